@@ -1,0 +1,100 @@
+/*
+  hhtdae: the Hilber-Hughes-Taylor integrator for index-3 differential-algebraic equations of multibody dynamics,
+  as the PETSc time stepper TSHHT3 ("hhtdae").
+
+  The application describes M(q) q'' + Phi_q^T lambda = Q, Phi(q,t) = 0 through PETSc's second-order interface,
+  F(t,U,U',U'') = 0 with TSSetI2Function() and TSSetI2Jacobian(); U holds generalized coordinates q, first-order states,
+  multipliers lambda, user-defined variables V and force states F in any order. Row i of F is the equation that belongs
+  to unknown i: the equation of motion of a coordinate, the constraint of a multiplier, the definition of a variable.
+
+  This is the only header an application needs. Every function is documented, with units and options, where it is defined.
+*/
+#ifndef HHTDAE_H
+#define HHTDAE_H
+
+#include <petscts.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+#define TSHHT3 "hhtdae"
+
+/* METIS nested dissection as a PETSc ordering, -pc_factor_mat_ordering_type metisnd */
+#define MATORDERINGMETISND "metisnd"
+
+/* How the inertia forces are averaged over a step */
+typedef enum {
+  TSHHT3_FORM_PAPER,       /* Negrut et al. (9a): inertia at t_{n+1} over (1+alpha); first order where M varies and alpha != 0 */
+  TSHHT3_FORM_SECOND_ORDER /* Arnold and Bruels: equations of motion exact at t_{n+1}; second order always */
+} TSHHT3Form;
+PETSC_EXTERN const char *const TSHHT3Forms[];
+
+/* What an unknown is, and with it its row of the residual */
+typedef enum {
+  TSHHT3_COORDINATE,   /* generalized coordinate q; its row is an equation of motion, affine in q'' */
+  TSHHT3_STATE,        /* first-order state; its row has U' and no U'' of its own */
+  TSHHT3_HOLONOMIC,    /* multiplier of a holonomic constraint Phi(q,t) = 0 */
+  TSHHT3_NONHOLONOMIC, /* multiplier of a velocity-level constraint Psi(q,q',t) = 0 */
+  TSHHT3_VARIABLE,     /* user-defined variable V, row V - v(...) = 0 */
+  TSHHT3_FORCE,        /* force state F, row F - f(...) = 0 */
+  TSHHT3_NUM_ROLES
+} TSHHT3Role;
+PETSC_EXTERN const char *const TSHHT3Roles[];
+
+/* What to do about initial values that violate the constraints */
+typedef enum {
+  TSHHT3_START_OFF,    /* take them as they are */
+  TSHHT3_START_REPORT, /* measure the misfit and report it where it matters (the default) */
+  TSHHT3_START_PROJECT /* move q_0 and q'_0 to the nearest consistent values in the metric of the mass matrix */
+} TSHHT3Start;
+PETSC_EXTERN const char *const TSHHT3Starts[];
+
+/* Cumulative counters of a run, in the order of the summary line */
+typedef struct {
+  PetscInt  steps;           /* accepted steps */
+  PetscInt  rejected;        /* steps rejected by the error test */
+  PetscInt  newton;          /* corrector iterations */
+  PetscInt  residuals;       /* evaluations of the application's residual */
+  PetscInt  jacobians;       /* evaluations of the application's Jacobian */
+  PetscInt  factorizations;  /* set-ups of the preconditioner with a new matrix */
+  PetscInt  solves;          /* linear solves */
+  PetscReal time;            /* wall-clock seconds from the first step of TSSolve() to its end */
+  PetscReal cpu;             /* CPU seconds of this process over the same span */
+  PetscInt  corrector_fails; /* corrections that did not converge */
+  PetscInt  retries;         /* of these, repeated at the same h with a new matrix */
+  PetscInt  restarts;        /* consistent starts: the first one, events, TSRestartStep() */
+  PetscInt  tiny_steps;      /* steps shorter than rounding in q allows the corrector, advanced by Taylor series */
+  PetscReal h_min, h_max;    /* smallest and largest accepted step */
+} TSHHT3Statistics;
+
+/* Registers TSHHT3 and the ordering "metisnd" with PETSc; PETSc calls it itself when the library is loaded as a plugin */
+PETSC_EXTERN PetscErrorCode TSHHT3Initialize(void);
+
+/* The method */
+PETSC_EXTERN PetscErrorCode TSHHT3SetForm(TS, TSHHT3Form);
+PETSC_EXTERN PetscErrorCode TSHHT3GetForm(TS, TSHHT3Form *);
+PETSC_EXTERN PetscErrorCode TSHHT3SetAlpha(TS, PetscReal);
+PETSC_EXTERN PetscErrorCode TSHHT3GetAlpha(TS, PetscReal *);
+PETSC_EXTERN PetscErrorCode TSHHT3SetRadius(TS, PetscReal);
+PETSC_EXTERN PetscErrorCode TSHHT3SetCorrectorTolerance(TS, PetscReal);
+PETSC_EXTERN PetscErrorCode TSHHT3SetPredictorDegree(TS, PetscInt);
+PETSC_EXTERN PetscErrorCode TSHHT3SetReuse(TS, PetscReal, PetscReal, PetscReal);
+
+/* The problem */
+PETSC_EXTERN PetscErrorCode TSHHT3SetIS(TS, TSHHT3Role, IS);
+PETSC_EXTERN PetscErrorCode TSHHT3GetIS(TS, TSHHT3Role, IS *);
+PETSC_EXTERN PetscErrorCode TSHHT3SetStart(TS, TSHHT3Start);
+
+/* The results */
+PETSC_EXTERN PetscErrorCode TSHHT3GetAcceleration(TS, Vec *);
+PETSC_EXTERN PetscErrorCode TSHHT3Interpolate(TS, PetscReal, Vec, Vec, Vec);
+PETSC_EXTERN PetscErrorCode TSHHT3GetStatistics(TS, TSHHT3Statistics *);
+PETSC_EXTERN PetscErrorCode TSHHT3CheckpointSave(TS, const char[]);
+PETSC_EXTERN PetscErrorCode TSHHT3CheckpointLoad(TS, const char[]);
+
+#if defined(__cplusplus)
+}
+#endif
+
+#endif
