@@ -1,0 +1,41 @@
+# PETSc and MPI: targets PkgConfig::PETSC, MPI::MPI_C, MPI::MPI_CXX.
+# PETSC_DIR and PETSC_ARCH, as cache or environment variables, name a PETSc of one's own.
+foreach(name PETSC_DIR PETSC_ARCH)
+  if(NOT DEFINED ${name} AND DEFINED ENV{${name}})
+    set(${name} $ENV{${name}})
+  endif()
+endforeach()
+
+if(PETSC_DIR)
+  # An in-place build keeps its files in PETSC_ARCH, an installed PETSc has none.
+  set(ENV{PKG_CONFIG_PATH}
+      "${PETSC_DIR}/${PETSC_ARCH}/lib/pkgconfig:${PETSC_DIR}/lib/pkgconfig:$ENV{PKG_CONFIG_PATH}")
+  # A PETSc that built its own MPI needs that one and no other.
+  foreach(language C CXX)
+    string(REPLACE "CXX" "cxx" wrapper "mpi${language}")
+    string(REPLACE "mpiC" "mpicc" wrapper "${wrapper}")
+    if(NOT MPI_${language}_COMPILER AND EXISTS "${PETSC_DIR}/${PETSC_ARCH}/bin/${wrapper}")
+      set(MPI_${language}_COMPILER "${PETSC_DIR}/${PETSC_ARCH}/bin/${wrapper}")
+    endif()
+  endforeach()
+endif()
+
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(PETSC REQUIRED IMPORTED_TARGET PETSc>=3.18)
+pkg_get_variable(PETSC_PCFILEDIR PETSc pcfiledir)
+find_package(MPI REQUIRED COMPONENTS C CXX)
+string(REGEX MATCH "^[0-9]+\\.[0-9]+" PETSC_MINOR_VERSION "${PETSC_VERSION}")
+message(STATUS "PETSc ${PETSC_VERSION} from ${PETSC_PCFILEDIR}")
+
+set(CMAKE_REQUIRED_LIBRARIES PkgConfig::PETSC MPI::MPI_C)
+include(CheckCSourceCompiles)
+check_c_source_compiles("#include <petscsys.h>
+#if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
+#error
+#endif
+int main(void) { return 0; }" HHTDAE_PETSC_IS_REAL_DOUBLE)
+unset(CMAKE_REQUIRED_LIBRARIES)
+if(NOT HHTDAE_PETSC_IS_REAL_DOUBLE)
+  message(FATAL_ERROR "hhtdae needs a PETSc with real double scalars and its MPI; PETSc ${PETSC_VERSION} in "
+                      "${PETSC_PCFILEDIR} is not one (or does not compile): set PETSC_DIR and PETSC_ARCH to one that is")
+endif()

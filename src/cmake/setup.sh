@@ -1,0 +1,55 @@
+#!/bin/sh
+# setup.sh PACKAGE... [--optional PACKAGE...]: installs the Debian packages that are missing.
+# Silent and fast when there are none; touches no package lists then. Optional packages may be unknown to the system.
+set -eu
+
+command -v dpkg-query >/dev/null || exit 0 # not Debian: the configuration says what it misses
+
+missing() {
+  for package; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || printf ' %s' "$package"
+  done
+}
+
+required='' optional='' kind=required
+for package; do
+  case $package in
+    --optional) kind=optional ;;
+    *) eval "$kind=\"\$$kind $package\"" ;;
+  esac
+done
+# shellcheck disable=SC2086
+required=$(missing $required)
+# shellcheck disable=SC2086
+optional=$(missing $optional)
+[ -n "$required$optional" ] || exit 0
+
+if [ "$(id -u)" = 0 ]; then
+  root=''
+elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
+  root=sudo
+elif [ -n "$required" ]; then
+  echo "sudo apt-get update && sudo apt-get install -y --no-install-recommends$required$optional"
+  exit 1
+else
+  exit 0
+fi
+
+apt() { $root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+echo "setup: package lists"
+# A third party's broken list must not stop us: what counts is whether the packages can be installed.
+apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
+for package in $optional; do
+  if apt-cache show "$package" >/dev/null 2>&1; then
+    required="$required $package"
+  else
+    echo "setup: $package is not to be had here, the tests that need it will be skipped"
+  fi
+done
+[ -n "$required" ] || exit 0
+echo "setup: installing$required"
+# shellcheck disable=SC2086
+apt install -y --no-install-recommends $required >"$log" 2>&1 || { cat "$log"; exit 1; }

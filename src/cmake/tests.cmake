@@ -1,0 +1,89 @@
+# Everything that ctest runs. Four GoogleTest programs, then scripts which use the library from the outside.
+find_package(GTest)
+if(NOT GTest_FOUND)
+  message(STATUS "GoogleTest not found: only the integration tests are built (Debian: libgtest-dev)")
+endif()
+
+# One thread per process, and Open MPI as root and with more ranks than cores
+set(test_environment OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1
+                     OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+                     OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_btl_base_warn_component_unused=0)
+if(HHTDAE_SANITIZE)
+  # Open MPI is compiled without frame pointers; its leaks can be told from ours by whole stacks only.
+  list(APPEND test_environment UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=fast_unwind_on_malloc=0)
+endif()
+
+# hhtdae_test_program(folder): <folder>_tests from tests/<folder>/*.cpp; sets <folder>_found
+function(hhtdae_test_program folder)
+  file(GLOB sources CONFIGURE_DEPENDS tests/${folder}/*.cpp)
+  file(GLOB common CONFIGURE_DEPENDS tests/*.cpp)
+  set(${folder}_found FALSE PARENT_SCOPE)
+  if(sources AND GTest_FOUND)
+    hhtdae_program(${folder}_tests ${sources} ${common})
+    target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
+    target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
+    set(${folder}_found TRUE PARENT_SCOPE)
+  endif()
+endfunction()
+
+include(GoogleTest)
+foreach(folder unit verification stability)
+  hhtdae_test_program(${folder})
+  if(${folder}_found)
+    gtest_discover_tests(${folder}_tests TEST_PREFIX ${folder}. TEST_LIST ${folder}_list DISCOVERY_TIMEOUT 60
+                         PROPERTIES TIMEOUT 600 LABELS ${folder})
+    # gtest_discover_tests takes lists among the properties apart, so the environment is set when ctest reads the tests.
+    file(WRITE ${PROJECT_BINARY_DIR}/${folder}_environment.cmake
+         "set_tests_properties(\${${folder}_list} PROPERTIES ENVIRONMENT \"${test_environment}\")\n")
+    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${PROJECT_BINARY_DIR}/${folder}_environment.cmake)
+  endif()
+endforeach()
+
+hhtdae_test_program(parallel)
+if(parallel_found)
+  foreach(ranks 1 2 3)
+    add_test(NAME parallel.${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks}
+                                            $<TARGET_FILE:parallel_tests>)
+    set_tests_properties(parallel.${ranks} PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 600 LABELS parallel
+                                                      PROCESSORS ${ranks})
+  endforeach()
+endif()
+
+# The integration tests start other programs, which a library with a sanitizer inside would need to be preloaded into.
+if(HHTDAE_SANITIZE)
+  return()
+endif()
+
+# petsc4py belongs to the system's python, which need not be the first in PATH.
+find_program(HHTDAE_PYTHON NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH)
+find_program(HHTDAE_PYTHON NAMES python3)
+if(NOT HHTDAE_PYTHON)
+  message(STATUS "python3 not found: the integration tests are left out")
+  return()
+endif()
+
+# hhtdae_script(name arguments...): ctest's test integration.<name> runs tests/integration/<name>.py; exit 77 skips
+function(hhtdae_script name)
+  add_test(NAME integration.${name}
+           COMMAND ${HHTDAE_PYTHON} -B ${PROJECT_SOURCE_DIR}/tests/integration/${name}.py ${ARGN})
+  set_tests_properties(integration.${name} PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 600
+                                                      LABELS integration SKIP_RETURN_CODE 77)
+endfunction()
+
+# PETSc's own tutorials, compiled as they are and not linked with us
+file(GLOB tutorial_dirs /usr/share/petsc/*/share/petsc/examples/src/ts/tutorials)
+foreach(name ex43 ex44)
+  find_file(HHTDAE_TUTORIAL_${name} ${name}.c NO_DEFAULT_PATH
+            PATHS ${PETSC_DIR}/src/ts/tutorials ${PETSC_DIR}/share/petsc/examples/src/ts/tutorials ${tutorial_dirs})
+  set(program missing)
+  if(HHTDAE_TUTORIAL_${name})
+    add_executable(${name} ${HHTDAE_TUTORIAL_${name}})
+    target_link_libraries(${name} PRIVATE PkgConfig::PETSC MPI::MPI_C m)
+    target_compile_options(${name} PRIVATE -w)
+    set(program $<TARGET_FILE:${name}>)
+  endif()
+  hhtdae_script(plugin_${name} $<TARGET_FILE:hhtdae> ${program})
+endforeach()
+set_tests_properties(integration.plugin_ex44 PROPERTIES PROCESSORS 2)
+hhtdae_script(python_pendulum $<TARGET_FILE:hhtdae>)
+hhtdae_script(install ${PROJECT_BINARY_DIR} ${CMAKE_COMMAND} $<CONFIG> ${PETSC_PCFILEDIR})

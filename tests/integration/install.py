@@ -1,0 +1,50 @@
+"""Installs into an empty prefix, then builds and runs a small C program that knows nothing but that prefix.
+
+Once with CMake's find_package(hhtdae), once with pkg-config hhtdae.
+usage: install.py build-tree cmake configuration directory-of-PETSc.pc
+"""
+
+import os
+import re
+import shutil
+import sys
+import tempfile
+
+from common import check, run
+
+build, cmake, configuration, petsc_pc = sys.argv[1:5]
+here = os.path.dirname(os.path.abspath(__file__))
+mpi_compiler_hint = [arg for arg in sys.argv[5:] if arg]
+
+
+def works(program, **environment):
+    """The program prints the exact solution's error and the type"""
+    out = run([program], **environment)
+    print(out.strip())
+    check("type hhtdae" in out, "the type is not the installed one: " + out)
+    error = float(re.search(r"error (\S+)", out).group(1))
+    check(error < 1e-4, "the pendulum is off by %g" % error)
+
+
+with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
+    prefix = os.path.join(work, "prefix")
+    run([cmake, "--install", build, "--prefix", prefix, "--config", configuration])
+    header = os.path.join(prefix, "include", "hhtdae", "hhtdae.h")
+    check(os.path.exists(header), "no header at " + header)
+    libdirs = [folder for folder, _, files in os.walk(prefix) if "libhhtdae.so" in files]
+    check(len(libdirs) == 1, "libhhtdae.so is in %s" % libdirs)
+    installed = [name for _, _, files in os.walk(prefix) for name in files]
+    check(all("hhtdae" in name for name in installed), "foreign files were installed: %s" % installed)
+
+    # The outside project is copied, so that nothing can be found by a relative path.
+    outside = shutil.copytree(os.path.join(here, "outside"), os.path.join(work, "outside"))
+    with_cmake = os.path.join(work, "with-cmake")
+    run([cmake, "-S", outside, "-B", with_cmake, "-DCMAKE_PREFIX_PATH=" + prefix, *mpi_compiler_hint])
+    run([cmake, "--build", with_cmake])
+    works(os.path.join(with_cmake, "outside"))
+
+    paths = os.pathsep.join([os.path.join(libdirs[0], "pkgconfig"), petsc_pc, os.environ.get("PKG_CONFIG_PATH", "")])
+    flags = run(["pkg-config", "--cflags", "--libs", "hhtdae"], PKG_CONFIG_PATH=paths).split()
+    with_pkg_config = os.path.join(work, "with-pkg-config")
+    run([os.environ.get("CC", "cc"), os.path.join(outside, "outside.c"), "-o", with_pkg_config, *flags, "-lm"])
+    works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
