@@ -9,6 +9,7 @@
 #include "problems/chain.h"
 #include "problems/doublependulum.h"
 #include "problems/fourbar.h"
+#include "problems/heavytop.h"
 #include "problems/oscillators.h"
 #include "problems/pendulum.h"
 #include "problems/rolling.h"
@@ -378,8 +379,40 @@ INSTANTIATE_TEST_SUITE_P(
                     make<Oscillators>("OscillatorsCoupled", Array{0., 1., 10., 3.}, Array{0., .2, 1., 1.5}, true),
                     make<Chain>("Chain", (PetscInt)7), make<Chain>("ChainAtAnAngle", (PetscInt)1, -30.),
                     make<DoublePendulum>("DoublePendulum"), make<SpringPendulum>("SpringPendulum", 1e4),
-                    make<SliderCrank>("SliderCrank")),
+                    make<SliderCrank>("SliderCrank"), make<HeavyTop>("HeavyTop")),
     [](const testing::TestParamInfo<Factory> &info) { return std::string(info.param.name); });
+
+/* The report measures differences against the reference in the scales it documents */
+TEST(ProblemReport, ErrorsAreRelativeToTheReference)
+{
+  FourBar       p(2, 1.);
+  ProblemErrors errors;
+  TS            ts;
+  Vec           U, V;
+  State         r(p.n);
+  double        lambdaMax = 0.;
+  ASSERT_EQ(ProblemCreateTS(PETSC_COMM_WORLD, p, &ts, &U, &V), 0);
+  ASSERT_EQ(TSSetTime(ts, 0.8), 0);
+  ASSERT_TRUE(p.reference(0.8, r.u.data(), r.v.data(), r.a.data()));
+  for (PetscInt i = p.pins(); i < p.n; i++) lambdaMax = std::max(lambdaMax, std::abs(r.u[i]));
+  for (PetscInt i = 0; i < p.n; i++) {
+    if (p.role[i] == TSHHT3_HOLONOMIC) r.v[i] = 0.;
+    ASSERT_EQ(VecSetValue(U, i, r.u[i] + (i == 2 ? 1e-3 : i == p.pins() ? 1e-2 : 0.), INSERT_VALUES), 0);
+    ASSERT_EQ(VecSetValue(V, i, r.v[i] + (i == 4 ? 1e-5 : 0.), INSERT_VALUES), 0);
+  }
+  for (Vec x : {U, V}) {
+    ASSERT_EQ(VecAssemblyBegin(x), 0);
+    ASSERT_EQ(VecAssemblyEnd(x), 0);
+  }
+  ASSERT_EQ(ProblemComputeErrors(ts, p, U, V, &errors), 0);
+  EXPECT_NEAR(errors.q, 1e-3 / std::max(1., std::abs(r.u[2])), 1e-12);
+  EXPECT_NEAR(errors.v, 1e-5 / std::max(1., std::abs(r.v[4])), 1e-12);
+  EXPECT_NEAR(errors.lambda, 1e-2 / lambdaMax, 1e-12);
+  EXPECT_LT(errors.other, 0.); /* nothing of that kind */
+  ASSERT_EQ(VecDestroy(&U), 0);
+  ASSERT_EQ(VecDestroy(&V), 0);
+  ASSERT_EQ(TSDestroy(&ts), 0);
+}
 
 /* Published or independently computed digits */
 
@@ -437,6 +470,20 @@ TEST(ProblemDigits, SpringPendulum)
     EXPECT_NEAR(s.u[0], e[1], 2e-11);
     EXPECT_NEAR(s.u[1], e[2], 2e-11);
     EXPECT_NEAR(s.v[0], e[3], 1e-9);
+  }
+}
+
+TEST(ProblemDigits, HeavyTop)
+{
+  HeavyTop     p(2.);
+  State        s(p.n);
+  const double expected[][7] = {
+      {.5, -.70246829705663, -.02116518470181, -.71140025765169, 523.2812435144, 404.2061783201, 357.3361764531},
+      {2., -.15041682274585, -.72416559163698, -.67302226956031, -260.735211311, 613.612698983, 309.716631391}};
+  for (const auto &e : expected) {
+    ASSERT_TRUE(p.reference(e[0], s.u.data(), s.v.data(), s.a.data()));
+    for (int i = 0; i < 3; i++) EXPECT_NEAR(s.u[i], e[1 + i], 1e-10);
+    for (int i = 0; i < 3; i++) EXPECT_NEAR(-s.u[7 + i], e[4 + i], 1e-7); /* force of the pivot on the top */
   }
 }
 
