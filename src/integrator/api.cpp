@@ -1,0 +1,522 @@
+/* Setters and getters. As in every PETSc type that may be loaded as a plugin, each one reaches its type through the object's
+   function list, so that it does nothing when the TS is of another type. */
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+PetscErrorCode NotAfterSetUp(TS ts, const char *what)
+{
+  PetscFunctionBegin;
+  PetscCheck(!ts->setupcalled, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "%s must be set before TSSetUp() or TSSolve(); TSReset() allows it again", what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetForm(TS ts, TSHHT3Form form)
+{
+  PetscFunctionBegin;
+  PetscCheck(form == TSHHT3_FORM_PAPER || form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Unknown form %d", (int)form);
+  if (form != Get(ts).form) PetscCall(NotAfterSetUp(ts, "The form of the method"));
+  Get(ts).form = form;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetForm(TS ts, TSHHT3Form *form)
+{
+  PetscFunctionBegin;
+  *form = Get(ts).form;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetAlpha(TS ts, PetscReal alpha)
+{
+  PetscFunctionBegin;
+  PetscCheck(alpha >= (PetscReal)-1 / 3 - 1e-12 && alpha <= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "alpha = %g is not in [-1/3, 0]", (double)alpha);
+  PetscCall(NotAfterSetUp(ts, "alpha"));
+  Get(ts).alpha  = alpha;
+  Get(ts).radius = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetAlpha(TS ts, PetscReal *alpha)
+{
+  PetscFunctionBegin;
+  *alpha = Get(ts).radius < 0 ? Get(ts).alpha : -Get(ts).p.af;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetRadius(TS ts, PetscReal rho)
+{
+  PetscFunctionBegin;
+  PetscCheck(rho >= 0 && rho <= 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Spectral radius %g is not in [0, 1]", (double)rho);
+  PetscCall(NotAfterSetUp(ts, "The spectral radius"));
+  Get(ts).radius = rho;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetCorrectorTolerance(TS ts, PetscReal c)
+{
+  PetscFunctionBegin;
+  PetscCheck(c > 0 && c < 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Corrector tolerance %g is not in (0, 1)", (double)c);
+  Get(ts).corrector.c = c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
+{
+  Predictor &p = Get(ts).predictor;
+
+  PetscFunctionBegin;
+  PetscCheck(degree >= -1 && degree <= max_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, max_degree);
+  PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
+  p.fixed      = (PetscBool)(degree >= 0);
+  p.degree_max = degree >= 0 ? degree : max_degree;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal hold)
+{
+  Corrector &c = Get(ts).corrector;
+
+  PetscFunctionBegin;
+  PetscCheck(ratio >= 1 && rate >= 0 && hold >= 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "Reuse of the matrix: ratio %g and hold %g must be at least 1, rate %g at least 0", (double)ratio, (double)hold, (double)rate);
+  c.ratio     = ratio;
+  c.slow_rate = rate;
+  c.hold      = hold;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetIS(TS ts, TSHHT3Role role, IS is)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCheck(role >= 0 && role < TSHHT3_NUM_ROLES, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Unknown role %d", (int)role);
+  PetscCall(NotAfterSetUp(ts, "The roles of unknowns"));
+  PetscCall(PetscObjectReference((PetscObject)is));
+  PetscCall(ISDestroy(&I.is[role]));
+  I.is[role] = is;
+  I.is_set   = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetIS(TS ts, TSHHT3Role role, IS *is)
+{
+  PetscFunctionBegin;
+  PetscCheck(role >= 0 && role < TSHHT3_NUM_ROLES, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Unknown role %d", (int)role);
+  *is = Get(ts).is[role];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetStart(TS ts, TSHHT3Start start)
+{
+  PetscFunctionBegin;
+  PetscCheck(start >= TSHHT3_START_OFF && start <= TSHHT3_START_PROJECT, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Unknown start %d", (int)start);
+  Get(ts).start_policy = start;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetAcceleration(TS ts, Vec *A)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCheck(I.have_step || I.stat.restarts, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There are no accelerations before the first step");
+  *A = I.have_step ? I.A1 : I.A0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetStatistics(TS ts, TSHHT3Statistics *s)
+{
+  PetscFunctionBegin;
+  *s = Get(ts).stat;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode ComposeSetters(TS ts, bool attach)
+{
+  PetscFunctionBegin;
+#define HHT3_COMPOSE(name) PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3" #name "_C", attach ? name : NULL))
+  HHT3_COMPOSE(SetForm);
+  HHT3_COMPOSE(GetForm);
+  HHT3_COMPOSE(SetAlpha);
+  HHT3_COMPOSE(GetAlpha);
+  HHT3_COMPOSE(SetRadius);
+  HHT3_COMPOSE(SetCorrectorTolerance);
+  HHT3_COMPOSE(SetPredictorDegree);
+  HHT3_COMPOSE(SetReuse);
+  HHT3_COMPOSE(SetIS);
+  HHT3_COMPOSE(GetIS);
+  HHT3_COMPOSE(SetStart);
+  HHT3_COMPOSE(GetAcceleration);
+  HHT3_COMPOSE(GetStatistics);
+  HHT3_COMPOSE(Interpolate);
+  HHT3_COMPOSE(CheckpointSave);
+  HHT3_COMPOSE(CheckpointLoad);
+#undef HHT3_COMPOSE
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@
+  TSHHT3SetForm - Chooses how `TSHHT3` averages inertia forces over a step
+
+  Logically Collective
+
+  Input Parameters:
++ ts   - the `TS` context
+- form - `TSHHT3_FORM_SECOND_ORDER` or `TSHHT3_FORM_PAPER`
+
+  Options Database Key:
+. -ts_hhtdae_form <paper,second_order> - the form
+
+  Level: intermediate
+
+  Notes:
+  The paper's form (9a) divides M q'' at t_{n+1} by 1+alpha and averages all other forces between both ends of the step. Where
+  M depends on q and alpha is not 0 it is of first order. The second-order form satisfies the equations of motion at t_{n+1}
+  and averages an algorithmic acceleration. For constant M both are the same method.
+
+.seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetRadius()`
+@*/
+PetscErrorCode TSHHT3SetForm(TS ts, TSHHT3Form form)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscTryMethod(ts, "TSHHT3SetForm_C", (TS, TSHHT3Form), (ts, form));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3GetForm - The form set by `TSHHT3SetForm()`
+
+  Not Collective
+
+  Input Parameter:
+. ts - the `TS` context
+
+  Output Parameter:
+. form - the form
+
+  Level: intermediate
+
+.seealso: `TSHHT3`, `TSHHT3SetForm()`
+@*/
+PetscErrorCode TSHHT3GetForm(TS ts, TSHHT3Form *form)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(form, 2);
+  PetscUseMethod(ts, "TSHHT3GetForm_C", (TS, TSHHT3Form *), (ts, form));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetAlpha - Sets the numerical damping of `TSHHT3`
+
+  Logically Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+- alpha - in [-1/3, 0], default -0.3; gamma = (1 - 2 alpha)/2 and beta = (1 - alpha)^2/4, (5) of the paper
+
+  Options Database Key:
+. -ts_hhtdae_alpha <alpha> - the parameter
+
+  Level: beginner
+
+  Notes:
+  alpha = 0 is the trapezoidal rule, without damping and weakly unstable on constrained systems; the smaller alpha, the more
+  are high frequencies damped: the spectral radius at infinity is (1+alpha)/(1-alpha). An error is raised outside the range.
+
+.seealso: `TSHHT3`, `TSHHT3GetAlpha()`, `TSHHT3SetRadius()`
+@*/
+PetscErrorCode TSHHT3SetAlpha(TS ts, PetscReal alpha)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveReal(ts, alpha, 2);
+  PetscTryMethod(ts, "TSHHT3SetAlpha_C", (TS, PetscReal), (ts, alpha));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3GetAlpha - The parameter set by `TSHHT3SetAlpha()`
+
+  Not Collective
+
+  Input Parameter:
+. ts - the `TS` context
+
+  Output Parameter:
+. alpha - the parameter; -alpha_f if a spectral radius was set
+
+  Level: intermediate
+
+.seealso: `TSHHT3`, `TSHHT3SetAlpha()`
+@*/
+PetscErrorCode TSHHT3GetAlpha(TS ts, PetscReal *alpha)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(alpha, 2);
+  PetscUseMethod(ts, "TSHHT3GetAlpha_C", (TS, PetscReal *), (ts, alpha));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetRadius - Sets the spectral radius at infinite frequency, with the parameters of Chung and Hulbert (1993)
+
+  Logically Collective
+
+  Input Parameters:
++ ts  - the `TS` context
+- rho - in [0, 1]; 0 annihilates the highest frequencies in a step, 1 damps nothing
+
+  Options Database Key:
+. -ts_hhtdae_radius <rho> - the radius
+
+  Level: intermediate
+
+  Note:
+  alpha_m = (2 rho - 1)/(rho + 1), alpha_f = rho/(rho + 1). Belongs to the second-order form; replaces alpha.
+
+.seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetForm()`
+@*/
+PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveReal(ts, rho, 2);
+  PetscTryMethod(ts, "TSHHT3SetRadius_C", (TS, PetscReal), (ts, rho));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetCorrectorTolerance - Sets where the Newton iteration of a step stops
+
+  Logically Collective
+
+  Input Parameters:
++ ts - the `TS` context
+- c  - error left by the iteration in units of the tolerance of a step, in (0, 1), default 0.001; (41b) of the paper
+
+  Options Database Key:
+. -ts_hhtdae_corrector_tolerance <c> - the tolerance
+
+  Level: advanced
+
+.seealso: `TSHHT3`, `TSSetTolerances()`
+@*/
+PetscErrorCode TSHHT3SetCorrectorTolerance(TS ts, PetscReal c)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveReal(ts, c, 2);
+  PetscTryMethod(ts, "TSHHT3SetCorrectorTolerance_C", (TS, PetscReal), (ts, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetPredictorDegree - Sets the degree of the polynomial that predicts the unknowns of a step
+
+  Logically Collective
+
+  Input Parameters:
++ ts     - the `TS` context
+- degree - 0 to 3, or -1 (default) to choose it in each step by which degree would have served best in the last one
+
+  Options Database Key:
+. -ts_hhtdae_predictor_degree <degree> - the degree
+
+  Level: advanced
+
+.seealso: `TSHHT3`
+@*/
+PetscErrorCode TSHHT3SetPredictorDegree(TS ts, PetscInt degree)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveInt(ts, degree, 2);
+  PetscTryMethod(ts, "TSHHT3SetPredictorDegree_C", (TS, PetscInt), (ts, degree));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetReuse - Sets when the Newton matrix is made anew
+
+  Logically Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+. ratio - factor by which h may differ from the h of the matrix, at least 1
+. rate  - rate of convergence beyond which the next step gets a new matrix; 0 renews it in every step
+- hold  - growth of h that is not taken, so that the factorization lives on, at least 1
+
+  Options Database Key:
+. -ts_hhtdae_reuse <ratio,rate,hold> - the three numbers
+
+  Level: advanced
+
+  Note:
+  A correction that fails with an old matrix is repeated once with a new one before h is cut. -snes_lag_jacobian, if given,
+  replaces all this.
+
+.seealso: `TSHHT3`, `SNESSetLagJacobian()`
+@*/
+PetscErrorCode TSHHT3SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal hold)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveReal(ts, ratio, 2);
+  PetscValidLogicalCollectiveReal(ts, rate, 3);
+  PetscValidLogicalCollectiveReal(ts, hold, 4);
+  PetscTryMethod(ts, "TSHHT3SetReuse_C", (TS, PetscReal, PetscReal, PetscReal), (ts, ratio, rate, hold));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetIS - Says which unknowns have a role
+
+  Collective
+
+  Input Parameters:
++ ts   - the `TS` context
+. role - the role, see `TSHHT3Role`
+- is   - global indices of the unknowns in U that have it, each on the rank that owns it
+
+  Level: intermediate
+
+  Notes:
+  Row i of the residual is the equation of unknown i. Unknowns that no index set names are coordinates. If no index set is
+  given at all the roles are detected from dF/dU, dF/dU' and dF/dU'' at the start. Overlapping sets and indices that the rank
+  does not own are errors, raised in `TSSetUp()`.
+
+.seealso: `TSHHT3`, `TSHHT3GetIS()`
+@*/
+PetscErrorCode TSHHT3SetIS(TS ts, TSHHT3Role role, IS is)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidHeaderSpecific(is, IS_CLASSID, 3);
+  PetscCheckSameComm(ts, 1, is, 3);
+  PetscTryMethod(ts, "TSHHT3SetIS_C", (TS, TSHHT3Role, IS), (ts, role, is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3GetIS - The unknowns that have a role, as set or, after `TSSetUp()`, as detected
+
+  Not Collective
+
+  Input Parameters:
++ ts   - the `TS` context
+- role - the role
+
+  Output Parameter:
+. is - the indices; `NULL` if there are none. Owned by the `TS`
+
+  Level: intermediate
+
+.seealso: `TSHHT3`, `TSHHT3SetIS()`
+@*/
+PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(is, 3);
+  PetscUseMethod(ts, "TSHHT3GetIS_C", (TS, TSHHT3Role, IS *), (ts, role, is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetStart - Says what to do about initial positions and velocities that violate the constraints
+
+  Logically Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+- start - `TSHHT3_START_OFF`, `TSHHT3_START_REPORT` (default) or `TSHHT3_START_PROJECT`
+
+  Options Database Key:
+. -ts_hhtdae_start <off,report,project> - the choice
+
+  Level: intermediate
+
+  Note:
+  The misfit is the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance;
+  it is printed if it exceeds 1 and always shown by -info. Accelerations and multipliers are made consistent in any case.
+
+.seealso: `TSHHT3`
+@*/
+PetscErrorCode TSHHT3SetStart(TS ts, TSHHT3Start start)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscTryMethod(ts, "TSHHT3SetStart_C", (TS, TSHHT3Start), (ts, start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3GetAcceleration - The second time derivative of the coordinates at the present time
+
+  Not Collective
+
+  Input Parameter:
+. ts - the `TS` context
+
+  Output Parameter:
+. A - accelerations, zero for unknowns that are not coordinates; owned by the `TS`, not to be changed
+
+  Level: intermediate
+
+  Note:
+  Multipliers, variables, force states are in the solution, `TSGetSolution()`; derivatives of states in the second vector of
+  `TS2GetSolution()`. Valid from the first step on.
+
+.seealso: `TSHHT3`, `TSHHT3Interpolate()`, `TS2GetSolution()`
+@*/
+PetscErrorCode TSHHT3GetAcceleration(TS ts, Vec *A)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(A, 2);
+  PetscUseMethod(ts, "TSHHT3GetAcceleration_C", (TS, Vec *), (ts, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3Interpolate - Dense output within the last accepted step
+
+  Collective
+
+  Input Parameters:
++ ts - the `TS` context
+- t  - a time between the ends of the last step
+
+  Output Parameters:
++ U - coordinates, states (cubic Hermite), multipliers, variables and force states (linear), or `NULL`
+. V - velocities (cubic Hermite) and derivatives of states (linear), or `NULL`
+- A - accelerations (linear), or `NULL`
+
+  Level: intermediate
+
+  Note:
+  At both ends the values of the step itself are returned, to the last bit.
+
+.seealso: `TSHHT3`, `TSInterpolate()`, `TSHHT3GetAcceleration()`
+@*/
+PetscErrorCode TSHHT3Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscUseMethod(ts, "TSHHT3Interpolate_C", (TS, PetscReal, Vec, Vec, Vec), (ts, t, U, V, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

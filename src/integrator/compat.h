@@ -1,0 +1,67 @@
+/* The differences between PETSc 3.18 and later releases, in one place. */
+#ifndef HHTDAE_COMPAT_H
+#define HHTDAE_COMPAT_H
+
+#include <petsc/private/snesimpl.h>
+#include <petsc/private/tsimpl.h>
+
+#if PETSC_VERSION_LT(3, 19, 0)
+  #define PETSC_SUCCESS 0
+#endif
+
+#if PETSC_VERSION_LT(3, 20, 0)
+  #define PetscAssertPointer(p, arg) PetscValidPointer(p, arg)
+#endif
+
+#if PETSC_VERSION_LT(3, 21, 0)
+  #define SNESLineSearchShellSetApply SNESLineSearchShellSetUserFunc
+typedef TSI2Function HHT3I2Function;
+typedef TSI2Jacobian HHT3I2Jacobian;
+#else
+typedef TSI2FunctionFn *HHT3I2Function;
+typedef TSI2JacobianFn *HHT3I2Jacobian;
+#endif
+
+/* setfromoptions() takes the options object by pointer until 3.22, by value since */
+#if PETSC_VERSION_LT(3, 23, 0)
+typedef PetscOptionItems *HHT3OptionItems;
+#else
+typedef PetscOptionItems HHT3OptionItems;
+#endif
+
+#if PETSC_VERSION_LT(3, 22, 0)
+  #define HHT3_INT_MAX PETSC_MAX_INT
+#else
+  #define HHT3_INT_MAX PETSC_INT_MAX
+#endif
+
+/* MatFDColoringSetFunction() took a function of no particular type */
+#if PETSC_VERSION_LT(3, 24, 0)
+typedef PetscErrorCode (*HHT3ColoringFunction)(void);
+#else
+typedef MatFDColoringFn *HHT3ColoringFunction;
+#endif
+
+/* The next point that TSAdaptChoose() aims at with TS_EXACTFINALTIME_MATCHSTEP: of a time span, or the final time */
+static inline PetscReal HHT3NextStop(TS ts)
+{
+#if PETSC_VERSION_LT(3, 23, 0)
+  if (ts->tspan && ts->tspan->spanctr < ts->tspan->num_span_times) return ts->tspan->span_times[ts->tspan->spanctr];
+#else
+  if (ts->eval_times && ts->eval_times->time_point_idx < ts->eval_times->num_time_points)
+    return ts->eval_times->time_points[ts->eval_times->time_point_idx];
+#endif
+  return ts->max_time;
+}
+
+/* Whether TSEvent is bracketing a zero, and so sets the steps itself */
+static inline PetscBool HHT3EventActive(TS ts)
+{
+#if PETSC_VERSION_LT(3, 21, 0)
+  return (PetscBool)(ts->event && ts->event->status != TSEVENT_NONE);
+#else
+  return (PetscBool)(ts->event && ts->event->processing);
+#endif
+}
+
+#endif

@@ -1,0 +1,307 @@
+/*
+  The corrector: a modified Newton iteration in SNES, stopped by its measured rate of convergence, and the ladder by which
+  its matrix is reused.
+
+  Stopping, (40) and (41b): with xi the ratio of two successive corrections, the iteration ends as soon as the error left,
+  xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. The rate
+  of the last corrections with the same matrix answers already after the first iteration.
+
+  The ladder, from the cheapest rung:
+    reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
+    renew      before a correction otherwise; within a correction when it is slow and the matrix is not of this step
+    retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
+    fail       with a matrix of this very correction: TSAdapt cuts h
+  A step size that would grow by less than `hold` is kept, so that the factorization lives on (estimate.cpp).
+
+  All of it goes through SNESSetLagJacobian(): -2 is "once, now", -1 is "not again". A user's -snes_lag_jacobian, line search
+  or convergence test stands.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+const char *RoleName(const Integrator &I, PetscInt local)
+{
+  static const char *const names[] = {"the equation of motion of a coordinate", "the equation of a first-order state",
+                                      "a holonomic constraint", "a velocity-level constraint",
+                                      "the definition of a variable", "the definition of a force state"};
+  return names[RoleOf(I, local)];
+}
+
+/* The first row of the residual that is not a number, for the message */
+PetscErrorCode NameBadRow(TS ts, Vec F)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *f;
+  PetscInt           n, start, bad[2] = {HHT3_INT_MAX, 0}, first;
+  PetscMPIInt        rank;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(F, &start, NULL));
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(F, &f));
+  for (PetscInt i = n - 1; i >= 0; i--)
+    if (PetscIsInfOrNanScalar(f[i])) {
+      bad[0] = start + i;
+      bad[1] = RoleOf(I, i);
+    }
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCallMPI(MPI_Allreduce(&bad[0], &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)ts), &rank));
+  if (first < HHT3_INT_MAX) {
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
+                            "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s",
+                            (double)I.t1, first, bad[0] == first ? ", " : "", bad[0] == first ? RoleName(I, first - start) : ""));
+  } else {
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)I.t1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* In the start there is no tolerance: relative to the unknowns themselves */
+PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
+{
+  PetscReal x, d;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(dX, NORM_2, &d));
+  PetscCall(VecNorm(X, NORM_2, &x));
+  *e = x > 0 ? d / x : d;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void Diverge(Integrator &I, const char *why)
+{
+  Corrector &c = I.corrector;
+  c.reason     = SNES_DIVERGED_DTOL;
+  (void)PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
+                      why, (double)I.t1, (double)I.h, c.it, (double)c.e);
+}
+
+/* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
+PetscErrorCode Judge(TS ts, PetscReal e)
+{
+  Integrator     &I     = Get(ts);
+  Corrector      &c     = I.corrector;
+  const PetscReal old_e = c.e;
+  const PetscReal tol   = I.mode == Mode::Start ? 1e-13 : c.c;
+  const PetscInt  left  = c.max_it - c.it;
+
+  PetscFunctionBegin;
+  c.e = e;
+  if (PetscIsInfOrNanReal(e)) {
+    Diverge(I, "produced a correction that is not a number");
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (e <= c.floor) {
+    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
+    const bool known = c.rate >= 0 && CorrectorError(c.rate, e) <= tol;
+    if (known || e <= 0.1 * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    else if (left <= 0) Diverge(I, "needs too many iterations");
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  const PetscReal xi = e / old_e;
+  c.rate             = xi;
+  c.xi_max           = PetscMax(c.xi_max, xi);
+  if (CorrectorError(xi, e) <= tol) {
+    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  } else if (I.mode == Mode::Start && xi > 0.3) {
+    if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
+    else if (left <= 0 || xi > 2) Diverge(I, "finds no consistent accelerations");
+    else PetscCall(FreshMatrixNextIteration(ts));
+  } else if (xi >= 1) {
+    Diverge(I, "diverges");
+  } else if (left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
+    if (!c.fresh && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
+    else Diverge(I, "converges too slowly");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CountCorrection(TS ts, Vec X, Vec Y)
+{
+  Integrator &I = Get(ts);
+  PetscReal   e;
+
+  PetscFunctionBegin;
+  I.corrector.it++;
+  I.stat.newton++;
+  I.stat.solves++;
+  if (I.mode == Mode::Start) PetscCall(RelativeNorm(X, Y, &e));
+  else PetscCall(CorrectionNorm(ts, Y, &e));
+  PetscCall(Judge(ts, e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The full step, and no residual after the last one: (40) needs the correction alone. The judgement is handed to SNES by
+   ConvergenceTest(). */
+PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
+{
+  TS          ts = (TS)ctx;
+  Integrator &I  = Get(ts);
+  SNES        snes;
+  Vec         X, F, Y;
+  PetscReal   xnorm, fnorm, ynorm;
+  PetscInt    monitors;
+
+  PetscFunctionBegin;
+  PetscCall(SNESLineSearchGetSNES(ls, &snes));
+  PetscCall(SNESLineSearchGetVecs(ls, &X, &F, &Y, NULL, NULL));
+  PetscCall(SNESLineSearchGetNorms(ls, &xnorm, &fnorm, &ynorm));
+  PetscCall(SNESLineSearchSetReason(ls, SNES_LINESEARCH_SUCCEEDED));
+  PetscCall(VecAXPY(X, -1, Y));
+  PetscCall(CountCorrection(ts, X, Y));
+  monitors = snes->numbermonitors;
+  if (!I.corrector.reason || monitors) {
+    PetscCall(SNESComputeFunction(snes, X, F));
+    PetscCall(VecNorm(F, NORM_2, &fnorm));
+  }
+  PetscCall(SNESLineSearchSetNorms(ls, 1, fnorm, I.corrector.e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
+PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
+{
+  TS          ts = (TS)ctx;
+  Integrator &I  = Get(ts);
+  Vec         X, Y;
+
+  PetscFunctionBegin;
+  *reason = SNES_CONVERGED_ITERATING;
+  if (!it) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.corrector.it < it) {
+    PetscCall(SNESGetSolution(snes, &X));
+    PetscCall(SNESGetSolutionUpdate(snes, &Y));
+    PetscCall(CountCorrection(ts, X, Y));
+  }
+  *reason = I.corrector.reason;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SNES ended without our judgement: a residual or a linear solve that went wrong, or a user's own test */
+PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
+{
+  Integrator    &I = Get(ts);
+  KSP            ksp;
+  Vec            F;
+  PCFailedReason pcreason = PC_NOERROR;
+  PC             pc;
+
+  PetscFunctionBegin;
+  if (reason == SNES_DIVERGED_LINEAR_SOLVE) {
+    PetscCall(SNESGetKSP(ts->snes, &ksp));
+    PetscCall(KSPGetPC(ksp, &pc));
+    PetscCall(PCGetFailedReason(pc, &pcreason));
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g, h = %g: %s", (double)I.t1, (double)I.h,
+                            pcreason ? "the Newton matrix is singular" : "the Krylov method did not converge"));
+  } else if (reason != SNES_DIVERGED_DTOL) {
+    PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
+    PetscReal norm;
+    PetscCall(VecNorm(F, NORM_2, &norm));
+    if (PetscIsInfOrNanReal(norm)) PetscCall(NameBadRow(ts, F));
+    else PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "SNES stopped with %s at t = %g, h = %g", SNESConvergedReasons[reason], (double)I.t1, (double)I.h));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* A slow correction goes on with a matrix made at its present iterate */
+PetscErrorCode FreshMatrixNextIteration(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.rate, I.corrector.it));
+  PetscCall(SNESSetLagJacobian(ts->snes, -2));
+  I.corrector.base = I.corrector.it;
+  I.corrector.rate = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CorrectorSetUp(TS ts)
+{
+  Integrator    &I = Get(ts);
+  SNES           snes;
+  SNESLineSearch ls;
+  PetscInt       lag, maxit;
+  PetscReal      atol, rtol, stol;
+  PetscInt       maxf;
+
+  PetscFunctionBegin;
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(SNESGetLagJacobian(snes, &lag));
+  I.corrector.user_lag = (PetscBool)(lag != 1 && lag != -1 && lag != -2);
+  PetscCall(SNESGetTolerances(snes, &atol, &rtol, &stol, &maxit, &maxf));
+  if (maxit < I.corrector.max_it) I.corrector.max_it = maxit;
+  PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));
+  if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
+  PetscCall(SNESGetLineSearch(snes, &ls));
+  if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
+  PetscBool shell;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
+  if (shell) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
+PetscErrorCode Iterate(TS ts, PetscBool *ok)
+{
+  Integrator         &I = Get(ts);
+  Corrector          &c = I.corrector;
+  SNESConvergedReason reason;
+  PetscInt            its;
+
+  PetscFunctionBegin;
+  c.it = c.base = 0;
+  c.e = c.xi_max = 0;
+  c.reason       = SNES_CONVERGED_ITERATING;
+  c.fresh        = PETSC_FALSE;
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));
+  PetscCall(SNESSolve(ts->snes, NULL, I.X));
+  PetscCall(SNESGetConvergedReason(ts->snes, &reason));
+  PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
+  ts->ksp_its += its;
+  ts->snes_its += c.it;
+  *ok = (PetscBool)(reason > 0);
+  if (!*ok) PetscCall(ExplainSNES(ts, reason));
+  if (*ok) PetscCall(StageVectors(ts, I.X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
+PetscErrorCode Correct(TS ts, PetscBool *converged)
+{
+  Integrator     &I = Get(ts);
+  Corrector      &c = I.corrector;
+  const PetscReal q = c.h_matrix > 0 ? I.h / c.h_matrix : 0;
+
+  PetscFunctionBegin;
+  if (!c.have_matrix || q > c.ratio || q * c.ratio < 1) c.want_matrix = PETSC_TRUE;
+  if (c.have_matrix && c.want_matrix) PetscCall(PetscInfo(ts, "corrector: new matrix, h/h_matrix = %g, rate %g\n", (double)q, (double)c.rate));
+  PetscCall(Iterate(ts, converged));
+  if (!*converged && !c.fresh && !c.user_lag) {
+    PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
+    I.stat.retries++;
+    c.want_matrix = PETSC_TRUE;
+    PetscCall(Predict(ts, I.X));
+    PetscCall(Iterate(ts, converged));
+  }
+  c.want_matrix = (PetscBool)(!*converged || c.xi_max > c.slow_rate);
+  if (!*converged) {
+    I.stat.corrector_fails++;
+    PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,75 @@
+/*
+  Dense output within the last accepted step, section 7 of the method: cubic Hermite polynomials for q (from q, q'), for q'
+  (from q', q'') and for states (from s, s'); linear for q'', lambda, V and F. Both ends give back the step's own values.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* Basis of the cubic Hermite polynomial on [0, 1] at x, for values and for h times slopes */
+struct Hermite {
+  PetscReal y0, y1, d0, d1;
+  Hermite(PetscReal x, PetscReal h)
+  {
+    const PetscReal z = 1 - x;
+    y0                = z * z * (1 + 2 * x);
+    y1                = x * x * (1 + 2 * z);
+    d0                = h * x * z * z;
+    d1                = -h * x * x * z;
+  }
+  PetscScalar operator()(PetscScalar a, PetscScalar da, PetscScalar b, PetscScalar db) const
+  {
+    return y0 * a + d0 * da + y1 * b + d1 * db;
+  }
+};
+
+void At(const Integrator &I, PetscReal x, PetscReal h, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[],
+        PetscScalar *u, PetscScalar *v, PetscScalar *a)
+{
+  const Hermite   H(x, h);
+  const PetscReal z = 1 - x;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscScalar u0 = s0[0][i], v0 = s0[1][i], a0 = s0[2][i], u1 = s1[0][i], v1 = s1[1][i], a1 = s1[2][i];
+    const TSHHT3Role  r = RoleOf(I, i);
+    if (u) u[i] = IsDifferential(r) ? H(u0, v0, u1, v1) : z * u0 + x * u1;
+    if (v) v[i] = r == TSHHT3_COORDINATE ? H(v0, a0, v1, a1) : z * v0 + x * v1;
+    if (a) a[i] = z * a0 + x * a1;
+  }
+}
+
+} // namespace
+
+/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
+PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
+{
+  Integrator        &I = Get(ts);
+  Vec                out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0}, end[3] = {I.U1, I.V1, I.A1};
+  PetscScalar       *o[3]   = {};
+  const PetscScalar *s0[3], *s1[3];
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
+  PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);
+  const PetscReal x = t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1);
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecGetArrayRead(begin[k], &s0[k]));
+    PetscCall(VecGetArrayRead(end[k], &s1[k]));
+    if (out[k]) PetscCall(VecGetArrayWrite(out[k], &o[k]));
+  }
+  At(I, x, I.h, n, s0, s1, o[0], o[1], o[2]);
+  for (int k = 0; k < 3; k++) {
+    if (out[k]) PetscCall(VecRestoreArrayWrite(out[k], &o[k]));
+    PetscCall(VecRestoreArrayRead(end[k], &s1[k]));
+    PetscCall(VecRestoreArrayRead(begin[k], &s0[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,176 @@
+/*
+  A Jacobian from differences of the residual, for applications that give none: dF/dU, dF/dU' and dF/dU'' apart, each in its
+  own scale and by MatFDColoring, then combined with the shifts. The pattern is the DM's matrix or is found by moving one
+  unknown at a time, which takes as many evaluations as there are unknowns; both are said with -info.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+struct Differences {
+  MatFDColoring coloring = nullptr;
+  Mat           part     = nullptr; /* dF/dU' or dF/dU'' */
+  TS            ts       = nullptr;
+  /* where the residual is evaluated, and which of the three vectors varies */
+  PetscReal t = 0;
+  Vec       at[3] = {};
+  int       which = 0;
+};
+
+namespace
+{
+
+PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
+{
+  Differences *d = (Differences *)ctx;
+  Vec          v[3] = {d->at[0], d->at[1], d->at[2]};
+
+  PetscFunctionBegin;
+  v[d->which] = x;
+  PetscCall(EvaluateResidual(d->ts, d->t, v[0], v[1], v[2], F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
+PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
+{
+  Vec                x[3], F0, F;
+  PetscInt           N, n, start, end;
+  const PetscScalar *a, *b;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetSize(ts->vec_sol, &N));
+  PetscCall(VecGetLocalSize(ts->vec_sol, &n));
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  for (Vec &v : x) PetscCall(VecDuplicate(ts->vec_sol, &v));
+  PetscCall(VecDuplicate(ts->vec_sol, &F0));
+  PetscCall(VecDuplicate(ts->vec_sol, &F));
+  PetscCall(VecCopy(ts->vec_sol, x[0]));
+  PetscCall(VecCopy(ts->vec_dot, x[1]));
+  PetscCall(VecSet(x[2], 0.1));
+  for (PetscInt i = start; i < end; i++) { /* off the initial state, where entries may happen to vanish */
+    PetscCall(VecSetValue(x[0], i, 1e-4 * (1 + (i * 7919) % 13), ADD_VALUES));
+    PetscCall(VecSetValue(x[1], i, 1e-3 * (1 + (i * 104729) % 17), ADD_VALUES));
+  }
+  for (int k = 0; k < 2; k++) {
+    PetscCall(VecAssemblyBegin(x[k]));
+    PetscCall(VecAssemblyEnd(x[k]));
+  }
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+  rows.assign(n, {});
+  for (PetscInt j = 0; j < N; j++) {
+    for (int sign = 1; sign >= -1; sign -= 2) {
+      for (Vec v : x) {
+        if (j >= start && j < end) PetscCall(VecSetValue(v, j, sign * 1e-3, ADD_VALUES));
+        PetscCall(VecAssemblyBegin(v));
+        PetscCall(VecAssemblyEnd(v));
+      }
+      if (sign < 0) break;
+      PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
+      PetscCall(VecGetArrayRead(F0, &a));
+      PetscCall(VecGetArrayRead(F, &b));
+      for (PetscInt i = 0; i < n; i++)
+        if (a[i] != b[i] || start + i == j) rows[i].push_back(j);
+      PetscCall(VecRestoreArrayRead(F, &b));
+      PetscCall(VecRestoreArrayRead(F0, &a));
+    }
+  }
+  for (Vec &v : x) PetscCall(VecDestroy(&v));
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&F0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CreateMatrix(TS ts, Mat *P)
+{
+  std::vector<std::vector<PetscInt>> rows;
+  PetscInt                           n, N, start, end;
+
+  PetscFunctionBegin;
+  PetscCall(FindPattern(ts, rows));
+  PetscCall(VecGetSize(ts->vec_sol, &N));
+  PetscCall(VecGetLocalSize(ts->vec_sol, &n));
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  std::vector<PetscInt> diag(n, 0), off(n, 0);
+  for (PetscInt i = 0; i < n; i++)
+    for (PetscInt j : rows[i]) (j >= start && j < end ? diag : off)[i]++;
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)ts), n, n, N, N, 0, diag.data(), 0, off.data(), P));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt               row = start + i;
+    const std::vector<PetscScalar> ones(rows[i].size(), 1);
+    PetscCall(MatSetValues(*P, 1, &row, (PetscInt)rows[i].size(), rows[i].data(), ones.data(), INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscInfo(ts, "no I2Jacobian: pattern of the matrix found by %" PetscInt_FMT " evaluations of the residual\n", N + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* *P: the matrix to use, or NULL to have one made */
+PetscErrorCode DifferencesCreate(TS ts, Mat *P)
+{
+  Integrator  &I = Get(ts);
+  MatColoring  mc;
+  ISColoring   colors;
+  Differences *d = new Differences;
+
+  PetscFunctionBegin;
+  I.differences                = d;
+  const TSHHT3Statistics saved = I.stat;
+  d->ts                        = ts;
+  if (!*P) PetscCall(CreateMatrix(ts, P));
+  PetscCall(MatColoringCreate(*P, &mc));
+  PetscCall(MatColoringSetDistance(mc, 2));
+  PetscCall(MatColoringSetType(mc, MATCOLORINGSL));
+  PetscCall(MatColoringSetFromOptions(mc));
+  PetscCall(MatColoringApply(mc, &colors));
+  PetscCall(MatColoringDestroy(&mc));
+  PetscCall(MatFDColoringCreate(*P, colors, &d->coloring));
+  PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(Evaluate)), d));
+  PetscCall(MatFDColoringSetFromOptions(d->coloring));
+  PetscCall(MatFDColoringSetUp(*P, colors, d->coloring));
+  PetscInt n;
+  PetscCall(ISColoringGetColors(colors, NULL, &n, NULL));
+  PetscCall(ISColoringDestroy(&colors));
+  PetscCall(MatDuplicate(*P, MAT_DO_NOT_COPY_VALUES, &d->part));
+  PetscCall(PetscInfo(ts, "no I2Jacobian: dF/dU, dF/dU', dF/dU'' by differences in %" PetscInt_FMT " colors\n", n));
+  I.stat = saved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DifferencesDestroy(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (!I.differences) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatFDColoringDestroy(&I.differences->coloring));
+  PetscCall(MatDestroy(&I.differences->part));
+  delete I.differences;
+  I.differences = nullptr;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat P)
+{
+  Differences    *d        = Get(ts).differences;
+  const PetscReal shift[3] = {1, sv, sa};
+  Vec             at[3]    = {U, V, A};
+
+  PetscFunctionBegin;
+  d->t = t;
+  for (int k = 0; k < 3; k++) d->at[k] = at[k];
+  for (d->which = 0; d->which < 3; d->which++) {
+    if (d->which && shift[d->which] == 0) continue;
+    Mat target = d->which ? d->part : P;
+    PetscCall(MatZeroEntries(target));
+    PetscCall(MatFDColoringApply(target, d->coloring, at[d->which], NULL));
+    if (d->which) PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

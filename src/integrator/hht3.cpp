@@ -1,0 +1,405 @@
+/* The front door: registration, creation, options, set-up, view, destruction. Setters and getters stand in api.cpp. */
+#include "impl.h"
+#include <petscdm.h>
+#include <petscdmshell.h>
+
+const char *const TSHHT3Forms[]  = {"paper", "second_order", "TSHHT3Form", "TSHHT3_FORM_", NULL};
+const char *const TSHHT3Roles[]  = {"coordinate", "state", "holonomic", "nonholonomic", "variable", "force", "TSHHT3Role", "TSHHT3_", NULL};
+const char *const TSHHT3Starts[] = {"off", "report", "project", "TSHHT3Start", "TSHHT3_START_", NULL};
+
+namespace hht3
+{
+
+Events events;
+
+namespace
+{
+
+PetscBool  cited      = PETSC_FALSE;
+const char citation[] = "@article{Negrut2007,\n"
+                        "  title   = {On an Implementation of the {Hilber-Hughes-Taylor} Method in the Context of Index 3\n"
+                        "             Differential-Algebraic Equations of Multibody Dynamics},\n"
+                        "  author  = {Negrut, D. and Rampalli, R. and Ottarsson, G. and Sajdak, A.},\n"
+                        "  journal = {Journal of Computational and Nonlinear Dynamics},\n"
+                        "  volume  = {2},\n  number  = {1},\n  pages   = {73--85},\n  year    = {2007}\n}\n"
+                        "@article{ArnoldBruels2007,\n"
+                        "  title   = {Convergence of the generalized-$\\alpha$ scheme for constrained mechanical systems},\n"
+                        "  author  = {Arnold, M. and Br{\\\"u}ls, O.},\n"
+                        "  journal = {Multibody System Dynamics},\n"
+                        "  volume  = {18},\n  pages   = {185--202},\n  year    = {2007}\n}\n";
+
+PetscErrorCode DuplicateAll(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.predictor.D[0]}) {
+    if (*v) continue;
+    PetscCall(VecDuplicate(ts->vec_sol, v));
+    PetscCall(VecZeroEntries(*v));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What only some problems need */
+PetscErrorCode AllocateForRoles(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.constraints() && !I.gamma) PetscCall(VecDuplicate(ts->vec_sol, &I.gamma));
+  if (!I.role.empty() && !I.row) {
+    PetscCall(VecDuplicate(ts->vec_sol, &I.row));
+    PetscCall(VecDuplicate(ts->vec_sol, &I.col));
+    PetscCall(VecDuplicate(ts->vec_sol, &I.work));
+  }
+  if (I.form == TSHHT3_FORM_PAPER && I.alpha != 0 && !I.F0) PetscCall(VecDuplicate(ts->vec_sol, &I.F0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrix: the application's, the DM's, or one made from differences of the residual */
+PetscErrorCode SetUpJacobian(TS ts)
+{
+  HHT3I2Jacobian jacobian;
+  DM             dm;
+  SNES           snes;
+  Mat            J, P;
+  PetscBool      shell;
+
+  PetscFunctionBegin;
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(TSGetDM(ts, &dm));
+  PetscCall(DMTSGetI2Jacobian(dm, &jacobian, NULL));
+  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
+  if (!P && jacobian) {
+    PetscCheck(!shell, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "TSSetI2Jacobian() was given a function but no matrix, and the TS has no DM to make one");
+    PetscCall(DMCreateMatrix(dm, &P));
+    PetscCall(SNESSetJacobian(snes, J ? J : P, P, NULL, NULL));
+    PetscCall(MatDestroy(&P));
+  }
+  if (!jacobian && !Get(ts).differences) {
+    if (!P && !shell) {
+      PetscCall(DMCreateMatrix(dm, &P));
+      PetscCall(DifferencesCreate(ts, &P));
+      PetscCall(SNESSetJacobian(snes, P, P, NULL, NULL));
+      PetscCall(MatDestroy(&P));
+    } else {
+      const PetscBool mine = (PetscBool)!P;
+      PetscCall(DifferencesCreate(ts, &P));
+      if (mine) {
+        PetscCall(SNESSetJacobian(snes, P, P, NULL, NULL));
+        PetscCall(MatDestroy(&P));
+      }
+    }
+    PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckProblem(TS ts)
+{
+  HHT3I2Function f;
+  DM             dm;
+
+  PetscFunctionBegin;
+  PetscCall(TSGetDM(ts, &dm));
+  PetscCall(DMTSGetI2Function(dm, &f, NULL));
+  PetscCheck(f, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+             "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none");
+  PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+             "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors");
+  PetscInt n, m;
+  PetscCall(VecGetSize(ts->vec_sol, &n));
+  PetscCall(VecGetSize(ts->vec_dot, &m));
+  PetscCheck(n == m, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ, "The solution has %" PetscInt_FMT " entries and its time derivative %" PetscInt_FMT, n, m);
+  PetscCheck(n > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ, "The problem has no unknowns");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetUp(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.wall0 <= 0) {
+    PetscCall(PetscTime(&I.wall0));
+    PetscCall(PetscGetCPUTime(&I.cpu0));
+    I.progress_t0 = ts->ptime;
+  }
+  PetscCall(PetscCitationsRegister(citation, &cited));
+  PetscCall(CheckProblem(ts));
+  PetscCall(UpdateParameters(ts));
+  PetscCall(DuplicateAll(ts));
+  PetscCall(SetUpJacobian(ts));
+  PetscCall(SetUpRoles(ts));
+  PetscCall(AllocateForRoles(ts));
+  KSP ksp;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  if (!((PetscObject)ksp)->type_name) PetscCall(LinearDefaults(ksp, &I.linear));
+  PetscCall(CorrectorSetUp(ts));
+  if (I.constraints() && I.p.rho == 1)
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: alpha = 0 has no numerical damping and is weakly unstable on index-3 systems; "
+                                                            "with constraints use alpha < 0 (-ts_hhtdae_alpha -0.05 is enough)\n"));
+  PetscCall(TSGetAdapt(ts, &ts->adapt));
+  PetscCall(TSAdaptCandidatesClear(ts->adapt));
+  if (I.resume_file[0]) {
+    PetscCall(CheckpointLoad(ts, I.resume_file));
+    I.resume_file[0] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Reset(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.F0, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col}) PetscCall(VecDestroy(v));
+  for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
+  PetscCall(MatDestroy(&I.second));
+  PetscCall(DifferencesDestroy(ts));
+  if (!I.is_set)
+    for (IS &is : I.is) PetscCall(ISDestroy(&is));
+  I.role.clear();
+  I.corrector.have_matrix = PETSC_FALSE;
+  I.corrector.want_matrix = PETSC_TRUE;
+  I.have_step             = PETSC_FALSE;
+  I.linear_chosen         = PETSC_FALSE;
+  I.norm_size             = 0;
+  I.h_last = I.h_regular = 0;
+  I.scaled_state         = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Destroy(TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(Reset(ts));
+  for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
+  delete static_cast<Integrator *>(ts->data);
+  ts->data = NULL;
+  PetscCall(ComposeSetters(ts, false));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
+{
+  Integrator &I = Get(ts);
+  TSHHT3Form  form = I.form;
+  TSHHT3Start start = I.start_policy;
+  PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[3] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold};
+  PetscInt    degree = -1, three = 3;
+  PetscBool   flg;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsEnum("-ts_hhtdae_form", "How inertia forces are averaged", "TSHHT3SetForm", TSHHT3Forms, (PetscEnum)form, (PetscEnum *)&form, &flg));
+  if (flg) PetscCall(TSHHT3SetForm(ts, form));
+  PetscCall(PetscOptionsReal("-ts_hhtdae_alpha", "HHT parameter in [-1/3, 0]", "TSHHT3SetAlpha", alpha, &alpha, &flg));
+  if (flg) PetscCall(TSHHT3SetAlpha(ts, alpha));
+  PetscCall(PetscOptionsReal("-ts_hhtdae_radius", "Spectral radius at infinite frequency (Chung and Hulbert)", "TSHHT3SetRadius", rho, &rho, &flg));
+  if (flg) PetscCall(TSHHT3SetRadius(ts, rho));
+  PetscCall(PetscOptionsReal("-ts_hhtdae_corrector_tolerance", "Error left by the corrector, relative to the tolerance", "TSHHT3SetCorrectorTolerance", c, &c, &flg));
+  if (flg) PetscCall(TSHHT3SetCorrectorTolerance(ts, c));
+  PetscCall(PetscOptionsInt("-ts_hhtdae_predictor_degree", "Degree 0..3 of the predictor, -1 to choose it in each step", "TSHHT3SetPredictorDegree", degree, &degree, &flg));
+  if (flg) PetscCall(TSHHT3SetPredictorDegree(ts, degree));
+  PetscCall(PetscOptionsRealArray("-ts_hhtdae_reuse", "Matrix reuse: ratio of h, rate, growth of h not taken", "TSHHT3SetReuse", reuse, &three, &flg));
+  if (flg) {
+    PetscCheck(three == 3, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "-ts_hhtdae_reuse takes three numbers, ratio,rate,hold; %" PetscInt_FMT " were given", three);
+    PetscCall(TSHHT3SetReuse(ts, reuse[0], reuse[1], reuse[2]));
+  }
+  PetscCall(PetscOptionsEnum("-ts_hhtdae_start", "What to do about inconsistent initial values", "TSHHT3SetStart", TSHHT3Starts, (PetscEnum)start, (PetscEnum *)&start, &flg));
+  if (flg) PetscCall(TSHHT3SetStart(ts, start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
+{
+  Integrator &I = Get(ts);
+  PetscBool   flg, on = PETSC_FALSE;
+  char        file[PETSC_MAX_PATH_LEN] = "";
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsBool("-ts_hhtdae_summary", "Print the counters at the end of the run", "TSHHT3GetStatistics", on, &on, NULL));
+  if (on) PetscCall(TSMonitorSet(ts, MonitorSummary, NULL, NULL));
+  on = PETSC_FALSE;
+  PetscCall(PetscOptionsBool("-ts_hhtdae_progress", "Show time, step size and time left on the terminal", "TSHHT3GetStatistics", on, &on, NULL));
+  if (on) PetscCall(TSMonitorSet(ts, MonitorProgress, NULL, NULL));
+  PetscCall(PetscOptionsString("-ts_hhtdae_checkpoint", "File to write a checkpoint to", "TSHHT3CheckpointSave", I.checkpoint_file, I.checkpoint_file, sizeof(I.checkpoint_file), NULL));
+  PetscCall(PetscOptionsInt("-ts_hhtdae_checkpoint_every", "Accepted steps from one checkpoint to the next", "TSHHT3CheckpointSave", I.checkpoint_every, &I.checkpoint_every, NULL));
+  PetscCall(PetscOptionsString("-ts_hhtdae_resume", "Checkpoint to go on from", "TSHHT3CheckpointLoad", file, file, sizeof(file), &flg));
+  if (flg && file[0]) PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
+{
+  Integrator &I = Get(ts);
+  SNES        snes;
+  KSP         ksp;
+  PetscBool   dt;
+
+  PetscFunctionBegin;
+  PetscOptionsHeadBegin(PetscOptionsObject, "HHT integrator for index-3 DAEs");
+  PetscCall(MethodOptions(ts, PetscOptionsObject));
+  PetscCall(OutputOptions(ts, PetscOptionsObject));
+  PetscOptionsHeadEnd();
+  /* a step that was neither set nor given is PETSc's 0.1; then the first one is chosen in the start */
+  PetscCall(PetscOptionsHasName(((PetscObject)ts)->options, ((PetscObject)ts)->prefix, "-ts_dt", &dt));
+  if (!dt) PetscCall(PetscOptionsHasName(((PetscObject)ts)->options, ((PetscObject)ts)->prefix, "-ts_time_step", &dt));
+  I.auto_h = (PetscBool)(!dt && ts->time_step == (PetscReal)0.1);
+  /* defaults go in before SNESSetFromOptions(), which TSSetFromOptions() calls next, so that options override them */
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(LinearDefaults(ksp, &I.linear));
+  SNESLineSearch ls;
+  PetscCall(SNESGetLineSearch(snes, &ls));
+  if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode View(TS ts, PetscViewer viewer)
+{
+  Integrator      &I = Get(ts);
+  const Corrector &c = I.corrector;
+  const Parameters &p = I.p;
+  PetscBool        ascii;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
+  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.radius < 0) PetscCall(PetscViewerASCIIPrintf(viewer, "form %s, alpha=%g (spectral radius %g)\n", TSHHT3Forms[I.form], (double)I.alpha, (double)p.rho));
+  else PetscCall(PetscViewerASCIIPrintf(viewer, "form %s, spectral radius %g: alpha_m=%g, alpha_f=%g\n", TSHHT3Forms[I.form], (double)p.rho, (double)p.am, (double)p.af));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "gamma=%g, beta=%g, local error %g h^2 (a_{n+1} - a_n)\n", (double)p.gamma, (double)p.beta, (double)p.k));
+  if (I.predictor.fixed) PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree %" PetscInt_FMT "\n", I.predictor.degree_max));
+  else PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree up to %" PetscInt_FMT ", chosen in each step (now %" PetscInt_FMT ")\n", I.predictor.degree_max, I.predictor.degree));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "corrector: error left below %g of the tolerance, at most %" PetscInt_FMT " iterations\n", (double)c.c, c.max_it));
+  if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
+  else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.slow_rate, (double)c.hold));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));
+  if (ts->setupcalled) PetscCall(ViewRoles(ts, viewer));
+  if (I.linear_chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));
+  const TSHHT3Statistics &s = I.stat;
+  if (s.steps) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "steps=%" PetscInt_FMT ", rejected=%" PetscInt_FMT ", failed corrections=%" PetscInt_FMT " (+%" PetscInt_FMT " repeated with a new matrix), restarts=%" PetscInt_FMT "\n",
+                                     s.steps, s.rejected, s.corrector_fails, s.retries, s.restarts));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "iterations=%" PetscInt_FMT ", residuals=%" PetscInt_FMT ", Jacobians=%" PetscInt_FMT ", factorizations=%" PetscInt_FMT ", h in [%g, %g]\n", s.newton, s.residuals, s.jacobians, s.factorizations,
+                                     (double)s.h_min, (double)s.h_max));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode UpdateParameters(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.radius >= 0) {
+    PetscCheck(I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+               "A spectral radius (%g) belongs to the second-order form; the paper's form takes alpha (-ts_hhtdae_alpha)", (double)I.radius);
+    I.p = RadiusParameters(I.radius);
+  } else I.p = HHTParameters(I.alpha, I.form == TSHHT3_FORM_PAPER);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*MC
+  TSHHT3 - Hilber-Hughes-Taylor integrator for index-3 differential-algebraic equations of multibody dynamics
+
+  M(q) q'' + Phi_q^T lambda = Q(q, q', t), Phi(q, t) = 0, with velocity-level constraints, first-order states, user-defined
+  variables and force states, given by TSSetI2Function() and TSSetI2Jacobian().
+
+  Options Database Keys:
++ -ts_hhtdae_form <paper,second_order>   - how inertia forces are averaged, `TSHHT3SetForm()`
+. -ts_hhtdae_alpha <alpha>               - numerical damping in [-1/3, 0], default -0.3, `TSHHT3SetAlpha()`
+. -ts_hhtdae_radius <rho>                - spectral radius at infinity in place of alpha, `TSHHT3SetRadius()`
+. -ts_hhtdae_corrector_tolerance <c>     - where the Newton iteration stops, `TSHHT3SetCorrectorTolerance()`
+. -ts_hhtdae_predictor_degree <d>        - degree of the predictor, -1 to choose, `TSHHT3SetPredictorDegree()`
+. -ts_hhtdae_reuse <ratio,rate,hold>     - when the matrix is renewed, `TSHHT3SetReuse()`
+. -ts_hhtdae_start <off,report,project>  - inconsistent initial values, `TSHHT3SetStart()`
+. -ts_hhtdae_summary                     - print the counters at the end of the run
+. -ts_hhtdae_progress                    - show the progress of the run on the terminal
+. -ts_hhtdae_checkpoint <file>           - write checkpoints, `TSHHT3CheckpointSave()`
+. -ts_hhtdae_checkpoint_every <n>        - ... every n steps
+- -ts_hhtdae_resume <file>               - go on from a checkpoint, `TSHHT3CheckpointLoad()`
+
+  Level: beginner
+
+  Notes:
+  The error test, `TSSetTolerances()`, judges positions (and first-order states) only: weight_i = max(atol_i, rtol_i Y_i) with
+  Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it takes; all options of
+  `SNES`, `KSP` and `PC` override the defaults. A correction that fails cuts the step; it does not end the run.
+
+  If no step size is set, the first one is chosen from the third derivative of the positions.
+
+  References:
++ * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007
+- * - M. Arnold, O. Bruels, Multibody Syst. Dyn. 18, 2007
+
+.seealso: `TSCreate()`, `TSSetType()`, `TSSetI2Function()`, `TSSetI2Jacobian()`, `TS2SetSolution()`, `TSHHT3SetIS()`
+M*/
+PetscErrorCode Create(TS ts)
+{
+  PetscFunctionBegin;
+  ts->data                = new Integrator();
+  for (Vec &d : Get(ts).predictor.D) d = nullptr;
+  Get(ts).p               = HHTParameters(Get(ts).alpha, false);
+  ts->ops->setup          = SetUp;
+  ts->ops->reset          = Reset;
+  ts->ops->destroy        = Destroy;
+  ts->ops->view           = View;
+  ts->ops->setfromoptions = SetFromOptions;
+  ts->ops->step           = Step;
+  ts->ops->evaluatewlte   = EvaluateWLTE;
+  ts->ops->rollback       = RollBack;
+  ts->ops->interpolate    = [](TS s, PetscReal t, Vec U) { return Interpolate(s, t, U, nullptr, nullptr); };
+  ts->ops->snesfunction   = FormFunction;
+  ts->ops->snesjacobian   = FormJacobian;
+  ts->default_adapt_type  = TSADAPTBASIC;
+  ts->usessnes            = PETSC_TRUE;
+  Get(ts).auto_h          = (PetscBool)(ts->time_step == (PetscReal)0.1);
+  if (ts->max_snes_failures == 1) ts->max_snes_failures = -1; /* PETSc's default ends the run at the first failure */
+  PetscCall(ComposeSetters(ts, true));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@C
+  TSHHT3Initialize - Registers `TSHHT3` and the ordering "metisnd"
+
+  Not Collective
+
+  Level: beginner
+
+  Note:
+  Programs that link the library call it once after `PetscInitialize()`. With -dll_append libhhtdae.so PETSc calls it itself.
+
+.seealso: `TSHHT3`, `TSRegister()`
+@*/
+PetscErrorCode TSHHT3Initialize(void)
+{
+  static PetscBool registered = PETSC_FALSE;
+  PetscClassId     id;
+
+  PetscFunctionBegin;
+  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
+  registered = PETSC_TRUE;
+  PetscCall(TSRegister(TSHHT3, hht3::Create));
+  PetscCall(LinearRegister());
+  PetscCall(PetscClassIdRegister("hhtdae", &id));
+  PetscCall(PetscLogEventRegister("HHT3Start", id, &hht3::events.start));
+  PetscCall(PetscLogEventRegister("HHT3Predict", id, &hht3::events.predict));
+  PetscCall(PetscLogEventRegister("HHT3Matrix", id, &hht3::events.matrix));
+  PetscCall(PetscLogEventRegister("HHT3Estimate", id, &hht3::events.estimate));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The name by which PETSc's plugin loader looks for libhhtdae.so */
+PETSC_EXTERN PetscErrorCode PetscDLLibraryRegister_hhtdae(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TSHHT3Initialize());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,181 @@
+/* The integrator's state, and the functions that its rooms offer one another. */
+#ifndef HHTDAE_IMPL_H
+#define HHTDAE_IMPL_H
+
+#include "compat.h"
+#include "formulas.h"
+#include "hhtdae/hhtdae.h"
+#include "linear/linear.h"
+#include <vector>
+
+namespace hht3
+{
+
+constexpr PetscInt max_degree = 3; /* of the predictor */
+
+/* What the corrector's residual and matrix stand for */
+enum class Mode {
+  Step, /* (9) at t_{n+1} */
+  Start /* accelerations and multipliers from given q, q': h -> 0, constraints differentiated as in (6b), (6c) */
+};
+
+/* The stopping test and the reuse ladder, section 5 of the paper */
+struct Corrector {
+  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance */
+  PetscInt  max_it    = 10;
+  PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
+  PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
+  PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
+  PetscBool user_lag  = PETSC_FALSE; /* -snes_lag_jacobian: the user rules */
+
+  PetscBool have_matrix = PETSC_FALSE; /* the SNES matrix is (10) of some earlier step */
+  PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
+  PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
+  PetscReal h_matrix    = 0;           /* h it was made with */
+  PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
+  PetscReal floor       = 0;           /* corrections below this are rounding of q */
+
+  PetscInt            it     = 0; /* of the present correction */
+  PetscInt            base   = 0; /* iteration after which the present matrix came into use */
+  PetscReal           e      = 0; /* last correction, in units of the tolerance */
+  PetscReal           xi_max = 0; /* worst rate of this correction */
+  SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
+};
+
+/* Divided differences of the unknowns over the accepted steps */
+struct Predictor {
+  PetscInt  degree_max = max_degree; /* what the user allows */
+  PetscBool fixed      = PETSC_FALSE;
+  PetscInt  degree     = 0; /* in use */
+  PetscInt  available  = 0; /* differences that exist */
+  PetscReal t[max_degree + 2]; /* t_n, t_{n-1}, ... */
+  Vec       D[max_degree + 1]; /* D[0] is X0; D[k] the k-th divided difference; allocated when first used */
+};
+
+struct Integrator {
+  /* the method */
+  TSHHT3Form  form   = TSHHT3_FORM_SECOND_ORDER;
+  PetscReal   alpha  = -0.3;
+  PetscReal   radius = -1; /* set: Chung and Hulbert's parameters in the second-order form */
+  Parameters  p;
+  TSHHT3Start start_policy = TSHHT3_START_REPORT;
+  Corrector   corrector;
+  Predictor   predictor;
+
+  /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
+  IS                         is[TSHHT3_NUM_ROLES] = {};
+  PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
+  std::vector<unsigned char> role;
+  PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
+  PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
+  PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
+
+  /* t_n: state, true second derivative (q) and the unknowns X0 = predictor.D[0] as of the accepted step h_last */
+  Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr;
+  Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
+  PetscReal h_last = 0;
+  /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
+  Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
+  PetscReal t0 = 0, t1 = 0, h = 0;
+  Mode      mode = Mode::Step;
+  Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
+  Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
+
+  /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
+  Vec       ymax = nullptr, weight = nullptr;
+  PetscInt  norm_size = 0; /* entries that enter, global */
+
+  /* the matrix */
+  Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
+  Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
+  struct Differences *differences = nullptr;  /* the application has no Jacobian */
+  LinearChoice  linear;
+  PetscBool     linear_chosen = PETSC_FALSE;
+  PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
+
+  /* bookkeeping */
+  TSStepStatus     status = TS_STEP_INCOMPLETE;
+  PetscBool        have_step = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
+  PetscObjectState sol_state = 0, dot_state = 0;
+  PetscObjectId    sol_id = 0;
+  PetscReal        h_regular = 0; /* last step that went through the corrector */
+  PetscBool        auto_h = PETSC_FALSE;
+  char             failure[512] = "";
+  char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
+  char             resume_file[PETSC_MAX_PATH_LEN] = "";
+  PetscInt         checkpoint_every = 0;
+  TSHHT3Statistics stat = {};
+  PetscLogDouble   wall0 = 0, cpu0 = 0;
+  PetscReal        progress_t0 = 0;
+  PetscLogDouble   progress_last = 0;
+};
+
+inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
+inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
+inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* log events, declared once in hht3.cpp */
+struct Events {
+  PetscLogEvent start, predict, matrix, estimate;
+};
+extern Events events;
+
+/* hht3.cpp */
+PetscErrorCode UpdateParameters(TS ts);
+/* api.cpp */
+PetscErrorCode ComposeSetters(TS ts, bool attach);
+/* roles.cpp */
+PetscErrorCode SetUpRoles(TS ts);
+PetscErrorCode ViewRoles(TS ts, PetscViewer viewer);
+/* differences.cpp: a Jacobian from differences of the residual, for applications that have none */
+PetscErrorCode DifferencesCreate(TS ts, Mat *P);
+PetscErrorCode DifferencesDestroy(TS ts);
+PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat P);
+/* equations.cpp */
+PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
+PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
+PetscErrorCode StageVectors(TS ts, Vec X);
+PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
+PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
+/* corrector.cpp */
+PetscErrorCode CorrectorSetUp(TS ts);
+PetscErrorCode Correct(TS ts, PetscBool *converged);
+PetscErrorCode Iterate(TS ts, PetscBool *converged);
+PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
+PetscErrorCode FreshMatrixNextIteration(TS ts);
+/* estimate.cpp */
+PetscErrorCode UpdateWeights(TS ts, Vec U);
+PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
+PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
+/* predictor.cpp */
+PetscErrorCode PredictorReset(TS ts);
+PetscErrorCode Predict(TS ts, Vec X);
+PetscErrorCode PredictorUpdate(TS ts, PetscReal t, Vec X);
+/* start.cpp */
+PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok);
+PetscErrorCode NameRedundant(TS ts);
+PetscErrorCode Start(TS ts);
+PetscErrorCode TinyStep(TS ts, PetscBool *ok);
+PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
+/* project.cpp */
+PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current);
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Vec first, Vec second);
+PetscErrorCode TimeScale(TS ts, PetscReal *T);
+/* step.cpp */
+PetscErrorCode Step(TS ts);
+PetscErrorCode RollBack(TS ts);
+PetscErrorCode Fail(TS ts, const char *what);
+/* dense.cpp */
+PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
+/* report.cpp */
+PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+/* checkpoint.cpp */
+PetscErrorCode CheckpointIfDue(TS ts);
+PetscErrorCode CheckpointSave(TS ts, const char file[]);
+PetscErrorCode CheckpointLoad(TS ts, const char file[]);
+
+} // namespace hht3
+
+#endif

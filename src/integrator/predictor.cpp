@@ -1,0 +1,114 @@
+/*
+  The predictor, section 6 of the paper: the unknowns at t_{n+1} extrapolated by a polynomial of degree 0 to 3 through the
+  accepted steps, in Newton's form
+
+    P_d(t) = D_0 + (t - t_n) D_1 + (t - t_n)(t - t_{n-1}) D_2 + ...
+
+  with divided differences D_k. A polynomial of degree d missed the new value by exactly (t - t_n)...(t - t_{n-d}) D_{d+1}
+  with the new difference, so that one sweep over the differences both updates them and tells which degree would have
+  served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
+
+/* New differences from the old ones and the new value x, in place; misses of the degrees 0..have, squared */
+void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x,
+           PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+{
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal wi = PetscRealPart(w[i]);
+    PetscScalar     fresh = x[i];
+    for (PetscInt k = 0; k <= have; k++) {
+      const PetscScalar old = k <= keep ? D[k][i] : 0;
+      if (k <= keep) D[k][i] = fresh;
+      fresh = (fresh - old) / span[k];
+      if (wi > 0) miss[k] += PetscSqr(PetscRealPart(fresh) * wi);
+    }
+    if (have + 1 <= keep) D[have + 1][i] = fresh;
+  }
+}
+
+} // namespace
+
+/* Forgets the history; X0 stands as the only point */
+PetscErrorCode PredictorReset(TS ts)
+{
+  Predictor &p = Get(ts).predictor;
+
+  PetscFunctionBegin;
+  p.available = 0;
+  p.degree    = 0;
+  p.t[0]      = ts->ptime;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Predict(TS ts, Vec X)
+{
+  Integrator  &I = Get(ts);
+  Predictor   &p = I.predictor;
+  PetscReal    factor = 1;
+  PetscScalar  coef[max_degree];
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
+  PetscCall(VecCopy(p.D[0], X));
+  for (PetscInt k = 0; k < p.degree; k++) coef[k] = factor *= I.t1 - p.t[k];
+  if (p.degree) PetscCall(VecMAXPY(X, p.degree, coef, &p.D[1]));
+  PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X is accepted at t: it becomes D_0, and the degree for the next step is chosen */
+PetscErrorCode PredictorUpdate(TS ts, PetscReal t, Vec X)
+{
+  Integrator        &I    = Get(ts);
+  Predictor         &p    = I.predictor;
+  const PetscInt     keep = PetscMax(p.degree_max, I.count[TSHHT3_STATE] ? 1 : 0); /* the estimate of states needs D_1 */
+  const PetscInt     have = PetscMin(p.available, keep);                           /* old D_0..D_have exist */
+  PetscReal          span[max_degree + 1], miss[max_degree + 1] = {0, 0, 0, 0}, sum[max_degree + 1];
+  PetscScalar       *D[max_degree + 1] = {};
+  const PetscScalar *x, *w;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k <= keep; k++)
+    if (!p.D[k]) PetscCall(VecDuplicate(X, &p.D[k]));
+  for (PetscInt k = 0; k <= have; k++) span[k] = t - p.t[k];
+  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  for (PetscInt k = 0; k <= keep; k++) PetscCall(VecGetArray(p.D[k], &D[k]));
+  Sweep(n, have, keep, span, x, D, w, miss);
+  for (PetscInt k = 0; k <= keep; k++) PetscCall(VecRestoreArray(p.D[k], &D[k]));
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  for (PetscInt k = have; k >= 0; k--) p.t[k + 1] = p.t[k];
+  p.t[0]      = t;
+  p.available = PetscMin(have + 1, keep);
+
+  if (p.fixed || !p.degree_max) {
+    p.degree = PetscMin(p.available, p.degree_max);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Allreduce(miss, sum, (PetscMPIInt)(have + 1), MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscReal factor = 1, best = PETSC_MAX_REAL;
+  p.degree = 0;
+  for (PetscInt d = 0; d <= PetscMin(have, p.degree_max); d++) {
+    factor *= span[d];
+    const PetscReal m = PetscAbsReal(factor) * PetscSqrtReal(sum[d]);
+    if (m < margin * best || d == 0) {
+      best     = m;
+      p.degree = d;
+    } else break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

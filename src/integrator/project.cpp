@@ -1,0 +1,303 @@
+/*
+  Initial values and the constraints: how far q_0 and q'_0 are from them, and the projection of both.
+
+  The misfit is measured as the distance to the nearest consistent state in the metric of the mass matrix, from
+
+    [M Phi_q^T; Phi_q 0] [dq; mu] = [0; Phi],      the same with dq', Phi_q q' + Phi_t (and Psi) for the velocities,
+
+  which has the units of q and so can be held against the tolerances. Time derivatives of the constraints come from
+  one-sided differences of the application's residual along q_0 + tau q'_0: exact in q'' by construction, blind to what
+  happened before t_0 (a motion may start there), and each row takes the step tau at which it is most accurate.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr int       levels = 9, points = 6;
+constexpr PetscReal first_weights[points]  = {-25. / 12, 4, -3, 4. / 3, -1. / 4, 0};
+constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -13, 61. / 12, -10. / 12};
+
+/* For each row, the value at the tau where it changed least from one tau to the next */
+struct Refined {
+  std::vector<PetscReal> last, best, change;
+  explicit Refined(PetscInt n) : last(n, 0), best(n, 0), change(n, PETSC_MAX_REAL) {}
+  void take(PetscInt i, int level, PetscReal value)
+  {
+    const PetscReal d = PetscAbsReal(value - last[i]);
+    if (level > 0 && d < change[i]) { /* false for NaN */
+      change[i] = d;
+      best[i]   = value;
+    }
+    last[i] = value;
+  }
+};
+
+bool IsConstraint(const Integrator &I, PetscInt i)
+{
+  return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC;
+}
+
+/* Copies the constraint rows of F times s into R and clears the others */
+PetscErrorCode ConstraintRows(const Integrator &I, TSHHT3Role which, Vec F, Vec R)
+{
+  const PetscScalar *f;
+  PetscScalar       *r;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(F, &f));
+  PetscCall(VecGetArray(R, &r));
+  for (PetscInt i = 0; i < n; i++) r[i] = IsConstraint(I, i) && (which == TSHHT3_NUM_ROLES || RoleOf(I, i) == which) ? f[i] : 0;
+  PetscCall(VecRestoreArray(R, &r));
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Weighted root mean square of the entries of d that belong to coordinates, times s: in units of the tolerance */
+PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *x, *w;
+  PetscReal          sum = 0, total;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(d, &n));
+  PetscCall(VecGetArrayRead(d, &x));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  for (PetscInt i = 0; i < n; i++)
+    if (RoleOf(I, i) == TSHHT3_COORDINATE) sum += PetscSqr(PetscRealPart(x[i] * w[i]) * s);
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArrayRead(d, &x));
+  PetscCallMPI(MPI_Allreduce(&sum, &total, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  *e = PetscSqrtReal(total / PetscMax(I.norm_size, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* y -= d on coordinates */
+PetscErrorCode Move(const Integrator &I, Vec y, Vec d)
+{
+  const PetscScalar *x;
+  PetscScalar       *z;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(y, &n));
+  PetscCall(VecGetArrayRead(d, &x));
+  PetscCall(VecGetArray(y, &z));
+  for (PetscInt i = 0; i < n; i++)
+    if (RoleOf(I, i) == TSHHT3_COORDINATE) z[i] -= x[i];
+  PetscCall(VecRestoreArray(y, &z));
+  PetscCall(VecRestoreArrayRead(d, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
+{
+  SNES               snes = ts->snes;
+  KSP                ksp;
+  Mat                J, P;
+  KSPConvergedReason reason;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  PetscCall(KSPSetOperators(ksp, J, P));
+  PetscCall(KSPSolve(ksp, rhs, d));
+  Get(ts).stat.solves++;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (reason < 0) PetscCall(NameRedundant(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row with the largest violation, for the report */
+PetscErrorCode WorstRow(TS ts, Vec R, PetscInt *row, PetscReal *value)
+{
+  Vec      a = Get(ts).A1;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(R, a));
+  PetscCall(VecAbs(a));
+  PetscCall(VecMax(a, row, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Report(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "start: %s violate the constraints by %g of the tolerance, most in row %" PetscInt_FMT " (%g)%s\n", what,
+                      (double)e, row, (double)value, moved ? "; projected" : ""));
+  if (e > 1 && I.start_policy == TSHHT3_START_REPORT) {
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                          "hhtdae: at t = %g the initial %s violate the constraints: the nearest consistent ones are %.3g "
+                          "tolerances away%s; the largest violation is %.3g, in row %" PetscInt_FMT
+                          ". Give consistent values, or use -ts_hhtdae_start project.\n",
+                          (double)ts->ptime, what, (double)e, unit, (double)value, row));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckPositions(TS ts, PetscBool *current)
+{
+  Integrator     &I = Get(ts);
+  PetscReal       e = PETSC_MAX_REAL, last, value = 0, e0 = 0, worst = 0;
+  PetscInt        row = 0, worst_row = 0;
+  const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
+
+  PetscFunctionBegin;
+  for (int it = 0; it < 20; it++) {
+    last = e;
+    PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
+    PetscCall(ConstraintRows(I, TSHHT3_HOLONOMIC, I.gamma, I.work));
+    PetscCall(SolveStart(ts, I.work, I.X));
+    PetscCall(Distance(ts, I.X, 1, &e));
+    PetscCall(WorstRow(ts, I.work, &row, &value));
+    if (it == 0) {
+      e0        = e;
+      worst     = value;
+      worst_row = row;
+    }
+    *current = PETSC_TRUE;
+    if (!project || e == 0 || e >= 0.5 * last) break;
+    PetscCall(Move(I, I.U0, I.X));
+    *current = PETSC_FALSE;
+  }
+  PetscCall(Report(ts, "positions", "", e0, worst_row, worst, project));
+  if (project && e > 1e-3)
+    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+            "The initial positions cannot be projected on the constraints: after the last correction row %" PetscInt_FMT
+            " is still violated by %g. Check that the mechanism can be assembled.", row, (double)value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckVelocities(TS ts)
+{
+  Integrator     &I = Get(ts);
+  PetscReal       T, e, value;
+  PetscInt        row;
+  const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
+
+  PetscFunctionBegin;
+  PetscCall(TimeScale(ts, &T));
+  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, T, I.work, NULL));
+  PetscCall(SolveStart(ts, I.work, I.X));
+  PetscCall(Distance(ts, I.X, T, &e));
+  PetscCall(WorstRow(ts, I.work, &row, &value));
+  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, project));
+  if (project) PetscCall(Move(I, I.V0, I.X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i|, at most the whole run */
+PetscErrorCode TimeScale(TS ts, PetscReal *T)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *v, *y;
+  PetscReal          local = 0, rate;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(I.V0, &n));
+  PetscCall(VecGetArrayRead(I.V0, &v));
+  PetscCall(VecGetArrayRead(I.ymax, &y));
+  const PetscReal least = ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1;
+  for (PetscInt i = 0; i < n; i++)
+    if (RoleOf(I, i) == TSHHT3_COORDINATE) local = PetscMax(local, PetscAbsScalar(v[i]) / PetscMax(PetscRealPart(y[i]), PetscMax(least, 1e-8)));
+  PetscCall(VecRestoreArrayRead(I.ymax, &y));
+  PetscCall(VecRestoreArrayRead(I.V0, &v));
+  PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > ts->ptime ? ts->max_time - ts->ptime : 1;
+  *T                   = rate > 0 ? PetscMin(1 / rate, span) : span;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of
+   holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. */
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Vec first, Vec second)
+{
+  Integrator        &I = Get(ts);
+  Vec                Ut, F, zero;
+  PetscInt           n;
+  const PetscScalar *f;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(U, &n));
+  PetscCall(VecDuplicate(U, &Ut));
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(VecDuplicate(U, &zero));
+  PetscCall(VecZeroEntries(zero));
+  std::vector<PetscReal> f0(n), s1(n), s2(n);
+  Refined                d1(n), d2(n);
+  for (int level = 0; level < levels; level++) {
+    const PetscReal tau = 0.1 * T * PetscPowRealInt(0.25, level);
+    for (int j = 0; j < points; j++) {
+      if (j > 0 || level == 0) {
+        PetscCall(VecWAXPY(Ut, j * tau, V, U));
+        PetscCall(EvaluateResidual(ts, t + j * tau, Ut, V, zero, F));
+      }
+      PetscCall(VecGetArrayRead(F, &f));
+      for (PetscInt i = 0; i < n; i++) {
+        if (!IsConstraint(I, i)) continue;
+        if (j == 0) {
+          if (level == 0) f0[i] = PetscRealPart(f[i]);
+          s1[i] = first_weights[0] * f0[i];
+          s2[i] = second_weights[0] * f0[i];
+        } else {
+          s1[i] += first_weights[j] * PetscRealPart(f[i]);
+          s2[i] += second_weights[j] * PetscRealPart(f[i]);
+        }
+      }
+      PetscCall(VecRestoreArrayRead(F, &f));
+    }
+    for (PetscInt i = 0; i < n; i++) {
+      if (!IsConstraint(I, i)) continue;
+      d1.take(i, level, s1[i] / tau);
+      d2.take(i, level, s2[i] / (tau * tau));
+    }
+  }
+  PetscScalar *g;
+  for (int order = 1; order <= 2; order++) {
+    Vec out = order == 1 ? first : second;
+    if (!out) continue;
+    PetscCall(VecGetArray(out, &g));
+    for (PetscInt i = 0; i < n; i++) {
+      g[i] = 0;
+      if (!IsConstraint(I, i)) continue;
+      if (I.role[i] == TSHHT3_HOLONOMIC) g[i] = order == 1 ? d1.best[i] : d2.best[i];
+      else g[i] = order == 1 ? f0[i] : d1.best[i];
+    }
+    PetscCall(VecRestoreArray(out, &g));
+  }
+  PetscCall(VecDestroy(&zero));
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&Ut));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Measures, reports and by choice mends U0, V0. *matrix_is_current: the start's matrix has been made at the final U0. */
+PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  *matrix_is_current = PETSC_FALSE;
+  if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CheckPositions(ts, matrix_is_current));
+  if (!*matrix_is_current) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+  PetscCall(CheckVelocities(ts));
+  /* the rows of velocity-level constraints may depend on q' */
+  *matrix_is_current = (PetscBool)(!I.count[TSHHT3_NONHOLONOMIC] || I.start_policy != TSHHT3_START_PROJECT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,90 @@
+/* What a run says about itself: the summary line and the progress line. Both are TS monitors. */
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+void StopClock(Integrator &I)
+{
+  PetscLogDouble wall = 0, cpu = 0;
+  (void)PetscTime(&wall);
+  (void)PetscGetCPUTime(&cpu);
+  I.stat.time = wall - I.wall0;
+  I.stat.cpu  = cpu - I.cpu0;
+}
+
+} // namespace
+
+/* TSSolve() calls its monitors a last time with the reason set, and that is when the line is due */
+PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
+{
+  Integrator           &I = Get(ts);
+  const TSHHT3Statistics &s = I.stat;
+
+  PetscFunctionBegin;
+  if (!ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  StopClock(I);
+  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                        "summary: steps=%" PetscInt_FMT " rejected=%" PetscInt_FMT " newton=%" PetscInt_FMT " residuals=%" PetscInt_FMT
+                        " jacobians=%" PetscInt_FMT " factorizations=%" PetscInt_FMT " solves=%" PetscInt_FMT " time=%.6g cpu=%.6g fails=%" PetscInt_FMT
+                        " retries=%" PetscInt_FMT " restarts=%" PetscInt_FMT " tiny=%" PetscInt_FMT " h_min=%.3g h_max=%.3g form=%s alpha=%g reason=%s\n",
+                        s.steps, s.rejected, s.newton, s.residuals, s.jacobians, s.factorizations, s.solves, (double)s.time, (double)s.cpu,
+                        s.corrector_fails, s.retries, s.restarts, s.tiny_steps, (double)s.h_min, (double)s.h_max, TSHHT3Forms[I.form],
+                        (double)(I.radius < 0 ? I.alpha : -I.p.af), TSConvergedReasons[ts->reason]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One line, rewritten four times a second, with what is left of the run at its average rate */
+PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
+{
+  Integrator    &I = Get(ts);
+  PetscLogDouble now;
+  FILE          *out = PETSC_STDERR;
+
+  PetscFunctionBegin;
+  if (step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscTime(&now));
+  if (I.wall0 <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!ts->reason && now - I.progress_last < 0.25) PetscFunctionReturn(PETSC_SUCCESS);
+  I.progress_last          = now;
+  const PetscLogDouble spent = now - I.wall0;
+  const PetscReal      done  = t - I.progress_t0;
+  const PetscReal      rate  = spent > 0 ? done / spent : 0;
+  const PetscReal      left  = rate > 0 && ts->max_time < PETSC_MAX_REAL / 2 ? (ts->max_time - t) / rate : 0;
+  PetscCall(PetscFPrintf(PetscObjectComm((PetscObject)ts), out, "\rt = %-12.6g h = %-10.3e step %-9" PetscInt_FMT " %.3e of time per second, %.0f s left   %s", (double)t, (double)I.h, step, (double)rate,
+                         (double)PetscMax(left, 0), ts->reason ? "\n" : ""));
+  if (!ts->reason) (void)fflush(out);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@
+  TSHHT3GetStatistics - The counters of a `TSHHT3` run
+
+  Not Collective
+
+  Input Parameter:
+. ts - the `TS` context
+
+  Output Parameter:
+. statistics - the cumulative counters since the first step, see `TSHHT3Statistics`
+
+  Options Database Key:
+. -ts_hhtdae_summary - print them as one line of key=value pairs at the end of `TSSolve()`
+
+  Level: intermediate
+
+.seealso: `TSHHT3`, `TSGetStepRejections()`, `TSGetSNESIterations()`
+@*/
+PetscErrorCode TSHHT3GetStatistics(TS ts, TSHHT3Statistics *statistics)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(statistics, 2);
+  PetscUseMethod(ts, "TSHHT3GetStatistics_C", (TS, TSHHT3Statistics *), (ts, statistics));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

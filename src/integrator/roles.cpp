@@ -1,0 +1,269 @@
+/*
+  Roles of unknowns and rows: set by the application, or read off dF/dU, dF/dU', dF/dU'' at the start.
+
+  An unknown whose second derivative enters anywhere is a coordinate; one whose first derivative does is a first-order state;
+  the others are algebraic. Row i belongs to unknown i: the row of an algebraic unknown that depends on it (or on q'')
+  defines it; one that does not is a constraint, velocity-level if it depends on q'.
+
+  The three matrices come from the application's Jacobian with shifts so large that a term with the shift cannot hide behind
+  one without: an entry belongs to dF/dU'' if doubling sigma_a changes it. Two states are probed, the initial one and one
+  moved off it, since at rest or in a symmetric position entries may vanish that are there otherwise.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal big = 1e20; /* shift of the probes */
+
+struct Probe {
+  std::vector<unsigned char> col_a, col_v, row_a, row_v, row_u, self; /* per local unknown or row */
+  explicit Probe(PetscInt n) : col_a(n), col_v(n), row_a(n), row_v(n), row_u(n), self(n) {}
+};
+
+/* Values of the local rows, one after another, and for each its global column */
+PetscErrorCode LocalValues(Mat P, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
+{
+  PetscInt           start, end, nc;
+  const PetscInt    *c;
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  val.clear();
+  col.clear();
+  offset.assign(1, 0);
+  PetscCall(MatGetOwnershipRange(P, &start, &end));
+  for (PetscInt i = start; i < end; i++) {
+    PetscCall(MatGetRow(P, i, &nc, &c, &v));
+    col.insert(col.end(), c, c + nc);
+    val.insert(val.end(), v, v + nc);
+    offset.push_back((PetscInt)val.size());
+    PetscCall(MatRestoreRow(P, i, &nc, &c, &v));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+bool Doubles(PetscScalar one, PetscScalar two)
+{
+  return PetscAbsScalar(two - one) > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two));
+}
+
+/* Marks rows and columns where the derivative that goes with one shift is not zero */
+PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceleration, Probe &probe)
+{
+  std::vector<PetscScalar>    one, two;
+  std::vector<PetscInt>       col, offset, col2, offset2;
+  std::vector<unsigned char> &row_flag = acceleration ? probe.row_a : probe.row_v, &col_flag = acceleration ? probe.col_a : probe.col_v;
+  const PetscReal             t = ts->ptime;
+  Vec                         mark;
+  const PetscScalar          *m;
+
+  PetscFunctionBegin;
+  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : big, acceleration ? big : 0, J, P));
+  PetscCall(LocalValues(P, one, col, offset));
+  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : 2 * big, acceleration ? 2 * big : 0, J, P));
+  PetscCall(LocalValues(P, two, col2, offset2));
+  PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
+  PetscCall(VecDuplicate(U, &mark));
+  PetscCall(VecZeroEntries(mark));
+  for (size_t i = 0; i < row_flag.size(); i++)
+    for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
+      if (!Doubles(one[k], two[k])) continue;
+      row_flag[i] = 1;
+      PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
+    }
+  PetscCall(VecAssemblyBegin(mark));
+  PetscCall(VecAssemblyEnd(mark));
+  PetscCall(VecGetArrayRead(mark, &m));
+  for (size_t i = 0; i < col_flag.size(); i++)
+    if (PetscRealPart(m[i]) > 0) col_flag[i] = 1;
+  PetscCall(VecRestoreArrayRead(mark, &m));
+  PetscCall(VecDestroy(&mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe)
+{
+  std::vector<PetscScalar> val;
+  std::vector<PetscInt>    col, offset;
+  PetscInt                 start;
+
+  PetscFunctionBegin;
+  PetscCall(ProbeShift(ts, J, P, U, V, A, true, probe));
+  PetscCall(ProbeShift(ts, J, P, U, V, A, false, probe));
+  PetscCall(EvaluateJacobian(ts, ts->ptime, U, V, A, 0, 0, J, P));
+  PetscCall(LocalValues(P, val, col, offset));
+  PetscCall(VecGetOwnershipRange(U, &start, NULL));
+  for (size_t i = 0; i < probe.row_u.size(); i++)
+    for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
+      if (val[k] == (PetscScalar)0) continue;
+      probe.row_u[i] = 1;
+      if (col[k] == start + (PetscInt)i) probe.self[i] = 1;
+    }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x moved by a fixed pseudo-random amount, of relative size r, that depends on the global index alone */
+PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
+{
+  PetscScalar *a;
+  PetscInt     n, start;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(x, &n));
+  PetscCall(VecGetOwnershipRange(x, &start, NULL));
+  PetscCall(VecGetArray(x, &a));
+  for (PetscInt i = 0; i < n; i++) {
+    unsigned k = (unsigned)(start + i) * 2654435761u + salt * 40503u;
+    k ^= k >> 15;
+    k *= 2246822519u;
+    k ^= k >> 13;
+    a[i] += r * (1 + PetscAbsScalar(a[i])) * ((PetscReal)(k % 20001u) / 10000 - 1);
+  }
+  PetscCall(VecRestoreArray(x, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RunProbes(TS ts, Probe &probe)
+{
+  Integrator            &I = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  Mat                    J, P;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(VecCopy(ts->vec_sol, I.U1));
+  PetscCall(VecCopy(ts->vec_dot, I.V1));
+  PetscCall(VecZeroEntries(I.A1));
+  PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
+  PetscCall(Shake(I.U1, 1e-4, 1));
+  PetscCall(Shake(I.V1, 1e-3, 2));
+  PetscCall(Shake(I.A1, 1e-3, 3));
+  PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
+  I.stat = saved; /* the probes are not part of the run */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Detect(TS ts, const Probe &p)
+{
+  Integrator &I = Get(ts);
+  PetscInt    start;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
+  for (size_t i = 0; i < I.role.size(); i++) {
+    const PetscInt row = start + (PetscInt)i;
+    PetscCheck(p.row_a[i] || p.row_v[i] || p.row_u[i], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "Row %" PetscInt_FMT " of the residual depends on no unknown", row);
+    PetscCheck(!p.col_a[i] || p.row_a[i], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+               "Unknown %" PetscInt_FMT " has inertia, but row %" PetscInt_FMT " of the residual contains no acceleration: row i must be the equation that belongs to unknown i", row, row);
+    if (p.col_a[i]) I.role[i] = TSHHT3_COORDINATE;
+    else if (p.col_v[i]) I.role[i] = TSHHT3_STATE;
+    else if (p.self[i] || p.row_a[i]) I.role[i] = TSHHT3_VARIABLE;
+    else I.role[i] = p.row_v[i] ? TSHHT3_NONHOLONOMIC : TSHHT3_HOLONOMIC;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Roles from the application's index sets */
+PetscErrorCode TakeSets(TS ts)
+{
+  Integrator     &I = Get(ts);
+  const PetscInt *index;
+  PetscInt        start, end, n;
+  std::vector<unsigned char> taken(I.role.size(), 0);
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+    if (!I.is[r]) continue;
+    PetscCall(ISGetLocalSize(I.is[r], &n));
+    PetscCall(ISGetIndices(I.is[r], &index));
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt i = index[k];
+      PetscCheck(i >= start && i < end, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "Index %" PetscInt_FMT " of role \"%s\" is not among the unknowns %" PetscInt_FMT "..%" PetscInt_FMT " of its rank", i, TSHHT3Roles[r], start, end - 1);
+      PetscCheck(!taken[i - start], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "Unknown %" PetscInt_FMT " is named twice, as \"%s\" and as \"%s\"", i, TSHHT3Roles[I.role[i - start]], TSHHT3Roles[r]);
+      taken[i - start]  = 1;
+      I.role[i - start] = (unsigned char)r;
+    }
+    PetscCall(ISRestoreIndices(I.is[r], &index));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode MakeSets(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscInt    start;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+    if (!I.count[r]) continue;
+    std::vector<PetscInt> index;
+    for (size_t i = 0; i < I.role.size(); i++)
+      if (I.role[i] == r) index.push_back(start + (PetscInt)i);
+    PetscCall(ISDestroy(&I.is[r]));
+    PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)index.size(), index.data(), PETSC_COPY_VALUES, &I.is[r]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode SetUpRoles(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscInt    n, local[TSHHT3_NUM_ROLES + 1] = {}, global[TSHHT3_NUM_ROLES + 1];
+  bool        probed = false;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(ts->vec_sol, &n));
+  I.role.assign(n, TSHHT3_COORDINATE);
+  Probe probe(n);
+  if (I.is_set) PetscCall(TakeSets(ts));
+  if (!I.is_set || I.form == TSHHT3_FORM_PAPER) {
+    PetscCall(RunProbes(ts, probe));
+    probed = true;
+  }
+  if (!I.is_set) PetscCall(Detect(ts, probe));
+  for (PetscInt i = 0; i < n; i++) {
+    local[I.role[i]]++;
+    if (probed && I.role[i] != TSHHT3_COORDINATE && probe.row_a[i]) local[TSHHT3_NUM_ROLES]++;
+  }
+  PetscCallMPI(MPI_Allreduce(local, global, TSHHT3_NUM_ROLES + 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) I.count[r] = global[r];
+  I.definitions_use_acceleration = (PetscBool)(global[TSHHT3_NUM_ROLES] > 0);
+  if (!I.is_set) PetscCall(MakeSets(ts));
+  PetscCall(VecGetSize(ts->vec_sol, &n));
+  if (I.count[TSHHT3_COORDINATE] == n) I.role = std::vector<unsigned char>(); /* an ODE: no roles to look up */
+  PetscCall(PetscInfo(ts, "roles %s: %" PetscInt_FMT " coordinates, %" PetscInt_FMT " states, %" PetscInt_FMT " holonomic, %" PetscInt_FMT " velocity-level constraints, %" PetscInt_FMT " variables, %" PetscInt_FMT " force states\n",
+                      I.is_set ? "set" : "detected", I.count[0], I.count[1], I.count[2], I.count[3], I.count[4], I.count[5]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ViewRoles(TS ts, PetscViewer viewer)
+{
+  Integrator              &I = Get(ts);
+  static const char *const names[] = {"coordinates", "first-order states", "holonomic constraints", "velocity-level constraints", "user-defined variables", "force states"};
+  bool                     any = false;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "unknowns (%s):", I.is_set ? "roles set by the application" : "roles detected"));
+  PetscCall(PetscViewerASCIIUseTabs(viewer, PETSC_FALSE));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
+    if (I.count[r]) PetscCall(PetscViewerASCIIPrintf(viewer, " %" PetscInt_FMT " %s", I.count[r], names[r]));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "; left out:"));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
+    if (!I.count[r]) {
+      PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", any ? "," : "", names[r]));
+      any = true;
+    }
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s\n", any ? "" : " nothing"));
+  PetscCall(PetscViewerASCIIUseTabs(viewer, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,369 @@
+/*
+  A consistent start: q''_0, s'_0, lambda_0, V_0, F_0 from given q_0, q'_0, s_0.
+
+  As h -> 0 the matrix (10) becomes [M Phi_q^T; Phi_q 0], so that the start is solved by the step's own SNES in another mode:
+  equations of motion, states and definitions at t_0, constraints differentiated to the level of accelerations,
+  Phi_q q'' + (Phi_q q')_q q' + 2 Phi_qt q' + Phi_tt = 0 (6c), velocity-level ones once.
+
+  Then a second solve a little later gives q'''_0. From it come the first step, when the user gave none, and the start
+  value of the algorithmic acceleration, a_0 = q''(t_0 + lag h): with a_0 = q''_0 the first steps excite an oscillation of
+  the multipliers and an error of second order in q' (Arnold, Bruels 2007).
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* Which entries of a vector of unknowns go where */
+PetscErrorCode CopyRoles(const Integrator &I, Vec from, Vec to, bool coordinates, bool states, bool algebraic)
+{
+  const PetscScalar *x;
+  PetscScalar       *y;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(from, &n));
+  PetscCall(VecGetArrayRead(from, &x));
+  PetscCall(VecGetArray(to, &y));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r = RoleOf(I, i);
+    if (r == TSHHT3_COORDINATE ? coordinates : r == TSHHT3_STATE ? states : algebraic) y[i] = x[i];
+  }
+  PetscCall(VecRestoreArray(to, &y));
+  PetscCall(VecRestoreArrayRead(from, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
+PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
+{
+  const PetscScalar *u0, *v0, *a0;
+  PetscScalar       *u, *v;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(U, &n));
+  PetscCall(VecGetArrayRead(I.U0, &u0));
+  PetscCall(VecGetArrayRead(I.V0, &v0));
+  PetscCall(VecGetArrayRead(I.A0, &a0));
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(VecGetArray(V, &v));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r = RoleOf(I, i);
+    u[i]               = u0[i] + (r == TSHHT3_COORDINATE ? d * (v0[i] + d / 2 * a0[i]) : r == TSHHT3_STATE ? d * v0[i] : 0);
+    v[i]               = v0[i] + (r == TSHHT3_COORDINATE ? d * a0[i] : 0);
+  }
+  PetscCall(VecRestoreArray(V, &v));
+  PetscCall(VecRestoreArray(U, &u));
+  PetscCall(VecRestoreArrayRead(I.A0, &a0));
+  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  PetscCall(VecRestoreArrayRead(I.U0, &u0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U1, V1, A1 = U, V, 0 and the mode, time and (tiny) step of the start */
+PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T;
+
+  PetscFunctionBegin;
+  PetscCall(TimeScale(ts, &T));
+  I.mode = Mode::Start;
+  I.t1   = t;
+  I.h    = 1e-12 * T; /* (beta h^2 K + gamma h C)/M is rounding for anything a double can integrate */
+  PetscCall(VecCopy(U, I.U1));
+  PetscCall(VecCopy(V, I.V1));
+  PetscCall(VecZeroEntries(I.A1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode MakeStartMatrix(TS ts)
+{
+  Integrator &I = Get(ts);
+  Mat         J, P;
+
+  PetscFunctionBegin;
+  PetscCall(SNESSetUp(ts->snes));
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(FormJacobian(ts->snes, I.X, J, P, ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Jerk by a second consistent solve, d later; zero where it cannot be had. Leaves X as it was. */
+PetscErrorCode Jerk(TS ts, Vec jerk)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T;
+  PetscBool   ok;
+  Vec         X0, U, V;
+
+  PetscFunctionBegin;
+  PetscCall(TimeScale(ts, &T));
+  const PetscReal d = 1e-5 * T;
+  PetscCall(VecDuplicate(I.X, &X0));
+  PetscCall(VecDuplicate(I.X, &U));
+  PetscCall(VecDuplicate(I.X, &V));
+  PetscCall(VecCopy(I.X, X0));
+  PetscCall(Advance(I, d, U, V));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, U, V, PETSC_FALSE, &ok));
+  PetscCall(VecZeroEntries(jerk));
+  if (ok) {
+    PetscCall(VecAXPY(I.X, -1, X0));
+    PetscCall(VecScale(I.X, 1 / d));
+    PetscCall(CopyRoles(I, I.X, jerk, true, true, false));
+  } else PetscCall(PetscInfo(ts, "start: no consistent accelerations at t_0 + %g, the start goes without q'''\n", (double)d));
+  PetscCall(VecCopy(X0, I.X));
+  PetscCall(VecDestroy(&V));
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&X0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run */
+PetscErrorCode FirstStep(TS ts, Vec jerk, PetscReal *h)
+{
+  Integrator &I = Get(ts);
+  PetscReal   e3, e2;
+
+  PetscFunctionBegin;
+  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
+  PetscCall(CorrectionNorm(ts, jerk, &e3));
+  PetscCall(CorrectionNorm(ts, I.A0, &e2));
+  const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
+  PetscReal       h3 = e3 > 0 ? 0.5 * PetscPowReal(e3, (PetscReal)-1 / 3) : PETSC_MAX_REAL;
+  if (e3 <= 0 && e2 > 0) h3 = PetscPowReal(e2, -0.5);
+  *h = PetscMin(h3, span / 10);
+  *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* a_0 and w_0 as a step of length h would have left them, unless q''' is too wild to be believed */
+PetscErrorCode Lag(TS ts, Vec jerk)
+{
+  Integrator        &I = Get(ts);
+  const PetscReal    h = ts->time_step;
+  const PetscScalar *j;
+  PetscScalar       *x;
+  PetscInt           n;
+  PetscReal          e;
+
+  PetscFunctionBegin;
+  I.h      = h;
+  I.h_last = h;
+  PetscCall(CorrectionNorm(ts, jerk, &e));
+  if (e * h > 100) {
+    PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)(e * h)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGetLocalSize(jerk, &n));
+  PetscCall(VecGetArrayRead(jerk, &j));
+  PetscCall(VecGetArray(I.predictor.D[0], &x));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r = RoleOf(I, i);
+    if (IsDifferential(r)) x[i] += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j[i];
+  }
+  PetscCall(VecRestoreArray(I.predictor.D[0], &x));
+  PetscCall(VecRestoreArrayRead(jerk, &j));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X holds the accelerations, derivatives and algebraic unknowns at U0, V0 */
+PetscErrorCode Distribute(Integrator &I)
+{
+  PetscFunctionBegin;
+  PetscCall(VecZeroEntries(I.A0));
+  PetscCall(CopyRoles(I, I.X, I.A0, true, false, false));
+  PetscCall(CopyRoles(I, I.X, I.V0, false, true, false));
+  PetscCall(CopyRoles(I, I.X, I.U0, false, false, true));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ClearAlgebraicRates(Integrator &I, Vec V)
+{
+  PetscScalar *v;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(V, &n));
+  PetscCall(VecGetArray(V, &v));
+  for (PetscInt i = 0; i < n; i++)
+    if (!IsDifferential(RoleOf(I, i))) v[i] = 0;
+  PetscCall(VecRestoreArray(V, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  PetscCall(EnterStart(ts, t, U, V));
+  PetscCall(MakeStartMatrix(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The singular matrix of the start, explained: an error in any case */
+PetscErrorCode NameRedundant(TS ts)
+{
+  Integrator           &I = Get(ts);
+  IS                    multipliers;
+  std::vector<PetscInt> list;
+  PetscInt              start, n = 0, rows[20];
+  Mat                   P;
+  char                  text[256] = "";
+  size_t                used;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
+  for (size_t i = 0; i < I.role.size(); i++)
+    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) list.push_back(start + (PetscInt)i);
+  if (I.constraints()) {
+    PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)list.size(), list.data(), PETSC_COPY_VALUES, &multipliers));
+    PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+    PetscCall(LinearNameDependent(P, multipliers, 20, &n, rows));
+    PetscCall(ISDestroy(&multipliers));
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(PetscStrlen(text, &used));
+    if (used < sizeof(text) - 16) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%" PetscInt_FMT, i ? ", " : "", rows[i]));
+  }
+  PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.", (double)ts->ptime, text);
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+          "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g, and not by dependent constraints: look for a coordinate without mass that no constraint holds, "
+          "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);
+}
+
+/* X from U, V at t; X enters as the guess */
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T;
+
+  PetscFunctionBegin;
+  PetscCall(EnterStart(ts, t, U, V));
+  if (I.constraints()) {
+    PetscCall(TimeScale(ts, &T));
+    PetscCall(ConstraintDerivatives(ts, t, U, V, T, NULL, I.gamma));
+  }
+  if (!have_matrix) PetscCall(MakeStartMatrix(ts));
+  /* the matrix is made beforehand, since the first residual needs it */
+  const Corrector saved   = I.corrector;
+  I.corrector.want_matrix = PETSC_FALSE;
+  I.corrector.have_matrix = PETSC_TRUE;
+  I.corrector.floor       = 0;
+  PetscCall(Iterate(ts, ok));
+  I.corrector             = saved;
+  I.corrector.have_matrix = PETSC_FALSE;
+  I.corrector.want_matrix = PETSC_TRUE;
+  I.corrector.h_matrix    = 0;
+  I.corrector.rate        = -1;
+  I.mode                  = Mode::Step;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From vec_sol and vec_dot at ptime; history is forgotten */
+PetscErrorCode Start(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscBool   current, ok, none;
+  Vec         jerk;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
+  PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
+  I.stat.restarts++;
+  PetscCall(VecCopy(ts->vec_sol, I.U0));
+  PetscCall(VecCopy(ts->vec_dot, I.V0));
+  PetscCall(ClearAlgebraicRates(I, I.V0));
+  PetscCall(UpdateWeights(ts, I.U0));
+  PetscCall(CheckInitialState(ts, &current));
+
+  PetscCall(VecZeroEntries(I.X));
+  PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, current, &ok));
+  if (!ok) {
+    PetscCall(PetscInfo(ts, "start: %s\n", I.failure));
+    PetscBool singular;
+    PetscCall(PetscStrendswith(I.failure, "singular", &singular));
+    if (singular) PetscCall(NameRedundant(ts));
+    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
+  }
+  PetscCall(Distribute(I));
+  PetscCall(VecCopy(I.X, I.predictor.D[0]));
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+
+  PetscCall(VecDuplicate(I.X, &jerk));
+  PetscCall(Jerk(ts, jerk));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &none));
+  if (I.auto_h && !none) {
+    PetscCall(FirstStep(ts, jerk, &ts->time_step));
+    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
+    I.auto_h = PETSC_FALSE;
+  }
+  PetscCall(Lag(ts, jerk));
+  PetscCall(VecDestroy(&jerk));
+  if (I.F0) {
+    PetscCall(VecZeroEntries(I.A1));
+    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
+  }
+  PetscCall(PredictorReset(ts));
+  PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A step so short that rounding of Phi, eps |q|/(beta h^2), would drown the accelerations: TSEvent may ask for one, or the
+  final time. q and q' advance by Taylor series, whose error is far below rounding of the corrector's, and accelerations
+  and multipliers are made consistent anew.
+*/
+PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T, e;
+
+  PetscFunctionBegin;
+  *tiny = PETSC_FALSE;
+  if (!I.count[TSHHT3_HOLONOMIC] || h > 1e-4 * I.h_regular) {
+    /* the common case is decided without a reduction: no step of regular size is tiny */
+    if (!I.count[TSHHT3_HOLONOMIC] || I.h_regular > 0) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  const PetscReal h0 = I.h;
+  I.h                = 1;
+  PetscCall(CorrectionNorm(ts, I.A0, &e));
+  I.h = h0;
+  PetscCall(TimeScale(ts, &T));
+  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
+  const PetscReal noise = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h);
+  *tiny                 = (PetscBool)(noise > 0.01 * a);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would */
+PetscErrorCode TinyStep(TS ts, PetscBool *ok)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal h = I.h, t1 = I.t1;
+  Vec             U, V;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "step of %g is below what rounding of q allows the corrector: Taylor series\n", (double)h));
+  I.stat.tiny_steps++;
+  PetscCall(VecDuplicate(I.U0, &U));
+  PetscCall(VecDuplicate(I.U0, &V));
+  PetscCall(Advance(I, h, U, V));
+  PetscCall(VecCopy(I.predictor.D[0], I.X));
+  PetscCall(ConsistentAccelerations(ts, t1, U, V, PETSC_FALSE, ok));
+  I.h  = h;
+  I.t1 = t1;
+  PetscCall(VecDestroy(&V));
+  PetscCall(VecDestroy(&U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

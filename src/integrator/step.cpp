@@ -1,0 +1,247 @@
+/*
+  One step: begin, predict, correct, estimate, accept or reject.
+
+  The state at t_n is U0, V0, A0 and the unknowns X0 (predictor.D[0]); an accepted step stays in U1, V1, A1, X until the next
+  one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
+  whatever happens in between.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+PetscErrorCode NoteState(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether someone other than the integrator has changed the solution since the last step: an event, a post-step function,
+   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. */
+PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
+{
+  Integrator      &I = Get(ts);
+  PetscObjectState s, d;
+  PetscObjectId    id;
+  PetscBool        same_u, same_v;
+
+  PetscFunctionBegin;
+  *changed = PETSC_FALSE;
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &s));
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &d));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &id));
+  const PetscInt touched = s != I.sol_state || d != I.dot_state || id != I.sol_id;
+  PetscInt       any;
+  PetscCallMPI(MPI_Allreduce(&touched, &any, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecEqual(ts->vec_sol, U, &same_u));
+  PetscCall(VecEqual(ts->vec_dot, V, &same_v));
+  *changed = (PetscBool)(!same_u || !same_v);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The accepted step becomes the history */
+PetscErrorCode Commit(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PredictorUpdate(ts, I.t1, I.X));
+  PetscCall(VecCopy(I.U1, I.U0));
+  PetscCall(VecCopy(I.V1, I.V0));
+  PetscCall(VecCopy(I.A1, I.A0));
+  I.h_last = I.h;
+  if (I.F0) {
+    PetscCall(VecZeroEntries(I.A1)); /* f_n of (9a): everything but the inertia forces */
+    PetscCall(EvaluateResidual(ts, I.t1, I.U0, I.V0, I.A1, I.F0));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the step starts from: the last one, the one before a roll-back, or a consistent start */
+PetscErrorCode Begin(TS ts)
+{
+  Integrator &I       = Get(ts);
+  PetscBool   changed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (!ts->steprestart) {
+    if (ts->steprollback) PetscCall(StateWasChanged(ts, I.U0, I.V0, &changed));
+    else if (I.have_step) PetscCall(StateWasChanged(ts, I.U1, I.V1, &changed));
+    else if (!I.stat.restarts) changed = PETSC_TRUE;
+    if (changed) PetscCall(PetscInfo(ts, "the solution was changed from outside: restart\n"));
+  }
+  if (ts->steprestart || changed) {
+    I.have_step = PETSC_FALSE;
+    PetscCall(Start(ts));
+  } else if (I.have_step && !ts->steprollback) PetscCall(Commit(ts));
+  I.have_step = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
+PetscErrorCode TrueAcceleration(Integrator &I)
+{
+  const PetscScalar *x;
+  PetscScalar       *a;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  if (I.form != TSHHT3_FORM_PAPER) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetLocalSize(I.X, &n));
+  PetscCall(VecGetArrayRead(I.X, &x));
+  PetscCall(VecGetArray(I.A1, &a));
+  for (PetscInt i = 0; i < n; i++)
+    if (RoleOf(I, i) == TSHHT3_COORDINATE) a[i] = x[i];
+  PetscCall(VecRestoreArray(I.A1, &a));
+  PetscCall(VecRestoreArrayRead(I.X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
+{
+  Integrator     &I    = Get(ts);
+  const PetscReal h    = I.h;
+  const PetscReal stop = HHT3NextStop(ts);
+
+  PetscFunctionBegin;
+  PetscCall(TrueAcceleration(I));
+  PetscCall(UpdateWeights(ts, I.U1));
+  PetscCall(HoldStep(ts, h, &next));
+  ts->ptime = I.t1;
+  /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
+    ts->ptime = stop;
+  ts->time_step = next;
+  if (!tiny) I.h_regular = h;
+  I.stat.steps++;
+  I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
+  I.stat.h_max = PetscMax(I.stat.h_max, h);
+  I.have_step  = PETSC_TRUE;
+  PetscCall(NoteState(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.h  = ts->time_step;
+  I.t0 = ts->ptime;
+  I.t1 = ts->ptime + I.h;
+  PetscCall(TSPreStage(ts, I.t1));
+  PetscCall(IsTinyStep(ts, I.h, tiny));
+  if (*tiny) PetscCall(TinyStep(ts, ok));
+  else {
+    PetscCall(Predict(ts, I.X));
+    PetscCall(Correct(ts, ok));
+  }
+  PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
+  PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* vec_sol and vec_dot take the new state while TSAdapt looks at it, and the old one back if it is rejected */
+PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.status = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
+  PetscCall(VecCopy(I.U1, ts->vec_sol));
+  PetscCall(VecCopy(I.V1, ts->vec_dot));
+  PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
+  if (*accept && tiny && I.h_regular > 0 && !HHT3EventActive(ts)) *next = PetscMax(*next, PetscMin(I.h_regular, HHT3NextStop(ts) - I.t1));
+  if (*next <= 0) *next = I.h;
+  if (!*accept) {
+    PetscCall(VecCopy(I.U0, ts->vec_sol));
+    PetscCall(VecCopy(I.V0, ts->vec_dot));
+    I.stat.rejected++;
+    PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
+  }
+  I.status = *accept ? TS_STEP_COMPLETE : TS_STEP_INCOMPLETE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a rejection: is there a point in another attempt? */
+PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
+{
+  PetscFunctionBegin;
+  ts->reject++;
+  if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
+  else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
+  else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
+PetscErrorCode Fail(TS ts, const char *what)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
+             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).",
+             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime);
+  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Step(TS ts)
+{
+  Integrator &I          = Get(ts);
+  PetscInt    rejections = 0;
+  PetscBool   ok, tiny, accept = PETSC_TRUE;
+  PetscReal   next = ts->time_step;
+
+  PetscFunctionBegin;
+  PetscCheck(ts->time_step > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
+  I.failure[0] = 0;
+  PetscCall(Begin(ts));
+  I.status = TS_STEP_INCOMPLETE;
+  while (!ts->reason && I.status != TS_STEP_COMPLETE) {
+    PetscCall(Attempt(ts, &tiny, &ok));
+    if (ok) {
+      PetscCall(Choose(ts, tiny, &next, &accept));
+      if (accept) PetscCall(Accept(ts, tiny, next));
+      else ts->time_step = next;
+    }
+    if (!ok || !accept) {
+      accept = PETSC_FALSE;
+      PetscCall(CheckRejections(ts, ++rejections));
+    }
+  }
+  if (I.status == TS_STEP_COMPLETE) PetscCall(CheckpointIfDue(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Back to t_n: U0, V0 and the history have not been touched since */
+PetscErrorCode RollBack(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  I.have_step = PETSC_FALSE;
+  I.stat.steps--;
+  PetscCall(NoteState(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
