@@ -47,7 +47,7 @@ int RunAllRanks()
 /* Open MPI and its helpers leak at start-up and at the end. */
 extern "C" const char *__lsan_default_suppressions()
 {
-  return "leak:libopen-pal\nleak:libopen-rte\nleak:libmpi\nleak:libpmix\nleak:mca_\nleak:libhwloc\nleak:libOpenCL\n";
+  return "leak:libopen-pal\nleak:libopen-rte\nleak:libmpi\nleak:libpmix\nleak:mca_\nleak:libhwloc\nleak:libevent\n";
 }
 #endif
 

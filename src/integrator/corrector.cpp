@@ -24,6 +24,9 @@ namespace hht3
 namespace
 {
 
+/* A remembered rate is believed down to here: it was measured on smaller corrections, and rates grow with them */
+constexpr PetscReal remembered = 0.02;
+
 const char *RoleName(const Integrator &I, PetscInt local)
 {
   static const char *const names[] = {"the equation of motion of a coordinate", "the equation of a first-order state",
@@ -102,7 +105,7 @@ PetscErrorCode Judge(TS ts, PetscReal e)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
-    const bool known = c.rate >= 0 && CorrectorError(c.rate, e) <= tol;
+    const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
     if (known || e <= 0.1 * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
     else if (left <= 0) Diverge(I, "needs too many iterations");
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -123,8 +123,7 @@ PetscErrorCode SetUp(TS ts)
 
   PetscFunctionBegin;
   if (I.wall0 <= 0) {
-    PetscCall(PetscTime(&I.wall0));
-    PetscCall(PetscGetCPUTime(&I.cpu0));
+    ReadClocks(&I.wall0, &I.cpu0);
     I.progress_t0 = ts->ptime;
   }
   PetscCall(PetscCitationsRegister(citation, &cited));

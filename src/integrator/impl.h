@@ -105,9 +105,9 @@ struct Integrator {
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
   PetscInt         checkpoint_every = 0;
   TSHHT3Statistics stat = {};
-  PetscLogDouble   wall0 = 0, cpu0 = 0;
+  PetscReal        wall0 = 0, cpu0 = 0;
   PetscReal        progress_t0 = 0;
-  PetscLogDouble   progress_last = 0;
+  PetscReal        progress_last = 0;
 };
 
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
@@ -169,6 +169,7 @@ PetscErrorCode Fail(TS ts, const char *what);
 /* dense.cpp */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 /* report.cpp */
+void           ReadClocks(PetscReal *wall, PetscReal *cpu);
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 /* checkpoint.cpp */
