@@ -1,6 +1,6 @@
 #!/bin/sh
 # check.sh BUILD [ctest options]: runs the tests and ends with the line "N passed, N failed", with ctest's exit status.
-# Skipped tests count in neither number; they are named on the line before.
+# Skipped tests count in neither number; they are named before that line.
 set -u
 
 build=$1
@@ -20,7 +20,10 @@ if [ -z "$tests" ] || [ "$tests" = 0 ]; then
   echo "0 passed, 1 failed"
   exit 1
 fi
-[ "$skipped" = 0 ] || echo "$skipped skipped: $(sed -n 's/.*<testcase name="\([^"]*\)".*status="notrun".*/\1/p' "$results" | tr '\n' ' ')"
+if [ "$skipped" != 0 ]; then
+  echo "$skipped skipped:"
+  sed -n 's/.*<testcase name="\([^"]*\)".*status="notrun".*/  \1/p' "$results"
+fi
 echo "$((tests - failures - skipped)) passed, $failures failed"
 [ "$failures" = 0 ] || [ "$status" != 0 ] || status=1
 exit "$status"

@@ -6,6 +6,10 @@
   xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. The rate
   of the last corrections with the same matrix answers already after the first iteration.
 
+  Where h is not set by the error test (fixed steps, a largest h) the step's own error is far below the tolerance, and an
+  iteration error of c times the tolerance would be all that is left of its accuracy. Then c refers to the error estimate of
+  the last step instead, down to a hundredth of the tolerance under error control and without limit at fixed steps.
+
   The ladder, from the cheapest rung:
     reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
     renew      before a correction otherwise; within a correction when it is slow and the matrix is not of this step
@@ -91,7 +95,7 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   Integrator     &I     = Get(ts);
   Corrector      &c     = I.corrector;
   const PetscReal old_e = c.e;
-  const PetscReal tol   = I.mode == Mode::Start ? 1e-13 : c.c;
+  const PetscReal tol   = I.mode == Mode::Start ? 1e-13 : c.c * PetscClipInterval(c.wlte, I.fixed_h ? 0 : 0.01, 1);
   const PetscInt  left  = c.max_it - c.it;
 
   PetscFunctionBegin;

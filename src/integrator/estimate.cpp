@@ -155,7 +155,20 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   PetscCall(VecRestoreArrayRead(I.predictor.D[0], &x0));
   PetscCall(VecRestoreArrayRead(I.X, &x));
   PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
+  I.wlte_pending = *wlte;
   PetscCall(PetscLogEventEnd(events.estimate, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The estimate of an accepted step, for the corrector's tolerance in the next one: TSAdapt has usually asked for it */
+PetscErrorCode NoteError(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscReal   e;
+
+  PetscFunctionBegin;
+  if (I.wlte_pending < 0) PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
+  if (I.wlte_pending >= 0) I.corrector.wlte = I.wlte_pending;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,12 +177,9 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 {
   const Corrector &c = Get(ts).corrector;
-  PetscBool        none;
 
   PetscFunctionBegin;
-  if (*next <= h || *next >= c.hold * h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &none));
-  if (none) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*next <= h || *next >= c.hold * h || Get(ts).fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3NextStop(ts) - (ts->ptime + h) < 4 * *next) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
   *next = h;

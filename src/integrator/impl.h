@@ -34,6 +34,7 @@ struct Corrector {
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
+  PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
   PetscInt            it     = 0; /* of the present correction */
   PetscInt            base   = 0; /* iteration after which the present matrix came into use */
@@ -95,11 +96,13 @@ struct Integrator {
 
   /* bookkeeping */
   TSStepStatus     status = TS_STEP_INCOMPLETE;
+  PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
   PetscBool        have_step = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
   PetscObjectState sol_state = 0, dot_state = 0;
   PetscObjectId    sol_id = 0;
   PetscReal        h_regular = 0; /* last step that went through the corrector */
   PetscBool        auto_h = PETSC_FALSE;
+  PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */
   char             failure[512] = "";
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
@@ -146,6 +149,7 @@ PetscErrorCode FreshMatrixNextIteration(TS ts);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
+PetscErrorCode NoteError(TS ts);
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);

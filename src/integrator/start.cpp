@@ -155,6 +155,7 @@ PetscErrorCode Lag(TS ts, Vec jerk)
   I.h      = h;
   I.h_last = h;
   PetscCall(CorrectionNorm(ts, jerk, &e));
+  I.corrector.wlte = e * h;
   if (e * h > 100) {
     PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)(e * h)));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -270,7 +271,7 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
 PetscErrorCode Start(TS ts)
 {
   Integrator &I = Get(ts);
-  PetscBool   current, ok, none;
+  PetscBool   current, ok;
   Vec         jerk;
 
   PetscFunctionBegin;
@@ -300,8 +301,7 @@ PetscErrorCode Start(TS ts)
 
   PetscCall(VecDuplicate(I.X, &jerk));
   PetscCall(Jerk(ts, jerk));
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &none));
-  if (I.auto_h && !none) {
+  if (I.auto_h && !I.fixed_h) {
     PetscCall(FirstStep(ts, jerk, &ts->time_step));
     PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
     I.auto_h = PETSC_FALSE;

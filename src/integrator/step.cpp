@@ -156,7 +156,8 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  I.status = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
+  I.status       = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
+  I.wlte_pending = -1;
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
   PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
@@ -167,7 +168,7 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
     PetscCall(VecCopy(I.V0, ts->vec_dot));
     I.stat.rejected++;
     PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
-  }
+  } else if (!tiny) PetscCall(NoteError(ts));
   I.status = *accept ? TS_STEP_COMPLETE : TS_STEP_INCOMPLETE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -212,6 +213,7 @@ PetscErrorCode Step(TS ts)
   PetscFunctionBegin;
   PetscCheck(ts->time_step > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(Begin(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {

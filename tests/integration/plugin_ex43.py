@@ -6,6 +6,7 @@ usage: plugin_ex43.py libhhtdae.so ex43
 
 import math
 import re
+import subprocess
 import sys
 
 from common import check, run, tutorial
@@ -31,22 +32,35 @@ by_environment = run([program, *view], PETSC_OPTIONS=" ".join(plugin))
 check(re.search(r"type: hhtdae", by_arguments), "-ts_view does not show the type:\n" + by_arguments)
 check(by_arguments == by_environment, "options from PETSC_OPTIONS gave another run:\n" + by_environment)
 
-# -damping 0 makes the program set an IFunction F(t,U,A) without velocity, anything else an I2Function.
-for damping in ("0", "0.1", "1", "2"):
-    # Every step commits at most the tolerance, and about tol^(-1/3) steps add up to tol^(2/3).
+# Every step commits at most the tolerance, and about tol^(-1/3) steps add up to tol^(2/3) times a factor, which grows with
+# the number of periods that are not damped away. The bounds are 1.7 times what alpha = -0.3 was measured to need.
+# The first damping is rounding: 0 itself makes the program set no I2Function.
+for damping, factor in (("1e-12", 36), ("0.1", 7), ("1", 0.9), ("2", 0.45)):
     previous = None
     for tolerance in (1e-4, 1e-6, 1e-8):
-        seen = errors("-damping", damping, "-ts_rtol", "0", "-ts_atol", str(tolerance), "-ts_adapt_type", "basic")
+        seen = errors("-damping", damping, "-ts_rtol", "0", "-ts_atol", str(tolerance))
         worst, steps = max(seen), len(seen)
-        print("damping %-4s tolerance %g: error %.2e in %d steps" % (damping, tolerance, worst, steps))
-        check(worst < ERROR_BOUND * tolerance ** (2 / 3), "the error %g is too large" % worst)
+        print("damping %-5s tolerance %g: error %.2e in %d steps" % (damping, tolerance, worst, steps))
+        check(worst < factor * tolerance ** (2 / 3), "the error %g is too large" % worst)
         if previous:
-            check(worst < previous[0] / 5, "100 times the accuracy was asked for, the error fell by less than 5")
-            check(steps > 2 * previous[1], "100 times the accuracy was asked for with less than twice the steps")
+            check(worst < previous[0] / 10, "a tolerance 100 times smaller made the error less than 10 times smaller")
+            check(steps > 3 * previous[1], "a tolerance 100 times smaller took less than 3 times the steps")
         previous = worst, steps
 
-    # Fixed steps: the observed order, which -ts_dt and -ts_adapt_type none must reach undisturbed
+    # Fixed steps: -ts_dt and -ts_adapt_type none have to be obeyed, and the order is 2.
     coarse, fine = (max(errors("-damping", damping, "-ts_adapt_type", "none", "-ts_dt", h)) for h in ("0.02", "0.01"))
     order = math.log2(coarse / fine)
-    print("damping %-4s fixed steps: errors %.2e %.2e, order %.2f" % (damping, coarse, fine, order))
+    print("damping %-5s fixed steps: errors %.2e %.2e, order %.2f" % (damping, coarse, fine, order))
     check(abs(order - 2) < 0.1, "the order is %.2f instead of 2" % order)
+
+# With -damping 0 the program sets an IFunction F(t,U,U'') in place of an I2Function. Taking it, or saying what to call
+# instead, are both right; a wrong answer is not.
+undamped = [program, *plugin, "-damping", "0", "-ts_monitor_error", "-ts_rtol", "0", "-ts_atol", "1e-6"]
+done = subprocess.run(undamped, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+if done.returncode:
+    check("TSSetI2Function" in done.stderr, "an IFunction was refused without a hint:\n" + done.stderr[:2000])
+    print("damping 0: refused with a hint at TSSetI2Function")
+else:
+    worst = max(float(x) for x in re.findall(r"2-norm of error (\S+)", done.stdout))
+    print("damping 0: IFunction taken, error %.2e" % worst)
+    check(worst < 36e-4, "an IFunction was taken and integrated with an error of %g" % worst)

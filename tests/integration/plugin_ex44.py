@@ -2,7 +2,7 @@
 
 Between two bounces u'' = -g - Cd/2 u'|u'| has a solution in closed form, with and without drag. The script checks
 every printed bounce time and every printed height against it.
-usage: plugin_ex44.py libhhtdae.so ex44 [mpiexec -n]
+usage: plugin_ex44.py libhhtdae.so ex44 mpiexec -n
 """
 
 import math
@@ -55,7 +55,7 @@ def flights(drag, height, number):
 
 def one_ball(drag, tolerance):
     """Largest errors of bounce times and of heights on one rank"""
-    out = run([program, *plugin, "-Cd", drag, "-ts_rtol", "0", "-ts_atol", tolerance, "-ts_adapt_type", "basic",
+    out = run([program, *plugin, "-Cd", drag, "-ts_rtol", "0", "-ts_atol", tolerance,
                "-ts_event_monitor", "-ts_monitor", "-ts_monitor_solution", "::ascii_matlab"])
     path = flights(float(drag), 0.0, BOUNCES + 1)
     times = [float(t) for t in re.findall(r"Event 0 zero crossing located at time (\S+)", out)]
@@ -81,23 +81,25 @@ def one_ball(drag, tolerance):
 # and TSEvent's tolerance on u, 1e-6.
 time_error, height_error = one_ball("0", "1e-4")
 check(time_error < 1e-4, "bounce times are off by %g" % time_error)
-check(height_error < 1e-3, "heights are off by %g" % height_error)
+check(height_error < 1.5e-3, "heights are off by %g" % height_error)
 
+# With drag the bounds are three times what was measured with alpha = -0.3.
 previous = math.inf
-for tolerance, bound in (("1e-4", TIME_BOUND_4), ("1e-6", TIME_BOUND_6)):
+for tolerance, bound in (("1e-4", 6e-3), ("1e-6", 3.5e-4)):
     time_error, height_error = one_ball("0.1", tolerance)
     check(time_error < bound, "bounce times are off by %g" % time_error)
-    check(height_error < 20 * bound, "heights are off by %g" % height_error)
+    check(height_error < 4 * bound, "heights are off by %g" % height_error)
     check(time_error < previous, "a tighter tolerance gave worse bounce times")
     previous = time_error
 
-# Two balls on two ranks meet the ground at different times; the steps are common, so both have to be found.
-if len(sys.argv) > 3:
-    out = run([*sys.argv[3:], 2, program, *plugin])
-    for rank in (0, 1):
-        exact = [f.end for f in flights(0.0, 5.0 * rank, BOUNCES)]
-        times = [float(t) for t in re.findall(r"\[%d\]: Ball hit the ground at t = *(\S+) seconds" % rank, out)]
-        check(len(times) >= BOUNCES - rank, "%d bounces on rank %d" % (len(times), rank))
-        worst = max(abs(t - e) for t, e in zip(times, exact))
-        print("two ranks: rank %d bounced %d times, within %.1e" % (rank, len(times), worst))
-        check(worst < 0.006, "times printed with two decimals are off by %g on rank %d" % (worst, rank))
+# Two balls on two ranks meet the ground at different times; the steps are common, so both have to be found, until the
+# first ball has made its last bounce.
+out = run([*sys.argv[3:], 2, program, *plugin])
+end = flights(0.0, 0.0, BOUNCES)[-1].end
+for rank in (0, 1):
+    exact = [f.end for f in flights(0.0, 5.0 * rank, BOUNCES) if f.end <= end]
+    times = [float(t) for t in re.findall(r"\[%d\]: Ball hit the ground at t = *(\S+) seconds" % rank, out)]
+    check(len(times) == len(exact), "rank %d: %d bounces instead of %d" % (rank, len(times), len(exact)))
+    worst = max(abs(t - e) for t, e in zip(times, exact))
+    print("two ranks: rank %d bounced %d times, within %.1e" % (rank, len(times), worst))
+    check(worst < 0.006, "times printed with two decimals are off by %g on rank %d" % (worst, rank))
