@@ -1,0 +1,288 @@
+/* The choice of a direct solver: by the work that a factorization takes, not by the number of unknowns */
+#include "graph.h"
+#include "linear.h"
+#include "mumpsnd.h"
+
+/*
+  KLU works column by column in scalar loops; MUMPS works on dense fronts with BLAS, at a cost per call and per front.
+  The number of unknowns says little: what counts is the work, and how much of it there is per entry of the factor.
+  Measured with tests/bench/linear_crossover.cpp (Debian 12, OpenBLAS, one core; work of L D L^T in AMD order; times in
+  ms for one factorization and three solves):
+
+      family, size              n     nz(L)     work  work/nz     KLU   MUMPS LU   MUMPS LDL^T
+      planar chain, 10         50   1.6e+02  5.4e+02      3.3    0.007      0.28          0.28
+      planar chain, 10000   50000   1.7e+05  5.9e+05      3.5     5.9         97           105
+      20 modes, 1000 bodies 25000   3.7e+05  6.7e+06       18      24         53            36
+      10 bodies, 40 modes     450   1.1e+04  3.5e+05       31     0.48       1.1          0.71
+      10 bodies, 80 modes     850   3.8e+04  2.2e+06       58     2.3        3.6           2.2
+      1 body, 160 modes       165   1.4e+04  1.5e+06      110     1.3        1.8           1.1
+      plate, 12 x 12 bricks  1092   7.2e+04  6.1e+06       86     8.6         14           8.1
+      1 body, 320 modes       325   5.3e+04  1.2e+07      217      17         17           9.2
+      plate, 16 x 16 bricks  1836   1.4e+05  1.4e+07       99      23         31            17
+      block, 6^3 bricks      1176   1.2e+05  1.9e+07      155      16         15            12
+      plate, 24 x 24 bricks  3900   3.8e+05  5.1e+07      136     100         81            53
+      block, 8^3 bricks      2430   4.6e+05  1.5e+08      318     102         74            51
+      block, 16^3 bricks    15606   1.0e+07  1.4e+10     1373   13500       2100          1170
+
+  So MUMPS begins at about 5e6 operations with LDL^T and 2e7 with LU, where there are at least 40 per entry.
+*/
+static const double LARGE_SYMMETRIC = 5e6, LARGE_UNSYMMETRIC = 2e7, LARGE_PER_ENTRY = 40;
+
+/* Counting stops here: a factor with this many entries is large by any measure */
+static const double COUNT_LIMIT = 1e7;
+
+static const char *const small_packages[] = {MATSOLVERKLU, MATSOLVERUMFPACK, MATSOLVERSUPERLU, LINEAR_MUMPSND,
+                                             MATSOLVERMUMPS};
+static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS,   MATSOLVERSUPERLU_DIST,
+                                             MATSOLVERUMFPACK, MATSOLVERSUPERLU, MATSOLVERKLU};
+
+/* ---- what the user settled ---- */
+
+static PetscErrorCode OptionGiven(KSP ksp, const char name[], PetscBool *given)
+{
+  PetscOptions options;
+  const char  *prefix;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetOptions((PetscObject)ksp, &options));
+  PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
+  PetscCall(PetscOptionsHasName(options, prefix, name, given));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode PackageGiven(PC pc, PetscBool *given)
+{
+  MatSolverType package = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  *given = package ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
+{
+  PC        pc;
+  KSPType   ksp_type;
+  PCType    pc_type;
+  PetscBool by_option, by_program = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *choice = LinearChoice();
+  PetscCall(KSPGetType(ksp, &ksp_type));
+  if (!ksp_type) PetscCall(KSPSetType(ksp, KSPPREONLY));
+
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetType(pc, &pc_type));
+  PetscCall(OptionGiven(ksp, "-pc_type", &by_option));
+  choice->user_pc = pc_type || by_option ? PETSC_TRUE : PETSC_FALSE;
+  if (pc_type) PetscCall(PackageGiven(pc, &by_program));
+  PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &by_option));
+  choice->user_package = by_program || by_option ? PETSC_TRUE : PETSC_FALSE;
+  if (!pc_type) PetscCall(PCSetType(pc, PCLU));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the work ---- */
+
+struct Size {
+  LinearWork work;
+  PetscBool  large;
+  char       text[128];
+};
+
+/* On one process by counting; with rows elsewhere only the packages for distributed matrices come into question */
+static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
+{
+  PetscMPIInt     processes;
+  PetscBool       seqaij, bounded, done;
+  IS              row, col;
+  const PetscInt *order;
+  LinearGraph     graph;
+
+  PetscFunctionBegin;
+  *size = Size();
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &processes));
+  PetscCall(PetscObjectTypeCompare((PetscObject)P, MATSEQAIJ, &seqaij));
+  if (processes > 1 || !seqaij) {
+    size->large = processes > 1 ? PETSC_TRUE : PETSC_FALSE;
+    PetscCall(PetscSNPrintf(size->text, sizeof size->text,
+                            processes > 1 ? "matrix distributed over %d processes" : "matrix not of type seqaij",
+                            processes));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(LinearGraphFromMat(P, &graph, &done));
+  PetscCall(MatGetOrdering(P, PetscDefined(HAVE_SUITESPARSE) ? "amd" : "metisnd", &row, &col));
+  PetscCall(ISGetIndices(row, &order));
+  LinearCountWork(graph, order, COUNT_LIMIT, &size->work, &bounded);
+  PetscCall(ISRestoreIndices(row, &order));
+  PetscCall(ISDestroy(&row));
+  PetscCall(ISDestroy(&col));
+  const double threshold = symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC;
+  const double per_entry = size->work.flops / PetscMax(size->work.factor, 1.0);
+  size->large = !bounded || (size->work.flops > threshold && per_entry > LARGE_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(PetscSNPrintf(size->text, sizeof size->text, "factor with %s%.2g entries, %.2g operations",
+                          bounded ? "" : "more than ", size->work.factor, size->work.flops));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the package ---- */
+
+/* The first of the list that factors P in this way; NULL if none does */
+static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large, const char **package)
+{
+  PetscFunctionBegin;
+  *package         = NULL;
+  const auto begin = large ? std::begin(large_packages) : std::begin(small_packages);
+  const auto end   = large ? std::end(large_packages) : std::end(small_packages);
+  for (auto p = begin; p != end; ++p) {
+    PetscBool available;
+    PetscCall(MatGetFactorAvailable(P, *p, type, &available));
+    if (!available) {
+      PetscCall(PetscInfo(P, "%s does not factor this matrix here\n", *p));
+      continue;
+    }
+    *package = *p;
+    break;
+  }
+  PetscFunctionReturn(0);
+}
+
+/* Packages that exploit symmetry of an indefinite matrix; the others' PCCHOLESKY wants a definite one */
+static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
+{
+  PetscBool mumps, ours;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
+  PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &ours));
+  *yes = mumps || ours ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+/* A change of type drops what the options said about the factorization, so they are read again */
+static PetscErrorCode SetPCType(PC pc, PCType type)
+{
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, type, &same));
+  if (same) PetscFunctionReturn(0);
+  PetscCall(PCSetType(pc, type));
+  PetscCall(PCSetFromOptions(pc));
+  PetscFunctionReturn(0);
+}
+
+/* A package cannot be exchanged under a factor that exists, so a change starts the preconditioner anew */
+static PetscErrorCode SetPackage(PC pc, const char package[])
+{
+  MatSolverType current = NULL;
+  PetscBool     same;
+  Mat           A, P;
+
+  PetscFunctionBegin;
+  PetscCall(PCFactorGetMatSolverType(pc, &current));
+  PetscCall(PetscStrcmp(current, package, &same));
+  if (same) PetscFunctionReturn(0);
+  if (current) {
+    PetscCall(PCGetOperators(pc, &A, &P));
+    PetscCall(PetscObjectReference((PetscObject)A));
+    PetscCall(PetscObjectReference((PetscObject)P));
+    PetscCall(PCReset(pc));
+    PetscCall(PCSetOperators(pc, A, P));
+    PetscCall(MatDestroy(&A));
+    PetscCall(MatDestroy(&P));
+  }
+  PetscCall(PCFactorSetMatSolverType(pc, package));
+  PetscFunctionReturn(0);
+}
+
+/* Only PETSc's own LU is left: it does not pivot, so zeros are moved off the diagonal by a permutation */
+static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
+{
+  PetscBool available, by_option;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetFactorAvailable(P, MATSOLVERPETSC, MAT_FACTOR_LU, &available));
+  if (available) {
+    PetscCall(SetPackage(pc, MATSOLVERPETSC));
+    PetscCall(PCFactorReorderForNonzeroDiagonal(pc, PETSC_SMALL));
+    PetscCall(PetscStrncpy(choice->text, "LU with petsc: no package that pivots is installed", sizeof choice->text));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(OptionGiven(ksp, "-ksp_type", &by_option));
+  if (!by_option) PetscCall(KSPSetType(ksp, KSPGMRES));
+  PetscCall(PCSetType(pc, PCNONE));
+  PetscCall(PetscStrncpy(choice->text, "GMRES without preconditioner: nothing factors this type of matrix",
+                         sizeof choice->text));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
+{
+  Size        size;
+  const char *package = NULL;
+  PetscBool   lu, cholesky;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCLU, &lu));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  if (!lu && !cholesky) {
+    PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(Measure(P, symmetric, &size));
+  if (!choice->user_pc) {
+    /* LDL^T where it halves a large work and a package for indefinite matrices is there */
+    PetscBool indefinite = PETSC_FALSE;
+    if (symmetric && size.large) PetscCall(FirstAvailable(P, MAT_FACTOR_CHOLESKY, PETSC_TRUE, &package));
+    if (package) PetscCall(FactorsIndefinite(package, &indefinite));
+    cholesky = choice->cholesky = indefinite;
+    PetscCall(SetPCType(pc, cholesky ? PCCHOLESKY : PCLU));
+  }
+  PetscCall(
+      FirstAvailable(P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, cholesky ? PETSC_TRUE : size.large, &package));
+  if (!package && !choice->user_pc) {
+    PetscCall(ChooseNone(ksp, P, pc, choice));
+    PetscFunctionReturn(0);
+  }
+  if (package) PetscCall(SetPackage(pc, package));
+  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", cholesky ? "LDL^T" : "LU",
+                          package ? package : "PETSc's default", size.text));
+  PetscFunctionReturn(0);
+}
+
+/* The user's package with the factorization it offers: LDL^T where the matrix is symmetric, possibly indefinite */
+static PetscErrorCode FollowPackage(Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
+{
+  MatSolverType package = NULL;
+  PetscBool     lu, cholesky, indefinite = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (!package) PetscFunctionReturn(0);
+  PetscCall(MatGetFactorAvailable(P, package, MAT_FACTOR_LU, &lu));
+  PetscCall(MatGetFactorAvailable(P, package, MAT_FACTOR_CHOLESKY, &cholesky));
+  if (symmetric && cholesky) PetscCall(FactorsIndefinite(package, &indefinite));
+  choice->cholesky = indefinite || (cholesky && !lu) ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(SetPCType(pc, choice->cholesky ? PCCHOLESKY : PCLU));
+  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s, with %s as the user chose",
+                          choice->cholesky ? "LDL^T" : "LU", package));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice)
+{
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetPC(ksp, &pc));
+  if (choice->user_pc && choice->user_package)
+    PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
+  else if (choice->user_package)
+    PetscCall(FollowPackage(P, symmetric, pc, choice));
+  else
+    PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
+  PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
+  PetscFunctionReturn(0);
+}

@@ -1,0 +1,154 @@
+#include "graph.h"
+#include <algorithm>
+#include <climits>
+#include <metis.h>
+
+template <typename Index>
+void LinearGraphFromEntries(PetscInt n, size_t count, const Index row[], const Index col[], Index base,
+                            LinearGraph *graph)
+{
+  std::vector<size_t> start(n + 1, 0);
+  for (size_t k = 0; k < count; ++k)
+    if (row[k] != col[k]) {
+      ++start[row[k] - base + 1];
+      ++start[col[k] - base + 1];
+    }
+  for (PetscInt i = 0; i < n; ++i) start[i + 1] += start[i];
+
+  std::vector<PetscInt> both(start[n]);
+  std::vector<size_t>   next(start.begin(), start.end() - 1);
+  for (size_t k = 0; k < count; ++k)
+    if (row[k] != col[k]) {
+      both[next[row[k] - base]++] = (PetscInt)(col[k] - base);
+      both[next[col[k] - base]++] = (PetscInt)(row[k] - base);
+    }
+
+  graph->n = n;
+  graph->xadj.assign(n + 1, 0);
+  graph->adj.clear();
+  graph->adj.reserve(both.size() / 2);
+  for (PetscInt i = 0; i < n; ++i) {
+    const auto first = both.begin() + start[i], last = both.begin() + start[i + 1];
+    std::sort(first, last);
+    graph->adj.insert(graph->adj.end(), first, std::unique(first, last));
+    graph->xadj[i + 1] = (PetscInt)graph->adj.size();
+  }
+}
+
+template void LinearGraphFromEntries<int>(PetscInt, size_t, const int[], const int[], int, LinearGraph *);
+#if defined(PETSC_USE_64BIT_INDICES)
+template void LinearGraphFromEntries<PetscInt>(PetscInt, size_t, const PetscInt[], const PetscInt[], PetscInt,
+                                               LinearGraph *);
+#endif
+
+PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
+{
+  PetscInt        n;
+  const PetscInt *ia, *ja;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
+  if (!*done) PetscFunctionReturn(0);
+  std::vector<PetscInt> row(ia[n]);
+  for (PetscInt i = 0; i < n; ++i) std::fill(row.begin() + ia[i], row.begin() + ia[i + 1], i);
+  LinearGraphFromEntries<PetscInt>(n, row.size(), row.data(), ja, 0, graph);
+  PetscCall(MatRestoreRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
+  *done = PETSC_TRUE;
+  PetscFunctionReturn(0);
+}
+
+/* Merges every unknown with its partner; group[i] and the members of each group in the order of elimination */
+static void MergePartners(PetscInt n, const std::vector<PetscInt> &partner, std::vector<PetscInt> &group,
+                          std::vector<PetscInt> &first, std::vector<PetscInt> &second)
+{
+  group.assign(n, -1);
+  for (PetscInt i = 0; i < (PetscInt)partner.size(); ++i) {
+    const PetscInt p = partner[i];
+    if (p < 0 || p == i || group[p] >= 0 || group[i] >= 0) continue;
+    group[p] = group[i] = (PetscInt)first.size();
+    first.push_back(p);
+    second.push_back(i);
+  }
+  for (PetscInt i = 0; i < n; ++i)
+    if (group[i] < 0) {
+      group[i] = (PetscInt)first.size();
+      first.push_back(i);
+      second.push_back(-1);
+    }
+}
+
+PetscErrorCode LinearMetisOrder(const LinearGraph &graph, const std::vector<PetscInt> &partner,
+                                std::vector<PetscInt> *order)
+{
+  std::vector<PetscInt> group, first, second;
+
+  PetscFunctionBegin;
+  PetscCheck(graph.adj.size() < (size_t)IDX_MAX, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "The pattern has %zu off-diagonal entries, more than this build of METIS can count (%zu); choose another "
+             "ordering",
+             graph.adj.size(), (size_t)IDX_MAX);
+  order->clear();
+  order->reserve(graph.n);
+  MergePartners(graph.n, partner, group, first, second);
+
+  const idx_t        groups = (idx_t)first.size();
+  std::vector<idx_t> xadj(groups + 1, 0), adj, seen(groups, -1), perm(groups), inverse(groups);
+  adj.reserve(graph.adj.size());
+  for (idx_t g = 0; g < groups; ++g) {
+    seen[g] = g;
+    for (PetscInt i : {first[g], second[g]})
+      for (PetscInt k = i < 0 ? 0 : graph.xadj[i]; k < (i < 0 ? 0 : graph.xadj[i + 1]); ++k) {
+        const idx_t other = (idx_t)group[graph.adj[k]];
+        if (seen[other] != g) adj.push_back(other);
+        seen[other] = g;
+      }
+    xadj[g + 1] = (idx_t)adj.size();
+  }
+
+  /* METIS reports an error for a graph without edges, for which every order is as good */
+  for (idx_t g = 0; g < groups; ++g) perm[g] = g;
+  if (!adj.empty()) {
+    idx_t nvtxs = groups, options[METIS_NOPTIONS];
+    METIS_SetDefaultOptions(options); /* the seed is fixed: the ordering is the same in every run */
+    const int status = METIS_NodeND(&nvtxs, xadj.data(), adj.data(), NULL, options, perm.data(), inverse.data());
+    PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB,
+               "METIS_NodeND returned %d for a graph of %lld vertices and %zu edges", status, (long long)groups,
+               adj.size() / 2);
+  }
+  for (idx_t g : perm) {
+    order->push_back(first[g]);
+    if (second[g] >= 0) order->push_back(second[g]);
+  }
+  PetscFunctionReturn(0);
+}
+
+/*
+  Row i of L has an entry in column j exactly if j lies on a path of the elimination tree from a neighbour k < i of i up
+  to i (Liu 1990). Walking these paths, each until a column already met in this row, counts every entry of L once and
+  grows the tree on the way: the parent of j is the first i that reaches it.
+*/
+void LinearCountWork(const LinearGraph &graph, const PetscInt order[], double limit, LinearWork *work,
+                     PetscBool *bounded)
+{
+  const PetscInt        n = graph.n;
+  std::vector<PetscInt> place(n), parent(n, -1), met(n, -1), count(n, 1);
+
+  *work    = LinearWork();
+  *bounded = PETSC_FALSE;
+  for (PetscInt k = 0; k < n; ++k) place[order[k]] = k;
+  for (PetscInt i = 0; i < n; ++i) {
+    const PetscInt v = order[i];
+    met[i]           = i;
+    work->factor += 1;
+    for (PetscInt k = graph.xadj[v]; k < graph.xadj[v + 1]; ++k)
+      for (PetscInt j = place[graph.adj[k]]; j < i && met[j] != i; j = parent[j]) {
+        met[j] = i;
+        ++count[j];
+        work->factor += 1;
+        if (parent[j] < 0) parent[j] = i;
+      }
+    if (work->factor > limit) break;
+  }
+  for (PetscInt j = 0; j < n; ++j) work->flops += (double)count[j] * (double)count[j];
+  if (work->factor <= limit) *bounded = PETSC_TRUE;
+}

@@ -1,0 +1,36 @@
+/*
+  What KSP gets: the choice of a direct solver where the user chose none, METIS orderings, and the names of redundant
+  constraints when a matrix turns out singular. The integrator calls these; they know nothing of time.
+*/
+#ifndef HHTDAE_LINEAR_H
+#define HHTDAE_LINEAR_H
+
+#include <petscksp.h>
+
+/* What the user settled, and what was chosen in its place; one per integrator */
+struct LinearChoice {
+  PetscBool user_pc      = PETSC_FALSE; /* the program or the options chose the preconditioner's type */
+  PetscBool user_package = PETSC_FALSE; /* ... or the package that factors the matrix */
+  PetscBool cholesky     = PETSC_FALSE; /* LDL^T was chosen, which stands on the symmetry of the matrix */
+  char      text[256]    = "";          /* for -ts_view and -info: what was chosen, and why */
+};
+
+/* Registers the ordering "metisnd" and whatever else KSP may be asked for by name */
+PetscErrorCode LinearRegister(void);
+
+/* Before KSPSetFromOptions(): preonly with a factorization where the program set no types, and notes what it did set */
+PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
+
+/* Once the Newton matrix P has its first values: the package and factorization, where the user chose none.
+   The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
+PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);
+
+/* Whether |y^T A x - x^T A y| is rounding for two fixed pseudo-random vectors: two products, no transpose */
+PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric);
+
+/* For a singular saddle-point matrix: global rows of multipliers that take part in linearly dependent constraints,
+   from the null space of Phi_q^T by inverse iteration on the regularized matrix; at most max of them.
+   Sets *n = 0 if no dependence is found. Collective; every rank gets the same list. */
+PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt *n, PetscInt rows[]);
+
+#endif

@@ -1,0 +1,462 @@
+/*
+  "mumpsnd": the factor matrix. Options: -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
+  MatMumpsSetIcntl(), MatMumpsGetInfog() and the like work on the factor. Unless ICNTL(7) or PETSc's ordering is set,
+  the analysis is done for METIS and for MUMPS's automatic choice and the one with fewer operations is kept: an analysis
+  costs a few percent of one factorization, and on long thin bodies PORD is sometimes the better one.
+*/
+#include "mumpsnd.h"
+#include <algorithm>
+#include <petsc/private/matimpl.h>
+
+#if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
+#include "mumpsnd_data.h"
+
+/* Rows below this, relative to the scaled matrix, count as null: redundant constraints leave rounding there */
+static const double NULL_PIVOT = 1e-14;
+
+/* MUMPS foresees its workspace without the pivots that are delayed; an indefinite matrix can need several times as much
+ */
+static const int WORKSPACE_PERCENT = 30, WORKSPACE_RETRIES = 5;
+
+static MumpsND *Data(Mat F) { return static_cast<MumpsND *>(F->data); }
+
+/* ---- errors ---- */
+
+static MatFactorError FactorError(int infog1)
+{
+  if (infog1 == -6) return MAT_FACTOR_STRUCT_ZEROPIVOT;
+  if (infog1 == -10) return MAT_FACTOR_NUMERIC_ZEROPIVOT;
+  if (infog1 == -5 || infog1 == -19 || (infog1 <= -7 && infog1 >= -15)) return MAT_FACTOR_OUTMEMORY;
+  return MAT_FACTOR_OTHER;
+}
+
+static PetscErrorCode ReportError(Mat F, Mat A, const char phase[])
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  if (m->infog(1) >= 0) PetscFunctionReturn(0);
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_LIB,
+             "MUMPS failed in its %s: INFOG(1)=%d, INFOG(2)=%d; see the list of errors in the MUMPS user's guide",
+             phase, m->infog(1), m->infog(2));
+  PetscCall(PetscInfo(F, "MUMPS failed in its %s: INFOG(1)=%d, INFOG(2)=%d\n", phase, m->infog(1), m->infog(2)));
+  F->factorerrortype = FactorError(m->infog(1));
+  PetscFunctionReturn(0);
+}
+
+/* MUMPS goes on past a null pivot with one of many solutions; unless the user asked for that, it is a singular matrix
+ */
+static PetscErrorCode ReportNullPivots(Mat F, Mat A)
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  if (m->infog(1) < 0 || m->infog(28) == 0 || m->user_null_pivots) PetscFunctionReturn(0);
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix of %" PetscInt_FMT " rows is singular: MUMPS met %d null pivots", A->rmap->N, m->infog(28));
+  PetscCall(PetscInfo(F, "The matrix is singular: MUMPS met %d null pivots\n", m->infog(28)));
+  F->factorerrortype = MAT_FACTOR_NUMERIC_ZEROPIVOT;
+  PetscFunctionReturn(0);
+}
+
+/* ---- the entries ---- */
+
+static bool Wanted(const MumpsND *m, PetscInt row, PetscInt col) { return m->id.sym == 0 || col >= row; }
+
+static PetscErrorCode CopyPattern(Mat A, MumpsND *m)
+{
+  PetscInt        begin, end, count;
+  const PetscInt *cols;
+
+  PetscFunctionBegin;
+  m->row.clear();
+  m->col.clear();
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt i = begin; i < end; ++i) {
+    PetscCall(MatGetRow(A, i, &count, &cols, NULL));
+    for (PetscInt k = 0; k < count; ++k)
+      if (Wanted(m, i, cols[k])) {
+        m->row.push_back((MUMPS_INT)(i + 1));
+        m->col.push_back((MUMPS_INT)(cols[k] + 1));
+      }
+    PetscCall(MatRestoreRow(A, i, &count, &cols, NULL));
+  }
+  m->val.resize(m->row.size());
+  m->id.n       = (MUMPS_INT)A->rmap->N;
+  m->id.nnz_loc = (MUMPS_INT8)m->row.size();
+  m->id.irn_loc = m->row.data();
+  m->id.jcn_loc = m->col.data();
+  m->id.a_loc   = m->val.data();
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CopyValues(Mat A, MumpsND *m)
+{
+  PetscInt           begin, end, count;
+  const PetscInt    *cols;
+  const PetscScalar *vals;
+  size_t             next = 0;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt i = begin; i < end; ++i) {
+    PetscCall(MatGetRow(A, i, &count, &cols, &vals));
+    for (PetscInt k = 0; k < count; ++k)
+      if (Wanted(m, i, cols[k])) {
+        PetscCheck(
+            next < m->val.size() && m->col[next] == cols[k] + 1, PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP,
+            "Row %" PetscInt_FMT " of the matrix has another pattern than the one analysed; set the operators anew", i);
+        m->val[next++] = vals[k];
+      }
+    PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* ---- solve ---- */
+
+static PetscErrorCode DropScatter(MumpsND *m)
+{
+  PetscFunctionBegin;
+  PetscCall(VecScatterDestroy(&m->scatter));
+  PetscCall(VecDestroy(&m->sol));
+  PetscFunctionReturn(0);
+}
+
+/* MUMPS decides anew in every factorization which process returns which part of the solution */
+static PetscErrorCode CreateScatter(MumpsND *m, Vec x)
+{
+  IS                    to;
+  std::vector<PetscInt> rows(m->sol_rows.begin(), m->sol_rows.end());
+
+  PetscFunctionBegin;
+  for (PetscInt &r : rows) --r;
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &to));
+  PetscCall(VecScatterCreate(m->sol, NULL, x, to, &m->scatter));
+  PetscCall(ISDestroy(&to));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode SolveDistributed(Mat F, Vec b, Vec x)
+{
+  MumpsND           *m = Data(F);
+  const PetscScalar *rhs;
+  PetscScalar       *sol;
+
+  PetscFunctionBegin;
+  if (!m->sol) {
+    const PetscInt local = m->id.info[22]; /* INFO(23) */
+    PetscCall(VecCreateSeq(PETSC_COMM_SELF, local, &m->sol));
+    m->sol_rows.assign(local, 0);
+  }
+  PetscCall(VecGetArrayRead(b, &rhs));
+  PetscCall(VecGetArray(m->sol, &sol));
+  m->id.rhs_loc  = const_cast<PetscScalar *>(rhs); /* MUMPS only reads it */
+  m->id.irhs_loc = m->rhs_rows.data();
+  m->id.nloc_rhs = m->id.lrhs_loc = (MUMPS_INT)m->rhs_rows.size();
+  m->id.sol_loc                   = sol;
+  m->id.isol_loc                  = m->sol_rows.data();
+  m->id.lsol_loc                  = (MUMPS_INT)m->sol_rows.size();
+  MumpsRun(m, MUMPS_SOLVE);
+  PetscCall(VecRestoreArray(m->sol, &sol));
+  PetscCall(VecRestoreArrayRead(b, &rhs));
+  if (m->infog(1) < 0) PetscFunctionReturn(0);
+  if (!m->scatter) PetscCall(CreateScatter(m, x));
+  PetscCall(VecScatterBegin(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
+{
+  MumpsND        *m     = Data(F);
+  const MUMPS_INT which = transposed ? 0 : 1;
+
+  PetscFunctionBegin;
+  if (F->factorerrortype) {
+    PetscCall(PetscInfo(F, "Solve with a factor that failed: the result is Inf\n"));
+    PetscCall(VecSet(x, PETSC_INFINITY));
+    PetscFunctionReturn(0);
+  }
+  if (m->icntl(9) != which) PetscCall(DropScatter(m));
+  m->icntl(9) = which;
+  m->id.nrhs  = 1;
+  if (m->size == 1) {
+    PetscScalar *array;
+    PetscCall(VecCopy(b, x));
+    PetscCall(VecGetArray(x, &array));
+    m->id.rhs = array;
+    MumpsRun(m, MUMPS_SOLVE);
+    PetscCall(VecRestoreArray(x, &array));
+  } else
+    PetscCall(SolveDistributed(F, b, x));
+  PetscCheck(m->infog(1) >= 0, PetscObjectComm((PetscObject)F), PETSC_ERR_LIB,
+             "MUMPS failed in its solve phase: INFOG(1)=%d, INFOG(2)=%d; see the MUMPS user's guide", m->infog(1),
+             m->infog(2));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MatSolve_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, false); }
+
+static PetscErrorCode MatSolveTranspose_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, Data(F)->id.sym == 0); }
+
+/* ---- analysis and factorization ---- */
+
+/* Controls that describe how the matrix and the vectors are passed belong to this file */
+static bool Owned(PetscInt i) { return i == 5 || i == 9 || i == 18 || i == 19 || i == 20 || i == 21; }
+
+static PetscErrorCode SetIcntl(Mat F, PetscInt i, PetscInt value)
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  PetscCheck(i >= 1 && i <= 60 && !Owned(i) && !(i == 7 && value == 1), PetscObjectComm((PetscObject)F),
+             PETSC_ERR_ARG_OUTOFRANGE, "ICNTL(%" PetscInt_FMT ")=%" PetscInt_FMT " cannot be set for solver type %s", i,
+             value, LINEAR_MUMPSND);
+  m->icntl((int)i) = (MUMPS_INT)value;
+  if (i == 7) m->user_ordering = PETSC_TRUE;
+  if (i == 24) m->user_null_pivots = PETSC_TRUE;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ReadOptions(Mat F)
+{
+  const PetscOptions options = ((PetscObject)F)->options;
+  const char *const  prefix  = ((PetscObject)F)->prefix;
+  char               name[32];
+  PetscBool          set;
+
+  PetscFunctionBegin;
+  for (int i = 1; i <= 60; ++i) {
+    PetscInt value;
+    PetscCall(PetscSNPrintf(name, sizeof name, "-mat_mumps_icntl_%d", i));
+    PetscCall(PetscOptionsGetInt(options, prefix, name, &value, &set));
+    if (set) PetscCall(SetIcntl(F, i, value));
+    if (set && i == 4) Data(F)->icntl(3) = 6;
+  }
+  for (int i = 1; i <= 15; ++i) {
+    PetscCall(PetscSNPrintf(name, sizeof name, "-mat_mumps_cntl_%d", i));
+    PetscCall(PetscOptionsGetReal(options, prefix, name, &Data(F)->cntl(i), NULL));
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT) PetscFunctionReturn(0); /* the analysis failed */
+  F->factorerrortype = MAT_FACTOR_NOERROR;
+  PetscCall(DropScatter(m));
+  PetscCall(CopyValues(A, m));
+  MumpsRun(m, MUMPS_FACTOR);
+  for (int k = 0; k < WORKSPACE_RETRIES && (m->infog(1) == -8 || m->infog(1) == -9); ++k) {
+    m->icntl(14) = std::max(2 * m->icntl(14), m->icntl(14) + 50);
+    PetscCall(PetscInfo(F, "MUMPS ran out of workspace, again with ICNTL(14)=%d\n", m->icntl(14)));
+    MumpsRun(m, MUMPS_FACTOR);
+  }
+  PetscCall(ReportError(F, A, "factorization"));
+  PetscCall(ReportNullPivots(F, A));
+  F->assembled = PETSC_TRUE;
+  PetscCall(PetscLogFlops(m->id.rinfo[1])); /* RINFO(2) */
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  PetscCall(ReadOptions(F));
+  PetscCall(CopyPattern(A, m));
+  PetscCall(CopyValues(A, m));
+  PetscCall(MumpsNDAnalyse(A, m->size == 1 ? given : NULL, m));
+  PetscCall(ReportError(F, A, "analysis"));
+  F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric;
+  F->ops->solve                                           = MatSolve_MumpsND;
+  F->ops->solvetranspose                                  = MatSolveTranspose_MumpsND;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode LUFactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorInfo *)
+{
+  return FactorSymbolic(F, A, row);
+}
+
+static PetscErrorCode CholeskyFactorSymbolic(Mat F, Mat A, IS row, const MatFactorInfo *)
+{
+  return FactorSymbolic(F, A, row);
+}
+
+/* ---- what can be asked of the factor ---- */
+
+static PetscErrorCode GetIcntl(Mat F, PetscInt i, PetscInt *value) { return *value = Data(F)->icntl((int)i), 0; }
+
+static PetscErrorCode SetCntl(Mat F, PetscInt i, PetscReal value) { return Data(F)->cntl((int)i) = value, 0; }
+
+static PetscErrorCode GetCntl(Mat F, PetscInt i, PetscReal *value) { return *value = Data(F)->cntl((int)i), 0; }
+
+static PetscErrorCode GetInfog(Mat F, PetscInt i, PetscInt *value) { return *value = Data(F)->infog((int)i), 0; }
+
+static PetscErrorCode GetRinfog(Mat F, PetscInt i, PetscReal *value) { return *value = Data(F)->rinfog((int)i), 0; }
+
+static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_MUMPSND, 0; }
+
+static PetscErrorCode GetInertia(Mat F, PetscInt *negative, PetscInt *zero, PetscInt *positive)
+{
+  const MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  if (negative) *negative = m->infog(12);
+  if (zero) *zero = m->infog(28);
+  if (positive) *positive = F->rmap->N - m->infog(12) - m->infog(28);
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
+{
+  const MumpsND *m       = Data(F);
+  const double   entries = m->infog(29) < 0 ? -1e6 * m->infog(29) : m->infog(29);
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(info, sizeof *info));
+  info->block_size   = 1;
+  info->nz_allocated = info->nz_used = entries;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode View(Mat F, PetscViewer viewer)
+{
+  MumpsND          *m = Data(F);
+  PetscBool         ascii;
+  PetscViewerFormat format;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
+  if (!ascii) PetscFunctionReturn(0);
+  PetscCall(PetscViewerGetFormat(viewer, &format));
+  if (format != PETSC_VIEWER_ASCII_INFO && format != PETSC_VIEWER_ASCII_INFO_DETAIL) PetscFunctionReturn(0);
+  PetscCall(
+      PetscViewerASCIIPrintf(viewer, "MUMPS %s, SYM=%d, ordering %s\n", m->id.version_number, m->id.sym, m->ordering));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  operations: %g foreseen, %g done; delayed pivots: %d\n", m->rinfog(1),
+                                   m->rinfog(3), m->infog(13)));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  memory used: %d MB on the fullest process, %d MB in all; ICNTL(14)=%d\n",
+                                   m->infog(21), m->infog(22), m->icntl(14)));
+  PetscFunctionReturn(0);
+}
+
+static const char *const composed[] = {"MatFactorGetSolverType_C", "MatMumpsSetIcntl_C", "MatMumpsGetIcntl_C",
+                                       "MatMumpsSetCntl_C",        "MatMumpsGetCntl_C",  "MatMumpsGetInfog_C",
+                                       "MatMumpsGetRinfog_C"};
+
+static PetscErrorCode Compose(Mat F)
+{
+  const PetscObject f = (PetscObject)F;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectComposeFunction(f, "MatFactorGetSolverType_C", GetSolverType));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetIcntl_C", SetIcntl));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetIcntl_C", GetIcntl));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetCntl_C", SetCntl));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetCntl_C", GetCntl));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetInfog_C", GetInfog));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetRinfog_C", GetRinfog));
+  PetscFunctionReturn(0);
+}
+
+/* ---- create and destroy ---- */
+
+static PetscErrorCode Destroy(Mat F)
+{
+  MumpsND *m = Data(F);
+
+  PetscFunctionBegin;
+  PetscCall(DropScatter(m));
+  MumpsRun(m, MUMPS_END);
+  PetscCall(PetscCommRestoreComm(PetscObjectComm((PetscObject)F), &m->comm));
+  delete m;
+  F->data = NULL;
+  for (const char *name : composed) PetscCall(PetscObjectComposeFunction((PetscObject)F, name, NULL));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CreateInstance(Mat A, int sym, MumpsND **instance)
+{
+  MumpsND *m = new MumpsND();
+  PetscInt begin, end;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCommGetComm(PetscObjectComm((PetscObject)A), &m->comm));
+  PetscCallMPI(MPI_Comm_rank(m->comm, &m->rank));
+  PetscCallMPI(MPI_Comm_size(m->comm, &m->size));
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt i = begin; i < end && m->size > 1; ++i) m->rhs_rows.push_back((MUMPS_INT)(i + 1));
+  m->id.comm_fortran = (MUMPS_INT)MPI_Comm_c2f(m->comm);
+  m->id.par          = 1;
+  m->id.sym          = sym;
+  MumpsRun(m, MUMPS_INIT);
+  PetscCheck(m->infog(1) >= 0, PetscObjectComm((PetscObject)A), PETSC_ERR_LIB, "MUMPS did not start: INFOG(1)=%d",
+             m->infog(1));
+  for (int i = 1; i <= 4; ++i) m->icntl(i) = 0; /* silent */
+  m->icntl(13) = 1;                             /* null pivots are not found in a root that ScaLAPACK factors */
+  m->icntl(14) = WORKSPACE_PERCENT;
+  m->icntl(18) = 3; /* every process gives its rows */
+  m->icntl(20) = m->size > 1 ? 10 : 0;
+  m->icntl(21) = m->size > 1 ? 1 : 0;
+  m->icntl(24) = 1;
+  m->icntl(28) = 1; /* one process orders: there is no parallel METIS here */
+  m->cntl(3)   = NULL_PIVOT;
+  *instance    = m;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MatGetFactor_MumpsND(Mat A, MatFactorType type, Mat *factor)
+{
+  Mat       F;
+  PetscBool known, spd;
+
+  PetscFunctionBegin;
+  PetscCheck(A->rmap->N <= PETSC_MPI_INT_MAX, PetscObjectComm((PetscObject)A), PETSC_ERR_ARG_OUTOFRANGE,
+             "MUMPS takes at most %d rows, the matrix has %" PetscInt_FMT, PETSC_MPI_INT_MAX, A->rmap->N);
+  PetscCall(MatCreate(PetscObjectComm((PetscObject)A), &F));
+  PetscCall(MatSetSizes(F, A->rmap->n, A->cmap->n, A->rmap->N, A->cmap->N));
+  PetscCall(PetscStrallocpy(LINEAR_MUMPSND, &((PetscObject)F)->type_name));
+  PetscCall(MatSetUp(F));
+  PetscCall(MatIsSPDKnown(A, &known, &spd));
+
+  MumpsND  *m   = NULL;
+  const int sym = type == MAT_FACTOR_LU ? 0 : (known && spd ? 1 : 2);
+  PetscCall(CreateInstance(A, sym, &m));
+  F->data                        = m;
+  F->factortype                  = type;
+  F->canuseordering              = m->size == 1 ? PETSC_TRUE : PETSC_FALSE;
+  F->ops->lufactorsymbolic       = LUFactorSymbolic;
+  F->ops->choleskyfactorsymbolic = CholeskyFactorSymbolic;
+  F->ops->getinertia             = sym ? GetInertia : NULL;
+  F->ops->getinfo                = GetInfo;
+  F->ops->view                   = View;
+  F->ops->destroy                = Destroy;
+  PetscCall(PetscFree(F->solvertype));
+  PetscCall(PetscStrallocpy(LINEAR_MUMPSND, &F->solvertype));
+  PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
+  PetscCall(Compose(F));
+  *factor = F;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearRegisterMumpsND(void)
+{
+  PetscFunctionBegin;
+  for (MatFactorType type : {MAT_FACTOR_LU, MAT_FACTOR_CHOLESKY}) {
+    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATSEQAIJ, type, MatGetFactor_MumpsND));
+    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATMPIAIJ, type, MatGetFactor_MumpsND));
+  }
+  PetscFunctionReturn(0);
+}
+
+#else
+
+PetscErrorCode LinearRegisterMumpsND(void) { return 0; }
+
+#endif

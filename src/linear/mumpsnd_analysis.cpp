@@ -1,0 +1,139 @@
+/* The analysis of "mumpsnd": which ordering MUMPS gets */
+#include <petscconf.h>
+#if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
+
+#include "graph.h"
+#include "mumpsnd_data.h"
+#include <cstring>
+#include <unordered_set>
+
+static_assert(sizeof(MUMPS_INT) == sizeof(int), "MUMPS with 64-bit integers throughout is not supported");
+
+/* For every owned row without a value on the diagonal: the column of its largest entry that no other such row took */
+static PetscErrorCode FindPartners(Mat A, std::vector<int> *partner)
+{
+  PetscInt                     begin, end, count;
+  const PetscInt              *cols;
+  const PetscScalar           *vals;
+  std::unordered_set<PetscInt> taken;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  partner->assign(end - begin, -1);
+  for (PetscInt i = begin; i < end; ++i) {
+    PetscReal diagonal = 0, largest = 0;
+    PetscInt  best = -1;
+    PetscCall(MatGetRow(A, i, &count, &cols, &vals));
+    for (PetscInt k = 0; k < count; ++k) {
+      const PetscReal size = PetscAbsScalar(vals[k]);
+      if (cols[k] == i)
+        diagonal = size;
+      else if (size > largest && !taken.count(cols[k])) {
+        largest = size;
+        best    = cols[k];
+      }
+    }
+    PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
+    if (diagonal > 0 || best < 0) continue;
+    (*partner)[i - begin] = (int)best;
+    taken.insert(best);
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode GatherToFirst(const MumpsND *m, const std::vector<int> &local, std::vector<int> *all)
+{
+  PetscMPIInt              count;
+  std::vector<PetscMPIInt> counts(m->size), starts(m->size + 1, 0);
+
+  PetscFunctionBegin;
+  PetscCall(PetscMPIIntCast((PetscInt)local.size(), &count));
+  PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, m->comm));
+  PetscInt64 total = 0;
+  for (PetscMPIInt r = 0; r < m->size && m->rank == 0; ++r) {
+    total += counts[r];
+    PetscCheck(total <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+               "The matrix has more entries than one MPI message can carry; use -pc_factor_mat_solver_type mumps");
+    starts[r + 1] = (PetscMPIInt)total;
+  }
+  all->resize(total);
+  PetscCallMPI(
+      MPI_Gatherv(local.data(), count, MPI_INT, all->data(), counts.data(), starts.data(), MPI_INT, 0, m->comm));
+  PetscFunctionReturn(0);
+}
+
+/* PERM_IN wants the position of each unknown, an ordering lists the unknowns by position */
+static void SetPositions(const PetscInt order[], MumpsND *m)
+{
+  m->position.resize(m->id.n);
+  for (MUMPS_INT k = 0; k < m->id.n; ++k) m->position[order[k]] = k + 1;
+}
+
+static PetscErrorCode OrderByMetis(Mat A, MumpsND *m)
+{
+  std::vector<int>      partner, row, col, partners;
+  std::vector<PetscInt> order;
+  LinearGraph           graph;
+
+  PetscFunctionBegin;
+  PetscCall(FindPartners(A, &partner));
+  PetscCall(GatherToFirst(m, partner, &partners));
+  PetscCall(GatherToFirst(m, m->row, &row));
+  PetscCall(GatherToFirst(m, m->col, &col));
+  if (m->rank) PetscFunctionReturn(0);
+  LinearGraphFromEntries<int>(m->id.n, row.size(), row.data(), col.data(), 1, &graph);
+  PetscCall(LinearMetisOrder(graph, std::vector<PetscInt>(partners.begin(), partners.end()), &order));
+  SetPositions(order.data(), m);
+  PetscFunctionReturn(0);
+}
+
+static void AnalyseGiven(MumpsND *m, const char name[])
+{
+  m->icntl(7)   = 1;
+  m->id.perm_in = m->rank ? NULL : m->position.data();
+  strcpy(m->ordering, name);
+  MumpsRun(m, MUMPS_ANALYSIS);
+}
+
+static void AnalyseBuiltIn(MumpsND *m, MUMPS_INT choice)
+{
+  static const char *const names[] = {"AMD", "given", "AMF", "Scotch", "PORD", "METIS", "QAMD"};
+  m->icntl(7)                      = choice;
+  MumpsRun(m, MUMPS_ANALYSIS);
+  const int used = m->infog(7);
+  strcpy(m->ordering, used >= 0 && used <= 6 ? names[used] : "MUMPS's own");
+}
+
+/* METIS and MUMPS's own choice compete by the operations that the analysis foresees, RINFOG(1) */
+static PetscErrorCode AnalyseBest(Mat A, MumpsND *m)
+{
+  const MUMPS_INT automatic = 7;
+
+  PetscFunctionBegin;
+  PetscCall(OrderByMetis(A, m));
+  AnalyseBuiltIn(m, automatic);
+  const bool   failed = m->infog(1) < 0;
+  const double own    = m->rinfog(1);
+  AnalyseGiven(m, "METIS");
+  PetscCall(PetscInfo(A, "Operations foreseen by MUMPS: %g with METIS, %g with its own ordering\n", m->rinfog(1), own));
+  if (!failed && (m->infog(1) < 0 || m->rinfog(1) > own)) AnalyseBuiltIn(m, automatic);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m)
+{
+  PetscFunctionBegin;
+  if (given) {
+    const PetscInt *order;
+    PetscCall(ISGetIndices(given, &order));
+    SetPositions(order, m);
+    PetscCall(ISRestoreIndices(given, &order));
+    AnalyseGiven(m, "given by PETSc");
+  } else if (m->user_ordering)
+    AnalyseBuiltIn(m, m->icntl(7));
+  else
+    PetscCall(AnalyseBest(A, m));
+  PetscFunctionReturn(0);
+}
+
+#endif

@@ -1,0 +1,32 @@
+/* Pseudo-random vectors that depend on the global index alone: the same on any number of processes and in every run */
+#ifndef HHTDAE_LINEAR_VECTORS_H
+#define HHTDAE_LINEAR_VECTORS_H
+
+#include <cstdint>
+#include <petscvec.h>
+
+/* A value of size 1/2 to 1, of either sign: none is small by chance (the mixing step of splitmix64) */
+inline PetscReal LinearPseudoRandomValue(uint64_t index, uint64_t stream)
+{
+  uint64_t z = index + (stream << 48) + 0x9e3779b97f4a7c15u;
+  z          = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z          = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  z ^= z >> 31;
+  const PetscReal size = 0.5 + 0.5 * (PetscReal)(z >> 12) / (PetscReal)(1ull << 52);
+  return z & 1 ? size : -size;
+}
+
+inline PetscErrorCode LinearPseudoRandom(Vec x, uint64_t stream)
+{
+  PetscScalar *array;
+  PetscInt     begin, end;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(x, &begin, &end));
+  PetscCall(VecGetArrayWrite(x, &array));
+  for (PetscInt i = begin; i < end; ++i) array[i - begin] = LinearPseudoRandomValue((uint64_t)i, stream);
+  PetscCall(VecRestoreArrayWrite(x, &array));
+  PetscFunctionReturn(0);
+}
+
+#endif
