@@ -14,8 +14,10 @@ ctest --test-dir "$build" --output-on-failure --output-junit "$(cd "$build" && p
 count() { sed -n "s/^[[:space:]]*$1=\"\([0-9]*\)\".*/\1/p" "$results" 2>/dev/null | head -n 1; }
 tests=$(count tests)
 failures=$(count failures)
-skipped=$(($(count skipped) + $(count disabled)))
-if [ -z "$tests" ] || [ "$tests" = 0 ]; then
+skipped=$(count skipped)
+disabled=$(count disabled)
+skipped=$((${skipped:-0} + ${disabled:-0}))
+if [ "${tests:-0}" = 0 ]; then
   echo "check: ctest ran no tests"
   echo "0 passed, 1 failed"
   exit 1
