@@ -240,14 +240,13 @@ PetscErrorCode CorrectorSetUp(TS ts)
   Integrator    &I = Get(ts);
   SNES           snes;
   SNESLineSearch ls;
-  PetscInt       lag, maxit;
+  PetscInt       maxit, maxf;
   PetscReal      atol, rtol, stol;
-  PetscInt       maxf;
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
-  PetscCall(SNESGetLagJacobian(snes, &lag));
-  I.corrector.user_lag = (PetscBool)(lag != 1 && lag != -1 && lag != -2);
+  PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, "-snes_lag_jacobian", &I.corrector.user_lag));
+  if (snes->lagjacobian > 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
   PetscCall(SNESGetTolerances(snes, &atol, &rtol, &stol, &maxit, &maxf));
   if (maxit < I.corrector.max_it) I.corrector.max_it = maxit;
   PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));

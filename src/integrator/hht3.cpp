@@ -60,7 +60,8 @@ PetscErrorCode AllocateForRoles(TS ts)
 /* The matrix: the application's, the DM's, or one made from differences of the residual */
 PetscErrorCode SetUpJacobian(TS ts)
 {
-  HHT3I2Jacobian jacobian;
+  HHT3I2Jacobian i2jacobian;
+  HHT3IJacobian  ijacobian;
   DM             dm;
   SNES           snes;
   Mat            J, P;
@@ -69,7 +70,9 @@ PetscErrorCode SetUpJacobian(TS ts)
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(TSGetDM(ts, &dm));
-  PetscCall(DMTSGetI2Jacobian(dm, &jacobian, NULL));
+  PetscCall(DMTSGetI2Jacobian(dm, &i2jacobian, NULL));
+  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
+  const bool jacobian = i2jacobian || ijacobian;
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
   if (!P && jacobian) {
@@ -100,12 +103,14 @@ PetscErrorCode SetUpJacobian(TS ts)
 PetscErrorCode CheckProblem(TS ts)
 {
   HHT3I2Function f;
+  HHT3IFunction  f1;
   DM             dm;
 
   PetscFunctionBegin;
   PetscCall(TSGetDM(ts, &dm));
   PetscCall(DMTSGetI2Function(dm, &f, NULL));
-  PetscCheck(f, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+  PetscCall(DMTSGetIFunction(dm, &f1, NULL)); /* PETSc's convention for second-order types: then it is F(t,U,U'') */
+  PetscCheck(f || f1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none");
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors");
