@@ -19,6 +19,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -365,6 +366,34 @@ TEST_P(ProblemTest, TimeStepperEvaluatesTheProblem)
   }
   ASSERT_EQ(MatDestroy(&copy), 0);
   for (Vec *v : {&U, &V, &A, &F, &X, &Y}) ASSERT_EQ(VecDestroy(v), 0);
+  ASSERT_EQ(TSDestroy(&ts), 0);
+}
+
+TEST_P(ProblemTest, RolesReachTheIntegrator)
+{
+  const Problem &p = *problem;
+  TS             ts;
+  Vec            U, V;
+  PetscInt       sum = 0;
+  ASSERT_EQ(ProblemCreateTS(PETSC_COMM_WORLD, p, &ts, &U, &V, true), 0);
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+    IS       is;
+    PetscInt size = 0, expected = std::count(p.role.begin(), p.role.end(), (TSHHT3Role)r), local = 0;
+    ASSERT_EQ(TSHHT3GetIS(ts, (TSHHT3Role)r, &is), 0);
+    if (is) {
+      const PetscInt *index;
+      ASSERT_EQ(ISGetSize(is, &size), 0);
+      ASSERT_EQ(ISGetLocalSize(is, &local), 0);
+      ASSERT_EQ(ISGetIndices(is, &index), 0);
+      for (PetscInt k = 0; k < local; k++) EXPECT_EQ(p.role[index[k]], r) << "unknown " << index[k];
+      ASSERT_EQ(ISRestoreIndices(is, &index), 0);
+    }
+    EXPECT_EQ(size, expected) << TSHHT3Roles[r];
+    sum += size;
+  }
+  EXPECT_EQ(sum, p.n);
+  ASSERT_EQ(VecDestroy(&U), 0);
+  ASSERT_EQ(VecDestroy(&V), 0);
   ASSERT_EQ(TSDestroy(&ts), 0);
 }
 
