@@ -1,0 +1,163 @@
+/*
+  What all solvers of the work-precision comparison share: the counted problem, the output points, the errors and the
+  clock.
+*/
+#ifndef WORKPRECISION_RUN_H
+#define WORKPRECISION_RUN_H
+
+#include "problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace wp
+{
+
+using hhtex::Entries;
+using hhtex::Problem;
+
+inline double cpuSeconds()
+{
+  timespec t = {};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return t.tv_sec + 1e-9 * t.tv_nsec;
+}
+
+inline bool isMultiplier(TSHHT3Role r) { return r == TSHHT3_HOLONOMIC || r == TSHHT3_NONHOLONOMIC; }
+
+/* What a run cost; counted the same way for every solver, at the problem's own functions, as far as possible */
+struct Counters {
+  long steps = 0, rejected = 0, newton = 0, residuals = 0, jacobians = 0, factorizations = 0;
+};
+
+/* One run, or the median of several: failure is empty if the solver reached the end */
+struct Run {
+  double      time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
+  Counters    count;
+  std::string failure;
+};
+
+/* Passes everything on, and counts */
+struct CountedProblem : Problem {
+  const Problem &p;
+  mutable long   residuals = 0, jacobians = 0;
+
+  explicit CountedProblem(const Problem &problem) : p(problem)
+  {
+    name = p.name;
+    n    = p.n;
+    t0   = p.t0;
+    t1   = p.t1;
+    role = p.role;
+  }
+  void initial(double *u, double *v) const override { p.initial(u, v); }
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    residuals++;
+    p.residual(t, u, v, a, f);
+  }
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                Entries &J) const override
+  {
+    jacobians++;
+    p.jacobian(t, u, v, a, sv, sa, J);
+  }
+};
+
+/* The reference at the output points, with the weights 1/max(1, running maximum) of section 11 of the method */
+struct Reference {
+  PetscInt                         n;
+  std::vector<TSHHT3Role>          role;
+  std::vector<double>              times; /* of the output points, without t0 */
+  std::vector<std::vector<double>> u, v, weightU, weightV;
+
+  explicit Reference(const Problem &p) : n(p.n), role(p.role)
+  {
+    std::vector<double> ur(n), vr(n), ar(n), maxU(n, 1.), maxV(n, 1.);
+    for (double t : p.referenceTimes()) {
+      if (!p.reference(t, ur.data(), vr.data(), ar.data())) continue;
+      for (PetscInt i = 0; i < n; i++) { /* fmax() passes over what is not known */
+        maxU[i] = std::fmax(maxU[i], std::abs(ur[i]));
+        maxV[i] = std::fmax(maxV[i], std::abs(vr[i]));
+      }
+      if (t <= p.t0) continue;
+      times.push_back(t);
+      u.push_back(ur);
+      v.push_back(vr);
+      weightU.push_back(maxU);
+      weightV.push_back(maxV);
+    }
+  }
+
+  /* error[] = the largest weighted difference over all output points */
+  void compare(const std::vector<std::vector<double>> &us, const std::vector<std::vector<double>> &vs,
+               double error[3]) const
+  {
+    error[0] = error[1] = error[2] = -1.;
+    for (size_t k = 0; k < times.size(); k++)
+      for (PetscInt i = 0; i < n; i++) {
+        const bool differential = role[i] == TSHHT3_COORDINATE || role[i] == TSHHT3_STATE;
+        if (differential) include(us[k][i], u[k][i], weightU[k][i], error[0]);
+        if (role[i] == TSHHT3_COORDINATE) include(vs[k][i], v[k][i], weightV[k][i], error[1]);
+        if (isMultiplier(role[i])) include(us[k][i], u[k][i], weightU[k][i], error[2]);
+      }
+  }
+
+private:
+  static void include(double x, double ref, double weight, double &error)
+  {
+    if (std::isnan(ref) || std::isnan(error)) return;
+    const double e = std::abs(x - ref) / weight;
+    if (!(e <= error)) error = e; /* a NaN that was computed must show */
+  }
+};
+
+/* Takes a solver's values at the output points, in their order */
+struct Recorder {
+  const Reference                 &ref;
+  std::vector<std::vector<double>> u, v;
+
+  explicit Recorder(const Reference &r) : ref(r) {}
+  bool   done() const { return u.size() == ref.times.size(); }
+  double next() const { return ref.times[u.size()]; }
+  void   store(const double *us, const double *vs)
+  {
+    u.emplace_back(us, us + ref.n);
+    v.emplace_back(vs, vs + ref.n);
+  }
+  /* Errors of a run that claims to have arrived */
+  void finish(Run &run) const
+  {
+    if (!run.failure.empty()) return;
+    if (!done()) {
+      run.failure = "ended before the last output point";
+      return;
+    }
+    ref.compare(u, v, run.error);
+    for (double e : run.error)
+      if (std::isnan(e)) run.failure = "result is not a number";
+    if (run.error[0] > 1e3) run.failure = "left the solution (error above 1000)";
+  }
+};
+
+/* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
+   entry per unknown */
+struct Case {
+  std::string                                              name;
+  std::function<std::unique_ptr<Problem>()>                make;
+  std::function<void(const Problem &, double, const double *, double *)> phiT = nullptr;
+};
+
+/* The limit for one run, in CPU seconds; beyond it a solver counts as failed */
+struct Limits {
+  double seconds = 10.;
+};
+
+} // namespace wp
+
+#endif
