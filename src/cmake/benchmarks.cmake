@@ -3,8 +3,16 @@ add_custom_target(bench)
 file(GLOB bench_sources CONFIGURE_DEPENDS tests/bench/*.cpp tests/soak/*.cpp)
 foreach(source IN LISTS bench_sources)
   cmake_path(GET source STEM name)
-
-  file(STRINGS ${source} uses_ida REGEX "#include [<\"]ida/ida\\.h")
+  # A program's own headers start with its name.
+  cmake_path(GET source PARENT_PATH folder)
+  file(GLOB own_headers CONFIGURE_DEPENDS ${folder}/${name}*.h)
+  set(uses_ida FALSE)
+  foreach(file IN LISTS source own_headers)
+    file(STRINGS ${file} includes REGEX "#include [<\"]ida/ida\\.h")
+    if(includes)
+      set(uses_ida TRUE)
+    endif()
+  endforeach()
   if(uses_ida)
     set(ida_libraries)
     foreach(library sundials_ida sundials_nvecserial sundials_sunmatrixdense sundials_sunmatrixsparse
