@@ -1,0 +1,102 @@
+/* The formulas by what they promise: exact for polynomials, consistent with each other, error constants measured */
+#include "integrator/formulas.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using namespace hht3;
+
+TEST(Formulas, HHTParametersOfThePaper)
+{
+  for (double alpha : {0., -.05, -.3, -1. / 3.}) {
+    const Parameters p = HHTParameters(alpha, true);
+    EXPECT_DOUBLE_EQ(p.gamma, (1 - 2 * alpha) / 2);                  /* (5) */
+    EXPECT_DOUBLE_EQ(p.beta, (1 - alpha) * (1 - alpha) / 4);         /* (5) */
+    EXPECT_NEAR(p.k, p.beta - 1 / (6 * (1 + alpha)), 1e-16);         /* (26) */
+    EXPECT_NEAR(p.ca(), 1 / (1 + alpha), 1e-15);                     /* (9a) */
+    EXPECT_NEAR(p.rho, (1 + alpha) / (1 - alpha), 1e-15);
+  }
+  const Parameters trapezoidal = HHTParameters(0, true);
+  EXPECT_DOUBLE_EQ(trapezoidal.k, 1. / 12.);
+}
+
+TEST(Formulas, RadiusParametersAreSecondOrderAccurate)
+{
+  for (double rho : {0., .3, .5, .9, 1.}) {
+    const Parameters p = RadiusParameters(rho);
+    EXPECT_NEAR(p.gamma, .5 - p.am + p.af, 1e-15);
+    EXPECT_NEAR(p.gamma, .5 - p.lag(), 1e-15);
+    EXPECT_NEAR(p.gamma_s, .5 - p.lagState(), 1e-15);
+    EXPECT_GE(p.beta, .25 + (p.af - p.am) / 2 - 1e-15); /* unconditional stability */
+    EXPECT_LE(p.am, p.af + 1e-15);
+    EXPECT_LE(p.af, .5 + 1e-15);
+  }
+}
+
+/* HHT with alpha = -1/3 is Chung and Hulbert's method with radius 1/2 */
+TEST(Formulas, BothFamiliesMeetAtOneHalf)
+{
+  const Parameters a = HHTParameters(-1. / 3., false), b = RadiusParameters(.5);
+  EXPECT_NEAR(a.am, b.am, 1e-15);
+  EXPECT_NEAR(a.af, b.af, 1e-15);
+  EXPECT_NEAR(a.gamma, b.gamma, 1e-15);
+  EXPECT_NEAR(a.beta, b.beta, 1e-15);
+  EXPECT_NEAR(a.k, b.k, 1e-15);
+}
+
+TEST(Formulas, NewmarkIsExactForConstantAcceleration)
+{
+  const Parameters p = HHTParameters(-.3, false);
+  EXPECT_NEAR(NewmarkPosition(p, .1, 2., 3., 4., 4.), 2 + .1 * 3 + .005 * 4, 1e-15);
+  EXPECT_NEAR(NewmarkVelocity(p, .1, 3., 4., 4.), 3.4, 1e-15);
+}
+
+/* With q''' = 1, a_n = lag h and a_{n+1} = (1 + lag) h by definition of the lag: the error in q is k h^2 (a_{n+1} - a_n) */
+TEST(Formulas, ErrorConstantOfThePosition)
+{
+  for (double rho : {0., .5, .9, 1.}) {
+    const Parameters p = RadiusParameters(rho);
+    const double     h = .5, a0 = p.lag() * h, a1 = (1 + p.lag()) * h;
+    EXPECT_NEAR(NewmarkPosition(p, h, 0., 0., a0, a1) - h * h * h / 6, p.k * h * h * (a1 - a0), 1e-15);
+    EXPECT_NEAR(NewmarkVelocity(p, h, 0., a0, a1), h * h / 2, 1e-15); /* exact in q': what the lag is for */
+  }
+  for (double alpha : {-.05, -.3}) {
+    const Parameters p = HHTParameters(alpha, false);
+    const double     h = .5, a0 = p.lag() * h, a1 = (1 + p.lag()) * h;
+    EXPECT_NEAR(NewmarkPosition(p, h, 0., 0., a0, a1) - h * h * h / 6, p.k * h * h * (a1 - a0), 1e-15);
+    EXPECT_NEAR(NewmarkVelocity(p, h, 0., a0, a1), h * h / 2, 1e-15);
+  }
+}
+
+/* The same for s''' = 1, s = t^3/6 */
+TEST(Formulas, ErrorConstantOfAState)
+{
+  for (double rho : {0., .5, .9, 1.}) {
+    const Parameters p  = RadiusParameters(rho);
+    const double     l  = p.lagState(), w0 = l * l / 2, w1 = (1 + l) * (1 + l) / 2;
+    const double     s1 = (1 - p.gamma_s) * w0 + p.gamma_s * w1;
+    EXPECT_NEAR(s1 - 1. / 6., p.k_s, 1e-15);
+  }
+}
+
+/* The scalings turn shifts into the derivatives of (2): sigma_v D_c = gamma h, sigma_a D_c = ca */
+TEST(Formulas, ScalingsAndShiftsBelongTogether)
+{
+  for (double h : {1., 1e-3, 1e-9}) {
+    const Parameters p = HHTParameters(-.2, true);
+    EXPECT_NEAR(ShiftA(p, h) * ScalePosition(p, h) / p.ca(), 1., 1e-14);
+    EXPECT_NEAR(ShiftV(p, h) * ScalePosition(p, h) / ScaleVelocity(p, h), 1., 1e-14);
+    /* a state's column: d s'/d w over d s/d w is the same sigma_v */
+    const double dw = (1 - p.am_s) / (1 - p.af_s);
+    EXPECT_NEAR(ShiftV(p, h) * ScaleState(p, h) / dw, 1., 1e-13);
+  }
+}
+
+TEST(Formulas, CorrectorStopsByTheRate)
+{
+  EXPECT_DOUBLE_EQ(CorrectorError(.5, 2.), 2.);  /* (40): xi/(1-xi) */
+  EXPECT_DOUBLE_EQ(CorrectorError(.1, 9.), 1.);
+  EXPECT_EQ(CorrectorError(1., 1.), PETSC_MAX_REAL);
+  EXPECT_EQ(CorrectorError(2., 1.), PETSC_MAX_REAL);
+}

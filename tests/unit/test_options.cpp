@@ -1,0 +1,339 @@
+/* Setters and options: what they take, what they refuse, and that PETSc's own options win over the defaults */
+#include "integrator/impl.h"
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* The error of a call and its message */
+void expectRefused(PetscErrorCode (*call)(TS), PetscErrorCode code, const std::string &message)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  ErrorTrap      trap;
+  EXPECT_EQ(call(run.ts), code);
+  EXPECT_TRUE(trap.says(message)) << trap.message;
+}
+
+std::string typeOf(void *object) { return object ? ((PetscObject)object)->type_name : ""; }
+
+} // namespace
+
+TEST(Options, Defaults)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  TSHHT3Form     form;
+  PetscReal      alpha;
+  must(TSHHT3GetForm(run.ts, &form));
+  must(TSHHT3GetAlpha(run.ts, &alpha));
+  EXPECT_EQ(form, TSHHT3_FORM_SECOND_ORDER);
+  EXPECT_DOUBLE_EQ(alpha, -.3);
+  TSAdapt adapt;
+  must(TSGetAdapt(run.ts, &adapt));
+  must(TSSetUp(run.ts));
+  EXPECT_EQ(typeOf(adapt), TSADAPTBASIC);
+}
+
+TEST(Options, AreRead)
+{
+  const Pendulum p;
+  Simulation     run(p, "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.1 -ts_hhtdae_corrector_tolerance 1e-5 -ts_hhtdae_predictor_degree 2 "
+                    "-ts_hhtdae_reuse 1.5,0.3,1.1 -ts_hhtdae_start project");
+  const hht3::Integrator &I = hht3::Get(run.ts);
+  EXPECT_EQ(I.form, TSHHT3_FORM_PAPER);
+  EXPECT_DOUBLE_EQ(I.alpha, -.1);
+  EXPECT_DOUBLE_EQ(I.corrector.c, 1e-5);
+  EXPECT_TRUE(I.predictor.fixed);
+  EXPECT_EQ(I.predictor.degree_max, 2);
+  EXPECT_DOUBLE_EQ(I.corrector.ratio, 1.5);
+  EXPECT_DOUBLE_EQ(I.corrector.slow_rate, .3);
+  EXPECT_DOUBLE_EQ(I.corrector.hold, 1.1);
+  EXPECT_EQ(I.start_policy, TSHHT3_START_PROJECT);
+}
+
+TEST(Options, OutOfRangeIsRefused)
+{
+  expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, .1); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = 0.1 is not in [-1/3, 0]");
+  expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, -.4); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = -0.4");
+  expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, NAN); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = nan");
+  expectRefused([](TS ts) { return TSHHT3SetRadius(ts, 1.1); }, PETSC_ERR_ARG_OUTOFRANGE, "radius 1.1");
+  expectRefused([](TS ts) { return TSHHT3SetRadius(ts, -.1); }, PETSC_ERR_ARG_OUTOFRANGE, "radius -0.1");
+  expectRefused([](TS ts) { return TSHHT3SetCorrectorTolerance(ts, 0.); }, PETSC_ERR_ARG_OUTOFRANGE, "tolerance 0");
+  expectRefused([](TS ts) { return TSHHT3SetCorrectorTolerance(ts, 1.); }, PETSC_ERR_ARG_OUTOFRANGE, "tolerance 1");
+  expectRefused([](TS ts) { return TSHHT3SetPredictorDegree(ts, 4); }, PETSC_ERR_ARG_OUTOFRANGE, "degree 4");
+  expectRefused([](TS ts) { return TSHHT3SetPredictorDegree(ts, -2); }, PETSC_ERR_ARG_OUTOFRANGE, "degree -2");
+  expectRefused([](TS ts) { return TSHHT3SetReuse(ts, .9, .2, 1.2); }, PETSC_ERR_ARG_OUTOFRANGE, "ratio 0.9");
+  expectRefused([](TS ts) { return TSHHT3SetReuse(ts, 1.4, -.2, 1.2); }, PETSC_ERR_ARG_OUTOFRANGE, "rate -0.2");
+  expectRefused([](TS ts) { return TSHHT3SetReuse(ts, 1.4, .2, .5); }, PETSC_ERR_ARG_OUTOFRANGE, "hold 0.5");
+  expectRefused([](TS ts) { return TSHHT3SetForm(ts, (TSHHT3Form)7); }, PETSC_ERR_ARG_OUTOFRANGE, "form 7");
+  expectRefused([](TS ts) { return TSHHT3SetStart(ts, (TSHHT3Start)7); }, PETSC_ERR_ARG_OUTOFRANGE, "start 7");
+}
+
+TEST(Options, OutOfRangeFromTheCommandLineIsRefused)
+{
+  const Pendulum p;
+  ErrorTrap      trap;
+  EXPECT_THROW(Simulation(p, "-ts_hhtdae_alpha 0.2"), std::runtime_error);
+  EXPECT_TRUE(trap.says("alpha = 0.2")) << trap.message;
+  EXPECT_THROW(Simulation(p, "-ts_hhtdae_reuse 1.5,0.3"), std::runtime_error);
+  EXPECT_TRUE(trap.says("three numbers")) << trap.message;
+}
+
+TEST(Options, RadiusBelongsToTheSecondOrderForm)
+{
+  const Pendulum p;
+  Simulation     run(p, "-ts_hhtdae_form paper -ts_hhtdae_radius 0.5");
+  ErrorTrap      trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_INCOMP);
+  EXPECT_TRUE(trap.says("spectral radius (0.5) belongs to the second-order form")) << trap.message;
+}
+
+TEST(Options, MissingI2Function)
+{
+  TS        ts;
+  Vec       U, V;
+  ErrorTrap trap;
+  must(VecCreateSeq(PETSC_COMM_SELF, 2, &U));
+  must(VecDuplicate(U, &V));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TS2SetSolution(ts, U, V));
+  EXPECT_EQ(TSSetUp(ts), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_TRUE(trap.says("TSSetI2Function()")) << trap.message;
+  must(TSDestroy(&ts));
+  must(VecDestroy(&U));
+  must(VecDestroy(&V));
+}
+
+namespace
+{
+
+PetscErrorCode freeFall(TS, PetscReal, Vec, Vec, Vec A, Vec F, void *) { return VecCopy(A, F); }
+
+/* A TS with a function, but not all that belongs to it */
+PetscErrorCode setUpWith(PetscInt n, PetscInt m, std::string &message)
+{
+  TS        ts;
+  Vec       U, V, F;
+  ErrorTrap trap;
+  must(VecCreateSeq(PETSC_COMM_SELF, n, &U));
+  must(VecDuplicate(U, &F));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, F, freeFall, nullptr));
+  if (m > 0) {
+    must(VecCreateSeq(PETSC_COMM_SELF, m, &V));
+    must(TS2SetSolution(ts, U, V));
+    must(VecDestroy(&V));
+  } else
+    must(TSSetSolution(ts, U));
+  const PetscErrorCode code = TSSetUp(ts);
+  message                   = trap.message;
+  must(TSDestroy(&ts));
+  must(VecDestroy(&U));
+  must(VecDestroy(&F));
+  return code;
+}
+
+} // namespace
+
+TEST(Options, MissingVelocities)
+{
+  std::string message;
+  EXPECT_EQ(setUpWith(2, 0, message), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_NE(message.find("TS2SetSolution()"), std::string::npos) << message;
+}
+
+TEST(Options, VelocitiesOfAnotherSize)
+{
+  std::string message;
+  EXPECT_EQ(setUpWith(2, 3, message), PETSC_ERR_ARG_SIZ);
+  EXPECT_NE(message.find("2 entries and its time derivative 3"), std::string::npos) << message;
+}
+
+TEST(Options, NoUnknowns)
+{
+  TS        ts;
+  Vec       U, V, F;
+  ErrorTrap trap;
+  must(VecCreateSeq(PETSC_COMM_SELF, 0, &U));
+  must(VecDuplicate(U, &V));
+  must(VecDuplicate(U, &F));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, F, freeFall, nullptr));
+  must(TS2SetSolution(ts, U, V));
+  EXPECT_EQ(TSSetUp(ts), PETSC_ERR_ARG_SIZ);
+  EXPECT_TRUE(trap.says("no unknowns")) << trap.message;
+  must(TSDestroy(&ts));
+  must(VecDestroy(&U));
+  must(VecDestroy(&V));
+  must(VecDestroy(&F));
+}
+
+TEST(Options, NoToleranceAtAll)
+{
+  const Pendulum p;
+  Simulation     run(p, "-ts_rtol 0 -ts_atol 0");
+  ErrorTrap      trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_WRONG);
+  EXPECT_TRUE(trap.says("No unknown enters the error test")) << trap.message;
+}
+
+TEST(Options, BackwardInTime)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(TSSetTimeStep(run.ts, -1e-3));
+  ErrorTrap trap;
+  EXPECT_EQ(run.step(), PETSC_ERR_ARG_OUTOFRANGE);
+  EXPECT_TRUE(trap.says("must be positive")) << trap.message;
+}
+
+TEST(Options, MethodAfterSetUpIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(TSSetUp(run.ts));
+  ErrorTrap trap;
+  EXPECT_EQ(TSHHT3SetAlpha(run.ts, -.1), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_EQ(TSHHT3SetForm(run.ts, TSHHT3_FORM_PAPER), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_EQ(TSHHT3SetRadius(run.ts, .5), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_TRUE(trap.says("before TSSetUp()")) << trap.message;
+}
+
+TEST(Options, AccelerationBeforeTheFirstStepIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(TSSetUp(run.ts));
+  Vec       A;
+  ErrorTrap trap;
+  EXPECT_EQ(TSHHT3GetAcceleration(run.ts, &A), PETSC_ERR_ARG_WRONGSTATE);
+}
+
+/* For a TS of another type setters do nothing, and getters are an error */
+TEST(Options, OtherTypes)
+{
+  TS        ts;
+  PetscReal alpha;
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSALPHA2));
+  EXPECT_EQ(TSHHT3SetAlpha(ts, -.1), 0);
+  EXPECT_EQ(TSHHT3SetReuse(ts, 2., .5, 1.), 0);
+  {
+    ErrorTrap trap;
+    EXPECT_NE(TSHHT3GetAlpha(ts, &alpha), 0);
+  }
+  must(TSSetType(ts, TSHHT3)); /* and back and forth */
+  EXPECT_EQ(TSHHT3SetAlpha(ts, -.1), 0);
+  must(TSHHT3GetAlpha(ts, &alpha));
+  EXPECT_DOUBLE_EQ(alpha, -.1);
+  must(TSSetType(ts, TSALPHA2));
+  must(TSDestroy(&ts));
+}
+
+TEST(Options, UsersLinearSolverWins)
+{
+  const FourBar p(2, .2);
+  Simulation    run(p, tolerance(1e-5) + "-ksp_type gmres -ksp_rtol 1e-12 -pc_type jacobi"), plain(p, tolerance(1e-5));
+  must(run.solve());
+  must(plain.solve());
+  SNES snes;
+  KSP  ksp;
+  PC   pc;
+  must(TSGetSNES(run.ts, &snes));
+  must(SNESGetKSP(snes, &ksp));
+  must(KSPGetPC(ksp, &pc));
+  EXPECT_EQ(typeOf(ksp), KSPGMRES);
+  EXPECT_EQ(typeOf(pc), PCJACOBI);
+  EXPECT_LT(relativeDifference(run.v(), plain.v()), 1e-6);
+  must(TSGetSNES(plain.ts, &snes));
+  must(SNESGetKSP(snes, &ksp));
+  EXPECT_EQ(typeOf(ksp), KSPPREONLY); /* the default costs one triangular solve */
+}
+
+TEST(Options, UsersJacobianLagWins)
+{
+  const Pendulum p(-90., 0., .5);
+  const int      steps = 100;
+  Simulation     always(p, fixedSteps(.5 / steps) + "-snes_lag_jacobian 1"), ladder(p, fixedSteps(.5 / steps));
+  must(always.solve());
+  must(ladder.solve());
+  const TSHHT3Statistics a = always.statistics(), l = ladder.statistics();
+  MEASURED("%d steps: %d factorizations in %d iterations with -snes_lag_jacobian 1, %d in %d with the ladder", steps,
+           (int)a.factorizations, (int)a.newton, (int)l.factorizations, (int)l.newton);
+  EXPECT_GE(a.factorizations, a.newton - 10); /* every iteration but those of the start */
+  EXPECT_LT(l.factorizations, l.newton / 2);
+}
+
+TEST(Options, SNESMonitorsWork)
+{
+  const Pendulum p(-90., 0., .5);
+  Simulation     run(p, fixedSteps(.01) + "-snes_monitor -snes_converged_reason");
+  Printed        out;
+  must(run.solve());
+  EXPECT_TRUE(out.says("0 SNES Function norm")) << out.text().substr(0, 400);
+  EXPECT_TRUE(out.says("1 SNES Function norm"));
+  EXPECT_TRUE(out.says("Nonlinear solve converged"));
+}
+
+/* A line search of the user's in place of ours gives the same answer */
+TEST(Options, UsersLineSearchWins)
+{
+  const Pendulum p(-90., 0., .5);
+  Simulation     run(p, tolerance(1e-6) + "-snes_linesearch_type basic"), plain(p, tolerance(1e-6));
+  must(run.solve());
+  must(plain.solve());
+  EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-6);
+}
+
+TEST(Options, SummaryLine)
+{
+  const Pendulum p(-90., 0., .5);
+  Simulation     run(p, tolerance(1e-6) + "-ts_hhtdae_summary");
+  Printed        out;
+  must(run.solve());
+  size_t at = out.text().find("summary:");
+  ASSERT_NE(at, std::string::npos) << out.text();
+  for (const char *key : {" steps=", " rejected=", " newton=", " residuals=", " jacobians=", " factorizations=", " solves=", " time="}) {
+    const size_t next = out.text().find(key, at);
+    ASSERT_NE(next, std::string::npos) << key << " in " << out.text();
+    at = next;
+  }
+  EXPECT_TRUE(out.says(text("steps=%d ", (int)run.statistics().steps)));
+}
+
+TEST(Options, ResetAndRunAgain)
+{
+  const UserVars p(.2);
+  Simulation     run(p, tolerance(1e-5));
+  must(run.solve());
+  const Array u = run.u();
+  SNES snes;
+  Mat  J, P;
+  must(TSGetSNES(run.ts, &snes));
+  must(SNESGetJacobian(snes, &J, &P, nullptr, nullptr));
+  must(PetscObjectReference((PetscObject)J));
+  must(TSReset(run.ts)); /* PETSc forgets the matrix, but not the function that fills it */
+  must(SNESSetJacobian(snes, J, J, nullptr, nullptr));
+  must(MatDestroy(&J));
+  Array u0(p.n), v0(p.n);
+  p.initial(u0.data(), v0.data());
+  Vec *x[2] = {&run.U, &run.V};
+  for (int k = 0; k < 2; k++)
+    for (PetscInt i = 0; i < p.n; i++) must(VecSetValue(*x[k], i, k ? v0[i] : u0[i], INSERT_VALUES));
+  for (Vec *y : x) {
+    must(VecAssemblyBegin(*y));
+    must(VecAssemblyEnd(*y));
+  }
+  must(TS2SetSolution(run.ts, run.U, run.V));
+  must(TSSetTime(run.ts, 0.));
+  must(TSSetTimeStep(run.ts, 2e-4));
+  must(TSSetStepNumber(run.ts, 0));
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), u), 1e-5);
+}

@@ -1,0 +1,199 @@
+/* Roles of unknowns: detected equal set ones for every example, refused where they make no sense */
+#include "integrator/impl.h"
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+std::vector<int> roles(TS ts, PetscInt n)
+{
+  std::vector<int> r(n, -1);
+  for (int k = 0; k < TSHHT3_NUM_ROLES; k++) {
+    IS              is;
+    PetscInt        m;
+    const PetscInt *index;
+    must(TSHHT3GetIS(ts, (TSHHT3Role)k, &is));
+    if (!is) continue;
+    must(ISGetLocalSize(is, &m));
+    must(ISGetIndices(is, &index));
+    for (PetscInt i = 0; i < m; i++) {
+      EXPECT_EQ(r[index[i]], -1) << "unknown " << index[i] << " has two roles";
+      r[index[i]] = k;
+    }
+    must(ISRestoreIndices(is, &index));
+  }
+  return r;
+}
+
+std::string view(TS ts)
+{
+  Printed out;
+  must(TSView(ts, PETSC_VIEWER_STDOUT_SELF));
+  return out.text();
+}
+
+void setIS(TS ts, TSHHT3Role role, std::vector<PetscInt> index)
+{
+  IS is;
+  must(ISCreateGeneral(PETSC_COMM_SELF, (PetscInt)index.size(), index.data(), PETSC_COPY_VALUES, &is));
+  must(TSHHT3SetIS(ts, role, is));
+  must(ISDestroy(&is));
+}
+
+} // namespace
+
+/* A force state and a variable differ in what they mean to the application only: both are detected as variables */
+TEST(Roles, DetectedEqualSetOnes)
+{
+  for (const Factory &f : allProblems()) {
+    SCOPED_TRACE(f.name);
+    const auto p = f.make();
+    Simulation detected(*p, "");
+    must(TSSetUp(detected.ts));
+    const std::vector<int> r = roles(detected.ts, p->n);
+    std::vector<int> expected(p->role.begin(), p->role.end());
+    for (int &e : expected)
+      if (e == TSHHT3_FORCE) e = TSHHT3_VARIABLE;
+    EXPECT_EQ(r, expected);
+    Simulation set(*p, "", PETSC_COMM_SELF, true);
+    must(TSSetUp(set.ts));
+    EXPECT_EQ(roles(set.ts, p->n), std::vector<int>(p->role.begin(), p->role.end()));
+  }
+}
+
+/* Set or detected, the run is the same to the last bit */
+TEST(Roles, DetectionDoesNotChangeTheRun)
+{
+  const UserVars p(.3);
+  Simulation     detected(p, tolerance(1e-5)), set(p, tolerance(1e-5), PETSC_COMM_SELF, true);
+  must(detected.solve());
+  must(set.solve());
+  EXPECT_EQ(detected.u(), set.u());
+  EXPECT_EQ(detected.v(), set.v());
+  EXPECT_EQ(detected.statistics().jacobians, set.statistics().jacobians); /* probes are not part of the run */
+}
+
+TEST(Roles, ViewSaysWhatIsLeftOut)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(TSSetUp(run.ts));
+  const std::string s = view(run.ts);
+  EXPECT_NE(s.find("roles detected"), std::string::npos) << s;
+  EXPECT_NE(s.find("2 coordinates 1 holonomic"), std::string::npos) << s;
+  EXPECT_NE(s.find("left out: first-order states, velocity-level constraints, user-defined variables, force states"),
+            std::string::npos)
+      << s;
+  const UserVars u;
+  Simulation     set(u, "", PETSC_COMM_SELF, true);
+  must(TSSetUp(set.ts));
+  const std::string w = view(set.ts);
+  EXPECT_NE(w.find("roles set by the application"), std::string::npos) << w;
+  EXPECT_NE(w.find("left out: velocity-level constraints"), std::string::npos) << w;
+}
+
+/* A plain second-order ODE has neither roles to look up nor scalings */
+TEST(Roles, AnODECarriesNoRoleMachinery)
+{
+  const Oscillators p({1., 3.}, {0., 0.}, true, 1.);
+  Simulation        run(p, "");
+  must(run.solve());
+  const hht3::Integrator &I = hht3::Get(run.ts);
+  EXPECT_TRUE(I.role.empty());
+  EXPECT_EQ(I.row, nullptr);
+  EXPECT_EQ(I.col, nullptr);
+  EXPECT_EQ(I.gamma, nullptr);
+  EXPECT_EQ(I.work, nullptr);
+  EXPECT_EQ(I.constraints(), 0);
+}
+
+TEST(Roles, OverlapIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  setIS(run.ts, TSHHT3_HOLONOMIC, {2});
+  setIS(run.ts, TSHHT3_VARIABLE, {2});
+  ErrorTrap trap;
+  EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_WRONG);
+  EXPECT_TRUE(trap.says("Unknown 2 is named twice")) << trap.message;
+  EXPECT_TRUE(trap.says("holonomic")) << trap.message;
+}
+
+TEST(Roles, IndexOfNoUnknownIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  setIS(run.ts, TSHHT3_HOLONOMIC, {3});
+  ErrorTrap trap;
+  EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_OUTOFRANGE);
+  EXPECT_TRUE(trap.says("Index 3")) << trap.message;
+  EXPECT_TRUE(trap.says("0..2")) << trap.message;
+}
+
+TEST(Roles, UnknownRoleIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  IS             is;
+  ErrorTrap      trap;
+  EXPECT_EQ(TSHHT3GetIS(run.ts, (TSHHT3Role)17, &is), PETSC_ERR_ARG_OUTOFRANGE);
+  EXPECT_TRUE(trap.says("17")) << trap.message;
+}
+
+TEST(Roles, AfterSetUpIsRefused)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(TSSetUp(run.ts));
+  ErrorTrap trap;
+  IS        is;
+  must(ISCreateStride(PETSC_COMM_SELF, 1, 2, 1, &is));
+  EXPECT_EQ(TSHHT3SetIS(run.ts, TSHHT3_HOLONOMIC, is), PETSC_ERR_ARG_WRONGSTATE);
+  must(ISDestroy(&is));
+}
+
+/* An unknown whose inertia stands in another row breaks the rule that row i belongs to unknown i */
+TEST(Roles, RowsInTheWrongOrderAreNamed)
+{
+  struct Swapped : Pendulum {
+    void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+    {
+      Pendulum::residual(t, u, v, a, f);
+      std::swap(f[1], f[2]);
+    }
+    void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                  Entries &J) const override
+    {
+      Pendulum::jacobian(t, u, v, a, sv, sa, J);
+      for (PetscInt &i : J.row) i = i == 1 ? 2 : i == 2 ? 1 : i;
+    }
+  } p;
+  Simulation run(p, "");
+  ErrorTrap  trap;
+  EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_WRONG);
+  EXPECT_TRUE(trap.says("Unknown 1 has inertia")) << trap.message;
+}
+
+TEST(Roles, EmptyRowIsNamed)
+{
+  struct Empty : Pendulum {
+    void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+    {
+      Pendulum::residual(t, u, v, a, f);
+      f[2] = 0.;
+    }
+    void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                  Entries &J) const override
+    {
+      Pendulum::jacobian(t, u, v, a, sv, sa, J);
+      for (size_t k = 0; k < J.row.size(); k++)
+        if (J.row[k] == 2) J.value[k] = 0.;
+    }
+  } p;
+  Simulation run(p, "");
+  ErrorTrap  trap;
+  EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_WRONG);
+  EXPECT_TRUE(trap.says("Row 2 of the residual depends on no unknown")) << trap.message;
+}

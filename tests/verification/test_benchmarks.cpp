@@ -1,0 +1,80 @@
+/* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight ones */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+double digits(double error) { return -std::log10(error); }
+
+/* Errors in q for rtol = atol = 1e-4, 1e-5, ..., smallest */
+std::vector<double> errorsAgainstTolerance(const Problem &p, const std::string &options, int first, int last)
+{
+  std::vector<double> q;
+  for (int k = first; k <= last; k++) {
+    Simulation run(p, tolerance(std::pow(10., -k)) + options);
+    must(run.solve());
+    const ProblemErrors    e = run.errors();
+    const TSHHT3Statistics s = run.statistics();
+    MEASURED("%-9s %-28s rtol = atol = 1e-%02d: %.1f digits in q, errors q %.1e, q' %.1e, lambda %.1e; %d steps, %d rejected, "
+             "%d iterations, %d factorizations, %.2f s",
+             p.name.c_str(), options.c_str(), k, digits(e.q), e.q, e.v, e.lambda, (int)s.steps, (int)s.rejected,
+             (int)s.newton, (int)s.factorizations, s.cpu);
+    EXPECT_DOUBLE_EQ(run.t(), p.t1);
+    q.push_back(e.q);
+  }
+  return q;
+}
+
+/* A method of order 2 under an error estimate of order 3 gains a factor 10^(2/3) = 4.6 in a decade of the tolerance */
+void expectFalling(const std::vector<double> &q)
+{
+  for (size_t k = 0; k + 1 < q.size(); k++) EXPECT_LT(q[k + 1], 1.2 * q[k]) << "decade " << k;
+  for (size_t k = 0; k + 2 < q.size(); k++) EXPECT_LT(q[k + 2], q[k] / 2.) << "decades " << k << ", " << k + 1;
+  const double perDecade = std::pow(q.front() / q.back(), 1. / (q.size() - 1.));
+  MEASURED("the error falls %.1f times per decade of the tolerance", perDecade);
+  EXPECT_GT(perDecade, 3.);
+  EXPECT_LT(perDecade, 12.);
+}
+
+} // namespace
+
+TEST(Benchmarks, AndrewsErrorFallsWithTolerance)
+{
+  const std::vector<double> q = errorsAgainstTolerance(Andrews(), "", 5, 11);
+  expectFalling(q);
+  EXPECT_GE(digits(q.back()), 6.);
+}
+
+TEST(Benchmarks, AndrewsSixDigits)
+{
+  const std::vector<double> q = errorsAgainstTolerance(Andrews(), "-ts_hhtdae_alpha -0.05", 12, 12);
+  EXPECT_GE(digits(q[0]), 6.);
+}
+
+/* To the end of IFToMM A03: twice as many revolutions */
+TEST(Benchmarks, AndrewsLongerRun)
+{
+  const std::vector<double> q = errorsAgainstTolerance(Andrews(.05), "-ts_hhtdae_alpha -0.05", 9, 9);
+  EXPECT_GE(digits(q[0]), 3.);
+}
+
+TEST(Benchmarks, CarAxisErrorFallsWithTolerance)
+{
+  const std::vector<double> q = errorsAgainstTolerance(CarAxis(), "", 4, 9);
+  expectFalling(q);
+}
+
+TEST(Benchmarks, CarAxisSixDigits)
+{
+  const std::vector<double> q = errorsAgainstTolerance(CarAxis(), "-ts_hhtdae_alpha -0.05", 12, 12);
+  EXPECT_GE(digits(q[0]), 6.);
+}
+
+/* The paper's form serves as well where M is constant */
+TEST(Benchmarks, CarAxisPaperForm)
+{
+  const std::vector<double> q = errorsAgainstTolerance(CarAxis(), "-ts_hhtdae_form paper", 4, 8);
+  expectFalling(q);
+}
