@@ -34,7 +34,7 @@ struct Numbers {
 std::vector<Vec> Vectors(TS ts)
 {
   Integrator      &I = Get(ts);
-  std::vector<Vec> v = {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.U1, I.V1, I.A1, I.X, I.ymax};
+  std::vector<Vec> v = {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.X0, I.U1, I.V1, I.A1, I.X, I.ymax};
   if (I.F0) v.push_back(I.F0);
   for (PetscInt k = 0; k <= I.predictor.available; k++) v.push_back(I.predictor.D[k]);
   return v;

@@ -53,7 +53,7 @@ void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScal
 }
 
 struct Ends { /* of the step, read-only */
-  const PetscScalar *u0, *v0, *a0, *x0, *x;
+  const PetscScalar *u0, *v0, *a0, *x0, *x, *dv = nullptr;
 };
 
 /* U1, V1, A1 from (2) and from the average that the form asks for. a_n and w_n were made by a step of length h_last; their
@@ -70,8 +70,9 @@ void StepStage(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, P
     const TSHHT3Role role = RoleOf(I, i);
     if (role == TSHHT3_COORDINATE) {
       const PetscScalar an = e.a0[i] + r * (e.x0[i] - e.a0[i]);
-      u[i]                 = NewmarkPosition(p, h, e.u0[i], e.v0[i], an, e.x[i]);
-      v[i]                 = NewmarkVelocity(p, h, e.v0[i], an, e.x[i]);
+      const PetscScalar v0 = e.dv ? e.v0[i] - I.misfit * e.dv[i] : e.v0[i];
+      u[i]                 = NewmarkPosition(p, h, e.u0[i], v0, an, e.x[i]);
+      v[i]                 = NewmarkVelocity(p, h, v0, an, e.x[i]);
       a[i]                 = ca * e.x[i] + cn * an - c0 * e.a0[i];
     } else if (role == TSHHT3_STATE) {
       const PetscScalar wn = e.v0[i] + r * (e.x0[i] - e.v0[i]);
@@ -262,9 +263,11 @@ PetscErrorCode StageVectors(TS ts, Vec X)
     PetscCall(VecGetArrayRead(I.U0, &e.u0));
     PetscCall(VecGetArrayRead(I.V0, &e.v0));
     PetscCall(VecGetArrayRead(I.A0, &e.a0));
-    PetscCall(VecGetArrayRead(I.predictor.D[0], &e.x0));
+    PetscCall(VecGetArrayRead(I.X0, &e.x0));
+    if (I.misfit != 0) PetscCall(VecGetArrayRead(I.dV, &e.dv));
     StepStage(I, n, e, u, v, a);
-    PetscCall(VecRestoreArrayRead(I.predictor.D[0], &e.x0));
+    if (I.misfit != 0) PetscCall(VecRestoreArrayRead(I.dV, &e.dv));
+    PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
     PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
     PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
     PetscCall(VecRestoreArrayRead(I.U0, &e.u0));

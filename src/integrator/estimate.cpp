@@ -2,7 +2,7 @@
   The error test: (26), (27) with the weights Y_i, and the decision to hold h.
 
   Positions are judged by delta = k h^2 (a_{n+1} - a_n); first-order states by k_s h^3 s''' with s''' from the last three
-  derivatives w; lambda, V and F never. In PETSc's terms weight_i = 1/max(atol_i, rtol_i Y_i) with Y_i the running maximum
+  derivatives s'; lambda, V and F never. In PETSc's terms weight_i = 1/max(atol_i, rtol_i Y_i) with Y_i the running maximum
   of |q_i| over accepted steps. The local error is of third order, which makes TSADAPTBASIC with its safety factor 0.9 the
   controller (41), h_new = 0.9 h / Theta^(1/6).
 */
@@ -125,7 +125,7 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   const PetscReal    h = I.h, r = I.h_last > 0 ? h / I.h_last : 1, kq = I.p.k * h * h;
   const bool         states = I.count[TSHHT3_STATE] > 0, second = states && I.predictor.available >= 1;
   const PetscReal    tn = I.predictor.t[0], span = second ? tn + h - I.predictor.t[1] : 1;
-  const PetscScalar *x, *x0, *a0, *w, *d1 = nullptr;
+  const PetscScalar *x, *x0, *a0, *w, *v0 = nullptr, *v1 = nullptr, *d1 = nullptr;
   PetscReal          acc = 0;
   PetscInt           n;
 
@@ -136,23 +136,31 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   PetscCall(PetscLogEventBegin(events.estimate, ts, 0, 0, 0));
   PetscCall(VecGetLocalSize(I.X, &n));
   PetscCall(VecGetArrayRead(I.X, &x));
-  PetscCall(VecGetArrayRead(I.predictor.D[0], &x0));
+  PetscCall(VecGetArrayRead(I.X0, &x0));
   PetscCall(VecGetArrayRead(I.A0, &a0));
   PetscCall(VecGetArrayRead(I.weight, &w));
-  if (second) PetscCall(VecGetArrayRead(I.predictor.D[1], &d1));
+  if (second) {
+    PetscCall(VecGetArrayRead(I.V0, &v0));
+    PetscCall(VecGetArrayRead(I.V1, &v1));
+    PetscCall(VecGetArrayRead(I.predictor.D[1], &d1));
+  }
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal wi = PetscRealPart(w[i]);
     if (!(wi > 0)) continue;
     PetscReal delta = 0;
     if (RoleOf(I, i) == TSHHT3_COORDINATE) delta = kq * PetscRealPart(x[i] - (a0[i] + r * (x0[i] - a0[i])));
-    else if (second) delta = I.p.k_s * h * h * h * 2 * PetscRealPart((x[i] - x0[i]) / h - d1[i]) / span;
+    else if (second) delta = I.p.k_s * h * h * h * 2 * PetscRealPart((v1[i] - v0[i]) / h - d1[i]) / span;
     delta *= wi;
     acc = type == NORM_2 ? acc + delta * delta : PetscMax(acc, PetscAbsReal(delta));
   }
-  if (second) PetscCall(VecRestoreArrayRead(I.predictor.D[1], &d1));
+  if (second) {
+    PetscCall(VecRestoreArrayRead(I.predictor.D[1], &d1));
+    PetscCall(VecRestoreArrayRead(I.V1, &v1));
+    PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  }
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArrayRead(I.A0, &a0));
-  PetscCall(VecRestoreArrayRead(I.predictor.D[0], &x0));
+  PetscCall(VecRestoreArrayRead(I.X0, &x0));
   PetscCall(VecRestoreArrayRead(I.X, &x));
   PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
   I.wlte_pending = *wlte;

@@ -43,14 +43,15 @@ struct Corrector {
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
 
-/* Divided differences of the unknowns over the accepted steps */
+/* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
+   time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
 struct Predictor {
   PetscInt  degree_max = max_degree; /* what the user allows */
   PetscBool fixed      = PETSC_FALSE;
   PetscInt  degree     = 0; /* in use */
   PetscInt  available  = 0; /* differences that exist */
   PetscReal t[max_degree + 2]; /* t_n, t_{n-1}, ... */
-  Vec       D[max_degree + 1]; /* D[0] is X0; D[k] the k-th divided difference; allocated when first used */
+  Vec       D[max_degree + 1]; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
 };
 
 struct Integrator {
@@ -71,8 +72,11 @@ struct Integrator {
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
   PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
 
-  /* t_n: state, true second derivative (q) and the unknowns X0 = predictor.D[0] as of the accepted step h_last */
-  Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr;
+  /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
+  Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
+  Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp; q_n' counts as V0 - misfit dV */
+  PetscReal misfit = 0;
+  PetscBool have_misfit = PETSC_FALSE; /* dV belongs to t_n */
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
   PetscReal h_last = 0;
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
@@ -154,18 +158,22 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);
-PetscErrorCode PredictorUpdate(TS ts, PetscReal t, Vec X);
+PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
 PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok);
 PetscErrorCode NameRedundant(TS ts);
 PetscErrorCode Start(TS ts);
+PetscErrorCode Repair(TS ts);
 PetscErrorCode TinyStep(TS ts, PetscBool *ok);
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
 /* project.cpp */
 PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current);
+PetscErrorCode ProjectVelocities(TS ts);
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Vec first, Vec second);
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
+/* misfit.cpp */
+PetscErrorCode AdaptVelocities(TS ts);
 /* step.cpp */
 PetscErrorCode Step(TS ts);
 PetscErrorCode RollBack(TS ts);

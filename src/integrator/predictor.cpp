@@ -1,5 +1,5 @@
 /*
-  The predictor, section 6 of the paper: the unknowns at t_{n+1} extrapolated by a polynomial of degree 0 to 3 through the
+  The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by a polynomial of degree 0 to 3 through the
   accepted steps, in Newton's form
 
     P_d(t) = D_0 + (t - t_n) D_1 + (t - t_n)(t - t_{n-1}) D_2 + ...
@@ -18,13 +18,13 @@ namespace
 
 constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
 
-/* New differences from the old ones and the new value x, in place; misses of the degrees 0..have, squared */
-void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x,
+/* New differences from the old ones and the new values x = (X, V1), in place; misses of the degrees 0..have, squared */
+void Sweep(const Integrator &I, PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *const x[],
            PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
 {
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal wi = PetscRealPart(w[i]);
-    PetscScalar     fresh = x[i];
+    PetscScalar     fresh = x[RoleOf(I, i) == TSHHT3_STATE][i];
     for (PetscInt k = 0; k <= have; k++) {
       const PetscScalar old = k <= keep ? D[k][i] : 0;
       if (k <= keep) D[k][i] = fresh;
@@ -35,9 +35,31 @@ void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], con
   }
 }
 
+/* Predicted s' at t1 to the algorithmic w that gives it: the average of StepStage() in equations.cpp, solved for w */
+PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
+{
+  const Parameters  &p = I.p;
+  const PetscReal    r = I.h_last > 0 ? I.h / I.h_last : 1;
+  const PetscScalar *v0, *x0;
+  PetscScalar       *x;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetArrayRead(I.V0, &v0));
+  PetscCall(VecGetArrayRead(I.X0, &x0));
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt i = 0; i < n; i++)
+    if (I.role[i] == TSHHT3_STATE) x[i] = ((1 - p.af_s) * x[i] + p.af_s * v0[i] - p.am_s * (v0[i] + r * (x0[i] - v0[i]))) / (1 - p.am_s);
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(VecRestoreArrayRead(I.X0, &x0));
+  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
-/* Forgets the history; X0 stands as the only point */
+/* Forgets the history; D_0 stands as the only point */
 PetscErrorCode PredictorReset(TS ts)
 {
   Predictor &p = Get(ts).predictor;
@@ -61,12 +83,13 @@ PetscErrorCode Predict(TS ts, Vec X)
   PetscCall(VecCopy(p.D[0], X));
   for (PetscInt k = 0; k < p.degree; k++) coef[k] = factor *= I.t1 - p.t[k];
   if (p.degree) PetscCall(VecMAXPY(X, p.degree, coef, &p.D[1]));
+  if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X is accepted at t: it becomes D_0, and the degree for the next step is chosen */
-PetscErrorCode PredictorUpdate(TS ts, PetscReal t, Vec X)
+/* The step at t1 is accepted: it becomes D_0, and the degree for the next step is chosen */
+PetscErrorCode PredictorUpdate(TS ts)
 {
   Integrator        &I    = Get(ts);
   Predictor         &p    = I.predictor;
@@ -74,21 +97,23 @@ PetscErrorCode PredictorUpdate(TS ts, PetscReal t, Vec X)
   const PetscInt     have = PetscMin(p.available, keep);                           /* old D_0..D_have exist */
   PetscReal          span[max_degree + 1], miss[max_degree + 1] = {0, 0, 0, 0}, sum[max_degree + 1];
   PetscScalar       *D[max_degree + 1] = {};
-  const PetscScalar *x, *w;
+  const PetscReal    t = I.t1;
+  const PetscScalar *x[2], *w;
+  Vec                now[2] = {I.X, I.V1};
   PetscInt           n;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k <= keep; k++)
-    if (!p.D[k]) PetscCall(VecDuplicate(X, &p.D[k]));
+    if (!p.D[k]) PetscCall(VecDuplicate(I.X, &p.D[k]));
   for (PetscInt k = 0; k <= have; k++) span[k] = t - p.t[k];
-  PetscCall(VecGetLocalSize(X, &n));
-  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetLocalSize(I.X, &n));
+  for (int k = 0; k < 2; k++) PetscCall(VecGetArrayRead(now[k], &x[k]));
   PetscCall(VecGetArrayRead(I.weight, &w));
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecGetArray(p.D[k], &D[k]));
-  Sweep(n, have, keep, span, x, D, w, miss);
+  Sweep(I, n, have, keep, span, x, D, w, miss);
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecRestoreArray(p.D[k], &D[k]));
   PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(X, &x));
+  for (int k = 0; k < 2; k++) PetscCall(VecRestoreArrayRead(now[k], &x[k]));
   for (PetscInt k = have; k >= 0; k--) p.t[k + 1] = p.t[k];
   p.t[0]      = t;
   p.available = PetscMin(have + 1, keep);

@@ -178,20 +178,17 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckVelocities(TS ts)
+PetscErrorCode CheckVelocities(TS ts, PetscBool project, PetscReal *e, PetscInt *row, PetscReal *value)
 {
-  Integrator     &I = Get(ts);
-  PetscReal       T, e, value;
-  PetscInt        row;
-  const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
+  Integrator &I = Get(ts);
+  PetscReal   T;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
   PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, T, I.work, NULL));
   PetscCall(SolveStart(ts, I.work, I.X));
-  PetscCall(Distance(ts, I.X, T, &e));
-  PetscCall(WorstRow(ts, I.work, &row, &value));
-  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, project));
+  PetscCall(Distance(ts, I.X, T, e));
+  PetscCall(WorstRow(ts, I.work, row, value));
   if (project) PetscCall(Move(I, I.V0, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -287,16 +284,33 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
 /* Measures, reports and by choice mends U0, V0. *matrix_is_current: the start's matrix has been made at the final U0. */
 PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current)
 {
-  Integrator &I = Get(ts);
+  Integrator     &I       = Get(ts);
+  const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
+  PetscReal       e, value;
+  PetscInt        row;
 
   PetscFunctionBegin;
   *matrix_is_current = PETSC_FALSE;
   if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckPositions(ts, matrix_is_current));
   if (!*matrix_is_current) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-  PetscCall(CheckVelocities(ts));
+  PetscCall(CheckVelocities(ts, project, &e, &row, &value));
+  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, project));
   /* the rows of velocity-level constraints may depend on q' */
-  *matrix_is_current = (PetscBool)(!I.count[TSHHT3_NONHOLONOMIC] || I.start_policy != TSHHT3_START_PROJECT);
+  *matrix_is_current = (PetscBool)(!I.count[TSHHT3_NONHOLONOMIC] || !project);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V0 to the nearest velocities that the constraints allow; makes the start's matrix at U0 */
+PetscErrorCode ProjectVelocities(TS ts)
+{
+  PetscReal e, value;
+  PetscInt  row;
+
+  PetscFunctionBegin;
+  PetscCall(StartMatrix(ts, ts->ptime, Get(ts).U0, Get(ts).V0));
+  PetscCall(CheckVelocities(ts, PETSC_TRUE, &e, &row, &value));
+  PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -93,8 +93,9 @@ PetscErrorCode MakeStartMatrix(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Jerk by a second consistent solve, d later; zero where it cannot be had. Leaves X as it was. */
-PetscErrorCode Jerk(TS ts, Vec jerk)
+/* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
+   Leaves X as it was. */
+PetscErrorCode Rates(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscReal   T;
@@ -110,11 +111,10 @@ PetscErrorCode Jerk(TS ts, Vec jerk)
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
   PetscCall(ConsistentAccelerations(ts, ts->ptime + d, U, V, PETSC_FALSE, &ok));
-  PetscCall(VecZeroEntries(jerk));
+  PetscCall(VecZeroEntries(rate));
   if (ok) {
-    PetscCall(VecAXPY(I.X, -1, X0));
-    PetscCall(VecScale(I.X, 1 / d));
-    PetscCall(CopyRoles(I, I.X, jerk, true, true, false));
+    PetscCall(VecWAXPY(rate, -1, X0, I.X));
+    PetscCall(VecScale(rate, 1 / d));
   } else PetscCall(PetscInfo(ts, "start: no consistent accelerations at t_0 + %g, the start goes without q'''\n", (double)d));
   PetscCall(VecCopy(X0, I.X));
   PetscCall(VecDestroy(&V));
@@ -124,14 +124,14 @@ PetscErrorCode Jerk(TS ts, Vec jerk)
 }
 
 /* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run */
-PetscErrorCode FirstStep(TS ts, Vec jerk, PetscReal *h)
+PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
 {
   Integrator &I = Get(ts);
   PetscReal   e3, e2;
 
   PetscFunctionBegin;
   I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, jerk, &e3));
+  PetscCall(CorrectionNorm(ts, rate, &e3));
   PetscCall(CorrectionNorm(ts, I.A0, &e2));
   const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
   PetscReal       h3 = e3 > 0 ? 0.5 * PetscPowReal(e3, (PetscReal)-1 / 3) : PETSC_MAX_REAL;
@@ -141,34 +141,49 @@ PetscErrorCode FirstStep(TS ts, Vec jerk, PetscReal *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* a_0 and w_0 as a step of length h would have left them, unless q''' is too wild to be believed */
-PetscErrorCode Lag(TS ts, Vec jerk)
+/* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided
+   difference of the predictor (at a double node). Not if the rates are too wild to be believed. */
+PetscErrorCode MakeHistory(TS ts, Vec rate)
 {
   Integrator        &I = Get(ts);
+  Predictor         &p = I.predictor;
   const PetscReal    h = ts->time_step;
   const PetscScalar *j;
-  PetscScalar       *x;
+  PetscScalar       *x, *d0;
   PetscInt           n;
   PetscReal          e;
 
   PetscFunctionBegin;
-  I.h      = h;
-  I.h_last = h;
-  PetscCall(CorrectionNorm(ts, jerk, &e));
-  I.corrector.wlte = e * h;
-  if (e * h > 100) {
-    PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)(e * h)));
+  PetscCall(PredictorReset(ts));
+  I.h           = h;
+  I.h_last      = h;
+  I.have_misfit = PETSC_FALSE;
+  PetscCall(CorrectionNorm(ts, rate, &e));
+  e *= h;
+  I.corrector.wlte = e;
+  if (e > 100) {
+    PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecGetLocalSize(jerk, &n));
-  PetscCall(VecGetArrayRead(jerk, &j));
-  PetscCall(VecGetArray(I.predictor.D[0], &x));
+  PetscCall(VecGetLocalSize(rate, &n));
+  PetscCall(VecGetArrayRead(rate, &j));
+  PetscCall(VecGetArray(I.X0, &x));
+  PetscCall(VecGetArray(p.D[0], &d0));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
     if (IsDifferential(r)) x[i] += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j[i];
+    if (r == TSHHT3_COORDINATE) d0[i] = x[i];
   }
-  PetscCall(VecRestoreArray(I.predictor.D[0], &x));
-  PetscCall(VecRestoreArrayRead(jerk, &j));
+  PetscCall(VecRestoreArray(p.D[0], &d0));
+  PetscCall(VecRestoreArray(I.X0, &x));
+  PetscCall(VecRestoreArrayRead(rate, &j));
+  if (e > 0 && (p.degree_max > 0 || I.count[TSHHT3_STATE])) {
+    if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
+    PetscCall(VecCopy(rate, p.D[1]));
+    p.available = 1;
+    p.degree    = PetscMin(1, p.degree_max);
+    p.t[1]      = p.t[0];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,12 +282,54 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+namespace
+{
+
+/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
+{
+  Integrator &I = Get(ts);
+  PetscBool   ok, singular;
+  Vec         rate;
+
+  PetscFunctionBegin;
+  PetscCall(VecZeroEntries(I.X));
+  PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, matrix_is_current, &ok));
+  if (!ok) {
+    PetscCall(PetscStrendswith(I.failure, "singular", &singular));
+    if (singular) PetscCall(NameRedundant(ts));
+    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
+  }
+  PetscCall(Distribute(I));
+  PetscCall(VecCopy(I.X, I.X0));
+  PetscCall(VecCopy(I.X, I.predictor.D[0]));
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+
+  PetscCall(VecDuplicate(I.X, &rate));
+  PetscCall(Rates(ts, rate));
+  if (I.auto_h && !I.fixed_h) {
+    PetscCall(FirstStep(ts, rate, &ts->time_step));
+    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
+    I.auto_h = PETSC_FALSE;
+  }
+  PetscCall(MakeHistory(ts, rate));
+  PetscCall(VecDestroy(&rate));
+  if (I.F0) {
+    PetscCall(VecZeroEntries(I.A1));
+    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
 /* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode Start(TS ts)
 {
   Integrator &I = Get(ts);
-  PetscBool   current, ok;
-  Vec         jerk;
+  PetscBool   current;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
@@ -283,36 +340,26 @@ PetscErrorCode Start(TS ts)
   PetscCall(ClearAlgebraicRates(I, I.V0));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(CheckInitialState(ts, &current));
+  PetscCall(StartFromState(ts, current));
+  PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-  PetscCall(VecZeroEntries(I.X));
-  PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, current, &ok));
-  if (!ok) {
-    PetscCall(PetscInfo(ts, "start: %s\n", I.failure));
-    PetscBool singular;
-    PetscCall(PetscStrendswith(I.failure, "singular", &singular));
-    if (singular) PetscCall(NameRedundant(ts));
-    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
-  }
-  PetscCall(Distribute(I));
-  PetscCall(VecCopy(I.X, I.predictor.D[0]));
-  PetscCall(VecCopy(I.U0, ts->vec_sol));
-  PetscCall(VecCopy(I.V0, ts->vec_dot));
+/*
+  When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
+  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So the
+  velocities of t_n are projected on the constraints and the step starts afresh, consistently, at the new h.
+*/
+PetscErrorCode Repair(TS ts)
+{
+  Integrator &I = Get(ts);
 
-  PetscCall(VecDuplicate(I.X, &jerk));
-  PetscCall(Jerk(ts, jerk));
-  if (I.auto_h && !I.fixed_h) {
-    PetscCall(FirstStep(ts, jerk, &ts->time_step));
-    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
-    I.auto_h = PETSC_FALSE;
-  }
-  PetscCall(Lag(ts, jerk));
-  PetscCall(VecDestroy(&jerk));
-  if (I.F0) {
-    PetscCall(VecZeroEntries(I.A1));
-    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
-  }
-  PetscCall(PredictorReset(ts));
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
+  PetscCall(PetscInfo(ts, "h falls from %g to %g at t = %g: velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
+  I.stat.restarts++;
+  PetscCall(ProjectVelocities(ts));
+  PetscCall(StartFromState(ts, (PetscBool)!I.count[TSHHT3_NONHOLONOMIC]));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

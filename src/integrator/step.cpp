@@ -1,7 +1,7 @@
 /*
   One step: begin, predict, correct, estimate, accept or reject.
 
-  The state at t_n is U0, V0, A0 and the unknowns X0 (predictor.D[0]); an accepted step stays in U1, V1, A1, X until the next
+  The state at t_n is U0, V0, A0 and the unknowns X0; an accepted step stays in U1, V1, A1, X until the next
   one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
   whatever happens in between.
 */
@@ -12,6 +12,8 @@ namespace hht3
 
 namespace
 {
+
+constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
 PetscErrorCode NoteState(TS ts)
 {
@@ -54,11 +56,13 @@ PetscErrorCode Commit(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  PetscCall(PredictorUpdate(ts, I.t1, I.X));
+  PetscCall(PredictorUpdate(ts));
+  PetscCall(VecCopy(I.X, I.X0));
   PetscCall(VecCopy(I.U1, I.U0));
   PetscCall(VecCopy(I.V1, I.V0));
   PetscCall(VecCopy(I.A1, I.A0));
-  I.h_last = I.h;
+  I.h_last      = I.h;
+  I.have_misfit = PETSC_FALSE;
   if (I.F0) {
     PetscCall(VecZeroEntries(I.A1)); /* f_n of (9a): everything but the inertia forces */
     PetscCall(EvaluateResidual(ts, I.t1, I.U0, I.V0, I.A1, I.F0));
@@ -135,13 +139,15 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
+  PetscCall(IsTinyStep(ts, ts->time_step, tiny));
+  if (!*tiny && I.constraints() && ts->time_step < shrink * I.h_last) PetscCall(Repair(ts));
   I.h  = ts->time_step;
   I.t0 = ts->ptime;
   I.t1 = ts->ptime + I.h;
   PetscCall(TSPreStage(ts, I.t1));
-  PetscCall(IsTinyStep(ts, I.h, tiny));
   if (*tiny) PetscCall(TinyStep(ts, ok));
   else {
+    PetscCall(AdaptVelocities(ts));
     PetscCall(Predict(ts, I.X));
     PetscCall(Correct(ts, ok));
   }

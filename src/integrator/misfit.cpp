@@ -1,0 +1,99 @@
+/*
+  Velocities when h changes.
+
+  The method satisfies Phi = 0, and Phi_q q' + Phi_t = 0 only to C h^2. While h is constant so is that misfit, and nobody
+  notices. When h changes from h_n to h it has to become C h^2 within one step, which takes normal accelerations of
+  C (h_n^2 - h^2)/h: a spike of first order in q'' and lambda, seen by whatever depends on them (outputs, states driven by
+  accelerations), and by the error test of such states as an error that does not fall as it should.
+
+  So the part 1 - (h/h_n)^2 of the misfit is taken out of q'_n before a step of a new length: dV from
+  [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the matrix at hand, since it need not be exact, and the right-hand side
+  from a central difference of Phi along the motion. Two residuals and one solve per change of h; nothing else. The reported
+  q'_n stays as it is.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* r = scale times the rows of holonomic constraints of F, added to what is there */
+PetscErrorCode AddHolonomicRows(const Integrator &I, PetscReal scale, Vec F, Vec r)
+{
+  const PetscScalar *f;
+  PetscScalar       *x;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(F, &f));
+  PetscCall(VecGetArray(r, &x));
+  for (PetscInt i = 0; i < n; i++)
+    if (I.role[i] == TSHHT3_HOLONOMIC) x[i] += scale * f[i];
+  PetscCall(VecRestoreArray(r, &x));
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
+{
+  PetscScalar *x;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(d, &n));
+  PetscCall(VecGetArray(d, &x));
+  for (PetscInt i = 0; i < n; i++)
+    if (I.role[i] != TSHHT3_COORDINATE) x[i] = 0;
+  PetscCall(VecRestoreArray(d, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
+PetscErrorCode ComputeMisfit(TS ts)
+{
+  Integrator         &I   = Get(ts);
+  const PetscReal     tau = 0.1 * I.h_last;
+  KSP                 ksp;
+  KSPConvergedReason  reason;
+  PetscReal           norm;
+
+  PetscFunctionBegin;
+  if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
+  PetscCall(VecZeroEntries(I.gamma));
+  PetscCall(VecZeroEntries(I.A1));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(VecWAXPY(I.U1, sign * tau, I.V0, I.U0));
+    PetscCall(EvaluateResidual(ts, ts->ptime + sign * tau, I.U1, I.V0, I.A1, I.work));
+    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
+  }
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPSolve(ksp, I.gamma, I.dV));
+  I.stat.solves++;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(VecNorm(I.dV, NORM_INFINITY, &norm));
+  if (reason < 0 || PetscIsInfOrNanReal(norm)) PetscCall(VecZeroEntries(I.dV));
+  else PetscCall(KeepCoordinates(I, I.dV));
+  I.have_misfit = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* For a step of length I.h after one of h_last */
+PetscErrorCode AdaptVelocities(TS ts)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal r = I.h_last > 0 ? I.h / I.h_last : 1;
+
+  PetscFunctionBegin;
+  I.misfit = 0;
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < 1e-3 || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
+  I.misfit = 1 - r * r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
