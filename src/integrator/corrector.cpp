@@ -81,9 +81,21 @@ PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Corrections that no longer fall may be rounding, at a level that only the problem knows (q'' of a short step as it enters
+   forces and states). They are if they have fallen a thousandfold before, or never mattered in the first place. */
+bool IsRounding(const Corrector &c)
+{
+  return (c.e <= 1e-3 * c.e_max && c.e <= 0.1) || (c.fresh && c.e_max <= 1e-3);
+}
+
 void Diverge(Integrator &I, const char *why)
 {
   Corrector &c = I.corrector;
+  if (I.mode == Mode::Step && IsRounding(c)) {
+    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    c.xi_max = 0; /* a new matrix would not help */
+    return;
+  }
   c.reason     = SNES_DIVERGED_DTOL;
   (void)PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
                       why, (double)I.t1, (double)I.h, c.it, (double)c.e);
@@ -99,8 +111,10 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   const PetscInt  left  = c.max_it - c.it;
 
   PetscFunctionBegin;
-  c.e = e;
+  c.e     = e;
+  c.e_max = PetscMax(c.e_max, e);
   if (PetscIsInfOrNanReal(e)) {
+    c.e_max = PETSC_INFINITY;
     Diverge(I, "produced a correction that is not a number");
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -269,7 +283,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
 
   PetscFunctionBegin;
   c.it = c.base = 0;
-  c.e = c.xi_max = 0;
+  c.e = c.e_max = c.xi_max = 0;
   c.reason       = SNES_CONVERGED_ITERATING;
   c.fresh        = PETSC_FALSE;
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));

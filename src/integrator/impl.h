@@ -39,6 +39,7 @@ struct Corrector {
   PetscInt            it     = 0; /* of the present correction */
   PetscInt            base   = 0; /* iteration after which the present matrix came into use */
   PetscReal           e      = 0; /* last correction, in units of the tolerance */
+  PetscReal           e_max  = 0; /* largest correction so far */
   PetscReal           xi_max = 0; /* worst rate of this correction */
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
@@ -182,6 +183,7 @@ PetscErrorCode Fail(TS ts, const char *what);
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 /* report.cpp */
 void           ReadClocks(PetscReal *wall, PetscReal *cpu);
+void           StopClocks(Integrator &I);
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 /* checkpoint.cpp */

@@ -23,6 +23,14 @@ void ReadClocks(PetscReal *wall, PetscReal *cpu)
   *cpu  = Seconds(CLOCK_PROCESS_CPUTIME_ID);
 }
 
+void StopClocks(Integrator &I)
+{
+  PetscReal wall, cpu;
+  ReadClocks(&wall, &cpu);
+  I.stat.time = wall - I.wall0;
+  I.stat.cpu  = cpu - I.cpu0;
+}
+
 /* TSSolve() calls its monitors a last time with the reason set, and that is when the line is due */
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
@@ -31,10 +39,7 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 
   PetscFunctionBegin;
   if (!ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscReal wall, cpu;
-  ReadClocks(&wall, &cpu);
-  I.stat.time = wall - I.wall0;
-  I.stat.cpu  = cpu - I.cpu0;
+  StopClocks(I);
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                         "summary: steps=%" PetscInt_FMT " rejected=%" PetscInt_FMT " newton=%" PetscInt_FMT " residuals=%" PetscInt_FMT
                         " jacobians=%" PetscInt_FMT " factorizations=%" PetscInt_FMT " solves=%" PetscInt_FMT " time=%.6g cpu=%.6g fails=%" PetscInt_FMT

@@ -235,6 +235,7 @@ PetscErrorCode Step(TS ts)
     }
   }
   if (I.status == TS_STEP_COMPLETE) PetscCall(CheckpointIfDue(ts));
+  if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

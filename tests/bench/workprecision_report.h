@@ -203,27 +203,48 @@ inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
 
 /* ---- pictures ---- */
 
+/* Range of the errors and times of what is drawn in a panel; false if there is nothing to draw */
+struct Range {
+  double x0 = 1e300, x1 = 0., y0 = 1e300, y1 = 0.;
+};
+
+inline bool findRange(const Results &r, size_t i, int kind, bool overview, Range &range)
+{
+  range = Range();
+  for (size_t s = 0; s < r.solvers.size(); s++)
+    for (const Run &run : r.curve[i][s].runs) {
+      if ((overview && !r.solvers[s].inOverview) || !run.failure.empty() || !(run.error[kind] > 0.)) continue;
+      range.x0 = std::min(range.x0, run.error[kind]);
+      range.x1 = std::max(range.x1, run.error[kind]);
+      range.y0 = std::min(range.y0, run.time);
+      range.y1 = std::max(range.y1, run.time);
+    }
+  return range.x1 > 0.;
+}
+
 inline void plotData(FILE *g, const Curve &c, int kind)
 {
-  bool any = false;
+  fprintf(g, "NaN NaN\n"); /* keeps a solver that failed everywhere in the key */
   for (const Run &r : c.runs)
-    if (r.failure.empty() && r.error[kind] > 0.) {
-      fprintf(g, "%.6e %.6e\n", r.error[kind], r.time);
-      any = true;
-    }
-  if (!any) fprintf(g, "NaN NaN\n"); /* keeps the solver in the key, and its colour */
+    if (r.failure.empty() && r.error[kind] > 0.) fprintf(g, "%.6e %.6e\n", r.error[kind], r.time);
   fprintf(g, "e\n");
 }
 
+/* Errors above 10 are no solution: the picture ends there */
 inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overview, bool key)
 {
-  bool first = true;
+  const char *separator = "plot ";
+  Range       range;
+  if (!findRange(r, i, kind, overview, range)) return;
+  fprintf(g, "set xrange [%g:%g]\nset yrange [%g:%g]\n", range.x0 / 2., std::min(10., range.x1 * 2.), range.y0 / 1.5,
+          range.y1 * 1.5);
   for (size_t s = 0; s < r.solvers.size(); s++) {
     if (overview && !r.solvers[s].inOverview) continue;
-    fprintf(g, "%s'-' using 1:2 with linespoints lt %d pt %d ps %g lw 1.5 %s%s%s", first ? "plot " : ", ", (int)s + 1,
-            (int)s + 4, overview ? .6 : .9, key ? "title \"" : "notitle", key ? r.solvers[s].title.c_str() : "",
-            key ? "\"" : "");
-    first = false;
+    fprintf(g, "%s'-' using 1:2 with linespoints lt %d pt %d ps %g lw 1.5 ", separator, (int)s + 1, (int)s + 4,
+            overview ? .6 : .9);
+    if (key) fprintf(g, "title \"%s\"", r.solvers[s].title.c_str());
+    else fprintf(g, "notitle");
+    separator = ", ";
   }
   fprintf(g, "\n");
   for (size_t s = 0; s < r.solvers.size(); s++)
@@ -232,18 +253,15 @@ inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overv
 
 inline void plotProblem(FILE *g, const Results &r, size_t i, const std::string &out)
 {
-  static const char *const what[] = {"position", "velocity", "multiplier"};
+  static const char *const what[] = {"positions", "velocities", "multipliers"};
   fprintf(g, "reset\nset terminal pngcairo size 1500,560 font ',10'\nset output '%s/workprecision_%s.png'\n",
           out.c_str(), r.cases[i].name.c_str());
-  fprintf(g, "set multiplot layout 1,3 title '%s'\nset logscale xy\nset format '10^{%%L}'\nset grid\n",
+  fprintf(g, "set multiplot layout 1,3 title '%s' font ',13'\nset logscale xy\nset format '10^{%%L}'\nset grid\n",
           r.cases[i].name.c_str());
   for (int kind = 0; kind < 3; kind++) {
     fprintf(g, "set xlabel 'error of the %s'\nset ylabel '%s'\nset key %s\n", what[kind],
             kind ? "" : "CPU time of the solve [s]", kind ? "off" : "top right font ',8' samplen 2 spacing .9");
-    bool known = false;
-    for (const Curve &c : r.curve[i])
-      for (const Run &run : c.runs) known = known || (run.failure.empty() && run.error[kind] > 0.);
-    if (known) plotCurves(g, r, i, kind, false, kind == 0);
+    plotCurves(g, r, i, kind, false, kind == 0);
   }
   fprintf(g, "unset multiplot\nunset output\n");
 }
@@ -252,7 +270,8 @@ inline void plotProblem(FILE *g, const Results &r, size_t i, const std::string &
 inline void plotOverview(FILE *g, const Results &r, const std::string &out)
 {
   const int panels = (int)r.cases.size() + 1, columns = panels <= 4 ? 2 : panels <= 9 ? 3 : 4,
-            rows   = (panels + columns - 1) / columns;
+            rows      = (panels + columns - 1) / columns;
+  const char *separator = "plot ";
   fprintf(g, "reset\nset terminal pngcairo size 1200,900 font ',10'\nset output '%s/workprecision.png'\n", out.c_str());
   fprintf(g, "set multiplot layout %d,%d title 'CPU time of the solve [s] against error of the positions' font ',13'\n",
           rows, columns);
@@ -262,15 +281,14 @@ inline void plotOverview(FILE *g, const Results &r, const std::string &out)
     fprintf(g, "set title '%s' offset 0,-.6 font ',11'\nset key off\n", r.cases[i].name.c_str());
     plotCurves(g, r, i, 0, true, false);
   }
-  fprintf(g, "unset title\nunset border\nunset tics\nunset grid\nunset logscale\nset key center center samplen 2 spacing 1.3\n"
-             "set xrange [0:1]\nset yrange [0:1]\n");
-  bool first = true;
-  for (size_t s = 0; s < r.solvers.size(); s++)
-    if (r.solvers[s].inOverview) {
-      fprintf(g, "%sNaN with linespoints lt %d pt %d lw 1.5 title \"%s\"", first ? "plot " : ", ", (int)s + 1,
-              (int)s + 4, r.solvers[s].title.c_str());
-      first = false;
-    }
+  fprintf(g, "unset title\nunset border\nunset tics\nunset grid\nunset logscale\nset key center center samplen 2 "
+             "spacing 1.3\nset xrange [0:1]\nset yrange [0:1]\n");
+  for (size_t s = 0; s < r.solvers.size(); s++) {
+    if (!r.solvers[s].inOverview) continue;
+    fprintf(g, "%sNaN with linespoints lt %d pt %d lw 1.5 title \"%s\"", separator, (int)s + 1, (int)s + 4,
+            r.solvers[s].title.c_str());
+    separator = ", ";
+  }
   fprintf(g, "\nunset multiplot\nunset output\n");
 }
 

@@ -18,6 +18,7 @@ struct TSSettings {
   Stepper                             stepper = Stepper::HHT;
   std::function<PetscErrorCode(TS)>   configure;                            /* after TSSetType() */
   FirstOrder::Form                    form    = FirstOrder::Form::Stabilized; /* BDF */
+  bool                                fixed   = false; /* ALPHA2: constant steps, 0.1 sqrt(eps) of the run */
 };
 
 /* What the callbacks of one run need */
@@ -224,11 +225,13 @@ inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
   PC      pc;
 
   PetscFunctionBegin;
-  PetscCall(TSSetTimeStep(r.ts, 1e-3 * (r.problem.t1 - r.problem.t0) * std::cbrt(eps)));
+  /* a last constant step of odd length would leave its transient in the multipliers */
+  PetscCall(TSSetTimeStep(r.ts, (r.problem.t1 - r.problem.t0) *
+                                    (r.settings.fixed ? 1. / std::round(10. / std::sqrt(eps)) : 1e-3 * std::cbrt(eps))));
   PetscCall(TSGetAdapt(r.ts, &adapt));
-  PetscCall(TSAdaptSetType(adapt, TSADAPTBASIC));
+  PetscCall(TSAdaptSetType(adapt, r.settings.fixed ? TSADAPTNONE : TSADAPTBASIC));
   PetscCall(SelectiveTolerances(r, eps));
-  PetscCall(TSSetMaxSNESFailures(r.ts, 1000));
+  PetscCall(TSSetMaxSNESFailures(r.ts, 50));
   PetscCall(TSSetMaxStepRejections(r.ts, 100));
   PetscCall(TSGetSNES(r.ts, &snes));
   PetscCall(SNESGetKSP(snes, &ksp));
