@@ -19,6 +19,9 @@ namespace hht3
 namespace
 {
 
+/* Relative changes of h that are worth it, without and with first-order states in the error test */
+constexpr PetscReal least[2] = {0.1, 1e-3};
+
 /* r = scale times the rows of holonomic constraints of F, added to what is there */
 PetscErrorCode AddHolonomicRows(const Integrator &I, PetscReal scale, Vec F, Vec r)
 {
@@ -90,7 +93,7 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
-  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < 1e-3 || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < least[I.count[TSHHT3_STATE] > 0] || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
   I.misfit = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);
