@@ -30,12 +30,15 @@ function(hhtdae_test_program folder)
 endfunction()
 
 include(GoogleTest)
+set(unit_timeout 120)
+set(verification_timeout 300)
+set(stability_timeout 600)
 foreach(folder unit verification stability)
   hhtdae_test_program(${folder})
   if(${folder}_found)
     gtest_discover_tests(${folder}_tests TEST_PREFIX ${folder}. TEST_LIST ${folder}_list NO_PRETTY_VALUES
                          DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 600 LABELS ${folder})
+                         PROPERTIES TIMEOUT ${${folder}_timeout} LABELS ${folder})
     # gtest_discover_tests takes lists among the properties apart, so the environment is set when ctest reads the tests.
     file(WRITE ${PROJECT_BINARY_DIR}/${folder}_environment.cmake
          "set_tests_properties(\${${folder}_list} PROPERTIES ENVIRONMENT \"${test_environment}\")\n")
