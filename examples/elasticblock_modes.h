@@ -76,9 +76,9 @@ inline PetscErrorCode shifted_solver(const Model &m, double shift, KSP *ksp)
 
 /*
   The start, the load's own deflection, lies in the load's plane. Modes out of that plane may be lower; rounding lets
-  them in and every iteration lets them grow, so that asking for more digits than these would find another mode.
+  them in and every iteration lets them grow, so the iteration ends where its changes begin to grow.
 */
-constexpr double MODE_TOLERANCE = 1e-8;
+constexpr double MODE_TOLERANCE = 1e-10, MODE_ACCEPTED = 1e-6;
 
 /* x <- the displacements of x, less their part in the modes known so far, with x^T M x = 1; work = M x */
 inline PetscErrorCode normalize(const Model &m, const std::vector<Mode> &known, Vec x, Vec work)
@@ -103,7 +103,7 @@ inline PetscErrorCode normalize(const Model &m, const std::vector<Mode> &known, 
 inline PetscErrorCode find_mode(const Model &m, KSP ksp, bool rigid, const std::vector<Mode> &known, Mode *mode)
 {
   Vec         x;
-  PetscReal   change = 1;
+  PetscReal   change = 2, before = 4;
   PetscScalar w2, load;
 
   PetscFunctionBeginUser;
@@ -112,7 +112,8 @@ inline PetscErrorCode find_mode(const Model &m, KSP ksp, bool rigid, const std::
   PetscCall(VecDuplicate(m.f, &x));
   PetscCall(VecCopy(m.f, mode->M_phi));
   PetscCall(VecZeroEntries(mode->phi));
-  for (int k = 0; k < 100 && change > MODE_TOLERANCE; ++k) {
+  for (int k = 0; k < 100 && change > MODE_TOLERANCE && change < before; ++k) {
+    before = change;
     PetscCall(KSPSolve(ksp, mode->M_phi, x));
     PetscCall(normalize(m, known, x, mode->M_phi));
     PetscCall(VecAXPY(mode->phi, -1.0, x));
@@ -121,6 +122,9 @@ inline PetscErrorCode find_mode(const Model &m, KSP ksp, bool rigid, const std::
     change = PetscSqrtReal(PetscAbsScalar(w2));
     PetscCall(VecCopy(x, mode->phi));
   }
+  PetscCheck(change < MODE_ACCEPTED, PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED,
+             "Inverse iteration stopped at a change of %g: the load excites no mode that stands apart from the others",
+             (double)change);
   PetscCall(MatMult(m.S, mode->phi, x));
   PetscCall(VecDot(mode->phi, x, &w2));
   PetscCall(VecDot(mode->phi, m.f, &load));
