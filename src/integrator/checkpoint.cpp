@@ -26,7 +26,7 @@ struct Numbers {
     Predictor       &p = I.predictor;
     ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
              &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.tiny_steps, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte};
+    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor};
     for (PetscReal &t : p.t) reals.push_back(&t);
   }
 };

@@ -34,6 +34,7 @@ struct Corrector {
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
+  PetscReal learned = 0, h_floor = 0;  /* level at which corrections of steps of about h_floor were seen to be rounding */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
   PetscInt            it     = 0; /* of the present correction */

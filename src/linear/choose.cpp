@@ -160,19 +160,6 @@ static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-/* A change of type drops what the options said about the factorization, so they are read again */
-static PetscErrorCode SetPCType(PC pc, PCType type)
-{
-  PetscBool same;
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, type, &same));
-  if (same) PetscFunctionReturn(0);
-  PetscCall(PCSetType(pc, type));
-  PetscCall(PCSetFromOptions(pc));
-  PetscFunctionReturn(0);
-}
-
 /* A package cannot be exchanged under a factor that exists, so a change starts the preconditioner anew */
 static PetscErrorCode SetPackage(PC pc, const char package[])
 {
@@ -194,6 +181,25 @@ static PetscErrorCode SetPackage(PC pc, const char package[])
     PetscCall(MatDestroy(&P));
   }
   PetscCall(PCFactorSetMatSolverType(pc, package));
+  PetscFunctionReturn(0);
+}
+
+/*
+  Type and package of a preconditioner whose type the user left to us. A new type has lost what the options said about
+  the factorization, so they are read again. The package orders by itself unless the user named an ordering: PETSc would
+  hand it the ordering that suits its own factorization.
+*/
+static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char package[])
+{
+  PetscBool same, ordering;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, type, &same));
+  if (!same) PetscCall(PCSetType(pc, type));
+  PetscCall(SetPackage(pc, package));
+  if (!same) PetscCall(PCSetFromOptions(pc));
+  PetscCall(OptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
+  if (!ordering) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGEXTERNAL));
   PetscFunctionReturn(0);
 }
 
@@ -238,7 +244,6 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     if (symmetric && size.large) PetscCall(FirstAvailable(P, MAT_FACTOR_CHOLESKY, PETSC_TRUE, &package));
     if (package) PetscCall(FactorsIndefinite(package, &indefinite));
     cholesky = choice->cholesky = indefinite;
-    PetscCall(SetPCType(pc, cholesky ? PCCHOLESKY : PCLU));
   }
   PetscCall(
       FirstAvailable(P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, cholesky ? PETSC_TRUE : size.large, &package));
@@ -246,14 +251,17 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);
   }
-  if (package) PetscCall(SetPackage(pc, package));
+  if (package && choice->user_pc)
+    PetscCall(SetPackage(pc, package));
+  else if (package)
+    PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", cholesky ? "LDL^T" : "LU",
                           package ? package : "PETSc's default", size.text));
   PetscFunctionReturn(0);
 }
 
 /* The user's package with the factorization it offers: LDL^T where the matrix is symmetric, possibly indefinite */
-static PetscErrorCode FollowPackage(Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
+static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
 {
   MatSolverType package = NULL;
   PetscBool     lu, cholesky, indefinite = PETSC_FALSE;
@@ -265,9 +273,11 @@ static PetscErrorCode FollowPackage(Mat P, PetscBool symmetric, PC pc, LinearCho
   PetscCall(MatGetFactorAvailable(P, package, MAT_FACTOR_CHOLESKY, &cholesky));
   if (symmetric && cholesky) PetscCall(FactorsIndefinite(package, &indefinite));
   choice->cholesky = indefinite || (cholesky && !lu) ? PETSC_TRUE : PETSC_FALSE;
-  PetscCall(SetPCType(pc, choice->cholesky ? PCCHOLESKY : PCLU));
+  char name[64];
+  PetscCall(PetscStrncpy(name, package, sizeof name)); /* a change of type frees the string */
+  PetscCall(SetFactorization(ksp, pc, choice->cholesky ? PCCHOLESKY : PCLU, name));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s, with %s as the user chose",
-                          choice->cholesky ? "LDL^T" : "LU", package));
+                          choice->cholesky ? "LDL^T" : "LU", name));
   PetscFunctionReturn(0);
 }
 
@@ -280,7 +290,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   if (choice->user_pc && choice->user_package)
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
   else if (choice->user_package)
-    PetscCall(FollowPackage(P, symmetric, pc, choice));
+    PetscCall(FollowPackage(ksp, P, symmetric, pc, choice));
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));

@@ -145,12 +145,13 @@ private:
   {
     std::vector<double> u(counted_.n), v(counted_.n);
     const double        start = cpuSeconds();
+    counted_.deadline         = start + limits.seconds;
     while (!recorder_.done()) {
       realtype  t;
       const int code = IDASolve(memory_, recorder_.next(), &t, y_, yp_, IDA_NORMAL);
       run.time       = cpuSeconds() - start;
+      if (counted_.late) throw Failure{"took longer than the limit"};
       if (code != IDA_TOO_MUCH_WORK) check(code, "IDASolve");
-      if (run.time > limits.seconds) throw Failure{"took longer than the limit"};
       if (code == IDA_TOO_MUCH_WORK) continue;
       system_.output(N_VGetArrayPointer(y_), u.data(), v.data());
       recorder_.store(u.data(), v.data());

@@ -32,8 +32,7 @@ struct TSRun {
   std::unique_ptr<FirstOrder> system; /* BDF */
   Entries                     entries;
   std::vector<double>         u, v, u0, v0; /* output; last step of ALPHA2 */
-  double                      t0 = 0., start = 0.;
-  bool                        tooLong = false;
+  double                      t0 = 0.;
   TS                          ts = nullptr;
   Vec                         U = nullptr, V = nullptr, W[2] = {nullptr, nullptr};
 
@@ -100,7 +99,7 @@ inline PetscErrorCode StoreAt(TSRun &r, double tout, double t, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-inline PetscErrorCode Watch(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
+inline PetscErrorCode Watch(TS ts, PetscInt, PetscReal t, Vec U, void *ctx)
 {
   TSRun       &r     = *static_cast<TSRun *>(ctx);
   const double slack = 1e-12 * (r.problem.t1 - r.problem.t0);
@@ -122,10 +121,7 @@ inline PetscErrorCode Watch(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
     PetscCall(VecRestoreArrayRead(U, &u));
     r.t0 = t;
   }
-  if (step % 256 == 0 && cpuSeconds() - r.start > r.limits.seconds) {
-    r.tooLong = true;
-    PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
-  }
+  if (r.counted.late) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   PetscFunctionReturn(0);
 }
 
@@ -269,9 +265,10 @@ inline PetscErrorCode SolveTS(TSRun &r, Run &run)
 {
   PetscFunctionBegin;
   r.counted.residuals = r.counted.jacobians = 0;
-  r.start                = cpuSeconds();
+  const double start     = cpuSeconds();
+  r.counted.deadline     = start + r.limits.seconds;
   const PetscErrorCode e = TSSolve(r.ts, r.U);
-  run.time               = cpuSeconds() - r.start;
+  run.time               = cpuSeconds() - start;
   PetscCall(e);
   PetscFunctionReturn(0);
 }
@@ -309,8 +306,8 @@ inline PetscErrorCode RunTS(const Case &c, const Problem &problem, const Referen
   PetscCall(PetscPopErrorHandler());
   PetscCall(ReadTSCounters(r, *run));
   PetscCall(TSGetConvergedReason(r.ts, &reason));
-  if (e) run->failure = "error in TSSolve()";
-  else if (r.tooLong) run->failure = "took longer than the limit";
+  if (r.counted.late) run->failure = "took longer than the limit";
+  else if (e) run->failure = "error in TSSolve()";
   else if (reason <= 0) run->failure = TSConvergedReasons[reason];
   r.recorder.finish(*run);
   PetscCall(TSDestroy(&r.ts));
