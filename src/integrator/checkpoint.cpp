@@ -4,6 +4,7 @@
   in the run that wrote it as in the run that reads it, so that on the same ranks both go on bit for bit alike.
 */
 #include "impl.h"
+#include <cstdint>
 #include <cstdio>
 #include <string>
 
@@ -26,7 +27,7 @@ struct Numbers {
     Predictor       &p = I.predictor;
     ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
              &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.tiny_steps, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor};
+    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor};
     for (PetscReal &t : p.t) reals.push_back(&t);
   }
 };
@@ -91,10 +92,66 @@ PetscErrorCode Read(TS ts, PetscViewer viewer, const char file[])
   for (PetscInt k = 0; k <= I.predictor.available; k++)
     if (!I.predictor.D[k]) PetscCall(VecDuplicate(ts->vec_sol, &I.predictor.D[k]));
   for (Vec v : Vectors(ts)) PetscCall(VecLoad(v, viewer));
+  const PetscReal floor = I.corrector.floor; /* which the first call measures on the present state */
   PetscCall(UpdateWeights(ts, I.U1));
+  I.corrector.floor = floor;
   I.have_step = PETSC_TRUE;
   I.auto_h    = PETSC_FALSE;
   I.status    = TS_STEP_COMPLETE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* FNV-1a over the first `length` bytes of a file */
+bool Checksum(std::FILE *f, long length, std::uint64_t *sum)
+{
+  std::vector<unsigned char> buffer(1 << 16);
+  *sum = 14695981039346656037ull;
+  while (length > 0) {
+    const size_t n = std::fread(buffer.data(), 1, (size_t)PetscMin(length, (long)buffer.size()), f);
+    if (!n) return false;
+    for (size_t i = 0; i < n; i++) *sum = (*sum ^ buffer[i]) * 1099511628211ull;
+    length -= (long)n;
+  }
+  return true;
+}
+
+/* Rank 0 appends the checksum to a file that is complete, and puts it in the place of the one before */
+bool Seal(const char part[], const char file[])
+{
+  std::uint64_t sum = 0;
+  std::FILE    *f   = std::fopen(part, "r+b");
+  if (!f) return false;
+  std::fseek(f, 0, SEEK_END);
+  const long length = std::ftell(f);
+  std::rewind(f);
+  bool ok = Checksum(f, length, &sum);
+  std::fseek(f, 0, SEEK_END);
+  ok = std::fwrite(&sum, sizeof(sum), 1, f) == 1 && ok;
+  ok = std::fclose(f) == 0 && ok;
+  return ok && std::rename(part, file) == 0;
+}
+
+/* Whether the file is as Seal() left it */
+PetscErrorCode CheckSeal(MPI_Comm comm, const char file[])
+{
+  PetscMPIInt   rank;
+  int           state[2] = {0, 0}; /* readable, whole */
+  std::uint64_t sum, stored;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  std::FILE *f = rank == 0 ? std::fopen(file, "rb") : NULL;
+  if (f) {
+    state[0] = 1;
+    std::fseek(f, 0, SEEK_END);
+    const long length = std::ftell(f) - (long)sizeof(sum);
+    std::rewind(f);
+    if (length > 0 && Checksum(f, length, &sum) && std::fread(&stored, sizeof(stored), 1, f) == 1) state[1] = sum == stored;
+    std::fclose(f);
+  }
+  PetscCallMPI(MPI_Bcast(state, 2, MPI_INT, 0, comm));
+  PetscCheck(state[0], comm, PETSC_ERR_FILE_OPEN, "Cannot open the checkpoint %s", file);
+  PetscCheck(state[1], comm, PETSC_ERR_FILE_UNEXPECTED, "%s is not a checkpoint of TSHHT3, or it is damaged or not complete", file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,9 +181,9 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   PetscCall(PetscViewerDestroy(&viewer));
   /* a run that dies while writing keeps the checkpoint before */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (rank == 0) failed = std::rename(part.c_str(), file);
+  if (rank == 0) failed = !Seal(part.c_str(), file);
   PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, comm));
-  PetscCheck(!failed, comm, PETSC_ERR_FILE_WRITE, "Cannot rename %s to %s", part.c_str(), file);
+  PetscCheck(!failed, comm, PETSC_ERR_FILE_WRITE, "Cannot complete %s and rename it to %s", part.c_str(), file);
   RenewMatrix(I);
   PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,6 +200,7 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
     PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(CheckSeal(PetscObjectComm((PetscObject)ts), file));
   PetscCall(PetscViewerBinaryOpen(PetscObjectComm((PetscObject)ts), file, FILE_MODE_READ, &viewer));
   PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
   PetscCall(Read(ts, viewer, file));
@@ -193,7 +251,7 @@ PetscErrorCode CheckpointIfDue(TS ts)
 
   Note:
   The matrix is renewed after a checkpoint, here and in the run that resumes, so that on the same number of ranks both go on
-  with the same bits. Events and adaptors with a memory of their own (dsp) start anew.
+  with the same bits. The file carries a checksum. Events and adaptors with a memory of their own (dsp) start anew.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`
 @*/

@@ -60,12 +60,41 @@ static PetscErrorCode PackageGiven(PC pc, PetscBool *given)
   PetscFunctionReturn(0);
 }
 
+/* A preconditioner whose type we set bears a mark, so that a second look does not take our choice for the user's */
+static const char MARK[] = "hhtdae_linear_choice";
+
+static PetscErrorCode SetMark(PC pc)
+{
+  PetscContainer mark;
+
+  PetscFunctionBegin;
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)pc), &mark));
+  PetscCall(PetscObjectCompose((PetscObject)pc, MARK, (PetscObject)mark));
+  PetscCall(PetscContainerDestroy(&mark));
+  PetscFunctionReturn(0);
+}
+
+/* The mark counts while the type is one that we choose */
+static PetscErrorCode SetByProgram(PC pc, PetscBool *by_program)
+{
+  PetscObject mark;
+  PetscBool   ours;
+  PCType      type;
+
+  PetscFunctionBegin;
+  PetscCall(PCGetType(pc, &type));
+  PetscCall(PetscObjectQuery((PetscObject)pc, MARK, &mark));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &ours, PCLU, PCCHOLESKY, ""));
+  *by_program = type && !(mark && ours) ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 {
   PC        pc;
   KSPType   ksp_type;
   PCType    pc_type;
-  PetscBool by_option, by_program = PETSC_FALSE;
+  PetscBool pc_by_program, pc_by_option, package_by_program = PETSC_FALSE, package_by_option;
 
   PetscFunctionBegin;
   *choice = LinearChoice();
@@ -74,12 +103,16 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetType(pc, &pc_type));
-  PetscCall(OptionGiven(ksp, "-pc_type", &by_option));
-  choice->user_pc = pc_type || by_option ? PETSC_TRUE : PETSC_FALSE;
-  if (pc_type) PetscCall(PackageGiven(pc, &by_program));
-  PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &by_option));
-  choice->user_package = by_program || by_option ? PETSC_TRUE : PETSC_FALSE;
-  if (!pc_type) PetscCall(PCSetType(pc, PCLU));
+  PetscCall(SetByProgram(pc, &pc_by_program));
+  PetscCall(OptionGiven(ksp, "-pc_type", &pc_by_option));
+  if (pc_by_program) PetscCall(PackageGiven(pc, &package_by_program));
+  PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
+  choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
+  choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
+  if (!pc_type) {
+    PetscCall(PCSetType(pc, PCLU));
+    PetscCall(SetMark(pc));
+  }
   PetscFunctionReturn(0);
 }
 
@@ -191,7 +224,7 @@ static PetscErrorCode SetPackage(PC pc, const char package[])
 */
 static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char package[])
 {
-  PetscBool same, ordering;
+  PetscBool same, ordering, petsc;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, type, &same));
@@ -199,7 +232,8 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
   PetscCall(SetPackage(pc, package));
   if (!same) PetscCall(PCSetFromOptions(pc));
   PetscCall(OptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
-  if (!ordering) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGEXTERNAL));
+  PetscCall(PetscStrcmp(package, MATSOLVERPETSC, &petsc));
+  if (!ordering && !petsc) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGEXTERNAL));
   PetscFunctionReturn(0);
 }
 

@@ -380,6 +380,50 @@ TEST_F(LinearChoiceTest, ProgramWins)
   EXPECT_EQ(choose(large, true, {}, klu).pc, PCLU);
 }
 
+/* TSSetFromOptions() may come more than once */
+TEST_F(LinearChoiceTest, SecondLookKnowsItsOwnDefaults)
+{
+  const auto before = [](KSP k, PC) {
+    LinearChoice choice;
+    EXPECT_EQ(LinearDefaults(k, &choice), 0);
+    EXPECT_FALSE(choice.user_pc);
+    EXPECT_EQ(KSPSetFromOptions(k), 0);
+  };
+  const Chosen c = choose(large, true, {}, before);
+  EXPECT_FALSE(c.choice.user_pc);
+  EXPECT_FALSE(c.choice.user_package);
+  EXPECT_EQ(c.pc, PCCHOLESKY);
+  EXPECT_EQ(c.package, "mumpsnd");
+}
+
+/* The factor gets the package's own ordering, not the one that PETSc prefers for its own factorization */
+TEST_F(LinearChoiceTest, PackageOrdersByItself)
+{
+  KSP           ksp;
+  PC            pc;
+  LinearChoice  choice;
+  Mat           F;
+  MatFactorInfo info;
+  PetscReal     chosen, own;
+  OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+  OK(LinearDefaults(ksp, &choice));
+  OK(KSPSetOperators(ksp, large, large));
+  OK(KSPSetFromOptions(ksp));
+  OK(LinearChoose(ksp, large, PETSC_TRUE, &choice));
+  OK(KSPSetUp(ksp));
+  OK(KSPGetPC(ksp, &pc));
+  OK(PCFactorGetMatrix(pc, &F));
+  OK(MatMumpsGetRinfog(F, 1, &chosen));
+  OK(KSPDestroy(&ksp));
+
+  OK(MatFactorInfoInitialize(&info));
+  OK(MatGetFactor(large, "mumpsnd", MAT_FACTOR_CHOLESKY, &F));
+  OK(MatCholeskyFactorSymbolic(F, large, NULL, &info));
+  OK(MatMumpsGetRinfog(F, 1, &own));
+  EXPECT_EQ(chosen, own);
+  OK(MatDestroy(&F));
+}
+
 /* Symmetry is lost between two solves: L D L^T gives way to LU on the same KSP */
 TEST_F(LinearChoiceTest, TurnsToLUWhenSymmetryIsLost)
 {
@@ -484,6 +528,36 @@ TEST_F(MumpsND, OrderingIsNoWorseThanTheBuiltInOnes)
     if (ordering < 0) ours = operations;
     EXPECT_LE(ours, 1.05 * operations) << "ICNTL(7)=" << ordering;
     OK(MatDestroy(&F));
+  }
+}
+
+/* A constraint given twice: the factorization fails instead of returning one of many solutions */
+TEST_F(MumpsND, SingularMatrixIsReported)
+{
+  Entries entries = block(4, 4, 4, true);
+  for (PetscInt d = 0; d < 3; ++d) {
+    const PetscInt row = entries.n++;
+    entries.add_symmetric(row, d, 2.0); /* the first node is held already */
+    entries.add(row, row, 0.0);
+  }
+  for (MatFactorType type : {MAT_FACTOR_CHOLESKY, MAT_FACTOR_LU}) {
+    Mat            B, F;
+    MatFactorInfo  info;
+    MatFactorError error;
+    OK(create_matrix(entries, &B));
+    OK(MatFactorInfoInitialize(&info));
+    OK(MatGetFactor(B, "mumpsnd", type, &F));
+    if (type == MAT_FACTOR_LU) {
+      OK(MatLUFactorSymbolic(F, B, NULL, NULL, &info));
+      OK(MatLUFactorNumeric(F, B, &info));
+    } else {
+      OK(MatCholeskyFactorSymbolic(F, B, NULL, &info));
+      OK(MatCholeskyFactorNumeric(F, B, &info));
+    }
+    OK(MatFactorGetError(F, &error));
+    EXPECT_TRUE(error == MAT_FACTOR_NUMERIC_ZEROPIVOT || error == MAT_FACTOR_STRUCT_ZEROPIVOT) << error;
+    OK(MatDestroy(&F));
+    OK(MatDestroy(&B));
   }
 }
 
