@@ -1,0 +1,216 @@
+/* Checkpoints: a resumed run repeats the uninterrupted one bit for bit; bad files are refused */
+#include "support.h"
+
+#include <fstream>
+#include <iterator>
+#include <unistd.h>
+
+using namespace hhtest;
+
+namespace
+{
+
+struct File {
+  std::string name;
+  explicit File(const char *what) : name(testing::TempDir() + "hhtdae-" + std::to_string((long)getpid()) + "-" + what) {}
+  ~File()
+  {
+    std::remove(name.c_str());
+    std::remove((name + ".info").c_str());
+  }
+  std::string read() const
+  {
+    std::ifstream f(name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(f), std::istreambuf_iterator<char>()};
+  }
+  void write(const std::string &bytes) const
+  {
+    std::ofstream f(name, std::ios::binary);
+    f << bytes;
+  }
+};
+
+struct Step {
+  double t;
+  Array  u, v, a;
+  bool   operator==(const Step &o) const { return t == o.t && u == o.u && v == o.v && a == o.a; }
+};
+
+std::vector<Step> record(Simulation &run)
+{
+  std::vector<Step> steps;
+  run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (step) steps.push_back({t, r.u(), r.v(), r.a()});
+  };
+  must(run.solve());
+  return steps;
+}
+
+void repeat(const Problem &p, const std::string &options, int every, int interrupted)
+{
+  SCOPED_TRACE(p.name + " " + options);
+  const File        running("running"), kept("kept");
+  const std::string write = text(" -ts_hhtdae_checkpoint %s -ts_hhtdae_checkpoint_every %d ", running.name.c_str(), every);
+  Simulation        whole_run(p, options + write);
+  std::vector<Step> steps;
+  whole_run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (step) steps.push_back({t, r.u(), r.v(), r.a()});
+    if (step == interrupted) kept.write(running.read());
+  };
+  must(whole_run.solve());
+  ASSERT_GT((int)steps.size(), interrupted + 5);
+
+  Simulation              resumed(p, options + write + "-ts_hhtdae_resume " + kept.name);
+  const std::vector<Step> rest = record(resumed);
+  /* the step number goes on, so that the monitor's first call is that of the checkpoint itself */
+  ASSERT_GE(rest.size() + interrupted, steps.size());
+  const size_t offset = rest.size() + interrupted - steps.size();
+  ASSERT_LE(offset, (size_t)1);
+  size_t different = 0;
+  for (size_t k = offset; k < rest.size(); k++) different += !(rest[k] == steps[interrupted + k - offset]);
+  EXPECT_EQ(different, (size_t)0) << "of " << rest.size();
+  const TSHHT3Statistics a = whole_run.statistics(), b = resumed.statistics();
+  EXPECT_EQ(a.steps, b.steps);
+  EXPECT_EQ(a.rejected, b.rejected);
+  EXPECT_EQ(a.newton, b.newton);
+  EXPECT_EQ(a.residuals, b.residuals);
+  EXPECT_EQ(a.jacobians, b.jacobians);
+  EXPECT_EQ(a.factorizations, b.factorizations);
+  EXPECT_EQ(a.solves, b.solves);
+  EXPECT_EQ(a.corrector_fails, b.corrector_fails);
+  EXPECT_EQ(a.retries, b.retries);
+  EXPECT_EQ(a.restarts, b.restarts);
+  EXPECT_EQ(a.h_min, b.h_min);
+  EXPECT_EQ(a.h_max, b.h_max);
+  PetscInt na, nb;
+  must(TSGetStepNumber(whole_run.ts, &na));
+  must(TSGetStepNumber(resumed.ts, &nb));
+  EXPECT_EQ(na, nb);
+  MEASURED("%-14s %-40s resumed after step %d: %d steps repeated, %d of them with other bits", p.name.c_str(), options.c_str(),
+           interrupted, (int)(rest.size() - offset), (int)different);
+}
+
+/* The error of resuming from a file with these bytes; empty if it was taken */
+std::string refusal(const Problem &p, const std::string &bytes, const std::string &options = "")
+{
+  const File file("bad");
+  file.write(bytes);
+  ErrorTrap  trap;
+  Simulation run(p, tolerance(1e-5) + options + "-ts_max_steps 100 -ts_hhtdae_resume " + file.name);
+  return run.solve() ? trap.message.empty() ? "no message" : trap.message : "";
+}
+
+std::string goodFile(const Problem &p, const std::string &options = "")
+{
+  const File file("good");
+  Simulation run(p, tolerance(1e-5) + options);
+  for (int k = 0; k < 30; k++) must(run.step());
+  must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+  return file.read();
+}
+
+} // namespace
+
+TEST(Checkpoint, ResumedRunsRepeatBitForBit)
+{
+  repeat(Andrews(.02), tolerance(1e-6), 50, 100);
+  repeat(UserVars(2.), tolerance(1e-5), 20, 60);
+  repeat(Oscillators({1., 5.}, {0., .1}, true, 5.), tolerance(1e-5), 50, 100);
+  repeat(Sleigh(5.), tolerance(1e-6), 20, 60);
+  repeat(FourBar(2, 3.), tolerance(1e-5), 40, 80);
+}
+
+TEST(Checkpoint, PaperFormAndRadius)
+{
+  repeat(DoublePendulum(1.), tolerance(1e-6) + "-ts_hhtdae_form paper ", 20, 60);
+  repeat(DoublePendulum(1.), tolerance(1e-6) + "-ts_hhtdae_radius 0.8 ", 20, 60);
+}
+
+TEST(Checkpoint, FixedSteps) { repeat(Pendulum(-90., 0., 2.), fixedSteps(.01), 30, 90); }
+
+/* By hand, in place of options */
+TEST(Checkpoint, SaveAndLoad)
+{
+  const Pendulum p(-90., 0., 2.);
+  const File     file("hand");
+  Simulation     first(p, tolerance(1e-6)), second(p, tolerance(1e-6));
+  for (int k = 0; k < 40; k++) must(first.step());
+  must(TSHHT3CheckpointSave(first.ts, file.name.c_str()));
+  const double t = first.t();
+  must(TSHHT3CheckpointLoad(second.ts, file.name.c_str()));
+  must(TSSetUp(second.ts));
+  EXPECT_EQ(second.t(), t);
+  EXPECT_EQ(second.u(), first.u());
+  EXPECT_EQ(second.v(), first.v());
+  EXPECT_EQ(second.a(), first.a());
+  must(first.solve());
+  must(second.solve());
+  EXPECT_EQ(second.u(), first.u());
+  EXPECT_EQ(second.v(), first.v());
+}
+
+TEST(Checkpoint, ForeignFilesAreRefused)
+{
+  const Pendulum    p(-90., 0., 2.);
+  const std::string good = goodFile(p);
+  EXPECT_NE(refusal(p, "This is not a checkpoint, but a text that somebody took for one by mistake.").find("not a checkpoint"),
+            std::string::npos);
+  EXPECT_NE(refusal(UserVars(), good).find("3 unknowns"), std::string::npos);
+  EXPECT_NE(refusal(p, good, "-ts_hhtdae_alpha -0.1 ").find("give the same options"), std::string::npos);
+  EXPECT_NE(refusal(p, good, "-ts_hhtdae_form paper ").find("give the same options"), std::string::npos);
+  std::string other_version = good;
+  other_version[7]++;
+  EXPECT_NE(refusal(p, other_version).find("version"), std::string::npos);
+}
+
+TEST(Checkpoint, MissingFileIsAnError)
+{
+  const Pendulum p;
+  Simulation     run(p, "-ts_hhtdae_resume /no/such/file");
+  ErrorTrap      trap;
+  EXPECT_NE(run.solve(), 0);
+  EXPECT_TRUE(trap.says("/no/such/file")) << trap.message;
+}
+
+TEST(Checkpoint, TruncatedFilesAreRefused)
+{
+  const Pendulum    p(-90., 0., 2.);
+  const std::string good = goodFile(p);
+  for (size_t length : {(size_t)0, (size_t)10, good.size() / 4, good.size() / 2, good.size() - 8, good.size() - 1}) {
+    SCOPED_TRACE(length);
+    EXPECT_NE(refusal(p, good.substr(0, length)), "");
+  }
+}
+
+TEST(Checkpoint, DamagedFilesAreRefused)
+{
+  const Pendulum    p(-90., 0., 2.);
+  const std::string good = goodFile(p);
+  int               taken = 0, tried = 0;
+  for (size_t at = 3; at < good.size(); at += good.size() / 50, tried++) {
+    std::string bad = good;
+    bad[at] ^= 0x10;
+    if (refusal(p, bad).empty()) taken++;
+  }
+  EXPECT_EQ(taken, 0) << "of " << tried << " files with one bit turned";
+}
+
+TEST(Checkpoint, BeforeTheFirstStepThereIsNone)
+{
+  const Pendulum p;
+  const File     file("none");
+  Simulation     run(p, "");
+  must(TSSetUp(run.ts));
+  ErrorTrap trap;
+  EXPECT_NE(TSHHT3CheckpointSave(run.ts, file.name.c_str()), 0);
+  EXPECT_TRUE(trap.says("no accepted step")) << trap.message;
+}
+
+TEST(Checkpoint, UnwritableDirectoryIsAnError)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  must(run.step());
+  ErrorTrap trap;
+  EXPECT_NE(TSHHT3CheckpointSave(run.ts, "/no/such/directory/file"), 0);
+}
