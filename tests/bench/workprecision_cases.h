@@ -110,27 +110,24 @@ inline void addForeign(std::vector<Solver> &list)
   alpha2.stepper   = Stepper::Alpha2;
   alpha2.configure = [](TS ts) { return TSAlpha2SetRadius(ts, 0.8); };
   bdf.stepper      = Stepper::BDF;
-  bdf.configure    = [](TS ts) { return TSBDFSetOrder(ts, 3); };
+  bdf.configure    = [](TS ts) { return TSBDFSetOrder(ts, 5); };
   list.push_back(makeTS("alpha2", "PETSc ALPHA2, radius 0.8", false, alpha2));
   alpha2.fixed = true;
   list.push_back(makeTS("alpha2_h", "PETSc ALPHA2, constant steps", true, alpha2));
   alpha2.fixed     = false;
   alpha2.configure = [](TS ts) { return TSAlpha2SetRadius(ts, 0.); };
   list.push_back(makeTS("alpha2_0", "PETSc ALPHA2, radius 0", true, alpha2));
-  list.push_back(makeTS("bdf", "PETSc BDF 3, stabilized index 2", true, bdf));
+  list.push_back(makeTS("bdf", "PETSc BDF 5, stabilized index 2", true, bdf));
   bdf.form = FirstOrder::Form::Index3;
-  list.push_back(makeTS("bdf3", "PETSc BDF 3, index 3", false, bdf));
+  list.push_back(makeTS("bdf3", "PETSc BDF 5, index 3", false, bdf));
 #if defined(HHTDAE_HAVE_IDA)
   IDASettings ida;
-  if (getenv("IDA_ORDER")) ida.maxOrder = atoi(getenv("IDA_ORDER"));
-  if (getenv("IDA_SPARSE")) ida.sparseFrom = atoi(getenv("IDA_SPARSE"));
-  if (getenv("IDA_LOOSE")) ida.looser = atof(getenv("IDA_LOOSE"));
-  list.push_back(makeIDA("ida", "IDA, stabilized index 2", true, ida));
+  list.push_back(makeIDA("ida", "IDA, stabilized index 2", false, ida));
   ida.testVelocity = true;
-  list.push_back(makeIDA("ida_v", "IDA, same, velocities tested", false, ida));
+  list.push_back(makeIDA("ida_v", "IDA, velocities tested", true, ida));
   ida.testVelocity = false;
   ida.form         = FirstOrder::Form::Index3;
-  ida.looser       = getenv("IDA_LOOSE3") ? atof(getenv("IDA_LOOSE3")) : 1e6;
+  ida.looser       = 1e6;
   list.push_back(makeIDA("ida3", "IDA, index 3", false, ida));
 #endif
 }
