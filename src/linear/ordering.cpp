@@ -1,5 +1,6 @@
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
+#include "klu.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -24,11 +25,12 @@ static PetscErrorCode MatGetOrdering_MetisND(Mat A, MatOrderingType type, IS *ro
   PetscFunctionReturn(0);
 }
 
-/* Both registrations replace an entry of the same name, so that a second call changes nothing */
+/* Every registration replaces an entry of the same name, so that a second call changes nothing */
 PetscErrorCode LinearRegister(void)
 {
   PetscFunctionBegin;
   PetscCall(MatOrderingRegister(MATORDERINGMETISND, MatGetOrdering_MetisND));
   PetscCall(LinearRegisterMumpsND());
+  PetscCall(LinearRegisterKLU());
   PetscFunctionReturn(0);
 }
