@@ -243,12 +243,12 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
   PC             pc;
 
   PetscFunctionBegin;
-  if (reason == SNES_DIVERGED_LINEAR_SOLVE) {
+  if (reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN) {
     PetscCall(SNESGetKSP(ts->snes, &ksp));
     PetscCall(KSPGetPC(ksp, &pc));
     PetscCall(PCGetFailedReason(pc, &pcreason));
     PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g, h = %g: %s", (double)I.t1, (double)I.h,
-                            pcreason ? "the Newton matrix is singular" : "the Krylov method did not converge"));
+                            pcreason || I.singular ? singular : "the Krylov method did not converge"));
   } else if (reason != SNES_DIVERGED_DTOL) {
     PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
     PetscReal norm;
@@ -287,6 +287,7 @@ PetscErrorCode CorrectorSetUp(TS ts)
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, "-snes_lag_jacobian", &I.corrector.user_lag));
   if (snes->lagjacobian > 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
+  PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* FormJacobian() says so of a singular matrix */
   PetscCall(SNESGetTolerances(snes, &atol, &rtol, &stol, &maxit, &maxf));
   if (maxit < I.corrector.max_it) I.corrector.max_it = maxit;
   PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));
@@ -342,7 +343,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
     PetscCall(Predict(ts, I.X));
     PetscCall(Iterate(ts, converged));
   }
-  c.want_matrix = (PetscBool)(!*converged || c.xi_max > c.slow_rate);
+  c.want_matrix = (PetscBool)(!*converged || c.xi_max >= c.slow_rate);
   if (!*converged) {
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));

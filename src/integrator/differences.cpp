@@ -10,7 +10,7 @@ namespace hht3
 
 struct Differences {
   MatFDColoring coloring = nullptr;
-  Mat           part     = nullptr; /* dF/dU' or dF/dU'' */
+  Mat           part     = nullptr; /* the colored matrix: dF/dU, dF/dU' or dF/dU'' */
   TS            ts       = nullptr;
   /* where the residual is evaluated, and which of the three vectors varies */
   PetscReal t = 0;
@@ -122,20 +122,20 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   const TSHHT3Statistics saved = I.stat;
   d->ts                        = ts;
   if (!*P) PetscCall(CreateMatrix(ts, P));
-  PetscCall(MatColoringCreate(*P, &mc));
+  PetscCall(MatDuplicate(*P, MAT_DO_NOT_COPY_VALUES, &d->part));
+  PetscCall(MatColoringCreate(d->part, &mc));
   PetscCall(MatColoringSetDistance(mc, 2));
   PetscCall(MatColoringSetType(mc, MATCOLORINGSL));
   PetscCall(MatColoringSetFromOptions(mc));
   PetscCall(MatColoringApply(mc, &colors));
   PetscCall(MatColoringDestroy(&mc));
-  PetscCall(MatFDColoringCreate(*P, colors, &d->coloring));
+  PetscCall(MatFDColoringCreate(d->part, colors, &d->coloring));
   PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(Evaluate)), d));
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
-  PetscCall(MatFDColoringSetUp(*P, colors, d->coloring));
+  PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
   PetscInt n;
   PetscCall(ISColoringGetColors(colors, NULL, &n, NULL));
   PetscCall(ISColoringDestroy(&colors));
-  PetscCall(MatDuplicate(*P, MAT_DO_NOT_COPY_VALUES, &d->part));
   PetscCall(PetscInfo(ts, "no I2Jacobian: dF/dU, dF/dU', dF/dU'' by differences in %" PetscInt_FMT " colors\n", n));
   I.stat = saved;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -163,12 +163,12 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscFunctionBegin;
   d->t = t;
   for (int k = 0; k < 3; k++) d->at[k] = at[k];
+  PetscCall(MatZeroEntries(P));
   for (d->which = 0; d->which < 3; d->which++) {
-    if (d->which && shift[d->which] == 0) continue;
-    Mat target = d->which ? d->part : P;
-    PetscCall(MatZeroEntries(target));
-    PetscCall(MatFDColoringApply(target, d->coloring, at[d->which], NULL));
-    if (d->which) PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
+    if (shift[d->which] == 0) continue;
+    PetscCall(MatZeroEntries(d->part));
+    PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
+    PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -225,6 +225,22 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Some packages report a singular matrix as an error, others as a failed preconditioner: both become a failed correction */
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P)
+{
+  Integrator    &I = Get(ts);
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(KSPSetOperators(ksp, J, P));
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = KSPSetUp(ksp);
+  PetscCall(PetscPopErrorHandler());
+  I.singular = (PetscBool)(ierr != 0);
+  if (ierr) PetscCall(PetscInfo(ts, "the factorization failed with PETSc error %d\n", (int)ierr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F)
@@ -331,6 +347,8 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     if (!I.linear_chosen || !symmetric) PetscCall(LinearChoose(ksp, P, symmetric, &I.linear));
     I.linear_chosen = PETSC_TRUE;
   }
+  PetscCall(Factor(ts, ksp, J, P));
+  if (I.singular) PetscCall(SNESSetJacobianDomainError(snes));
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

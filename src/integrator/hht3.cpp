@@ -224,11 +224,11 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   char        file[PETSC_MAX_PATH_LEN] = "";
 
   PetscFunctionBegin;
-  PetscCall(PetscOptionsBool("-ts_hhtdae_summary", "Print the counters at the end of the run", "TSHHT3GetStatistics", on, &on, NULL));
-  if (on) PetscCall(TSMonitorSet(ts, MonitorSummary, NULL, NULL));
-  on = PETSC_FALSE;
   PetscCall(PetscOptionsBool("-ts_hhtdae_progress", "Show time, step size and time left on the terminal", "TSHHT3GetStatistics", on, &on, NULL));
   if (on) PetscCall(TSMonitorSet(ts, MonitorProgress, NULL, NULL));
+  on = PETSC_FALSE;
+  PetscCall(PetscOptionsBool("-ts_hhtdae_summary", "Print the counters at the end of the run", "TSHHT3GetStatistics", on, &on, NULL));
+  if (on) PetscCall(TSMonitorSet(ts, MonitorSummary, NULL, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_checkpoint", "File to write a checkpoint to", "TSHHT3CheckpointSave", I.checkpoint_file, I.checkpoint_file, sizeof(I.checkpoint_file), NULL));
   PetscCall(PetscOptionsInt("-ts_hhtdae_checkpoint_every", "Accepted steps from one checkpoint to the next", "TSHHT3CheckpointSave", I.checkpoint_every, &I.checkpoint_every, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_resume", "Checkpoint to go on from", "TSHHT3CheckpointLoad", file, file, sizeof(file), &flg));

@@ -98,6 +98,7 @@ struct Integrator {
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   LinearChoice  linear;
   PetscBool     linear_chosen = PETSC_FALSE;
+  PetscBool     singular = PETSC_FALSE;       /* the package could not factor the last matrix */
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
 
   /* bookkeeping */
@@ -122,6 +123,9 @@ struct Integrator {
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* how every failure by a singular matrix ends */
+constexpr char singular[] = "the Newton matrix is singular";
 
 /* log events, declared once in hht3.cpp */
 struct Events {

@@ -107,6 +107,7 @@ PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  if (Get(ts).singular) PetscCall(NameRedundant(ts));
   PetscCall(KSPSetOperators(ksp, J, P));
   PetscCall(KSPSolve(ksp, rhs, d));
   Get(ts).stat.solves++;

@@ -267,6 +267,12 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
     PetscCall(ConstraintDerivatives(ts, t, U, V, T, NULL, I.gamma));
   }
   if (!have_matrix) PetscCall(MakeStartMatrix(ts));
+  if (I.singular) {
+    I.mode = Mode::Step;
+    *ok    = PETSC_FALSE;
+    PetscCall(PetscStrncpy(I.failure, singular, sizeof(I.failure)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   /* the matrix is made beforehand, since the first residual needs it */
   const Corrector saved   = I.corrector;
   I.corrector.want_matrix = PETSC_FALSE;
@@ -289,7 +295,7 @@ namespace
 PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
 {
   Integrator &I = Get(ts);
-  PetscBool   ok, singular;
+  PetscBool   ok, is_singular;
   Vec         rate;
 
   PetscFunctionBegin;
@@ -297,8 +303,8 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
   PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, matrix_is_current, &ok));
   if (!ok) {
-    PetscCall(PetscStrendswith(I.failure, "singular", &singular));
-    if (singular) PetscCall(NameRedundant(ts));
+    PetscCall(PetscStrendswith(I.failure, singular, &is_singular));
+    if (is_singular) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
   PetscCall(Distribute(I));
