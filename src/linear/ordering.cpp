@@ -1,6 +1,5 @@
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
-#include "klu.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -31,6 +30,5 @@ PetscErrorCode LinearRegister(void)
   PetscFunctionBegin;
   PetscCall(MatOrderingRegister(MATORDERINGMETISND, MatGetOrdering_MetisND));
   PetscCall(LinearRegisterMumpsND());
-  PetscCall(LinearRegisterKLU());
   PetscFunctionReturn(0);
 }

@@ -462,49 +462,6 @@ TEST_F(LinearChoiceTest, TurnsToLUWhenSymmetryIsLost)
   OK(KSPDestroy(&ksp));
 }
 
-/* Dependent constraints fail the solve, they do not end the program */
-TEST(LinearKLU, SingularMatrixFailsTheSolve)
-{
-  Entries            entries = chain(10, 0);
-  const PetscInt     twice = 38, row = entries.n++;
-  Mat                A;
-  KSP                ksp;
-  PC                 pc;
-  Vec                b, x;
-  KSPConvergedReason reason;
-  PCFailedReason     failure;
-  for (size_t k = 0, size = entries.row.size(); k < size; ++k)
-    if (entries.row[k] == twice) entries.add_symmetric(row, entries.col[k], -2.0 * entries.val[k]);
-  OK(create_matrix(entries, &A));
-  if (!has(A, MATSOLVERKLU, MAT_FACTOR_LU)) {
-    OK(MatDestroy(&A));
-    GTEST_SKIP() << "this PETSc was built without KLU";
-  }
-  OK(KSPCreate(PETSC_COMM_SELF, &ksp));
-  OK(KSPSetType(ksp, KSPPREONLY));
-  OK(KSPGetPC(ksp, &pc));
-  OK(PCSetType(pc, PCLU));
-  OK(PCFactorSetMatSolverType(pc, MATSOLVERKLU));
-  OK(KSPSetOperators(ksp, A, A));
-  OK(MatCreateVecs(A, &x, &b));
-  OK(VecSet(b, 1.0));
-  OK(KSPSolve(ksp, b, x));
-  OK(KSPGetConvergedReason(ksp, &reason));
-  OK(PCGetFailedReason(pc, &failure));
-  EXPECT_EQ(reason, KSP_DIVERGED_PC_FAILED);
-  EXPECT_EQ(failure, PC_FACTOR_NUMERIC_ZEROPIVOT);
-
-  /* A regular matrix afterwards is solved by the same objects */
-  OK(MatShift(A, 3.0));
-  OK(KSPSolve(ksp, b, x));
-  OK(KSPGetConvergedReason(ksp, &reason));
-  EXPECT_GT(reason, 0);
-  OK(KSPDestroy(&ksp));
-  OK(VecDestroy(&x));
-  OK(VecDestroy(&b));
-  OK(MatDestroy(&A));
-}
-
 /* ---- MUMPS with our ordering ---- */
 
 class MumpsND : public testing::Test
