@@ -230,18 +230,27 @@ inline void plotData(FILE *g, const Curve &c, int kind)
   fprintf(g, "e\n");
 }
 
+/* Line style of the k-th solver that is drawn */
+inline std::string style(int k)
+{
+  static const char *const colour[] = {"#d00000", "#ff8c00", "#0060c0", "#909090", "#000000",
+                                       "#8040a0", "#008060", "#a06030", "#e060a0", "#60b000"};
+  static const int         point[]  = {7, 5, 9, 1, 2, 3, 4, 6, 8, 10, 12, 13};
+  return std::string("with linespoints dt 1 lc rgb '") + colour[k % 10] + "' pt " + std::to_string(point[k % 12]);
+}
+
 /* Errors above 10 are no solution: the picture ends there */
 inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overview, bool key)
 {
   const char *separator = "plot ";
+  int         drawn     = 0;
   Range       range;
   if (!findRange(r, i, kind, overview, range)) return;
   fprintf(g, "set xrange [%g:%g]\nset yrange [%g:%g]\n", range.x0 / 2., std::min(10., range.x1 * 2.), range.y0 / 1.5,
           range.y1 * 1.5);
   for (size_t s = 0; s < r.solvers.size(); s++) {
     if (overview && !r.solvers[s].inOverview) continue;
-    fprintf(g, "%s'-' using 1:2 with linespoints lt %d pt %d ps %g lw 1.5 ", separator, (int)s + 1, (int)s + 4,
-            overview ? .6 : .9);
+    fprintf(g, "%s'-' using 1:2 %s ps %g lw 1.5 ", separator, style(drawn++).c_str(), overview ? .6 : .9);
     if (key) fprintf(g, "title \"%s\"", r.solvers[s].title.c_str());
     else fprintf(g, "notitle");
     separator = ", ";
@@ -266,27 +275,30 @@ inline void plotProblem(FILE *g, const Results &r, size_t i, const std::string &
   fprintf(g, "unset multiplot\nunset output\n");
 }
 
-/* Small multiples: a panel per problem, the key in a panel of its own */
+/* Small multiples: a panel per problem, and the key in a strip below */
 inline void plotOverview(FILE *g, const Results &r, const std::string &out)
 {
-  const int panels = (int)r.cases.size() + 1, columns = panels <= 4 ? 2 : panels <= 9 ? 3 : 4,
-            rows      = (panels + columns - 1) / columns;
-  const char *separator = "plot ";
+  const int    panels = (int)r.cases.size(), columns = panels <= 4 ? 2 : panels <= 9 ? 3 : 4;
+  const int    rows = (panels + columns - 1) / columns;
+  const double strip = .11, top = .955, height = (top - strip) / rows, width = .985 / columns;
+  const char  *separator = "plot ";
+  int          drawn     = 0;
   fprintf(g, "reset\nset terminal pngcairo size 1200,900 font ',10'\nset output '%s/workprecision.png'\n", out.c_str());
-  fprintf(g, "set multiplot layout %d,%d title 'CPU time of the solve [s] against error of the positions' font ',13'\n",
-          rows, columns);
-  fprintf(g, "set logscale xy\nset format '10^{%%L}'\nset grid lc rgb '#dddddd' lt 1\nset tmargin 2\nset bmargin 2\n"
-             "set lmargin 6.5\nset rmargin 1\nset xtics 100 offset 0,.3\nset ytics 10 offset .5,0\n");
+  fprintf(g, "set multiplot title 'CPU time of the solve [s] against error of the positions' font ',14'\n"
+             "set logscale xy\nset format '10^{%%L}'\nset grid lc rgb '#dddddd' lt 1\nset tmargin 1.8\nset bmargin 1.8\n"
+             "set lmargin 6.5\nset rmargin 1\nset xtics 100 offset 0,.3\nset ytics 10 offset .5,0\nset mytics 10\n");
   for (size_t i = 0; i < r.cases.size(); i++) {
-    fprintf(g, "set title '%s' offset 0,-.6 font ',11'\nset key off\n", r.cases[i].name.c_str());
+    const int row = (int)i / columns, column = (int)i % columns;
+    fprintf(g, "set origin %g,%g\nset size %g,%g\n", column * width, top - (row + 1) * height, width, height);
+    fprintf(g, "set title '%s' offset 0,-.6 font ',12'\nset key off\n", r.cases[i].name.c_str());
     plotCurves(g, r, i, 0, true, false);
   }
-  fprintf(g, "unset title\nunset border\nunset tics\nunset grid\nunset logscale\nset key center center samplen 2 "
-             "spacing 1.3\nset xrange [0:1]\nset yrange [0:1]\n");
-  for (size_t s = 0; s < r.solvers.size(); s++) {
-    if (!r.solvers[s].inOverview) continue;
-    fprintf(g, "%sNaN with linespoints lt %d pt %d lw 1.5 title \"%s\"", separator, (int)s + 1, (int)s + 4,
-            r.solvers[s].title.c_str());
+  fprintf(g, "set origin 0,0\nset size 1,%g\nunset title\nunset border\nunset tics\nunset grid\nunset logscale\n"
+             "set margins 1,1,0,0\nset key center center horizontal maxrows 2 samplen 3 spacing 1.4 font ',12' width 1\n"
+             "set xrange [0:1]\nset yrange [0:1]\n", strip);
+  for (const Solver &solver : r.solvers) {
+    if (!solver.inOverview) continue;
+    fprintf(g, "%sNaN %s lw 2 title \"%s\"", separator, style(drawn++).c_str(), solver.title.c_str());
     separator = ", ";
   }
   fprintf(g, "\nunset multiplot\nunset output\n");
