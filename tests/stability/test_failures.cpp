@@ -1,0 +1,197 @@
+/* Failures: residuals that are not numbers, now and then or for ever, steps that cannot succeed, budgets */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A pendulum whose residual is spoiled when `bad` says so */
+struct Spoiled : Pendulum {
+  std::function<bool(int call, double t)> bad;
+  double                                  value;
+  mutable int                             calls = 0;
+  explicit Spoiled(double end, double with, std::function<bool(int, double)> when)
+      : Pendulum(-60., 1., end), bad(std::move(when)), value(with)
+  {
+  }
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    Pendulum::residual(t, u, v, a, f);
+    if (bad(calls++, t)) f[1] = value;
+  }
+};
+
+} // namespace
+
+TEST(Failures, NotANumberNowAndThenCutsTheStep)
+{
+  for (double value : {(double)NAN, (double)INFINITY}) {
+    const Spoiled p(2., value, [](int call, double t) { return t > .1 && call % 97 == 0; });
+    Simulation    run(p, tolerance(1e-6));
+    must(run.solve());
+    const TSHHT3Statistics s = run.statistics();
+    MEASURED("residual %g every 97th time: %d steps, %d failed corrections, error q %.1e", value, (int)s.steps,
+             (int)s.corrector_fails, run.errors().q);
+    EXPECT_EQ(run.t(), 2.);
+    EXPECT_GT(s.corrector_fails + s.retries, 3);
+    EXPECT_LT(run.errors().q, 2e-3);
+  }
+}
+
+/* A force that is not defined beyond some velocity: shorter steps keep out of it */
+TEST(Failures, NotANumberForEverIsAnErrorThatNamesTheRow)
+{
+  for (double value : {(double)NAN, (double)INFINITY}) {
+    const Spoiled p(2., value, [](int, double t) { return t > .5; });
+    Simulation    run(p, tolerance(1e-6));
+    double        last = 0.;
+    Array         u, v;
+    run.watch = [&](Simulation &r, PetscInt, double t) {
+      last = t;
+      u    = r.u();
+      v    = r.v();
+    };
+    ErrorTrap trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_NOT_CONVERGED);
+    EXPECT_TRUE(trap.says("not a number")) << trap.message;
+    EXPECT_TRUE(trap.says("row 1")) << trap.message;
+    EXPECT_TRUE(trap.says("equation of motion")) << trap.message;
+    EXPECT_TRUE(trap.says("last accepted state")) << trap.message;
+    EXPECT_EQ(run.t(), last);
+    EXPECT_EQ(run.u(), u);
+    EXPECT_EQ(run.v(), v);
+    EXPECT_NEAR(last, .5, 1e-2);
+  }
+}
+
+TEST(Failures, NotANumberAtTheStart)
+{
+  const Spoiled p(2., NAN, [](int, double) { return true; });
+  Simulation    run(p, tolerance(1e-6));
+  ErrorTrap     trap;
+  EXPECT_NE(run.solve(), 0);
+  EXPECT_TRUE(trap.says("t = 0")) << trap.message;
+  EXPECT_TRUE(trap.says("not a number")) << trap.message;
+}
+
+/* -ts_error_if_step_fails 0: a reason in place of an error, and the last good state */
+TEST(Failures, ReasonInPlaceOfAnError)
+{
+  const Spoiled p(2., NAN, [](int, double t) { return t > .5; });
+  Simulation    run(p, tolerance(1e-6) + "-ts_error_if_step_fails 0");
+  must(run.solve());
+  EXPECT_LT(run.reason(), 0) << TSConvergedReasons[run.reason()];
+  EXPECT_LE(run.t(), .5);
+  EXPECT_LT(run.errors().q, 1e-3);
+  for (double x : run.v()) EXPECT_TRUE(std::isfinite(x));
+}
+
+TEST(Failures, TooManyRejections)
+{
+  const Spoiled p(2., NAN, [](int, double t) { return t > .5; });
+  {
+    Simulation run(p, tolerance(1e-6) + "-ts_error_if_step_fails 0 -ts_max_reject 3");
+    must(run.solve());
+    EXPECT_EQ(run.reason(), TS_DIVERGED_STEP_REJECTED);
+    EXPECT_LT(run.errors().q, 1e-3);
+  }
+  Simulation run(p, tolerance(1e-6) + "-ts_max_reject 3");
+  ErrorTrap  trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_NOT_CONVERGED);
+  EXPECT_TRUE(trap.says("rejected too often")) << trap.message;
+}
+
+TEST(Failures, TooManyFailedCorrections)
+{
+  const Spoiled p(2., NAN, [](int, double t) { return t > .5; });
+  Simulation    run(p, tolerance(1e-6) + "-ts_error_if_step_fails 0 -ts_max_snes_failures 2");
+  must(run.solve());
+  EXPECT_EQ(run.reason(), TS_DIVERGED_NONLINEAR_SOLVE);
+  EXPECT_LT(run.errors().q, 1e-3);
+}
+
+/* The error test itself cannot be met: too small a smallest step */
+TEST(Failures, SmallestStepTooLarge)
+{
+  const Pendulum p(-60., 1., 2.);
+  Simulation     run(p, tolerance(1e-10) + "-ts_adapt_dt_min 0.05 -ts_dt 0.1 -ts_error_if_step_fails 0 -ts_max_steps 1000");
+  must(run.solve());
+  MEASURED("smallest step of 0.05 at tolerance 1e-10: %s at t = %g", TSConvergedReasons[run.reason()], run.t());
+  for (double x : run.u()) EXPECT_TRUE(std::isfinite(x));
+  if (run.reason() < 0) {
+    EXPECT_LT(run.t(), 2.);
+  } else {
+    EXPECT_EQ(run.t(), 2.);
+  }
+}
+
+TEST(Failures, StepBudget)
+{
+  const Pendulum p(-60., 1., 2.);
+  Simulation     run(p, tolerance(1e-8) + "-ts_max_steps 20");
+  must(run.solve());
+  EXPECT_EQ(run.reason(), TS_CONVERGED_ITS);
+  EXPECT_EQ(run.statistics().steps, 20);
+  EXPECT_LT(run.errors().q, 1e-5);
+}
+
+/* A run that failed can be taken up again once the cause is gone */
+TEST(Failures, GoOnAfterAFailure)
+{
+  bool          broken = true;
+  const Spoiled p(2., NAN, [&](int, double t) { return broken && t > .5; });
+  Simulation    run(p, tolerance(1e-6) + "-ts_error_if_step_fails 0");
+  must(run.solve());
+  EXPECT_LT(run.reason(), 0);
+  broken = false;
+  must(TSSetTimeStep(run.ts, 1e-3));
+  must(run.solve());
+  EXPECT_EQ(run.reason(), TS_CONVERGED_TIME);
+  EXPECT_EQ(run.t(), 2.);
+  EXPECT_LT(run.errors().q, 2e-3);
+}
+
+/* The application's own error passes through */
+TEST(Failures, ErrorOfTheApplication)
+{
+  TS   ts;
+  Vec  U, V, F;
+  auto function = [](TS, PetscReal t, Vec, Vec, Vec A, Vec R, void *) -> PetscErrorCode {
+    PetscFunctionBegin;
+    PetscCheck(t < .5, PETSC_COMM_SELF, PETSC_ERR_USER, "no table beyond t = 0.5");
+    PetscCall(VecCopy(A, R));
+    PetscCall(VecShift(R, 9.81));
+    PetscFunctionReturn(0);
+  };
+  auto jacobian = [](TS, PetscReal, Vec, Vec, Vec, PetscReal, PetscReal sa, Mat J, Mat, void *) -> PetscErrorCode {
+    PetscFunctionBegin;
+    PetscCall(MatZeroEntries(J));
+    PetscCall(MatShift(J, sa));
+    PetscFunctionReturn(0);
+  };
+  Mat J;
+  must(VecCreateSeq(PETSC_COMM_SELF, 2, &U));
+  must(VecDuplicate(U, &V));
+  must(VecDuplicate(U, &F));
+  must(MatCreateSeqAIJ(PETSC_COMM_SELF, 2, 2, 1, nullptr, &J));
+  for (PetscInt i = 0; i < 2; i++) must(MatSetValue(J, i, i, 1., INSERT_VALUES));
+  must(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+  must(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, F, function, nullptr));
+  must(TSSetI2Jacobian(ts, J, J, jacobian, nullptr));
+  must(TS2SetSolution(ts, U, V));
+  must(TSSetMaxTime(ts, 1.));
+  must(TSSetTimeStep(ts, .01));
+  must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+  {
+    ErrorTrap trap;
+    EXPECT_EQ(TSSolve(ts, nullptr), PETSC_ERR_USER);
+    EXPECT_TRUE(trap.says("no table beyond")) << trap.message;
+  }
+  must(TSDestroy(&ts));
+  must(MatDestroy(&J));
+  for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
+}
