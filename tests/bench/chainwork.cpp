@@ -6,9 +6,12 @@ static char help[] =
     "  -angle <0>: start angle from the horizontal, degrees\n"
     "  -repeats <7>: runs of which the medians count\n"
     "Options of the integrator are taken, -ts_hhtdae_...\n\n"
-    "The first ten steps, with the consistent start, the symbolic factorization and the growth of h, are left out and shown\n"
-    "as 'begin'. Shares come from PETSc's log events of the application's functions, factorizations and triangular solves, with all\n"
-    "other events switched off; 'else' is what is left of TSSolve(). Times per step come from runs without any logging,\n"
+    "The first ten steps, with the consistent start, the symbolic factorization and the growth of h, are left out and "
+    "shown\n"
+    "as 'begin'. Shares come from PETSc's log events of the application's functions, factorizations and triangular "
+    "solves, with all\n"
+    "other events switched off; 'else' is what is left of TSSolve(). Times per step come from runs without any "
+    "logging,\n"
     "and 'logging' is what the events add to them.\n";
 
 #include "problem.h"
@@ -35,8 +38,8 @@ enum Part { Residual, Jacobian, Factor, Solve, Else, NumParts };
 constexpr PetscInt BEGIN = 10; /* steps that are left out */
 
 struct Sample {
-  double   begin = 0., total = 0.;  /* CPU seconds of TSSolve() up to step BEGIN, and from there on */
-  double   part[NumParts] = {};     /* from there on, wall-clock seconds, as PETSc logs them */
+  double   begin = 0., total = 0.; /* CPU seconds of TSSolve() up to step BEGIN, and from there on */
+  double   part[NumParts] = {};    /* from there on, wall-clock seconds, as PETSc logs them */
   PetscInt steps = 0, newton = 0, factored = 0, rejected = 0;
 };
 
@@ -127,12 +130,12 @@ static PetscErrorCode RunChain(const hhtex::Problem &problem, double eps, PetscI
   PetscCall(Now(ts, &before));
   PetscCall(TSSolve(ts, U));
   PetscCall(Now(ts, &last));
-  sample->begin      = first.cpu - before.cpu;
-  sample->total      = last.cpu - first.cpu;
-  sample->steps      = last.stat.steps - first.stat.steps;
-  sample->newton     = last.stat.newton - first.stat.newton;
-  sample->factored   = last.stat.factorizations - first.stat.factorizations;
-  sample->rejected   = last.stat.rejected + last.stat.corrector_fails - first.stat.rejected - first.stat.corrector_fails;
+  sample->begin    = first.cpu - before.cpu;
+  sample->total    = last.cpu - first.cpu;
+  sample->steps    = last.stat.steps - first.stat.steps;
+  sample->newton   = last.stat.newton - first.stat.newton;
+  sample->factored = last.stat.factorizations - first.stat.factorizations;
+  sample->rejected = last.stat.rejected + last.stat.corrector_fails - first.stat.rejected - first.stat.corrector_fails;
   sample->part[Else] = last.wall - first.wall;
   for (int k = 0; k < Else; k++) {
     sample->part[k] = last.part[k] - first.part[k];
@@ -229,8 +232,8 @@ int main(int argc, char **argv)
       for (Sample &s : samples) PetscCall(RunChain(problem, eps, steps, &s));
     }
   }
-  printf("Falling chain, tolerance %g, at most %d steps; CPU time per accepted step, shares of the solve\n\n", (double)eps,
-         (int)steps);
+  printf("Falling chain, tolerance %g, at most %d steps; CPU time per accepted step, shares of the solve\n\n",
+         (double)eps, (int)steps);
   printf("%6s %7s %6s %6s %9s %9s %8s %6s %7s %9s %9s %9s %9s %9s %9s\n", "N", "unknown", "steps", "failed", "begin/ms",
          "us/step", "ns/st/N", "it/st", "fac/st", "residual", "Jacobian", "factor", "solve", "else", "logging");
   for (PetscInt k = 0; k < count; k++) rows.push_back(PrintRow(sizes[k], plain[k], events[k]));

@@ -1,16 +1,17 @@
-static char help[] =
-    "Error against run time of every example problem with a reference: both forms of hhtdae, PETSc's ALPHA2 and BDF, and\n"
-    "SUNDIALS IDA (where it was found), in turn in one process. Error: largest weighted difference to the reference over\n"
-    "the output points. Time: CPU time of the solve alone, median of the repeats.\n"
-    "  -problems <a,b,...>: problems [all]\n"
-    "  -solvers <a,b,...>: solvers [all]; the first one is what the others are compared with\n"
-    "  -sweep: instead of other solvers, variations of hhtdae's own settings\n"
-    "  -eps_max <1e-2> -eps_min <1e-8>: range of tolerances, two per decade with -dense [one]\n"
-    "  -repeats <5>: runs of which the median counts\n"
-    "  -limit <5>: CPU seconds after which a run counts as failed\n"
-    "  -errors <q|v|lambda>: tables per problem for this error [q]\n"
-    "  -out <dir>: where CSV and pictures go [the directory above the program's]\n"
-    "Further options, such as -ts_hhtdae_predictor_degree, go to every TS.\n";
+static char help[] = "Error against run time of every example problem with a reference: both forms of hhtdae, PETSc's "
+                     "ALPHA2 and BDF, and\n"
+                     "SUNDIALS IDA (where it was found), in turn in one process. Error: largest weighted difference to "
+                     "the reference over\n"
+                     "the output points. Time: CPU time of the solve alone, median of the repeats.\n"
+                     "  -problems <a,b,...>: problems [all]\n"
+                     "  -solvers <a,b,...>: solvers [all]; the first one is what the others are compared with\n"
+                     "  -sweep: instead of other solvers, variations of hhtdae's own settings\n"
+                     "  -eps_max <1e-2> -eps_min <1e-8>: range of tolerances, two per decade with -dense [one]\n"
+                     "  -repeats <5>: runs of which the median counts\n"
+                     "  -limit <5>: CPU seconds after which a run counts as failed\n"
+                     "  -errors <q|v|lambda>: tables per problem for this error [q]\n"
+                     "  -out <dir>: where CSV and pictures go [the directory above the program's]\n"
+                     "Further options, such as -ts_hhtdae_predictor_degree, go to every TS.\n";
 
 #include "workprecision_report.h"
 #if defined(HHTDAE_HAVE_IDA)

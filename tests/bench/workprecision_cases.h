@@ -46,8 +46,8 @@ inline std::vector<Case> allCases()
   for (Case &c : cases)
     if (c.name == "caraxis")
       c.phiT = [](const Problem &p, double t, const double *u, double *f) {
-        const auto  &axis = static_cast<const CarAxis &>(p);
-        double       xb, yb;
+        const auto &axis = static_cast<const CarAxis &>(p);
+        double      xb, yb;
         axis.road(t, xb, yb);
         const double dyb = axis.r * axis.w * std::cos(axis.w * t);
         f[4] -= -yb * dyb / xb * u[0] + dyb * u[1];
@@ -56,8 +56,8 @@ inline std::vector<Case> allCases()
 }
 
 struct Solver {
-  std::string                                                                                    name, title;
-  bool                                                                                           inOverview;
+  std::string name, title;
+  bool        inOverview;
   std::function<PetscErrorCode(const Case &, const Problem &, const Reference &, double, const Limits &, Run *)> run;
 };
 
@@ -136,7 +136,7 @@ inline void addForeign(std::vector<Solver> &list)
 inline std::vector<Solver> allSolvers()
 {
   const TSHHT3Form second = TSHHT3_FORM_SECOND_ORDER, paper = TSHHT3_FORM_PAPER;
-  auto             form   = [](TSHHT3Form f, double alpha) { return [=](TS ts) { return SetFormAndAlpha(ts, f, alpha); }; };
+  auto form = [](TSHHT3Form f, double alpha) { return [=](TS ts) { return SetFormAndAlpha(ts, f, alpha); }; };
   std::vector<Solver> list = {
       makeHHT("hhtdae", "hhtdae, defaults", true, nullptr),
       makeHHT("second-0.3", "hhtdae, second order, {/Symbol a} = -0.3", false, form(second, -.3)),
@@ -163,8 +163,7 @@ inline std::vector<Solver> sweepSolvers()
   };
   for (double c : {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4})
     add("c=" + number(c), [c](TS ts) { return TSHHT3SetCorrectorTolerance(ts, c); });
-  for (int d : {-1, 0, 1, 2, 3})
-    add("degree=" + number(d), [d](TS ts) { return TSHHT3SetPredictorDegree(ts, d); });
+  for (int d : {-1, 0, 1, 2, 3}) add("degree=" + number(d), [d](TS ts) { return TSHHT3SetPredictorDegree(ts, d); });
   for (double ratio : {1.1, 1.2, 1.4, 1.7, 2.})
     for (double rate : {.1, .25, .5})
       for (double hold : {1., 1.2, 1.4}) {

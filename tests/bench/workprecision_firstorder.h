@@ -1,6 +1,6 @@
 /*
-  A problem as a first-order DAE G(t,y,y') = 0, for BDF codes. y holds all unknowns of the problem (q, states, lambda, V,
-  F in its own order), then the velocities v of the coordinates, and in the stabilized form then one mu per holonomic
+  A problem as a first-order DAE G(t,y,y') = 0, for BDF codes. y holds all unknowns of the problem (q, states, lambda,
+  V, F in its own order), then the velocities v of the coordinates, and in the stabilized form then one mu per holonomic
   constraint:
 
     index 3                                      Gear, Gupta and Leimkuhler, index 2
@@ -8,8 +8,8 @@
     q' - v = 0                                   q' - v + Phi_q^T mu = 0
                                                  Phi_q v + Phi_t = 0
 
-  Phi_q comes from the problem's Jacobian with both shifts zero, (Phi_q v)_q + Phi_qt from a central difference of it along
-  (1, v) - in the iteration matrix only. (Phi_q^T mu)_q is left out of the matrix: mu vanishes with the step size.
+  Phi_q comes from the problem's Jacobian with both shifts zero, (Phi_q v)_q + Phi_qt from a central difference of it
+  along (1, v) - in the iteration matrix only. (Phi_q^T mu)_q is left out of the matrix: mu vanishes with the step size.
 */
 #ifndef WORKPRECISION_FIRSTORDER_H
 #define WORKPRECISION_FIRSTORDER_H

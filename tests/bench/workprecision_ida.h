@@ -1,7 +1,7 @@
 /*
   SUNDIALS IDA through its C interface: analytic Jacobian, variable order up to 5, its own first step, dense output by
-  IDA_NORMAL. Small systems get its dense solver, the others KLU. The settings are the best of those tried: order 3 costs
-  1.2 times more at equal error, and so does the dense solver throughout.
+  IDA_NORMAL. Small systems get its dense solver, the others KLU. The settings are the best of those tried: order 3
+  costs 1.2 times more at equal error, and so does the dense solver throughout.
 */
 #ifndef WORKPRECISION_IDA_H
 #define WORKPRECISION_IDA_H
@@ -95,9 +95,8 @@ private:
     std::copy(y0_.begin(), y0_.end(), N_VGetArrayPointer(y_));
     std::copy(yp0_.begin(), yp0_.end(), N_VGetArrayPointer(yp_));
     for (PetscInt i = 0; i < n; i++) {
-      const bool tested =
-          system_.isDifferential(i) && (settings_.testVelocity || !system_.isVelocity(i));
-      N_VGetArrayPointer(id_)[i]        = tested;
+      const bool tested          = system_.isDifferential(i) && (settings_.testVelocity || !system_.isVelocity(i));
+      N_VGetArrayPointer(id_)[i] = tested;
       N_VGetArrayPointer(tolerance_)[i] = tested ? eps : eps * settings_.looser;
     }
     memory_ = IDACreate(context_);
@@ -134,7 +133,7 @@ private:
       slot_[order[k]] = k > 0 && position(order[k]) == position(order[k - 1]) ? last : ++last;
     matrix_ = SUNSparseMatrix(n, n, last + 1, CSC_MAT, context_);
     for (size_t k : order) {
-      SUNSparseMatrix_IndexValues(matrix_)[slot_[k]]            = entries_.row[k];
+      SUNSparseMatrix_IndexValues(matrix_)[slot_[k]]              = entries_.row[k];
       SUNSparseMatrix_IndexPointers(matrix_)[entries_.col[k] + 1] = slot_[k] + 1;
     }
     pattern_.assign(SUNSparseMatrix_IndexValues(matrix_), SUNSparseMatrix_IndexValues(matrix_) + last + 1);
@@ -183,7 +182,7 @@ private:
   static int jacobian(realtype t, realtype c, N_Vector y, N_Vector yp, N_Vector, SUNMatrix J, void *self, N_Vector,
                       N_Vector, N_Vector)
   {
-    auto    &s = *static_cast<IDASolver *>(self);
+    auto     &s = *static_cast<IDASolver *>(self);
     realtype *value;
     s.system_.jacobian(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp), c, s.entries_);
     if (SUNMatGetID(J) == SUNMATRIX_DENSE) {

@@ -40,7 +40,7 @@ inline double timeAtError(const Curve &c, int kind, double target)
 /* Ratios of a solver's time to the first one's over error levels */
 struct Ratios {
   double logSum = 0., worst = 0., best = 0.;
-  int    count  = 0;
+  int    count = 0;
 
   void add(double ratio)
   {
@@ -61,8 +61,10 @@ inline const char *errorName(int kind)
 
 inline void printNumber(double x)
 {
-  if (std::isnan(x)) printf(" %8s", "-");
-  else printf(" %8.3g", x);
+  if (std::isnan(x))
+    printf(" %8s", "-");
+  else
+    printf(" %8.3g", x);
 }
 
 inline double ratioAt(const Results &r, size_t i, size_t s, int kind, double level)
@@ -186,7 +188,8 @@ inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
 {
   PetscFunctionBegin;
   FILE *f = fopen(file.c_str(), "w");
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s: name a directory that exists with -out", file.c_str());
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s: name a directory that exists with -out",
+             file.c_str());
   fprintf(f, "problem,solver,eps,error_q,error_v,error_lambda,time,steps,rejected,newton,residuals,jacobians,"
              "factorizations,failure\n");
   for (size_t i = 0; i < r.cases.size(); i++)
@@ -251,8 +254,10 @@ inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overv
   for (size_t s = 0; s < r.solvers.size(); s++) {
     if (overview && !r.solvers[s].inOverview) continue;
     fprintf(g, "%s'-' using 1:2 %s ps %g lw 1.5 ", separator, style(drawn++).c_str(), overview ? .6 : .9);
-    if (key) fprintf(g, "title \"%s\"", r.solvers[s].title.c_str());
-    else fprintf(g, "notitle");
+    if (key)
+      fprintf(g, "title \"%s\"", r.solvers[s].title.c_str());
+    else
+      fprintf(g, "notitle");
     separator = ", ";
   }
   fprintf(g, "\n");
@@ -279,23 +284,26 @@ inline void plotProblem(FILE *g, const Results &r, size_t i, const std::string &
 inline void plotOverview(FILE *g, const Results &r, const std::string &out)
 {
   const int    panels = (int)r.cases.size(), columns = panels <= 4 ? 2 : panels <= 9 ? 3 : 4;
-  const int    rows = (panels + columns - 1) / columns;
+  const int    rows  = (panels + columns - 1) / columns;
   const double strip = .11, top = .955, height = (top - strip) / rows, width = .985 / columns;
   const char  *separator = "plot ";
   int          drawn     = 0;
   fprintf(g, "reset\nset terminal pngcairo size 1200,900 font ',10'\nset output '%s/workprecision.png'\n", out.c_str());
-  fprintf(g, "set multiplot title 'CPU time of the solve [s] against error of the positions' font ',14'\n"
-             "set logscale xy\nset format '10^{%%L}'\nset grid lc rgb '#dddddd' lt 1\nset tmargin 1.8\nset bmargin 1.8\n"
-             "set lmargin 6.5\nset rmargin 1\nset xtics 100 offset 0,.3\nset ytics 10 offset .5,0\nset mytics 10\n");
+  fprintf(g,
+          "set multiplot title 'CPU time of the solve [s] against error of the positions' font ',14'\n"
+          "set logscale xy\nset format '10^{%%L}'\nset grid lc rgb '#dddddd' lt 1\nset tmargin 1.8\nset bmargin 1.8\n"
+          "set lmargin 6.5\nset rmargin 1\nset xtics 100 offset 0,.3\nset ytics 10 offset .5,0\nset mytics 10\n");
   for (size_t i = 0; i < r.cases.size(); i++) {
     const int row = (int)i / columns, column = (int)i % columns;
     fprintf(g, "set origin %g,%g\nset size %g,%g\n", column * width, top - (row + 1) * height, width, height);
     fprintf(g, "set title '%s' offset 0,-.6 font ',12'\nset key off\n", r.cases[i].name.c_str());
     plotCurves(g, r, i, 0, true, false);
   }
-  fprintf(g, "set origin 0,0\nset size 1,%g\nunset title\nunset border\nunset tics\nunset grid\nunset logscale\n"
-             "set margins 1,1,0,0\nset key center center horizontal maxrows 2 samplen 3 spacing 1.4 font ',12' width 1\n"
-             "set xrange [0:1]\nset yrange [0:1]\n", strip);
+  fprintf(g,
+          "set origin 0,0\nset size 1,%g\nunset title\nunset border\nunset tics\nunset grid\nunset logscale\n"
+          "set margins 1,1,0,0\nset key center center horizontal maxrows 2 samplen 3 spacing 1.4 font ',12' width 1\n"
+          "set xrange [0:1]\nset yrange [0:1]\n",
+          strip);
   for (const Solver &solver : r.solvers) {
     if (!solver.inOverview) continue;
     fprintf(g, "%sNaN %s lw 2 title \"%s\"", separator, style(drawn++).c_str(), solver.title.c_str());

@@ -37,18 +37,18 @@ struct Counters {
 
 /* One run, or the median of several: failure is empty if the solver reached the end */
 struct Run {
-  double      time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
-  Counters    count;
+  double   time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
+  Counters count;
   std::string failure;
 };
 
-/* Passes everything on, and counts. After the deadline residuals are not a number, which ends solvers that never accept a
-   step and so never come by a monitor. */
+/* Passes everything on, and counts. After the deadline residuals are not a number, which ends solvers that never accept
+   a step and so never come by a monitor. */
 struct CountedProblem : Problem {
   const Problem &p;
   mutable long   residuals = 0, jacobians = 0;
-  double         deadline  = 1e300; /* CPU time of the process */
-  mutable bool   late      = false;
+  double         deadline = 1e300; /* CPU time of the process */
+  mutable bool   late     = false;
 
   explicit CountedProblem(const Problem &problem) : p(problem)
   {
@@ -62,8 +62,10 @@ struct CountedProblem : Problem {
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
     if (++residuals % 256 == 0 && !late) late = cpuSeconds() > deadline;
-    if (late) std::fill_n(f, n, std::nan(""));
-    else p.residual(t, u, v, a, f);
+    if (late)
+      std::fill_n(f, n, std::nan(""));
+    else
+      p.residual(t, u, v, a, f);
   }
   void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
                 Entries &J) const override
@@ -152,8 +154,8 @@ struct Recorder {
 /* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
    entry per unknown */
 struct Case {
-  std::string                                              name;
-  std::function<std::unique_ptr<Problem>()>                make;
+  std::string                                                            name;
+  std::function<std::unique_ptr<Problem>()>                              make;
   std::function<void(const Problem &, double, const double *, double *)> phiT = nullptr;
 };
 

@@ -1,6 +1,7 @@
 /*
-  PETSc's time steppers: hhtdae, ALPHA2 and BDF, the last one on the first-order form. Output between steps is by hhtdae's
-  and BDF's own interpolation; ALPHA2 has none and gets cubic Hermite polynomials, so that nobody has to hit a point.
+  PETSc's time steppers: hhtdae, ALPHA2 and BDF, the last one on the first-order form. Output between steps is by
+  hhtdae's and BDF's own interpolation; ALPHA2 has none and gets cubic Hermite polynomials, so that nobody has to hit a
+  point.
 */
 #ifndef WORKPRECISION_TS_H
 #define WORKPRECISION_TS_H
@@ -15,10 +16,10 @@ namespace wp
 enum class Stepper { HHT, Alpha2, BDF };
 
 struct TSSettings {
-  Stepper                             stepper = Stepper::HHT;
-  std::function<PetscErrorCode(TS)>   configure;                            /* after TSSetType() */
-  FirstOrder::Form                    form    = FirstOrder::Form::Stabilized; /* BDF */
-  bool                                fixed   = false; /* ALPHA2: constant steps, about 0.1 eps^0.4 of the run */
+  Stepper                           stepper = Stepper::HHT;
+  std::function<PetscErrorCode(TS)> configure;                            /* after TSSetType() */
+  FirstOrder::Form                  form  = FirstOrder::Form::Stabilized; /* BDF */
+  bool                              fixed = false; /* ALPHA2: constant steps, about 0.1 eps^0.4 of the run */
 };
 
 /* What the callbacks of one run need */
@@ -87,8 +88,10 @@ inline PetscErrorCode StoreHermite(TSRun &r, double t, double t1, Vec U, Vec V)
 inline PetscErrorCode StoreAt(TSRun &r, double tout, double t, Vec U, Vec V)
 {
   PetscFunctionBegin;
-  if (tout >= t) PetscCall(StoreOutput(r, U, V));
-  else if (r.settings.stepper == Stepper::Alpha2) PetscCall(StoreHermite(r, tout, t, U, V));
+  if (tout >= t)
+    PetscCall(StoreOutput(r, U, V));
+  else if (r.settings.stepper == Stepper::Alpha2)
+    PetscCall(StoreHermite(r, tout, t, U, V));
   else if (r.settings.stepper == Stepper::HHT) {
     PetscCall(TSHHT3Interpolate(r.ts, tout, r.W[0], r.W[1], nullptr));
     PetscCall(StoreOutput(r, r.W[0], r.W[1]));
@@ -169,8 +172,9 @@ inline PetscErrorCode SelectiveTolerances(TSRun &r, double eps)
   PetscCall(VecGetSize(tolerance, &n));
   PetscCall(VecGetArrayWrite(tolerance, &x));
   for (PetscInt i = 0; i < n; i++) {
-    const bool tested = i < r.problem.n && (r.problem.role[i] == TSHHT3_COORDINATE || r.problem.role[i] == TSHHT3_STATE);
-    x[i]              = tested ? eps : 1e100;
+    const bool tested =
+        i < r.problem.n && (r.problem.role[i] == TSHHT3_COORDINATE || r.problem.role[i] == TSHHT3_STATE);
+    x[i] = tested ? eps : 1e100;
   }
   PetscCall(VecRestoreArrayWrite(tolerance, &x));
   PetscCall(TSSetTolerances(r.ts, eps, tolerance, eps, nullptr));
@@ -180,10 +184,10 @@ inline PetscErrorCode SelectiveTolerances(TSRun &r, double eps)
 
 inline PetscErrorCode CreateFirstOrderTS(TSRun &r)
 {
-  std::vector<double>   y, yp;
-  Mat                   J;
-  Vec                   F;
-  double               *array;
+  std::vector<double> y, yp;
+  Mat                 J;
+  Vec                 F;
+  double             *array;
 
   PetscFunctionBegin;
   r.system.reset(new FirstOrder(r.counted, r.settings.form, r.which.phiT));
@@ -222,8 +226,9 @@ inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
 
   PetscFunctionBegin;
   /* a last constant step of odd length would leave its transient in the multipliers */
-  PetscCall(TSSetTimeStep(r.ts, (r.problem.t1 - r.problem.t0) *
-                                    (r.settings.fixed ? 1. / std::round(10. * std::pow(eps, -.4)) : 1e-3 * std::cbrt(eps))));
+  PetscCall(
+      TSSetTimeStep(r.ts, (r.problem.t1 - r.problem.t0) *
+                              (r.settings.fixed ? 1. / std::round(10. * std::pow(eps, -.4)) : 1e-3 * std::cbrt(eps))));
   PetscCall(TSGetAdapt(r.ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, r.settings.fixed ? TSADAPTNONE : TSADAPTBASIC));
   PetscCall(SelectiveTolerances(r, eps));
@@ -243,8 +248,10 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
   static const TSType type[] = {TSHHT3, TSALPHA2, TSBDF};
 
   PetscFunctionBegin;
-  if (r.settings.stepper == Stepper::BDF) PetscCall(CreateFirstOrderTS(r));
-  else PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, r.counted, &r.ts, &r.U, &r.V));
+  if (r.settings.stepper == Stepper::BDF)
+    PetscCall(CreateFirstOrderTS(r));
+  else
+    PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, r.counted, &r.ts, &r.U, &r.V));
   PetscCall(TSSetType(r.ts, type[(int)r.settings.stepper]));
   PetscCall(TSSetMaxSteps(r.ts, 100000000));
   if (r.settings.stepper == Stepper::HHT) {
@@ -265,10 +272,10 @@ inline PetscErrorCode SolveTS(TSRun &r, Run &run)
 {
   PetscFunctionBegin;
   r.counted.residuals = r.counted.jacobians = 0;
-  const double start     = cpuSeconds();
-  r.counted.deadline     = start + r.limits.seconds;
-  const PetscErrorCode e = TSSolve(r.ts, r.U);
-  run.time               = cpuSeconds() - start;
+  const double start                        = cpuSeconds();
+  r.counted.deadline                        = start + r.limits.seconds;
+  const PetscErrorCode e                    = TSSolve(r.ts, r.U);
+  run.time                                  = cpuSeconds() - start;
   PetscCall(e);
   PetscFunctionReturn(0);
 }
@@ -306,9 +313,12 @@ inline PetscErrorCode RunTS(const Case &c, const Problem &problem, const Referen
   PetscCall(PetscPopErrorHandler());
   PetscCall(ReadTSCounters(r, *run));
   PetscCall(TSGetConvergedReason(r.ts, &reason));
-  if (r.counted.late) run->failure = "took longer than the limit";
-  else if (e) run->failure = "error in TSSolve()";
-  else if (reason <= 0) run->failure = TSConvergedReasons[reason];
+  if (r.counted.late)
+    run->failure = "took longer than the limit";
+  else if (e)
+    run->failure = "error in TSSolve()";
+  else if (reason <= 0)
+    run->failure = TSConvergedReasons[reason];
   r.recorder.finish(*run);
   PetscCall(TSDestroy(&r.ts));
   PetscCall(VecDestroy(&r.U));
