@@ -6,7 +6,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A chain of two point masses on massless rods, masses m1 and m2, in absolute coordinates */
+/* A chain of two point masses on massless rods, masses m1 and m2, in absolute coordinates. Starts straight: folded, a heavy
+   end would snap the light middle, and accelerations would be those of an impact. */
 struct Masses : Problem {
   const double m[2], g = 9.81;
   Masses(double m1, double m2, double end) : m{m1, m2}
@@ -18,7 +19,7 @@ struct Masses : Problem {
   }
   void initial(double *u, double *v) const override
   {
-    const double u0[6] = {1., 0., 1., -1., 0., 0.};
+    const double u0[6] = {.8, -.6, 1.6, -1.2, 0., 0.};
     std::copy_n(u0, 6, u);
     std::fill_n(v, 6, 0.);
   }
@@ -97,7 +98,7 @@ TEST(Stiff, MassRatios)
 /* The fast mode is damped away, the slow one is that of a rigid rod: error control must not follow the fast one */
 TEST(Stiff, Springs)
 {
-  for (double k : {1e6, 1e9, 1e12}) {
+  for (double k : {1e6, 1e9, 1e12}) { /* N/m at 1 kg */
     const SpringPendulum p(k, 2.);
     const Pendulum       rod(90., 0., 2.);
     Simulation           run(p, tolerance(1e-6));
@@ -110,7 +111,8 @@ TEST(Stiff, Springs)
     MEASURED("spring of %g N/m, tolerance 1e-6: %.1e from the rigid pendulum; %d steps, %d rejected, %d failed corrections", k, e,
              (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
     EXPECT_LT(e, 2e-3 + 100. / k);
-    EXPECT_LT(s.steps, 20000);
+    EXPECT_LT(s.steps, 2000);
+    EXPECT_LT(s.corrector_fails, s.steps / 10);
   }
 }
 
