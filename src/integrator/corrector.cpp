@@ -208,7 +208,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   monitors = snes->numbermonitors;
   if (!I.corrector.reason || monitors) {
     PetscCall(SNESComputeFunction(snes, X, F));
-    PetscCall(VecNorm(F, NORM_2, &fnorm));
+    if (monitors) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
   }
   PetscCall(SNESLineSearchSetNorms(ls, 1, fnorm, I.corrector.e));
   PetscFunctionReturn(PETSC_SUCCESS);

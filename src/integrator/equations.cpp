@@ -53,37 +53,57 @@ void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScal
 }
 
 struct Ends { /* of the step, read-only */
-  const PetscScalar *u0, *v0, *a0, *x0, *x, *dv = nullptr;
+  const PetscScalar *u0, *v0, *a0, *x0, *dv = nullptr;
 };
 
-/* U1, V1, A1 from (2) and from the average that the form asks for. a_n and w_n were made by a step of length h_last; their
-   lag behind the true values is stretched to the present h, without which a change of h costs an order (Bruels, Arnold 2008).
-   In the paper's form a_n is itself what counts as the true value, so that nothing changes. */
-void StepStage(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+/* The parts of U1, V1, A1 that do not depend on X, from (2) and from the average that the form asks for. a_n and w_n were made
+   by a step of length h_last; their lag behind the true values is stretched to the present h, without which a change of h
+   costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true value, so that nothing
+   changes. */
+void StepBase(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, PetscScalar *v, PetscScalar *a)
 {
   const Parameters &p = I.p;
-  const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1, ca = p.ca();
+  const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1;
   const bool        paper = I.form == TSHHT3_FORM_PAPER;
   const PetscReal   cn = paper ? 0 : p.am / (1 - p.af), c0 = paper ? 0 : p.af / (1 - p.af);
-  const PetscReal   ds = 1 / (1 - p.af_s);
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role role = RoleOf(I, i);
     if (role == TSHHT3_COORDINATE) {
       const PetscScalar an = e.a0[i] + r * (e.x0[i] - e.a0[i]);
       const PetscScalar v0 = e.dv ? e.v0[i] - I.misfit * e.dv[i] : e.v0[i];
-      u[i]                 = NewmarkPosition(p, h, e.u0[i], v0, an, e.x[i]);
-      v[i]                 = NewmarkVelocity(p, h, v0, an, e.x[i]);
-      a[i]                 = ca * e.x[i] + cn * an - c0 * e.a0[i];
+      u[i]                 = NewmarkPosition(p, h, e.u0[i], v0, an, 0);
+      v[i]                 = NewmarkVelocity(p, h, v0, an, 0);
+      a[i]                 = cn * an - c0 * e.a0[i];
     } else if (role == TSHHT3_STATE) {
       const PetscScalar wn = e.v0[i] + r * (e.x0[i] - e.v0[i]);
-      u[i]                 = e.u0[i] + h * ((1 - p.gamma_s) * wn + p.gamma_s * e.x[i]);
-      v[i]                 = ds * ((1 - p.am_s) * e.x[i] + p.am_s * wn - p.af_s * e.v0[i]);
+      u[i]                 = e.u0[i] + h * (1 - p.gamma_s) * wn;
+      v[i]                 = (p.am_s * wn - p.af_s * e.v0[i]) / (1 - p.af_s);
       a[i]                 = 0;
-    } else {
-      u[i] = e.x[i];
-      v[i] = 0;
-      a[i] = 0;
+    } else u[i] = v[i] = a[i] = 0;
+  }
+}
+
+/* U1, V1, A1 = base + X times the derivatives by X that belong to the role */
+void StepStage(const Integrator &I, PetscInt n, const PetscScalar *const base[], const PetscScalar *x, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+{
+  const Parameters &p = I.p;
+  const PetscReal   cu = ScalePosition(p, I.h), cv = ScaleVelocity(p, I.h), ca = p.ca();
+  if (I.role.empty()) {
+    for (PetscInt i = 0; i < n; i++) {
+      u[i] = base[0][i] + cu * x[i];
+      v[i] = base[1][i] + cv * x[i];
+      a[i] = base[2][i] + ca * x[i];
     }
+    return;
+  }
+  PetscReal d[TSHHT3_NUM_ROLES][3] = {{cu, cv, ca}, {ScaleState(p, I.h), (1 - p.am_s) / (1 - p.af_s), 0}};
+  for (int k = TSHHT3_STATE + 1; k < TSHHT3_NUM_ROLES; k++) d[k][0] = 1;
+  const unsigned char *role = I.role.data();
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *di = d[role[i]];
+    u[i]                = base[0][i] + di[0] * x[i];
+    v[i]                = base[1][i] + di[1] * x[i];
+    a[i]                = base[2][i] + di[2] * x[i];
   }
 }
 
@@ -137,10 +157,11 @@ PetscErrorCode ScaleConstraintRows(const Integrator &I, Vec F)
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(F, &n));
   PetscCall(VecGetArray(F, &f));
-  for (PetscInt i = 0; i < n; i++) {
-    if (I.role[i] == TSHHT3_HOLONOMIC) f[i] *= s.holonomic;
-    else if (I.role[i] == TSHHT3_NONHOLONOMIC) f[i] *= s.velocity;
-  }
+  PetscReal factor[TSHHT3_NUM_ROLES];
+  for (PetscReal &x : factor) x = 1;
+  factor[TSHHT3_HOLONOMIC]    = s.holonomic;
+  factor[TSHHT3_NONHOLONOMIC] = s.velocity;
+  for (PetscInt i = 0; i < n; i++) f[i] *= factor[I.role[i]];
   PetscCall(VecRestoreArray(F, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -263,35 +284,54 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 /* U1, V1, A1 from the unknowns X and the state at t_n */
 PetscErrorCode StageVectors(TS ts, Vec X)
 {
-  Integrator  &I = Get(ts);
-  Ends         e;
-  PetscScalar *u, *v, *a;
-  PetscInt     n;
+  Integrator        &I       = Get(ts);
+  Vec                from[3] = {I.base[0], I.base[1], I.base[2]};
+  const PetscScalar *x, *base[3];
+  PetscScalar       *u, *v, *a;
+  PetscInt           n;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(X, &n));
-  PetscCall(VecGetArrayRead(X, &e.x));
+  PetscCall(VecGetArrayRead(X, &x));
   PetscCall(VecGetArray(I.U1, &u));
   PetscCall(VecGetArray(I.V1, &v));
   PetscCall(VecGetArray(I.A1, &a));
-  if (I.mode == Mode::Start) StartStage(I, n, e.x, u, v, a);
+  if (I.mode == Mode::Start) StartStage(I, n, x, u, v, a);
   else {
-    PetscCall(VecGetArrayRead(I.U0, &e.u0));
-    PetscCall(VecGetArrayRead(I.V0, &e.v0));
-    PetscCall(VecGetArrayRead(I.A0, &e.a0));
-    PetscCall(VecGetArrayRead(I.X0, &e.x0));
-    if (I.misfit != 0) PetscCall(VecGetArrayRead(I.dV, &e.dv));
-    StepStage(I, n, e, u, v, a);
-    if (I.misfit != 0) PetscCall(VecRestoreArrayRead(I.dV, &e.dv));
-    PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
-    PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
-    PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
-    PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
+    for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(from[k], &base[k]));
+    StepStage(I, n, base, x, u, v, a);
+    for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(from[k], &base[k]));
   }
   PetscCall(VecRestoreArray(I.A1, &a));
   PetscCall(VecRestoreArray(I.V1, &v));
   PetscCall(VecRestoreArray(I.U1, &u));
-  PetscCall(VecRestoreArrayRead(X, &e.x));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual */
+PetscErrorCode PrepareStage(TS ts)
+{
+  Integrator  &I = Get(ts);
+  Ends         e;
+  PetscScalar *b[3];
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  PetscCall(VecGetArrayRead(I.U0, &e.u0));
+  PetscCall(VecGetArrayRead(I.V0, &e.v0));
+  PetscCall(VecGetArrayRead(I.A0, &e.a0));
+  PetscCall(VecGetArrayRead(I.X0, &e.x0));
+  if (I.misfit != 0) PetscCall(VecGetArrayRead(I.dV, &e.dv));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(I.base[k], &b[k]));
+  StepBase(I, n, e, b[0], b[1], b[2]);
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayWrite(I.base[k], &b[k]));
+  if (I.misfit != 0) PetscCall(VecRestoreArrayRead(I.dV, &e.dv));
+  PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
+  PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
+  PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
+  PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

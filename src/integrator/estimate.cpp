@@ -74,6 +74,7 @@ PetscErrorCode UpdateWeights(TS ts, Vec U)
   PetscCall(VecGetArray(I.weight, &w));
   for (PetscInt i = 0; i < n; i++) {
     if (!IsDifferential(RoleOf(I, i))) continue;
+    if (PetscAbsScalar(u[i]) <= PetscRealPart(y[i]) && I.norm_size) continue;
     y[i] = PetscMax(PetscRealPart(y[i]), PetscAbsScalar(u[i]));
     w[i] = tol.weight(i, PetscRealPart(y[i]));
     local[0] += PetscSqr(PetscRealPart(y[i] * w[i]));
@@ -102,17 +103,19 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
   Integrator        &I = Get(ts);
   const PetscReal    q = PetscAbsReal(I.p.k) * I.h * I.h, s = I.p.gamma_s * I.h;
   const PetscScalar *d, *w;
-  PetscReal          sum = 0;
+  PetscReal          sum = 0, states = 0;
   PetscInt           n;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(dX, &n));
   PetscCall(VecGetArrayRead(dX, &d));
   PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i = 0; i < n; i++) {
-    if (PetscRealPart(w[i]) > 0) sum += PetscSqr(PetscRealPart(d[i] * w[i]) * (RoleOf(I, i) == TSHHT3_STATE ? s : q));
-    else if (PetscIsInfOrNanScalar(d[i])) sum = PETSC_INFINITY; /* multipliers do not count, but must be numbers */
-  }
+  /* multipliers have no weight, but must be numbers: 0 times Inf or NaN is NaN */
+  for (PetscInt i = 0; i < n; i++) sum += PetscSqr(PetscRealPart(d[i] * w[i]));
+  if (I.count[TSHHT3_STATE])
+    for (PetscInt i = 0; i < n; i++)
+      if (I.role[i] == TSHHT3_STATE) states += PetscSqr(PetscRealPart(d[i] * w[i]));
+  sum = PetscMax(sum - states, 0) * q * q + states * s * s;
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArrayRead(dX, &d));
   PetscCall(Reduce(ts, NORM_2, I.norm_size, sum, e));

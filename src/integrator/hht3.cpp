@@ -33,7 +33,7 @@ PetscErrorCode DuplicateAll(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.predictor.D[0]}) {
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.predictor.D[0]}) {
     if (*v) continue;
     PetscCall(VecDuplicate(ts->vec_sol, v));
     PetscCall(VecZeroEntries(*v));
@@ -159,7 +159,7 @@ PetscErrorCode Reset(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));

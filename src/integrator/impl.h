@@ -83,6 +83,7 @@ struct Integrator {
   PetscReal h_last = 0;
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
+  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see StepBase() */
   PetscReal t0 = 0, t1 = 0, h = 0;
   Mode      mode = Mode::Step;
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
@@ -147,6 +148,7 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
 /* equations.cpp */
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
+PetscErrorCode PrepareStage(TS ts);
 PetscErrorCode StageVectors(TS ts, Vec X);
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);

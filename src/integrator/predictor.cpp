@@ -18,21 +18,41 @@ namespace
 
 constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
 
-/* New differences from the old ones and the new values x = (X, V1), in place; misses of the degrees 0..have, squared */
-void Sweep(const Integrator &I, PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *const x[],
-           PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+/* New differences from the old ones and the new values x, in place; misses of the degrees 0..have, squared. Weights of
+   unknowns that do not count are zero. */
+void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
 {
+  PetscReal inverse[max_degree + 1];
+  for (PetscInt k = 0; k <= have; k++) inverse[k] = 1 / span[k];
   for (PetscInt i = 0; i < n; i++) {
-    const PetscReal wi = PetscRealPart(w[i]);
-    PetscScalar     fresh = x[RoleOf(I, i) == TSHHT3_STATE][i];
+    PetscScalar fresh = x[i];
     for (PetscInt k = 0; k <= have; k++) {
-      const PetscScalar old = k <= keep ? D[k][i] : 0;
-      if (k <= keep) D[k][i] = fresh;
-      fresh = (fresh - old) / span[k];
-      if (wi > 0) miss[k] += PetscSqr(PetscRealPart(fresh) * wi);
+      const PetscScalar old = D[k][i];
+      D[k][i]               = fresh;
+      fresh                 = (fresh - old) * inverse[k];
+      miss[k] += PetscSqr(PetscRealPart(fresh * w[i]));
     }
-    if (have + 1 <= keep) D[have + 1][i] = fresh;
+    if (have < keep) D[have + 1][i] = fresh;
   }
+}
+
+/* The new values: a, lambda, V, F as they are, of states s' */
+PetscErrorCode TrueValues(const Integrator &I, Vec x)
+{
+  const PetscScalar *v;
+  PetscScalar       *a;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(I.X, x));
+  PetscCall(VecGetLocalSize(x, &n));
+  PetscCall(VecGetArrayRead(I.V1, &v));
+  PetscCall(VecGetArray(x, &a));
+  for (PetscInt i = 0; i < n; i++)
+    if (I.role[i] == TSHHT3_STATE) a[i] = v[i];
+  PetscCall(VecRestoreArray(x, &a));
+  PetscCall(VecRestoreArrayRead(I.V1, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Predicted s' at t1 to the algorithmic w that gives it: the average of StepStage() in equations.cpp, solved for w */
@@ -98,8 +118,8 @@ PetscErrorCode PredictorUpdate(TS ts)
   PetscReal          span[max_degree + 1], miss[max_degree + 1] = {0, 0, 0, 0}, sum[max_degree + 1];
   PetscScalar       *D[max_degree + 1] = {};
   const PetscReal    t = I.t1;
-  const PetscScalar *x[2], *w;
-  Vec                now[2] = {I.X, I.V1};
+  const PetscScalar *x, *w;
+  Vec                now = I.X;
   PetscInt           n;
 
   PetscFunctionBegin;
@@ -107,13 +127,14 @@ PetscErrorCode PredictorUpdate(TS ts)
     if (!p.D[k]) PetscCall(VecDuplicate(I.X, &p.D[k]));
   for (PetscInt k = 0; k <= have; k++) span[k] = t - p.t[k];
   PetscCall(VecGetLocalSize(I.X, &n));
-  for (int k = 0; k < 2; k++) PetscCall(VecGetArrayRead(now[k], &x[k]));
+  if (I.count[TSHHT3_STATE]) PetscCall(TrueValues(I, now = I.work));
+  PetscCall(VecGetArrayRead(now, &x));
   PetscCall(VecGetArrayRead(I.weight, &w));
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecGetArray(p.D[k], &D[k]));
-  Sweep(I, n, have, keep, span, x, D, w, miss);
+  Sweep(n, have, keep, span, x, D, w, miss);
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecRestoreArray(p.D[k], &D[k]));
   PetscCall(VecRestoreArrayRead(I.weight, &w));
-  for (int k = 0; k < 2; k++) PetscCall(VecRestoreArrayRead(now[k], &x[k]));
+  PetscCall(VecRestoreArrayRead(now, &x));
   for (PetscInt k = have; k >= 0; k--) p.t[k + 1] = p.t[k];
   p.t[0]      = t;
   p.available = PetscMin(have + 1, keep);

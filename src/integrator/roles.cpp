@@ -46,9 +46,11 @@ PetscErrorCode LocalValues(Mat P, std::vector<PetscScalar> &val, std::vector<Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-bool Doubles(PetscScalar one, PetscScalar two)
+/* least: what counts as nothing in this row, for matrices made of differences */
+bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
 {
-  return PetscAbsScalar(two - one) > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two));
+  const PetscReal d = PetscAbsScalar(two - one);
+  return d > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)) && d > least;
 }
 
 /* Marks rows and columns where the derivative that goes with one shift is not zero */
@@ -69,12 +71,16 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
   PetscCall(VecDuplicate(U, &mark));
   PetscCall(VecZeroEntries(mark));
-  for (size_t i = 0; i < row_flag.size(); i++)
+  for (size_t i = 0; i < row_flag.size(); i++) {
+    PetscReal least = 0;
+    if (Get(ts).differences)
+      for (PetscInt k = offset[i]; k < offset[i + 1]; k++) least = PetscMax(least, 1e-6 * PetscAbsScalar(two[k] - one[k]));
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
-      if (!Doubles(one[k], two[k])) continue;
+      if (!Doubles(one[k], two[k], least)) continue;
       row_flag[i] = 1;
       PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
     }
+  }
   PetscCall(VecAssemblyBegin(mark));
   PetscCall(VecAssemblyEnd(mark));
   PetscCall(VecGetArrayRead(mark, &m));

@@ -6,6 +6,7 @@
   whatever happens in between.
 */
 #include "impl.h"
+#include <utility>
 
 namespace hht3
 {
@@ -57,10 +58,10 @@ PetscErrorCode Commit(TS ts)
 
   PetscFunctionBegin;
   PetscCall(PredictorUpdate(ts));
-  PetscCall(VecCopy(I.X, I.X0));
-  PetscCall(VecCopy(I.U1, I.U0));
-  PetscCall(VecCopy(I.V1, I.V0));
-  PetscCall(VecCopy(I.A1, I.A0));
+  std::swap(I.X, I.X0);
+  std::swap(I.U1, I.U0);
+  std::swap(I.V1, I.V0);
+  std::swap(I.A1, I.A0);
   I.h_last      = I.h;
   I.have_misfit = PETSC_FALSE;
   if (I.F0) {
@@ -148,6 +149,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   if (*tiny) PetscCall(TinyStep(ts, ok));
   else {
     PetscCall(AdaptVelocities(ts));
+    PetscCall(PrepareStage(ts));
     PetscCall(Predict(ts, I.X));
     PetscCall(Correct(ts, ok));
   }
@@ -167,7 +169,8 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
   PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
-  if (*accept && tiny && I.h_regular > 0 && !HHT3EventActive(ts)) *next = PetscMax(*next, PetscMin(I.h_regular, HHT3NextStop(ts) - I.t1));
+  if (*accept && tiny && !I.fixed_h && !HHT3EventActive(ts)) /* no estimate, no growth by TSAdapt */
+    *next = PetscMax(*next, PetscMin(I.h_regular > 0 ? I.h_regular : 10 * I.h, HHT3NextStop(ts) - I.t1));
   if (*next <= 0) *next = I.h;
   if (!*accept) {
     PetscCall(VecCopy(I.U0, ts->vec_sol));
@@ -199,6 +202,7 @@ PetscErrorCode Fail(TS ts, const char *what)
 
   PetscFunctionBegin;
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
+  ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
