@@ -181,9 +181,9 @@ public:
     Options in(options_);
     return TSStep(ts);
   }
-  Array  u() const { return whole(U); }
-  Array  v() const { return whole(V); }
-  Array  a() const
+  Array u() const { return whole(U); }
+  Array v() const { return whole(V); }
+  Array a() const
   {
     Vec A;
     must(TSHHT3GetAcceleration(ts, &A));
@@ -243,7 +243,7 @@ inline void widen(double &to, double by)
 inline ProblemErrors fixedStepErrors(const Problem &p, int steps, const std::string &options, int samples = 10)
 {
   ProblemErrors worst;
-  Simulation           run(p, fixedSteps((p.t1 - p.t0) / steps) + options);
+  Simulation    run(p, fixedSteps((p.t1 - p.t0) / steps) + options);
   run.watch = [&](Simulation &r, PetscInt step, double) {
     if (step == 0 || step % (steps / samples)) return;
     const ProblemErrors e = r.errors();

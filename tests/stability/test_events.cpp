@@ -65,13 +65,13 @@ PetscErrorCode bounce(TS ts, PetscInt, PetscInt[], PetscReal t, Vec, PetscBool, 
 
 TEST(Events, BouncingBall)
 {
-  const Ball  p(3.);
-  Bounces     b = {{}, .8};
-  PetscInt    direction = -1;
-  PetscBool   terminate = PETSC_FALSE;
-  Simulation  run(p, tolerance(1e-8) + "-ts_adapt_dt_max 0.1 -ts_event_tol 1e-12");
+  const Ball          p(3.);
+  Bounces             b         = {{}, .8};
+  PetscInt            direction = -1;
+  PetscBool           terminate = PETSC_FALSE;
+  Simulation          run(p, tolerance(1e-8) + "-ts_adapt_dt_max 0.1 -ts_event_tol 1e-12");
   std::vector<double> exact;
-  double      t = std::sqrt(2. * p.height / p.g), v = p.g * t;
+  double              t = std::sqrt(2. * p.height / p.g), v = p.g * t;
   while (t < 3.) {
     exact.push_back(t);
     v *= b.restitution;

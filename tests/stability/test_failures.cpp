@@ -115,7 +115,7 @@ TEST(Failures, TooManyFailedCorrections)
 TEST(Failures, SmallestStepTooLarge)
 {
   const Pendulum p(-60., 1., 2.);
-  Simulation     run(p, tolerance(1e-10) + "-ts_adapt_dt_min 0.05 -ts_dt 0.1 -ts_error_if_step_fails 0 -ts_max_steps 1000");
+  Simulation run(p, tolerance(1e-10) + "-ts_adapt_dt_min 0.05 -ts_dt 0.1 -ts_error_if_step_fails 0 -ts_max_steps 1000");
   must(run.solve());
   MEASURED("smallest step of 0.05 at tolerance 1e-10: %s at t = %g", TSConvergedReasons[run.reason()], run.t());
   for (double x : run.u()) EXPECT_TRUE(std::isfinite(x));

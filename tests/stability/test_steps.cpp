@@ -85,18 +85,19 @@ TEST(Steps, NoSliverAtTheEnd)
     for (int fixed = 0; fixed < 2; fixed++) {
       const Pendulum p(-60., 1., 1. + sliver);
       SCOPED_TRACE(text("t1 = 1 + %g, %s", sliver, fixed ? "fixed steps" : "error control"));
-      Simulation run(p, fixed ? fixedSteps(.01) : tolerance(1e-6) + "-ts_adapt_dt_max 0.01 -ts_dt 0.01");
+      Simulation                run(p, fixed ? fixedSteps(.01) : tolerance(1e-6) + "-ts_adapt_dt_max 0.01 -ts_dt 0.01");
       const std::vector<double> h = stepLengths(run);
       EXPECT_EQ(run.t(), p.t1);
       const double shortest = *std::min_element(h.begin(), h.end());
-      MEASURED("t1 = 1 %+.0e, %-13s shortest step %.2e, lambda to %.1e", sliver, fixed ? "fixed steps" : "error control",
-               shortest, run.errors().lambda);
+      MEASURED("t1 = 1 %+.0e, %-13s shortest step %.2e, lambda to %.1e", sliver,
+               fixed ? "fixed steps" : "error control", shortest, run.errors().lambda);
       EXPECT_GT(shortest, 2e-3);
       EXPECT_LT(run.errors().lambda, 1e-2);
     }
 }
 
-/* The defect that a corrector without a notion of rounding has: it can never be satisfied, and smaller steps are worse */
+/* The defect that a corrector without a notion of rounding has: it can never be satisfied, and smaller steps are worse
+ */
 TEST(Steps, CorrectorStopsAtRounding)
 {
   for (const char *c : {"1e-3", "1e-6", "1e-12"})
@@ -136,7 +137,8 @@ TEST(Steps, AnyFirstStep)
     must(run.solve());
     EXPECT_EQ(run.t(), 2.);
     const TSHHT3Statistics s = run.statistics();
-    MEASURED("pendulum, -ts_dt %-6g %d steps, %d rejected, error q %.1e", h, (int)s.steps, (int)s.rejected, run.errors().q);
+    MEASURED("pendulum, -ts_dt %-6g %d steps, %d rejected, error q %.1e", h, (int)s.steps, (int)s.rejected,
+             run.errors().q);
     EXPECT_LT(run.errors().q, 2e-3);
     EXPECT_LT(s.steps, 2000);
   }
@@ -151,13 +153,13 @@ TEST(Steps, PendulumThroughItsInvertedPosition)
       const Pendulum p(angle, 0., 20.);
       Simulation     run(p, tolerance(eps));
       double         drift = 0., length = 0., E0 = energy(p, run.u(), run.v());
-      run.watch            = [&](Simulation &r, PetscInt, double) {
+      run.watch = [&](Simulation &r, PetscInt, double) {
         widen(drift, std::abs(energy(p, r.u(), r.v()) - E0));
         widen(length, std::abs(std::hypot(r.u()[0], r.u()[1]) - 1.));
       };
       must(run.solve());
-      MEASURED("pendulum from %g degrees, tolerance %g: energy to %.1e, length to %.1e, %d steps", angle, eps, drift, length,
-               (int)run.statistics().steps);
+      MEASURED("pendulum from %g degrees, tolerance %g: energy to %.1e, length to %.1e, %d steps", angle, eps, drift,
+               length, (int)run.statistics().steps);
       EXPECT_LT(length, 10. * eps);
       EXPECT_LT(drift, before > 0. ? before / 3. : 1.);
       before = drift;

@@ -6,8 +6,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A chain of two point masses on massless rods, masses m1 and m2, in absolute coordinates. Starts straight: folded, a heavy
-   end would snap the light middle, and accelerations would be those of an impact. */
+/* A chain of two point masses on massless rods, masses m1 and m2, in absolute coordinates. Starts straight: folded, a
+   heavy end would snap the light middle, and accelerations would be those of an impact. */
 struct Masses : Problem {
   const double m[2], g = 9.81;
   Masses(double m1, double m2, double end) : m{m1, m2}
@@ -15,7 +15,8 @@ struct Masses : Problem {
     name = "masses";
     n    = 6;
     t1   = end;
-    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC, TSHHT3_HOLONOMIC};
+    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_COORDINATE,
+            TSHHT3_COORDINATE, TSHHT3_HOLONOMIC,  TSHHT3_HOLONOMIC};
   }
   void initial(double *u, double *v) const override
   {
@@ -26,12 +27,12 @@ struct Masses : Problem {
   void residual(double, const double *u, const double *, const double *a, double *f) const override
   {
     const double dx = u[2] - u[0], dy = u[3] - u[1];
-    f[0]            = m[0] * a[0] + u[0] * u[4] - dx * u[5];
-    f[1]            = m[0] * (a[1] + g) + u[1] * u[4] - dy * u[5];
-    f[2]            = m[1] * a[2] + dx * u[5];
-    f[3]            = m[1] * (a[3] + g) + dy * u[5];
-    f[4]            = (u[0] * u[0] + u[1] * u[1] - 1.) / 2.;
-    f[5]            = (dx * dx + dy * dy - 1.) / 2.;
+    f[0] = m[0] * a[0] + u[0] * u[4] - dx * u[5];
+    f[1] = m[0] * (a[1] + g) + u[1] * u[4] - dy * u[5];
+    f[2] = m[1] * a[2] + dx * u[5];
+    f[3] = m[1] * (a[3] + g) + dy * u[5];
+    f[4] = (u[0] * u[0] + u[1] * u[1] - 1.) / 2.;
+    f[5] = (dx * dx + dy * dy - 1.) / 2.;
   }
   void jacobian(double, const double *u, const double *, const double *, double, double sa, Entries &J) const override
   {
@@ -52,7 +53,8 @@ struct Masses : Problem {
   double energy(const Array &u, const Array &v) const
   {
     double E = 0.;
-    for (int k = 0; k < 2; k++) E += m[k] * ((v[2 * k] * v[2 * k] + v[2 * k + 1] * v[2 * k + 1]) / 2. + g * u[2 * k + 1]);
+    for (int k = 0; k < 2; k++)
+      E += m[k] * ((v[2 * k] * v[2 * k] + v[2 * k + 1] * v[2 * k + 1]) / 2. + g * u[2 * k + 1]);
     return E;
   }
 };
@@ -77,7 +79,7 @@ TEST(Stiff, MassRatios)
       Simulation   run(p, tolerance(eps));
       const double E0 = p.energy(run.u(), run.v()), scale = p.g * std::max(1., ratio);
       double       drift = 0., length = 0.;
-      run.watch          = [&](Simulation &r, PetscInt, double) {
+      run.watch = [&](Simulation &r, PetscInt, double) {
         const Array u = r.u();
         widen(drift, std::abs(p.energy(u, r.v()) - E0) / scale);
         widen(length, std::abs(std::hypot(u[0], u[1]) - 1.));
@@ -85,8 +87,9 @@ TEST(Stiff, MassRatios)
       };
       must(run.solve());
       const TSHHT3Statistics s = run.statistics();
-      MEASURED("masses 1 : %g, tolerance %g: energy to %.1e, lengths to %.1e; %d steps, %d rejected, %d failed corrections", ratio,
-               eps, drift, length, (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
+      MEASURED(
+          "masses 1 : %g, tolerance %g: energy to %.1e, lengths to %.1e; %d steps, %d rejected, %d failed corrections",
+          ratio, eps, drift, length, (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
       EXPECT_LT(length, 10. * eps);
       EXPECT_LT(drift, before > 0. ? before / 3. : .1);
       EXPECT_LT(s.corrector_fails, s.steps / 20 + 5);
@@ -108,8 +111,9 @@ TEST(Stiff, Springs)
     const Array            u = run.u();
     const double           e = std::hypot(u[0] - ur[0], u[1] - ur[1]);
     const TSHHT3Statistics s = run.statistics();
-    MEASURED("spring of %g N/m, tolerance 1e-6: %.1e from the rigid pendulum; %d steps, %d rejected, %d failed corrections", k, e,
-             (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
+    MEASURED(
+        "spring of %g N/m, tolerance 1e-6: %.1e from the rigid pendulum; %d steps, %d rejected, %d failed corrections",
+        k, e, (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
     EXPECT_LT(e, 2e-3 + 100. / k);
     EXPECT_LT(s.steps, 2000);
     EXPECT_LT(s.corrector_fails, s.steps / 10);
@@ -122,11 +126,11 @@ TEST(Stiff, FastModeBesideASlowOne)
   const Oscillators p({1., 1e6}, {0., 0.}, true, 10.);
   Simulation        run(p, fixedSteps(.01));
   must(run.solve());
-  const Array  u = run.u();
+  const Array  u    = run.u();
   const double h[2] = {1., 2.}; /* modal coordinates y = H q */
   const double s = 2. * (h[0] * u[0] + h[1] * u[1]) / 5., y0 = u[0] - s * h[0], y1 = u[1] - s * h[1];
-  MEASURED("modes of 1 and 1e6 rad/s at h = 0.01: slow one to %.1e, fast one damped to %.1e", std::abs(y0 - std::cos(10.)),
-           std::abs(y1));
+  MEASURED("modes of 1 and 1e6 rad/s at h = 0.01: slow one to %.1e, fast one damped to %.1e",
+           std::abs(y0 - std::cos(10.)), std::abs(y1));
   EXPECT_NEAR(y0, std::cos(10.), 1e-3);
   EXPECT_LT(std::abs(y1), 1e-6);
 }
@@ -139,16 +143,17 @@ TEST(Stiff, FourBarThroughItsSingularPosition)
     for (double eps : {1e-5, 1e-6, 1e-7, 1e-8}) {
       const FourBar p(2, 10.);
       Simulation    run(p, tolerance(eps) + options);
-      const double  E0 = energy(p, run.u(), run.v());
+      const double  E0    = energy(p, run.u(), run.v());
       double        drift = 0., turns = 0.;
-      run.watch           = [&](Simulation &r, PetscInt, double) {
+      run.watch = [&](Simulation &r, PetscInt, double) {
         const Array u = r.u();
         widen(drift, std::abs(energy(p, u, r.v()) - E0) / E0);
         turns = std::abs(u[2]) / (2. * M_PI);
       };
       must(run.solve());
       const TSHHT3Statistics s = run.statistics();
-      MEASURED("fourbar N = 2, %s tolerance %g: %.2f turns, energy to %.1e relative, error q %.1e; %d steps, %d rejected, %d failed "
+      MEASURED("fourbar N = 2, %s tolerance %g: %.2f turns, energy to %.1e relative, error q %.1e; %d steps, %d "
+               "rejected, %d failed "
                "corrections",
                options, eps, turns, drift, run.errors().q, (int)s.steps, (int)s.rejected, (int)s.corrector_fails);
       EXPECT_EQ(run.t(), 10.);
@@ -164,10 +169,10 @@ TEST(Stiff, ChainKeepsItsEnergy)
 {
   double before = 0.;
   for (double eps : {1e-4, 1e-6}) {
-    const Chain p(10, 0., 2.);
-    Simulation  run(p, tolerance(eps));
-    Array       u = run.u(), v = run.v();
-    const double E0 = p.energy(u.data(), v.data());
+    const Chain  p(10, 0., 2.);
+    Simulation   run(p, tolerance(eps));
+    Array        u = run.u(), v = run.v();
+    const double E0    = p.energy(u.data(), v.data());
     double       drift = 0.;
     run.watch          = [&](Simulation &r, PetscInt, double) {
       const Array x = r.u(), y = r.v();

@@ -24,15 +24,15 @@ struct DenseErrors {
   double q = 0., v = 0., a = 0., s = 0., lambda = 0.;
 };
 
-/* What interpolation adds between steps: error there minus the errors at both ends, weighted linearly (these are smooth).
-   Fixed steps to t = 1/2, the second half of them looked at. */
+/* What interpolation adds between steps: error there minus the errors at both ends, weighted linearly (these are
+   smooth). Fixed steps to t = 1/2, the second half of them looked at. */
 DenseErrors betweenSteps(const Problem &p, double h, const std::string &options)
 {
   Simulation  run(p, fixedSteps(h) + options);
   Vectors     x(run.U);
   DenseErrors worst;
-  using State      = std::array<Array, 3>;
-  auto errorsAt    = [&](double t) {
+  using State   = std::array<Array, 3>;
+  auto errorsAt = [&](double t) {
     State e = {Array(p.n), Array(p.n), Array(p.n)};
     must(TSHHT3Interpolate(run.ts, t, x.U, x.V, x.A));
     p.reference(t, e[0].data(), e[1].data(), e[2].data());
@@ -69,7 +69,8 @@ DenseErrors betweenSteps(const Problem &p, double h, const std::string &options)
 void expectThirdOrder(const Problem &p, double h, const std::string &options = "", double inV = 2.9)
 {
   const DenseErrors c = betweenSteps(p, h, options), f = betweenSteps(p, h / 2., options);
-  MEASURED("%-14s %-24s dense output: order q %.2f, q' %.2f, q'' %.2f, states %.2f, lambda and definitions %.2f; errors q %.1e, q' %.1e",
+  MEASURED("%-14s %-24s dense output: order q %.2f, q' %.2f, q'' %.2f, states %.2f, lambda and definitions %.2f; "
+           "errors q %.1e, q' %.1e",
            p.name.c_str(), options.c_str(), order(c.q, f.q), order(c.v, f.v), order(c.a, f.a), order(c.s, f.s),
            order(c.lambda, f.lambda), f.q, f.v);
   EXPECT_GE(order(c.q, f.q), 2.9);
@@ -93,7 +94,8 @@ TEST(Dense, ThirdOrder)
     expectThirdOrder(Pendulum(-60., 1., 1.), .02, options);
     expectThirdOrder(UserVars(1.), .004, options);
   }
-  /* in the paper's form the unknown a_{n+1} counts as q''_{n+1}, from which it differs by O(alpha h): the slopes of q' */
+  /* in the paper's form the unknown a_{n+1} counts as q''_{n+1}, from which it differs by O(alpha h): the slopes of q'
+   */
   expectThirdOrder(Pendulum(-60., 1., 1.), .02, "-ts_hhtdae_form paper", 1.9);
 }
 
@@ -127,7 +129,8 @@ TEST(Dense, AsGoodAsTheSteps)
     last = t;
   };
   must(run.solve());
-  MEASURED("pendulum, tolerance 1e-6: errors at the steps %.2e, %.2e, between them %.2e, %.2e", at, vat, between, vbetween);
+  MEASURED("pendulum, tolerance 1e-6: errors at the steps %.2e, %.2e, between them %.2e, %.2e", at, vat, between,
+           vbetween);
   EXPECT_LT(between, 1.05 * at);
   EXPECT_LT(vbetween, 1.05 * vat);
 }

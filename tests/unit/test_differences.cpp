@@ -59,13 +59,14 @@ TEST(Differences, GiveTheSameAnswer)
   for (const Factory &f : allProblems()) {
     SCOPED_TRACE(f.name);
     const auto        p = f.make();
-    const std::string o = fixedSteps((p->t1 - p->t0) / (p->name == "caraxis" ? 3000 : 500)) + "-ts_hhtdae_corrector_tolerance 1e-6 ";
-    Simulation        run(*p, o);
+    const std::string o =
+        fixedSteps((p->t1 - p->t0) / (p->name == "caraxis" ? 3000 : 500)) + "-ts_hhtdae_corrector_tolerance 1e-6 ";
+    Simulation run(*p, o);
     must(run.solve());
-    const End                 end = withoutJacobian(*p, o);
-    std::vector<PetscInt>     q;
-    Array                     a, b, va, vb;
-    const Array               u = run.u(), v = run.v();
+    const End             end = withoutJacobian(*p, o);
+    std::vector<PetscInt> q;
+    Array                 a, b, va, vb;
+    const Array           u = run.u(), v = run.v();
     for (PetscInt i = 0; i < p->n; i++)
       if (p->role[i] <= TSHHT3_STATE) {
         a.push_back(end.u[i]);
@@ -74,8 +75,8 @@ TEST(Differences, GiveTheSameAnswer)
         vb.push_back(v[i]);
       }
     const double du = relativeDifference(a, b), dv = relativeDifference(va, vb);
-    MEASURED("%-15s without a Jacobian: differs by %.1e in q, %.1e in q'; %d residuals in place of %d, %d steps, %d", f.name, du,
-             dv, (int)end.statistics.residuals, (int)run.statistics().residuals, (int)end.statistics.steps,
+    MEASURED("%-15s without a Jacobian: differs by %.1e in q, %.1e in q'; %d residuals in place of %d, %d steps, %d",
+             f.name, du, dv, (int)end.statistics.residuals, (int)run.statistics().residuals, (int)end.statistics.steps,
              (int)run.statistics().steps);
     EXPECT_LT(du, 1e-6);
     EXPECT_LT(dv, 1e-6);
@@ -92,16 +93,17 @@ TEST(Differences, SnesTestJacobian)
     for (const char *form : {"second_order", "paper"}) {
       std::vector<double> d;
       {
-        Simulation run(*p, fixedSteps((p->t1 - p->t0) / 40.) + "-snes_test_jacobian -ts_max_steps 20 -snes_lag_jacobian 1 " +
-                               "-ts_hhtdae_form " + form);
+        Simulation run(*p, fixedSteps((p->t1 - p->t0) / 40.) +
+                               "-snes_test_jacobian -ts_max_steps 20 -snes_lag_jacobian 1 " + "-ts_hhtdae_form " +
+                               form);
         Printed    out;
         must(run.solve());
         d = printedDifferences(out.text());
       }
       ASSERT_GE((int)d.size(), 20);
       std::sort(d.begin(), d.end());
-      MEASURED("%-15s %-12s matrix against differences: median %.1e, worst %.1e of %d", f.name, form, d[d.size() / 2], d.back(),
-               (int)d.size());
+      MEASURED("%-15s %-12s matrix against differences: median %.1e, worst %.1e of %d", f.name, form, d[d.size() / 2],
+               d.back(), (int)d.size());
       /* andrews: h < 1e-3 leaves little of PETSc's increments in the positions */
       EXPECT_LT(d[d.size() / 2], p->name == "andrews" ? 5e-3 : 2e-4);
       EXPECT_LT(d.back(), 1e-2);

@@ -11,10 +11,10 @@ TEST(Formulas, HHTParametersOfThePaper)
 {
   for (double alpha : {0., -.05, -.3, -1. / 3.}) {
     const Parameters p = HHTParameters(alpha, true);
-    EXPECT_DOUBLE_EQ(p.gamma, (1 - 2 * alpha) / 2);                  /* (5) */
-    EXPECT_DOUBLE_EQ(p.beta, (1 - alpha) * (1 - alpha) / 4);         /* (5) */
-    EXPECT_NEAR(p.k, p.beta - 1 / (6 * (1 + alpha)), 1e-16);         /* (26) */
-    EXPECT_NEAR(p.ca(), 1 / (1 + alpha), 1e-15);                     /* (9a) */
+    EXPECT_DOUBLE_EQ(p.gamma, (1 - 2 * alpha) / 2);          /* (5) */
+    EXPECT_DOUBLE_EQ(p.beta, (1 - alpha) * (1 - alpha) / 4); /* (5) */
+    EXPECT_NEAR(p.k, p.beta - 1 / (6 * (1 + alpha)), 1e-16); /* (26) */
+    EXPECT_NEAR(p.ca(), 1 / (1 + alpha), 1e-15);             /* (9a) */
     EXPECT_NEAR(p.rho, (1 + alpha) / (1 - alpha), 1e-15);
   }
   const Parameters trapezoidal = HHTParameters(0, true);
@@ -52,7 +52,8 @@ TEST(Formulas, NewmarkIsExactForConstantAcceleration)
   EXPECT_NEAR(NewmarkVelocity(p, .1, 3., 4., 4.), 3.4, 1e-15);
 }
 
-/* With q''' = 1, a_n = lag h and a_{n+1} = (1 + lag) h by definition of the lag: the error in q is k h^2 (a_{n+1} - a_n) */
+/* With q''' = 1, a_n = lag h and a_{n+1} = (1 + lag) h by definition of the lag: the error in q is k h^2 (a_{n+1} -
+ * a_n) */
 TEST(Formulas, ErrorConstantOfThePosition)
 {
   for (double rho : {0., .5, .9, 1.}) {
@@ -73,8 +74,8 @@ TEST(Formulas, ErrorConstantOfThePosition)
 TEST(Formulas, ErrorConstantOfAState)
 {
   for (double rho : {0., .5, .9, 1.}) {
-    const Parameters p  = RadiusParameters(rho);
-    const double     l  = p.lagState(), w0 = l * l / 2, w1 = (1 + l) * (1 + l) / 2;
+    const Parameters p = RadiusParameters(rho);
+    const double     l = p.lagState(), w0 = l * l / 2, w1 = (1 + l) * (1 + l) / 2;
     const double     s1 = (1 - p.gamma_s) * w0 + p.gamma_s * w1;
     EXPECT_NEAR(s1 - 1. / 6., p.k_s, 1e-15);
   }
@@ -95,7 +96,7 @@ TEST(Formulas, ScalingsAndShiftsBelongTogether)
 
 TEST(Formulas, CorrectorStopsByTheRate)
 {
-  EXPECT_DOUBLE_EQ(CorrectorError(.5, 2.), 2.);  /* (40): xi/(1-xi) */
+  EXPECT_DOUBLE_EQ(CorrectorError(.5, 2.), 2.); /* (40): xi/(1-xi) */
   EXPECT_DOUBLE_EQ(CorrectorError(.1, 9.), 1.);
   EXPECT_EQ(CorrectorError(1., 1.), PETSC_MAX_REAL);
   EXPECT_EQ(CorrectorError(2., 1.), PETSC_MAX_REAL);

@@ -40,8 +40,10 @@ TEST(Options, Defaults)
 TEST(Options, AreRead)
 {
   const Pendulum p;
-  Simulation     run(p, "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.1 -ts_hhtdae_corrector_tolerance 1e-5 -ts_hhtdae_predictor_degree 2 "
-                    "-ts_hhtdae_reuse 1.5,0.3,1.1 -ts_hhtdae_start project");
+  Simulation     run(
+          p,
+          "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.1 -ts_hhtdae_corrector_tolerance 1e-5 -ts_hhtdae_predictor_degree 2 "
+              "-ts_hhtdae_reuse 1.5,0.3,1.1 -ts_hhtdae_start project");
   const hht3::Integrator &I = hht3::Get(run.ts);
   EXPECT_EQ(I.form, TSHHT3_FORM_PAPER);
   EXPECT_DOUBLE_EQ(I.alpha, -.1);
@@ -56,7 +58,8 @@ TEST(Options, AreRead)
 
 TEST(Options, OutOfRangeIsRefused)
 {
-  expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, .1); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = 0.1 is not in [-1/3, 0]");
+  expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, .1); }, PETSC_ERR_ARG_OUTOFRANGE,
+                "alpha = 0.1 is not in [-1/3, 0]");
   expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, -.4); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = -0.4");
   expectRefused([](TS ts) { return TSHHT3SetAlpha(ts, NAN); }, PETSC_ERR_ARG_OUTOFRANGE, "alpha = nan");
   expectRefused([](TS ts) { return TSHHT3SetRadius(ts, 1.1); }, PETSC_ERR_ARG_OUTOFRANGE, "radius 1.1");
@@ -299,7 +302,8 @@ TEST(Options, SummaryLine)
   must(run.solve());
   size_t at = out.text().find("summary:");
   ASSERT_NE(at, std::string::npos) << out.text();
-  for (const char *key : {" steps=", " rejected=", " newton=", " residuals=", " jacobians=", " factorizations=", " solves=", " time="}) {
+  for (const char *key :
+       {" steps=", " rejected=", " newton=", " residuals=", " jacobians=", " factorizations=", " solves=", " time="}) {
     const size_t next = out.text().find(key, at);
     ASSERT_NE(next, std::string::npos) << key << " in " << out.text();
     at = next;
@@ -313,8 +317,8 @@ TEST(Options, ResetAndRunAgain)
   Simulation     run(p, tolerance(1e-5));
   must(run.solve());
   const Array u = run.u();
-  SNES snes;
-  Mat  J, P;
+  SNES        snes;
+  Mat         J, P;
   must(TSGetSNES(run.ts, &snes));
   must(SNESGetJacobian(snes, &J, &P, nullptr, nullptr));
   must(PetscObjectReference((PetscObject)J));

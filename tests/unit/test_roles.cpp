@@ -53,7 +53,7 @@ TEST(Roles, DetectedEqualSetOnes)
     Simulation detected(*p, "");
     must(TSSetUp(detected.ts));
     const std::vector<int> r = roles(detected.ts, p->n);
-    std::vector<int> expected(p->role.begin(), p->role.end());
+    std::vector<int>       expected(p->role.begin(), p->role.end());
     for (int &e : expected)
       if (e == TSHHT3_FORCE) e = TSHHT3_VARIABLE;
     EXPECT_EQ(r, expected);

@@ -1,4 +1,5 @@
-/* The consistent start: accelerations and multipliers, projection and report of inconsistent values, singular problems */
+/* The consistent start: accelerations and multipliers, projection and report of inconsistent values, singular problems
+ */
 #include "support.h"
 
 using namespace hhtest;
@@ -84,7 +85,8 @@ struct Redundant : Pendulum {
     f[1] += 2. * u[1] * u[3];
     f[3] = 2. * f[2];
   }
-  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, Entries &J) const override
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                Entries &J) const override
   {
     Pendulum::jacobian(t, u, v, a, sv, sa, J);
     J.add(0, 0, 2. * u[3]);
@@ -172,7 +174,7 @@ TEST(Start, AllReferences)
     const auto p = f.make();
     Array      ur(p->n), vr(p->n), ar(p->n);
     if (!p->reference(p->t0, ur.data(), vr.data(), ar.data())) continue;
-    const StartValues s = startValues(*p, tolerance(1e-6));
+    const StartValues s  = startValues(*p, tolerance(1e-6));
     double            da = 0., du = 0., scale = 1e-3, uscale = 1e-3;
     for (PetscInt i = 0; i < p->n; i++) {
       if (p->role[i] == TSHHT3_COORDINATE && !std::isnan(ar[i])) {
@@ -218,14 +220,14 @@ TEST(Start, MisfitIsReported)
   {
     Printed out;
     startValues(position, tolerance(1e-6));
-    EXPECT_TRUE(out.says("initial positions violate the constraints")) << out.text();
+    EXPECT_TRUE(out.says("positions violate the constraints")) << out.text();
     EXPECT_TRUE(out.says("in row 2")) << out.text();
     EXPECT_TRUE(out.says("-ts_hhtdae_start project")) << out.text();
   }
   {
     Printed out;
     startValues(velocity, tolerance(1e-6));
-    EXPECT_TRUE(out.says("initial velocities violate the constraints")) << out.text();
+    EXPECT_TRUE(out.says("velocities violate the constraints")) << out.text();
     EXPECT_FALSE(out.says("positions")) << out.text();
   }
   for (const char *options : {"", "-ts_hhtdae_start project"}) {
@@ -301,7 +303,8 @@ TEST(Start, TrapezoidalRuleWithConstraintsWarns)
 {
   const Pendulum    pendulum(-90., 0., .1);
   const Oscillators oscillators({1.}, {0.}, false, 1.);
-  for (const char *options : {"-ts_hhtdae_alpha 0", "-ts_hhtdae_radius 1", "-ts_hhtdae_form paper -ts_hhtdae_alpha 0"}) {
+  for (const char *options :
+       {"-ts_hhtdae_alpha 0", "-ts_hhtdae_radius 1", "-ts_hhtdae_form paper -ts_hhtdae_alpha 0"}) {
     Printed    out;
     Simulation run(pendulum, options);
     must(TSSetUp(run.ts));

@@ -15,7 +15,8 @@ struct Counting : Pendulum {
     residuals++;
     Pendulum::residual(t, u, v, a, f);
   }
-  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, Entries &J) const override
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                Entries &J) const override
   {
     jacobians++;
     Pendulum::jacobian(t, u, v, a, sv, sa, J);
@@ -52,7 +53,7 @@ TEST(Statistics, StepSizes)
   const Pendulum p(-90., 0., 2.);
   Simulation     run(p, tolerance(1e-6));
   double         last = 0., smallest = 1e9, largest = 0.;
-  run.watch           = [&](Simulation &, PetscInt step, double t) {
+  run.watch = [&](Simulation &, PetscInt step, double t) {
     if (step) {
       smallest = std::min(smallest, t - last);
       largest  = std::max(largest, t - last);
@@ -82,7 +83,8 @@ TEST(Statistics, OneFactorizationForALinearProblemAtOneStepSize)
   Simulation        run(p, fixedSteps(.01));
   must(run.solve());
   const TSHHT3Statistics s = run.statistics();
-  MEASURED("linear, fixed h: %d steps, %d iterations, %d factorizations", (int)s.steps, (int)s.newton, (int)s.factorizations);
+  MEASURED("linear, fixed h: %d steps, %d iterations, %d factorizations", (int)s.steps, (int)s.newton,
+           (int)s.factorizations);
   EXPECT_EQ(s.steps, 1000);
   EXPECT_LE(s.factorizations, 4);
 }
@@ -106,8 +108,8 @@ TEST(Statistics, FewFactorizationsForMechanisms)
     Simulation run(*p, tolerance(1e-7));
     must(run.solve());
     const TSHHT3Statistics s = run.statistics();
-    MEASURED("%-15s %d steps, %d rejected, %d failed corrections, %.2f iterations and %.3f factorizations a step", f.name,
-             (int)s.steps, (int)s.rejected, (int)s.corrector_fails, (double)s.newton / s.steps,
+    MEASURED("%-15s %d steps, %d rejected, %d failed corrections, %.2f iterations and %.3f factorizations a step",
+             f.name, (int)s.steps, (int)s.rejected, (int)s.corrector_fails, (double)s.newton / s.steps,
              (double)s.factorizations / s.steps);
     EXPECT_LT(s.factorizations, s.steps / 2) << f.name;
     EXPECT_LT(s.newton, 4 * s.steps) << f.name;

@@ -1,4 +1,5 @@
-/* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight ones */
+/* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight ones
+ */
 #include "support.h"
 
 using namespace hhtest;
@@ -17,7 +18,8 @@ std::vector<double> errorsAgainstTolerance(const Problem &p, const std::string &
     must(run.solve());
     const ProblemErrors    e = run.errors();
     const TSHHT3Statistics s = run.statistics();
-    MEASURED("%-9s %-28s rtol = atol = 1e-%02d: %.1f digits in q, errors q %.1e, q' %.1e, lambda %.1e; %d steps, %d rejected, "
+    MEASURED("%-9s %-28s rtol = atol = 1e-%02d: %.1f digits in q, errors q %.1e, q' %.1e, lambda %.1e; %d steps, %d "
+             "rejected, "
              "%d iterations, %d factorizations, %.2f s",
              p.name.c_str(), options.c_str(), k, digits(e.q), e.q, e.v, e.lambda, (int)s.steps, (int)s.rejected,
              (int)s.newton, (int)s.factorizations, s.cpu);

@@ -1,6 +1,7 @@
 /*
-  Numerical damping of one oscillator q'' + w^2 q = 0 against the amplification matrix A of the method, from h w = 1e-2 to
-  1e4. With x_n = (q, h q', h^2 a)_n, x_{n+1} = A x_n. The h^2 a_n of a run follow from its q and q' by (2a) and (2b).
+  Numerical damping of one oscillator q'' + w^2 q = 0 against the amplification matrix A of the method, from h w = 1e-2
+  to 1e4. With x_n = (q, h q', h^2 a)_n, x_{n+1} = A x_n. The h^2 a_n of a run follow from its q and q' by (2a) and
+  (2b).
 */
 #include "support.h"
 
@@ -56,8 +57,8 @@ Real size(const State &x) { return std::max({std::abs(x[0]), std::abs(x[1]), std
 /* Roots of z^3 + c2 z^2 + c1 z + c0 by simultaneous iteration; the largest */
 Real largestRoot(Real c0, Real c1, Real c2)
 {
-  using Complex     = std::complex<Real>;
-  Complex z[3]      = {1, Complex(.4L, .9L), Complex(.4L, .9L) * Complex(.4L, .9L)};
+  using Complex      = std::complex<Real>;
+  Complex z[3]       = {1, Complex(.4L, .9L), Complex(.4L, .9L) * Complex(.4L, .9L)};
   auto    polynomial = [&](Complex x) { return ((x + c2) * x + c1) * x + c0; };
   for (int it = 0; it < 2000; it++)
     for (int k = 0; k < 3; k++) {
@@ -69,7 +70,7 @@ Real largestRoot(Real c0, Real c1, Real c2)
 
 Real spectralRadius(const Matrix &A)
 {
-  const Real trace = A[0][0] + A[1][1] + A[2][2];
+  const Real trace  = A[0][0] + A[1][1] + A[2][2];
   const Real minors = A[0][0] * A[1][1] - A[0][1] * A[1][0] + A[0][0] * A[2][2] - A[0][2] * A[2][0] +
                       A[1][1] * A[2][2] - A[1][2] * A[2][1];
   const Real det = A[0][0] * (A[1][1] * A[2][2] - A[1][2] * A[2][1]) -
@@ -88,8 +89,8 @@ struct Oscillator : Oscillators { /* with any initial state */
   }
 };
 
-/* x_0..x_{N-1} of a run with h = 1. The tolerance is so small that the run starts from a_0 = q''_0, which excites the third
-   root. */
+/* x_0..x_{N-1} of a run with h = 1. The tolerance is so small that the run starts from a_0 = q''_0, which excites the
+   third root. */
 std::vector<State> states(double hw, double q0, double v0, const std::string &options, const Method &m, int N)
 {
   const Oscillator   p(hw, q0, v0, N);
@@ -105,7 +106,8 @@ std::vector<State> states(double hw, double q0, double v0, const std::string &op
   return x;
 }
 
-/* The matrix that maps each x_n to x_{n+1} best, from the runs' first states; of the trapezoidal rule the one for (q, h q') */
+/* The matrix that maps each x_n to x_{n+1} best, from the runs' first states; of the trapezoidal rule the one for (q, h
+ * q') */
 Matrix fit(const std::vector<std::vector<State>> &runs, int pairs, bool two)
 {
   Real S[3][3] = {}, T[3][3] = {};
@@ -146,7 +148,7 @@ void compare(const char *name, const std::string &options, const Method &m)
   constexpr int N = 300;
   for (double hw : {1e-2, 3e-2, 1e-1, .3, 1., 3., 10., 30., 100., 1e3, 1e4}) {
     SCOPED_TRACE(text("%s, h w = %g", name, hw));
-    const Matrix                          A = amplification(m, hw);
+    const Matrix                          A    = amplification(m, hw);
     const std::vector<std::vector<State>> runs = {states(hw, 1., 0., options, m, N), states(hw, 0., hw, options, m, N),
                                                   states(hw, .6, -.8 * hw, options, m, N)};
     Real                                  difference = 0;

@@ -12,8 +12,8 @@ struct Path {
 
 Path path(const Problem &p, int steps, const std::string &options)
 {
-  Path result;
-  Simulation  run(p, fixedSteps((p.t1 - p.t0) / steps) + "-ts_hhtdae_corrector_tolerance 1e-12 " + options);
+  Path       result;
+  Simulation run(p, fixedSteps((p.t1 - p.t0) / steps) + "-ts_hhtdae_corrector_tolerance 1e-12 " + options);
   run.watch = [&](Simulation &r, PetscInt, double) {
     result.u.push_back(r.u());
     result.v.push_back(r.v());
@@ -63,7 +63,7 @@ TEST(Equivalence, CarAxis) { compare(CarAxis(), 600, 1e-8); }
 TEST(Equivalence, NotForVariableMass)
 {
   const DoublePendulum p(1.);
-  const Path           x = path(p, 200, "-ts_hhtdae_alpha -0.3 -ts_hhtdae_form paper"), y = path(p, 200, "-ts_hhtdae_alpha -0.3");
+  const Path x = path(p, 200, "-ts_hhtdae_alpha -0.3 -ts_hhtdae_form paper"), y = path(p, 200, "-ts_hhtdae_alpha -0.3");
   EXPECT_GT(difference(x.u, y.u, {0, 1}), 1e-4);
 }
 
@@ -71,9 +71,9 @@ TEST(Equivalence, NotForVariableMass)
 TEST(Equivalence, RadiusOneHalf)
 {
   const Oscillators p({1.}, {0.}, false, 4.);
-  const Path        x = path(p, 100, "-ts_hhtdae_radius 0.5"), y = path(p, 100, "-ts_hhtdae_alpha -0.33333333333333331");
+  const Path x = path(p, 100, "-ts_hhtdae_radius 0.5"), y = path(p, 100, "-ts_hhtdae_alpha -0.33333333333333331");
   EXPECT_LT(difference(x.u, y.u, {0}), 1e-13);
-  const double      rho = .6;
+  const double      rho   = .6;
   const std::string alpha = text("-ts_hhtdae_alpha %.17g", (rho - 1) / (rho + 1));
   EXPECT_GT(difference(path(p, 100, text("-ts_hhtdae_radius %g", rho)).u, path(p, 100, alpha).u, {0}), 1e-6);
 }

@@ -10,13 +10,15 @@ struct Setting {
   const char *name, *options;
 };
 
-const Setting second_order[] = {
-    {"alpha -0.05", "-ts_hhtdae_alpha -0.05"}, {"alpha -0.3", "-ts_hhtdae_alpha -0.3"},
-    {"alpha -1/3", "-ts_hhtdae_alpha -0.33333333333333331"}, {"radius 0", "-ts_hhtdae_radius 0"},
-    {"radius 0.5", "-ts_hhtdae_radius 0.5"}, {"radius 0.9", "-ts_hhtdae_radius 0.9"}};
-const Setting paper[] = {{"paper -0.05", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.05"},
-                         {"paper -0.3", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.3"},
-                         {"paper -1/3", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.33333333333333331"}};
+const Setting second_order[] = {{"alpha -0.05", "-ts_hhtdae_alpha -0.05"},
+                                {"alpha -0.3", "-ts_hhtdae_alpha -0.3"},
+                                {"alpha -1/3", "-ts_hhtdae_alpha -0.33333333333333331"},
+                                {"radius 0", "-ts_hhtdae_radius 0"},
+                                {"radius 0.5", "-ts_hhtdae_radius 0.5"},
+                                {"radius 0.9", "-ts_hhtdae_radius 0.9"}};
+const Setting paper[]        = {{"paper -0.05", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.05"},
+                                {"paper -0.3", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.3"},
+                                {"paper -1/3", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.33333333333333331"}};
 
 struct Orders {
   double q, v, lambda, other;
@@ -27,8 +29,9 @@ Orders measure(const Problem &p, const Setting &s, int steps)
   const ProblemErrors coarse = fixedStepErrors(p, steps, s.options), fine = fixedStepErrors(p, 2 * steps, s.options);
   const Orders        o = {order(coarse.q, fine.q), order(coarse.v, fine.v), order(coarse.lambda, fine.lambda),
                            order(coarse.other, fine.other)};
-  MEASURED("%-15s %-12s order q %.2f, q' %.2f, lambda %.2f, others %.2f; errors q %.1e, q' %.1e, lambda %.1e, others %.1e",
-           p.name.c_str(), s.name, o.q, o.v, o.lambda, o.other, fine.q, fine.v, fine.lambda, fine.other);
+  MEASURED(
+      "%-15s %-12s order q %.2f, q' %.2f, lambda %.2f, others %.2f; errors q %.1e, q' %.1e, lambda %.1e, others %.1e",
+      p.name.c_str(), s.name, o.q, o.v, o.lambda, o.other, fine.q, fine.v, fine.lambda, fine.other);
   return o;
 }
 
@@ -122,7 +125,7 @@ TEST(Order, ChangingSteps)
       double q[2] = {0., 0.}, v[2] = {0., 0.}, lambda[2] = {0., 0.};
       for (int fine = 0; fine < 2; fine++) {
         const double h = p->t1 / (fine ? 1200 : 600);
-        Simulation          run(*p, fixedSteps(h) + s.options);
+        Simulation   run(*p, fixedSteps(h) + s.options);
         for (int k = 0; k < (fine ? 800 : 400); k++) {
           must(TSSetTimeStep(run.ts, k % 2 ? 2. * h : h));
           must(run.step());
