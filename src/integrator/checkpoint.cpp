@@ -27,7 +27,7 @@ struct Numbers {
     Predictor       &p = I.predictor;
     ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
              &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.tiny_steps, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor};
+    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit};
     for (PetscReal &t : p.t) reals.push_back(&t);
   }
 };
@@ -155,11 +155,20 @@ PetscErrorCode CheckSeal(MPI_Comm comm, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void RenewMatrix(Integrator &I)
+/* Nothing of the matrix survives, not even the analysis of its pattern, which may depend on the values it was made with */
+PetscErrorCode RenewMatrix(TS ts)
 {
+  Integrator &I = Get(ts);
+  KSP         ksp;
+
+  PetscFunctionBegin;
   I.corrector.have_matrix = PETSC_FALSE;
   I.corrector.want_matrix = PETSC_TRUE;
   I.corrector.rate        = -1;
+  I.linear_chosen         = PETSC_FALSE;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPReset(ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
@@ -184,7 +193,7 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   if (rank == 0) failed = !Seal(part.c_str(), file);
   PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, comm));
   PetscCheck(!failed, comm, PETSC_ERR_FILE_WRITE, "Cannot complete %s and rename it to %s", part.c_str(), file);
-  RenewMatrix(I);
+  PetscCall(RenewMatrix(ts));
   PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -205,7 +214,7 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
   PetscCall(Read(ts, viewer, file));
   PetscCall(PetscViewerDestroy(&viewer));
-  RenewMatrix(I);
+  PetscCall(RenewMatrix(ts));
   ts->steprestart = PETSC_FALSE;
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));

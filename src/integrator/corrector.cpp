@@ -13,7 +13,7 @@
 
   The ladder, from the cheapest rung:
     reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
-    renew      before a correction otherwise; within a correction when it is slow and the matrix is not of this step
+    renew      before a correction otherwise; within a correction when it is slow, a few times
     retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
     fail       with a matrix of this very correction: TSAdapt cuts h
   A step size that would grow by less than `hold` is kept, so that the factorization lives on (estimate.cpp).
@@ -36,6 +36,9 @@ constexpr PetscReal remembered = 0.3;
 
 /* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
 constexpr PetscReal fixed = 0.02;
+
+/* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
+constexpr PetscInt max_renewals = 3;
 
 const char *RoleName(const Integrator &I, PetscInt local)
 {
@@ -166,7 +169,7 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   } else if (xi >= 1) {
     Diverge(I, "diverges");
   } else if (left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
-    if (!c.fresh && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
+    if (c.renewals < max_renewals && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
     else Diverge(I, "converges too slowly");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -270,6 +273,7 @@ PetscErrorCode FreshMatrixNextIteration(TS ts)
   if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.rate, I.corrector.it));
   PetscCall(SNESSetLagJacobian(ts->snes, -2));
+  I.corrector.renewals++;
   I.corrector.base = I.corrector.it;
   I.corrector.rate = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -309,7 +313,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscInt            its;
 
   PetscFunctionBegin;
-  c.it = c.base = 0;
+  c.it = c.base = c.renewals = 0;
   c.e = c.e_max = c.xi_max = 0;
   c.reason       = SNES_CONVERGED_ITERATING;
   c.fresh        = PETSC_FALSE;
@@ -336,15 +340,17 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   if (!c.have_matrix || q > c.ratio || q * c.ratio < 1) c.want_matrix = PETSC_TRUE;
   if (c.have_matrix && c.want_matrix) PetscCall(PetscInfo(ts, "corrector: new matrix, h/h_matrix = %g, rate %g\n", (double)q, (double)c.rate));
   PetscCall(Iterate(ts, converged));
-  if (!*converged && !c.fresh && !c.user_lag) {
+  const bool retry = !*converged && !c.fresh && !c.user_lag;
+  if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
     I.stat.retries++;
     c.want_matrix = PETSC_TRUE;
     PetscCall(Predict(ts, I.X));
     PetscCall(Iterate(ts, converged));
   }
-  c.want_matrix = (PetscBool)(!*converged || c.xi_max >= c.slow_rate);
+  c.want_matrix = (PetscBool)(!*converged || c.xi_max >= c.slow_rate || retry);
   if (!*converged) {
+    I.h_limit = 0.7 * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

@@ -21,6 +21,9 @@ struct Differences {
 namespace
 {
 
+/* Of U, U', U''. F is affine in q'' but for definitions that need not be, and small entries of M must show beside forces */
+constexpr PetscReal relative_step[3] = {1.5e-8, 1.5e-8, 1e-4};
+
 PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
 {
   Differences *d = (Differences *)ctx;
@@ -167,6 +170,7 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
+    PetscCall(MatFDColoringSetParameters(d->coloring, relative_step[d->which], 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }

@@ -183,14 +183,17 @@ PetscErrorCode NoteError(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A gain in h below the threshold costs more in matrices than it saves in steps. Not near the end of the run, where
+/* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
+   in h below the threshold costs more in matrices than it saves in steps. Not near the end of the run, where
    TSAdapt fits the last steps to the final time. */
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 {
-  const Corrector &c = Get(ts).corrector;
+  Integrator      &I = Get(ts);
+  const Corrector &c = I.corrector;
 
   PetscFunctionBegin;
-  if (*next <= h || *next >= c.hold * h || Get(ts).fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.h_limit > 0 && *next > I.h_limit && !I.fixed_h) *next = PetscMax(h, I.h_limit);
+  if (*next <= h || *next >= c.hold * h || I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3NextStop(ts) - (ts->ptime + h) < 4 * *next) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
   *next = h;

@@ -39,6 +39,7 @@ struct Corrector {
 
   PetscInt            it     = 0; /* of the present correction */
   PetscInt            base   = 0; /* iteration after which the present matrix came into use */
+  PetscInt            renewals = 0; /* matrices made in the course of it */
   PetscReal           e      = 0; /* last correction, in units of the tolerance */
   PetscReal           e_max  = 0; /* largest correction so far */
   PetscReal           xi_max = 0; /* worst rate of this correction */
@@ -79,6 +80,8 @@ struct Integrator {
   Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp; q_n' counts as V0 - misfit dV */
   PetscReal misfit = 0;
   PetscBool have_misfit = PETSC_FALSE; /* dV belongs to t_n */
+  Vec       accepted[2] = {}; /* U, U' as accepted, when Repair() has changed U0, V0 since */
+  PetscBool repaired = PETSC_FALSE;
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
   PetscReal h_last = 0;
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
@@ -109,6 +112,7 @@ struct Integrator {
   PetscObjectState sol_state = 0, dot_state = 0;
   PetscObjectId    sol_id = 0;
   PetscReal        h_regular = 0; /* last step that went through the corrector */
+  PetscReal        h_limit = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscBool        auto_h = PETSC_FALSE;
   PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */
   char             failure[512] = "";

@@ -19,6 +19,10 @@ namespace hht3
 namespace
 {
 
+/* Growth of h beyond which what dV holds of the misfit would be amplified with its rounding; the spike is then one of the
+   new, larger step's own order */
+constexpr PetscReal most = 2;
+
 /* Relative changes of h that are worth it, without and with first-order states in the error test */
 constexpr PetscReal least[2] = {0.1, 1e-3};
 
@@ -93,6 +97,7 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
+  if (r > most) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < least[I.count[TSHHT3_STATE] > 0] || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
   I.misfit = 1 - r * r;

@@ -138,10 +138,10 @@ PetscErrorCode Report(TS ts, const char *what, const char *unit, PetscReal e, Pe
   /* within a run the velocities are consistent to the order of the method only, which is no fault of the user's */
   if (e > (I.stat.restarts > 1 ? 100 : 1) && I.start_policy == TSHHT3_START_REPORT) {
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
-                          "hhtdae: at t = %g the %s violate the constraints: the nearest consistent ones are %.3g "
+                          "hhtdae: at t = %g the %s%s violate the constraints: the nearest consistent ones are %.3g "
                           "tolerances away%s; the largest violation is %.3g, in row %" PetscInt_FMT
                           ". Give consistent values, or use -ts_hhtdae_start project.\n",
-                          (double)ts->ptime, what, (double)e, unit, (double)value, row));
+                          (double)ts->ptime, I.stat.restarts > 1 ? "" : "initial ", what, (double)e, unit, (double)value, row));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

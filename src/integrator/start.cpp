@@ -341,6 +341,7 @@ PetscErrorCode Start(TS ts)
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
   PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
   I.stat.restarts++;
+  I.repaired = PETSC_FALSE;
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ClearAlgebraicRates(I, I.V0));
@@ -364,6 +365,14 @@ PetscErrorCode Repair(TS ts)
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
   PetscCall(PetscInfo(ts, "h falls from %g to %g at t = %g: velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
   I.stat.restarts++;
+  if (!I.repaired) {
+    Vec now[2] = {I.U0, I.V0};
+    for (int k = 0; k < 2; k++) {
+      if (!I.accepted[k]) PetscCall(VecDuplicate(now[k], &I.accepted[k]));
+      PetscCall(VecCopy(now[k], I.accepted[k]));
+    }
+    I.repaired = PETSC_TRUE;
+  }
   PetscCall(ProjectVelocities(ts));
   PetscCall(StartFromState(ts, (PetscBool)!I.count[TSHHT3_NONHOLONOMIC]));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));

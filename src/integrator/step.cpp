@@ -64,6 +64,7 @@ PetscErrorCode Commit(TS ts)
   std::swap(I.A1, I.A0);
   I.h_last      = I.h;
   I.have_misfit = PETSC_FALSE;
+  I.repaired    = PETSC_FALSE;
   if (I.F0) {
     PetscCall(VecZeroEntries(I.A1)); /* f_n of (9a): everything but the inertia forces */
     PetscCall(EvaluateResidual(ts, I.t1, I.U0, I.V0, I.A1, I.F0));
@@ -127,6 +128,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
     ts->ptime = stop;
   ts->time_step = next;
   if (!tiny) I.h_regular = h;
+  if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
   I.stat.steps++;
   I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
   I.stat.h_max = PetscMax(I.stat.h_max, h);
@@ -203,8 +205,8 @@ PetscErrorCode Fail(TS ts, const char *what)
   PetscFunctionBegin;
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
   ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
-  PetscCall(VecCopy(I.U0, ts->vec_sol));
-  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCall(VecCopy(I.repaired ? I.accepted[0] : I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.repaired ? I.accepted[1] : I.V0, ts->vec_dot));
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
              "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).",
