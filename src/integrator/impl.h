@@ -111,7 +111,7 @@ struct Integrator {
   PetscBool        have_step = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
   PetscObjectState sol_state = 0, dot_state = 0;
   PetscObjectId    sol_id = 0;
-  PetscReal        h_regular = 0; /* last step that went through the corrector */
+  PetscReal        h_regular = 0; /* running maximum of steps that went through the corrector, forgetting a tenth in each */
   PetscReal        h_limit = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscBool        auto_h = PETSC_FALSE;
   PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */

@@ -19,9 +19,9 @@ namespace hht3
 namespace
 {
 
-/* Growth of h beyond which what dV holds of the misfit would be amplified with its rounding; the spike is then one of the
-   new, larger step's own order */
-constexpr PetscReal most = 2;
+/* After a step shorter than this part of the regular ones dV holds more rounding than misfit, which growth would amplify;
+   the spike is then one of the new, larger step's own order */
+constexpr PetscReal regular = 1e-3;
 
 /* Relative changes of h that are worth it, without and with first-order states in the error test */
 constexpr PetscReal least[2] = {0.1, 1e-3};
@@ -97,7 +97,7 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
-  if (r > most) PetscFunctionReturn(PETSC_SUCCESS);
+  if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < least[I.count[TSHHT3_STATE] > 0] || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
   I.misfit = 1 - r * r;
