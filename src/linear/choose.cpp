@@ -11,22 +11,24 @@
 
       family, size              n     nz(L)     work  work/nz     KLU   MUMPS LU   MUMPS LDL^T
       planar chain, 10         50   1.6e+02  5.4e+02      3.3    0.007      0.28          0.28
-      planar chain, 10000   50000   1.7e+05  5.9e+05      3.5     5.9         97           105
-      20 modes, 1000 bodies 25000   3.7e+05  6.7e+06       18      24         53            36
-      10 bodies, 40 modes     450   1.1e+04  3.5e+05       31     0.48       1.1          0.71
-      10 bodies, 80 modes     850   3.8e+04  2.2e+06       58     2.3        3.6           2.2
-      1 body, 160 modes       165   1.4e+04  1.5e+06      110     1.3        1.8           1.1
-      plate, 12 x 12 bricks  1092   7.2e+04  6.1e+06       86     8.6         14           8.1
-      1 body, 320 modes       325   5.3e+04  1.2e+07      217      17         17           9.2
-      plate, 16 x 16 bricks  1836   1.4e+05  1.4e+07       99      23         31            17
-      block, 6^3 bricks      1176   1.2e+05  1.9e+07      155      16         15            12
-      plate, 24 x 24 bricks  3900   3.8e+05  5.1e+07      136     100         81            53
-      block, 8^3 bricks      2430   4.6e+05  1.5e+08      318     102         74            51
-      block, 16^3 bricks    15606   1.0e+07  1.4e+10     1373   13500       2100          1170
+      20 modes, 1000 bodies 25000   3.7e+05  6.7e+06       18      31         71            47
+      10 bodies, 40 modes     450   1.1e+04  3.5e+05       31     0.47       1.0          0.66
+      1 body, 160 modes       165   1.4e+04  1.5e+06      110     1.3        1.2          0.77
+      10 bodies, 80 modes     850   3.8e+04  2.2e+06       58     6.3        6.9           1.8
+      block, 4^3 bricks       450   2.6e+04  2.3e+06       88     1.1        1.5           1.0
+      plate, 12 x 12 bricks  1092   7.2e+04  6.1e+06       86     8.2        7.4           6.3
+      10 bodies, 120 modes   1250   8.1e+04  6.9e+06       85      14         14           7.8
+      1 body, 320 modes       325   5.3e+04  1.2e+07      217      17        8.5           6.7
+      plate, 16 x 16 bricks  1836   1.4e+05  1.4e+07       99      23         15           8.3
+      block, 6^3 bricks      1176   1.2e+05  1.9e+07      155      23        9.0           7.3
+      plate, 24 x 24 bricks  3900   3.8e+05  5.1e+07      136      82         32            22
+      block, 8^3 bricks      2430   4.6e+05  1.5e+08      318     131         32            23
+      block, 16^3 bricks    15606   1.0e+07  1.4e+10     1373   20154        728           516
 
-  So MUMPS begins at about 5e6 operations with LDL^T and 2e7 with LU, where there are at least 40 per entry.
+  So MUMPS begins at about 2.5e6 operations with LDL^T and 7e6 with LU, where there are at least 40 per entry. With the
+  reference BLAS in place of OpenBLAS it is 5e6 and 2e7, and MUMPS takes three times as long on large blocks.
 */
-static const double LARGE_SYMMETRIC = 5e6, LARGE_UNSYMMETRIC = 2e7, LARGE_PER_ENTRY = 40;
+static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6, LARGE_PER_ENTRY = 40;
 
 /* Counting stops here: a factor with this many entries is large by any measure */
 static const double COUNT_LIMIT = 1e7;
