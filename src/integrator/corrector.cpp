@@ -295,12 +295,28 @@ PetscErrorCode CorrectorSetUp(TS ts)
   PetscCall(SNESGetTolerances(snes, &atol, &rtol, &stol, &maxit, &maxf));
   if (maxit < I.corrector.max_it) I.corrector.max_it = maxit;
   PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));
+  PetscCheck(!snes->mf || snes->mf_operator, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_mf leaves no matrix, which the consistent start needs; use -snes_mf_operator, whose preconditioner is the assembled matrix");
   if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
   PetscCall(SNESGetLineSearch(snes, &ls));
   if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
   PetscBool shell;
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
   if (shell) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A SNES type that asks for no convergence test of ours (ksponly) has counted by itself */
+static PetscErrorCode CountForeign(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscInt    its;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetIterationNumber(ts->snes, &its));
+  I.corrector.it = its;
+  I.stat.newton += its;
+  I.stat.solves += its;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -322,6 +338,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
   ts->ksp_its += its;
+  if (!c.it) PetscCall(CountForeign(ts));
   ts->snes_its += c.it;
   *ok = (PetscBool)(reason > 0);
   if (!*ok) PetscCall(ExplainSNES(ts, reason));

@@ -101,14 +101,14 @@ PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
 {
   SNES               snes = ts->snes;
   KSP                ksp;
-  Mat                J, P;
+  Mat                P;
   KSPConvergedReason reason;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  PetscCall(SNESGetJacobian(snes, NULL, &P, NULL, NULL));
   if (Get(ts).singular) PetscCall(NameRedundant(ts));
-  PetscCall(KSPSetOperators(ksp, J, P));
+  PetscCall(KSPSetOperators(ksp, P, P));
   PetscCall(KSPSolve(ksp, rhs, d));
   Get(ts).stat.solves++;
   PetscCall(KSPGetConvergedReason(ksp, &reason));

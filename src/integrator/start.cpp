@@ -84,12 +84,12 @@ PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
 PetscErrorCode MakeStartMatrix(TS ts)
 {
   Integrator &I = Get(ts);
-  Mat         J, P;
+  Mat         P; /* alone: a matrix-free operator has nothing to differentiate before SNESSolve() */
 
   PetscFunctionBegin;
   PetscCall(SNESSetUp(ts->snes));
-  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
-  PetscCall(FormJacobian(ts->snes, I.X, J, P, ts));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -341,3 +341,32 @@ TEST(Options, ResetAndRunAgain)
   must(run.solve());
   EXPECT_LT(relativeDifference(run.u(), u), 1e-5);
 }
+
+/* The operator without a matrix, preconditioned by the assembled one; without any matrix there is no consistent start */
+TEST(Options, MatrixFreeOperators)
+{
+  const Pendulum p(-90., 0., 2.);
+  Simulation     plain(p, tolerance(1e-6)), free(p, tolerance(1e-6) + "-snes_mf_operator -ksp_type gmres -ksp_rtol 1e-10 ");
+  must(plain.solve());
+  must(free.solve());
+  EXPECT_LT(free.errors().q, 1e-3);
+  EXPECT_LT(free.errors().q, 3. * plain.errors().q);
+
+  Simulation none(p, tolerance(1e-6) + "-snes_mf ");
+  ErrorTrap  trap;
+  EXPECT_EQ(none.solve(), PETSC_ERR_SUP);
+  EXPECT_TRUE(trap.says("-snes_mf_operator")) << trap.message;
+}
+
+/* A SNES of one linear solve counts its iterations by itself */
+TEST(Options, OneLinearSolvePerStep)
+{
+  const Oscillators p({1., 3.}, {0., .1}, true, 2.);
+  Simulation        run(p, fixedSteps(.01) + "-snes_type ksponly ");
+  must(run.solve());
+  const TSHHT3Statistics s = run.statistics();
+  EXPECT_EQ(s.steps, 200);
+  EXPECT_EQ(s.newton, s.solves);
+  EXPECT_GE(s.newton, s.steps);
+  EXPECT_LT(run.errors().q, 1e-3);
+}
