@@ -83,28 +83,13 @@ void StepBase(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, Pe
   }
 }
 
-/* U1, V1, A1 = base + X times the derivatives by X that belong to the role */
-void StepStage(const Integrator &I, PetscInt n, const PetscScalar *const base[], const PetscScalar *x, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+/* y = base + slope x, entry by entry or with one slope for all */
+void Line(PetscInt n, const PetscScalar *PETSC_RESTRICT base, const PetscScalar *PETSC_RESTRICT slope, PetscReal one, const PetscScalar *PETSC_RESTRICT x, PetscScalar *PETSC_RESTRICT y)
 {
-  const Parameters &p = I.p;
-  const PetscReal   cu = ScalePosition(p, I.h), cv = ScaleVelocity(p, I.h), ca = p.ca();
-  if (I.role.empty()) {
-    for (PetscInt i = 0; i < n; i++) {
-      u[i] = base[0][i] + cu * x[i];
-      v[i] = base[1][i] + cv * x[i];
-      a[i] = base[2][i] + ca * x[i];
-    }
-    return;
-  }
-  PetscReal d[TSHHT3_NUM_ROLES][3] = {{cu, cv, ca}, {ScaleState(p, I.h), (1 - p.am_s) / (1 - p.af_s), 0}};
-  for (int k = TSHHT3_STATE + 1; k < TSHHT3_NUM_ROLES; k++) d[k][0] = 1;
-  const unsigned char *role = I.role.data();
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscReal *di = d[role[i]];
-    u[i]                = base[0][i] + di[0] * x[i];
-    v[i]                = base[1][i] + di[1] * x[i];
-    a[i]                = base[2][i] + di[2] * x[i];
-  }
+  if (slope)
+    for (PetscInt i = 0; i < n; i++) y[i] = base[i] + slope[i] * x[i];
+  else
+    for (PetscInt i = 0; i < n; i++) y[i] = base[i] + one * x[i];
 }
 
 /* (9a): what the average takes from t_n. f_n is evaluated once per step, at the end of the last one */
@@ -147,25 +132,6 @@ PetscErrorCode TrueAccelerationRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (9b) and its velocity-level sibling */
-PetscErrorCode ScaleConstraintRows(const Integrator &I, Vec F)
-{
-  const Scales s = CurrentScales(I);
-  PetscScalar *f;
-  PetscInt     n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArray(F, &f));
-  PetscReal factor[TSHHT3_NUM_ROLES];
-  for (PetscReal &x : factor) x = 1;
-  factor[TSHHT3_HOLONOMIC]    = s.holonomic;
-  factor[TSHHT3_NONHOLONOMIC] = s.velocity;
-  for (PetscInt i = 0; i < n; i++) f[i] *= factor[I.role[i]];
-  PetscCall(VecRestoreArray(F, &f));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* (6b), (6c): in the start the constraint rows read Phi_q q'' + gamma = 0; the matrix holds Phi_q */
 PetscErrorCode AccelerationConstraintRows(TS ts, Vec X, Vec F)
 {
@@ -190,23 +156,30 @@ PetscErrorCode AccelerationConstraintRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* D_r, D_c = dU/dX and, in a step, dU'/dX and dU''/dX. Kept while h and the mode stay. */
 PetscErrorCode FillScalings(Integrator &I)
 {
-  const Scales s = CurrentScales(I);
-  PetscScalar *r, *c;
-  PetscInt     n;
+  const Scales      s     = CurrentScales(I);
+  const Parameters &p     = I.p;
+  const PetscReal   cv    = ScaleVelocity(p, I.h), cs = (1 - p.am_s) / (1 - p.af_s), ca = p.ca();
+  Vec               to[4] = {I.row, I.col, I.slope[0], I.slope[1]};
+  PetscScalar      *x[4];
+  PetscInt          n;
 
   PetscFunctionBegin;
+  if (I.scaled_h == I.h && I.scaled_mode == I.mode) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetLocalSize(I.row, &n));
-  PetscCall(VecGetArrayWrite(I.row, &r));
-  PetscCall(VecGetArrayWrite(I.col, &c));
+  for (int k = 0; k < 4; k++) PetscCall(VecGetArrayWrite(to[k], &x[k]));
   for (PetscInt i = 0; i < n; i++) {
     const unsigned char role = I.role[i];
-    r[i] = role == TSHHT3_HOLONOMIC ? s.holonomic : role == TSHHT3_NONHOLONOMIC ? s.velocity : 1;
-    c[i] = role == TSHHT3_COORDINATE ? s.coordinate : role == TSHHT3_STATE ? s.state : 1;
+    x[0][i] = role == TSHHT3_HOLONOMIC ? s.holonomic : role == TSHHT3_NONHOLONOMIC ? s.velocity : 1;
+    x[1][i] = role == TSHHT3_COORDINATE ? s.coordinate : role == TSHHT3_STATE ? s.state : 1;
+    x[2][i] = role == TSHHT3_COORDINATE ? cv : role == TSHHT3_STATE ? cs : 0;
+    x[3][i] = role == TSHHT3_COORDINATE ? ca : 0;
   }
-  PetscCall(VecRestoreArrayWrite(I.row, &r));
-  PetscCall(VecRestoreArrayWrite(I.col, &c));
+  for (int k = 0; k < 4; k++) PetscCall(VecRestoreArrayWrite(to[k], &x[k]));
+  I.scaled_h    = I.h;
+  I.scaled_mode = I.mode;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,30 +254,30 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U1, V1, A1 from the unknowns X and the state at t_n */
+/* U1, V1, A1 = base + X times the derivatives by X */
 PetscErrorCode StageVectors(TS ts, Vec X)
 {
-  Integrator        &I       = Get(ts);
-  Vec                from[3] = {I.base[0], I.base[1], I.base[2]};
-  const PetscScalar *x, *base[3];
-  PetscScalar       *u, *v, *a;
+  Integrator        &I        = Get(ts);
+  const PetscReal    one[3]   = {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca()};
+  Vec                slope[3] = {I.col, I.slope[0], I.slope[1]}, to[3] = {I.U1, I.V1, I.A1};
+  const PetscScalar *x, *base, *s = nullptr;
+  PetscScalar       *y[3];
   PetscInt           n;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(X, &n));
   PetscCall(VecGetArrayRead(X, &x));
-  PetscCall(VecGetArray(I.U1, &u));
-  PetscCall(VecGetArray(I.V1, &v));
-  PetscCall(VecGetArray(I.A1, &a));
-  if (I.mode == Mode::Start) StartStage(I, n, x, u, v, a);
-  else {
-    for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(from[k], &base[k]));
-    StepStage(I, n, base, x, u, v, a);
-    for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(from[k], &base[k]));
-  }
-  PetscCall(VecRestoreArray(I.A1, &a));
-  PetscCall(VecRestoreArray(I.V1, &v));
-  PetscCall(VecRestoreArray(I.U1, &u));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(to[k], &y[k]));
+  if (I.mode == Mode::Start) StartStage(I, n, x, y[0], y[1], y[2]);
+  else
+    for (int k = 0; k < 3; k++) {
+      PetscCall(VecGetArrayRead(I.base[k], &base));
+      if (!I.role.empty()) PetscCall(VecGetArrayRead(slope[k], &s));
+      Line(n, base, s, one[k], x, y[k]);
+      if (!I.role.empty()) PetscCall(VecRestoreArrayRead(slope[k], &s));
+      PetscCall(VecRestoreArrayRead(I.base[k], &base));
+    }
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &y[k]));
   PetscCall(VecRestoreArrayRead(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -318,6 +291,7 @@ PetscErrorCode PrepareStage(TS ts)
   PetscInt     n;
 
   PetscFunctionBegin;
+  if (!I.role.empty()) PetscCall(FillScalings(I));
   PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));
   PetscCall(VecGetArrayRead(I.V0, &e.v0));
@@ -350,7 +324,7 @@ PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
     if (I.definitions_use_acceleration) PetscCall(TrueAccelerationRows(ts, X, F));
     PetscCall(AddOldForces(I, F));
   }
-  if (I.constraints()) PetscCall(ScaleConstraintRows(I, F));
+  if (I.constraints()) PetscCall(VecPointwiseMult(F, F, I.row)); /* (9b) and its velocity-level sibling */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -42,6 +42,17 @@ PetscErrorCode RestoreTolerances(TS ts, Tolerances *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Four partial sums: one alone waits for each addition */
+PetscReal SumOfSquares(PetscInt n, const PetscScalar *d, const PetscScalar *w)
+{
+  PetscReal part[4] = {0, 0, 0, 0};
+  PetscInt  i       = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int k = 0; k < 4; k++) part[k] += PetscSqr(PetscRealPart(d[i + k] * w[i + k]));
+  for (; i < n; i++) part[0] += PetscSqr(PetscRealPart(d[i] * w[i]));
+  return (part[0] + part[1]) + (part[2] + part[3]);
+}
+
 /* Root mean square or maximum over all ranks of values accumulated locally */
 PetscErrorCode Reduce(TS ts, NormType type, PetscInt size, PetscReal local, PetscReal *norm)
 {
@@ -111,7 +122,7 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
   PetscCall(VecGetArrayRead(dX, &d));
   PetscCall(VecGetArrayRead(I.weight, &w));
   /* multipliers have no weight, but must be numbers: 0 times Inf or NaN is NaN */
-  for (PetscInt i = 0; i < n; i++) sum += PetscSqr(PetscRealPart(d[i] * w[i]));
+  sum = SumOfSquares(n, d, w);
   if (I.count[TSHHT3_STATE])
     for (PetscInt i = 0; i < n; i++)
       if (I.role[i] == TSHHT3_STATE) states += PetscSqr(PetscRealPart(d[i] * w[i]));

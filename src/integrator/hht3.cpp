@@ -51,6 +51,7 @@ PetscErrorCode AllocateForRoles(TS ts)
   if (!I.role.empty() && !I.row) {
     PetscCall(VecDuplicate(ts->vec_sol, &I.row));
     PetscCall(VecDuplicate(ts->vec_sol, &I.col));
+    for (Vec &v : I.slope) PetscCall(VecDuplicate(ts->vec_sol, &v));
     PetscCall(VecDuplicate(ts->vec_sol, &I.work));
   }
   if (I.form == TSHHT3_FORM_PAPER && I.alpha != 0 && !I.F0) PetscCall(VecDuplicate(ts->vec_sol, &I.F0));
@@ -159,7 +160,7 @@ PetscErrorCode Reset(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.slope[0], &I.slope[1], &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
@@ -171,7 +172,7 @@ PetscErrorCode Reset(TS ts)
   I.have_step             = PETSC_FALSE;
   I.linear_chosen         = PETSC_FALSE;
   I.norm_size             = 0;
-  I.h_last = I.h_regular = 0;
+  I.h_last = I.h_regular = I.scaled_h = 0;
   I.scaled_state         = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

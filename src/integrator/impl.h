@@ -98,6 +98,9 @@ struct Integrator {
 
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
+  Vec           slope[2] = {};                /* dU'/dX, dU''/dX; col is dU/dX */
+  PetscReal     scaled_h = 0;                 /* for which they stand */
+  Mode          scaled_mode = Mode::Step;
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   LinearChoice  linear;

@@ -19,20 +19,38 @@ namespace
 constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
 
 /* New differences from the old ones and the new values x, in place; misses of the degrees 0..have, squared. Weights of
-   unknowns that do not count are zero. */
-void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+   unknowns that do not count are zero. The number of differences is a template's, for a loop without inner branches. */
+template <int have>
+void SweepFixed(PetscInt n, bool grow, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
 {
-  PetscReal inverse[max_degree + 1];
-  for (PetscInt k = 0; k <= have; k++) inverse[k] = 1 / span[k];
+  PetscReal    inverse[have + 1], sum[have + 1] = {};
+  PetscScalar *d[have + 1], *const next = grow ? D[have + 1] : nullptr;
+  for (int k = 0; k <= have; k++) {
+    inverse[k] = 1 / span[k];
+    d[k]       = D[k];
+  }
   for (PetscInt i = 0; i < n; i++) {
     PetscScalar fresh = x[i];
-    for (PetscInt k = 0; k <= have; k++) {
-      const PetscScalar old = D[k][i];
-      D[k][i]               = fresh;
+    for (int k = 0; k <= have; k++) {
+      const PetscScalar old = d[k][i];
+      d[k][i]               = fresh;
       fresh                 = (fresh - old) * inverse[k];
-      miss[k] += PetscSqr(PetscRealPart(fresh * w[i]));
+      sum[k] += PetscSqr(PetscRealPart(fresh * w[i]));
     }
-    if (have < keep) D[have + 1][i] = fresh;
+    if (next) next[i] = fresh;
+  }
+  for (int k = 0; k <= have; k++) miss[k] = sum[k];
+}
+
+void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+{
+  static_assert(max_degree == 3, "one case for each number of differences");
+  const bool grow = have < keep;
+  switch (have) {
+  case 0: SweepFixed<0>(n, grow, span, x, D, w, miss); break;
+  case 1: SweepFixed<1>(n, grow, span, x, D, w, miss); break;
+  case 2: SweepFixed<2>(n, grow, span, x, D, w, miss); break;
+  default: SweepFixed<3>(n, false, span, x, D, w, miss); break;
   }
 }
 
