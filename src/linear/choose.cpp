@@ -249,7 +249,9 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
   if (available) {
     PetscCall(SetPackage(pc, MATSOLVERPETSC));
     PetscCall(PCFactorReorderForNonzeroDiagonal(pc, PETSC_SMALL));
-    PetscCall(PetscStrncpy(choice->text, "LU with petsc: no package that pivots is installed", sizeof choice->text));
+    const char *type;
+    PetscCall(MatGetType(P, &type));
+    PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "LU with petsc: no other installed package factors matrices of type %s", type));
     PetscFunctionReturn(0);
   }
   PetscCall(OptionGiven(ksp, "-ksp_type", &by_option));
