@@ -140,6 +140,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
 PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
+  PetscBool   stage;
 
   PetscFunctionBegin;
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
@@ -156,7 +157,10 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
     PetscCall(Correct(ts, ok));
   }
   PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
-  PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, ok));
+  /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
+  PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, &stage));
+  if (!*ok && stage) ts->time_step *= ts->adapt->scale_solve_failed;
+  *ok = (PetscBool)(*ok && stage);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
