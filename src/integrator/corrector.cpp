@@ -334,6 +334,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   c.reason       = SNES_CONVERGED_ITERATING;
   c.fresh        = PETSC_FALSE;
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));
+  ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   PetscCall(SNESSolve(ts->snes, NULL, I.X));
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));

@@ -362,7 +362,10 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     I.linear_chosen = PETSC_TRUE;
   }
   PetscCall(Factor(ts, ksp, J, P));
-  if (I.singular) PetscCall(SNESSetJacobianDomainError(snes));
+  if (I.singular) {
+    I.corrector.have_matrix = PETSC_FALSE; /* there is nothing to solve with */
+    PetscCall(SNESSetJacobianDomainError(snes));
+  }
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

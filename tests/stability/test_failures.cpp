@@ -202,3 +202,39 @@ TEST(Failures, ErrorOfTheApplication)
   must(MatDestroy(&J));
   for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
 }
+
+namespace
+{
+
+/* A pendulum whose rod is gone after the start, which leaves the multiplier without an equation */
+struct Detached : Pendulum {
+  Detached() : Pendulum(-60., 1., 1.) {}
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    Pendulum::residual(t, u, v, a, f);
+    if (t > 0.) f[2] = 0.;
+  }
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, Entries &J) const override
+  {
+    Pendulum::jacobian(t, u, v, a, sv, sa, J);
+    for (size_t k = 0; k < J.row.size(); k++)
+      if (t > 0. && J.row[k] == 2) J.value[k] = 0.;
+  }
+};
+
+} // namespace
+
+/* Steps so short that they go without the corrector (1e-9) must notice a singular matrix as the others (1e-2) do */
+TEST(Failures, SingularMatrixIsAFailedStepOfAnySize)
+{
+  for (double h : {1e-9, 1e-2}) {
+    const Detached p;
+    Simulation     run(p, fixedSteps(h) + "-ts_max_steps 3 ");
+    SCOPED_TRACE(text("h = %g", h));
+    ErrorTrap trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_NOT_CONVERGED);
+    EXPECT_TRUE(trap.says("singular")) << trap.message;
+    EXPECT_EQ(run.statistics().steps, 0);
+    EXPECT_EQ(run.t(), 0.);
+  }
+}
