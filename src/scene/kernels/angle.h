@@ -1,0 +1,133 @@
+/*
+  The relative angle of marker i about z_j, and the advance of i along an axis of j: values, rates, gradients and curvatures, shared
+  by motions, couplers and torsional springs.
+
+  Angle: of the projection of x_i on the xy plane of j, from x_j, positive about z_j,
+
+    theta = atan2(x_i . y_j, x_i . x_j),    d theta = g . (d theta_i - d theta_j),    g = (z_j - h x_i)/(1 - h^2),  h = x_i . z_j,
+
+  exact whether or not the z axes are parallel; g = z_j where they are. It is undefined where x_i is along z_j: derivatives are then
+  not finite, which the integrator takes as a failed step.
+*/
+#ifndef HHTDAE_SCENE_KERNELS_ANGLE_H
+#define HHTDAE_SCENE_KERNELS_ANGLE_H
+
+#include "scene/kernel.h"
+#include <cmath>
+
+namespace hhtdae
+{
+
+constexpr double kTurn = 6.283185307179586477;
+
+/* theta + 2 pi n, the one nearest to `near` */
+template <class T> T Unwind(const T &theta, double near)
+{
+  return theta + T(kTurn * std::round((near - Plain(theta)) / kTurn));
+}
+
+/* in (-pi, pi] */
+template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
+{
+  using std::atan2;
+  const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
+  return atan2(s, c);
+}
+
+/* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn from it */
+template <class T> T UnwoundAngle(const Frame<T> &i, const Frame<T> &j, double remembered)
+{
+  return Unwind<T>(PrincipalAngle<T>(i, j), remembered);
+}
+
+/* g: the derivative of the angle for rotations of i; the negative of that for rotations of j */
+template <class T> Vec3<T> AngleGradient(const Frame<T> &i, const Frame<T> &j)
+{
+  const T       h = i.R.col(0).dot(j.R.col(2)), k = T(1) / (T(1) - h * h);
+  const Vec3<T> n = j.R.col(2) - i.R.col(0) * h;
+  return n * k;
+}
+
+/* the exact time derivative of the angle */
+template <class T> T AngleRate(const Frame<T> &i, const Frame<T> &j, const Twist<T> &wi, const Twist<T> &wj)
+{
+  const Vec3<T> g = AngleGradient<T>(i, j), w = wi.w - wj.w;
+  return g.dot(w);
+}
+
+/* dg/d theta_i and dg/d theta_j */
+inline void AngleCurvature(const Frame<double> &i, const Frame<double> &j, Mat3<double> &Gi, Mat3<double> &Gj)
+{
+  const Vec3<double> x = i.R.col(0), z = j.R.col(2), q = x.cross(z);
+  const double       h = x.dot(z), k = 1 / (1 - h * h);
+  const Vec3<double> g = k * (z - h * x);
+  const Mat3<double> A = (2 * h * g - x) * q.transpose();
+  Gi                   = k * (A + h * Cross<double>(x));
+  Gj                   = -k * (A + Cross<double>(z));
+}
+
+/* whether the angle is well defined there: x_i at least about one degree off z_j */
+inline bool AngleDefined(const Frame<double> &i, const Frame<double> &j)
+{
+  return std::abs(i.R.col(0).dot(j.R.col(2))) < 0.9998;
+}
+
+/* component of x_i - x_j along axis a of j */
+template <class T> T Advance(const Frame<T> &i, const Frame<T> &j, int axis)
+{
+  const Vec3<T> u = i.x - j.x;
+  return u.dot(j.R.col(axis));
+}
+
+/* its exact time derivative, the rotation of j's axis included */
+template <class T> T AdvanceRate(const Frame<T> &i, const Frame<T> &j, const Twist<T> &wi, const Twist<T> &wj, int axis)
+{
+  const Vec3<T> e = j.R.col(axis), u = i.x - j.x, v = wi.v - wj.v, m = e.cross(u);
+  const T       along = e.dot(v), turning = m.dot(wj.w);
+  return along + turning;
+}
+
+/* Gradient as a row and curvature, both times `factor`, of the markers' 12 directions (x_i, theta_i, x_j, theta_j) */
+template <class Row> void AddAngleGradient(const Frame<double> &i, const Frame<double> &j, double factor, Row &&J)
+{
+  const Vec3<double> g = factor * AngleGradient<double>(i, j);
+  J.template segment<3>(3) += g.transpose();
+  J.template segment<3>(9) -= g.transpose();
+}
+
+template <class Block> void AddAngleCurvature(const Frame<double> &i, const Frame<double> &j, double factor, Block &&H)
+{
+  Mat3<double> Gi, Gj;
+  AngleCurvature(i, j, Gi, Gj);
+  H.template block<3, 3>(3, 3) += factor * Gi;
+  H.template block<3, 3>(3, 9) += factor * Gj;
+  H.template block<3, 3>(9, 3) -= factor * Gi;
+  H.template block<3, 3>(9, 9) -= factor * Gj;
+}
+
+template <class Row> void AddAdvanceGradient(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Row &&J)
+{
+  const Vec3<double> e = factor * j.R.col(axis), u = i.x - j.x;
+  J.template segment<3>(0) += e.transpose();
+  J.template segment<3>(6) -= e.transpose();
+  J.template segment<3>(9) += e.cross(u).transpose();
+}
+
+template <class Block> void AddAdvanceCurvature(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Block &&H)
+{
+  const Vec3<double> u = i.x - j.x;
+  const Mat3<double> E = Cross<double>(factor * j.R.col(axis));
+  H.template block<3, 3>(0, 9) -= E;
+  H.template block<3, 3>(6, 9) += E;
+  H.template block<3, 3>(9, 0) += E;
+  H.template block<3, 3>(9, 6) -= E;
+  H.template block<3, 3>(9, 9) += Cross<double>(u) * E;
+}
+
+/* block (a, b) of those curvatures, for Constraint::curved(), with a and b in 0..3 */
+constexpr bool AngleCurved(int a, int b) { return (a == 1 || a == 3) && (b == 1 || b == 3); }
+constexpr bool AdvanceCurved(int a, int b) { return (a == 3 && b != 1) || (b == 3 && a != 1); }
+
+} // namespace hhtdae
+
+#endif
