@@ -1,0 +1,119 @@
+/*
+  Functions that a user gives: of time, with exact derivatives, and of the state, through measures.
+*/
+#ifndef HHTDAE_FUNCTIONS_H
+#define HHTDAE_FUNCTIONS_H
+
+#include "hhtdae/types.h"
+#include <functional>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <unsupported/Eigen/AutoDiff>
+#include <utility>
+#include <vector>
+
+namespace hhtdae
+{
+
+/* f(t) with f'(t) and f''(t) */
+class TimeFunction
+{
+public:
+  using Number = Eigen::AutoDiffScalar<Eigen::Matrix<Eigen::AutoDiffScalar<Eigen::Matrix<double, 1, 1>>, 1, 1>>;
+  struct Value {
+    double f, f1, f2;
+  };
+
+  TimeFunction(double constant = 0);
+  /* c0 + c1 t + c2 t^2 + ... */
+  static TimeFunction polynomial(const std::vector<double> &coefficients);
+  /* offset + amplitude sin(omega t + phase) */
+  static TimeFunction harmonic(double amplitude, double omega, double phase = 0, double offset = 0);
+  /* from x0 before t0 to x1 after t1 by a quintic, twice continuously differentiable */
+  static TimeFunction step(double t0, double x0, double t1, double x1);
+  /* natural cubic spline through (t_k, x_k), t increasing, continued linearly */
+  static TimeFunction spline(const std::vector<double> &t, const std::vector<double> &x);
+  /* any formula in t, differentiated automatically: [](TimeFunction::Number t) -> TimeFunction::Number { return sin(t) * t; } */
+  static TimeFunction formula(std::function<Number(const Number &)> f);
+  /* A lambda without "-> TimeFunction::Number" may return an expression that refers to numbers which are gone. */
+  template <class F, class R = std::invoke_result_t<F, const Number &>> static TimeFunction formula(F f)
+  {
+    static_assert(std::is_same<std::decay_t<R>, Number>::value, "a formula must return TimeFunction::Number");
+    return formula(std::function<Number(const Number &)>(std::move(f)));
+  }
+  /* values and derivatives by the user's own hand */
+  static TimeFunction values(std::function<Value(double)> f);
+
+  Value operator()(double t) const { return f_ ? f_(t) : Value{constant_, 0, 0}; }
+  bool  isConstant() const { return !f_; }
+  const std::string &error() const { return error_; } /* what is wrong with it, empty if nothing */
+
+private:
+  static TimeFunction faulty(const std::string &error);
+
+  double                       constant_ = 0;
+  std::function<Value(double)> f_;
+  std::string                  error_;
+};
+
+/*
+  A scalar that can be read off the state: an argument of expressions, a term of couplers, an output channel.
+  Components are 0, 1, 2 for x, y, z of the marker `frame` (default: the ground's, space axes).
+*/
+struct Measure {
+  enum Kind {
+    Time,
+    Displacement,        /* of marker i from marker j (default: the space origin), component in frame */
+    Distance,            /* |x_i - x_j| */
+    Velocity,            /* of i relative to j (time derivative taken in space), component in frame */
+    Rate,                /* d Distance / dt */
+    Acceleration,        /* of i relative to j, component in frame */
+    Angle,               /* of i's x axis about j's z axis, from j's x axis; counted over full turns in joints, else in (-pi, pi] */
+    AngularVelocity,     /* of i relative to j, component in frame */
+    AngularAcceleration, /* likewise */
+    Multiplier,          /* of row `component` of a joint or motion */
+    JointForce,          /* of a joint or motion on its marker i's body, component in frame (default: marker j) */
+    JointMoment,         /* likewise, about marker i's origin */
+    Component,           /* component of a force element: force state where it is carried as one, else its value */
+    Value,               /* of a variable V */
+    StateValue,          /* of a first-order state */
+    KineticEnergy, PotentialEnergy /* of the whole scene; for output alone */
+  };
+  Kind     kind      = Time;
+  Marker   i, j, frame;
+  int      component = 0;
+  PetscInt target    = -1; /* element, variable or state */
+
+  static Measure time() { return {}; }
+  static Measure displacement(Marker i, int component, Marker j = {}, Marker frame = {}) { return {Displacement, i, j, frame, component}; }
+  static Measure distance(Marker i, Marker j) { return {Distance, i, j, {}}; }
+  static Measure velocity(Marker i, int component, Marker j = {}, Marker frame = {}) { return {Velocity, i, j, frame, component}; }
+  static Measure rate(Marker i, Marker j) { return {Rate, i, j, {}}; }
+  static Measure acceleration(Marker i, int component, Marker j = {}, Marker frame = {}) { return {Acceleration, i, j, frame, component}; }
+  static Measure angle(Marker i, Marker j) { return {Angle, i, j, {}}; }
+  static Measure angularVelocity(Marker i, int component, Marker j = {}, Marker frame = {}) { return {AngularVelocity, i, j, frame, component}; }
+  static Measure angularAcceleration(Marker i, int component, Marker j = {}, Marker frame = {}) { return {AngularAcceleration, i, j, frame, component}; }
+  static Measure multiplier(Element joint, int row) { return {Multiplier, {}, {}, {}, row, joint.id}; }
+  static Measure jointForce(Element joint, int component, Marker frame = {}) { return {JointForce, {}, {}, frame, component, joint.id}; }
+  static Measure jointMoment(Element joint, int component, Marker frame = {}) { return {JointMoment, {}, {}, frame, component, joint.id}; }
+  static Measure force(Element force, int component) { return {Component, {}, {}, {}, component, force.id}; }
+  static Measure value(Variable v) { return {Value, {}, {}, {}, 0, v.id}; }
+  static Measure value(State s) { return {StateValue, {}, {}, {}, 0, s.id}; }
+};
+
+/* f(m_1, ..., m_n) of measures, differentiated automatically:
+     Expression{{Measure::distance(a, b), Measure::value(s)}, [](const Real *m) -> Real { return 3.0 * m[0] * m[0] + sin(m[1]); }} */
+using Real = Eigen::AutoDiffScalar<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>>; /* at most 16 arguments */
+struct Expression {
+  std::vector<Measure>              arguments;
+  std::function<Real(const Real *)> f;
+
+  Expression() = default;
+  Expression(std::vector<Measure> a, std::function<Real(const Real *)> g) : arguments(std::move(a)), f(std::move(g)) {}
+  Expression(const Measure &m) : arguments{m}, f([](const Real *x) { return x[0]; }) {}
+};
+
+} // namespace hhtdae
+
+#endif
