@@ -64,6 +64,7 @@ typedef struct {
   PetscInt  corrector_fails; /* corrections that did not converge */
   PetscInt  retries;         /* of these, repeated at the same h with a new matrix */
   PetscInt  restarts;        /* consistent starts: the first one, events, TSRestartStep() */
+  PetscInt  changes;         /* changes of coordinates, TSHHT3SetCoordinateChange() */
   PetscInt  tiny_steps;      /* steps shorter than rounding in q allows the corrector, advanced by Taylor series */
   PetscReal h_min, h_max;    /* smallest and largest accepted step */
 } TSHHT3Statistics;
@@ -86,12 +87,19 @@ PETSC_EXTERN PetscErrorCode TSHHT3SetIS(TS, TSHHT3Role, IS);
 PETSC_EXTERN PetscErrorCode TSHHT3GetIS(TS, TSHHT3Role, IS *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStart(TS, TSHHT3Start);
 
+/* New generalized coordinates in the course of a run: whether, the map of (U, U', U''), and the word that it is done */
+typedef PetscErrorCode (*TSHHT3ChangeTest)(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx);
+typedef PetscErrorCode (*TSHHT3ChangeMap)(TS ts, PetscReal t, Vec U, Vec V, Vec A, void *ctx);
+typedef PetscErrorCode (*TSHHT3ChangeCommit)(TS ts, void *ctx);
+PETSC_EXTERN PetscErrorCode TSHHT3SetCoordinateChange(TS, TSHHT3ChangeTest, TSHHT3ChangeMap, TSHHT3ChangeCommit, void *);
+
 /* The results */
 PETSC_EXTERN PetscErrorCode TSHHT3GetAcceleration(TS, Vec *);
 PETSC_EXTERN PetscErrorCode TSHHT3Interpolate(TS, PetscReal, Vec, Vec, Vec);
 PETSC_EXTERN PetscErrorCode TSHHT3GetStatistics(TS, TSHHT3Statistics *);
 PETSC_EXTERN PetscErrorCode TSHHT3CheckpointSave(TS, const char[]);
 PETSC_EXTERN PetscErrorCode TSHHT3CheckpointLoad(TS, const char[]);
+PETSC_EXTERN PetscErrorCode TSHHT3SetCheckpointVec(TS, Vec);
 
 #if defined(__cplusplus)
 }

@@ -159,6 +159,8 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(Interpolate);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
+  HHT3_COMPOSE(SetCheckpointVec);
+  HHT3_COMPOSE(SetCoordinateChange);
 #undef HHT3_COMPOSE
   PetscFunctionReturn(PETSC_SUCCESS);
 }

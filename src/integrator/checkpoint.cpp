@@ -14,7 +14,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscInt magic = 1211306, version = 1;
+constexpr PetscInt magic = 1211306, version = 2;
 
 /* Numbers of the integrator and of TS, in one order for writing and reading */
 struct Numbers {
@@ -26,8 +26,8 @@ struct Numbers {
     TSHHT3Statistics &s = I.stat;
     Predictor       &p = I.predictor;
     ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
-             &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.tiny_steps, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit};
+             &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.changes, &I.change.step, &s.tiny_steps, &p.degree, &p.available};
+    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit, &I.change.t};
     for (PetscReal &t : p.t) reals.push_back(&t);
   }
 };
@@ -38,19 +38,30 @@ std::vector<Vec> Vectors(TS ts)
   std::vector<Vec> v = {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.X0, I.U1, I.V1, I.A1, I.X, I.ymax};
   if (I.F0) v.push_back(I.F0);
   for (PetscInt k = 0; k <= I.predictor.available; k++) v.push_back(I.predictor.D[k]);
+  if (I.checkpoint_vec) v.push_back(I.checkpoint_vec);
   return v;
+}
+
+/* Entries of the application's vector, 0 without one */
+PetscErrorCode ExtraSize(const Integrator &I, PetscInt *n)
+{
+  PetscFunctionBegin;
+  *n = 0;
+  if (I.checkpoint_vec) PetscCall(VecGetSize(I.checkpoint_vec, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode Write(TS ts, PetscViewer viewer)
 {
   Integrator    &I         = Get(ts);
   const PetscInt header[5] = {magic, version, I.form, I.F0 ? 1 : 0, I.predictor.available};
-  PetscInt       N;
+  PetscInt       N[2];
 
   PetscFunctionBegin;
-  PetscCall(VecGetSize(ts->vec_sol, &N));
+  PetscCall(VecGetSize(ts->vec_sol, &N[0]));
+  PetscCall(ExtraSize(I, &N[1]));
   PetscCall(PetscViewerBinaryWrite(viewer, header, 5, PETSC_INT));
-  PetscCall(PetscViewerBinaryWrite(viewer, &N, 1, PETSC_INT));
+  PetscCall(PetscViewerBinaryWrite(viewer, N, 2, PETSC_INT));
   PetscCall(PetscViewerBinaryWrite(viewer, &I.p, sizeof(I.p) / sizeof(PetscReal), PETSC_REAL));
   Numbers numbers(ts);
   for (PetscInt *i : numbers.ints) PetscCall(PetscViewerBinaryWrite(viewer, i, 1, PETSC_INT));
@@ -62,7 +73,7 @@ PetscErrorCode Write(TS ts, PetscViewer viewer)
 PetscErrorCode ReadHeader(TS ts, PetscViewer viewer, const char file[], PetscInt header[5])
 {
   Integrator &I = Get(ts);
-  PetscInt    N, M;
+  PetscInt    N[2], M[2];
   Parameters  p;
   MPI_Comm    comm = PetscObjectComm((PetscObject)ts);
 
@@ -70,9 +81,12 @@ PetscErrorCode ReadHeader(TS ts, PetscViewer viewer, const char file[], PetscInt
   PetscCall(PetscViewerBinaryRead(viewer, header, 5, NULL, PETSC_INT));
   PetscCheck(header[0] == magic, comm, PETSC_ERR_FILE_UNEXPECTED, "%s is not a checkpoint of TSHHT3", file);
   PetscCheck(header[1] == version, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s is of version %" PetscInt_FMT ", this library reads version %" PetscInt_FMT, file, header[1], version);
-  PetscCall(PetscViewerBinaryRead(viewer, &N, 1, NULL, PETSC_INT));
-  PetscCall(VecGetSize(ts->vec_sol, &M));
-  PetscCheck(N == M, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, N, M);
+  PetscCall(PetscViewerBinaryRead(viewer, N, 2, NULL, PETSC_INT));
+  PetscCall(VecGetSize(ts->vec_sol, &M[0]));
+  PetscCall(ExtraSize(I, &M[1]));
+  PetscCheck(N[0] == M[0], comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, N[0], M[0]);
+  PetscCheck(N[1] == M[1], comm, PETSC_ERR_FILE_UNEXPECTED,
+             "Checkpoint %s has %" PetscInt_FMT " entries of the application's own, the run expects %" PetscInt_FMT ": give TSHHT3SetCheckpointVec() the vector of the run that wrote it", file, N[1], M[1]);
   PetscCall(PetscViewerBinaryRead(viewer, &p, sizeof(p) / sizeof(PetscReal), NULL, PETSC_REAL));
   PetscCheck(header[2] == (PetscInt)I.form && p.beta == I.p.beta && p.am == I.p.am, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, TSHHT3Forms[header[2] == 0 ? 0 : 1], (double)p.af, TSHHT3Forms[I.form], (double)I.p.af);
@@ -216,11 +230,21 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscCall(PetscViewerDestroy(&viewer));
   PetscCall(RenewMatrix(ts));
   ts->steprestart = PETSC_FALSE;
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
+  PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
+  PetscCall(NoteState(ts));
   if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));
   PetscCall(PetscInfo(ts, "resumed at t = %g, step %" PetscInt_FMT ", from %s\n", (double)ts->ptime, ts->steps, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetCheckpointVec(TS ts, Vec extra)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectReference((PetscObject)extra));
+  PetscCall(VecDestroy(&I.checkpoint_vec));
+  I.checkpoint_vec = extra;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,7 +286,7 @@ PetscErrorCode CheckpointIfDue(TS ts)
   The matrix is renewed after a checkpoint, here and in the run that resumes, so that on the same number of ranks both go on
   with the same bits. The file carries a checksum. Events and adaptors with a memory of their own (dsp) start anew.
 
-.seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`
+.seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
 @*/
 PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
 {
@@ -297,5 +321,36 @@ PetscErrorCode TSHHT3CheckpointLoad(TS ts, const char file[])
   PetscFunctionBegin;
   PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
   PetscUseMethod(ts, "TSHHT3CheckpointLoad_C", (TS, const char[]), (ts, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetCheckpointVec - Gives checkpoints a vector of the application's to save and restore with the state
+
+  Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+- extra - the vector, of any size and layout, on the communicator of `ts`; `NULL` for none. A reference is kept
+
+  Level: advanced
+
+  Notes:
+  It is meant for what the application's residual depends on besides the state, such as the reference frames that
+  `TSHHT3SetCoordinateChange()` changes. A file is written with the values that the vector has then, and `TSHHT3CheckpointLoad()`
+  overwrites them; then it calls commit of `TSHHT3SetCoordinateChange()`, if there is one, for the application to take them over. A
+  file whose vector has another size, or that has one where the run has none or the other way round, is refused.
+
+.seealso: `TSHHT3`, `TSHHT3CheckpointSave()`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCoordinateChange()`
+@*/
+PetscErrorCode TSHHT3SetCheckpointVec(TS ts, Vec extra)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  if (extra) {
+    PetscValidHeaderSpecific(extra, VEC_CLASSID, 2);
+    PetscCheckSameComm(ts, 1, extra, 2);
+  }
+  PetscTryMethod(ts, "TSHHT3SetCheckpointVec_C", (TS, Vec), (ts, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

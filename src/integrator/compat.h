@@ -58,6 +58,19 @@ static inline PetscReal HHT3NextStop(TS ts)
   return ts->max_time;
 }
 
+/* Since 3.21 TSRollBack() restores the solution from a copy made at the beginning of the step: it has to follow a change of
+   coordinates of vec_sol within the step */
+static inline PetscErrorCode HHT3KeepForRollBack(TS ts)
+{
+  PetscFunctionBegin;
+#if PETSC_VERSION_GE(3, 21, 0)
+  if (ts->vec_sol0) PetscCall(VecCopy(ts->vec_sol, ts->vec_sol0));
+#else
+  (void)ts;
+#endif
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether TSEvent is bracketing a zero, and so sets the steps itself */
 static inline PetscBool HHT3EventActive(TS ts)
 {

@@ -53,7 +53,7 @@ void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScal
 }
 
 struct Ends { /* of the step, read-only */
-  const PetscScalar *u0, *v0, *a0, *x0, *dv = nullptr;
+  const PetscScalar *u0, *v0, *a0, *x0, *dv = nullptr, *bend = nullptr;
 };
 
 /* The parts of U1, V1, A1 that do not depend on X, from (2) and from the average that the form asks for. a_n and w_n were made
@@ -65,12 +65,14 @@ void StepBase(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, Pe
   const Parameters &p = I.p;
   const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1;
   const bool        paper = I.form == TSHHT3_FORM_PAPER;
+  const PetscReal   bent = I.p.bend() * h * h;
   const PetscReal   cn = paper ? 0 : p.am / (1 - p.af), c0 = paper ? 0 : p.af / (1 - p.af);
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role role = RoleOf(I, i);
     if (role == TSHHT3_COORDINATE) {
       const PetscScalar an = e.a0[i] + r * (e.x0[i] - e.a0[i]);
-      const PetscScalar v0 = e.dv ? e.v0[i] - I.misfit * e.dv[i] : e.v0[i];
+      PetscScalar       v0 = e.dv ? e.v0[i] - I.misfit * e.dv[i] : e.v0[i];
+      if (e.bend) v0 -= bent * e.bend[i];
       u[i]                 = NewmarkPosition(p, h, e.u0[i], v0, an, 0);
       v[i]                 = NewmarkVelocity(p, h, v0, an, 0);
       a[i]                 = cn * an - c0 * e.a0[i];
@@ -298,9 +300,11 @@ PetscErrorCode PrepareStage(TS ts)
   PetscCall(VecGetArrayRead(I.A0, &e.a0));
   PetscCall(VecGetArrayRead(I.X0, &e.x0));
   if (I.misfit != 0) PetscCall(VecGetArrayRead(I.dV, &e.dv));
+  if (I.bent == Bend::Velocities) PetscCall(VecGetArrayRead(I.bend, &e.bend));
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(I.base[k], &b[k]));
   StepBase(I, n, e, b[0], b[1], b[2]);
   for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayWrite(I.base[k], &b[k]));
+  if (I.bent == Bend::Velocities) PetscCall(VecRestoreArrayRead(I.bend, &e.bend));
   if (I.misfit != 0) PetscCall(VecRestoreArrayRead(I.dV, &e.dv));
   PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
   PetscCall(VecRestoreArrayRead(I.A0, &e.a0));

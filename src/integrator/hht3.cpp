@@ -160,7 +160,7 @@ PetscErrorCode Reset(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.slope[0], &I.slope[1], &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.slope[0], &I.slope[1], &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
@@ -170,6 +170,8 @@ PetscErrorCode Reset(TS ts)
   I.corrector.have_matrix = PETSC_FALSE;
   I.corrector.want_matrix = PETSC_TRUE;
   I.have_step             = PETSC_FALSE;
+  I.change.stale          = PETSC_FALSE;
+  I.bent                  = Bend::None;
   I.linear_chosen         = PETSC_FALSE;
   I.norm_size             = 0;
   I.h_last = I.h_regular = I.scaled_h = 0;
@@ -182,6 +184,7 @@ PetscErrorCode Destroy(TS ts)
   PetscFunctionBegin;
   PetscCall(Reset(ts));
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
+  PetscCall(VecDestroy(&Get(ts).checkpoint_vec));
   delete static_cast<Integrator *>(ts->data);
   ts->data = NULL;
   PetscCall(ComposeSetters(ts, false));
@@ -291,6 +294,8 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
     PetscCall(PetscViewerASCIIPrintf(viewer, "iterations=%" PetscInt_FMT ", residuals=%" PetscInt_FMT ", Jacobians=%" PetscInt_FMT ", factorizations=%" PetscInt_FMT ", h in [%g, %g]\n", s.newton, s.residuals, s.jacobians, s.factorizations,
                                      (double)s.h_min, (double)s.h_max));
   }
+  if (s.changes)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "coordinates changed at t=%g, step %" PetscInt_FMT ", the last of %" PetscInt_FMT " changes\n", (double)I.change.t, I.change.step, s.changes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

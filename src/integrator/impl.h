@@ -57,6 +57,20 @@ struct Predictor {
   Vec       D[max_degree + 1]; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
 };
 
+/* New coordinates in the course of a run, change.cpp */
+struct Change {
+  TSHHT3ChangeTest   test   = nullptr;
+  TSHHT3ChangeMap    map    = nullptr;
+  TSHHT3ChangeCommit commit = nullptr;
+  void              *ctx    = nullptr;
+  PetscBool          stale  = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
+  PetscReal          t      = 0;           /* of the last change */
+  PetscInt           step   = 0;
+};
+
+/* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
+enum class Bend { None, Rates, Velocities };
+
 struct Integrator {
   /* the method */
   TSHHT3Form  form   = TSHHT3_FORM_SECOND_ORDER;
@@ -80,6 +94,8 @@ struct Integrator {
   Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp; q_n' counts as V0 - misfit dV */
   PetscReal misfit = 0;
   PetscBool have_misfit = PETSC_FALSE; /* dV belongs to t_n */
+  Vec       bend = nullptr; /* change of that misfit over k h^2 by a change of coordinates at t_n */
+  Bend      bent = Bend::None;
   Vec       accepted[2] = {}; /* U, U' as accepted, when Repair() has changed U0, V0 since */
   PetscBool repaired = PETSC_FALSE;
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
@@ -108,6 +124,8 @@ struct Integrator {
   PetscBool     singular = PETSC_FALSE;       /* the package could not factor the last matrix */
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
 
+  Change change;
+
   /* bookkeeping */
   TSStepStatus     status = TS_STEP_INCOMPLETE;
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
@@ -122,6 +140,7 @@ struct Integrator {
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
   PetscInt         checkpoint_every = 0;
+  Vec              checkpoint_vec = nullptr; /* the application's, saved and restored with the state */
   TSHHT3Statistics stat = {};
   PetscReal        wall0 = 0, cpu0 = 0;
   PetscReal        progress_t0 = 0;
@@ -130,6 +149,7 @@ struct Integrator {
 
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
+inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
 
 /* how every failure by a singular matrix ends */
@@ -189,7 +209,16 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
 /* misfit.cpp */
 PetscErrorCode AdaptVelocities(TS ts);
+/* history.cpp: what a change of coordinates does to the state and the history */
+PetscErrorCode MapStart(TS ts);
+PetscErrorCode MapHistory(TS ts);
+/* change.cpp */
+PetscErrorCode ChangeCoordinates(TS ts, bool starting);
+PetscErrorCode MatrixAfterChange(TS ts);
+PetscErrorCode CommitChange(TS ts);
+PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap map, TSHHT3ChangeCommit commit, void *ctx);
 /* step.cpp */
+PetscErrorCode NoteState(TS ts);
 PetscErrorCode Step(TS ts);
 PetscErrorCode RollBack(TS ts);
 PetscErrorCode Fail(TS ts, const char *what);
@@ -204,6 +233,7 @@ PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *c
 PetscErrorCode CheckpointIfDue(TS ts);
 PetscErrorCode CheckpointSave(TS ts, const char file[]);
 PetscErrorCode CheckpointLoad(TS ts, const char file[]);
+PetscErrorCode SetCheckpointVec(TS ts, Vec extra);
 
 } // namespace hht3
 

@@ -10,6 +10,11 @@
   [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the matrix at hand, since it need not be exact, and the right-hand side
   from a central difference of Phi along the motion. Two residuals and one solve per change of h; nothing else. The reported
   q'_n stays as it is.
+
+  A change of coordinates bends the motion: (2a) misses q by k h^3 q''', which Phi = 0 does not allow in the normals' directions,
+  and that is the misfit, -k h^2 (q''')_normal. While velocities follow the new coordinates Q as tangents, Q'_n = T q'_n, the third
+  derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
+  spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
 #include "impl.h"
 
@@ -58,14 +63,30 @@ PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had */
+PetscErrorCode SolveNormal(TS ts, Vec dV)
+{
+  Integrator        &I = Get(ts);
+  KSP                ksp;
+  KSPConvergedReason reason;
+  PetscReal          norm;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPSolve(ksp, I.gamma, dV));
+  I.stat.solves++;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(VecNorm(dV, NORM_INFINITY, &norm));
+  if (reason < 0 || PetscIsInfOrNanReal(norm)) PetscCall(VecZeroEntries(dV));
+  else PetscCall(KeepCoordinates(I, dV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
 PetscErrorCode ComputeMisfit(TS ts)
 {
-  Integrator         &I   = Get(ts);
-  const PetscReal     tau = 0.1 * I.h_last;
-  KSP                 ksp;
-  KSPConvergedReason  reason;
-  PetscReal           norm;
+  Integrator     &I   = Get(ts);
+  const PetscReal tau = 0.1 * I.h_last;
 
   PetscFunctionBegin;
   if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
@@ -76,14 +97,32 @@ PetscErrorCode ComputeMisfit(TS ts)
     PetscCall(EvaluateResidual(ts, ts->ptime + sign * tau, I.U1, I.V0, I.A1, I.work));
     PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
   }
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
-  PetscCall(KSPSolve(ksp, I.gamma, I.dV));
-  I.stat.solves++;
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
-  PetscCall(VecNorm(I.dV, NORM_INFINITY, &norm));
-  if (reason < 0 || PetscIsInfOrNanReal(norm)) PetscCall(VecZeroEntries(I.dV));
-  else PetscCall(KeepCoordinates(I, I.dV));
+  PetscCall(SolveNormal(ts, I.dV));
   I.have_misfit = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From d to its normal part, in place. Phi is followed over a length that shows above its rounding. */
+PetscErrorCode ComputeBend(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscReal   d, u;
+
+  PetscFunctionBegin;
+  I.bent = Bend::None;
+  PetscCall(VecNorm(I.bend, NORM_INFINITY, &d));
+  PetscCall(VecNorm(I.U0, NORM_INFINITY, &u));
+  if (!(d > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal tau = 1e-5 * PetscClipInterval(u, 1e-3, 1) / d;
+  PetscCall(VecZeroEntries(I.gamma));
+  PetscCall(VecZeroEntries(I.A1));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(VecWAXPY(I.U1, sign * tau, I.bend, I.U0));
+    PetscCall(EvaluateResidual(ts, ts->ptime, I.U1, I.V0, I.A1, I.work));
+    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
+  }
+  PetscCall(SolveNormal(ts, I.bend));
+  I.bent = Bend::Velocities;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,6 +136,7 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
+  if (I.bent == Bend::Rates && I.corrector.have_matrix) PetscCall(ComputeBend(ts));
   if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < least[I.count[TSHHT3_STATE] > 0] || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));

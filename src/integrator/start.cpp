@@ -158,6 +158,7 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   I.h           = h;
   I.h_last      = h;
   I.have_misfit = PETSC_FALSE;
+  I.bent        = Bend::None;
   PetscCall(CorrectionNorm(ts, rate, &e));
   e *= h;
   I.corrector.wlte = e;
@@ -345,6 +346,7 @@ PetscErrorCode Start(TS ts)
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ClearAlgebraicRates(I, I.V0));
+  if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(CheckInitialState(ts, &current));
   PetscCall(StartFromState(ts, current));

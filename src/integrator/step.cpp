@@ -16,17 +16,6 @@ namespace
 
 constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
-PetscErrorCode NoteState(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether someone other than the integrator has changed the solution since the last step: an event, a post-step function,
    a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. */
 PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
@@ -64,6 +53,7 @@ PetscErrorCode Commit(TS ts)
   std::swap(I.A1, I.A0);
   I.h_last      = I.h;
   I.have_misfit = PETSC_FALSE;
+  I.bent        = Bend::None;
   I.repaired    = PETSC_FALSE;
   if (I.F0) {
     PetscCall(VecZeroEntries(I.A1)); /* f_n of (9a): everything but the inertia forces */
@@ -88,7 +78,10 @@ PetscErrorCode Begin(TS ts)
   if (ts->steprestart || changed) {
     I.have_step = PETSC_FALSE;
     PetscCall(Start(ts));
-  } else if (I.have_step && !ts->steprollback) PetscCall(Commit(ts));
+  } else if (I.have_step && !ts->steprollback) {
+    PetscCall(Commit(ts));
+    if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
+  }
   I.have_step = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -151,6 +144,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscCall(TSPreStage(ts, I.t1));
   if (*tiny) PetscCall(TinyStep(ts, ok));
   else {
+    if (I.change.stale) PetscCall(MatrixAfterChange(ts));
     PetscCall(AdaptVelocities(ts));
     PetscCall(PrepareStage(ts));
     PetscCall(Predict(ts, I.X));
@@ -200,6 +194,18 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 }
 
 } // namespace
+
+/* vec_sol and vec_dot are as the integrator left them, see StateWasChanged() */
+PetscErrorCode NoteState(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
 PetscErrorCode Fail(TS ts, const char *what)

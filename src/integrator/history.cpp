@@ -1,0 +1,373 @@
+/*
+  New coordinates for the state and for the history.
+
+  The application's map takes (q, q', q'') at one time from the old to the new coordinates. The predictor keeps accelerations
+  alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at which neither q nor
+  q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the a_{n-k} at x_k, q' and q as its
+  integrals from the state at t_n. The integrals are as smooth in time as the polynomial, and so are the mapped accelerations:
+  their divided differences predict as well as the old ones did. (Newmark's formulas backwards would give the stored q, q', but
+  with the jumps that changes of h leave in them, which divided differences magnify.)
+
+  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep. The nodes may end
+  in a double one, at a start, where the second value is a slope.
+
+  Entries that the map leaves alone keep their bits.
+*/
+#include "impl.h"
+#include <utility>
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscInt max_basis = max_degree + 1;
+
+/* The motion about t_n in old coordinates, by stored vectors */
+struct Motion {
+  PetscInt  nodes = 0;                  /* of the predictor */
+  PetscInt  n = 0;                      /* stored vectors in use */
+  Vec       stored[max_basis];          /* D_0, D_1, ..., or D_0 and A0 */
+  PetscReal x[max_basis];               /* times of the nodes, from t_n */
+  bool      slope[max_basis] = {};      /* second of a double node */
+  PetscReal to_values[max_basis][max_basis] = {}; /* node values (slopes) by stored vectors */
+  PetscReal unit = 1;
+};
+
+/* Newton's polynomial of degree j at node k, or its slope there */
+PetscReal NewtonBasis(const PetscReal t[], PetscInt k, PetscInt j, bool slope)
+{
+  PetscReal value = 1, derivative = 0;
+  for (PetscInt i = 0; i < j; i++) {
+    derivative = derivative * (t[k] - t[i]) + value;
+    value *= t[k] - t[i];
+  }
+  return slope ? derivative : value;
+}
+
+Motion Recall(const Integrator &I)
+{
+  const Predictor &p = I.predictor;
+  Motion           m;
+  PetscReal        lag = I.p.lag() * I.h_last;
+  m.nodes = m.n = p.available + 1;
+  m.unit  = I.h_last > 0 ? I.h_last : 1;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    /* the step that ended at t_{n-k}; of the last node it is not known */
+    if (k > 0 && k < m.nodes - 1 && p.t[k] > p.t[k + 1]) lag = I.p.lag() * (p.t[k] - p.t[k + 1]);
+    m.slope[k]  = k > 0 && p.t[k] == p.t[k - 1];
+    m.x[k]      = m.slope[k] ? m.x[k - 1] : p.t[k] - p.t[0] + lag;
+    m.stored[k] = p.D[k];
+    for (PetscInt j = 0; j <= k; j++) m.to_values[k][j] = NewtonBasis(p.t, k, j, m.slope[k]);
+  }
+  if (m.nodes == 1 && m.x[0] != 0) { /* a history of one: q'' at t_n tells the slope */
+    m.n               = 2;
+    m.x[1]            = 0;
+    m.stored[1]       = I.A0;
+    m.to_values[1][1] = 1;
+  }
+  return m;
+}
+
+/* Solves A^T y = b for three right-hand sides, in place */
+void SolveTransposed(PetscInt n, PetscReal A[max_basis][max_basis], PetscReal b[3][max_basis])
+{
+  for (PetscInt c = 0; c < n; c++) { /* rows of A^T are columns of A */
+    PetscInt p = c;
+    for (PetscInt r = c + 1; r < n; r++)
+      if (PetscAbsReal(A[c][r]) > PetscAbsReal(A[c][p])) p = r;
+    for (PetscInt k = 0; k < n; k++) std::swap(A[k][c], A[k][p]);
+    for (int s = 0; s < 3; s++) std::swap(b[s][c], b[s][p]);
+    for (PetscInt r = c + 1; r < n; r++) {
+      const PetscReal f = A[c][r] / A[c][c];
+      for (PetscInt k = c; k < n; k++) A[k][r] -= f * A[k][c];
+      for (int s = 0; s < 3; s++) b[s][r] -= f * b[s][c];
+    }
+  }
+  for (int s = 0; s < 3; s++)
+    for (PetscInt r = n - 1; r >= 0; r--) {
+      for (PetscInt k = r + 1; k < n; k++) b[s][r] -= A[k][r] * b[s][k];
+      b[s][r] /= A[r][r];
+    }
+}
+
+/* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
+void Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
+{
+  PetscReal       L[max_basis][max_basis] = {}, y[3][max_basis], power = 1;
+  const PetscReal z = x / m.unit, u = m.unit;
+  for (PetscInt j = 0; j < m.n; j++, power *= z) {
+    y[0][j] = power;
+    y[1][j] = u * power * z / (j + 1);
+    y[2][j] = u * u * power * z * z / ((j + 1) * (j + 2));
+    for (PetscInt k = 0; k < m.n; k++) {
+      const PetscReal zk = m.x[k] / u;
+      if (!m.slope[k]) L[k][j] = PetscPowRealInt(zk, j);
+      else L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
+    }
+  }
+  SolveTransposed(m.n, L, y);
+  for (int s = 0; s < 3; s++)
+    for (PetscInt i = 0; i < m.n; i++) {
+      w[s][i] = 0;
+      for (PetscInt k = 0; k < m.n; k++) w[s][i] += y[s][k] * m.to_values[k][i];
+    }
+}
+
+/* What the map is given, what came of it, and which entries it has changed in any triple */
+struct Mapping {
+  enum : unsigned char { Triple = 1, Acceleration = 2 };
+  Vec                        old[3] = {}, now[3] = {};
+  std::vector<unsigned char> changed;
+};
+
+PetscErrorCode CreateMapping(const Integrator &I, Mapping *map)
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecDuplicate(I.U0, &map->old[k]));
+    PetscCall(VecDuplicate(I.U0, &map->now[k]));
+  }
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  map->changed.assign(n, 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DestroyMapping(Mapping *map)
+{
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecDestroy(&map->old[k]));
+    PetscCall(VecDestroy(&map->now[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From old to now at t_n + x */
+PetscErrorCode Apply(TS ts, Mapping &map, PetscReal x)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *a, *b;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) PetscCall(VecCopy(map.old[k], map.now[k]));
+  PetscCall((*I.change.map)(ts, ts->ptime + x, map.now[0], map.now[1], map.now[2], I.change.ctx));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecGetArrayRead(map.old[k], &a));
+    PetscCall(VecGetArrayRead(map.now[k], &b));
+    for (size_t i = 0; i < map.changed.size(); i++)
+      if (a[i] != b[i]) map.changed[i] |= k == 2 ? Mapping::Triple | Mapping::Acceleration : Mapping::Triple;
+    PetscCall(VecRestoreArrayRead(map.now[k], &b));
+    PetscCall(VecRestoreArrayRead(map.old[k], &a));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The motion at t_n + x; what is not a coordinate as at t_n, without accelerations */
+PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, Vec to[3])
+{
+  const PetscScalar *stored[max_basis], *u0, *v0;
+  PetscScalar       *y[3];
+  PetscReal          w[3][max_basis];
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  Weights(m, x, w);
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  PetscCall(VecGetArrayRead(I.U0, &u0));
+  PetscCall(VecGetArrayRead(I.V0, &v0));
+  for (PetscInt j = 0; j < m.n; j++) PetscCall(VecGetArrayRead(m.stored[j], &stored[j]));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(to[k], &y[k]));
+  for (PetscInt i = 0; i < n; i++) {
+    const bool  moves = IsCoordinate(I, i);
+    PetscScalar sum[3] = {0, 0, 0};
+    for (PetscInt j = 0; moves && j < m.n; j++)
+      for (int s = 0; s < 3; s++) sum[s] += w[s][j] * stored[j][i];
+    y[0][i] = moves ? u0[i] + x * v0[i] + sum[2] : u0[i];
+    y[1][i] = v0[i] + sum[1];
+    y[2][i] = sum[0];
+  }
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayWrite(to[k], &y[k]));
+  for (PetscInt j = 0; j < m.n; j++) PetscCall(VecRestoreArrayRead(m.stored[j], &stored[j]));
+  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  PetscCall(VecRestoreArrayRead(I.U0, &u0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* New values of q'' (slopes at the second of a double node) at the nodes */
+PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, Vec value[])
+{
+  Integrator     &I = Get(ts);
+  const PetscReal d = 0.01 * m.unit;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    PetscCall(At(I, m, m.x[k] + (m.slope[k] ? d : 0), map.old));
+    PetscCall(Apply(ts, map, m.x[k] + (m.slope[k] ? d : 0)));
+    PetscCall(VecCopy(map.now[2], value[k]));
+    if (!m.slope[k]) continue;
+    PetscCall(At(I, m, m.x[k] - d, map.old));
+    PetscCall(Apply(ts, map, m.x[k] - d));
+    PetscCall(VecAXPY(value[k], -1, map.now[2]));
+    PetscCall(VecScale(value[k], 1 / (2 * d)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* d of misfit.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine in
+   q'', and its difference for two q'' is that tangent. */
+PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal d = 0.01 * m.unit;
+  Vec             jerk;
+
+  PetscFunctionBegin;
+  if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
+  PetscCall(VecDuplicate(I.U0, &jerk));
+  PetscCall(VecZeroEntries(I.bend));
+  PetscCall(VecZeroEntries(jerk));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(At(I, m, sign * d, map.old));
+    PetscCall(Apply(ts, map, sign * d));
+    PetscCall(VecAXPY(I.bend, sign / (2 * d), map.now[2]));
+    PetscCall(VecAXPY(jerk, sign / (2 * d), map.old[2]));
+  }
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(VecCopy(I.U0, map.old[0]));
+    PetscCall(VecCopy(I.V0, map.old[1]));
+    PetscCall(VecWAXPY(map.old[2], sign * m.unit, jerk, I.A0));
+    PetscCall(Apply(ts, map, 0));
+    PetscCall(VecAXPY(I.bend, -sign / (2 * m.unit), map.now[2]));
+  }
+  PetscCall(VecDestroy(&jerk));
+  PetscScalar *b;
+  PetscCall(VecGetArray(I.bend, &b));
+  for (size_t i = 0; i < map.changed.size(); i++)
+    if (!(map.changed[i] & Mapping::Acceleration)) b[i] = 0; /* rounding */
+  PetscCall(VecRestoreArray(I.bend, &b));
+  I.bent = Bend::Rates;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The state, from old to now */
+PetscErrorCode MapState(TS ts, Mapping &map)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(I.U0, map.old[0]));
+  PetscCall(VecCopy(I.V0, map.old[1]));
+  PetscCall(VecCopy(I.A0, map.old[2]));
+  PetscCall(Apply(ts, map, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Multipliers and the like have no second derivative to map, and states are no coordinates */
+PetscErrorCode CheckRoles(TS ts, const Mapping &map)
+{
+  Integrator &I = Get(ts);
+  PetscInt    start, bad = HHT3_INT_MAX, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(I.U0, &start, NULL));
+  for (size_t i = map.changed.size(); i-- > 0;)
+    if (map.changed[i] && !IsCoordinate(I, (PetscInt)i)) bad = start + (PetscInt)i;
+  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  PetscCheck(first == HHT3_INT_MAX, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "The map of TSHHT3SetCoordinateChange() has changed unknown %" PetscInt_FMT " at t = %g, which is not a coordinate: it may change U, U', U'' of coordinates only", first, (double)ts->ptime);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* D_0, D_1, ... of entry i from the values at the nodes, by forward substitution */
+void NewDifferences(const Motion &m, PetscInt i, const PetscScalar *const value[], PetscScalar *const D[])
+{
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    PetscScalar v = value[k][i];
+    for (PetscInt j = 0; j < k; j++) v -= m.to_values[k][j] * D[j][i];
+    D[k][i] = v / m.to_values[k][k];
+  }
+}
+
+/* Takes over what has changed; in the paper's form q''_n is a_n but for a start */
+PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const Vec value[])
+{
+  const PetscScalar *w[max_basis], *now[3];
+  PetscScalar       *D[max_basis], *x, *to[3];
+  Vec                state[3] = {I.U0, I.V0, I.A0};
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    PetscCall(VecGetArrayRead(value[k], &w[k]));
+    PetscCall(VecGetArray(I.predictor.D[k], &D[k]));
+  }
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecGetArrayRead(map.now[k], &now[k]));
+    PetscCall(VecGetArray(state[k], &to[k]));
+  }
+  PetscCall(VecGetArray(I.X0, &x));
+  for (size_t i = 0; i < map.changed.size(); i++) {
+    if (!map.changed[i]) continue;
+    const bool same = I.form == TSHHT3_FORM_PAPER && to[2][i] == x[i];
+    for (int k = 0; k < 3; k++) to[k][i] = now[k][i];
+    if (!(map.changed[i] & Mapping::Acceleration)) continue;
+    NewDifferences(m, (PetscInt)i, w, D);
+    x[i] = D[0][i];
+    if (same) to[2][i] = x[i];
+  }
+  PetscCall(VecRestoreArray(I.X0, &x));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecRestoreArray(state[k], &to[k]));
+    PetscCall(VecRestoreArrayRead(map.now[k], &now[k]));
+  }
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    PetscCall(VecRestoreArray(I.predictor.D[k], &D[k]));
+    PetscCall(VecRestoreArrayRead(value[k], &w[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U0 and V0 before a consistent start: there is no history, and accelerations are still to come */
+PetscErrorCode MapStart(TS ts)
+{
+  Integrator &I = Get(ts);
+  Mapping     map;
+
+  PetscFunctionBegin;
+  PetscCall(CreateMapping(I, &map));
+  PetscCall(VecZeroEntries(I.A0));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(VecCopy(map.now[0], I.U0));
+  PetscCall(VecCopy(map.now[1], I.V0));
+  PetscCall(DestroyMapping(&map));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U0, V0, A0, X0, the predictor's differences, and what misfit.cpp needs to know */
+PetscErrorCode MapHistory(TS ts)
+{
+  Integrator  &I = Get(ts);
+  const Motion m = Recall(I);
+  Mapping      map;
+  Vec          value[max_basis];
+
+  PetscFunctionBegin;
+  PetscCall(CreateMapping(I, &map));
+  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDuplicate(I.U0, &value[k]));
+  PetscCall(MapNodes(ts, m, map, value));
+  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(TakeOver(I, m, map, value));
+  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDestroy(&value[k]));
+  PetscCall(DestroyMapping(&map));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
