@@ -1,0 +1,144 @@
+/*
+  Motions: the angle of i about z_j, or the advance of i along an axis of j, follows f(t); or its rate does; or the rate follows a
+  first-order state w, w' = f(t). The multiplier is the drive's moment about z_j or force along the axis, up to its sign.
+*/
+#ifndef HHTDAE_SCENE_KERNELS_MOTION_H
+#define HHTDAE_SCENE_KERNELS_MOTION_H
+
+#include "angle.h"
+#include "hhtdae/functions.h"
+
+namespace hhtdae
+{
+
+struct MotionData {
+  TimeFunction function;
+  int          axis = 2; /* of j; of translations alone */
+};
+
+/* ---- what moves: the two kinds share value, rate, gradient and curvature with couplers and springs ---- */
+
+struct TurnAboutZ {
+  static constexpr unsigned depends = Rotation(0) | Rotation(1);
+  static constexpr bool     curved(int a, int b) { return AngleCurved(a, b); }
+
+  template <class T> static T value(const MotionData &, const Frame<T> *f, double near)
+  {
+    return UnwoundAngle<T>(f[0], f[1], near);
+  }
+  template <class T> static T rate(const MotionData &, const Frame<T> *f, const Twist<T> *w)
+  {
+    return AngleRate<T>(f[0], f[1], w[0], w[1]);
+  }
+  static void gradient(const MotionData &, const Frame<double> *f, Matrix<1, 12> &J)
+  {
+    J.setZero();
+    AddAngleGradient(f[0], f[1], 1, J);
+  }
+  static void curvature(const MotionData &, const Frame<double> *f, double lambda, Matrix<12, 12> &H)
+  {
+    H.setZero();
+    AddAngleCurvature(f[0], f[1], lambda, H);
+  }
+};
+
+struct AdvanceAlongAxis {
+  static constexpr unsigned depends = Everything(2) & ~Rotation(0);
+  static constexpr bool     curved(int a, int b) { return AdvanceCurved(a, b); }
+
+  template <class T> static T value(const MotionData &d, const Frame<T> *f, double)
+  {
+    return Advance<T>(f[0], f[1], d.axis);
+  }
+  template <class T> static T rate(const MotionData &d, const Frame<T> *f, const Twist<T> *w)
+  {
+    return AdvanceRate<T>(f[0], f[1], w[0], w[1], d.axis);
+  }
+  static void gradient(const MotionData &d, const Frame<double> *f, Matrix<1, 12> &J)
+  {
+    J.setZero();
+    AddAdvanceGradient(f[0], f[1], d.axis, 1, J);
+  }
+  static void curvature(const MotionData &d, const Frame<double> *f, double lambda, Matrix<12, 12> &H)
+  {
+    H.setZero();
+    AddAdvanceCurvature(f[0], f[1], d.axis, lambda, H);
+  }
+};
+
+/* ---- displacement - f(t) = 0 ---- */
+
+/* The angle is unwound to the turn nearest to f(t): the motion itself says how many turns were made, nothing need be remembered. */
+template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> {
+  using Data = MotionData;
+  using Base = Constraint<K, 2, 1>;
+  static constexpr bool     driven = true;
+  static constexpr unsigned depends = Moves::depends;
+  static constexpr bool     curved(int a, int b) { return Moves::curved(a, b); }
+
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &t, T *phi)
+  {
+    const TimeFunction::Value v = d.function(Plain(t));
+    phi[0]                      = Moves::template value<T>(d, f, v.f) - Taylor(v.f, v.f1, v.f2, t);
+  }
+  static void gradient(const Data &d, const Frame<double> *f, double, typename Base::Gradient &J) { Moves::gradient(d, f, J); }
+  static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, typename Base::Hessian &H)
+  {
+    Moves::curvature(d, f, lambda[0], H);
+  }
+  static void time(const Data &d, const Frame<double> *, double t, double *first, double *second)
+  {
+    const TimeFunction::Value v = d.function(t);
+    first[0]                    = -v.f1;
+    second[0]                   = -v.f2;
+  }
+};
+
+struct DrivenAngle : DrivenDisplacement<DrivenAngle, TurnAboutZ> {
+  static constexpr const char *name = "driven angle";
+};
+struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
+  static constexpr const char *name = "driven advance";
+};
+
+/* ---- rate - f(t) = 0, the time derivative of the same ---- */
+
+template <class K, class Moves> struct DrivenRate : VelocityConstraint<K, 2, 1> {
+  using Data = MotionData;
+  using Base = VelocityConstraint<K, 2, 1>;
+  static constexpr unsigned depends = Moves::depends;
+  static constexpr bool     curved(int a, int b) { return Moves::curved(a, b); }
+
+  template <class T> static void value(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, T *psi)
+  {
+    const TimeFunction::Value v = d.function(Plain(t));
+    psi[0]                      = Moves::template rate<T>(d, f, w) - Taylor(v.f, v.f1, v.f2, t);
+  }
+  /* The rate is J u with the gradient J of the displacement, so that its derivative for the frames is u^T dJ^T. */
+  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double, typename Base::Gradient &J,
+                       typename Base::Gradient &P)
+  {
+    typename Base::Hessian H;
+    Matrix<12, 1>          u;
+    Moves::gradient(d, f, J);
+    Moves::curvature(d, f, 1, H);
+    u << w[0].v, w[0].w, w[1].v, w[1].w;
+    P = u.transpose() * H;
+  }
+  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *, double, const double *lambda,
+                        typename Base::Hessian &H)
+  {
+    Moves::curvature(d, f, lambda[0], H);
+  }
+};
+
+struct DrivenAngularVelocity : DrivenRate<DrivenAngularVelocity, TurnAboutZ> {
+  static constexpr const char *name = "driven angular velocity";
+};
+struct DrivenVelocity : DrivenRate<DrivenVelocity, AdvanceAlongAxis> {
+  static constexpr const char *name = "driven velocity";
+};
+
+} // namespace hhtdae
+
+#endif
