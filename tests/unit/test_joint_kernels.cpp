@@ -95,13 +95,16 @@ template <Mistake mistake> struct Spring : Force<Spring<mistake>, 2, 1> {
   }
 };
 
-/* a driven velocity row, and one that is quadratic in the twists */
+/* a driven velocity row with an input, and one that is quadratic in the twists */
 template <bool quadratic> struct Drive : VelocityConstraint<Drive<quadratic>, 2, 1> {
-  static constexpr const char   *name = "drive";
-  template <class T> static void value(const Empty &, const Frame<T> *f, const Twist<T> *w, const T &t, T *psi)
+  static constexpr const char *name   = "drive";
+  static constexpr int         inputs = 1;
+  template <class T>
+  static void value(const Empty &, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *psi)
   {
     using std::sin;
-    psi[0] = f[1].R.col(2).dot(w[0].w - w[1].w) - sin(t);
+    const Vec3<T> d = w[0].w - w[1].w;
+    psi[0]          = f[1].R.col(2).dot(d) - sin(t) * z[0];
     if (quadratic) psi[0] += w[0].v(0) * w[0].v(0) * T(1e-3);
   }
 };
