@@ -1,0 +1,179 @@
+/*
+  Contact of two shapes as a force kernel: Contact<Shape>, Shape from contact_shapes.h, force by contact_law.h.
+
+  Components: the contact force on i's body along the axes of j (between spheres: along the space axes); it acts at the
+  contact point, and so does its reaction on j's body. Apart bodies cost the evaluation of their gap in plain numbers,
+  in the Jacobian as well.
+*/
+#ifndef HHTDAE_SCENE_KERNELS_CONTACT_H
+#define HHTDAE_SCENE_KERNELS_CONTACT_H
+
+#include "contact_law.h"
+#include "contact_shapes.h"
+#include "scene/kernel.h"
+
+namespace hhtdae
+{
+
+template <class T> Frame<double> PlainFrame(const Frame<T> &f)
+{
+  Frame<double> p;
+  for (int i = 0; i < 3; i++) {
+    p.x(i) = Plain(f.x(i));
+    for (int c = 0; c < 3; c++) p.R(i, c) = Plain(f.R(i, c));
+  }
+  return p;
+}
+
+template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
+  static constexpr const char *name           = Shape::name;
+  static constexpr bool        needs_rotation = Shape::axes_of_j; /* spheres have no axes */
+  struct Data {
+    typename Shape::Data shape;
+    ContactLawData       law;
+  };
+
+  template <class T> static bool touches(const Data &d, const Frame<T> *f, Touch<T> &t)
+  {
+    if constexpr (!std::is_same<T, double>::value) {
+      const Frame<double> plain[2] = {PlainFrame(f[0]), PlainFrame(f[1])};
+      Touch<double>       where;
+      if (!touches<double>(d, plain, where)) return false;
+    }
+    Shape::template touch<T>(d.shape, f, t);
+    return Plain(t.depth) > 0;
+  }
+
+  /* velocity of i's material at p against that of j's */
+  template <class T> static Vec3<T> slip(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &p)
+  {
+    const Vec3<T> ri = p - f[0].x, rj = p - f[1].x;
+    const Vec3<T> vi = w[0].v + w[0].w.cross(ri), vj = w[1].v + w[1].w.cross(rj);
+    return vi - vj;
+  }
+
+  template <class T>
+  static void components(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &, const T *, T *c)
+  {
+    Touch<T> t;
+    Vec3<T>  F(T(0), T(0), T(0));
+    if (touches<T>(d, f, t)) {
+      const Vec3<T> space = ContactForce<T>(d.law, t.depth, t.n, slip<T>(f, w, t.p));
+      if constexpr (Shape::axes_of_j)
+        F = f[1].R.transpose() * space;
+      else
+        F = space;
+    }
+    for (int k = 0; k < 3; k++) c[k] = F(k);
+  }
+
+  template <class T> static void apply(const Data &d, const Frame<T> *f, const T *c, Wrench<T> *on)
+  {
+    const Vec3<T> given(c[0], c[1], c[2]);
+    Vec3<T>       F = given;
+    if constexpr (Shape::axes_of_j) F = f[1].R * given;
+    Touch<T> t;
+    Shape::template touch<T>(d.shape, f, t);
+    place<T>(f, t.p, F, on);
+  }
+
+  /* force F on i, -F on j, both at p */
+  template <class T> static void place(const Frame<T> *f, const Vec3<T> &p, const Vec3<T> &F, Wrench<T> *on)
+  {
+    const Vec3<T> ri = p - f[0].x, rj = p - f[1].x;
+    on[0].f = F;
+    on[0].m = ri.cross(F);
+    on[1].f = -F;
+    on[1].m = F.cross(rj);
+  }
+
+  static void wrench(const Data &d, const Frame<double> *f, const Twist<double> *w, double, const double *,
+                     Wrench<double> *on)
+  {
+    Touch<double> t;
+    if (touches<double>(d, f, t))
+      place<double>(f, t.p, ContactForce<double>(d.law, t.depth, t.n, slip<double>(f, w, t.p)), on);
+    else
+      clear(on);
+  }
+
+  static void clear(Wrench<double> *on)
+  {
+    for (int k = 0; k < 2; k++) {
+      on[k].f.setZero();
+      on[k].m.setZero();
+    }
+  }
+
+  /* The chain rule by hand: depth, normal and point along the 12 directions of the frames; the law along the 7 of (d,
+   * n, v) */
+  template <int Z>
+  static void jacobian(const Data &d, const Frame<double> *f, const Twist<double> *w, double, const double *,
+                       Wrench<double> *on, ForceJacobian<2, Z> &J)
+  {
+    J.frames.setZero();
+    J.twists.setZero();
+    J.inputs.setZero();
+    Touch<double> t;
+    if (!touches<double>(d, f, t)) return clear(on);
+
+    Frame<Dual<12>> s[2];
+    Touch<Dual<12>> moved;
+    SeedAll<12, 2>(f, s);
+    Shape::template touch<Dual<12>>(d.shape, s, moved);
+    Matrix<1, 12> depth = moved.depth.derivatives().transpose();
+    Matrix<3, 12> normal, point, slide, F, Fw;
+    for (int k = 0; k < 3; k++) {
+      normal.row(k) = moved.n(k).derivatives().transpose();
+      point.row(k)  = moved.p(k).derivatives().transpose();
+    }
+    const Vector3 ri = t.p - f[0].x, rj = t.p - f[1].x;
+    slide = Cross<double>(w[0].w - w[1].w) * point;
+    slide.template middleCols<3>(0) -= Cross<double>(w[0].w);
+    slide.template middleCols<3>(6) += Cross<double>(w[1].w);
+
+    const Vector3 force = lawGradient(d.law, t, slip<double>(f, w, t.p), depth, normal, slide, F, Fw, ri, rj);
+    place<double>(f, t.p, force, on);
+    const Matrix3 cross = Cross<double>(force), arm_i = Cross<double>(ri), arm_j = Cross<double>(rj);
+    J.frames.template middleRows<3>(0) = F;
+    J.frames.template middleRows<3>(3) = arm_i * F - cross * point;
+    J.frames.template block<3, 3>(3, 0) += cross;
+    J.frames.template middleRows<3>(6) = -F;
+    J.frames.template middleRows<3>(9) = cross * point - arm_j * F;
+    J.frames.template block<3, 3>(9, 6) -= cross;
+    J.twists.template middleRows<3>(0) = Fw;
+    J.twists.template middleRows<3>(3) = arm_i * Fw;
+    J.twists.template middleRows<3>(6) = -Fw;
+    J.twists.template middleRows<3>(9) = -arm_j * Fw;
+  }
+
+private:
+  /* dF/d frames and dF/d twists from the derivatives of depth, normal and slip velocity along the frames' directions;
+   * returns F */
+  static Vector3 lawGradient(const ContactLawData &law, const Touch<double> &t, const Vector3 &v,
+                             const Matrix<1, 12> &depth, const Matrix<3, 12> &normal, const Matrix<3, 12> &slide,
+                             Matrix<3, 12> &F, Matrix<3, 12> &Fw, const Vector3 &ri, const Vector3 &rj)
+  {
+    using T = Dual<7>;
+    Vec3<T> ns, vs;
+    for (int k = 0; k < 3; k++) {
+      ns(k) = T(t.n(k), 7, 1 + k);
+      vs(k) = T(v(k), 7, 4 + k);
+    }
+    const Vec3<T> force = ContactForce<T>(law, T(t.depth, 7, 0), ns, vs);
+    Vector3       value;
+    Matrix<3, 7>  L;
+    for (int k = 0; k < 3; k++) {
+      value(k) = force(k).value();
+      L.row(k) = force(k).derivatives().transpose();
+    }
+    const Matrix3 Lv = L.rightCols<3>();
+    F                = L.col(0) * depth + L.middleCols<3>(1) * normal + Lv * slide;
+    Fw << Lv, -Lv * Cross<double>(ri), -Lv, Lv * Cross<double>(rj);
+    return value;
+  }
+};
+
+} // namespace hhtdae
+
+#endif

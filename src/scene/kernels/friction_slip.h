@@ -1,0 +1,45 @@
+/*
+  Coulomb friction, regularized: a force of size mu N tanh(|v|/v_s) against the slip velocity v. The factor of v,
+  -(mu N/v_s) tanh(x)/x with x = |v|/v_s, is an analytic function of x^2, so nothing is singular at rest.
+*/
+#ifndef HHTDAE_SCENE_KERNELS_FRICTION_SLIP_H
+#define HHTDAE_SCENE_KERNELS_FRICTION_SLIP_H
+
+#include "scene/frames.h"
+#include <cmath>
+
+namespace hhtdae
+{
+
+/* tanh(x)/x as a function of y = x^2 */
+template <class T> T TanhRatio(const T &y)
+{
+  using std::sqrt;
+  using std::tanh;
+  const double plain = Plain(y);
+  if (plain < 1e-3) { /* Taylor series, its first term left out is below rounding */
+    T s = T(21844. / 6081075.) * y - T(1382. / 155925.);
+    s   = s * y + T(62. / 2835.);
+    s   = s * y - T(17. / 315.);
+    s   = s * y + T(2. / 15.);
+    s   = s * y - T(1. / 3.);
+    s   = s * y + T(1);
+    return s;
+  }
+  const T x = sqrt(y);
+  if (plain > 400) return T(1) / x; /* tanh is 1 to rounding, and cosh in its derivative would overflow further out */
+  const T ratio = tanh(x) / x;
+  return ratio;
+}
+
+/* The factor of the slip velocity in the friction force: F = SlipFactor(mu N, |v|^2, v_s) v */
+template <class T> T SlipFactor(const T &limit, const T &speed2, double slip_velocity)
+{
+  const T y = speed2 * T(1 / (slip_velocity * slip_velocity));
+  const T r = TanhRatio<T>(y);
+  return limit * r * T(-1 / slip_velocity);
+}
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,157 @@
+/* Friction in joints: derivatives, the limits mu N and rest, power, and the loads that the reaction makes */
+#include "kernel_checks.h"
+#include "scene/kernels/friction.h"
+
+using namespace hhtdae;
+
+namespace
+{
+
+FrictionData SomeFriction(Random &random)
+{
+  return {random(.1, 1), random(.2, 2), random(.3, 3), (int)random(0, 2.999)};
+}
+
+/* components and wrenches of one state; total power of the wrenches */
+template <class K> struct Evaluated {
+  double         c[K::count], power = 0;
+  Wrench<double> on[2];
+  Evaluated(const FrictionData &d, const Frame<double> *f, const Twist<double> *w, const double *z)
+  {
+    K::template components<double>(d, f, w, 0, z, c);
+    K::template apply<double>(d, f, c, on);
+    for (int k = 0; k < 2; k++) power += on[k].f.dot(w[k].v) + on[k].m.dot(w[k].w);
+  }
+};
+
+template <class K> class JointFrictionKernel : public testing::Test
+{
+};
+using Kernels = testing::Types<RevoluteFriction<3>, RevoluteFriction<2>, TranslationalFriction<2>,
+                               TranslationalFriction<1>, CylindricalFriction, SphericalFriction>;
+TYPED_TEST_SUITE(JointFrictionKernel, Kernels);
+
+const Frame<double> origin{Vec3<double>::Zero(), Mat3<double>::Identity()};
+const Twist<double> rest{Vec3<double>::Zero(), Vec3<double>::Zero()};
+
+} // namespace
+
+TYPED_TEST(JointFrictionKernel, DerivativesMasksBalance) { CheckForce<TypeParam>(SomeFriction); }
+
+TYPED_TEST(JointFrictionKernel, TakesEnergyAlways)
+{
+  Random random(3);
+  double strongest = 0;
+  for (int k = 0; k < 500; k++) {
+    const Frame<double>        f[2] = {random.frame(), random.frame()};
+    const Twist<double>        w[2] = {random.twist(), random.twist()};
+    const double               z[3] = {random(-5, 5), random(-5, 5), random(-5, 5)};
+    const Evaluated<TypeParam> e(SomeFriction(random), f, w, z);
+    EXPECT_LE(e.power, 1e-12);
+    strongest = std::min(strongest, e.power);
+  }
+  EXPECT_LT(strongest, -1);
+}
+
+TYPED_TEST(JointFrictionKernel, VanishesWithoutLoadAndAtRest)
+{
+  Random                     random(5);
+  const Frame<double>        f[2] = {random.frame(), random.frame()};
+  const Twist<double>        w[2] = {random.twist(), random.twist()}, still[2] = {rest, rest};
+  const double               none[3] = {0, 0, 0}, load[3] = {1, 2, 3};
+  const FrictionData         d = SomeFriction(random);
+  const Evaluated<TypeParam> unloaded(d, f, w, none), resting(d, f, still, load);
+  for (int r = 0; r < TypeParam::count; r++) {
+    EXPECT_EQ(unloaded.c[r], 0);
+    EXPECT_EQ(resting.c[r], 0);
+  }
+  ForceJacobian<2, TypeParam::inputs> J;
+  Wrench<double>                      on[2];
+  TypeParam::jacobian(d, f, still, 0, none, on, J);
+  EXPECT_TRUE(J.frames.allFinite() && J.twists.allFinite() && J.inputs.allFinite());
+}
+
+/* a shaft that turns with both bodies does not slip */
+TYPED_TEST(JointFrictionKernel, RigidMotionOfBothDoesNotSlip)
+{
+  Random                     random(7);
+  const Frame<double>        f[2] = {random.frame(), random.frame()};
+  const Vec3<double>         v = random.vector(), turn = random.vector();
+  const Twist<double>        w[2]    = {{v + turn.cross(f[0].x), turn}, {v + turn.cross(f[1].x), turn}};
+  const double               load[3] = {1, 2, 3};
+  const Evaluated<TypeParam> e(SomeFriction(random), f, w, load);
+  for (int r = 0; r < TypeParam::count; r++) EXPECT_NEAR(e.c[r], 0, 1e-14);
+}
+
+/* fast slip: mu r N about z_j against the rotation, N = |(2, 3, 6)| = 7 */
+TEST(JointFriction, RevoluteKnownValue)
+{
+  const FrictionData  d{.2, .5, 1e-3, 0};
+  const Frame<double> f[2]    = {origin, origin};
+  Twist<double>       w[2]    = {rest, rest};
+  const double        load[3] = {2, 3, 6};
+  w[0].w                      = {5, 7, 3}; /* only the part about z counts */
+  const Evaluated<RevoluteFriction<3>> e(d, f, w, load);
+  EXPECT_NEAR(e.on[0].m(2), -.2 * .5 * 7, 1e-8);
+  EXPECT_EQ(e.on[0].m(0), 0);
+  w[0].w(2) = 1e-3; /* r w/v_s = 1/2 */
+  const Evaluated<RevoluteFriction<3>> slow(d, f, w, load);
+  EXPECT_NEAR(slow.on[0].m(2), -.2 * .5 * 7 * std::tanh(.5), 1e-8);
+}
+
+TEST(JointFriction, TranslationalKnownValue)
+{
+  for (int axis = 0; axis < 3; axis++) {
+    const FrictionData  d{.3, 0, 1e-3, axis};
+    const Frame<double> f[2]    = {{Vec3<double>(0, 0, 2), Mat3<double>::Identity()}, origin};
+    Twist<double>       w[2]    = {rest, rest};
+    const double        load[2] = {-3, 4};
+    w[0].v(axis)                = -2;
+    const Evaluated<TranslationalFriction<2>> e(d, f, w, load);
+    EXPECT_NEAR(e.on[0].f(axis), .3 * 5, 1e-8);
+    EXPECT_NEAR(e.on[1].f(axis), -.3 * 5, 1e-8);
+    const Evaluated<TranslationalFriction<1>> one(d, f, w, load);
+    EXPECT_NEAR(one.on[0].f(axis), .3 * 3, 1e-8);
+  }
+}
+
+/* slip (3, 4) along and around: the friction force mu N has that direction */
+TEST(JointFriction, CylindricalFrictionFollowsTheHelix)
+{
+  const FrictionData  d{.5, 2, 1e-3, 0};
+  const Frame<double> f[2]    = {origin, origin};
+  Twist<double>       w[2]    = {rest, rest};
+  const double        load[2] = {6, 8};
+  w[0].v(2)                   = 3;
+  w[0].w(2)                   = 2;
+  const Evaluated<CylindricalFriction> e(d, f, w, load);
+  EXPECT_NEAR(e.on[0].f(2), -.5 * 10 * .6, 1e-8);
+  EXPECT_NEAR(e.on[0].m(2), -.5 * 10 * .8 * 2, 1e-8);
+}
+
+TEST(JointFriction, SphericalMomentOpposesTheRelativeRotation)
+{
+  const FrictionData  d{.1, 3, 1e-3, 0};
+  const Frame<double> f[2]    = {origin, origin};
+  Twist<double>       w[2]    = {rest, rest};
+  const double        load[3] = {0, 3, 4};
+  w[0].w                      = {1, 2, 2};
+  w[1].w                      = {-1, -2, -2};
+  const Evaluated<SphericalFriction> e(d, f, w, load);
+  EXPECT_LT((e.on[0].m + .1 * 3 * 5 * Vec3<double>(1, 2, 2) / 3).norm(), 1e-8);
+}
+
+/* tanh(x)/x by either of its two ways, with its derivative by y = x^2 */
+TEST(JointFriction, RegularizationIsSmoothAtRest)
+{
+  for (double x : {1e-9, 1e-3, .01, .031, .032, .1, .5, 2., 19., 21., 1e3}) {
+    using T            = Dual<1>;
+    const T      ratio = TanhRatio<T>(T(x * x, 1, 0));
+    const double y = x * x, th = std::tanh(x);
+    const double series  = -1. / 3. + y * (4. / 15. - y * (17. / 105. - y * 248. / 2835.)),
+                 formula = (1 - th * th - th / x) / (2 * y);
+    EXPECT_NEAR(ratio.value(), th / x, 1e-15) << x;
+    EXPECT_NEAR(ratio.derivatives()(0), x < .02 ? series : formula, 1e-12) << x;
+  }
+  EXPECT_EQ(TanhRatio<double>(0.), 1);
+}
