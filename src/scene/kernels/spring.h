@@ -1,0 +1,168 @@
+/*
+  Springs and dampers along the line between the origins of two markers. The component is the tension, positive when it
+  pulls the two together; with d = x_i - x_j, l = |d|, n = d/l and l' = n . (v_i - v_j) the force on i is -tension n.
+
+  Where the origins coincide, n is taken as zero: the line has no direction, and a tension without one makes no force.
+  For a spring of free length zero and no preload this is the exact limit, f = -k d, with the exact derivative -k. A
+  damper there resists as along the path through the point, f = -c (v_i - v_j).
+*/
+#ifndef HHTDAE_SCENE_KERNELS_SPRING_H
+#define HHTDAE_SCENE_KERNELS_SPRING_H
+
+#include "hhtdae/functions.h"
+#include "scene/kernel.h"
+#include <cmath>
+#include <functional>
+#include <type_traits>
+
+namespace hhtdae
+{
+
+/* The line from j to i: its length and direction */
+template <class T> struct Line {
+  T       length;
+  Vec3<T> along;
+
+  explicit Line(const Frame<T> *f)
+  {
+    using std::sqrt;
+    const Vec3<T> d  = f[0].x - f[1].x;
+    const T       l2 = d.dot(d);
+    if (Plain(l2) > 0) {
+      length = sqrt(l2);
+      along  = d * T(T(1) / length);
+    } else {
+      length = T(0);
+      along  = Vec3<T>(T(0), T(0), T(0));
+    }
+  }
+  T rate(const Twist<T> *w) const
+  {
+    const Vec3<T> v = w[0].v - w[1].v;
+    return along.dot(v);
+  }
+};
+
+/* What all forces along a line share */
+template <class K> struct LineForce : Force<K, 2, 1> {
+  static constexpr unsigned depends = Position(0) | Position(1), acts = depends;
+  static constexpr bool     needs_rotation = false;
+
+  template <class T, class Data> static void apply(const Data &, const Frame<T> *f, const T *c, Wrench<T> *on)
+  {
+    const Line<T> line(f);
+    pull<T>(line.along * c[0], on);
+  }
+
+  /* F on j, -F on i */
+  template <class T> static void pull(const Vec3<T> &F, Wrench<T> *on)
+  {
+    on[0].f = -F;
+    on[1].f = F;
+    on[0].m = on[1].m = Vec3<T>(T(0), T(0), T(0));
+  }
+
+  /* the blocks of forces that depend on x_i - x_j; B = d(-f_i)/d(x_i - x_j) */
+  static void spread(const Mat3<double> &B, Matrix<12, 12> &J)
+  {
+    J.setZero();
+    J.template block<3, 3>(0, 0) = J.template block<3, 3>(6, 6) = -B;
+    J.template block<3, 3>(0, 6) = J.template block<3, 3>(6, 0) = B;
+  }
+};
+
+/* tension = k (l - length) + c l' + preload, in N; a spring without damping is a kernel of its own, symmetric and
+ * without velocities */
+template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
+  static constexpr const char *name   = Damped ? "spring-damper" : "spring";
+  static constexpr bool        damped = Damped, symmetric = !Damped;
+  struct Data {
+    double stiffness, damping, length, preload;
+  };
+
+  template <class T>
+  static void components(const Data &p, const Frame<T> *f, const Twist<T> *w, const T &, const T *, T *c)
+  {
+    const Line<T> line(f);
+    c[0] = T(p.stiffness) * (line.length - T(p.length)) + T(p.preload);
+    if constexpr (Damped) c[0] += T(p.damping) * line.rate(w);
+  }
+
+  static void wrench(const Data &p, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
+                     Wrench<double> *on)
+  {
+    const Line<double> line(f);
+    if constexpr (Damped)
+      if (line.length == 0) return LinearSpring::template pull<double>(p.damping * (w[0].v - w[1].v), on);
+    double tension;
+    components<double>(p, f, w, t, z, &tension);
+    LinearSpring::template pull<double>(tension * line.along, on);
+  }
+
+  /* d(tension n) = (k n + c dl') n + tension/l (1 - n n^T),  dl' = (v - l' n)/l; tension/l is k plus what vanishes for
+   * free length zero */
+  template <int Z>
+  static void jacobian(const Data &p, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
+                       Wrench<double> *on, ForceJacobian<2, Z> &J)
+  {
+    const Line<double>  line(f);
+    const Vec3<double> &n = line.along;
+    const double        l = line.length, inverse = l > 0 ? 1 / l : 0;
+    double              across = p.stiffness + (p.preload - p.stiffness * p.length) * inverse; /* tension/l */
+    Mat3<double>        B;
+
+    wrench(p, f, w, t, z, on);
+    if constexpr (Damped) {
+      const double rate = line.rate(w);
+      across += p.damping * rate * inverse;
+      B = n * ((p.stiffness - across) * n + p.damping * inverse * (w[0].v - w[1].v - rate * n)).transpose();
+    } else
+      B = (p.stiffness - across) * n * n.transpose();
+    B.diagonal().array() += across;
+    LinearSpring::spread(B, J.frames);
+    if constexpr (Damped) {
+      B = p.damping * n * n.transpose();
+      if (l == 0) B.diagonal().array() += p.damping;
+      LinearSpring::spread(B, J.twists);
+    } else
+      J.twists.setZero();
+  }
+};
+
+/* A function of two numbers that its user gives */
+using Curve = std::function<Real(const Real &, const Real &)>;
+
+/* f(a, b) to first order from its value and two derivatives at the plain numbers: exact for double and Dual */
+template <class T> T Evaluate(const Curve &f, const T &a, const T &b)
+{
+  const Real y = f(Real(Plain(a), 2, 0), Real(Plain(b), 2, 1));
+  if constexpr (std::is_same_v<T, double>)
+    return y.value();
+  else {
+    T r(y.value());
+    if (y.derivatives().size() == 2) { /* a constant has none */
+      const double fa = y.derivatives()(0), fb = y.derivatives()(1);
+      r += (a - T(Plain(a))) * T(fa) + (b - T(Plain(b))) * T(fb);
+    }
+    return r;
+  }
+}
+
+/* tension f(l, l') */
+struct CurveSpring : LineForce<CurveSpring> {
+  static constexpr const char *name = "nonlinear spring";
+  struct Data {
+    Curve tension;
+  };
+
+  template <class T>
+  static void components(const Data &p, const Frame<T> *f, const Twist<T> *w, const T &, const T *, T *c)
+  {
+    const Line<T> line(f);
+    c[0] = Evaluate<T>(p.tension, line.length, line.rate(w));
+  }
+};
+
+} // namespace hhtdae
+
+#endif
