@@ -1,0 +1,60 @@
+/*
+  Joints, motions and primitive constraints between marker i (on the first body) and marker j (on the second). Every constraint is
+  written so that its multipliers are forces and moments: lengths for positions, sines of angles for directions.
+*/
+#ifndef HHTDAE_JOINTS_H
+#define HHTDAE_JOINTS_H
+
+#include "hhtdae/functions.h"
+#include "hhtdae/types.h"
+
+namespace hhtdae
+{
+
+/* ---- joints; planar scenes: revolute, translational, fixed ---- */
+struct Spherical { Marker i, j; };      /* origins coincide */
+struct Revolute { Marker i, j; };       /* and z axes are parallel */
+struct Universal { Marker i, j; };      /* origins coincide, z_i perpendicular to z_j */
+struct ConstantVelocity { Marker i, j; }; /* origins coincide, rotations about z_i and z_j are equal */
+struct Translational { Marker i, j; };  /* along z_j, no rotation */
+struct Cylindrical { Marker i, j; };    /* along and about z_j */
+struct Planar { Marker i, j; };         /* xy planes coincide */
+struct Fixed { Marker i, j; };
+struct Screw { Marker i, j; double pitch = 1; }; /* cylindrical, pitch of advance along z_j per turn */
+/* couplers of joint motions, each given by its two markers: angle about z_j (revolute, cylindrical) or advance along z_j */
+struct Gear { Marker i1, j1, i2, j2; double ratio = 1; };          /* angle_1 + ratio angle_2 = its value at the start */
+struct RackAndPinion { Marker i1, j1, i2, j2; double radius = 1; }; /* advance_2 - radius angle_1 = its value at the start */
+struct Coupler {                                                   /* sum of c_k s_k = its value at the start */
+  struct Term { Marker i, j; bool rotation = true; double factor = 1; };
+  std::vector<Term> terms; /* two or three */
+};
+
+/* ---- primitives ---- */
+struct InLine { Marker i, j; };         /* origin of i on the z axis of j */
+struct InPlane { Marker i, j; };        /* origin of i in the xy plane of j */
+struct ParallelAxes { Marker i, j; };   /* z axes */
+struct Perpendicular { Marker i, j; };  /* z axes */
+struct Orientation { Marker i, j; };    /* all axes parallel */
+struct PointDistance { Marker i, j; double length = -1; }; /* negative: the distance at the start */
+struct PointOnCurve {                   /* origin of i on the curve (c_x(s), c_y(s), c_z(s)) in j's axes */
+  Marker i, j;
+  std::vector<Vector3> points;          /* interpolated by a twice continuously differentiable cubic spline over chord length */
+  bool closed = false;
+};
+
+/* ---- velocity-level (non-holonomic) ---- */
+struct RollingDisc { /* a disc about z_i through i's origin on the xy plane of j: its lowest point touches and does not slip */
+  Marker i, j;
+  double radius = 1;
+};
+struct RollingSphere { Marker i, j; double radius = 1; }; /* about i's origin on the xy plane of j */
+struct KnifeEdge { Marker i, j; };      /* no velocity of i's origin along y_i; in the xy plane of j */
+
+/* ---- motions of i relative to j ---- */
+enum class MotionOf { Displacement, Velocity, Acceleration };
+struct RotationalMotion { Marker i, j; TimeFunction function; MotionOf of = MotionOf::Displacement; }; /* about z_j */
+struct TranslationalMotion { Marker i, j; TimeFunction function; MotionOf of = MotionOf::Displacement; int axis = 2; }; /* along an axis of j */
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,107 @@
+/*
+  Multibody scenes: rigid bodies, markers, joints, motions and forces, assembled in parallel for a PETSc time stepper.
+
+    hhtdae::Scene scene(PETSC_COMM_WORLD);
+    Body   arm   = scene.add("arm", RigidBody{mass, inertia, position});
+    Marker pivot = scene.marker(arm, {-1, 0, 0});
+    scene.add("pin", Revolute{pivot, scene.marker(scene.ground(), {0, 0, 0})});
+    TS ts;
+    PetscCall(scene.createTS(&ts));
+    PetscCall(TSSetFromOptions(ts));
+    PetscCall(scene.solve(ts));
+
+  Units are the user's own, but consistent; angles are in radians. Building a scene never fails: what is wrong with it is reported
+  by name, all of it at once, as a PETSc error from setUp(), createTS() or solve(), whichever comes first. Every rank describes the
+  same scene in the same order; METIS gives each rank its part of the bodies.
+*/
+#ifndef HHTDAE_SCENE_H
+#define HHTDAE_SCENE_H
+
+#include "hhtdae/forces.h"
+#include "hhtdae/functions.h"
+#include "hhtdae/hhtdae.h"
+#include "hhtdae/joints.h"
+#include "hhtdae/types.h"
+#include <memory>
+#include <string>
+
+namespace hhtdae
+{
+
+enum class Space {
+  Spatial, /* rigid bodies have 6 coordinates: position of the centre of mass, 3-1-3 Euler angles */
+  Planar   /* 3: position of the centre of mass in the xy plane, angle about z; markers lie in that plane, their z axes along z */
+};
+
+struct RigidBody {
+  double  mass    = 1;
+  Matrix3 inertia = Matrix3::Identity();  /* about the centre of mass, in body axes; planar: element (2,2) alone counts */
+  Vector3 position = Vector3::Zero();     /* of the body's origin at the start, space axes */
+  Matrix3 rotation = Matrix3::Identity(); /* body axes as columns, at the start */
+  Vector3 velocity = Vector3::Zero();     /* of the centre of mass, space axes */
+  Vector3 angular_velocity = Vector3::Zero(); /* space axes */
+  Vector3 center = Vector3::Zero();       /* of mass, in body axes from the body's origin */
+  bool    fixed_start = false;            /* the assembly phase leaves pose and velocities as given */
+};
+
+struct PointMass { /* 3 coordinates, no rotation; planar 2 */
+  double  mass     = 1;
+  Vector3 position = Vector3::Zero();
+  Vector3 velocity = Vector3::Zero();
+  bool    fixed_start = false;
+};
+
+struct SceneData; /* src/scene/scene_data.h */
+
+class Scene
+{
+public:
+  explicit Scene(MPI_Comm comm, Space space = Space::Spatial);
+  ~Scene();
+  Scene(const Scene &)            = delete;
+  Scene &operator=(const Scene &) = delete;
+
+  /* bodies; an empty name becomes "body 7" */
+  Body ground() const { return Body{-1}; }
+  Body add(const std::string &name, const RigidBody &body);
+  Body add(const std::string &name, const PointMass &body);
+
+  /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes */
+  Marker marker(Body body, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity(),
+                const std::string &name = "");
+  /* the same, given where it is at the start, in space axes */
+  Marker markerAt(Body body, const Vector3 &position, const Matrix3 &axes = Matrix3::Identity(), const std::string &name = "");
+
+  /* joints, motions, forces: joints.h, forces.h */
+  template <class Spec> Element add(const std::string &name, const Spec &spec);
+
+  /* user-defined variable V = expression; first-order state x' = rate; see functions.h */
+  Variable variable(const std::string &name, const Expression &definition, double initial = 0);
+  State    state(const std::string &name, const Expression &rate, double initial);
+
+  void gravity(const Vector3 &acceleration);
+
+  /* Checks the scene, numbers and distributes it; collective; called by createTS() when it has not been. After this the scene is
+     fixed. */
+  PetscErrorCode setUp();
+
+  /* A TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it, the scene must
+     outlive it. Set final time, step and options on it as on any TS. */
+  PetscErrorCode createTS(TS *ts);
+
+  /* Start-up work that was asked for (assembly, equilibrium), TSSolve(), output. */
+  PetscErrorCode solve(TS ts);
+
+  PetscErrorCode view(PetscViewer viewer) const;
+
+  /* Everything, for the library's own rooms and for tests */
+  SceneData       &data() { return *data_; }
+  const SceneData &data() const { return *data_; }
+
+private:
+  std::unique_ptr<SceneData> data_;
+};
+
+} // namespace hhtdae
+
+#endif

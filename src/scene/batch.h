@@ -1,0 +1,87 @@
+/* What the assembly sees of joints, forces, variables and states: lists of instances that add to the residual and the matrix. */
+#ifndef HHTDAE_SCENE_BATCH_H
+#define HHTDAE_SCENE_BATCH_H
+
+#include "bodies.h"
+#include "pattern.h"
+#include <vector>
+
+namespace hhtdae
+{
+
+/* A scalar unknown that an element reads: where it is, and its column of the matrix. A multiplier that was dropped is nowhere, and zero. */
+struct Input {
+  PetscInt local = -1, group = -1, offset = 0;
+};
+
+/* One evaluation: state of the local unknowns (own, then others'), own rows of the residual or arrays of the matrix */
+struct Evaluation {
+  double        t;
+  const double *u, *v, *a;
+  Bodies       &bodies;
+  PetscInt      n;                      /* own unknowns */
+  double       *F  = nullptr;           /* residual, cleared; null in a Jacobian */
+  double        sv = 0, sa = 0;         /* the Jacobian is F_u + sv F_v + sa F_a */
+  Sink          sink{nullptr, nullptr};
+
+  double input(const Input &i) const { return i.local < 0 ? 0 : u[i.local]; }
+  void   row(PetscInt local, double value)
+  {
+    if (local < n) F[local] += value;
+  }
+};
+
+class Batch
+{
+public:
+  virtual ~Batch() = default;
+  virtual void pattern(Pattern &p) = 0;       /* asks for blocks */
+  virtual void resolve(const Pattern &p);     /* their slots */
+  virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
+  virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
+  /* after an accepted step; bodies have moved there */
+  virtual void accept(Bodies &) {}
+  /* constraints: Phi_t and Phi_tt (Psi itself and nothing at velocity level) into local rows */
+  virtual void timeDerivatives(Evaluation &, double *first, double *second) { (void)first; (void)second; }
+  /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
+  virtual PetscInt memory() const { return 0; }
+  virtual void     copyMemory(double *, bool in) { (void)in; }
+
+protected:
+  std::vector<PetscInt> request_; /* numbers of the blocks, in the order of assembly */
+  std::vector<Slot>     slot_;
+};
+
+inline void Batch::resolve(const Pattern &p)
+{
+  slot_.resize(request_.size());
+  for (std::size_t i = 0; i < request_.size(); i++) slot_[i] = p.slot(request_[i]);
+  std::vector<PetscInt>().swap(request_);
+}
+
+/* ---- groups of coordinates of a marker's body ---- */
+
+inline bool Turns(BodyKind k, int group) { return k == BodyKind::Planar || (k == BodyKind::Rigid && group == 1); }
+inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
+
+/* An entry of the derivative that pairs x or theta of a row marker with x or theta of a column marker reaches groups (g, h) of
+   their bodies: a turn of the body moves its markers' origins as well. */
+template <class Pair> bool Reaches(const Pair &pair, BodyKind row, int g, BodyKind column, int h)
+{
+  const bool tr = Turns(row, g), tc = Turns(column, h);
+  return pair(0, 0) || (tr && pair(1, 0)) || (tc && pair(0, 1)) || (tr && tc && pair(1, 1));
+}
+
+/* The change of the moment s x f of a force held fixed in space when its body turns: [f][s], in coordinates */
+inline void AddLever(const Bodies &B, PetscInt b, const Vector3 &s, const Vector3 &f, Eigen::Matrix<double, 6, 6> &H)
+{
+  const BodyKind k = B.body[b].kind;
+  if (k == BodyKind::Planar) H(2, 2) -= f(0) * s(0) + f(1) * s(1);
+  if (k != BodyKind::Rigid) return;
+  const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
+  H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
+}
+
+} // namespace hhtdae
+
+#endif

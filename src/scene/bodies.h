@@ -1,0 +1,148 @@
+/*
+  The bodies of this rank, its own first, then those of other ranks that its joints and forces touch, then the ground: their present
+  motion, the loads that the elements put on them, and the change from marker perturbations to generalized coordinates.
+
+  The residual of a body is its inertia less the load, written in space axes and taken to the coordinates at the end:
+  rows of r: m r'' - f;  rows of the Euler angles: G^T (N - m), N = I w' + w x I w, I = A J A^T (moments about the centre of mass).
+*/
+#ifndef HHTDAE_SCENE_BODIES_H
+#define HHTDAE_SCENE_BODIES_H
+
+#include "euler.h"
+#include "frames.h"
+#include <petscsys.h>
+#include <vector>
+
+namespace hhtdae
+{
+
+enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint };
+
+constexpr int max_coordinates = 6; /* of a body */
+
+inline int Coordinates(BodyKind k)
+{
+  constexpr int n[] = {0, 3, 6, 3, 2};
+  return n[(int)k];
+}
+/* Coordinates come in groups whose rows of the matrix have the same columns */
+inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : k == BodyKind::Rigid ? 2 : 1; }
+inline int GroupSize(BodyKind k) { return k == BodyKind::PlanarPoint ? 2 : 3; }
+
+/* what does not change in a step */
+struct LocalBody {
+  BodyKind kind  = BodyKind::Ground;
+  bool     owned = false;
+  PetscInt first = -1; /* coordinate, among the local unknowns */
+  PetscInt group = -1;
+  PetscInt id    = -1; /* in the scene */
+  double   mass  = 0;
+  Matrix3  J;          /* inertia in the axes of the Euler angles; planar: J(2,2) */
+  Matrix3  C;          /* body axes to the axes of the Euler angles */
+};
+
+/* present motion and load */
+struct BodyMotion {
+  Vector3   r, v, w;
+  Matrix3   A;
+  EulerAxes euler; /* rigid bodies in space alone */
+  Vector3   f, m;  /* load: force, moment about the centre of mass */
+};
+
+struct LocalMarker {
+  PetscInt body;
+  Vector3  s; /* from the centre of mass, body axes */
+  Matrix3  R; /* axes, in body axes */
+};
+
+class Bodies
+{
+public:
+  std::vector<LocalBody>   body; /* own, others', ground */
+  std::vector<BodyMotion>  now;
+  std::vector<LocalMarker> marker;
+  PetscInt                 own = 0;
+  Vector3                  gravity = Vector3::Zero();
+
+  /* motion of all bodies from their coordinates and rates; clears the loads */
+  void move(const double *u, const double *v);
+  void setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J);
+
+  /* ---- markers ---- */
+  template <bool with_axes = true> Frame<double> frame(PetscInt m) const
+  {
+    const LocalMarker &k = marker[m];
+    const BodyMotion  &b = now[k.body];
+    Frame<double>      f;
+    f.x.noalias() = b.r + b.A * k.s;
+    if constexpr (with_axes) f.R.noalias() = b.A * k.R;
+    return f;
+  }
+  Twist<double> twist(PetscInt m, const Frame<double> &f) const
+  {
+    const BodyMotion &b = now[marker[m].body];
+    return {b.v + b.w.cross(f.x - b.r), b.w};
+  }
+  void load(PetscInt m, const Frame<double> &at, const Vector3 &f, const Vector3 &moment)
+  {
+    BodyMotion &b = now[marker[m].body];
+    b.f += f;
+    b.m += moment + (at.x - b.r).cross(f);
+  }
+
+  /* J, columns (x, theta) of marker m at f, to the coordinates of its body; returns their number */
+  template <class In, class Out> int columns(PetscInt m, const Frame<double> &f, const In &J, Out &out) const
+  {
+    const BodyMotion &b = now[marker[m].body];
+    switch (body[marker[m].body].kind) {
+    case BodyKind::Ground:
+      return 0;
+    case BodyKind::PlanarPoint:
+      out.template leftCols<2>() = J.template leftCols<2>();
+      return 2;
+    case BodyKind::Point:
+      out.template leftCols<3>() = J.template leftCols<3>();
+      return 3;
+    case BodyKind::Planar: {
+      const double sx = f.x(0) - b.r(0), sy = f.x(1) - b.r(1);
+      out.template leftCols<2>() = J.template leftCols<2>();
+      out.col(2)                 = J.col(5) - sy * J.col(0) + sx * J.col(1);
+      return 3;
+    }
+    case BodyKind::Rigid: {
+      /* dx = dr + dtheta x s, dtheta = G deps: column c of the angles is J_theta g_c + J_x (g_c x s) */
+      const Vector3 s = f.x - b.r;
+      out.template leftCols<3>() = J.template leftCols<3>();
+      out.col(3)                 = J.col(5) - s(1) * J.col(0) + s(0) * J.col(1);
+      out.col(4).noalias() = J.template rightCols<3>() * b.euler.g2 + J.template leftCols<3>() * b.euler.g2.cross(s);
+      out.col(5).noalias() = J.template rightCols<3>() * b.euler.g3 + J.template leftCols<3>() * b.euler.g3.cross(s);
+      return 6;
+    }
+    }
+    return 0;
+  }
+  /* the change of velocities with coordinates at constant rates: J, columns (v, w) of marker m, adds to out */
+  template <class In, class Out> void convectiveColumns(PetscInt m, const Frame<double> &f, const double *v, const In &J, Out &out) const
+  {
+    const LocalBody  &k = body[marker[m].body];
+    const BodyMotion &b = now[marker[m].body];
+    const Vector3     s = f.x - b.r;
+    if (k.kind == BodyKind::Planar) out.col(2) += J.template leftCols<3>() * b.w.cross(CrossZ(s));
+    if (k.kind != BodyKind::Rigid) return;
+    const Eigen::Map<const Vector3> rate(v + k.first + 3);
+    const Matrix3                   W = RateGradient(b.euler, rate, b.w), G = b.euler.G();
+    for (int c = 0; c < 3; c++) {
+      const Vector3 dw = W.col(c);
+      out.col(3 + c) += J.template leftCols<3>() * (dw.cross(s) + b.w.cross(G.col(c).cross(s))) + J.template rightCols<3>() * dw;
+    }
+  }
+
+  /* ---- own bodies' rows ---- */
+  void residual(const double *v, const double *a, double *F) const;
+  /* adds sv dF/dv + sa dF/da + dF/du of body b to B (coordinates x coordinates, row major of leading dimension 6) */
+  void jacobian(PetscInt b, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const;
+};
+
+} // namespace hhtdae
+
+#endif

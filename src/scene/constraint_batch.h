@@ -1,0 +1,280 @@
+/* All instances of one constraint kernel on this rank: rows Phi, reactions Phi_q^T lambda, and their derivatives. */
+#ifndef HHTDAE_SCENE_CONSTRAINT_BATCH_H
+#define HHTDAE_SCENE_CONSTRAINT_BATCH_H
+
+#include "batch.h"
+#include "kernel.h"
+
+namespace hhtdae
+{
+
+template <class K> class ConstraintBatch : public Batch
+{
+  static constexpr int M = K::markers, R = K::rows, Z = K::inputs;
+
+public:
+  struct Instance {
+    PetscInt         marker[M];
+    PetscInt         lambda; /* first multiplier among the local unknowns; its row is the constraint's */
+    PetscInt         group;
+    unsigned char    active; /* bits of the rows that are not redundant */
+    Input            input[Z > 0 ? Z : 1];
+    typename K::Data data;
+  };
+  std::vector<Instance> all;
+
+  void pattern(Pattern &p) override
+  {
+    const Bodies &B = *bodies;
+    for (const Instance &e : all) {
+      for (int k = 0; k < M; k++) {
+        const LocalBody &b = bodyOf(B, e, k);
+        for (int g = 0; g < Groups(b.kind); g++) {
+          if (!uses(b.kind, g, k)) continue;
+          request_.push_back(p.need(e.group, b.group + g));
+          request_.push_back(p.need(b.group + g, e.group));
+        }
+      }
+      for (int i = 0; i < Z; i++) request_.push_back(p.need(e.group, e.input[i].group));
+      for (int k = 0; k < M; k++)
+        for (int l = 0; l < M; l++) {
+          const LocalBody &b = bodyOf(B, e, k), &c = bodyOf(B, e, l);
+          for (int g = 0; g < Groups(b.kind); g++)
+            for (int h = 0; h < Groups(c.kind); h++)
+              if (curves(b.kind, g, k, c.kind, h, l)) request_.push_back(p.need(b.group + g, c.group + h));
+        }
+    }
+  }
+
+  void residual(Evaluation &ev) override
+  {
+    const Bodies &B = *bodies;
+    for (const Instance &e : all) {
+      Frame<double>        f[M];
+      Twist<double>        w[M];
+      double               phi[R], lambda[R], z[Z > 0 ? Z : 1];
+      typename K::Gradient J, P;
+      gather(ev, e, f, w, lambda, z);
+      if constexpr (K::holonomic) {
+        K::value(e.data, f, ev.t, phi);
+        K::gradient(e.data, f, ev.t, J);
+      } else {
+        value(e, f, w, ev.t, z, phi);
+        gradient(e, f, w, ev.t, z, J, P, nullptr);
+      }
+      PetscInt row = e.lambda;
+      for (int r = 0; r < R; r++)
+        if (e.active >> r & 1) ev.row(row++, phi[r]);
+      react(ev.bodies, e, f, lambda, J);
+    }
+    (void)B;
+  }
+
+  void jacobian(Evaluation &ev) override
+  {
+    const Slot *slot = slot_.data();
+    for (const Instance &e : all) {
+      Frame<double>        f[M];
+      Twist<double>        w[M];
+      double               lambda[R], z[Z > 0 ? Z : 1], zj[R * (Z > 0 ? Z : 1)];
+      typename K::Gradient J, P;
+      gather(ev, e, f, w, lambda, z);
+      if constexpr (K::holonomic) K::gradient(e.data, f, ev.t, J);
+      else gradient(e, f, w, ev.t, z, J, P, zj);
+      react(ev.bodies, e, f, lambda, J);
+      gradientBlocks(ev, e, f, J, P, zj, slot);
+      curvatureBlocks(ev, e, f, w, z, lambda, J, slot);
+    }
+  }
+
+  void accept(Bodies &B) override
+  {
+    if constexpr (K::memory > 0)
+      for (Instance &e : all) {
+        Frame<double> f[M];
+        for (int k = 0; k < M; k++) f[k] = B.frame<true>(e.marker[k]);
+        K::accept(e.data, f);
+      }
+    (void)B;
+  }
+
+  void timeDerivatives(Evaluation &ev, double *first, double *second) override
+  {
+    if constexpr (K::holonomic && !K::driven) return;
+    for (const Instance &e : all) {
+      Frame<double> f[M];
+      Twist<double> w[M];
+      double        lambda[R], z[Z > 0 ? Z : 1], d1[R], d2[R];
+      gather(ev, e, f, w, lambda, z);
+      if constexpr (K::holonomic) {
+        K::time(e.data, f, ev.t, d1, d2);
+      } else {
+        /* Psi with all velocities zero */
+        for (int k = 0; k < M; k++) w[k] = {Vector3::Zero(), Vector3::Zero()};
+        value(e, f, w, ev.t, z, d1);
+        for (int r = 0; r < R; r++) d2[r] = 0;
+      }
+      PetscInt row = e.lambda;
+      for (int r = 0; r < R; r++)
+        if (e.active >> r & 1) {
+          first[row] = d1[r];
+          second[row++] = d2[r];
+        }
+    }
+  }
+
+  PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
+  void     copyMemory(double *x, bool in) override
+  {
+    if constexpr (K::memory > 0)
+      for (Instance &e : all)
+        for (int i = 0; i < K::memory; i++, x++) {
+          if (in) e.data.memory[i] = *x;
+          else *x = e.data.memory[i];
+        }
+    (void)x;
+    (void)in;
+  }
+
+  Bodies *bodies = nullptr;
+
+private:
+  static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
+
+  static bool uses(BodyKind b, int g, int k)
+  {
+    if (Depends(K::depends, 2 * k)) return true;
+    return Turns(b, g) && Depends(K::depends, 2 * k + 1);
+  }
+  static bool curves(BodyKind b, int g, int k, BodyKind c, int h, int l)
+  {
+    if (k == l && Turns(b, g) && Turns(c, h) && Depends(K::depends, 2 * k)) return true; /* AddLever() */
+    return Reaches([&](int x, int y) { return K::curved(2 * k + x, 2 * l + y); }, b, g, c, h);
+  }
+  static constexpr bool curvedAtAll()
+  {
+    for (int a = 0; a < 2 * M; a++)
+      for (int b = 0; b < 2 * M; b++)
+        if (K::curved(a, b)) return true;
+    return false;
+  }
+
+  /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
+  static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)
+  {
+    for (int k = 0; k < M; k++) {
+      f[k] = ev.bodies.template frame<K::needs_rotation>(e.marker[k]);
+      if constexpr (!K::holonomic) w[k] = ev.bodies.twist(e.marker[k], f[k]);
+    }
+    PetscInt i = e.lambda;
+    for (int r = 0; r < R; r++) lambda[r] = e.active >> r & 1 ? ev.u[i++] : 0;
+    for (int c = 0; c < Z; c++) z[c] = ev.input(e.input[c]);
+    (void)w;
+    (void)z;
+  }
+
+  static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)
+  {
+    if constexpr (Z > 0) K::template value<double>(e.data, f, w, t, z, psi);
+    else K::template value<double>(e.data, f, w, t, psi);
+    (void)z;
+  }
+  static void gradient(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
+                       typename K::Gradient &J, typename K::Gradient &P, double *zj)
+  {
+    if constexpr (!K::holonomic) K::gradient(e.data, f, w, t, z, J, P, zj);
+  }
+
+  /* - Phi_q^T lambda as a load */
+  static void react(Bodies &B, const Instance &e, const Frame<double> *f, const double *lambda, const typename K::Gradient &J)
+  {
+    const Eigen::Map<const Matrix<R, 1>> l(lambda);
+    const Matrix<6 * M, 1>               on = -J.transpose() * l;
+    for (int k = 0; k < M; k++) B.load(e.marker[k], f[k], on.template segment<3>(6 * k), on.template segment<3>(6 * k + 3));
+  }
+
+  /* rows of Phi and columns of lambda */
+  static void gradientBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, typename K::Gradient &J,
+                             const typename K::Gradient &P, const double *zj, const Slot *&slot)
+  {
+    int active[R], rows = 0;
+    for (int r = 0; r < R; r++)
+      if (e.active >> r & 1) active[rows++] = r;
+    for (int k = 0; k < M; k++) {
+      const LocalBody &b = bodyOf(ev.bodies, e, k);
+      Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
+      int              n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
+      if constexpr (K::holonomic) {
+        S = T;
+      } else {
+        S.leftCols(n).setZero();
+        ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k) + ev.sv * J.template middleCols<6>(6 * k)), S);
+        ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, J.template middleCols<6>(6 * k), S);
+      }
+      if (rows < R)
+        for (int r = 0; r < rows; r++) {
+          T.row(r) = Matrix<1, 6>(T.row(active[r]));
+          S.row(r) = Matrix<1, 6>(S.row(active[r]));
+        }
+      const int size = GroupSize(b.kind);
+      for (int g = 0; g < Groups(b.kind); g++) {
+        if (!uses(b.kind, g, k)) continue;
+        ev.sink.add(*slot++, S.middleCols(g * size, size), rows, size);
+        ev.sink.add(*slot++, T.middleCols(g * size, size).transpose(), size, rows);
+      }
+      (void)n;
+    }
+    for (int i = 0; i < Z; i++) {
+      Matrix<R, 1> column;
+      for (int r = 0; r < rows; r++) column(r) = zj[active[r] * Z + i];
+      ev.sink.add((slot++)->column(e.input[i].offset), column, rows, 1);
+    }
+    (void)P;
+    (void)zj;
+  }
+
+  /* d(Phi_q^T lambda)/dq, but for what the body itself adds */
+  static void curvatureBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Twist<double> *w, const double *z,
+                              const double *lambda, const typename K::Gradient &J, const Slot *&slot)
+  {
+    constexpr bool      curved = curvedAtAll();
+    typename K::Hessian H;
+    if constexpr (curved) {
+      if constexpr (K::holonomic) K::curvature(e.data, f, ev.t, lambda, H);
+      else K::curvature(e.data, f, w, ev.t, z, lambda, H);
+    }
+    const Eigen::Map<const Matrix<R, 1>> l(lambda);
+    for (int k = 0; k < M; k++)
+      for (int m = 0; m < M; m++) {
+        const LocalBody            &b = bodyOf(ev.bodies, e, k), &c = bodyOf(ev.bodies, e, m);
+        Eigen::Matrix<double, 6, 6> D;
+        bool                        made = false;
+        for (int g = 0; g < Groups(b.kind); g++)
+          for (int h = 0; h < Groups(c.kind); h++) {
+            if (!curves(b.kind, g, k, c.kind, h, m)) continue;
+            if (!made) {
+              D.setZero();
+              if constexpr (curved) {
+                Eigen::Matrix<double, 6, 6> right = Eigen::Matrix<double, 6, 6>::Zero(), both = right;
+                ev.bodies.columns(e.marker[m], f[m], H.template block<6, 6>(6 * k, 6 * m), right);
+                ev.bodies.columns(e.marker[k], f[k], right.transpose(), both);
+                D = both.transpose();
+              }
+              if (k == m && Depends(K::depends, 2 * k)) {
+                const PetscInt body = ev.bodies.marker[e.marker[k]].body;
+                AddLever(ev.bodies, body, f[k].x - ev.bodies.now[body].r, J.template middleCols<3>(6 * k).transpose() * l, D);
+              }
+              made = true;
+            }
+            const int sb = GroupSize(b.kind), sc = GroupSize(c.kind);
+            ev.sink.add(*slot++, D.block(g * sb, h * sc, sb, sc), sb, sc);
+          }
+      }
+    (void)w;
+    (void)z;
+  }
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,134 @@
+/* Residual and Jacobian of the scene: exchange, motion of the bodies, elements, bodies' own rows. */
+#include "runtime.h"
+#include <algorithm>
+
+namespace hhtdae
+{
+
+/* The local unknowns: the arrays themselves on one rank, else copies with others' values behind */
+PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3])
+{
+  const double *own[3] = {u, v, a};
+  PetscFunctionBegin;
+  if (R.size == 1) {
+    std::copy(own, own + 3, local);
+    PetscFunctionReturn(0);
+  }
+  const int            width  = R.uses_acceleration ? 3 : 2;
+  std::vector<double> *all[3] = {&R.u, &R.v, &R.a};
+  for (PetscInt i : R.boundary)
+    for (int k = 0; k < width; k++) R.send[(std::size_t)width * i + k] = own[k][i];
+  PetscCall(PetscSFBcastBegin(R.sf, R.unit, R.send.data(), R.receive.data(), MPI_REPLACE));
+  for (int k = 0; k < 3; k++) std::copy(own[k], own[k] + R.n, all[k]->begin());
+  PetscCall(PetscSFBcastEnd(R.sf, R.unit, R.send.data(), R.receive.data(), MPI_REPLACE));
+  for (std::size_t i = 0; i < R.others.size(); i++)
+    for (int k = 0; k < width; k++) (*all[k])[R.n + i] = R.receive[width * i + k];
+  for (int k = 0; k < 3; k++) local[k] = all[k]->data();
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
+{
+  const double *u, *v, *a, *local[3];
+  double       *f;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(VecGetArrayRead(A, &a));
+  PetscCall(LocalState(R, u, v, a, local));
+  PetscCall(VecGetArrayWrite(F, &f));
+  std::fill(f, f + R.n, 0.0);
+  R.bodies.move(local[0], local[1]);
+  Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
+  for (auto &b : R.batches) b->residual(e);
+  R.bodies.residual(local[1], local[2], f);
+  PetscCall(VecRestoreArrayWrite(F, &f));
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscCall(VecRestoreArrayRead(A, &a));
+  PetscFunctionReturn(0);
+}
+
+namespace
+{
+
+void BodyBlocks(const Runtime &R, const Evaluation &e)
+{
+  const Slot *slot = R.body_slot.data();
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    Eigen::Matrix<double, 6, 6, Eigen::RowMajor> B;
+    const BodyKind                               kind = R.bodies.body[b].kind;
+    R.bodies.jacobian(b, e.v, e.a, e.sv, e.sa, B);
+    const int size = GroupSize(kind);
+    for (int g = 0; g < Groups(kind); g++) e.sink.add(*slot++, B.block(g * size, g * size, size, size), size, size);
+  }
+}
+
+/* The arrays of SEQAIJ and MPIAIJ are filled in place; another type gets the rows of an AIJ copy. */
+PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
+{
+  Mat       diagonal = aij, off = nullptr;
+  PetscInt  n;
+  PetscFunctionBegin;
+  if (R.size > 1) PetscCall(MatMPIAIJGetSeqAIJ(aij, &diagonal, &off, nullptr));
+  MatInfo info;
+  PetscCall(MatSeqAIJGetArrayWrite(diagonal, &e.sink.diagonal));
+  PetscCall(MatGetInfo(diagonal, MAT_LOCAL, &info));
+  n = (PetscInt)info.nz_used;
+  std::fill(e.sink.diagonal, e.sink.diagonal + n, 0.0);
+  if (off) {
+    PetscCall(MatSeqAIJGetArrayWrite(off, &e.sink.off));
+    PetscCall(MatGetInfo(off, MAT_LOCAL, &info));
+    std::fill(e.sink.off, e.sink.off + (PetscInt)info.nz_used, 0.0);
+  }
+  for (auto &b : R.batches) b->jacobian(e);
+  BodyBlocks(R, e);
+  PetscCall(MatSeqAIJRestoreArrayWrite(diagonal, &e.sink.diagonal));
+  if (off) PetscCall(MatSeqAIJRestoreArrayWrite(off, &e.sink.off));
+  PetscCall(MatAssemblyBegin(aij, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(aij, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J)
+{
+  const double *u, *v, *a, *local[3];
+  PetscBool     seq, mpi;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(VecGetArrayRead(A, &a));
+  PetscCall(LocalState(R, u, v, a, local));
+  R.bodies.move(local[0], local[1]);
+  Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, nullptr, sv, sa};
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSEQAIJ, &seq));
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMPIAIJ, &mpi));
+  if (seq || mpi) {
+    PetscCall(Fill(R, e, J));
+  } else {
+    MatType type;
+    PetscCall(Fill(R, e, R.J));
+    PetscCall(MatGetType(J, &type));
+    PetscCall(MatConvert(R.J, type, MAT_REUSE_MATRIX, &J));
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscCall(VecRestoreArrayRead(A, &a));
+  PetscFunctionReturn(0);
+}
+
+Runtime::~Runtime()
+{
+  PetscBool gone = PETSC_FALSE;
+  if (PetscFinalized(&gone) || gone) return; /* PETSc has taken everything with it */
+  for (IS &is : roles) PetscCallAbort(PETSC_COMM_SELF, ISDestroy(&is));
+  PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
+  PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&axes));
+  PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&sf));
+  PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&axes_sf));
+  if (unit != MPI_DATATYPE_NULL) MPI_Type_free(&unit);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,321 @@
+/* All instances of one force kernel on this rank, eliminated (the default) or carried as force states F - f(...) = 0, (7b). */
+#ifndef HHTDAE_SCENE_FORCE_BATCH_H
+#define HHTDAE_SCENE_FORCE_BATCH_H
+
+#include "batch.h"
+#include "kernel.h"
+
+namespace hhtdae
+{
+
+template <class K> struct ForceInstance {
+  static constexpr int Z = K::inputs;
+  PetscInt         marker[K::markers];
+  PetscInt         state = -1, state_group = -1; /* force states, if carried */
+  Input            input[Z > 0 ? Z : 1];
+  typename K::Data data;
+};
+
+/* What both ways share: blocks between the coordinates of the markers' bodies */
+template <class K> class ForceBatchBase : public Batch
+{
+protected:
+  static constexpr int M = K::markers, Z = K::inputs;
+  using Instance         = ForceInstance<K>;
+
+public:
+  std::vector<Instance> all;
+  Bodies               *bodies = nullptr;
+
+  void accept(Bodies &B) override
+  {
+    if constexpr (K::memory > 0)
+      for (Instance &e : all) {
+        Frame<double> f[M];
+        for (int k = 0; k < M; k++) f[k] = B.frame<true>(e.marker[k]);
+        K::accept(e.data, f);
+      }
+    (void)B;
+  }
+  PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
+  void     copyMemory(double *x, bool in) override
+  {
+    if constexpr (K::memory > 0)
+      for (Instance &e : all)
+        for (int i = 0; i < K::memory; i++, x++) {
+          if (in) e.data.memory[i] = *x;
+          else *x = e.data.memory[i];
+        }
+    (void)x;
+    (void)in;
+  }
+
+protected:
+  static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
+
+  /* does the load reach group g of marker k's body; do the load or its components depend on it */
+  static bool loads(BodyKind b, int g, int k)
+  {
+    return Depends(K::acts, 2 * k) || (Turns(b, g) && Depends(K::acts, 2 * k + 1));
+  }
+  static bool uses(BodyKind b, int g, int k)
+  {
+    return Depends(K::depends, 2 * k) || (Turns(b, g) && Depends(K::depends, 2 * k + 1));
+  }
+  static bool couples(BodyKind b, int g, int k, BodyKind c, int h, int l)
+  {
+    if (k == l && Turns(b, g) && Turns(c, h) && Depends(K::acts, 2 * k)) return true; /* AddLever() */
+    return loads(b, g, k) && uses(c, h, l);
+  }
+
+  void bodyPattern(const Instance &e, Pattern &p)
+  {
+    for (int k = 0; k < M; k++)
+      for (int l = 0; l < M; l++) {
+        const LocalBody &b = bodyOf(*bodies, e, k), &c = bodyOf(*bodies, e, l);
+        for (int g = 0; g < Groups(b.kind); g++)
+          for (int h = 0; h < Groups(c.kind); h++)
+            if (couples(b.kind, g, k, c.kind, h, l)) request_.push_back(p.need(b.group + g, c.group + h));
+      }
+  }
+
+  static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *z)
+  {
+    for (int k = 0; k < M; k++) {
+      f[k] = ev.bodies.template frame<K::needs_rotation>(e.marker[k]);
+      if constexpr (K::damped) w[k] = ev.bodies.twist(e.marker[k], f[k]);
+    }
+    for (int i = 0; i < Z; i++) z[i] = ev.input(e.input[i]);
+    (void)w;
+    (void)z;
+  }
+
+  static void apply(Evaluation &ev, const Instance &e, const Frame<double> *f, const Wrench<double> *on)
+  {
+    for (int k = 0; k < M; k++) ev.bodies.load(e.marker[k], f[k], on[k].f, on[k].m);
+  }
+
+  /* - d load: derivatives of the wrenches by frames (and twists, null if none) */
+  static void bodyBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Wrench<double> *on, const Matrix<6 * M, 6 * M> &frames,
+                         const Matrix<6 * M, 6 * M> *twists, const Slot *&slot)
+  {
+    using Six = Eigen::Matrix<double, 6, 6>;
+    for (int k = 0; k < M; k++)
+      for (int l = 0; l < M; l++) {
+        const LocalBody &b = bodyOf(ev.bodies, e, k), &c = bodyOf(ev.bodies, e, l);
+        Six              D;
+        bool             made = false;
+        for (int g = 0; g < Groups(b.kind); g++)
+          for (int h = 0; h < Groups(c.kind); h++) {
+            if (!couples(b.kind, g, k, c.kind, h, l)) continue;
+            if (!made) {
+              Six right = Six::Zero(), both = Six::Zero();
+              if (twists) {
+                const Six T = -twists->template block<6, 6>(6 * k, 6 * l);
+                ev.bodies.columns(e.marker[l], f[l], Six(ev.sv * T - frames.template block<6, 6>(6 * k, 6 * l)), right);
+                ev.bodies.convectiveColumns(e.marker[l], f[l], ev.v, T, right);
+              } else {
+                ev.bodies.columns(e.marker[l], f[l], Six(-frames.template block<6, 6>(6 * k, 6 * l)), right);
+              }
+              ev.bodies.columns(e.marker[k], f[k], right.transpose(), both);
+              D = both.transpose();
+              if (k == l && Depends(K::acts, 2 * k)) {
+                const PetscInt body = ev.bodies.marker[e.marker[k]].body;
+                AddLever(ev.bodies, body, f[k].x - ev.bodies.now[body].r, -on[k].f, D);
+              }
+              made = true;
+            }
+            const int sb = GroupSize(b.kind), sc = GroupSize(c.kind);
+            ev.sink.add(*slot++, D.block(g * sb, h * sc, sb, sc), sb, sc);
+          }
+      }
+  }
+
+  /* - d load / d scalars: columns of one group of size n */
+  template <int n>
+  static void scalarColumns(Evaluation &ev, const Instance &e, const Frame<double> *f, const Matrix<6 * M, n> &J, PetscInt offset, const Slot *&slot)
+  {
+    for (int k = 0; k < M; k++) {
+      const LocalBody &b = bodyOf(ev.bodies, e, k);
+      Matrix<n, 6>     T = Matrix<n, 6>::Zero();
+      ev.bodies.columns(e.marker[k], f[k], Matrix<n, 6>(-J.template middleRows<6>(6 * k).transpose()), T);
+      const int size = GroupSize(b.kind);
+      for (int g = 0; g < Groups(b.kind); g++)
+        if (loads(b.kind, g, k)) ev.sink.add((slot++)->column(offset), T.middleCols(g * size, size).transpose(), size, n);
+    }
+  }
+};
+
+/* Components eliminated: the load depends on the state */
+template <class K> class ForceBatch : public ForceBatchBase<K>
+{
+  using Base = ForceBatchBase<K>;
+  using Base::M, Base::Z, Base::bodies, Base::request_, Base::slot_;
+
+public:
+  void pattern(Pattern &p) override
+  {
+    for (const auto &e : this->all) {
+      this->bodyPattern(e, p);
+      for (int i = 0; i < Z; i++)
+        for (int k = 0; k < M; k++) {
+          const LocalBody &b = Base::bodyOf(*bodies, e, k);
+          for (int g = 0; g < Groups(b.kind); g++)
+            if (Base::loads(b.kind, g, k)) request_.push_back(p.need(b.group + g, e.input[i].group));
+        }
+    }
+  }
+
+  void residual(Evaluation &ev) override
+  {
+    for (const auto &e : this->all) {
+      Frame<double>  f[M];
+      Twist<double>  w[M];
+      Wrench<double> on[M];
+      double         z[Z > 0 ? Z : 1];
+      Base::gather(ev, e, f, w, z);
+      K::wrench(e.data, f, w, ev.t, z, on);
+      Base::apply(ev, e, f, on);
+    }
+  }
+
+  void jacobian(Evaluation &ev) override
+  {
+    const Slot *slot = slot_.data();
+    for (const auto &e : this->all) {
+      Frame<double>       f[M];
+      Twist<double>       w[M];
+      Wrench<double>      on[M];
+      double              z[Z > 0 ? Z : 1];
+      ForceJacobian<M, Z> J;
+      Base::gather(ev, e, f, w, z);
+      K::jacobian(e.data, f, w, ev.t, z, on, J);
+      Base::apply(ev, e, f, on);
+      Base::bodyBlocks(ev, e, f, on, J.frames, K::damped ? &J.twists : nullptr, slot);
+      for (int i = 0; i < Z; i++) this->template scalarColumns<1>(ev, e, f, J.inputs.col(i), e.input[i].offset, slot);
+    }
+  }
+};
+
+/* Components carried as force states: rows F - c(...) = 0, loads from F and the frames alone */
+template <class K> class ForceStateBatch : public ForceBatchBase<K>
+{
+  using Base = ForceBatchBase<K>;
+  using Base::M, Base::Z, Base::bodies, Base::request_, Base::slot_;
+  static constexpr int C = K::count;
+
+public:
+  void pattern(Pattern &p) override
+  {
+    for (const auto &e : this->all) {
+      request_.push_back(p.need(e.state_group, e.state_group));
+      for (int i = 0; i < Z; i++) request_.push_back(p.need(e.state_group, e.input[i].group));
+      for (int k = 0; k < M; k++) {
+        const LocalBody &b = Base::bodyOf(*bodies, e, k);
+        for (int g = 0; g < Groups(b.kind); g++)
+          if (Base::uses(b.kind, g, k)) request_.push_back(p.need(e.state_group, b.group + g));
+      }
+      this->bodyPattern(e, p);
+      for (int k = 0; k < M; k++) {
+        const LocalBody &b = Base::bodyOf(*bodies, e, k);
+        for (int g = 0; g < Groups(b.kind); g++)
+          if (Base::loads(b.kind, g, k)) request_.push_back(p.need(b.group + g, e.state_group));
+      }
+    }
+  }
+
+  void residual(Evaluation &ev) override
+  {
+    for (const auto &e : this->all) {
+      Frame<double>  f[M];
+      Twist<double>  w[M];
+      Wrench<double> on[M];
+      double         z[Z > 0 ? Z : 1], c[C];
+      Base::gather(ev, e, f, w, z);
+      K::template components<double>(e.data, f, w, ev.t, z, c);
+      for (int i = 0; i < C; i++) ev.row(e.state + i, ev.u[e.state + i] - c[i]);
+      K::template apply<double>(e.data, f, ev.u + e.state, on);
+      Base::apply(ev, e, f, on);
+    }
+  }
+
+  void jacobian(Evaluation &ev) override
+  {
+    const Slot *slot = slot_.data();
+    for (const auto &e : this->all) {
+      Frame<double>  f[M];
+      Twist<double>  w[M];
+      double         z[Z > 0 ? Z : 1];
+      Base::gather(ev, e, f, w, z);
+      definition(ev, e, f, w, z, slot);
+      load(ev, e, f, slot);
+    }
+  }
+
+private:
+  /* rows F - c = 0 */
+  static void definition(Evaluation &ev, const typename Base::Instance &e, const Frame<double> *f, const Twist<double> *w, const double *z,
+                         const Slot *&slot)
+  {
+    constexpr int n = 6 * M, moving = K::damped ? n : 0, N = n + moving + Z;
+    using T         = Dual<N>;
+    Frame<T> s[M];
+    Twist<T> u[M];
+    T        c[C], zs[Z > 0 ? Z : 1];
+    for (int k = 0; k < M; k++) {
+      s[k] = Seed<N>(f[k], 6 * k);
+      if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
+    }
+    for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+    K::template components<T>(e.data, s, u, T(ev.t), zs, c);
+    ev.sink.add(*slot++, Matrix<C, C>(Matrix<C, C>::Identity()), C, C);
+    for (int i = 0; i < Z; i++) {
+      Matrix<C, 1> column;
+      for (int r = 0; r < C; r++) column(r) = -c[r].derivatives()(n + moving + i);
+      ev.sink.add((slot++)->column(e.input[i].offset), column, C, 1);
+    }
+    for (int k = 0; k < M; k++) {
+      const LocalBody &b = Base::bodyOf(ev.bodies, e, k);
+      Matrix<C, 6>     J, V = Matrix<C, 6>::Zero(), out = Matrix<C, 6>::Zero();
+      for (int r = 0; r < C; r++) {
+        J.row(r) = -c[r].derivatives().template segment<6>(6 * k).transpose();
+        if constexpr (K::damped) V.row(r) = -c[r].derivatives().template segment<6>(n + 6 * k).transpose();
+      }
+      ev.bodies.columns(e.marker[k], f[k], Matrix<C, 6>(J + ev.sv * V), out);
+      if constexpr (K::damped) ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, V, out);
+      const int size = GroupSize(b.kind);
+      for (int g = 0; g < Groups(b.kind); g++)
+        if (Base::uses(b.kind, g, k)) ev.sink.add(*slot++, out.middleCols(g * size, size), C, size);
+    }
+  }
+
+  /* loads Pi(q) F */
+  static void load(Evaluation &ev, const typename Base::Instance &e, const Frame<double> *f, const Slot *&slot)
+  {
+    constexpr int n = 6 * M, N = n + C;
+    using T         = Dual<N>;
+    Frame<T>             s[M];
+    T                    c[C];
+    Wrench<T>            w[M];
+    Wrench<double>       on[M];
+    Matrix<n, n>         frames;
+    Matrix<n, C>         columns;
+    for (int k = 0; k < M; k++) s[k] = Seed<N>(f[k], 6 * k);
+    for (int i = 0; i < C; i++) c[i] = T(ev.u[e.state + i], N, n + i);
+    K::template apply<T>(e.data, s, c, w);
+    for (int k = 0; k < M; k++)
+      for (int i = 0; i < 6; i++) {
+        const T &x = i < 3 ? w[k].f(i) : w[k].m(i - 3);
+        (i < 3 ? on[k].f(i) : on[k].m(i - 3)) = x.value();
+        frames.row(6 * k + i)  = x.derivatives().template head<n>().transpose();
+        columns.row(6 * k + i) = x.derivatives().template tail<C>().transpose();
+      }
+    Base::apply(ev, e, f, on);
+    Base::bodyBlocks(ev, e, f, on, frames, nullptr, slot);
+    Base::template scalarColumns<C>(ev, e, f, columns, 0, slot);
+  }
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,63 @@
+/* The state that the description gives, and the axes of the Euler angles chosen for it. */
+#include "runtime.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+void Start(const Runtime &R, const LocalBody &k, double *u, double *v)
+{
+  const BodyData &b = R.scene.bodies[k.id];
+  const int       n = Coordinates(k.kind), directions = PlanarScene(k.kind) ? 2 : 3;
+  for (int i = 0; i < directions; i++) {
+    u[i] = b.r(i);
+    v[i] = b.v(i);
+  }
+  if (k.kind == BodyKind::Planar) {
+    u[2] = std::atan2(b.A(1, 0), b.A(0, 0));
+    v[2] = b.w(2);
+  }
+  if (k.kind != BodyKind::Rigid) return;
+  const Vector3 eps = EulerAngles(b.A * k.C.transpose());
+  Matrix3       A;
+  EulerAxes     e;
+  EulerFrame(eps.data(), A, e);
+  const Vector3 rate = EulerRates(e, b.w);
+  for (int i = 0; i < 3; i++) {
+    u[n - 3 + i] = eps(i);
+    v[n - 3 + i] = rate(i);
+  }
+}
+
+} // namespace
+
+PetscErrorCode InitialState(Runtime &R, Vec U, Vec V)
+{
+  double *u, *v;
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < (PetscInt)R.bodies.body.size(); b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (k.kind != BodyKind::Rigid) continue;
+    const BodyData &d = R.scene.bodies[k.id];
+    R.bodies.setAxes(b, ChooseAxes(d.A, d.w), d.inertia);
+  }
+  PetscCall(VecSet(U, 0));
+  PetscCall(VecSet(V, 0));
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(VecGetArray(V, &v));
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    Start(R, k, u + k.first, v + k.first);
+  }
+  for (std::size_t i = 0; i < R.number.variable.size(); i++)
+    if (R.number.variable_owner[i] == R.rank) u[R.number.variable[i] - R.start] = R.scene.variables[i].initial;
+  for (std::size_t i = 0; i < R.number.state.size(); i++)
+    if (R.number.state_owner[i] == R.rank) u[R.number.state[i] - R.start] = R.scene.states[i].initial;
+  PetscCall(VecRestoreArray(U, &u));
+  PetscCall(VecRestoreArray(V, &v));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,253 @@
+/*
+  What a joint, a motion or a force is to the assembly: a kernel, a struct of static functions of marker frames in space axes.
+  The assembly turns marker perturbations into generalized coordinates, so that a kernel knows nothing of Euler angles, planar
+  bodies or modes. Kernels are compiled into loops over all their instances (batch.h); nothing is virtual inside such a loop.
+
+  A holonomic constraint Phi(frames, t) = 0
+
+    struct K : Constraint<K, markers, rows> {
+      static constexpr const char *name = "in-plane";
+      struct Data { ... };                       constants of one instance (may be empty)
+      static constexpr unsigned depends = ...;   bits Position(k), Rotation(k) of what the rows depend on (default: everything)
+      template <class T> static void value(const Data &, const Frame<T> *f, const T &t, T *phi);
+    };
+
+  gets gradient and curvature by automatic differentiation from Constraint<>; a hot kernel hides them by its own:
+
+      static void gradient(const Data &, const Frame<double> *f, double t, Matrix<rows, 6*markers> &J);    J = dPhi/d(x_0, theta_0, x_1, ...)
+      static void curvature(const Data &, const Frame<double> *f, double t, const double *lambda, Matrix<6*markers, 6*markers> &H);
+                                                                                                           H = d(J^T lambda)/d(...)
+      static constexpr bool curved(int a, int b);   whether block (a, b) of H, 3 x 3, can be nonzero; a = 2k position of k, 2k+1 rotation
+
+  where theta perturbs a frame as R -> (1 + [theta]) R with the origin held, see frames.h.
+
+  A velocity-level (non-holonomic) constraint Psi(frames, twists, t) = 0, linear in the twists: derive from VelocityConstraint<>,
+  value() takes the twists after the frames,
+  and after t the scalars z where it has `inputs`. What `depends` says of positions and rotations of markers holds for their
+  velocities and angular velocities too, here and in forces.
+
+  A force: components c(frames, twists, t, z), and the wrenches on the markers' bodies that they stand for,
+
+    struct K : Force<K, markers, components> {
+      template <class T> static void components(const Data &, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *c);
+      template <class T> static void apply(const Data &, const Frame<T> *f, const T *c, Wrench<T> *on);
+    };
+
+  so that the components can be carried as force states F of the paper: then c are unknowns, and apply() alone makes the load.
+  `damped`: components() uses the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) that it uses.
+
+  Memory of accepted steps (unwinding of angles, say): `static constexpr int memory = 1`, Data begins with `double memory[1]`, and
+  accept(Data &, frames) updates it after each accepted step.
+*/
+#ifndef HHTDAE_SCENE_KERNEL_H
+#define HHTDAE_SCENE_KERNEL_H
+
+#include "frames.h"
+
+namespace hhtdae
+{
+
+struct Empty {
+};
+
+constexpr unsigned Position(int k) { return 1u << (2 * k); }
+constexpr unsigned Rotation(int k) { return 2u << (2 * k); }
+constexpr unsigned Everything(int markers) { return (1u << (2 * markers)) - 1; }
+constexpr bool     Depends(unsigned mask, int a) { return (mask >> a) & 1u; }
+
+template <int N, int M> void SeedAll(const Frame<double> *f, Frame<Dual<N>> *s)
+{
+  for (int k = 0; k < M; k++) s[k] = Seed<N>(f[k], 6 * k);
+}
+
+/* What constraints of both kinds share */
+template <class K, int M, int R> struct ConstraintBase {
+  static constexpr int      markers = M, rows = R, size = 6 * M;
+  static constexpr int      memory = 0, inputs = 0;
+  static constexpr unsigned depends = Everything(M);
+  static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
+  using Data                               = Empty;
+  using Gradient                           = Matrix<R, size>;
+  using Hessian                            = Matrix<size, size>;
+  static constexpr bool curved(int a, int b) { return Depends(K::depends, a) && Depends(K::depends, b); }
+};
+
+template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
+  using Base = ConstraintBase<K, M, R>;
+  using typename Base::Gradient;
+  using typename Base::Hessian;
+  static constexpr bool holonomic = true;
+  static constexpr int  N         = Base::size;
+
+  template <class Data> static void gradient(const Data &d, const Frame<double> *f, double t, Gradient &J)
+  {
+    Frame<Dual<N>> s[M];
+    Dual<N>        phi[R];
+    SeedAll<N, M>(f, s);
+    K::template value<Dual<N>>(d, s, Dual<N>(t), phi);
+    for (int r = 0; r < R; r++) J.row(r) = phi[r].derivatives().transpose();
+  }
+
+  template <class Data>
+  static void curvature(const Data &d, const Frame<double> *f, double t, const double *lambda, Hessian &H)
+  {
+    Frame<Dual2<N>> s[M];
+    Dual2<N>        phi[R];
+    for (int k = 0; k < M; k++) s[k] = Seed2<N>(f[k], 6 * k);
+    K::template value<Dual2<N>>(d, s, Dual2<N>(Dual<N>(t)), phi);
+    H.setZero();
+    for (int r = 0; r < R; r++)
+      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * phi[r].derivatives()(a).derivatives().transpose();
+  }
+
+  /* partial derivatives Phi_t, Phi_tt; kernels without time inherit zeros */
+  static constexpr bool driven = false; /* value() depends on t */
+  template <class Data> static void time(const Data &d, const Frame<double> *f, double t, double *first, double *second)
+  {
+    for (int r = 0; r < R; r++) first[r] = second[r] = 0;
+    if constexpr (K::driven) {
+      using T = Dual2<1>;
+      Frame<T> s[M];
+      T        phi[R], clock(Dual<1>(t, 1, 0));
+      clock.derivatives()(0) = Dual<1>(1);
+      for (int k = 0; k < M; k++) s[k] = Constant<T>(f[k]);
+      K::template value<T>(d, s, clock, phi);
+      for (int r = 0; r < R; r++) {
+        first[r]  = phi[r].value().derivatives()(0);
+        second[r] = phi[r].derivatives()(0).derivatives()(0);
+      }
+    }
+  }
+};
+
+template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M, R> {
+  using Base = ConstraintBase<K, M, R>;
+  using typename Base::Gradient;
+  using typename Base::Hessian;
+  static constexpr bool holonomic = false, driven = true;
+  static constexpr int  N = Base::size;
+
+  /* dPsi/d twists (J), dPsi/d frames (P), dPsi/dz (zj, rows x inputs) */
+  template <class Data>
+  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Gradient &J, Gradient &P,
+                       double *zj)
+  {
+    constexpr int Z = K::inputs;
+    using T         = Dual<2 * N + Z>;
+    Frame<T> s[M];
+    Twist<T> u[M];
+    T        psi[R], zs[Z > 0 ? Z : 1];
+    for (int k = 0; k < M; k++) {
+      s[k] = Seed<2 * N + Z>(f[k], 6 * k);
+      u[k] = Seed<2 * N + Z>(w[k], N + 6 * k);
+    }
+    for (int i = 0; i < Z; i++) zs[i] = T(z[i], 2 * N + Z, 2 * N + i);
+    evaluate<T>(d, s, u, T(t), zs, psi);
+    for (int r = 0; r < R; r++) {
+      P.row(r) = psi[r].derivatives().template head<N>().transpose();
+      J.row(r) = psi[r].derivatives().template segment<N>(N).transpose();
+      for (int i = 0; i < Z && zj; i++) zj[r * Z + i] = psi[r].derivatives()(2 * N + i);
+    }
+  }
+  template <class Data>
+  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, Gradient &J, Gradient &P)
+  {
+    const double none = 0;
+    gradient(d, f, w, t, &none, J, P, nullptr);
+  }
+
+  /* d(J^T lambda)/d frames */
+  template <class Data>
+  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, const double *lambda,
+                        Hessian &H)
+  {
+    using T = Dual2<N>;
+    Frame<T> s[M];
+    Twist<T> u[M];
+    T        psi[R], zs[K::inputs > 0 ? K::inputs : 1];
+    for (int k = 0; k < M; k++) {
+      const Frame<Dual<N>> inner = Seed<N>(f[k], 6 * k);
+      u[k]                       = Constant<T>(w[k]);
+      for (int i = 0; i < 3; i++) {
+        s[k].x(i) = T(inner.x(i));
+        for (int c = 0; c < 3; c++) s[k].R(i, c) = T(inner.R(i, c));
+        u[k].v(i).derivatives()(6 * k + i)     = Dual<N>(1);
+        u[k].w(i).derivatives()(6 * k + 3 + i) = Dual<N>(1);
+      }
+    }
+    for (int i = 0; i < K::inputs; i++) zs[i] = T(Dual<N>(z[i]));
+    evaluate<T>(d, s, u, T(Dual<N>(t)), zs, psi);
+    H.setZero();
+    for (int r = 0; r < R; r++)
+      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * psi[r].derivatives()(a).derivatives().transpose();
+  }
+  template <class Data>
+  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *lambda, Hessian &H)
+  {
+    const double none = 0;
+    curvature(d, f, w, t, &none, lambda, H);
+  }
+
+private:
+  template <class T, class Data> static void evaluate(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *psi)
+  {
+    if constexpr (K::inputs > 0) K::template value<T>(d, f, w, t, z, psi);
+    else K::template value<T>(d, f, w, t, psi);
+    (void)z;
+  }
+};
+
+/* Wrenches of all markers as one vector, and its derivatives */
+template <int M, int Z> struct ForceJacobian {
+  Matrix<6 * M, 6 * M>          frames, twists;
+  Matrix<6 * M, (Z > 0 ? Z : 1)> inputs;
+};
+
+template <class K, int M, int C> struct Force {
+  static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0;
+  static constexpr unsigned depends = Everything(M); /* what components() and apply() use */
+  static constexpr unsigned acts    = Everything(M); /* Position(k): a force at k, Rotation(k): a moment at k */
+  static constexpr bool     damped = true, symmetric = false, needs_rotation = true;
+  using Data = Empty;
+
+  template <class Data>
+  static void wrench(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on)
+  {
+    double c[C];
+    K::template components<double>(d, f, w, t, z, c);
+    K::template apply<double>(d, f, c, on);
+  }
+
+  /* Derivatives of the wrenches; hidden by kernels that know better. on: the wrenches themselves */
+  template <class Data, int Z>
+  static void jacobian(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on,
+                       ForceJacobian<M, Z> &J)
+  {
+    constexpr int n = 6 * M, moving = K::damped ? n : 0, N = n + moving + Z;
+    using T         = Dual<N>;
+    Frame<T>  s[M];
+    Twist<T>  u[M];
+    T         c[C], zs[Z > 0 ? Z : 1];
+    Wrench<T> load[M];
+    for (int k = 0; k < M; k++) {
+      s[k] = Seed<N>(f[k], 6 * k);
+      if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
+    }
+    for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+    K::template components<T>(d, s, u, T(t), zs, c);
+    K::template apply<T>(d, s, c, load);
+    J.twists.setZero();
+    for (int k = 0; k < M; k++)
+      for (int i = 0; i < 6; i++) {
+        const T &x = i < 3 ? load[k].f(i) : load[k].m(i - 3);
+        (i < 3 ? on[k].f(i) : on[k].m(i - 3)) = x.value();
+        J.frames.row(6 * k + i) = x.derivatives().template head<n>().transpose();
+        if constexpr (K::damped) J.twists.row(6 * k + i) = x.derivatives().template segment<n>(n).transpose();
+        if constexpr (Z > 0) J.inputs.row(6 * k + i) = x.derivatives().template tail<Z>().transpose();
+      }
+  }
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,273 @@
+/* What this rank needs of the scene: bodies, markers, joints and forces, the pattern of its rows, the exchange with other ranks. */
+#include "runtime.h"
+#include <algorithm>
+#include <unordered_map>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+PetscMPIInt OwnerOfBody(const Runtime &R, PetscInt b) { return R.number.owner.empty() ? 0 : R.number.owner[b]; }
+
+class LocalizerOf : public Localizer
+{
+public:
+  LocalizerOf(Runtime &r, bool collecting) : R(r), collecting_(collecting), marker_(r.scene.markers.size(), -1)
+  {
+    bodies = &r.bodies;
+  }
+
+  bool needed(const StoreBase &s, PetscInt e) const override
+  {
+    if (R.size == 1 || OwnerOf(R, s, e) == R.rank) return true;
+    for (int k = 0; k < s.markers(); k++) {
+      const PetscInt b = R.scene.markers[s.marker(e, k)].body;
+      if (b >= 0 && OwnerOfBody(R, b) == R.rank) return true;
+    }
+    return false;
+  }
+
+  PetscInt marker(PetscInt id) override
+  {
+    const MarkerData &m = R.scene.markers[id];
+    if (collecting_) {
+      if (m.body >= 0 && OwnerOfBody(R, m.body) != R.rank) other_bodies.push_back(m.body);
+      return 0;
+    }
+    if (marker_[id] < 0) {
+      marker_[id] = (PetscInt)R.bodies.marker.size();
+      R.bodies.marker.push_back({m.body < 0 ? (PetscInt)R.bodies.body.size() - 1 : R.local_body[m.body], m.s, m.R});
+    }
+    return marker_[id];
+  }
+
+  PetscInt group(PetscInt global, PetscInt size) override
+  {
+    const bool own = global >= R.start && global < R.start + R.n;
+    if (collecting_) {
+      for (PetscInt i = 0; i < size && !own; i++) others.push_back(global + i);
+      return 0;
+    }
+    const auto found = group_.find(global);
+    if (found != group_.end()) return found->second;
+    return group_[global] = R.pattern.addGroup(global, local(global), size, own);
+  }
+
+  PetscInt local(PetscInt global) const override
+  {
+    if (global >= R.start && global < R.start + R.n) return global - R.start;
+    if (collecting_) return 0;
+    return R.n + (PetscInt)(std::lower_bound(R.others.begin(), R.others.end(), global) - R.others.begin());
+  }
+
+  Input input(const ScalarRef &r) override
+  {
+    switch (r.kind) {
+    case ScalarRef::Variable:
+      return place(R.number.variable[r.id], 1, 0);
+    case ScalarRef::State:
+      return place(R.number.state[r.id], 1, 0);
+    default:
+      break;
+    }
+    PetscInt row = r.component;
+    for (const Part &p : R.scene.elements[r.id].parts) {
+      if (p.store->isConstraint() != (r.kind == ScalarRef::Multiplier)) continue;
+      if (row >= p.store->rows()) {
+        row -= p.store->rows();
+        continue;
+      }
+      PetscInt offset = row;
+      if (p.store->isConstraint()) {
+        const unsigned char active = p.store->active(p.index);
+        if (!(active >> row & 1)) return {}; /* dropped: zero */
+        offset = 0;
+        for (PetscInt i = 0; i < row; i++) offset += active >> i & 1;
+      }
+      return place(p.store->start[p.index], p.store->unknowns(p.index), offset);
+    }
+    return {};
+  }
+
+  std::vector<PetscInt> other_bodies, others; /* what collecting has found */
+
+private:
+  Input place(PetscInt global, PetscInt size, PetscInt offset)
+  {
+    const PetscInt g = group(global, size);
+    return {local(global + offset), g, offset};
+  }
+
+  Runtime                               &R;
+  bool                                   collecting_;
+  std::vector<PetscInt>                  marker_;
+  std::unordered_map<PetscInt, PetscInt> group_;
+};
+
+PetscErrorCode Localize(Runtime &R, Localizer &l)
+{
+  PetscFunctionBegin;
+  R.batches.clear();
+  for (StoreBase *s : R.scene.order) s->localize(l, R.batches);
+  PetscCall(LocalizeExpressions(R, l));
+  PetscFunctionReturn(0);
+}
+
+LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
+{
+  const BodyData &b = R.scene.bodies[id];
+  LocalBody       k;
+  k.kind  = KindOf(R.scene, b);
+  k.owned = own;
+  k.id    = id;
+  k.mass  = b.mass;
+  k.C.setIdentity();
+  k.J = b.inertia;
+  const PetscInt global = R.number.body[id];
+  k.first = own ? global - R.start : R.n + (PetscInt)(std::lower_bound(R.others.begin(), R.others.end(), global) - R.others.begin());
+  k.group = (PetscInt)R.pattern.group.size();
+  for (int g = 0; g < Groups(k.kind); g++) {
+    const int size = GroupSize(k.kind);
+    R.pattern.addGroup(global + g * size, k.first + g * size, size, own);
+  }
+  return k;
+}
+
+/* Own bodies in the order of their numbers, others', the ground */
+void MakeBodies(Runtime &R, const std::vector<PetscInt> &other)
+{
+  Bodies &B = R.bodies;
+  B.body.clear();
+  B.marker.clear();
+  R.local_body.assign(R.scene.bodies.size(), -1);
+  for (PetscInt id = 0; id < (PetscInt)R.scene.bodies.size(); id++)
+    if (OwnerOfBody(R, id) == R.rank) {
+      R.local_body[id] = (PetscInt)B.body.size();
+      B.body.push_back(MakeBody(R, id, true));
+    }
+  B.own = (PetscInt)B.body.size();
+  for (PetscInt id : other) {
+    R.local_body[id] = (PetscInt)B.body.size();
+    B.body.push_back(MakeBody(R, id, false));
+  }
+  B.body.push_back(LocalBody());
+  BodyMotion still;
+  still.r.setZero();
+  still.v.setZero();
+  still.w.setZero();
+  still.A.setIdentity();
+  still.euler.g2.setZero();
+  still.euler.g3.setZero();
+  still.f.setZero();
+  still.m.setZero();
+  B.now.assign(B.body.size(), still);
+  B.gravity = R.scene.gravity;
+}
+
+void SortUnique(std::vector<PetscInt> &x)
+{
+  std::sort(x.begin(), x.end());
+  x.erase(std::unique(x.begin(), x.end()), x.end());
+}
+
+/* Leaves are others' unknowns here; the roots that have leaves are packed */
+PetscErrorCode MakeExchange(Runtime &R)
+{
+  const PetscInt  n = (PetscInt)R.others.size();
+  const PetscInt *degree;
+  PetscLayout     layout;
+  PetscFunctionBegin;
+  PetscCall(PetscLayoutCreateFromSizes(R.scene.comm, R.n, R.number.first.back(), 1, &layout));
+  PetscCall(PetscSFCreate(R.scene.comm, &R.sf));
+  PetscCall(PetscSFSetGraphLayout(R.sf, layout, n, nullptr, PETSC_COPY_VALUES, R.others.data()));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscCall(PetscSFComputeDegreeBegin(R.sf, &degree));
+  PetscCall(PetscSFComputeDegreeEnd(R.sf, &degree));
+  R.boundary.clear();
+  for (PetscInt i = 0; i < R.n; i++)
+    if (degree[i]) R.boundary.push_back(i);
+  const int width = R.uses_acceleration ? 3 : 2;
+  PetscCallMPI(MPI_Type_contiguous(width, MPI_DOUBLE, &R.unit));
+  PetscCallMPI(MPI_Type_commit(&R.unit));
+  R.send.assign((std::size_t)width * R.n, 0);
+  R.receive.assign((std::size_t)width * n, 0);
+  R.u.assign(R.n + n, 0);
+  R.v.assign(R.n + n, 0);
+  R.a.assign(R.n + n, 0);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode MakePattern(Runtime &R)
+{
+  std::vector<PetscInt> request;
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    for (int g = 0; g < Groups(k.kind); g++) request.push_back(R.pattern.need(k.group + g, k.group + g));
+  }
+  for (auto &b : R.batches) b->pattern(R.pattern);
+  R.pattern.build(R.start, R.n);
+  R.body_slot.clear();
+  for (PetscInt r : request) R.body_slot.push_back(R.pattern.slot(r));
+  for (auto &b : R.batches) b->resolve(R.pattern);
+  R.pattern.release();
+  PetscCall(R.pattern.createMat(R.scene.comm, R.n, &R.J));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode MakeRoles(Runtime &R)
+{
+  std::vector<PetscInt> role[TSHHT3_NUM_ROLES];
+  const auto            add = [&](TSHHT3Role r, PetscInt global, PetscInt count) {
+    for (PetscInt i = 0; i < count; i++) role[r].push_back(global + i);
+  };
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    add(TSHHT3_COORDINATE, k.first + R.start, Coordinates(k.kind));
+  }
+  for (StoreBase *s : R.scene.order)
+    for (PetscInt e = 0; e < s->size(); e++)
+      if (s->unknowns(e) && OwnerOf(R, *s, e) == R.rank)
+        add(!s->isConstraint() ? TSHHT3_FORCE : s->isHolonomic() ? TSHHT3_HOLONOMIC : TSHHT3_NONHOLONOMIC, s->start[e], s->unknowns(e));
+  for (std::size_t i = 0; i < R.number.variable.size(); i++)
+    if (R.number.variable_owner[i] == R.rank) add(TSHHT3_VARIABLE, R.number.variable[i], 1);
+  for (std::size_t i = 0; i < R.number.state.size(); i++)
+    if (R.number.state_owner[i] == R.rank) add(TSHHT3_STATE, R.number.state[i], 1);
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+    PetscCall(ISDestroy(&R.roles[r]));
+    PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)role[r].size(), role[r].data(), PETSC_COPY_VALUES, &R.roles[r]));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Layout(Runtime &R)
+{
+  PetscFunctionBegin;
+  std::vector<PetscInt> other;
+  R.pattern = Pattern();
+  R.others.clear();
+  if (R.size > 1) {
+    LocalizerOf collect(R, true);
+    PetscCall(Localize(R, collect));
+    other = collect.other_bodies;
+    SortUnique(other);
+    R.others = collect.others;
+    for (PetscInt b : other)
+      for (int i = 0; i < Coordinates(KindOf(R.scene, R.scene.bodies[b])); i++) R.others.push_back(R.number.body[b] + i);
+    SortUnique(R.others);
+  }
+  MakeBodies(R, other);
+  LocalizerOf place(R, false);
+  PetscCall(Localize(R, place));
+  if (R.size > 1) PetscCall(MakeExchange(R));
+  PetscCall(MakePattern(R));
+  PetscCall(MakeRoles(R));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

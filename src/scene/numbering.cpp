@@ -1,0 +1,68 @@
+/* Global numbers of all unknowns, the same computation on every rank. */
+#include "runtime.h"
+
+namespace hhtdae
+{
+
+/* The owner of its first body that can move */
+PetscMPIInt OwnerOf(const Runtime &R, const StoreBase &s, PetscInt e)
+{
+  if (R.size == 1) return 0;
+  for (int k = 0; k < s.markers(); k++) {
+    const PetscInt b = R.scene.markers[s.marker(e, k)].body;
+    if (b >= 0) return R.number.owner[b];
+  }
+  return 0;
+}
+
+BodyKind KindOf(const SceneData &s, const BodyData &b)
+{
+  if (s.planar) return b.point ? BodyKind::PlanarPoint : BodyKind::Planar;
+  return b.point ? BodyKind::Point : BodyKind::Rigid;
+}
+
+namespace
+{
+
+/* Visits everything that has unknowns, in the order of their numbers within a rank: f(owner, count, place of the number) */
+template <class F> void Visit(Runtime &R, F f)
+{
+  SceneData &s = R.scene;
+  Numbering &N = R.number;
+  for (std::size_t b = 0; b < s.bodies.size(); b++) f(N.owner.empty() ? 0 : N.owner[b], Coordinates(KindOf(s, s.bodies[b])), N.body[b]);
+  for (StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++) f(OwnerOf(R, *store, e), store->unknowns(e), store->start[e]);
+  for (std::size_t i = 0; i < s.variables.size(); i++) f(N.variable_owner[i], 1, N.variable[i]);
+  for (std::size_t i = 0; i < s.states.size(); i++) f(N.state_owner[i], 1, N.state[i]);
+}
+
+} // namespace
+
+PetscErrorCode Number(Runtime &R)
+{
+  SceneData &s = R.scene;
+  Numbering &N = R.number;
+  PetscFunctionBegin;
+  N.body.assign(s.bodies.size(), -1);
+  N.variable.assign(s.variables.size(), -1);
+  N.state.assign(s.states.size(), -1);
+  N.variable_owner.clear();
+  N.state_owner.clear();
+  for (const ExpressionData &v : s.variables) N.variable_owner.push_back(OwnerOf(R, v.expression));
+  for (const ExpressionData &x : s.states) N.state_owner.push_back(OwnerOf(R, x.expression));
+  for (StoreBase *store : s.order) store->start.assign(store->size(), -1);
+
+  N.first.assign(R.size + 1, 0);
+  Visit(R, [&](PetscMPIInt owner, int count, PetscInt &) { N.first[owner + 1] += count; });
+  for (PetscMPIInt r = 0; r < R.size; r++) N.first[r + 1] += N.first[r];
+  std::vector<PetscInt> next(N.first.begin(), N.first.end() - 1);
+  Visit(R, [&](PetscMPIInt owner, int count, PetscInt &number) {
+    number = count ? next[owner] : -1;
+    next[owner] += count;
+  });
+  R.start = N.first[R.rank];
+  R.n     = N.first[R.rank + 1] - R.start;
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

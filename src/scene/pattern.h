@@ -1,0 +1,87 @@
+/*
+  The sparsity pattern by groups of unknowns. The rows of a group (the position of a body, its angles, the rows of a joint's
+  primitive) have the same columns, so that a block of the matrix is found by one offset and one stride, and elements add to the
+  arrays of the matrix without any search.
+*/
+#ifndef HHTDAE_SCENE_PATTERN_H
+#define HHTDAE_SCENE_PATTERN_H
+
+#include <petscmat.h>
+#include <vector>
+
+namespace hhtdae
+{
+
+struct Group {
+  PetscInt global; /* number of its first unknown */
+  PetscInt local;  /* the same among the local unknowns: own, then others' */
+  PetscInt size;
+  bool     own;
+};
+
+/* Where a block goes: entry (r, c) at base + r stride + c of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix */
+struct Slot {
+  PetscInt base   = -1; /* -1: the rows belong to another rank */
+  PetscInt stride = 0;
+  bool     off    = false;
+
+  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off}; }
+};
+
+class Pattern
+{
+public:
+  std::vector<Group> group;
+
+  PetscInt addGroup(PetscInt global, PetscInt local, PetscInt size, bool own)
+  {
+    group.push_back({global, local, size, own});
+    return (PetscInt)group.size() - 1;
+  }
+  /* asks for a block; its slot is known after build() under the number that is returned. Group -1: nothing, its slot takes nothing */
+  PetscInt need(PetscInt row, PetscInt column)
+  {
+    request_.push_back({column < 0 ? -1 : row, column});
+    return (PetscInt)request_.size() - 1;
+  }
+  /* diagonal entries that no element asks for are left out: multipliers have none */
+  void build(PetscInt start, PetscInt n);
+  Slot slot(PetscInt number) const { return slot_[number]; }
+  void release(); /* what is not needed any more: requests, slots, rows */
+
+  /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
+  std::vector<PetscInt> di, dj, oi, oj;
+
+  /* SEQAIJ or MPIAIJ with this pattern; other types get it through MatConvert by the caller */
+  PetscErrorCode createMat(MPI_Comm comm, PetscInt n, Mat *A) const;
+
+private:
+  struct Request {
+    PetscInt row, column;
+  };
+  std::vector<Request> request_;
+  std::vector<Slot>    slot_;
+};
+
+/* Adds blocks to the arrays of a matrix */
+struct Sink {
+  double *diagonal, *off;
+
+  /* rows, columns: of the block at (0, 0) of B; blocks of three columns are the common ones */
+  template <class Block> void add(const Slot &s, const Block &B, int rows, int columns) const
+  {
+    if (s.base < 0) return;
+    double *p = (s.off ? off : diagonal) + s.base;
+    if (columns == 3) {
+      for (int r = 0; r < rows; r++, p += s.stride)
+        for (int c = 0; c < 3; c++) p[c] += B(r, c);
+    } else {
+      for (int r = 0; r < rows; r++, p += s.stride)
+        for (int c = 0; c < columns; c++) p[c] += B(r, c);
+    }
+  }
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,81 @@
+/* A scene at work: its part on this rank, numbered, with all that an evaluation needs. */
+#ifndef HHTDAE_SCENE_RUNTIME_H
+#define HHTDAE_SCENE_RUNTIME_H
+
+#include "scene_data.h"
+#include <petscsf.h>
+#include <petscts.h>
+
+namespace hhtdae
+{
+
+/* Numbers of all unknowns of the scene, known on every rank; within a rank: bodies, multipliers and force states kernel by
+   kernel, variables, states */
+struct Numbering {
+  std::vector<PetscMPIInt> owner;    /* of bodies; empty on one rank */
+  std::vector<PetscInt>    first;    /* of ranks, and the total */
+  std::vector<PetscInt>    body;     /* first coordinate */
+  std::vector<PetscInt>    variable, state;
+  std::vector<PetscMPIInt> variable_owner, state_owner;
+};
+
+struct Runtime {
+  SceneData  &scene;
+  PetscMPIInt rank = 0, size = 1;
+  Numbering   number;
+  PetscInt    n = 0, start = 0; /* own unknowns, global number of the first */
+
+  Pattern                             pattern;
+  Bodies                              bodies;
+  std::vector<std::unique_ptr<Batch>> batches;
+  std::vector<Slot>                   body_slot; /* diagonal blocks of own bodies, group by group */
+  std::vector<PetscInt>               local_body; /* of bodies in the scene, -1: not here */
+  bool                                uses_acceleration = false; /* somebody reads q'' of other bodies */
+
+  /* exchange: values of others' unknowns; packs (u, v) or (u, v, a) */
+  PetscSF                sf = nullptr;
+  MPI_Datatype           unit = MPI_DATATYPE_NULL;
+  std::vector<PetscInt>  boundary; /* own unknowns that others read */
+  std::vector<PetscInt>  others;   /* global numbers of others' unknowns, sorted */
+  std::vector<double>    send, receive;
+  std::vector<double>    u, v, a; /* local unknowns, where there are others */
+
+  Mat  J = nullptr;      /* the pattern; every TS gets a duplicate */
+  IS   roles[TSHHT3_NUM_ROLES] = {};
+  Vec  axes = nullptr;   /* quaternions of the axes of own rigid bodies, and memories: what a checkpoint has to keep */
+  PetscSF axes_sf = nullptr; /* axes of others' bodies */
+  std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
+  std::vector<PetscInt> next_body;
+  PetscInt              reframed = 0; /* changes of axes so far, own bodies */
+
+  explicit Runtime(SceneData &s) : scene(s) {}
+  ~Runtime();
+};
+
+/* partition.cpp: owners of bodies, METIS */
+PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt> &owner);
+/* numbering.cpp */
+PetscMPIInt    OwnerOf(const Runtime &R, const StoreBase &s, PetscInt e);
+PetscErrorCode Number(Runtime &R);
+/* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
+PetscErrorCode Layout(Runtime &R);
+BodyKind       KindOf(const SceneData &s, const BodyData &b);
+/* initial.cpp: state of the description, with the axes of the Euler angles chosen by it */
+PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
+/* evaluate.cpp */
+PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
+PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
+PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);
+/* reframe.cpp: change of the axes of the Euler angles in the course of a run */
+PetscErrorCode AttachReframing(Runtime &R, TS ts);
+PetscErrorCode KeepAxes(Runtime &R);    /* into Runtime::axes */
+PetscErrorCode RestoreAxes(Runtime &R); /* out of it */
+/* expressions.cpp: variables, states, user's forces */
+PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
+PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);
+/* check.cpp: everything that is wrong with the description, as one error */
+PetscErrorCode CheckDescription(SceneData &s);
+
+} // namespace hhtdae
+
+#endif

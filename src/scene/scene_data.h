@@ -1,0 +1,136 @@
+/* A scene as its user describes it: the same on every rank, before anything is numbered. */
+#ifndef HHTDAE_SCENE_DATA_H
+#define HHTDAE_SCENE_DATA_H
+
+#include "frames.h"
+#include "hhtdae/scene.h"
+#include "kernel.h"
+#include <map>
+#include <memory>
+#include <string>
+#include <typeindex>
+#include <vector>
+
+namespace hhtdae
+{
+
+struct BodyData {
+  std::string name;
+  bool        point = false, fixed_start = false;
+  double      mass = 0;
+  Matrix3     inertia;  /* about the centre of mass, body axes */
+  Vector3     center;   /* of mass, from the body's origin, body axes */
+  Vector3     r;        /* centre of mass at the start */
+  Matrix3     A;        /* body axes at the start */
+  Vector3     v, w;     /* at the start, space axes */
+};
+
+struct MarkerData {
+  PetscInt body; /* -1: ground, -2: invalid */
+  Vector3  s;    /* from the centre of mass, body axes */
+  Matrix3  R;    /* axes, in body axes */
+};
+
+/* A scalar unknown of the scene, by what it is for the user */
+struct ScalarRef {
+  enum Kind { Multiplier, ForceState, Variable, State } kind = Variable;
+  PetscInt id        = -1; /* element, variable or state */
+  PetscInt component = 0;  /* row of the element's constraints, in the order of its parts; component of its force */
+};
+
+class StoreBase; /* all instances of one kernel, store.h */
+
+/* One kernel instance of an element */
+struct Part {
+  StoreBase *store;
+  PetscInt   index;
+};
+
+struct ElementData {
+  enum Kind { Joint, Motion, Force };
+  std::string       name;
+  const char       *type; /* "revolute" */
+  Kind              kind;
+  Marker            i, j; /* of the element; reactions are given on i's body */
+  std::vector<Part> parts;
+};
+
+struct ExpressionData { /* variable or state */
+  std::string name;
+  Expression  expression;
+  double      initial;
+};
+
+struct Runtime; /* numbering, matrices, evaluation: runtime.h */
+
+struct SceneData {
+  MPI_Comm                    comm;
+  bool                        planar = false;
+  std::vector<BodyData>       bodies;
+  std::vector<MarkerData>     markers;
+  std::map<PetscInt, std::string> marker_names;
+  std::vector<ElementData>    elements;
+  std::vector<ExpressionData> variables, states;
+  std::map<std::type_index, std::unique_ptr<StoreBase>> stores;
+  std::vector<StoreBase *>    order; /* of first use: the order of assembly */
+  Vector3                     gravity = Vector3::Zero();
+  std::vector<std::string>    errors; /* found while the scene was described */
+  std::unique_ptr<Runtime>    run;
+
+  SceneData();
+  ~SceneData();
+  std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
+  bool        valid(Marker m) const { return m.id >= 0 && m.id < (PetscInt)markers.size(); }
+  /* at the start */
+  Frame<double> frame(Marker m) const;
+  Twist<double> twist(Marker m) const;
+};
+
+/*
+  What a joint's or force's file uses to enter itself:
+
+    template <> Element Scene::add(const std::string &name, const Revolute &s)
+    {
+      ElementBuilder e(*this, name, "revolute", ElementData::Joint, s.i, s.j);
+      e.constrain<Coincide>({s.i, s.j});
+      e.constrain<Parallel>({s.i, s.j});
+      return e.done();
+    }
+
+  Errors are collected, with the element's type and name in front; an element with errors gets no parts.
+*/
+class ElementBuilder
+{
+public:
+  ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j);
+
+  bool planar() const { return data_.planar; }
+  bool good() const { return good_; } /* no error so far: i and j are markers */
+  void require(bool condition, const std::string &message); /* "stiffness is -3, must not be negative" */
+  void require(Marker m, const char *what);                 /* m is a marker of this scene */
+  Frame<double>    frame(Marker m) const { return data_.frame(m); } /* at the start; only if good() */
+  const SceneData &scene() const { return data_; }
+
+  /* a constraint kernel on these markers; returns the first of its rows among the element's rows */
+  template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});
+  template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs);
+  /* a force kernel; inputs: the scalars z of components(); state: carry the components as force states */
+  template <class K>
+  void load(std::initializer_list<Marker> markers, const typename K::Data &data = {}, const std::vector<ScalarRef> &inputs = {},
+            bool state = false);
+
+  Element done();
+
+private:
+  SceneData  &data_;
+  ElementData element_;
+  PetscInt    rows_ = 0;
+  bool        good_ = true;
+  template <class S> S &store();
+};
+
+} // namespace hhtdae
+
+#include "store.h"
+
+#endif

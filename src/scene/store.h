@@ -1,0 +1,195 @@
+/* The instances of one kernel as the scene describes them, and what of them this rank needs. Included by scene_data.h. */
+#ifndef HHTDAE_SCENE_STORE_H
+#define HHTDAE_SCENE_STORE_H
+
+#include "constraint_batch.h"
+#include "force_batch.h"
+#include <type_traits>
+
+namespace hhtdae
+{
+
+/* Gives an instance its place among this rank's unknowns; layout.cpp */
+class Localizer
+{
+public:
+  virtual ~Localizer() = default;
+  virtual bool     needed(const StoreBase &s, PetscInt e) const = 0; /* it belongs to this rank or touches its bodies */
+  virtual PetscInt marker(PetscInt id)                          = 0;
+  virtual PetscInt group(PetscInt global, PetscInt size)        = 0;
+  virtual PetscInt local(PetscInt global) const                 = 0;
+  virtual Input    input(const ScalarRef &r)                    = 0;
+  Bodies          *bodies = nullptr;
+};
+
+class StoreBase
+{
+public:
+  virtual ~StoreBase() = default;
+  virtual PetscInt      size() const                      = 0;
+  virtual int           markers() const                   = 0;
+  virtual PetscInt      marker(PetscInt e, int k) const   = 0;
+  virtual PetscInt      element(PetscInt e) const         = 0;
+  virtual bool          isConstraint() const              = 0;
+  virtual bool          isHolonomic() const               = 0; /* of constraints */
+  virtual int           rows() const                      = 0; /* of a constraint, components of a force */
+  virtual unsigned char active(PetscInt e) const          = 0; /* bits of the rows that stay */
+  virtual void          setActive(PetscInt, unsigned char) {}
+  virtual bool          carried(PetscInt) const           = 0; /* as force states */
+  virtual int           inputs() const                    = 0;
+  virtual ScalarRef     input(PetscInt e, int i) const    = 0;
+  virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+
+  /* number of unknowns of its own: multipliers or force states */
+  int unknowns(PetscInt e) const
+  {
+    if (!isConstraint()) return carried(e) ? rows() : 0;
+    int n = 0;
+    for (unsigned char m = active(e); m; m &= (unsigned char)(m - 1)) n++;
+    return n;
+  }
+
+  std::vector<PetscInt> start; /* global number of the first of them, layout.cpp */
+};
+
+template <class K> struct Described {
+  PetscInt         element;
+  PetscInt         marker[K::markers];
+  unsigned char    active = 0xff;
+  bool             carried = false;
+  ScalarRef        input[K::inputs > 0 ? K::inputs : 1];
+  typename K::Data data;
+};
+
+/* what both kinds of store share */
+template <class K> class StoreOf : public StoreBase
+{
+public:
+  std::vector<Described<K>> all;
+
+  PetscInt  size() const override { return (PetscInt)all.size(); }
+  int       markers() const override { return K::markers; }
+  PetscInt  marker(PetscInt e, int k) const override { return all[e].marker[k]; }
+  PetscInt  element(PetscInt e) const override { return all[e].element; }
+  bool      carried(PetscInt e) const override { return all[e].carried; }
+  int       inputs() const override { return K::inputs; }
+  ScalarRef input(PetscInt e, int i) const override { return all[e].input[i]; }
+
+protected:
+  template <class I> void place(Localizer &l, const Described<K> &d, I &i) const
+  {
+    for (int k = 0; k < K::markers; k++) i.marker[k] = l.marker(d.marker[k]);
+    for (int z = 0; z < K::inputs; z++) i.input[z] = l.input(d.input[z]);
+    i.data = d.data;
+  }
+};
+
+template <class K> class ConstraintStore : public StoreOf<K>
+{
+public:
+  bool          isConstraint() const override { return true; }
+  bool          isHolonomic() const override { return K::holonomic; }
+  int           rows() const override { return K::rows; }
+  unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
+  void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
+
+  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
+  {
+    auto batch    = std::make_unique<ConstraintBatch<K>>();
+    batch->bodies = l.bodies;
+    for (PetscInt e = 0; e < this->size(); e++) {
+      if (!this->unknowns(e) || !l.needed(*this, e)) continue;
+      typename ConstraintBatch<K>::Instance i;
+      this->place(l, this->all[e], i);
+      i.active = active(e);
+      i.lambda = l.local(this->start[e]);
+      i.group  = l.group(this->start[e], this->unknowns(e));
+      batch->all.push_back(i);
+    }
+    batch->all.shrink_to_fit();
+    if (!batch->all.empty()) batches.push_back(std::move(batch));
+  }
+};
+
+template <class K> class ForceStore : public StoreOf<K>
+{
+public:
+  bool          isConstraint() const override { return false; }
+  bool          isHolonomic() const override { return false; }
+  int           rows() const override { return K::count; }
+  unsigned char active(PetscInt) const override { return 0; }
+
+  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
+  {
+    auto direct = std::make_unique<ForceBatch<K>>();
+    auto states = std::make_unique<ForceStateBatch<K>>();
+    direct->bodies = states->bodies = l.bodies;
+    for (PetscInt e = 0; e < this->size(); e++) {
+      if (!l.needed(*this, e)) continue;
+      ForceInstance<K> i;
+      this->place(l, this->all[e], i);
+      if (!this->all[e].carried) {
+        direct->all.push_back(i);
+        continue;
+      }
+      i.state       = l.local(this->start[e]);
+      i.state_group = l.group(this->start[e], K::count);
+      states->all.push_back(i);
+    }
+    if (!direct->all.empty()) batches.push_back(std::move(direct));
+    if (!states->all.empty()) batches.push_back(std::move(states));
+  }
+};
+
+template <class S> S &ElementBuilder::store()
+{
+  std::unique_ptr<StoreBase> &s = data_.stores[std::type_index(typeid(S))];
+  if (!s) {
+    s = std::make_unique<S>();
+    data_.order.push_back(s.get());
+  }
+  return static_cast<S &>(*s);
+}
+
+template <class K> PetscInt ElementBuilder::constrain(std::initializer_list<Marker> markers, const typename K::Data &data)
+{
+  return constrain<K>(markers, data, {});
+}
+
+template <class K>
+PetscInt ElementBuilder::constrain(std::initializer_list<Marker> markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs)
+{
+  const PetscInt row = rows_;
+  if (!good_) return row;
+  auto        &s = store<ConstraintStore<K>>();
+  Described<K> d;
+  d.element = (PetscInt)data_.elements.size();
+  std::size_t k = 0;
+  for (Marker m : markers) d.marker[k++] = m.id;
+  for (std::size_t i = 0; i < inputs.size() && i < (std::size_t)K::inputs; i++) d.input[i] = inputs[i];
+  d.data = data;
+  s.all.push_back(d);
+  element_.parts.push_back({&s, s.size() - 1});
+  rows_ += K::rows;
+  return row;
+}
+
+template <class K>
+void ElementBuilder::load(std::initializer_list<Marker> markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs, bool state)
+{
+  if (!good_) return;
+  auto        &s = store<ForceStore<K>>();
+  Described<K> d;
+  d.element = (PetscInt)data_.elements.size();
+  d.carried = state;
+  std::size_t k = 0;
+  for (Marker m : markers) d.marker[k++] = m.id;
+  for (std::size_t i = 0; i < inputs.size() && i < (std::size_t)K::inputs; i++) d.input[i] = inputs[i];
+  d.data = data;
+  s.all.push_back(d);
+  element_.parts.push_back({&s, s.size() - 1});
+}
+
+} // namespace hhtdae
+
+#endif

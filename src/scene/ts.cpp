@@ -1,0 +1,67 @@
+/* The scene as a problem of PETSc's TS. */
+#include "runtime.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+PetscErrorCode I2Function(TS, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode I2Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Jacobian(*static_cast<Runtime *>(ctx), t, U, V, A, sv, sa, P));
+  if (J != P) {
+    PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Scene::createTS(TS *ts)
+{
+  Vec U, V, F;
+  Mat J;
+  PetscFunctionBegin;
+  PetscCall(setUp());
+  Runtime &R = *data_->run;
+  PetscCall(VecCreate(data_->comm, &U));
+  PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
+  PetscCall(VecSetType(U, VECSTANDARD));
+  PetscCall(VecDuplicate(U, &V));
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(InitialState(R, U, V));
+  PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
+  PetscCall(TSCreate(data_->comm, ts));
+  PetscCall(TSSetProblemType(*ts, TS_NONLINEAR));
+  PetscCall(TSSetType(*ts, TSHHT3));
+  PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
+  PetscCall(TSSetI2Jacobian(*ts, J, J, I2Jacobian, &R));
+  PetscCall(TS2SetSolution(*ts, U, V));
+  PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) PetscCall(TSHHT3SetIS(*ts, (TSHHT3Role)r, R.roles[r]));
+  PetscCall(AttachReframing(R, *ts));
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&V));
+  PetscCall(VecDestroy(&F));
+  PetscCall(MatDestroy(&J));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Scene::solve(TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(TSSolve(ts, nullptr));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
