@@ -90,7 +90,7 @@ TEST(CouplerKernels, GearTransmitsManyTurns)
     EXPECT_NEAR(d.memory[1], second - 1.3 * k / ratio, 1e-12);
   }
   pose(1.3 * 60, .01, f);
-  EXPECT_NEAR(Row<Gear>(d, f), ratio * .01, 1e-12);
+  EXPECT_NEAR(Row<Gear>(d, f), -ratio * .01, 1e-12);
 }
 
 /* value() never changes the memory: a rejected step that went far leaves no trace */
@@ -104,7 +104,7 @@ TEST(CouplerKernels, OnlyAcceptedStepsAreRemembered)
   d.factor[0] = 1;
   Gear::begin(d, f);
   f[0] = Turned(j, 3.5);
-  for (int k = 0; k < 3; k++) EXPECT_NEAR(Row<Gear>(d, f), .5, 1e-14); /* beyond pi, not wrapped */
+  for (int k = 0; k < 3; k++) EXPECT_NEAR(Row<Gear>(d, f), -.5, 1e-14); /* beyond pi, not wrapped */
   EXPECT_NEAR(d.memory[0], 3, 1e-14);
 }
 
@@ -130,12 +130,12 @@ TEST(CouplerKernels, RackAndPinion)
   }
   Rack::Gradient J;
   Rack::gradient(d, f, 0, J);
-  EXPECT_NEAR((J.segment<3>(12).transpose() - j2.R.col(2)).norm(), 0, 1e-14);
-  EXPECT_NEAR((J.segment<3>(3).transpose() + radius * j1.R.col(2)).norm(), 0, 1e-13);
+  EXPECT_NEAR((-J.segment<3>(12).transpose() - j2.R.col(2)).norm(), 0, 1e-14);
+  EXPECT_NEAR((-J.segment<3>(3).transpose() + radius * j1.R.col(2)).norm(), 0, 1e-13);
   EXPECT_EQ(J.segment<3>(0).norm(), 0);
 }
 
-/* A screw advances by its pitch in each turn; its multiplier is the axial force, its moment pitch/(2 pi) times that */
+/* A screw advances by its pitch in each turn; its multiplier is the axial force on i's body, beside -pitch/(2 pi) times that as moment */
 TEST(CouplerKernels, ScrewAdvancesByItsPitch)
 {
   Random              random(9);
@@ -151,8 +151,8 @@ TEST(CouplerKernels, ScrewAdvancesByItsPitch)
   }
   ScrewRow::Gradient J;
   ScrewRow::gradient(d, f, 0, J);
-  EXPECT_NEAR((J.segment<3>(0).transpose() - j.R.col(2)).norm(), 0, 1e-14);
-  EXPECT_NEAR((J.segment<3>(3).transpose() + .05 / kTurn * j.R.col(2)).norm(), 0, 1e-14);
+  EXPECT_NEAR((-J.segment<3>(0).transpose() - j.R.col(2)).norm(), 0, 1e-14);
+  EXPECT_NEAR((-J.segment<3>(3).transpose() + .05 / kTurn * j.R.col(2)).norm(), 0, 1e-14);
 }
 
 /* No load where bodies move together: a common rigid motion of all markers leaves every row unchanged */

@@ -137,26 +137,49 @@ TEST(MotionKernels, DrivenVelocity)
   for (int axis = 0; axis < 3; axis++) CheckVelocityConstraint<DrivenVelocity>(Along(axis), 20 + axis);
 }
 
-/* what the kernels' own gradient and curvature replace */
-TEST(MotionKernels, VelocityRowsAgreeWithAutomaticDifferentiation)
+/* the state that carries the speed enters as a further unknown */
+TEST(MotionKernels, RatesOfAState)
 {
-  using Automatic = VelocityConstraint<DrivenAngularVelocity, 2, 1>;
-  Random random(7);
+  CheckVelocityConstraint<StateAngularVelocity>(Turning, 30);
+  for (int axis = 0; axis < 3; axis++) CheckVelocityConstraint<StateVelocity>(Along(axis), 31 + axis);
+}
+
+namespace
+{
+
+/* what the kernels' own gradient and curvature replace */
+template <class K> void CompareWithAutomaticRate(unsigned seed)
+{
+  using Automatic = VelocityConstraint<K, 2, 1>;
+  Random random(seed);
   for (int k = 0; k < 10; k++) {
-    Frame<double>           f[2] = {random.frame(), random.frame()};
-    const Twist<double>     w[2] = {random.twist(), random.twist()};
-    const MotionData        d    = Turning(random, f);
-    const double            lambda = random(-2, 2);
-    Automatic::Gradient     J, P, Ja, Pa;
-    Automatic::Hessian      H, Ha;
-    DrivenAngularVelocity::gradient(d, f, w, .3, J, P);
-    DrivenAngularVelocity::curvature(d, f, w, .3, &lambda, H);
-    Automatic::gradient(d, f, w, .3, Ja, Pa);
-    Automatic::curvature(d, f, w, .3, &lambda, Ha);
+    SCOPED_TRACE(K::name);
+    Frame<double>                f[2]   = {random.frame(), random.frame()};
+    const Twist<double>          w[2]   = {random.twist(), random.twist()};
+    const MotionData             d      = Turning(random, f);
+    const double                 lambda = random(-2, 2), z = random(-2, 2);
+    typename Automatic::Gradient J, P, Ja, Pa;
+    typename Automatic::Hessian  H, Ha;
+    double                       zj = 0, za = 0;
+    K::gradient(d, f, w, .3, &z, J, P, &zj);
+    K::curvature(d, f, w, .3, &z, &lambda, H);
+    Automatic::gradient(d, f, w, .3, &z, Ja, Pa, &za);
+    Automatic::curvature(d, f, w, .3, &z, &lambda, Ha);
     ExpectClose(J, Ja, 1e-12, "J");
     ExpectClose(P, Pa, 1e-12, "P");
     ExpectClose(H, Ha, 1e-12, "H");
+    EXPECT_EQ(zj, za);
   }
+}
+
+} // namespace
+
+TEST(MotionKernels, RateRowsAgreeWithAutomaticDifferentiation)
+{
+  CompareWithAutomaticRate<DrivenAngularVelocity>(40);
+  CompareWithAutomaticRate<DrivenVelocity>(41);
+  CompareWithAutomaticRate<StateAngularVelocity>(42);
+  CompareWithAutomaticRate<StateVelocity>(43);
 }
 
 /* The velocity row is d/dt of the displacement row of the integral, along any motion of the frames. */
@@ -200,7 +223,7 @@ TEST(MotionKernels, DrivenAngleFollowsManyTurns)
     DrivenAngle::value<double>(d, met, t, &phi);
     EXPECT_NEAR(phi, 0, 1e-12);
     DrivenAngle::value<double>(d, ahead, t, &phi);
-    EXPECT_NEAR(phi, .4, 1e-12);
+    EXPECT_NEAR(phi, -.4, 1e-12);
   }
 }
 
@@ -216,4 +239,19 @@ TEST(MotionKernels, AFunctionWithoutValueShows)
   DrivenAngularVelocity::value<double>(d, f, w, 2., phi + 2);
   DrivenVelocity::value<double>(d, f, w, 2., phi + 3);
   for (double x : phi) EXPECT_TRUE(std::isnan(x));
+}
+
+/* -J^T lambda on i's body is the multiplier about z_j, or along the axis */
+TEST(MotionKernels, TheMultiplierIsTheDrive)
+{
+  Random              random(12);
+  const Frame<double> j    = random.frame();
+  const Frame<double> f[2] = {Turned(j, .7, {.1, .2, .3}), j};
+  Matrix<1, 12>       J;
+  DrivenAngle::gradient({kWave, 2}, f, 0, J);
+  EXPECT_NEAR((-J.segment<3>(3).transpose() - j.R.col(2)).norm(), 0, 1e-14);
+  EXPECT_EQ(J.segment<3>(0).norm(), 0);
+  DrivenAdvance::gradient({kWave, 1}, f, 0, J);
+  EXPECT_NEAR((-J.segment<3>(0).transpose() - j.R.col(1)).norm(), 0, 1e-14);
+  EXPECT_EQ(J.segment<3>(3).norm(), 0);
 }

@@ -3,7 +3,8 @@
   axis of j_k, counted over full turns, or the advance of i_k along an axis of j_k. The first R terms are angles. Markers:
   i_1, j_1, i_2, j_2, ...
 
-  The sum is separable: gradient and curvature are those of the pairs, factor by factor.
+  The sum is separable: gradient and curvature are those of the pairs, factor by factor. The row is "start minus sum", so that
+  factor_k times the multiplier is the moment on i_k's body about z_j, or the force on it along the axis of j.
 */
 #ifndef HHTDAE_SCENE_KERNELS_COUPLER_H
 #define HHTDAE_SCENE_KERNELS_COUPLER_H
@@ -47,7 +48,7 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     }
     return s;
   }
-  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = sum<T>(d, f) - T(d.start); }
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = T(d.start) - sum<T>(d, f); }
 
   static void gradient(const Data &d, const Frame<double> *f, double, Gradient &J)
   {
@@ -55,9 +56,9 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     for (int k = 0; k < N; k++) {
       auto part = J.template segment<12>(12 * k);
       if (k < R)
-        AddAngleGradient(f[2 * k], f[2 * k + 1], d.factor[k], part);
+        AddAngleGradient(f[2 * k], f[2 * k + 1], -d.factor[k], part);
       else
-        AddAdvanceGradient(f[2 * k], f[2 * k + 1], d.axis, d.factor[k], part);
+        AddAdvanceGradient(f[2 * k], f[2 * k + 1], d.axis, -d.factor[k], part);
     }
   }
   static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, Hessian &H)
@@ -66,9 +67,9 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     for (int k = 0; k < N; k++) {
       auto part = H.template block<12, 12>(12 * k, 12 * k);
       if (k < R)
-        AddAngleCurvature(f[2 * k], f[2 * k + 1], lambda[0] * d.factor[k], part);
+        AddAngleCurvature(f[2 * k], f[2 * k + 1], -lambda[0] * d.factor[k], part);
       else
-        AddAdvanceCurvature(f[2 * k], f[2 * k + 1], d.axis, lambda[0] * d.factor[k], part);
+        AddAdvanceCurvature(f[2 * k], f[2 * k + 1], d.axis, -lambda[0] * d.factor[k], part);
     }
   }
 
@@ -84,7 +85,8 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   }
 };
 
-/* Advance along z_j minus pitch/(2 pi) angle: both motions of one pair of markers, so that the multiplier is the axial force */
+/* Advance along z_j minus pitch/(2 pi) angle is what it was at the start. Multiplier: force on i's body along z_j, beside which goes
+   the moment -pitch/(2 pi) times that about z_j. */
 struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   static constexpr const char *name   = "screw";
   static constexpr int         memory = 1;
@@ -101,19 +103,19 @@ struct ScrewRow : Constraint<ScrewRow, 2, 1> {
     const T angle = UnwoundAngle<T>(f[0], f[1], d.memory[0]), advance = Advance<T>(f[0], f[1], 2);
     return advance - T(d.pitch / kTurn) * angle;
   }
-  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = lead<T>(d, f) - T(d.start); }
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = T(d.start) - lead<T>(d, f); }
 
   static void gradient(const Data &d, const Frame<double> *f, double, Base::Gradient &J)
   {
     J.setZero();
-    AddAdvanceGradient(f[0], f[1], 2, 1, J);
-    AddAngleGradient(f[0], f[1], -d.pitch / kTurn, J);
+    AddAdvanceGradient(f[0], f[1], 2, -1, J);
+    AddAngleGradient(f[0], f[1], d.pitch / kTurn, J);
   }
   static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, Base::Hessian &H)
   {
     H.setZero();
-    AddAdvanceCurvature(f[0], f[1], 2, lambda[0], H);
-    AddAngleCurvature(f[0], f[1], -lambda[0] * d.pitch / kTurn, H);
+    AddAdvanceCurvature(f[0], f[1], 2, -lambda[0], H);
+    AddAngleCurvature(f[0], f[1], lambda[0] * d.pitch / kTurn, H);
   }
   static void accept(Data &d, const Frame<double> *f) { d.memory[0] = UnwoundAngle<double>(f[0], f[1], d.memory[0]); }
   static void begin(Data &d, const Frame<double> *f)

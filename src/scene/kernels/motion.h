@@ -1,6 +1,7 @@
 /*
   Motions: the angle of i about z_j, or the advance of i along an axis of j, follows f(t); or its rate does; or the rate follows a
-  first-order state w, w' = f(t). The multiplier is the drive's moment about z_j or force along the axis, up to its sign.
+  first-order state w, w' = f(t). Rows are "wanted minus actual", so that the multiplier is the drive's moment on i's body about z_j,
+  or its force on i's body along the axis of j; j's body takes the opposite.
 */
 #ifndef HHTDAE_SCENE_KERNELS_MOTION_H
 #define HHTDAE_SCENE_KERNELS_MOTION_H
@@ -30,15 +31,15 @@ struct TurnAboutZ {
   {
     return AngleRate<T>(f[0], f[1], w[0], w[1]);
   }
-  static void gradient(const MotionData &, const Frame<double> *f, Matrix<1, 12> &J)
+  static void gradient(const MotionData &, const Frame<double> *f, double factor, Matrix<1, 12> &J)
   {
     J.setZero();
-    AddAngleGradient(f[0], f[1], 1, J);
+    AddAngleGradient(f[0], f[1], factor, J);
   }
-  static void curvature(const MotionData &, const Frame<double> *f, double lambda, Matrix<12, 12> &H)
+  static void curvature(const MotionData &, const Frame<double> *f, double factor, Matrix<12, 12> &H)
   {
     H.setZero();
-    AddAngleCurvature(f[0], f[1], lambda, H);
+    AddAngleCurvature(f[0], f[1], factor, H);
   }
 };
 
@@ -54,19 +55,19 @@ struct AdvanceAlongAxis {
   {
     return AdvanceRate<T>(f[0], f[1], w[0], w[1], d.axis);
   }
-  static void gradient(const MotionData &d, const Frame<double> *f, Matrix<1, 12> &J)
+  static void gradient(const MotionData &d, const Frame<double> *f, double factor, Matrix<1, 12> &J)
   {
     J.setZero();
-    AddAdvanceGradient(f[0], f[1], d.axis, 1, J);
+    AddAdvanceGradient(f[0], f[1], d.axis, factor, J);
   }
-  static void curvature(const MotionData &d, const Frame<double> *f, double lambda, Matrix<12, 12> &H)
+  static void curvature(const MotionData &d, const Frame<double> *f, double factor, Matrix<12, 12> &H)
   {
     H.setZero();
-    AddAdvanceCurvature(f[0], f[1], d.axis, lambda, H);
+    AddAdvanceCurvature(f[0], f[1], d.axis, factor, H);
   }
 };
 
-/* ---- displacement - f(t) = 0 ---- */
+/* ---- f(t) - displacement = 0 ---- */
 
 /* The angle is unwound to the turn nearest to f(t): the motion itself says how many turns were made, nothing need be remembered. */
 template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> {
@@ -79,18 +80,18 @@ template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> 
   template <class T> static void value(const Data &d, const Frame<T> *f, const T &t, T *phi)
   {
     const TimeFunction::Value v = d.function(Plain(t));
-    phi[0]                      = Moves::template value<T>(d, f, v.f) - Taylor(v.f, v.f1, v.f2, t);
+    phi[0]                      = Taylor(v.f, v.f1, v.f2, t) - Moves::template value<T>(d, f, v.f);
   }
-  static void gradient(const Data &d, const Frame<double> *f, double, typename Base::Gradient &J) { Moves::gradient(d, f, J); }
+  static void gradient(const Data &d, const Frame<double> *f, double, typename Base::Gradient &J) { Moves::gradient(d, f, -1, J); }
   static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, typename Base::Hessian &H)
   {
-    Moves::curvature(d, f, lambda[0], H);
+    Moves::curvature(d, f, -lambda[0], H);
   }
   static void time(const Data &d, const Frame<double> *, double t, double *first, double *second)
   {
     const TimeFunction::Value v = d.function(t);
-    first[0]                    = -v.f1;
-    second[0]                   = -v.f2;
+    first[0]                    = v.f1;
+    second[0]                   = v.f2;
   }
 };
 
@@ -101,34 +102,48 @@ struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
   static constexpr const char *name = "driven advance";
 };
 
-/* ---- rate - f(t) = 0, the time derivative of the same ---- */
+/* ---- f(t) - rate = 0, the time derivative of the same; or w - rate = 0 with a state w ---- */
 
-template <class K, class Moves> struct DrivenRate : VelocityConstraint<K, 2, 1> {
+/* The row is J u with the gradient J of the displacement's row, so that its derivative for the frames is u^T dJ^T. */
+template <class K, class Moves> struct RateRow : VelocityConstraint<K, 2, 1> {
   using Data = MotionData;
   using Base = VelocityConstraint<K, 2, 1>;
   static constexpr unsigned depends = Moves::depends;
   static constexpr bool     curved(int a, int b) { return Moves::curved(a, b); }
 
-  template <class T> static void value(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, T *psi)
-  {
-    const TimeFunction::Value v = d.function(Plain(t));
-    psi[0]                      = Moves::template rate<T>(d, f, w) - Taylor(v.f, v.f1, v.f2, t);
-  }
-  /* The rate is J u with the gradient J of the displacement, so that its derivative for the frames is u^T dJ^T. */
-  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double, typename Base::Gradient &J,
-                       typename Base::Gradient &P)
+  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double, const double *,
+                       typename Base::Gradient &J, typename Base::Gradient &P, double *zj)
   {
     typename Base::Hessian H;
     Matrix<12, 1>          u;
-    Moves::gradient(d, f, J);
-    Moves::curvature(d, f, 1, H);
+    Moves::gradient(d, f, -1, J);
+    Moves::curvature(d, f, -1, H);
     u << w[0].v, w[0].w, w[1].v, w[1].w;
-    P = u.transpose() * H;
+    P.noalias() = u.transpose() * H;
+    if (K::inputs > 0 && zj) zj[0] = 1;
   }
-  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *, double, const double *lambda,
+  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *, double, const double *, const double *lambda,
                         typename Base::Hessian &H)
   {
-    Moves::curvature(d, f, lambda[0], H);
+    Moves::curvature(d, f, -lambda[0], H);
+  }
+};
+
+template <class K, class Moves> struct DrivenRate : RateRow<K, Moves> {
+  template <class T> static void value(const MotionData &d, const Frame<T> *f, const Twist<T> *w, const T &t, T *psi)
+  {
+    const TimeFunction::Value v = d.function(Plain(t));
+    psi[0]                      = Taylor(v.f, v.f1, v.f2, t) - Moves::template rate<T>(d, f, w);
+  }
+};
+
+/* The function of the motion is the rate of change of w, which is a state of the scene: it is not looked at here. */
+template <class K, class Moves> struct StateRate : RateRow<K, Moves> {
+  static constexpr int inputs = 1;
+
+  template <class T> static void value(const MotionData &d, const Frame<T> *f, const Twist<T> *w, const T &, const T *z, T *psi)
+  {
+    psi[0] = z[0] - Moves::template rate<T>(d, f, w);
   }
 };
 
@@ -137,6 +152,12 @@ struct DrivenAngularVelocity : DrivenRate<DrivenAngularVelocity, TurnAboutZ> {
 };
 struct DrivenVelocity : DrivenRate<DrivenVelocity, AdvanceAlongAxis> {
   static constexpr const char *name = "driven velocity";
+};
+struct StateAngularVelocity : StateRate<StateAngularVelocity, TurnAboutZ> {
+  static constexpr const char *name = "angular velocity of a state";
+};
+struct StateVelocity : StateRate<StateVelocity, AdvanceAlongAxis> {
+  static constexpr const char *name = "velocity of a state";
 };
 
 } // namespace hhtdae
