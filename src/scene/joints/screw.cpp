@@ -1,0 +1,29 @@
+/* Screw: a cylindrical joint whose advance and rotation are coupled. */
+#include "scene/kernels/coupler.h"
+#include "scene/kernels/primitives.h"
+#include "scene/kernels/primitives_axes.h"
+#include "scene/scene_data.h"
+
+namespace hhtdae
+{
+
+/* Rows: force on i's body along j's x and y axes, moment about them, axial force. */
+template <> Element Scene::add(const std::string &name, const Screw &s)
+{
+  ElementBuilder e(*this, name, "screw", ElementData::Joint, s.i, s.j);
+  e.require(!e.planar(), "a planar scene has no screws");
+  e.require(std::isfinite(s.pitch), "pitch is " + std::to_string(s.pitch) + ", must be finite");
+  if (e.good()) e.require(AngleDefined(e.frame(s.i), e.frame(s.j)), "the x axis of marker i is along the z axis of j, the angle about it is undefined");
+  if (e.good()) {
+    const Frame<double> f[2] = {e.frame(s.i), e.frame(s.j)};
+    ScrewRow::Data      d;
+    d.pitch = s.pitch;
+    ScrewRow::begin(d, f);
+    e.constrain<OnLine>({s.i, s.j});
+    e.constrain<Parallel>({s.i, s.j});
+    e.constrain<ScrewRow>({s.i, s.j}, d);
+  }
+  return e.done();
+}
+
+} // namespace hhtdae

@@ -1,0 +1,74 @@
+/* Motions: displacement, velocity or acceleration of marker i relative to j as a function of time. */
+#include "scene/kernels/motion.h"
+#include "scene/scene_data.h"
+#include <string>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of)
+{
+  e.require(f.error().empty(), "its function: " + f.error());
+  if (!e.good()) return;
+  const TimeFunction::Value v = f(0);
+  e.require(std::isfinite(v.f), "its function is " + std::to_string(v.f) + " at t = 0, must be finite");
+  if (of == MotionOf::Displacement)
+    e.require(std::isfinite(v.f1) && std::isfinite(v.f2),
+              "its function has derivatives " + std::to_string(v.f1) + " and " + std::to_string(v.f2) +
+                  " at t = 0, a displacement needs them finite");
+}
+
+/* f as the rate of a state */
+Expression Rate(const TimeFunction &f)
+{
+  return {{Measure::time()}, [f](const Real *m) {
+            const TimeFunction::Value v = f(m[0].value());
+            Real                      rate(v.f);
+            rate.derivatives() = v.f1 * m[0].derivatives();
+            return rate;
+          }};
+}
+
+/* speed: of the joint at the start, from where a given acceleration is integrated */
+template <class Displacement, class Velocity, class OfState, class Spec>
+void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec &s, const MotionData &d, double speed)
+{
+  if (s.of == MotionOf::Displacement) e.constrain<Displacement>({s.i, s.j}, d);
+  if (s.of == MotionOf::Velocity) e.constrain<Velocity>({s.i, s.j}, d);
+  if (s.of == MotionOf::Acceleration) {
+    const State w = scene.state(name.empty() ? "" : name + " speed", Rate(s.function), speed);
+    e.constrain<OfState>({s.i, s.j}, d, {ScalarRef{ScalarRef::State, w.id, 0}});
+  }
+}
+
+} // namespace
+
+template <> Element Scene::add(const std::string &name, const RotationalMotion &s)
+{
+  ElementBuilder e(*this, name, "rotational motion", ElementData::Motion, s.i, s.j);
+  CheckFunction(e, s.function, s.of);
+  if (e.good()) e.require(AngleDefined(e.frame(s.i), e.frame(s.j)), "the x axis of marker i is along the z axis of j, the angle about it is undefined");
+  if (e.good()) {
+    const double speed = AngleRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j));
+    Drive<DrivenAngle, DrivenAngularVelocity, StateAngularVelocity>(*this, e, name, s, {s.function, 2}, speed);
+  }
+  return e.done();
+}
+
+template <> Element Scene::add(const std::string &name, const TranslationalMotion &s)
+{
+  ElementBuilder e(*this, name, "translational motion", ElementData::Motion, s.i, s.j);
+  const int      axes = e.planar() ? 2 : 3;
+  CheckFunction(e, s.function, s.of);
+  e.require(s.axis >= 0 && s.axis < axes, "axis is " + std::to_string(s.axis) + (e.planar() ? ", must be 0 or 1 in a planar scene" : ", must be 0, 1 or 2"));
+  if (e.good()) {
+    const double speed = AdvanceRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j), s.axis);
+    Drive<DrivenAdvance, DrivenVelocity, StateVelocity>(*this, e, name, s, {s.function, s.axis}, speed);
+  }
+  return e.done();
+}
+
+} // namespace hhtdae
