@@ -1,15 +1,16 @@
 /*
   New coordinates for the state and for the history.
 
-  The application's map takes (q, q', q'') at one time from the old to the new coordinates. The predictor keeps accelerations
-  alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at which neither q nor
-  q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the a_{n-k} at x_k, q' and q as its
-  integrals from the state at t_n. The integrals are as smooth in time as the polynomial, and so are the mapped accelerations:
-  their divided differences predict as well as the old ones did. (Newmark's formulas backwards would give the stored q, q', but
-  with the jumps that changes of h leave in them, which divided differences magnify.)
+  The application's map takes (q, q', q'') at one time from the old to the new coordinates. The predictor keeps
+  accelerations alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at
+  which neither q nor q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the
+  a_{n-k} at x_k, q' and q as its integrals from the state at t_n. The integrals are as smooth in time as the
+  polynomial, and so are the mapped accelerations: their divided differences predict as well as the old ones did.
+  (Newmark's formulas backwards would give the stored q, q', but with the jumps that changes of h leave in them, which
+  divided differences magnify.)
 
-  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep. The nodes may end
-  in a double one, at a start, where the second value is a slope.
+  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep. The nodes
+  may end in a double one, at a start, where the second value is a slope.
 
   Entries that the map leaves alone keep their bits.
 */
@@ -26,13 +27,13 @@ constexpr PetscInt max_basis = max_degree + 1;
 
 /* The motion about t_n in old coordinates, by stored vectors */
 struct Motion {
-  PetscInt  nodes = 0;                  /* of the predictor */
-  PetscInt  n = 0;                      /* stored vectors in use */
-  Vec       stored[max_basis];          /* D_0, D_1, ..., or D_0 and A0 */
-  PetscReal x[max_basis];               /* times of the nodes, from t_n */
-  bool      slope[max_basis] = {};      /* second of a double node */
+  PetscInt  nodes = 0;                            /* of the predictor */
+  PetscInt  n     = 0;                            /* stored vectors in use */
+  Vec       stored[max_basis];                    /* D_0, D_1, ..., or D_0 and A0 */
+  PetscReal x[max_basis];                         /* times of the nodes, from t_n */
+  bool      slope[max_basis]                = {}; /* second of a double node */
   PetscReal to_values[max_basis][max_basis] = {}; /* node values (slopes) by stored vectors */
-  PetscReal unit = 1;
+  PetscReal unit                            = 1;
 };
 
 /* Newton's polynomial of degree j at node k, or its slope there */
@@ -52,7 +53,7 @@ Motion Recall(const Integrator &I)
   Motion           m;
   PetscReal        lag = I.p.lag() * I.h_last;
   m.nodes = m.n = p.available + 1;
-  m.unit  = I.h_last > 0 ? I.h_last : 1;
+  m.unit        = I.h_last > 0 ? I.h_last : 1;
   for (PetscInt k = 0; k < m.nodes; k++) {
     /* the step that ended at t_{n-k}; of the last node it is not known */
     if (k > 0 && k < m.nodes - 1 && p.t[k] > p.t[k + 1]) lag = I.p.lag() * (p.t[k] - p.t[k + 1]);
@@ -103,8 +104,10 @@ void Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
     y[2][j] = u * u * power * z * z / ((j + 1) * (j + 2));
     for (PetscInt k = 0; k < m.n; k++) {
       const PetscReal zk = m.x[k] / u;
-      if (!m.slope[k]) L[k][j] = PetscPowRealInt(zk, j);
-      else L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
+      if (!m.slope[k])
+        L[k][j] = PetscPowRealInt(zk, j);
+      else
+        L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
     }
   }
   SolveTransposed(m.n, L, y);
@@ -182,7 +185,7 @@ PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, Vec to[3])
   for (PetscInt j = 0; j < m.n; j++) PetscCall(VecGetArrayRead(m.stored[j], &stored[j]));
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(to[k], &y[k]));
   for (PetscInt i = 0; i < n; i++) {
-    const bool  moves = IsCoordinate(I, i);
+    const bool  moves  = IsCoordinate(I, i);
     PetscScalar sum[3] = {0, 0, 0};
     for (PetscInt j = 0; moves && j < m.n; j++)
       for (int s = 0; s < 3; s++) sum[s] += w[s][j] * stored[j][i];
@@ -217,8 +220,8 @@ PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, Vec value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* d of misfit.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine in
-   q'', and its difference for two q'' is that tangent. */
+/* d of misfit.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine
+   in q'', and its difference for two q'' is that tangent. */
 PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
 {
   Integrator     &I = Get(ts);
@@ -278,7 +281,9 @@ PetscErrorCode CheckRoles(TS ts, const Mapping &map)
     if (map.changed[i] && !IsCoordinate(I, (PetscInt)i)) bad = start + (PetscInt)i;
   PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
   PetscCheck(first == HHT3_INT_MAX, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "The map of TSHHT3SetCoordinateChange() has changed unknown %" PetscInt_FMT " at t = %g, which is not a coordinate: it may change U, U', U'' of coordinates only", first, (double)ts->ptime);
+             "The map of TSHHT3SetCoordinateChange() has changed unknown %" PetscInt_FMT
+             " at t = %g, which is not a coordinate: it may change U, U', U'' of coordinates only",
+             first, (double)ts->ptime);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

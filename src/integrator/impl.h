@@ -214,6 +214,7 @@ PetscErrorCode MapStart(TS ts);
 PetscErrorCode MapHistory(TS ts);
 /* change.cpp */
 PetscErrorCode ChangeCoordinates(TS ts, bool starting);
+PetscErrorCode StepAfterChange(TS ts);
 PetscErrorCode MatrixAfterChange(TS ts);
 PetscErrorCode CommitChange(TS ts);
 PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap map, TSHHT3ChangeCommit commit, void *ctx);
