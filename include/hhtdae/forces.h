@@ -12,82 +12,149 @@
 namespace hhtdae
 {
 
-/* ---- springs and dampers: tension k (l - length) + c l' + preload along the line between the origins ---- */
+/*
+  Tension k (l - length) + c l' + preload along the line between the origins, positive when it pulls them together; l is
+  their distance. Component: the tension. Free length zero is allowed: a force -k (x_i - x_j) in any direction. Without
+  damping the element evaluates no velocities and its matrix is symmetric.
+*/
 struct SpringDamper {
   Marker i, j;
-  double stiffness = 0, damping = 0;
-  double length  = -1; /* free length; negative: the distance at the start */
-  double preload = 0;
-  bool   state   = false;
-};
-/* tension f(l, l') given by the user's function of two numbers */
-struct NonlinearSpring {
-  Marker i, j;
-  std::function<Real(const Real &length, const Real &rate)> tension;
-  bool state = false;
-};
-/* moment -k (angle - free angle) - c angle' on i's body about z_j; the angle counts full turns */
-struct TorsionalSpringDamper {
-  Marker i, j;
-  double stiffness = 0, damping = 0, angle = 0, preload = 0;
-  bool   state = false;
-};
-struct NonlinearTorsionalSpring {
-  Marker i, j;
-  std::function<Real(const Real &angle, const Real &rate)> moment; /* on i's body, about z_j */
-  bool state = false;
-};
-/* six components in j's axes from displacement and small rotation (3-2-1-free vector of rotation) of i in j: f = f0 - K u - C u' */
-struct Bushing {
-  Marker i, j;
-  Vector3 stiffness = Vector3::Zero(), torsional_stiffness = Vector3::Zero();
-  Vector3 damping = Vector3::Zero(), torsional_damping = Vector3::Zero();
-  Vector3 force = Vector3::Zero(), moment = Vector3::Zero(); /* preload */
-  bool    state = false;
-};
-/* Timoshenko beam from j (at x = 0) to i (at x = length) along the x axes of the markers */
-struct Beam {
-  Marker i, j;
-  double length = -1; /* negative: the distance at the start */
-  double E = 0, G = 0, area = 0, Iyy = 0, Izz = 0, J = 0;
-  double shear_y = 0, shear_z = 0; /* shear areas; 0: Euler-Bernoulli */
-  double damping = 0;              /* of the stiffness: C = damping K */
-  bool   state = false;
+  double stiffness = 0;  /* k, force per length; not negative */
+  double damping   = 0;  /* c, force per velocity; not negative */
+  double length    = -1; /* free length; negative: the distance at the start */
+  double preload   = 0;  /* tension at the free length */
+  bool   state     = false;
 };
 
-/* ---- the user's own: components as functions of the state, in the axes of `frame` (default: i's body stays, space axes) ---- */
-struct UserForce {
-  Marker i, j, frame;                /* j may be none: no reaction */
-  std::vector<Expression> force, moment; /* none or three each */
+/* Tension f(l, l') given by the user's function, differentiated automatically; the lambda must return a Real:
+     [](const Real &l, const Real &v) -> Real { return 100. * pow(l - 1., 3) + 2. * v; } */
+struct NonlinearSpring {
+  Marker                                                    i, j;
+  std::function<Real(const Real &length, const Real &rate)> tension;
+  bool                                                      state = false;
+};
+
+/*
+  Moment preload - k (angle - free angle) - c angle' on i's body, about z_j, and its opposite on j's. The angle is that
+  of i's x axis about z_j from j's x axis; it counts full turns, from the one in (-pi, pi] at the start. Component: the
+  moment. Meant for bodies that a joint holds together, with parallel z axes; where they are not parallel, the moment is
+  about the gradient of the angle.
+*/
+struct TorsionalSpringDamper {
+  Marker i, j;
+  double stiffness = 0; /* k, moment per radian; not negative */
+  double damping   = 0; /* c; not negative */
+  double angle     = 0; /* free angle, rad; full turns count */
+  double preload   = 0; /* moment on i's body at the free angle */
+  bool   state     = false;
+};
+
+struct NonlinearTorsionalSpring {
+  Marker i, j;
+  std::function<Real(const Real &angle, const Real &rate)>
+       moment; /* on i's body, about z_j; a restoring one is negative */
   bool state = false;
+};
+
+/*
+  Six springs and dampers in j's axes: for displacement d of i from j, rotation vector phi of i in j, and the relative
+  velocity v and angular velocity w that an observer on j sees,
+
+    force = f_0 - K d - C v,  moment = m_0 - K_t phi - C_t w    on i's body, about i's origin
+
+  for rotations small or about one axis; in general the elastic moment is the one that makes the bushing conservative.
+  Rotations stay below half a turn. The reaction on j's body balances both. Components: force and moment on i in j's
+  axes.
+*/
+struct Bushing {
+  Marker  i, j;
+  Vector3 stiffness = Vector3::Zero(), torsional_stiffness = Vector3::Zero(); /* not negative */
+  Vector3 damping = Vector3::Zero(), torsional_damping = Vector3::Zero();     /* not negative */
+  Vector3 force = Vector3::Zero(), moment = Vector3::Zero();                  /* preload f_0, m_0 */
+  bool    state = false;
+};
+
+/*
+  Timoshenko beam from j (at x = 0) to i (at x = length) along the x axes of the markers, without mass. It is linear in
+  the mean frame of the two markers, which goes along with any motion of the whole; several in a row, with bodies
+  between, bend far. Free of force when both markers have the same axes and i is at (length, 0, 0) of j. Components:
+  force and moment on i in the mean frame. Planar scenes need E, area and Izz alone.
+*/
+struct Beam {
+  Marker i, j;
+  double length = -1;              /* negative: the distance at the start */
+  double E = 0, G = 0;             /* Young's modulus, shear modulus */
+  double area = 0;                 /* of the cross section */
+  double Iyy = 0, Izz = 0;         /* second moments of area: Iyy for bending in the xz plane, Izz in the xy plane */
+  double J       = 0;              /* torsion constant */
+  double shear_y = 0, shear_z = 0; /* shear areas along y and z; 0: no shear deformation (Euler and Bernoulli) */
+  double damping = 0;              /* of the stiffness, a time: C = damping K in the mean frame */
+  bool   state   = false;
+};
+
+/* The user's own: components as functions of the state, in the axes of `frame` (default: space axes) */
+struct UserForce {
+  Marker                  i, j, frame;   /* j may be none: no reaction */
+  std::vector<Expression> force, moment; /* none or three each */
+  bool                    state = false;
 };
 /* a force along the line from j to i (repulsive when positive), or a moment about z_j on i's body */
 struct UserScalarForce {
-  Marker i, j;
+  Marker     i, j;
   Expression value;
-  bool rotational = false;
-  bool state = false;
+  bool       rotational = false;
+  bool       state      = false;
 };
 
 /* ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ---- */
 struct ContactLaw {
   double stiffness = 1e5, exponent = 1.5;
-  double damping = 0;              /* s/m, of the rate of penetration; force never pulls */
+  double damping  = 0;                       /* s/m, of the rate of penetration; force never pulls */
   double friction = 0, slip_velocity = 1e-3; /* Coulomb coefficient, velocity of the regularization mu tanh(v/v_s) */
 };
-struct SpherePlane { Marker i, j; double radius = 1; ContactLaw law; bool state = false; };       /* sphere at i, plane: xy of j, outside z > 0 */
-struct EllipsoidPlane { Marker i, j; Vector3 semiaxes = Vector3::Ones(); ContactLaw law; bool state = false; };
-struct TorusPlane { Marker i, j; double radius = 1, tube = 0.1; ContactLaw law; bool state = false; }; /* tire: torus about z_i */
-struct SphereSphere { Marker i, j; double radius_i = 1, radius_j = 1; ContactLaw law; bool state = false; };
-struct SphereBox { Marker i, j; double radius = 1; Vector3 half = Vector3::Ones(); ContactLaw law; bool state = false; }; /* box at j */
+/* sphere about i, plane: xy of j, outside z > 0 */
+struct SpherePlane {
+  Marker     i, j;
+  double     radius = 1;
+  ContactLaw law;
+  bool       state = false;
+};
+/* ellipsoid about i in its axes, plane as above */
+struct EllipsoidPlane {
+  Marker     i, j;
+  Vector3    semiaxes = Vector3::Ones();
+  ContactLaw law;
+  bool       state = false;
+};
+/* tire: torus about z_i, plane as above */
+struct TorusPlane {
+  Marker     i, j;
+  double     radius = 1, tube = 0.1;
+  ContactLaw law;
+  bool       state = false;
+};
+struct SphereSphere {
+  Marker     i, j;
+  double     radius_i = 1, radius_j = 1;
+  ContactLaw law;
+  bool       state = false;
+};
+/* sphere about i, box about j in its axes */
+struct SphereBox {
+  Marker     i, j;
+  double     radius = 1;
+  Vector3    half   = Vector3::Ones(); /* half of its edges */
+  ContactLaw law;
+  bool       state = false;
+};
 
-/* friction in a revolute, translational, cylindrical or spherical joint, from its reaction: moment mu r N or force mu N against the
-   relative motion, regularized */
+/* friction in a revolute, translational, cylindrical or spherical joint, from its reaction: moment mu r N or force mu N
+   against the relative motion, regularized */
 struct JointFriction {
   Element joint;
-  double coefficient = 0;
-  double radius      = 0; /* of the pin or ball; not used along a translation */
-  double slip_velocity = 1e-3;
+  double  coefficient   = 0;
+  double  radius        = 0; /* of the pin or ball; not used along a translation */
+  double  slip_velocity = 1e-3;
 };
 
 } // namespace hhtdae

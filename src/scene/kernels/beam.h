@@ -40,6 +40,18 @@ template <bool Damped> struct BeamForce : RelativeForce<BeamForce<Damped>, Dampe
     double  damping;
   };
 
+  /* shear areas of zero: no shear deformation (Euler and Bernoulli) */
+  static Data section(double L, double E, double G, double area, double Iyy, double Izz, double J, double shear_y,
+                      double shear_z, double damping)
+  {
+    const double phi_y = shear_y > 0 ? 12 * E * Izz / (G * shear_y * L * L) : 0;
+    const double phi_z = shear_z > 0 ? 12 * E * Iyy / (G * shear_z * L * L) : 0;
+    return {L,
+            {E * area / L, 12 * E * Izz / ((1 + phi_y) * L * L * L), 12 * E * Iyy / ((1 + phi_z) * L * L * L)},
+            {G * J / L, E * Iyy / L, E * Izz / L},
+            damping};
+  }
+
   template <class T> static Mat3<T> axes(const Mat3<T> &Rj, const Quaternion<T> &q)
   {
     return Rj * RotationMatrix<T>(HalfTurn<T>(q));
