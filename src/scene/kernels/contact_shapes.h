@@ -137,20 +137,16 @@ struct SphereBoxShape {
   {
     using std::sqrt;
     const Vec3<T> x = f[0].x - f[1].x, c = f[1].R.transpose() * x;
-    double        excess[3], length2     = 0; /* of |c| over half */
+    double        excess[3]; /* of |c| over half */
     int           nearest = 0, out = 0;
     for (int k = 0; k < 3; k++) {
       excess[k] = std::abs(Plain(c(k))) - d.half[k];
       if (excess[k] > excess[nearest]) nearest = k;
-      if (excess[k] > 0) {
-        out++;
-        length2 += excess[k] * excess[k];
-      }
+      if (excess[k] > 0) out++;
     }
     Vec3<T> n(T(0), T(0), T(0));
     T       distance;
-    if (out < 2 ||
-        length2 < 1e-24 * d.radius * d.radius) { /* a face; or so close to an edge that there is no direction */
+    if (out < 2) {
       const double sign = Plain(c(nearest)) < 0 ? -1 : 1;
       n(nearest)        = T(sign);
       distance          = c(nearest) * T(sign) - T(d.half[nearest]);
