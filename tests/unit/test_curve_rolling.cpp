@@ -74,9 +74,8 @@ TEST(Rolling, DiscOnTheGround)
   EXPECT_NEAR(phi, 0, 1e-15);
 }
 
-/* The lowest point of a disc in steady turning draws a circle; its centre one that is smaller by r sin(lean). With the
-   lean b, the rate W about the vertical and the spin s about the disc's axis, R W = -r s for the circle's radius R (on
-   the ground) and w = W z + s z_i + ... : no slip exactly if the spin is that. */
+/* Steady turning: the lowest point of a leaning disc goes round a circle of radius R on the ground. Without slip the
+   disc's spin about its axis is rate R / r beside the turning of its plane with the rate about the vertical. */
 TEST(Rolling, DiscInACircle)
 {
   const double       r = .4, lean = .5, rate = 1.3, R = 2;
@@ -89,11 +88,9 @@ TEST(Rolling, DiscInACircle)
   s.f[0].x = center;
   DiscOnPlane::value<double>(data, s.f, 0, &phi);
   EXPECT_NEAR(phi, 0, 1e-15);
-  /* the disc turns with the rate about the vertical through the origin, and spins about its own axis */
-  const double spin =
-      -rate * R / r; /* the contact's velocity rate R y against spin axis x (contact - center) = spin r y */
-  s.w[0].w = rate * up + spin * axis;
-  s.w[0].v = (rate * up).cross(center);
+  const double spin = rate * R / r;
+  s.w[0].w          = rate * up + spin * axis;
+  s.w[0].v          = (rate * up).cross(center);
   DiscNoSlip::value<double>(data, s.f, s.w, 0, psi);
   EXPECT_NEAR(psi[0], 0, 1e-14);
   EXPECT_NEAR(psi[1], 0, 1e-14);
