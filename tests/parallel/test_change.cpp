@@ -26,9 +26,9 @@ TEST(ChangeOnRanks, SameAsOnOne)
 {
   for (bool pivot : {false, true})
     for (const char *form : {"second_order", "paper"}) {
-      const Tumbling    p(pivot, pivot ? 1. : 4.);
+      const Tumbling    p(pivot, pivot ? .3 : 1.2);
       const std::string options =
-          fixedSteps(p.t1 / 400) + "-ts_hhtdae_corrector_tolerance 1e-10 -ts_hhtdae_form " + form;
+          fixedSteps(p.t1 / 100) + "-ts_hhtdae_corrector_tolerance 1e-10 -ts_hhtdae_form " + form;
       const End    all = run(PETSC_COMM_WORLD, p, options), self = run(PETSC_COMM_SELF, p, options);
       const double du = relativeDifference(all.u, self.u), dv = relativeDifference(all.v, self.v),
                    da = relativeDifference(all.a, self.a);
@@ -38,7 +38,7 @@ TEST(ChangeOnRanks, SameAsOnOne)
         MEASURED("%s, %s: differ by %.1e in U, %.1e in U', %.1e in U''; %d changes", p.name.c_str(), form, du, dv, da,
                  (int)all.s.changes);
       EXPECT_EQ(all.s.changes, self.s.changes);
-      EXPECT_GE(all.s.changes, 39);
+      EXPECT_GE(all.s.changes, 9);
       EXPECT_LT(du, 1e-8);
       EXPECT_LT(dv, 1e-8);
       EXPECT_LT(da, 1e-8);
@@ -47,13 +47,13 @@ TEST(ChangeOnRanks, SameAsOnOne)
 
 TEST(ChangeOnRanks, Checkpoint)
 {
-  const Tumbling    p(true, 1.);
+  const Tumbling    p(true, .2);
   const std::string file = testing::TempDir() + "hhtdae-ranks-change", o = fixedSteps(.0025);
   Array             u[2], v[2];
   {
     Simulation   first(p, o, PETSC_COMM_WORLD);
     FrameChanges changes(first, p, 10);
-    for (int k = 0; k < 35; k++) must(first.step());
+    for (int k = 0; k < 25; k++) must(first.step());
     must(TSHHT3CheckpointSave(first.ts, file.c_str()));
     must(first.solve());
     u[0] = first.u();
