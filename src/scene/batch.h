@@ -43,6 +43,8 @@ public:
   virtual void accept(Bodies &) {}
   /* constraints: Phi_t and Phi_tt (Psi itself and nothing at velocity level) into local rows */
   virtual void timeDerivatives(Evaluation &, double *first, double *second) { (void)first; (void)second; }
+  /* potential energy of the instances that belong to this rank; bodies have moved */
+  virtual double energy(const Evaluation &) const { return 0; }
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }

@@ -4,6 +4,8 @@
 
 #include "batch.h"
 #include "kernel.h"
+#include <type_traits>
+#include <utility>
 
 namespace hhtdae
 {
@@ -14,6 +16,13 @@ template <class K> struct ForceInstance {
   PetscInt         state = -1, state_group = -1; /* force states, if carried */
   Input            input[Z > 0 ? Z : 1];
   typename K::Data data;
+};
+
+/* A force with a potential says so by  static double energy(const Data &, const Frame<double> *f);  used for the balance of energy alone */
+template <class K, class = void> struct HasEnergy : std::false_type {
+};
+template <class K>
+struct HasEnergy<K, std::void_t<decltype(K::energy(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr))>> : std::true_type {
 };
 
 /* What both ways share: blocks between the coordinates of the markers' bodies */
@@ -37,6 +46,19 @@ public:
       }
     (void)B;
   }
+  double energy(const Evaluation &ev) const override
+  {
+    double sum = 0;
+    if constexpr (HasEnergy<K>::value)
+      for (const Instance &e : all) {
+        Frame<double> f[M];
+        if (!mine(e)) continue;
+        for (int k = 0; k < M; k++) f[k] = ev.bodies.template frame<K::needs_rotation>(e.marker[k]);
+        sum += K::energy(e.data, f);
+      }
+    (void)ev;
+    return sum;
+  }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   void     copyMemory(double *x, bool in) override
   {
@@ -52,6 +74,16 @@ public:
 
 protected:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
+
+  /* the owner of the first body that can move has it, as in OwnerOf() */
+  bool mine(const Instance &e) const
+  {
+    for (int k = 0; k < M; k++) {
+      const LocalBody &b = bodyOf(*bodies, e, k);
+      if (b.kind != BodyKind::Ground) return b.owned;
+    }
+    return false;
+  }
 
   /* does the load reach group g of marker k's body; do the load or its components depend on it */
   static bool loads(BodyKind b, int g, int k)
@@ -150,9 +182,11 @@ protected:
 template <class K> class ForceBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;
-  using Base::M, Base::Z, Base::bodies, Base::request_, Base::slot_;
+  using Base::M, Base::Z, Base::request_, Base::slot_;
 
 public:
+  using Base::bodies;
+
   void pattern(Pattern &p) override
   {
     for (const auto &e : this->all) {
@@ -201,10 +235,12 @@ public:
 template <class K> class ForceStateBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;
-  using Base::M, Base::Z, Base::bodies, Base::request_, Base::slot_;
+  using Base::M, Base::Z, Base::request_, Base::slot_;
   static constexpr int C = K::count;
 
 public:
+  using Base::bodies;
+
   void pattern(Pattern &p) override
   {
     for (const auto &e : this->all) {

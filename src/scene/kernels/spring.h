@@ -88,6 +88,13 @@ template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
     if constexpr (Damped) c[0] += T(p.damping) * line.rate(w);
   }
 
+  /* of spring and preload */
+  static double energy(const Data &p, const Frame<double> *f)
+  {
+    const double l = Line<double>(f).length, stretch = l - p.length;
+    return 0.5 * p.stiffness * stretch * stretch + p.preload * l;
+  }
+
   static void wrench(const Data &p, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
                      Wrench<double> *on)
   {

@@ -73,6 +73,13 @@ template <bool Damped> struct LinearTorsion : TurnForce<LinearTorsion<Damped>> {
     if constexpr (Damped) c[0] -= T(p.damping) * AngleRate<T>(f[0], f[1], w[0], w[1]);
   }
 
+  /* of spring and preload */
+  static double energy(const Data &p, const Frame<double> *f)
+  {
+    const double angle = UnwoundAngle<double>(f[0], f[1], p.memory[0]), turn = angle - p.angle;
+    return 0.5 * p.stiffness * turn * turn - p.preload * angle;
+  }
+
   template <int Z>
   static void jacobian(const Data &p, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
                        Wrench<double> *on, ForceJacobian<2, Z> &J)
