@@ -79,6 +79,9 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
   PetscFunctionBegin;
   PetscCall(WantsChange(ts, &wanted));
   if (!wanted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(I.change.map, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+             "The test of TSHHT3SetCoordinateChange() asks for new coordinates at t = %g, and there is no map to them",
+             (double)ts->ptime);
   if (starting) {
     PetscCall(MapStart(ts));
     PetscCall(Publish(ts));
@@ -152,9 +155,8 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
   Change &c = Get(ts).change;
 
   PetscFunctionBegin;
-  PetscCheck(!test == !map, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_NULL,
-             "TSHHT3SetCoordinateChange() was given %s, it takes both or none",
-             test ? "a test but no map" : "a map but no test");
+  PetscCheck(test || !map, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_NULL,
+             "TSHHT3SetCoordinateChange() was given a map but no test that asks for it");
   c.test   = test;
   c.map    = map;
   c.commit = commit;
@@ -173,8 +175,8 @@ restart
   Input Parameters:
 + ts     - the `TS` context
 . test   - whether new coordinates are wanted, or `NULL` for none ever
-. map    - from the old to the new coordinates
-. commit - the change is done, or `NULL`
+. map    - from the old to the new coordinates; `NULL` if `test` never asks for any, and only takes note of accepted
+states . commit - the change is done, or `NULL`
 - ctx    - context of the three functions
 
   Calling sequence of `test`:

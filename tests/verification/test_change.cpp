@@ -471,16 +471,40 @@ TEST(Change, MultipliersAreNotToBeMapped)
   EXPECT_TRUE(trap.says("unknown 6")) << trap.message;
 }
 
-TEST(Change, TestAndMapBelongTogether)
+/* A test alone sees every accepted state once, but cannot have new coordinates */
+TEST(Change, TestWithoutMap)
 {
-  const Tumbling p(false, 1.);
-  Simulation     run(p, "");
-  ErrorTrap      trap;
-  EXPECT_EQ(TSHHT3SetCoordinateChange(
-                run.ts, [](TS, PetscReal, Vec, Vec, PetscBool *, void *) -> PetscErrorCode { return 0; }, nullptr,
-                nullptr, nullptr),
-            PETSC_ERR_ARG_NULL);
-  EXPECT_TRUE(trap.says("a test but no map")) << trap.message;
+  struct Seen {
+    std::vector<double> times;
+    double              until;
+  };
+  const auto test = [](TS, PetscReal t, Vec, Vec, PetscBool *change, void *ctx) -> PetscErrorCode {
+    auto *seen = static_cast<Seen *>(ctx);
+    seen->times.push_back(t);
+    *change = t < seen->until ? PETSC_FALSE : PETSC_TRUE;
+    return 0;
+  };
+  const auto     map = [](TS, PetscReal, Vec, Vec, Vec, void *) -> PetscErrorCode { return 0; };
+  const Tumbling p(false, 1., steady);
+  Seen           all = {{}, 2.}, some = {{}, .5};
+  {
+    std::vector<double> times;
+    Simulation          run(p, tolerance(1e-5));
+    run.watch = [&](Simulation &, PetscInt, double t) { times.push_back(t); };
+    must(TSHHT3SetCoordinateChange(run.ts, test, nullptr, nullptr, &all));
+    must(run.solve());
+    times.resize(
+        all.times.size()); /* the last state begins no step, and the monitor may have been called twice at the end */
+    EXPECT_GT(times.size(), 10u);
+    EXPECT_EQ(all.times, times);
+  }
+  Simulation run(p, tolerance(1e-5));
+  ErrorTrap  trap;
+  EXPECT_EQ(TSHHT3SetCoordinateChange(run.ts, nullptr, map, nullptr, nullptr), PETSC_ERR_ARG_NULL);
+  EXPECT_TRUE(trap.says("a map but no test")) << trap.message;
+  must(TSHHT3SetCoordinateChange(run.ts, test, nullptr, nullptr, &some));
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_TRUE(trap.says("there is no map")) << trap.message;
 }
 
 /* The user's -snes_lag_jacobian does not go on with a matrix of the old coordinates */
