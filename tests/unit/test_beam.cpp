@@ -281,14 +281,12 @@ TEST(Beam, ElasticaUnderTipLoad)
         ASSERT_GT(c.solve(), 0) << "load " << a << ", elements " << n;
       }
       const double error = std::hypot(c.tip().x(1) - exact.deflection, 1 - c.tip().x(0) - exact.shortening);
-      printf("a = %g, %2d elements: deflection %.6f shortening %.6f error %.2e (exact %.6f %.6f)\n", a, n, c.tip().x(1),
-             1 - c.tip().x(0), error, exact.deflection, exact.shortening);
       if (before > 0) {
-        EXPECT_NEAR(before / error, 4, .5) << "second order";
+        EXPECT_GT(before / error, 3.6) << "second order, load " << a << ", elements " << n;
       }
       before = error;
     }
-    EXPECT_LT(before, 1e-3) << "load " << a;
+    EXPECT_LT(before, 2e-4) << "load " << a;
   }
 }
 
@@ -296,32 +294,32 @@ TEST(Beam, ElasticaUnderTipLoad)
    root exactly, and the opposite point tends to the circle's */
 TEST(Beam, StripRollsIntoCircle)
 {
-  const double L      = 1;
-  double       before = 0;
-  for (int n : {8, 16, 32}) {
+  const double L         = 1;
+  double       before[3] = {0, 0, 0};
+  for (int n : {8, 16, 32})
     for (int plane : {1, 2}) {
       Cantilever c = Cantilever::straight(n, L, Strip());
       for (int step = 1; step <= 10; step++) {
-        c.moment                     = Vector3::Zero();
-        c.moment(plane == 1 ? 2 : 1) = (plane == 1 ? 1 : -1) * step * 2 * M_PI / (10 * L);
+        c.moment = Vector3::Zero();
+        if (plane == 1)
+          c.moment(2) = step * 2 * M_PI / (10 * L);
+        else
+          c.moment(1) = -step * 2 * M_PI / (10 * L);
         ASSERT_GT(c.solve(), 0) << n << " elements, step " << step;
       }
-      EXPECT_LT(c.tip().x.norm(), 1e-8) << n;
-      EXPECT_LT((c.tip().R - Matrix3::Identity()).norm(), 1e-8) << n;
       const double error = (c.node[n / 2].x - L / M_PI * Vector3::Unit(plane)).norm();
-      printf("%2d elements: tip %.1e, opposite point off by %.3e\n", n, c.tip().x.norm(), error);
-      if (plane == 2) {
-        if (before > 0) {
-          EXPECT_NEAR(before / error, n == 16 ? 2 : 2, 3);
-        }
-        before = error;
+      EXPECT_LT(c.tip().x.norm(), 1e-12) << n;
+      EXPECT_LT((c.tip().R - Matrix3::Identity()).norm(), 1e-12) << n;
+      if (before[plane] > 0) {
+        EXPECT_NEAR(before[plane] / error, 4, .2) << "second order, elements " << n;
       }
+      before[plane] = error;
     }
-  }
+  EXPECT_LT(before[2], 6e-4);
 }
 
-/* Bathe and Bolourchi (1979): a cantilever bent to an eighth of a circle of radius 100 in the plane, loaded by 600
- * across it */
+/* A cantilever bent to an eighth of a circle of radius 100 in the plane, loaded across it, of eight straight elements:
+   tip by Bathe and Bolourchi (1979) and by Simo and Vu-Quoc (1986), whose figures differ among themselves by 0.15 */
 TEST(Beam, CurvedCantileverInSpace)
 {
   Section s;
@@ -332,11 +330,12 @@ TEST(Beam, CurvedCantileverInSpace)
     const double a = M_PI / 4 * k / n;
     points.push_back({100 * std::sin(a), 100 * (1 - std::cos(a)), 0});
   }
-  Cantilever c(points, s);
-  for (double P : {300., 600.}) {
-    c.force = {0, 0, P};
+  Cantilever    c(points, s);
+  const Vector3 published[] = {{58.84, 22.33, 40.08}, {47.23, 15.79, 53.37}};
+  for (int k : {0, 1}) {
+    c.force = {0, 0, 300. * (k + 1)};
     ASSERT_GT(c.solve(), 0);
-    printf("P = %g: tip at %.3f %.3f %.3f\n", P, c.tip().x(0), c.tip().x(1), c.tip().x(2));
+    EXPECT_LT((c.tip().x - published[k]).cwiseAbs().maxCoeff(), .2) << c.tip().x.transpose();
   }
 }
 
@@ -355,16 +354,15 @@ TEST(Beam, EulerBuckling)
       c.force = {-P, 0, 0};
       for (int i = 1; i <= n; i++) c.node[i].x(0) *= 1 - P / 1e7; /* EA = 1e7 */
       c.assemble(r, K);
-      ASSERT_LT(r.norm(), 1e-9);
+      ASSERT_LT(r.norm(), 1e-6);
       const double smallest = Eigen::SelfAdjointEigenSolver<DynamicMatrix>((K + K.transpose()) / 2).eigenvalues()(0);
       (smallest > 0 ? low : high) = P;
     }
     const double error = std::abs(low / exact - 1);
-    printf("%2d elements: P/P_cr = %.6f\n", n, low / exact);
     if (before > 0) {
       EXPECT_NEAR(before / error, 4, .5);
     }
     before = error;
   }
-  EXPECT_LT(before, 5e-3);
+  EXPECT_LT(before, 1e-3);
 }

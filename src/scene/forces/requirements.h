@@ -1,0 +1,79 @@
+/* What the entries of forces ask of their numbers and markers, in words that name the number and say what to do */
+#ifndef HHTDAE_SCENE_FORCES_REQUIREMENTS_H
+#define HHTDAE_SCENE_FORCES_REQUIREMENTS_H
+
+#include "scene/scene_data.h"
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace hhtdae
+{
+
+inline std::string Show(double x)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", x);
+  return text;
+}
+
+inline void RequireFinite(ElementBuilder &e, const std::string &what, double x)
+{
+  e.require(std::isfinite(x), what + " is " + Show(x) + ", must be finite");
+}
+
+inline void RequireNotNegative(ElementBuilder &e, const std::string &what, double x)
+{
+  e.require(std::isfinite(x) && x >= 0, what + " is " + Show(x) + ", must be finite and not negative");
+}
+
+inline void RequirePositive(ElementBuilder &e, const std::string &what, double x)
+{
+  e.require(std::isfinite(x) && x > 0, what + " is " + Show(x) + ", must be finite and positive");
+}
+
+inline std::string Component(const std::string &what, int k) { return what + " " + "xyz"[k]; }
+
+inline void RequireFinite(ElementBuilder &e, const std::string &what, const Vector3 &x)
+{
+  for (int k = 0; k < 3; k++) RequireFinite(e, Component(what, k), x(k));
+}
+
+inline void RequireNotNegative(ElementBuilder &e, const std::string &what, const Vector3 &x)
+{
+  for (int k = 0; k < 3; k++) RequireNotNegative(e, Component(what, k), x(k));
+}
+
+/* the markers are on different bodies: else action and reaction cancel */
+inline void RequireTwoBodies(ElementBuilder &e, Marker i, Marker j)
+{
+  if (!e.good()) return;
+  const PetscInt b = e.scene().markers[i.id].body;
+  e.require(b != e.scene().markers[j.id].body,
+            "both markers are on " + e.scene().bodyName(b) + ", where its action and reaction cancel");
+}
+
+inline bool OnPoint(const ElementBuilder &e, Marker m)
+{
+  const PetscInt b = e.scene().markers[m.id].body;
+  return b >= 0 && e.scene().bodies[b].point;
+}
+
+/* the body of m can take a moment */
+inline void RequireTurning(ElementBuilder &e, Marker m, const char *marker)
+{
+  if (!e.good()) return;
+  e.require(!OnPoint(e, m), std::string("marker ") + marker + " is on the point mass " +
+                                e.scene().bodyName(e.scene().markers[m.id].body) +
+                                ", which takes no moment; use a rigid body");
+}
+
+/* no distance but rounding */
+inline bool Coincident(const Frame<double> &i, const Frame<double> &j)
+{
+  return (i.x - j.x).norm() <= 1e-13 * (i.x.norm() + j.x.norm());
+}
+
+} // namespace hhtdae
+
+#endif
