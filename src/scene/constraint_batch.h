@@ -138,6 +138,20 @@ public:
 
   Bodies *bodies = nullptr;
 
+  /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
+  static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)
+  {
+    for (int k = 0; k < M; k++) {
+      f[k] = ev.bodies.template frame<K::needs_rotation>(e.marker[k]);
+      if constexpr (!K::holonomic) w[k] = ev.bodies.twist(e.marker[k], f[k]);
+    }
+    PetscInt i = e.lambda;
+    for (int r = 0; r < R; r++) lambda[r] = e.active >> r & 1 ? ev.u[i++] : 0;
+    for (int c = 0; c < Z; c++) z[c] = ev.input(e.input[c]);
+    (void)w;
+    (void)z;
+  }
+
 private:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
 
@@ -157,20 +171,6 @@ private:
       for (int b = 0; b < 2 * M; b++)
         if (K::curved(a, b)) return true;
     return false;
-  }
-
-  /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
-  static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)
-  {
-    for (int k = 0; k < M; k++) {
-      f[k] = ev.bodies.template frame<K::needs_rotation>(e.marker[k]);
-      if constexpr (!K::holonomic) w[k] = ev.bodies.twist(e.marker[k], f[k]);
-    }
-    PetscInt i = e.lambda;
-    for (int r = 0; r < R; r++) lambda[r] = e.active >> r & 1 ? ev.u[i++] : 0;
-    for (int c = 0; c < Z; c++) z[c] = ev.input(e.input[c]);
-    (void)w;
-    (void)z;
   }
 
   static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)

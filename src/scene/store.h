@@ -4,10 +4,13 @@
 
 #include "constraint_batch.h"
 #include "force_batch.h"
+#include "probe.h"
 #include <type_traits>
 
 namespace hhtdae
 {
+
+struct Runtime;
 
 /* Gives an instance its place among this rank's unknowns; layout.cpp */
 class Localizer
@@ -20,6 +23,7 @@ public:
   virtual PetscInt local(PetscInt global) const                 = 0;
   virtual Input    input(const ScalarRef &r)                    = 0;
   Bodies          *bodies = nullptr;
+  Runtime         *run    = nullptr;
 };
 
 class StoreBase
@@ -39,6 +43,9 @@ public:
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  /* one instance to be read where it is not assembled: loads of a constraint, components of a force that is not carried */
+  virtual std::unique_ptr<Probe>         probe(Localizer &l, PetscInt e) const = 0;
+  virtual const std::vector<Expression> *expressions(PetscInt) const { return nullptr; } /* of user's forces */
 
   /* number of unknowns of its own: multipliers or force states */
   int unknowns(PetscInt e) const
@@ -109,6 +116,16 @@ public:
     batch->all.shrink_to_fit();
     if (!batch->all.empty()) batches.push_back(std::move(batch));
   }
+
+  std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
+  {
+    typename ConstraintBatch<K>::Instance i;
+    this->place(l, this->all[e], i);
+    i.active = active(e);
+    i.lambda = this->unknowns(e) ? l.local(this->start[e]) : -1;
+    i.group  = this->unknowns(e) ? l.group(this->start[e], this->unknowns(e)) : -1;
+    return std::make_unique<ConstraintProbe<K>>(i);
+  }
 };
 
 template <class K> class ForceStore : public StoreOf<K>
@@ -138,6 +155,13 @@ public:
     }
     if (!direct->all.empty()) batches.push_back(std::move(direct));
     if (!states->all.empty()) batches.push_back(std::move(states));
+  }
+
+  std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
+  {
+    ForceInstance<K> i;
+    this->place(l, this->all[e], i);
+    return std::make_unique<ForceProbe<K>>(i);
   }
 };
 

@@ -1,0 +1,143 @@
+/*
+  A joint or force read from outside, for measures: the loads of a constraint on the bodies of its markers, the components of a force
+  that is eliminated. A probe is an instance of its own, so that any rank can read one whose bodies and multipliers it has.
+*/
+#ifndef HHTDAE_SCENE_PROBE_H
+#define HHTDAE_SCENE_PROBE_H
+
+#include "constraint_batch.h"
+#include "force_batch.h"
+
+namespace hhtdae
+{
+
+class Probe
+{
+public:
+  virtual ~Probe() = default;
+  virtual int      markers() const     = 0;
+  virtual PetscInt marker(int k) const = 0; /* local number */
+
+  /* of a constraint: - J^T lambda on the bodies of its markers; its multipliers */
+  virtual void  reaction(const Evaluation &, Wrench<double> *) const {}
+  virtual int   multipliers() const { return 0; }
+  virtual Input multiplier(int) const { return {}; }
+  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 a marker) and by the
+     multipliers. The reactions of the kernels that have inputs do not depend on them. */
+  virtual void reactionGradient(const Evaluation &, const double *, double *, double *) const {}
+
+  /* of a force */
+  virtual void components(const Evaluation &, double *) const {}
+
+  virtual void     accept(const Bodies &) {}
+  virtual PetscInt memory() const { return 0; }
+  virtual void     copyMemory(double *, bool in) { (void)in; }
+};
+
+template <class K, class Instance> class ProbeOf : public Probe
+{
+public:
+  explicit ProbeOf(const Instance &i) : e(i) {}
+  int      markers() const override { return K::markers; }
+  PetscInt marker(int k) const override { return e.marker[k]; }
+
+  void accept(const Bodies &B) override
+  {
+    if constexpr (K::memory > 0) {
+      Frame<double> f[K::markers];
+      for (int k = 0; k < K::markers; k++) f[k] = B.frame<true>(e.marker[k]);
+      K::accept(e.data, f);
+    }
+    (void)B;
+  }
+  PetscInt memory() const override { return K::memory; }
+  void     copyMemory(double *x, bool in) override
+  {
+    if constexpr (K::memory > 0)
+      for (int i = 0; i < K::memory; i++) {
+        if (in) e.data.memory[i] = x[i];
+        else x[i] = e.data.memory[i];
+      }
+    (void)x;
+    (void)in;
+  }
+
+protected:
+  Instance e;
+};
+
+template <class K> class ConstraintProbe : public ProbeOf<K, typename ConstraintBatch<K>::Instance>
+{
+  using Instance         = typename ConstraintBatch<K>::Instance;
+  static constexpr int M = K::markers, R = K::rows, Z = K::inputs;
+  struct State {
+    Frame<double>        f[M];
+    Twist<double>        w[M];
+    double               lambda[R], z[Z > 0 ? Z : 1];
+    typename K::Gradient J, P;
+  };
+
+public:
+  explicit ConstraintProbe(const Instance &i) : ProbeOf<K, Instance>(i)
+  {
+    for (int r = 0; r < R; r++)
+      if (i.active >> r & 1) row_[rows_++] = r;
+  }
+
+  void reaction(const Evaluation &ev, Wrench<double> *on) const override
+  {
+    State s;
+    gather(ev, s);
+    const Matrix<6 * M, 1> load = -s.J.transpose() * Eigen::Map<const Matrix<R, 1>>(s.lambda);
+    for (int k = 0; k < M; k++) on[k] = {load.template segment<3>(6 * k), load.template segment<3>(6 * k + 3)};
+  }
+  int   multipliers() const override { return rows_; }
+  Input multiplier(int i) const override { return {this->e.lambda + i, this->e.group, i}; }
+  void  reactionGradient(const Evaluation &ev, const double *y, double *frames, double *lambda) const override
+  {
+    State               s;
+    typename K::Hessian H;
+    gather(ev, s);
+    if constexpr (K::holonomic) K::curvature(this->e.data, s.f, ev.t, s.lambda, H);
+    else K::curvature(this->e.data, s.f, s.w, ev.t, s.z, s.lambda, H);
+    const Eigen::Map<const Matrix<6 * M, 1>> by(y);
+    const Matrix<R, 1>                       rows = -s.J * by;
+    Eigen::Map<Matrix<6 * M, 1>>(frames).noalias() = -H.transpose() * by;
+    for (int i = 0; i < rows_; i++) lambda[i] = rows(row_[i]);
+  }
+
+private:
+  int row_[R], rows_ = 0; /* that are not redundant */
+
+  void gather(const Evaluation &ev, State &s) const
+  {
+    ConstraintBatch<K>::gather(ev, this->e, s.f, s.w, s.lambda, s.z);
+    if constexpr (K::holonomic) K::gradient(this->e.data, s.f, ev.t, s.J);
+    else K::gradient(this->e.data, s.f, s.w, ev.t, s.z, s.J, s.P, nullptr);
+  }
+};
+
+template <class K> class ForceProbe : public ProbeOf<K, ForceInstance<K>>
+{
+  static constexpr int M = K::markers, Z = K::inputs;
+
+public:
+  using ProbeOf<K, ForceInstance<K>>::ProbeOf;
+
+  void components(const Evaluation &ev, double *c) const override
+  {
+    Frame<double> f[M];
+    Twist<double> w[M];
+    double        z[Z > 0 ? Z : 1];
+    for (int k = 0; k < M; k++) {
+      f[k] = ev.bodies.template frame<true>(this->e.marker[k]);
+      w[k] = ev.bodies.twist(this->e.marker[k], f[k]);
+    }
+    for (int i = 0; i < Z; i++) z[i] = ev.input(this->e.input[i]);
+    K::template components<double>(this->e.data, f, w, ev.t, z, c);
+  }
+};
+
+} // namespace hhtdae
+
+#endif
