@@ -1,0 +1,65 @@
+/* What the joints between two markers share: an ElementBuilder that knows its markers, and which of them have to have
+ * axes. */
+#ifndef HHTDAE_SCENE_JOINT_BUILDER_H
+#define HHTDAE_SCENE_JOINT_BUILDER_H
+
+#include "scene/scene_data.h"
+#include <cmath>
+#include <cstdio>
+
+namespace hhtdae
+{
+
+class JointBuilder : public ElementBuilder
+{
+public:
+  JointBuilder(Scene &scene, const std::string &name, const char *type, Marker i, Marker j)
+      : ElementBuilder(scene, name, type, ElementData::Joint, i, j), marker_{i, j}
+  {
+    if (!good()) return;
+    const PetscInt body_i = body(0), body_j = body(1);
+    require(body_i != body_j, "both markers are on " + this->scene().bodyName(body_i) + ", must be on two bodies");
+  }
+
+  Frame<double> start(int k) const { return frame(marker_[k]); }
+  double        startDistance() const { return (start(0).x - start(1).x).norm(); }
+
+  void spatialOnly()
+  {
+    require(!planar(),
+            "not for planar scenes; these have revolute, translational and fixed joints, point distances, points on "
+            "curves and rolling discs");
+  }
+  void positive(const char *what, double value)
+  {
+    require(std::isfinite(value) && value > 0,
+            std::string(what) + " is " + text(value) + ", must be positive and finite");
+  }
+
+  /* Rows of kernel K. What it takes from the axes of a marker could not react on a body without rotation. */
+  template <class K> void rows(const typename K::Data &data = {})
+  {
+    for (int k = 0; k < 2 && good(); k++) {
+      if (!Depends(K::depends, 2 * k + 1) || body(k) < 0) continue;
+      require(!scene().bodies[body(k)].point, std::string("marker ") + (k == 0 ? "i" : "j") + " is on the point mass " +
+                                                  scene().bodyName(body(k)) +
+                                                  ", must be on a rigid body or the ground");
+    }
+    if (good()) constrain<K>({marker_[0], marker_[1]}, data);
+  }
+
+  static std::string text(double x)
+  {
+    char s[32];
+    snprintf(s, sizeof s, "%g", x);
+    return s;
+  }
+
+private:
+  Marker   marker_[2];
+  PetscInt body(int k) const { return scene().markers[marker_[k].id].body; }
+};
+
+} // namespace hhtdae
+
+#endif
