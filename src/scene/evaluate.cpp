@@ -126,6 +126,7 @@ Runtime::~Runtime()
   for (IS &is : roles) PetscCallAbort(PETSC_COMM_SELF, ISDestroy(&is));
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
   PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&axes));
+  PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&rtol));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&sf));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&axes_sf));
   if (unit != MPI_DATATYPE_NULL) MPI_Type_free(&unit);

@@ -1,4 +1,4 @@
-/* The state that the description gives, and the axes of the Euler angles chosen for it. */
+/* The state that the description gives. */
 #include "runtime.h"
 
 namespace hhtdae
@@ -37,12 +37,6 @@ PetscErrorCode InitialState(Runtime &R, Vec U, Vec V)
 {
   double *u, *v;
   PetscFunctionBegin;
-  for (PetscInt b = 0; b < (PetscInt)R.bodies.body.size(); b++) {
-    const LocalBody &k = R.bodies.body[b];
-    if (k.kind != BodyKind::Rigid) continue;
-    const BodyData &d = R.scene.bodies[k.id];
-    R.bodies.setAxes(b, ChooseAxes(d.A, d.w), d.inertia);
-  }
   PetscCall(VecSet(U, 0));
   PetscCall(VecSet(V, 0));
   PetscCall(VecGetArray(U, &u));

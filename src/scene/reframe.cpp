@@ -1,9 +1,280 @@
+/*
+  A body whose theta comes near 0 or pi gets new axes: its Euler angles then belong to another frame fixed in the body, in which it
+  is far from the singularity. The integrator carries angles, rates, accelerations and their history over,
+  TSHHT3SetCoordinateChange(). The same call before each step tells that the state has been accepted, and angles that are counted
+  over full turns remember where they are.
+
+  Axes and remembered angles are in one vector, Runtime::axes, which checkpoints keep: a quaternion per own rigid body, then the
+  memories of the elements.
+*/
 #include "runtime.h"
+
 namespace hhtdae
 {
-PetscErrorCode AttachReframing(Runtime &, TS)
+
+namespace
 {
+
+bool HasAxes(const LocalBody &k) { return k.kind == BodyKind::Rigid; }
+
+PetscInt Memories(const Runtime &R)
+{
+  PetscInt n = 0;
+  for (const auto &b : R.batches) n += b->memory();
+  return n;
+}
+
+void Store(const Matrix3 &C, double *x)
+{
+  const Eigen::Quaterniond q(C);
+  x[0] = q.w();
+  x[1] = q.x();
+  x[2] = q.y();
+  x[3] = q.z();
+}
+
+Matrix3 Load(const double *x) { return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix(); }
+
+/* Leaves: others' rigid bodies here; roots: own bodies of their owners */
+PetscErrorCode MakeExchange(Runtime &R)
+{
+  std::vector<PetscInt>   place(R.scene.bodies.size()), next(R.size, 0);
+  std::vector<PetscSFNode> root;
   PetscFunctionBegin;
+  for (std::size_t b = 0; b < place.size(); b++) place[b] = next[R.number.owner[b]]++;
+  for (std::size_t b = R.bodies.own; b + 1 < R.bodies.body.size(); b++) {
+    const PetscInt id = R.bodies.body[b].id;
+    PetscSFNode    node;
+    node.rank  = R.number.owner[id];
+    node.index = place[id];
+    root.push_back(node);
+  }
+  PetscCall(PetscSFCreate(R.scene.comm, &R.axes_sf));
+  PetscCall(PetscSFSetGraph(R.axes_sf, R.bodies.own, (PetscInt)root.size(), nullptr, PETSC_OWN_POINTER, root.data(), PETSC_COPY_VALUES));
   PetscFunctionReturn(0);
 }
+
+/* Motion of the bodies in the state (U, V), with others' bodies */
+PetscErrorCode Move(Runtime &R, Vec U, Vec V)
+{
+  const double *u, *v, *local[3];
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(LocalState(R, u, v, v, local));
+  R.bodies.move(local[0], local[1]);
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscFunctionReturn(0);
+}
+
+/* Elements remember the accepted state */
+PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
+{
+  double *x;
+  PetscFunctionBegin;
+  if (!R.remembers) PetscFunctionReturn(0);
+  PetscCall(Move(R, U, V));
+  PetscCall(VecGetArray(R.axes, &x));
+  double *m = x + 4 * R.bodies.own;
+  for (auto &b : R.batches) {
+    b->accept(R.bodies);
+    b->copyMemory(m, false);
+    m += b->memory();
+  }
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscFunctionReturn(0);
+}
+
+/* Own bodies that need other axes, and which */
+PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
+{
+  const double *u, *v;
+  PetscFunctionBegin;
+  R.next_body.clear();
+  R.next_axes.clear();
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (!HasAxes(k)) continue;
+    const double *eps = u + k.first + 3, *rate = v + k.first + 3;
+    if (std::abs(std::sin(eps[1])) >= singular_sine) continue;
+    Matrix3   A;
+    EulerAxes e;
+    EulerFrame(eps, A, e);
+    R.next_body.push_back(b);
+    R.next_axes.push_back(ChooseAxes(A * k.C, AngularVelocity(e, Vector3(rate[0], rate[1], rate[2]))));
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Test(TS ts, PetscReal, Vec U, Vec V, PetscBool *change, void *ctx)
+{
+  Runtime &R = *static_cast<Runtime *>(ctx);
+  PetscFunctionBegin;
+  PetscCall(AngleTolerances(R, ts));
+  PetscCall(Remember(R, U, V));
+  *change = PETSC_FALSE;
+  if (!R.turns) PetscFunctionReturn(0);
+  PetscCall(ChooseNext(R, U, V));
+  int any = !R.next_body.empty();
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
+  *change = any ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+/* The same attitude, angular velocity and acceleration in other axes; eps'' also when it is not quite at the time of eps */
+void MapBody(const Matrix3 &C, const Matrix3 &next, double *eps, double *rate, double *acc)
+{
+  Matrix3   A;
+  EulerAxes e;
+  EulerFrame(eps, A, e);
+  const Vector3 x(rate[0], rate[1], rate[2]), w = AngularVelocity(e, x);
+  const Vector3 alpha = AngularVelocity(e, Vector3(acc[0], acc[1], acc[2])) + Convective(e, x, w);
+  const Vector3 angles = EulerAngles(A * C * next.transpose());
+  EulerFrame(angles.data(), A, e);
+  const Vector3 y = EulerRates(e, w), z = EulerRates(e, alpha - Convective(e, y, w));
+  for (int i = 0; i < 3; i++) {
+    eps[i]  = angles(i);
+    rate[i] = y(i);
+    acc[i]  = z(i);
+  }
+}
+
+PetscErrorCode Map(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
+{
+  Runtime &R = *static_cast<Runtime *>(ctx);
+  double  *u, *v, *a;
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(VecGetArray(V, &v));
+  PetscCall(VecGetArray(A, &a));
+  for (std::size_t i = 0; i < R.next_body.size(); i++) {
+    const LocalBody &k = R.bodies.body[R.next_body[i]];
+    MapBody(k.C, R.next_axes[i], u + k.first + 3, v + k.first + 3, a + k.first + 3);
+  }
+  PetscCall(VecRestoreArray(U, &u));
+  PetscCall(VecRestoreArray(V, &v));
+  PetscCall(VecRestoreArray(A, &a));
+  PetscFunctionReturn(0);
+}
+
+/* New axes into the vector, and from it to where they are used; also after a checkpoint has been loaded */
+PetscErrorCode Commit(TS ts, void *ctx)
+{
+  Runtime &R = *static_cast<Runtime *>(ctx);
+  double  *x;
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(R.axes, &x));
+  for (std::size_t i = 0; i < R.next_body.size(); i++) {
+    Store(R.next_axes[i], x + 4 * R.next_body[i]);
+    PetscCall(PetscInfo(ts, "new axes for the Euler angles of %s\n", R.scene.bodyName(R.bodies.body[R.next_body[i]].id).c_str()));
+  }
+  PetscCall(VecRestoreArray(R.axes, &x));
+  R.reframed += (PetscInt)R.next_body.size();
+  R.next_body.clear();
+  R.next_axes.clear();
+  PetscCall(UseAxes(R));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+/* Makes the vector, with the axes that the initial attitudes and angular velocities choose */
+PetscErrorCode MakeAxes(Runtime &R)
+{
+  double *x;
+  int     local[2] = {0, Memories(R) > 0}, global[2];
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < R.bodies.own; b++) local[0] |= HasAxes(R.bodies.body[b]);
+  PetscCallMPI(MPI_Allreduce(local, global, 2, MPI_INT, MPI_MAX, R.scene.comm));
+  R.turns     = global[0];
+  R.remembers = global[1];
+  PetscCall(VecDestroy(&R.axes));
+  PetscCall(PetscSFDestroy(&R.axes_sf));
+  if (!R.turns && !R.remembers) PetscFunctionReturn(0);
+  PetscCall(VecCreate(R.scene.comm, &R.axes));
+  PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R), PETSC_DETERMINE));
+  PetscCall(VecSetType(R.axes, VECSTANDARD));
+  if (R.size > 1) PetscCall(MakeExchange(R));
+  PetscCall(VecGetArray(R.axes, &x));
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const BodyData &d = R.scene.bodies[R.bodies.body[b].id];
+    Store(HasAxes(R.bodies.body[b]) ? ChooseAxes(d.A, d.w) : Matrix3(Matrix3::Identity()), x + 4 * b);
+  }
+  double *m = x + 4 * R.bodies.own;
+  for (auto &b : R.batches) {
+    b->copyMemory(m, false);
+    m += b->memory();
+  }
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscCall(UseAxes(R));
+  PetscFunctionReturn(0);
+}
+
+/* Axes and memories as the vector has them */
+PetscErrorCode UseAxes(Runtime &R)
+{
+  double             *x;
+  std::vector<double> other(4 * R.bodies.body.size());
+  PetscFunctionBegin;
+  if (!R.axes) PetscFunctionReturn(0);
+  PetscCall(VecGetArray(R.axes, &x));
+  if (R.size > 1) {
+    MPI_Datatype quaternion;
+    PetscCallMPI(MPI_Type_contiguous(4, MPI_DOUBLE, &quaternion));
+    PetscCallMPI(MPI_Type_commit(&quaternion));
+    PetscCall(PetscSFBcastBegin(R.axes_sf, quaternion, x, other.data(), MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(R.axes_sf, quaternion, x, other.data(), MPI_REPLACE));
+    PetscCallMPI(MPI_Type_free(&quaternion));
+  }
+  for (PetscInt b = 0; b + 1 < (PetscInt)R.bodies.body.size(); b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (HasAxes(k)) R.bodies.setAxes(b, Load(b < R.bodies.own ? x + 4 * b : other.data() + 4 * (b - R.bodies.own)), R.scene.bodies[k.id].inertia);
+  }
+  double *m = x + 4 * R.bodies.own;
+  for (auto &b : R.batches) {
+    b->copyMemory(m, true);
+    m += b->memory();
+  }
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscFunctionReturn(0);
+}
+
+/* Angles are measured against atol alone: their values depend on the axes and grow with every turn, while an error of an angle
+   does not. */
+PetscErrorCode AngleTolerances(Runtime &R, TS ts)
+{
+  PetscReal atol, rtol;
+  Vec       vatol, vrtol, U;
+  double   *x;
+  PetscFunctionBegin;
+  PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
+  if (vatol || (vrtol && vrtol != R.rtol) || (vrtol && R.rtol_of == rtol)) PetscFunctionReturn(0); /* the user's own, or done */
+  PetscCall(TSGetSolution(ts, &U));
+  if (!R.rtol) PetscCall(VecDuplicate(U, &R.rtol));
+  PetscCall(VecSet(R.rtol, rtol));
+  PetscCall(VecGetArray(R.rtol, &x));
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (k.kind == BodyKind::Planar) x[k.first + 2] = 0;
+    if (k.kind == BodyKind::Rigid) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
+  }
+  PetscCall(VecRestoreArray(R.rtol, &x));
+  R.rtol_of = rtol;
+  PetscCall(TSSetTolerances(ts, atol, nullptr, rtol, R.rtol));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode AttachReframing(Runtime &R, TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns ? Map : nullptr, R.axes ? Commit : nullptr, &R));
+  if (R.axes) PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
+  PetscFunctionReturn(0);
+}
+
 } // namespace hhtdae

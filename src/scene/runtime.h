@@ -19,6 +19,9 @@ struct Numbering {
   std::vector<PetscMPIInt> variable_owner, state_owner;
 };
 
+struct Recorder;    /* output/recorder.h */
+struct ChannelWork; /* output/channels.h */
+
 struct Runtime {
   SceneData  &scene;
   PetscMPIInt rank = 0, size = 1;
@@ -43,10 +46,16 @@ struct Runtime {
   Mat  J = nullptr;      /* the pattern; every TS gets a duplicate */
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* quaternions of the axes of own rigid bodies, and memories: what a checkpoint has to keep */
+  bool turns = false, remembers = false; /* on any rank: rigid bodies in space, elements with memory */
+  Vec       rtol    = nullptr; /* relative tolerances, none for angles */
+  PetscReal rtol_of = -1;
   PetscSF axes_sf = nullptr; /* axes of others' bodies */
   std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
   std::vector<PetscInt> next_body;
   PetscInt              reframed = 0; /* changes of axes so far, own bodies */
+
+  std::shared_ptr<ChannelWork> channels;
+  std::shared_ptr<Recorder>    recorder; /* none unless output was asked for */
 
   explicit Runtime(SceneData &s) : scene(s) {}
   ~Runtime();
@@ -68,11 +77,16 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);
 /* reframe.cpp: change of the axes of the Euler angles in the course of a run */
 PetscErrorCode AttachReframing(Runtime &R, TS ts);
-PetscErrorCode KeepAxes(Runtime &R);    /* into Runtime::axes */
-PetscErrorCode RestoreAxes(Runtime &R); /* out of it */
+PetscErrorCode MakeAxes(Runtime &R);
+PetscErrorCode UseAxes(Runtime &R);
+PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */
 PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);
+/* output/channels.cpp: markers and unknowns that own channels read; output/recorder.cpp */
+PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
+PetscErrorCode AttachOutput(Runtime &R, TS ts);
+PetscErrorCode FinishOutput(Runtime &R);
 /* check.cpp: everything that is wrong with the description, as one error */
 PetscErrorCode CheckDescription(SceneData &s);
 
