@@ -1,9 +1,7 @@
 /* Friction in joints: the kernel that fits the joint, with the multipliers of its position rows as inputs;
  * kernels/friction.h */
 #include "scene/kernels/friction.h"
-#include "scene/scene_data.h"
-#include <cstring>
-#include <sstream>
+#include "requirements.h"
 
 namespace hhtdae
 {
@@ -21,14 +19,9 @@ template <class K> void Enter(ElementBuilder &e, const JointFriction &s, Marker 
 
 void CheckNumbers(ElementBuilder &e, const JointFriction &s, bool turns)
 {
-  auto check = [&e](bool good, const char *what, double x, const char *must) {
-    std::ostringstream message;
-    message << what << " is " << x << ", must " << must;
-    e.require(good && std::isfinite(x), message.str());
-  };
-  check(s.coefficient >= 0, "coefficient", s.coefficient, "not be negative");
-  check(s.slip_velocity > 0, "slip velocity", s.slip_velocity, "be positive");
-  if (turns) check(s.radius > 0, "radius of pin or ball", s.radius, "be positive");
+  RequireNotNegative(e, "coefficient", s.coefficient);
+  RequirePositive(e, "slip velocity", s.slip_velocity);
+  if (turns) RequirePositive(e, "radius of pin or ball", s.radius);
 }
 
 } // namespace
