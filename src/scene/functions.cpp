@@ -130,18 +130,22 @@ TimeFunction TimeFunction::step(double t0, double x0, double t1, double x1)
     if (s <= 0) return Value{x0, 0, 0};
     if (s >= 1) return Value{x1, 0, 0};
     const double r = 1 - s; /* s^3 (10 - 15 s + 6 s^2) has derivatives 30 s^2 r^2 and 60 s r (r - s) */
-    return Value{x0 + d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r / h, d * 60 * s * r * (r - s) / (h * h)};
+    return Value{x0 + d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r / h,
+                 d * 60 * s * r * (r - s) / (h * h)};
   };
   return g;
 }
 
 TimeFunction TimeFunction::spline(const std::vector<double> &t, const std::vector<double> &x)
 {
-  if (t.size() != x.size()) return faulty(Text("a spline of ", t.size(), " times and ", x.size(), " values needs as many of both"));
-  if (t.size() < 2) return faulty(Text("a spline of ", t.size(), t.size() == 1 ? " point" : " points", " needs at least two"));
+  if (t.size() != x.size())
+    return faulty(Text("a spline of ", t.size(), " times and ", x.size(), " values needs as many of both"));
+  if (t.size() < 2)
+    return faulty(Text("a spline of ", t.size(), t.size() == 1 ? " point" : " points", " needs at least two"));
   if (!Finite(t) || !Finite(x)) return faulty("times and values of a spline must be finite");
   for (size_t k = 1; k < t.size(); k++)
-    if (!(t[k] > t[k - 1])) return faulty(Text("the spline's times must increase, but ", t[k - 1], " is followed by ", t[k]));
+    if (!(t[k] > t[k - 1]))
+      return faulty(Text("the spline's times must increase, but ", t[k - 1], " is followed by ", t[k]));
   Spline s{t, x, {}};
   s.solve();
   if (!Finite(s.m)) return faulty("the spline's times are too close to each other for its values");
@@ -156,7 +160,7 @@ TimeFunction TimeFunction::formula(std::function<Number(const Number &)> f)
   TimeFunction g;
   g.f_ = [f](double t) {
     using Inner = Number::Scalar;
-    Number clock(Inner(t, 1, 0), 1, 0);
+    Number       clock(Inner(t, 1, 0), 1, 0);
     const Number y = f(clock);
     return Value{y.value().value(), y.value().derivatives()(0), y.derivatives()(0).derivatives()(0)};
   };

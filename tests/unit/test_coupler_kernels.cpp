@@ -62,7 +62,8 @@ TEST(CouplerKernels, DerivativesOfTheScrew)
   });
 }
 
-/* Two wheels through many turns: in steps of less than half a turn with accept(), the row stays met; a wrong ratio does not. */
+/* Two wheels through many turns: in steps of less than half a turn with accept(), the row stays met; a wrong ratio does
+ * not. */
 TEST(CouplerKernels, GearTransmitsManyTurns)
 {
   using Gear = CouplerRow<2, 2>;
@@ -70,13 +71,13 @@ TEST(CouplerKernels, GearTransmitsManyTurns)
   const Frame<double> j1 = random.frame(), j2 = random.frame();
   const double        ratio = 2.5, first = .4, second = -.7;
   Gear::Data          d;
-  d.factor[0] = 1;
-  d.factor[1] = ratio;
+  d.factor[0]     = 1;
+  d.factor[1]     = ratio;
   const auto pose = [&](double turn, double error, Frame<double> *f) { /* angle_1 + ratio angle_2 = start */
-    f[0] = Turned(j1, first + turn);
-    f[1] = j1;
-    f[2] = Turned(j2, second - turn / ratio + error);
-    f[3] = j2;
+                                                                       f[0] = Turned(j1, first + turn);
+                                                                       f[1] = j1;
+                                                                       f[2] = Turned(j2, second - turn / ratio + error);
+                                                                       f[3] = j2;
   };
   Frame<double> f[4];
   pose(0, 0, f);
@@ -98,7 +99,7 @@ TEST(CouplerKernels, OnlyAcceptedStepsAreRemembered)
 {
   using Gear = CouplerRow<2, 2>;
   Random              random(7);
-  const Frame<double> j = random.frame();
+  const Frame<double> j    = random.frame();
   Frame<double>       f[4] = {Turned(j, 3), j, Turned(j, 0), j};
   Gear::Data          d;
   d.factor[0] = 1;
@@ -135,7 +136,8 @@ TEST(CouplerKernels, RackAndPinion)
   EXPECT_EQ(J.segment<3>(0).norm(), 0);
 }
 
-/* A screw advances by its pitch in each turn; its multiplier is the axial force on i's body, beside -pitch/(2 pi) times that as moment */
+/* A screw advances by its pitch in each turn; its multiplier is the axial force on i's body, beside -pitch/(2 pi) times
+ * that as moment */
 TEST(CouplerKernels, ScrewAdvancesByItsPitch)
 {
   Random              random(9);
@@ -160,9 +162,9 @@ TEST(CouplerKernels, CommonMotionIsFree)
 {
   Random random(10);
   for (int k = 0; k < 10; k++) {
-    Frame<double>     f[6];
+    Frame<double>       f[6];
     const Twist<double> w = random.twist();
-    Matrix<36, 1>     u;
+    Matrix<36, 1>       u;
     for (int m = 0; m < 6; m++) f[m] = random.frame();
     const auto d = Coupled<3, 2>(random, f);
     for (int m = 0; m < 6; m++) u.segment<6>(6 * m) << w.v + w.w.cross(f[m].x), w.w;

@@ -15,9 +15,9 @@ namespace
 /* f1 and f2 against central differences of f and f1: error of order d^2, of f of size one */
 void ExpectDerivatives(const TimeFunction &f, double t, double tolerance = 1e-8)
 {
-  const double             d = 1e-5;
+  const double              d = 1e-5;
   const TimeFunction::Value v = f(t), a = f(t - d), b = f(t + d);
-  const double             scale = 1 + std::abs(v.f) + std::abs(v.f1) + std::abs(v.f2);
+  const double              scale = 1 + std::abs(v.f) + std::abs(v.f1) + std::abs(v.f2);
   EXPECT_NEAR(v.f1, (b.f - a.f) / (2 * d), tolerance * scale) << "f' at " << t;
   EXPECT_NEAR(v.f2, (b.f1 - a.f1) / (2 * d), tolerance * scale) << "f'' at " << t;
 }
@@ -128,7 +128,8 @@ TEST(TimeFunctions, SplineThroughThreePointsHasItsClosedForm)
 
 TEST(TimeFunctions, SplineOfALineIsTheLine)
 {
-  const TimeFunction two = TimeFunction::spline({1, 3}, {2, 6}), five = TimeFunction::spline({0, 1, 3, 4, 9}, {1, 3, 7, 9, 19});
+  const TimeFunction two  = TimeFunction::spline({1, 3}, {2, 6}),
+                     five = TimeFunction::spline({0, 1, 3, 4, 9}, {1, 3, 7, 9, 19});
   for (double t : {-1., 1., 2.2, 20.}) {
     EXPECT_NEAR(two(t).f, 2 * t, 1e-13);
     EXPECT_NEAR(two(t).f1, 2, 1e-13);
@@ -157,7 +158,8 @@ TEST(TimeFunctions, SplineConvergesWithFourthOrder)
 
 TEST(TimeFunctions, FormulasAreDifferentiatedExactly)
 {
-  const TimeFunction f = TimeFunction::formula([](const Number &t) -> Number { return sin(2.0 * t) * exp(-t) + 1.0 / (2.0 + t * t); });
+  const TimeFunction f =
+      TimeFunction::formula([](const Number &t) -> Number { return sin(2.0 * t) * exp(-t) + 1.0 / (2.0 + t * t); });
   for (double t : {-.7, 0., .4, 3.}) {
     const TimeFunction::Value v = f(t);
     const double              s = std::sin(2 * t), c = std::cos(2 * t), e = std::exp(-t), r = 1 / (2 + t * t);
@@ -220,8 +222,8 @@ TEST(TimeFunctions, BadInputIsNamed)
 /* Nothing hides a value that is no number: it reaches whoever asks */
 TEST(TimeFunctions, NotANumberPassesThrough)
 {
-  for (const TimeFunction &f : {TimeFunction::polynomial({1, 2}), TimeFunction::harmonic(1, 1), TimeFunction::step(0, 0, 1, 1),
-                                TimeFunction::spline({0, 1, 2}, {0, 1, 0})})
+  for (const TimeFunction &f : {TimeFunction::polynomial({1, 2}), TimeFunction::harmonic(1, 1),
+                                TimeFunction::step(0, 0, 1, 1), TimeFunction::spline({0, 1, 2}, {0, 1, 0})})
     EXPECT_TRUE(std::isnan(f(kNaN).f));
   const TimeFunction late = TimeFunction::formula([](const Number &t) -> Number { return log(1.0 - t); });
   EXPECT_TRUE(std::isfinite(late(.5).f));

@@ -1,4 +1,5 @@
-/* Angles, advances and motions of them: derivatives, full turns, one motion described by its displacement and by its velocity */
+/* Angles, advances and motions of them: derivatives, full turns, one motion described by its displacement and by its
+ * velocity */
 #include "kernel_checks.h"
 #include "scene/kernels/angle.h"
 #include "scene/kernels/motion.h"
@@ -29,12 +30,12 @@ std::function<MotionData(Random &)> Along(int axis)
 
 /* Frames that move and turn smoothly in time, and their exact twists */
 struct Flight {
-  Vec3<double>  x, v, a, axis, w;
-  Mat3<double>  R;
+  Vec3<double> x, v, a, axis, w;
+  Mat3<double> R;
 
   explicit Flight(Random &random)
-      : x(random.vector(2)), v(random.vector(2)), a(random.vector(2)), axis(random.direction()), w(axis * random(-2, 2)),
-        R(random.rotation())
+      : x(random.vector(2)), v(random.vector(2)), a(random.vector(2)), axis(random.direction()),
+        w(axis * random(-2, 2)), R(random.rotation())
   {
   }
   Frame<double> frame(double t) const
@@ -69,7 +70,7 @@ TEST(Angle, IsTheRotationAboutZWhereAxesAreParallel)
 TEST(Angle, CountsFullTurnsBothWays)
 {
   Random              random(4);
-  const Frame<double> j = random.frame();
+  const Frame<double> j  = random.frame();
   double              up = 0, down = 0;
   for (int k = 1; k <= 100; k++) {
     up   = UnwoundAngle<double>(Turned(j, .3 * k), j, up);
@@ -105,7 +106,8 @@ TEST(Angle, RatesAreTimeDerivatives)
     };
     DynamicVector rates(4);
     rates(0) = AngleRate<double>(i.frame(0), j.frame(0), i.twist(0), j.twist(0));
-    for (int axis = 0; axis < 3; axis++) rates(1 + axis) = AdvanceRate<double>(i.frame(0), j.frame(0), i.twist(0), j.twist(0), axis);
+    for (int axis = 0; axis < 3; axis++)
+      rates(1 + axis) = AdvanceRate<double>(i.frame(0), j.frame(0), i.twist(0), j.twist(0), axis);
     ExpectClose(rates, Difference(g), 1e-8, "rates");
   }
 }
@@ -189,7 +191,7 @@ TEST(MotionKernels, VelocityRowIsTheTimeDerivativeOfTheDisplacementRow)
     const TimeFunction::Value v = kWave(t);
     return TimeFunction::Value{v.f1, v.f2, 0};
   });
-  Random random(8);
+  Random             random(8);
   for (int k = 0; k < 20; k++) {
     SCOPED_TRACE(k);
     Flight i(random), j(random);
@@ -229,7 +231,8 @@ TEST(MotionKernels, DrivenAngleFollowsManyTurns)
 
 TEST(MotionKernels, AFunctionWithoutValueShows)
 {
-  const MotionData    d{TimeFunction::formula([](const TimeFunction::Number &t) -> TimeFunction::Number { return sqrt(1.0 - t); }), 2};
+  const MotionData d{
+      TimeFunction::formula([](const TimeFunction::Number &t) -> TimeFunction::Number { return sqrt(1.0 - t); }), 2};
   Random              random(11);
   const Frame<double> f[2] = {random.frame(), random.frame()};
   const Twist<double> w[2] = {random.twist(), random.twist()};

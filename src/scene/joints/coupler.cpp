@@ -1,6 +1,6 @@
 /* Couplers of joint motions: gear, rack and pinion, general coupler of two or three. */
 #include "scene/kernels/coupler.h"
-#include "scene/scene_data.h"
+#include "scene/motions/moving_pair.h"
 #include <algorithm>
 
 namespace hhtdae
@@ -15,14 +15,11 @@ using Terms = std::vector<Term>;
 void CheckTerm(ElementBuilder &e, const Term &t, std::size_t k)
 {
   const std::string term = "term " + std::to_string(k + 1);
-  const SceneData  &s    = e.scene();
   e.require(t.i, (term + ": marker i").c_str());
   e.require(t.j, (term + ": marker j").c_str());
-  e.require(std::isfinite(t.factor) && t.factor != 0, term + ": factor is " + std::to_string(t.factor) + ", must be finite and not zero");
-  if (!s.valid(t.i) || !s.valid(t.j)) return;
-  e.require(t.i.id != t.j.id, term + ": markers i and j are the same");
-  if (e.good() && t.rotation)
-    e.require(AngleDefined(e.frame(t.i), e.frame(t.j)), term + ": the x axis of marker i is along the z axis of j, the angle about it is undefined");
+  e.require(std::isfinite(t.factor) && t.factor != 0,
+            term + ": factor is " + Text(t.factor) + ", must be finite and not zero");
+  if (e.good()) RequirePair(e, t.i, t.j, t.rotation, term + ": ");
 }
 
 /* In a planar scene translations are along x_j, z being out of the plane. */
@@ -38,15 +35,19 @@ template <int N, int R> void Constrain(ElementBuilder &e, const Terms &terms)
     d.factor[k]  = terms[k].factor;
   }
   K::begin(d, f);
-  if constexpr (N == 2) e.constrain<K>({terms[0].i, terms[0].j, terms[1].i, terms[1].j}, d);
-  else e.constrain<K>({terms[0].i, terms[0].j, terms[1].i, terms[1].j, terms[2].i, terms[2].j}, d);
+  if constexpr (N == 2)
+    e.constrain<K>({terms[0].i, terms[0].j, terms[1].i, terms[1].j}, d);
+  else
+    e.constrain<K>({terms[0].i, terms[0].j, terms[1].i, terms[1].j, terms[2].i, terms[2].j}, d);
 }
 
 /* the kernel whose first R terms are rotations */
 template <int N, int R = N> void Dispatch(ElementBuilder &e, const Terms &terms, int rotations)
 {
-  if (rotations == R) Constrain<N, R>(e, terms);
-  else if constexpr (R > 0) Dispatch<N, R - 1>(e, terms, rotations);
+  if (rotations == R)
+    Constrain<N, R>(e, terms);
+  else if constexpr (R > 0)
+    Dispatch<N, R - 1>(e, terms, rotations);
 }
 
 Element Couple(ElementBuilder &e, Terms terms)
@@ -55,8 +56,10 @@ Element Couple(ElementBuilder &e, Terms terms)
   if (!e.good()) return e.done();
   std::stable_sort(terms.begin(), terms.end(), [](const Term &a, const Term &b) { return a.rotation && !b.rotation; });
   const int rotations = (int)std::count_if(terms.begin(), terms.end(), [](const Term &t) { return t.rotation; });
-  if (terms.size() == 2) Dispatch<2>(e, terms, rotations);
-  else Dispatch<3>(e, terms, rotations);
+  if (terms.size() == 2)
+    Dispatch<2>(e, terms, rotations);
+  else
+    Dispatch<3>(e, terms, rotations);
   return e.done();
 }
 
@@ -66,7 +69,7 @@ Element Couple(ElementBuilder &e, Terms terms)
 template <> Element Scene::add(const std::string &name, const Gear &s)
 {
   ElementBuilder e(*this, name, "gear", ElementData::Joint, s.i1, s.j1);
-  e.require(std::isfinite(s.ratio) && s.ratio != 0, "ratio is " + std::to_string(s.ratio) + ", must be finite and not zero");
+  e.require(std::isfinite(s.ratio) && s.ratio != 0, "ratio is " + Text(s.ratio) + ", must be finite and not zero");
   if (!e.good()) return e.done();
   return Couple(e, {{s.i1, s.j1, true, 1}, {s.i2, s.j2, true, s.ratio}});
 }
@@ -75,7 +78,7 @@ template <> Element Scene::add(const std::string &name, const Gear &s)
 template <> Element Scene::add(const std::string &name, const RackAndPinion &s)
 {
   ElementBuilder e(*this, name, "rack and pinion", ElementData::Joint, s.i1, s.j1);
-  e.require(std::isfinite(s.radius) && s.radius != 0, "radius is " + std::to_string(s.radius) + ", must be finite and not zero");
+  e.require(std::isfinite(s.radius) && s.radius != 0, "radius is " + Text(s.radius) + ", must be finite and not zero");
   if (!e.good()) return e.done();
   return Couple(e, {{s.i1, s.j1, true, -s.radius}, {s.i2, s.j2, false, 1}});
 }
@@ -84,8 +87,10 @@ template <> Element Scene::add(const std::string &name, const RackAndPinion &s)
 template <> Element Scene::add(const std::string &name, const Coupler &s)
 {
   const bool     some = !s.terms.empty();
-  ElementBuilder e(*this, name, "coupler", ElementData::Joint, some ? s.terms[0].i : Marker{}, some ? s.terms[0].j : Marker{});
-  e.require(s.terms.size() == 2 || s.terms.size() == 3, std::to_string(s.terms.size()) + " terms, must be two or three");
+  ElementBuilder e(*this, name, "coupler", ElementData::Joint, some ? s.terms[0].i : Marker{},
+                   some ? s.terms[0].j : Marker{});
+  e.require(s.terms.size() == 2 || s.terms.size() == 3,
+            std::to_string(s.terms.size()) + " terms, must be two or three");
   if (!e.good()) return e.done();
   return Couple(e, s.terms);
 }

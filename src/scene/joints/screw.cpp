@@ -2,7 +2,7 @@
 #include "scene/kernels/coupler.h"
 #include "scene/kernels/primitives.h"
 #include "scene/kernels/primitives_axes.h"
-#include "scene/scene_data.h"
+#include "scene/motions/moving_pair.h"
 
 namespace hhtdae
 {
@@ -12,8 +12,8 @@ template <> Element Scene::add(const std::string &name, const Screw &s)
 {
   ElementBuilder e(*this, name, "screw", ElementData::Joint, s.i, s.j);
   e.require(!e.planar(), "a planar scene has no screws");
-  e.require(std::isfinite(s.pitch), "pitch is " + std::to_string(s.pitch) + ", must be finite");
-  if (e.good()) e.require(AngleDefined(e.frame(s.i), e.frame(s.j)), "the x axis of marker i is along the z axis of j, the angle about it is undefined");
+  e.require(std::isfinite(s.pitch), "pitch is " + Text(s.pitch) + ", must be finite");
+  if (e.good()) RequirePair(e, s.i, s.j, true);
   if (e.good()) {
     const Frame<double> f[2] = {e.frame(s.i), e.frame(s.j)};
     ScrewRow::Data      d;

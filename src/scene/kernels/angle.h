@@ -1,13 +1,14 @@
 /*
-  The relative angle of marker i about z_j, and the advance of i along an axis of j: values, rates, gradients and curvatures, shared
-  by motions, couplers and torsional springs.
+  The relative angle of marker i about z_j, and the advance of i along an axis of j: values, rates, gradients and
+  curvatures, shared by motions, couplers and torsional springs.
 
   Angle: of the projection of x_i on the xy plane of j, from x_j, positive about z_j,
 
-    theta = atan2(x_i . y_j, x_i . x_j),    d theta = g . (d theta_i - d theta_j),    g = (z_j - h x_i)/(1 - h^2),  h = x_i . z_j,
+    theta = atan2(x_i . y_j, x_i . x_j),    d theta = g . (d theta_i - d theta_j),    g = (z_j - h x_i)/(1 - h^2),  h =
+  x_i . z_j,
 
-  exact whether or not the z axes are parallel; g = z_j where they are. It is undefined where x_i is along z_j: derivatives are then
-  not finite, which the integrator takes as a failed step.
+  exact whether or not the z axes are parallel; g = z_j where they are. It is undefined where x_i is along z_j:
+  derivatives are then not finite, which the integrator takes as a failed step.
 */
 #ifndef HHTDAE_SCENE_KERNELS_ANGLE_H
 #define HHTDAE_SCENE_KERNELS_ANGLE_H
@@ -34,7 +35,8 @@ template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
   return atan2(s, c);
 }
 
-/* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn from it */
+/* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn
+ * from it */
 template <class T> T UnwoundAngle(const Frame<T> &i, const Frame<T> &j, double remembered)
 {
   return Unwind<T>(PrincipalAngle<T>(i, j), remembered);
@@ -105,7 +107,8 @@ template <class Block> void AddAngleCurvature(const Frame<double> &i, const Fram
   H.template block<3, 3>(9, 9) -= factor * Gj;
 }
 
-template <class Row> void AddAdvanceGradient(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Row &&J)
+template <class Row>
+void AddAdvanceGradient(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Row &&J)
 {
   const Vec3<double> e = factor * j.R.col(axis), u = i.x - j.x;
   J.template segment<3>(0) += e.transpose();
@@ -113,7 +116,8 @@ template <class Row> void AddAdvanceGradient(const Frame<double> &i, const Frame
   J.template segment<3>(9) += e.cross(u).transpose();
 }
 
-template <class Block> void AddAdvanceCurvature(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Block &&H)
+template <class Block>
+void AddAdvanceCurvature(const Frame<double> &i, const Frame<double> &j, int axis, double factor, Block &&H)
 {
   const Vec3<double> u = i.x - j.x;
   const Mat3<double> E = Cross<double>(factor * j.R.col(axis));

@@ -1,10 +1,10 @@
 /*
-  Couplers of N joint motions: the sum of factor_k s_k is what it was at the start, where s_k is the angle of marker i_k about the z
-  axis of j_k, counted over full turns, or the advance of i_k along an axis of j_k. The first R terms are angles. Markers:
-  i_1, j_1, i_2, j_2, ...
+  Couplers of N joint motions: the sum of factor_k s_k is what it was at the start, where s_k is the angle of marker i_k
+  about the z axis of j_k, counted over full turns, or the advance of i_k along an axis of j_k. The first R terms are
+  angles. Markers: i_1, j_1, i_2, j_2, ...
 
-  The sum is separable: gradient and curvature are those of the pairs, factor by factor. The row is "start minus sum", so that
-  factor_k times the multiplier is the moment on i_k's body about z_j, or the force on it along the axis of j.
+  The sum is separable: gradient and curvature are those of the pairs, factor by factor. The row is "start minus sum",
+  so that factor_k times the multiplier is the moment on i_k's body about z_j, or the force on it along the axis of j.
 */
 #ifndef HHTDAE_SCENE_KERNELS_COUPLER_H
 #define HHTDAE_SCENE_KERNELS_COUPLER_H
@@ -31,7 +31,8 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   static constexpr unsigned depends = [] {
     unsigned mask = 0;
     for (int k = 0; k < N; k++)
-      mask |= k < R ? Rotation(2 * k) | Rotation(2 * k + 1) : Position(2 * k) | Position(2 * k + 1) | Rotation(2 * k + 1);
+      mask |=
+          k < R ? Rotation(2 * k) | Rotation(2 * k + 1) : Position(2 * k) | Position(2 * k + 1) | Rotation(2 * k + 1);
     return mask;
   }();
   static constexpr bool curved(int a, int b)
@@ -48,7 +49,10 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     }
     return s;
   }
-  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = T(d.start) - sum<T>(d, f); }
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi)
+  {
+    phi[0] = T(d.start) - sum<T>(d, f);
+  }
 
   static void gradient(const Data &d, const Frame<double> *f, double, Gradient &J)
   {
@@ -85,8 +89,8 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   }
 };
 
-/* Advance along z_j minus pitch/(2 pi) angle is what it was at the start. Multiplier: force on i's body along z_j, beside which goes
-   the moment -pitch/(2 pi) times that about z_j. */
+/* Advance along z_j minus pitch/(2 pi) angle is what it was at the start. Multiplier: force on i's body along z_j,
+   beside which goes the moment -pitch/(2 pi) times that about z_j. */
 struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   static constexpr const char *name   = "screw";
   static constexpr int         memory = 1;
@@ -103,7 +107,10 @@ struct ScrewRow : Constraint<ScrewRow, 2, 1> {
     const T angle = UnwoundAngle<T>(f[0], f[1], d.memory[0]), advance = Advance<T>(f[0], f[1], 2);
     return advance - T(d.pitch / kTurn) * angle;
   }
-  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi) { phi[0] = T(d.start) - lead<T>(d, f); }
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi)
+  {
+    phi[0] = T(d.start) - lead<T>(d, f);
+  }
 
   static void gradient(const Data &d, const Frame<double> *f, double, Base::Gradient &J)
   {

@@ -1,7 +1,7 @@
 /*
-  Motions: the angle of i about z_j, or the advance of i along an axis of j, follows f(t); or its rate does; or the rate follows a
-  first-order state w, w' = f(t). Rows are "wanted minus actual", so that the multiplier is the drive's moment on i's body about z_j,
-  or its force on i's body along the axis of j; j's body takes the opposite.
+  Motions: the angle of i about z_j, or the advance of i along an axis of j, follows f(t); or its rate does; or the rate
+  follows a first-order state w, w' = f(t). Rows are "wanted minus actual", so that the multiplier is the drive's moment
+  on i's body about z_j, or its force on i's body along the axis of j; j's body takes the opposite.
 */
 #ifndef HHTDAE_SCENE_KERNELS_MOTION_H
 #define HHTDAE_SCENE_KERNELS_MOTION_H
@@ -69,11 +69,12 @@ struct AdvanceAlongAxis {
 
 /* ---- f(t) - displacement = 0 ---- */
 
-/* The angle is unwound to the turn nearest to f(t): the motion itself says how many turns were made, nothing need be remembered. */
+/* The angle is unwound to the turn nearest to f(t): the motion itself says how many turns were made, nothing need be
+ * remembered. */
 template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> {
-  using Data = MotionData;
-  using Base = Constraint<K, 2, 1>;
-  static constexpr bool     driven = true;
+  using Data                        = MotionData;
+  using Base                        = Constraint<K, 2, 1>;
+  static constexpr bool     driven  = true;
   static constexpr unsigned depends = Moves::depends;
   static constexpr bool     curved(int a, int b) { return Moves::curved(a, b); }
 
@@ -82,7 +83,10 @@ template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> 
     const TimeFunction::Value v = d.function(Plain(t));
     phi[0]                      = Taylor(v.f, v.f1, v.f2, t) - Moves::template value<T>(d, f, v.f);
   }
-  static void gradient(const Data &d, const Frame<double> *f, double, typename Base::Gradient &J) { Moves::gradient(d, f, -1, J); }
+  static void gradient(const Data &d, const Frame<double> *f, double, typename Base::Gradient &J)
+  {
+    Moves::gradient(d, f, -1, J);
+  }
   static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, typename Base::Hessian &H)
   {
     Moves::curvature(d, f, -lambda[0], H);
@@ -106,8 +110,8 @@ struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
 
 /* The row is J u with the gradient J of the displacement's row, so that its derivative for the frames is u^T dJ^T. */
 template <class K, class Moves> struct RateRow : VelocityConstraint<K, 2, 1> {
-  using Data = MotionData;
-  using Base = VelocityConstraint<K, 2, 1>;
+  using Data                        = MotionData;
+  using Base                        = VelocityConstraint<K, 2, 1>;
   static constexpr unsigned depends = Moves::depends;
   static constexpr bool     curved(int a, int b) { return Moves::curved(a, b); }
 
@@ -122,8 +126,8 @@ template <class K, class Moves> struct RateRow : VelocityConstraint<K, 2, 1> {
     P.noalias() = u.transpose() * H;
     if (K::inputs > 0 && zj) zj[0] = 1;
   }
-  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *, double, const double *, const double *lambda,
-                        typename Base::Hessian &H)
+  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *, double, const double *,
+                        const double *lambda, typename Base::Hessian &H)
   {
     Moves::curvature(d, f, -lambda[0], H);
   }
@@ -141,7 +145,8 @@ template <class K, class Moves> struct DrivenRate : RateRow<K, Moves> {
 template <class K, class Moves> struct StateRate : RateRow<K, Moves> {
   static constexpr int inputs = 1;
 
-  template <class T> static void value(const MotionData &d, const Frame<T> *f, const Twist<T> *w, const T &, const T *z, T *psi)
+  template <class T>
+  static void value(const MotionData &d, const Frame<T> *f, const Twist<T> *w, const T &, const T *z, T *psi)
   {
     psi[0] = z[0] - Moves::template rate<T>(d, f, w);
   }

@@ -1,7 +1,6 @@
 /* Motions: displacement, velocity or acceleration of marker i relative to j as a function of time. */
 #include "scene/kernels/motion.h"
-#include "scene/scene_data.h"
-#include <string>
+#include "scene/motions/moving_pair.h"
 
 namespace hhtdae
 {
@@ -14,11 +13,11 @@ void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of)
   e.require(f.error().empty(), "its function: " + f.error());
   if (!e.good()) return;
   const TimeFunction::Value v = f(0);
-  e.require(std::isfinite(v.f), "its function is " + std::to_string(v.f) + " at t = 0, must be finite");
+  e.require(std::isfinite(v.f), "its function is " + Text(v.f) + " at t = 0, must be finite");
   if (of == MotionOf::Displacement)
-    e.require(std::isfinite(v.f1) && std::isfinite(v.f2),
-              "its function has derivatives " + std::to_string(v.f1) + " and " + std::to_string(v.f2) +
-                  " at t = 0, a displacement needs them finite");
+    e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Text(v.f1) + " and " +
+                                                              Text(v.f2) +
+                                                              " at t = 0, a displacement needs them finite");
 }
 
 /* f as the rate of a state */
@@ -50,7 +49,7 @@ template <> Element Scene::add(const std::string &name, const RotationalMotion &
 {
   ElementBuilder e(*this, name, "rotational motion", ElementData::Motion, s.i, s.j);
   CheckFunction(e, s.function, s.of);
-  if (e.good()) e.require(AngleDefined(e.frame(s.i), e.frame(s.j)), "the x axis of marker i is along the z axis of j, the angle about it is undefined");
+  if (e.good()) RequirePair(e, s.i, s.j, true);
   if (e.good()) {
     const double speed = AngleRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j));
     Drive<DrivenAngle, DrivenAngularVelocity, StateAngularVelocity>(*this, e, name, s, {s.function, 2}, speed);
@@ -63,7 +62,10 @@ template <> Element Scene::add(const std::string &name, const TranslationalMotio
   ElementBuilder e(*this, name, "translational motion", ElementData::Motion, s.i, s.j);
   const int      axes = e.planar() ? 2 : 3;
   CheckFunction(e, s.function, s.of);
-  e.require(s.axis >= 0 && s.axis < axes, "axis is " + std::to_string(s.axis) + (e.planar() ? ", must be 0 or 1 in a planar scene" : ", must be 0, 1 or 2"));
+  e.require(s.axis >= 0 && s.axis < axes,
+            "axis is " + std::to_string(s.axis) +
+                (e.planar() ? ", must be 0 or 1 in a planar scene" : ", must be 0, 1 or 2"));
+  if (e.good()) RequirePair(e, s.i, s.j, false);
   if (e.good()) {
     const double speed = AdvanceRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j), s.axis);
     Drive<DrivenAdvance, DrivenVelocity, StateVelocity>(*this, e, name, s, {s.function, s.axis}, speed);
