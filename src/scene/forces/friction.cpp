@@ -17,11 +17,14 @@ template <class K> void Enter(ElementBuilder &e, const JointFriction &s, Marker 
   e.load<K>({i, j}, {s.coefficient, s.radius, s.slip_velocity, axis}, load);
 }
 
-void CheckNumbers(ElementBuilder &e, const JointFriction &s, bool turns)
+void Check(ElementBuilder &e, const JointFriction &s, Marker i, Marker j, bool turns)
 {
   RequireNotNegative(e, "coefficient", s.coefficient);
   RequirePositive(e, "slip velocity", s.slip_velocity);
-  if (turns) RequirePositive(e, "radius of pin or ball", s.radius);
+  if (!turns) return;
+  RequirePositive(e, "radius of pin or ball", s.radius);
+  RequireTurning(e, i, "i");
+  RequireTurning(e, j, "j");
 }
 
 } // namespace
@@ -36,22 +39,22 @@ template <> Element Scene::add(const std::string &name, const JointFriction &s)
   const bool        planar = e.planar();
   e.require(known, "its joint is not an element of this scene; add the joint first");
   if (type == "revolute") {
-    CheckNumbers(e, s, true);
+    Check(e, s, i, j, true);
     if (planar)
       Enter<RevoluteFriction<2>>(e, s, i, j, 2);
     else
       Enter<RevoluteFriction<3>>(e, s, i, j, 2);
   } else if (type == "translational") {
-    CheckNumbers(e, s, false);
+    Check(e, s, i, j, false);
     if (planar)
       Enter<TranslationalFriction<1>>(e, s, i, j, 0); /* planar translations are along x_j */
     else
       Enter<TranslationalFriction<2>>(e, s, i, j, 2);
   } else if (type == "cylindrical") {
-    CheckNumbers(e, s, true);
+    Check(e, s, i, j, true);
     Enter<CylindricalFriction>(e, s, i, j, 2);
   } else if (type == "spherical") {
-    CheckNumbers(e, s, true);
+    Check(e, s, i, j, true);
     Enter<SphericalFriction>(e, s, i, j, 2);
   } else if (known) {
     e.require(false, "\"" + joint + "\" is a " + type +

@@ -77,6 +77,13 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     place<T>(f, t.p, F, on);
   }
 
+  /* of the elastic part of the force */
+  static double energy(const Data &d, const Frame<double> *f)
+  {
+    Touch<double> t;
+    return touches<double>(d, f, t) ? ElasticEnergy(d.law, t.depth) : 0;
+  }
+
   /* force F on i, -F on j, both at p */
   template <class T> static void place(const Frame<T> *f, const Vec3<T> &p, const Vec3<T> &F, Wrench<T> *on)
   {

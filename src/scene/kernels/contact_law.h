@@ -51,6 +51,15 @@ template <class T> T ElasticForce(const ContactLawData &law, const T &d)
   return T(law.stiffness) * power;
 }
 
+/* the work that it takes to get to d > 0: the integral of ElasticForce() */
+inline double ElasticEnergy(const ContactLawData &law, double d)
+{
+  const double e = law.exponent, k = law.stiffness, o = law.onset;
+  if (e == 1 && d < o) return k * d * d * (d / o) * (d / o) * (0.75 - 0.4 * d / o);
+  if (e == 1) return k * (0.5 * d * d - 0.15 * o * o);
+  return k * std::pow(d, e + 1) / (e + 1);
+}
+
 /* F for d > 0, in the axes of n and v */
 template <class T> Vec3<T> ContactForce(const ContactLawData &law, const T &d, const Vec3<T> &n, const Vec3<T> &v)
 {
