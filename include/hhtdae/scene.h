@@ -21,9 +21,11 @@
 #include "hhtdae/functions.h"
 #include "hhtdae/hhtdae.h"
 #include "hhtdae/joints.h"
+#include "hhtdae/output.h"
 #include "hhtdae/types.h"
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace hhtdae
 {
@@ -80,6 +82,12 @@ public:
   State    state(const std::string &name, const Expression &rate, double initial);
 
   void gravity(const Vector3 &acceleration);
+
+  /* results, output.h: a channel to sample; what a body looks like, the ground too; a line through markers, a spring for example */
+  Channel         channel(const std::string &name, const Measure &measure, const std::string &unit = "");
+  void            shape(Body body, const Shape &shape);
+  void            line(const std::vector<Marker> &markers);
+  OutputSettings &output();
 
   /* Checks the scene, numbers and distributes it; collective; called by createTS() when it has not been. After this the scene is
      fixed. */

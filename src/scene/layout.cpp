@@ -17,6 +17,7 @@ public:
   LocalizerOf(Runtime &r, bool collecting) : R(r), collecting_(collecting), marker_(r.scene.markers.size(), -1)
   {
     bodies = &r.bodies;
+    run    = &r;
   }
 
   bool needed(const StoreBase &s, PetscInt e) const override
@@ -112,6 +113,7 @@ PetscErrorCode Localize(Runtime &R, Localizer &l)
   R.batches.clear();
   for (StoreBase *s : R.scene.order) s->localize(l, R.batches);
   PetscCall(LocalizeExpressions(R, l));
+  PetscCall(LocalizeChannels(R, l));
   PetscFunctionReturn(0);
 }
 
@@ -267,6 +269,7 @@ PetscErrorCode Layout(Runtime &R)
   if (R.size > 1) PetscCall(MakeExchange(R));
   PetscCall(MakePattern(R));
   PetscCall(MakeRoles(R));
+  PetscCall(MakeAxes(R));
   PetscFunctionReturn(0);
 }
 

@@ -61,6 +61,16 @@ struct ExpressionData { /* variable or state */
   double      initial;
 };
 
+struct ChannelData {
+  std::string name, unit;
+  Measure     measure;
+};
+
+struct ShapeData {
+  PetscInt body;
+  Shape    shape;
+};
+
 struct Runtime; /* numbering, matrices, evaluation: runtime.h */
 
 struct SceneData {
@@ -74,6 +84,10 @@ struct SceneData {
   std::map<std::type_index, std::unique_ptr<StoreBase>> stores;
   std::vector<StoreBase *>    order; /* of first use: the order of assembly */
   Vector3                     gravity = Vector3::Zero();
+  std::vector<ChannelData>    channels;
+  std::vector<ShapeData>      shapes;
+  std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
+  OutputSettings              output;
   std::vector<std::string>    errors; /* found while the scene was described */
   std::unique_ptr<Runtime>    run;
 

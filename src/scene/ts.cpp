@@ -60,7 +60,11 @@ PetscErrorCode Scene::createTS(TS *ts)
 PetscErrorCode Scene::solve(TS ts)
 {
   PetscFunctionBegin;
-  PetscCall(TSSolve(ts, nullptr));
+  PetscCall(AttachOutput(*data_->run, ts));
+  const PetscErrorCode failed = TSSolve(ts, nullptr);
+  /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
+  if (!failed || data_->run->size == 1) PetscCall(FinishOutput(*data_->run));
+  PetscCall(failed);
   PetscFunctionReturn(0);
 }
 

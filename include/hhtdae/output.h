@@ -1,0 +1,70 @@
+/*
+  Results of a run: named channels sampled at a fixed rate into HDF5 and CSV files, an animation for ParaView, the balance of
+  energy and momentum. What is not asked for costs nothing.
+
+    scene.channel("tip.y", Measure::displacement(tip, 1), "m");
+    scene.shape(arm, Shape::box({1, 0.05, 0.05}));
+    scene.output().csv = "run.csv";
+    scene.output().dt  = 0.01;
+
+  The same from the command line; options win over what the program has set:
+
+    -scene_output <file.h5>       channels into HDF5: a dataset per channel with the attribute "units", and "time"
+    -scene_csv <file.csv>         channels into a table, its first line "time,name [unit],..."
+    -scene_dt <dt>                time between samples; 0, the default: the end of every step
+    -scene_rate <n>               the same as samples per unit of time
+    -scene_animation <prefix>     prefix.pvd, which ParaView opens, and prefix_000000.vtp, ...
+    -scene_animation_dt <dt>      time between frames; 0: every step
+    -scene_balance [file]         energy and momentum at every step, into a file or printed; largest drift at the end
+
+  Samples between the ends of steps come from TSHHT3Interpolate(): positions and velocities are cubic in the step, accelerations
+  and multipliers linear. The first sample is the consistent start. Other types of TS are sampled at the ends of steps.
+*/
+#ifndef HHTDAE_OUTPUT_H
+#define HHTDAE_OUTPUT_H
+
+#include "hhtdae/types.h"
+#include <string>
+
+namespace hhtdae
+{
+
+struct Channel {
+  PetscInt id = -1;
+};
+
+/* What a body looks like in the animation; placed by position and axes in body axes, from the body's origin */
+struct Shape {
+  enum Kind { Box, Cylinder, Sphere };
+  Kind    kind     = Box;
+  Vector3 size     = Vector3::Ones(); /* half edges; radius, radius, half length along z; radii: a sphere may be an ellipsoid */
+  Vector3 position = Vector3::Zero();
+  Matrix3 axes     = Matrix3::Identity();
+
+  static Shape box(const Vector3 &half, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity())
+  {
+    return {Box, half, position, axes};
+  }
+  static Shape cylinder(double radius, double length, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity())
+  {
+    return {Cylinder, {radius, radius, 0.5 * length}, position, axes};
+  }
+  static Shape sphere(double radius, const Vector3 &position = Vector3::Zero())
+  {
+    return {Sphere, {radius, radius, radius}, position, Matrix3::Identity()};
+  }
+};
+
+struct OutputSettings {
+  std::string file;             /* HDF5, channels */
+  std::string csv;              /* table of channels */
+  double      dt = 0;           /* between samples; 0: the end of every step */
+  std::string animation;        /* prefix of its files */
+  double      animation_dt = 0; /* between frames; 0: every step */
+  bool        balance = false;  /* of energy and momentum, at every step */
+  std::string balance_file;     /* empty: printed */
+};
+
+} // namespace hhtdae
+
+#endif

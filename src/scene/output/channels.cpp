@@ -1,0 +1,81 @@
+#include "scene/output/channels.h"
+#include "scene/measures.h"
+#include "scene/output/energy.h"
+
+namespace hhtdae
+{
+
+struct ChannelWork {
+  std::vector<PetscMPIInt>  owner;
+  std::vector<LocalMeasure> own;
+  bool                      energies = false; /* any rank reads one */
+};
+
+namespace
+{
+
+/* Angles and motions that channels read are counted over full turns like those of elements: the batch takes part in accepted steps
+   and checkpoints, and adds nothing to the equations. */
+class ChannelBatch : public Batch
+{
+public:
+  explicit ChannelBatch(std::shared_ptr<ChannelWork> work) : work_(std::move(work)) {}
+
+  void pattern(Pattern &) override {}
+  void residual(Evaluation &) override {}
+  void jacobian(Evaluation &) override {}
+  void accept(Bodies &B) override
+  {
+    for (LocalMeasure &m : work_->own) m.accept(B);
+  }
+  PetscInt memory() const override
+  {
+    PetscInt n = 0;
+    for (const LocalMeasure &m : work_->own) n += m.memory();
+    return n;
+  }
+  void copyMemory(double *x, bool in) override
+  {
+    for (LocalMeasure &m : work_->own) {
+      m.copyMemory(x, in);
+      x += m.memory();
+    }
+  }
+
+private:
+  std::shared_ptr<ChannelWork> work_;
+};
+
+} // namespace
+
+PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l)
+{
+  auto work = std::make_shared<ChannelWork>();
+  PetscFunctionBegin;
+  for (const ChannelData &c : R.scene.channels) {
+    const Measure &m = c.measure;
+    work->owner.push_back(OwnerOf(R, Expression(m)));
+    work->energies = work->energies || m.kind == Measure::KineticEnergy || m.kind == Measure::PotentialEnergy;
+    if (work->owner.back() == R.rank) work->own.push_back(PlaceMeasure(l, m));
+  }
+  R.channels = work;
+  if (!work->own.empty()) R.batches.push_back(std::make_unique<ChannelBatch>(work));
+  PetscFunctionReturn(0);
+}
+
+const std::vector<PetscMPIInt> &ChannelOwners(const Runtime &R) { return R.channels->owner; }
+
+PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<double> &values)
+{
+  Balance b;
+  PetscFunctionBegin;
+  if (R.channels->energies) PetscCall(MakeBalance(R, e, b));
+  for (const LocalMeasure &m : R.channels->own) {
+    if (m.kind == Measure::KineticEnergy) values.push_back(b.kinetic);
+    else if (m.kind == Measure::PotentialEnergy) values.push_back(b.potential());
+    else values.push_back(MeasureValue(m, e));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,47 @@
+/* What the user asks for: channels and shapes of the scene. */
+#include "scene/measures.h"
+
+namespace hhtdae
+{
+
+Channel Scene::channel(const std::string &name, const Measure &m, const std::string &unit)
+{
+  SceneData        &s   = *data_;
+  const std::string who = "channel " + name + ": ";
+  if (name.empty() || name.front() == '/' || name.back() == '/' || name.find("//") != std::string::npos)
+    s.errors.push_back(who + "a name is neither empty nor begins or ends with /, which separates groups in the file");
+  if (name == "time") s.errors.push_back(who + "this name is taken by the times of the samples");
+  for (const ChannelData &c : s.channels)
+    if (c.name == name) s.errors.push_back(who + "there is one of this name");
+  const std::string error = CheckMeasure(s, m, false);
+  if (!error.empty()) s.errors.push_back(who + error);
+  s.channels.push_back({name, unit, m});
+  return Channel{(PetscInt)s.channels.size() - 1};
+}
+
+void Scene::shape(Body body, const Shape &shape)
+{
+  SceneData &s = *data_;
+  if (body.id < -1 || body.id >= (PetscInt)s.bodies.size()) {
+    s.errors.push_back("shape: its body is not one of this scene");
+    return;
+  }
+  if (!shape.size.allFinite() || shape.size.minCoeff() < 0) s.errors.push_back("shape of " + s.bodyName(body.id) + ": sizes must be finite and not negative");
+  s.shapes.push_back({body.id, shape});
+}
+
+void Scene::line(const std::vector<Marker> &markers)
+{
+  SceneData            &s = *data_;
+  std::vector<PetscInt> ids;
+  for (Marker m : markers) {
+    if (!s.valid(m) || s.markers[m.id].body < -1) s.errors.push_back("line: a marker is not one of this scene");
+    ids.push_back(m.id);
+  }
+  if (ids.size() < 2) s.errors.push_back("line: it takes two markers or more");
+  s.lines.push_back(ids);
+}
+
+OutputSettings &Scene::output() { return data_->output; }
+
+} // namespace hhtdae

@@ -1,0 +1,25 @@
+/* Energy and momentum of a scene in the state that its bodies are in */
+#ifndef HHTDAE_SCENE_OUTPUT_ENERGY_H
+#define HHTDAE_SCENE_OUTPUT_ENERGY_H
+
+#include "scene/runtime.h"
+
+namespace hhtdae
+{
+
+struct Balance {
+  double  kinetic = 0;
+  double  gravity = 0;                 /* - sum of m g . r: zero at the space origin */
+  double  elastic = 0;                 /* of the forces that have a potential: linear springs, bushings, beams, not their damping */
+  Vector3 linear  = Vector3::Zero();   /* momentum */
+  Vector3 angular = Vector3::Zero();   /* about the space origin */
+  double  potential() const { return gravity + elastic; }
+  double  total() const { return kinetic + potential(); }
+};
+
+/* Of the whole scene, on every rank. Bodies have moved to the state of e. */
+PetscErrorCode MakeBalance(const Runtime &R, const Evaluation &e, Balance &b);
+
+} // namespace hhtdae
+
+#endif

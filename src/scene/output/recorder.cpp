@@ -1,0 +1,206 @@
+#include "scene/output/recorder.h"
+#include <limits>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* The scene at time t of the last step: all that the tasks read */
+PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> &tasks)
+{
+  Runtime      &R = r.R;
+  Vec           U = r.U, V = r.V;
+  const double *u, *v, *a, *local[3];
+  PetscFunctionBegin;
+  if (r.dense) PetscCall(TSHHT3Interpolate(ts, t, U, V, r.A));
+  else PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(VecGetArrayRead(r.A, &a));
+  /* The exchange carries accelerations only where elements read them. */
+  if (R.size > 1 && !R.uses_acceleration) {
+    PetscCall(LocalState(R, a, a, a, local));
+    r.acceleration.assign(local[0], local[0] + R.u.size());
+  }
+  PetscCall(LocalState(R, u, v, a, local));
+  if (R.size > 1 && !R.uses_acceleration) local[2] = r.acceleration.data();
+  R.bodies.move(local[0], local[1]);
+  Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
+  for (Task *task : tasks) {
+    PetscCall(task->record(R, e));
+    task->done++;
+  }
+  PetscCall(VecRestoreArrayRead(r.A, &a));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscFunctionReturn(0);
+}
+
+/* The next time that a task wants, not beyond t but for rounding; infinity if that is later */
+double Due(const Recorder &r, const Task &task, double t)
+{
+  constexpr double never = std::numeric_limits<double>::infinity();
+  if (task.done == 0) return r.begin;
+  if (task.dt == 0) return r.last < t ? t : never;
+  const double due = r.begin + (double)task.done * task.dt;
+  return due <= t + 1e-9 * task.dt ? std::min(due, t) : never;
+}
+
+/* Samples of the step that ends at t, each time for all tasks that want it */
+PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
+{
+  std::vector<Task *> now;
+  std::vector<double> due(r.tasks.size());
+  PetscFunctionBegin;
+  for (bool ended = false; !ended;) {
+    double next = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < due.size(); k++) {
+      due[k] = Due(r, *r.tasks[k], t);
+      next   = std::min(next, due[k]);
+    }
+    if (next > t) break;
+    ended = next == t; /* tasks of every step would want it for ever */
+    now.clear();
+    for (std::size_t k = 0; k < due.size(); k++)
+      if (due[k] == next) now.push_back(r.tasks[k].get());
+    PetscCall(RecordAt(r, ts, next, now));
+  }
+  r.last = t;
+  for (auto &task : r.tasks) PetscCall(task->stepped(r.R));
+  PetscFunctionReturn(0);
+}
+
+/* Accelerations and multipliers of the start are not known before the first step, and an initial state may be corrected there: the
+   first sample waits for it. */
+PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
+{
+  Runtime      &R = *static_cast<Runtime *>(ctx);
+  PetscObjectId id;
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
+  if (!R.recorder || R.recorder->ts != id) PetscFunctionReturn(0);
+  if (step < 0) PetscFunctionReturn(0); /* a final time inside the last step, which has been sampled */
+  Recorder &r = *R.recorder;
+  if (!r.begun) {
+    r.begun = true;
+    r.begin = r.last = t;
+    if (r.dense) PetscFunctionReturn(0);
+    PetscCall(RecordStep(r, ts, t));
+  } else if (t > r.last) { /* not after a roll-back */
+    PetscCall(RecordStep(r, ts, t));
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReadOptions(TS ts, OutputSettings &o)
+{
+  PetscReal rate = 0, dt = o.dt, animation_dt = o.animation_dt;
+  char      file[PETSC_MAX_PATH_LEN] = "";
+  PetscBool   set;
+  const char *prefix;
+  PetscFunctionBegin;
+  PetscCall(TSGetOptionsPrefix(ts, &prefix));
+  PetscOptionsBegin(PetscObjectComm((PetscObject)ts), prefix, "Results of a scene", "TS");
+  const auto name = [&](const char *option, const char *text, std::string &value) {
+    PetscFunctionBegin;
+    PetscCall(PetscOptionsString(option, text, "Scene::output", value.c_str(), file, sizeof file, &set));
+    if (set) value = file;
+    PetscFunctionReturn(0);
+  };
+  PetscCall(name("-scene_output", "HDF5 file of the channels", o.file));
+  PetscCall(name("-scene_csv", "CSV file of the channels", o.csv));
+  PetscCall(PetscOptionsReal("-scene_dt", "Time between samples, 0: every step", "Scene::output", dt, &dt, nullptr));
+  PetscCall(PetscOptionsReal("-scene_rate", "Samples per unit of time", "Scene::output", rate, &rate, &set));
+  if (set) {
+    PetscCheck(rate > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "-scene_rate %g: samples per unit of time must be positive", (double)rate);
+    dt = 1 / rate;
+  }
+  PetscCall(name("-scene_animation", "Prefix of the animation's files", o.animation));
+  PetscCall(PetscOptionsReal("-scene_animation_dt", "Time between frames, 0: every step", "Scene::output", animation_dt, &animation_dt, nullptr));
+  PetscCall(name("-scene_balance", "Energy and momentum at every step; a file, or printed", o.balance_file));
+  if (set) o.balance = true;
+  PetscOptionsEnd();
+  PetscCheck(dt >= 0 && animation_dt >= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "times between samples (%g) and frames (%g) must not be negative", (double)dt, (double)animation_dt);
+  o.dt           = dt;
+  o.animation_dt = animation_dt;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode MakeTasks(Recorder &r, const OutputSettings &o)
+{
+  PetscFunctionBegin;
+  for (auto make : {MakeTable, MakeAnimation, MakeBalanceSheet}) {
+    std::unique_ptr<Task> task;
+    PetscCall(make(r.R, o, task));
+    if (task) r.tasks.push_back(std::move(task));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* What the other types of TS have: values at the ends of steps */
+PetscErrorCode FallBack(Recorder &r, TS ts)
+{
+  TSType type;
+  PetscFunctionBegin;
+  PetscCall(TSGetType(ts, &type));
+  for (auto &task : r.tasks) task->dt = 0;
+  PetscCall(VecSet(r.A, std::numeric_limits<double>::quiet_NaN()));
+  PetscCall(PetscPrintf(r.R.scene.comm, "scene: TS type %s gives no values inside a step and no accelerations: samples are taken at the ends of steps, accelerations are nan\n", type));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+Recorder::~Recorder()
+{
+  PetscBool gone = PETSC_FALSE;
+  if (PetscFinalized(&gone) || gone) return;
+  for (Vec *x : {&U, &V, &A}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
+}
+
+PetscErrorCode AttachOutput(Runtime &R, TS ts)
+{
+  OutputSettings o = R.scene.output;
+  PetscObjectId  id;
+  PetscReal      t;
+  Vec            U;
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
+  PetscCall(TSGetTime(ts, &t));
+  if (R.recorder && R.recorder->ts == id) { /* a further solve goes on */
+    if (t == R.recorder->last) PetscFunctionReturn(0);
+    R.recorder->begun = false;
+    for (auto &task : R.recorder->tasks) task->done = 0;
+    PetscFunctionReturn(0);
+  }
+  R.recorder.reset();
+  PetscCall(ReadOptions(ts, o));
+  auto r = std::make_shared<Recorder>(R);
+  PetscCall(MakeTasks(*r, o));
+  if (r->tasks.empty()) PetscFunctionReturn(0);
+  PetscBool dense;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &dense));
+  r->dense = dense;
+  r->ts    = id;
+  PetscCall(TS2GetSolution(ts, &U, nullptr));
+  PetscCall(VecDuplicate(U, &r->U));
+  PetscCall(VecDuplicate(U, &r->V));
+  PetscCall(VecDuplicate(U, &r->A));
+  if (!dense) PetscCall(FallBack(*r, ts));
+  PetscCall(TSMonitorSet(ts, Monitor, &R, nullptr));
+  R.recorder = r;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FinishOutput(Runtime &R)
+{
+  PetscFunctionBegin;
+  if (!R.recorder) PetscFunctionReturn(0);
+  for (auto &task : R.recorder->tasks) PetscCall(task->finish(R));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,47 @@
+/*
+  A run as it is recorded. A monitor of the TS calls every task at the times it wants, within the step that was just accepted and at
+  its end, with the bodies moved to that time.
+*/
+#ifndef HHTDAE_SCENE_OUTPUT_RECORDER_H
+#define HHTDAE_SCENE_OUTPUT_RECORDER_H
+
+#include "scene/runtime.h"
+
+namespace hhtdae
+{
+
+class Task
+{
+public:
+  explicit Task(double dt) : dt(dt) {}
+  virtual ~Task() = default;
+  virtual PetscErrorCode record(Runtime &R, Evaluation &e) = 0; /* collective, as all of them */
+  virtual PetscErrorCode stepped(Runtime &) { return 0; }       /* after the samples of a step */
+  virtual PetscErrorCode finish(Runtime &) { return 0; }        /* at the end of a solve; there may be another one */
+
+  double   dt;       /* 0: the end of every step */
+  PetscInt done = 0; /* samples so far */
+};
+
+struct Recorder {
+  Runtime                           &R;
+  PetscObjectId                      ts = 0;
+  bool                               dense = true;  /* TSHHT3: values between the ends of steps, accelerations */
+  bool                               begun = false;
+  double                             begin = 0, last = 0; /* time of the first sample, of the end of the last step seen */
+  Vec                                U = nullptr, V = nullptr, A = nullptr;
+  std::vector<double>                acceleration; /* of the local unknowns */
+  std::vector<std::unique_ptr<Task>> tasks;
+
+  explicit Recorder(Runtime &r) : R(r) {}
+  ~Recorder();
+};
+
+/* What there is to record; null if it was not asked for */
+PetscErrorCode MakeTable(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task);     /* table.cpp */
+PetscErrorCode MakeAnimation(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* animation.cpp */
+PetscErrorCode MakeBalanceSheet(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* balance.cpp */
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,27 @@
+/* Files of sampled channels: blocks of samples are appended, so that a run that breaks off leaves what it had. */
+#ifndef HHTDAE_SCENE_OUTPUT_TABLE_H
+#define HHTDAE_SCENE_OUTPUT_TABLE_H
+
+#include <petscsys.h>
+#include <string>
+#include <vector>
+
+namespace hhtdae
+{
+
+/* Samples of all channels, one after the other in time; on the first rank */
+struct Block {
+  std::vector<double> time, values; /* values[sample * channels + channel] */
+};
+
+struct TableHead {
+  std::vector<std::string> name, unit; /* of the channels */
+};
+
+/* first: begins the file anew */
+PetscErrorCode AppendCSV(const std::string &file, bool first, const TableHead &head, const Block &block);
+PetscErrorCode AppendHDF5(const std::string &file, bool first, const TableHead &head, const Block &block);
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,90 @@
+#include "scene/output/vtp.h"
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+std::string Base64(const unsigned char *data, std::size_t n)
+{
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string       text;
+  text.reserve((n + 2) / 3 * 4);
+  for (std::size_t i = 0; i < n; i += 3) {
+    const int      left  = n - i < 3 ? (int)(n - i) : 3;
+    const unsigned group = data[i] << 16 | (left > 1 ? data[i + 1] << 8 : 0) | (left > 2 ? data[i + 2] : 0);
+    for (int k = 0; k < 4; k++) text += k <= left ? digits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+bool BigEndian()
+{
+  const std::uint16_t one = 1;
+  unsigned char       first;
+  std::memcpy(&first, &one, 1);
+  return first == 0;
+}
+
+/* The number of bytes, and the bytes */
+template <class T> void Array(std::string &out, const char *type, const char *name, const char *more, const std::vector<T> &values)
+{
+  const std::uint64_t        bytes = values.size() * sizeof(T);
+  std::vector<unsigned char> raw(sizeof bytes + bytes);
+  std::memcpy(raw.data(), &bytes, sizeof bytes);
+  if (bytes) std::memcpy(raw.data() + sizeof bytes, values.data(), bytes);
+  out += std::string("<DataArray type=\"") + type + "\" Name=\"" + name + "\"" + more + " format=\"binary\">" + Base64(raw.data(), raw.size()) + "</DataArray>\n";
+}
+
+void AddCells(std::string &out, const char *name, const PolyData::Cells &c)
+{
+  out += std::string("<") + name + ">\n";
+  Array(out, "Int32", "connectivity", "", c.point);
+  Array(out, "Int32", "offsets", "", c.end);
+  out += std::string("</") + name + ">\n";
+}
+
+} // namespace
+
+std::string XMLText(const std::string &text)
+{
+  std::string out;
+  for (char c : text) {
+    if (c == '&') out += "&amp;";
+    else if (c == '<') out += "&lt;";
+    else if (c == '"') out += "&quot;";
+    else out += c;
+  }
+  return out;
+}
+
+PetscErrorCode WriteVTP(const std::string &file, const PolyData &d)
+{
+  static_assert(sizeof(int) == 4 && sizeof(float) == 4, "the types that the file names");
+  std::string out;
+  PetscFunctionBegin;
+  out = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"") + (BigEndian() ? "BigEndian" : "LittleEndian") +
+        "\" header_type=\"UInt64\">\n<PolyData>\n<Piece NumberOfPoints=\"" + std::to_string(d.points.size() / 3) + "\" NumberOfVerts=\"0\" NumberOfLines=\"" +
+        std::to_string(d.lines.end.size()) + "\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(d.polygons.end.size()) + "\">\n";
+  out += "<CellData Scalars=\"speed\">\n";
+  Array(out, "Int32", "body", "", d.body);
+  Array(out, "Float32", "speed", "", d.speed);
+  out += "</CellData>\n<Points>\n";
+  Array(out, "Float32", "points", " NumberOfComponents=\"3\"", d.points);
+  out += "</Points>\n";
+  AddCells(out, "Lines", d.lines);
+  AddCells(out, "Polys", d.polygons);
+  out += "</Piece>\n</PolyData>\n</VTKFile>\n";
+  FILE *f = std::fopen(file.c_str(), "wb");
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write the frame %s: does its directory exist?", file.c_str());
+  const bool written = std::fwrite(out.data(), 1, out.size(), f) == out.size();
+  const bool closed  = std::fclose(f) == 0;
+  PetscCheck(written && closed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "writing the frame %s failed", file.c_str());
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,27 @@
+/* VTK's XML file of polygonal data, binary in base64. The format is that of VTK's file formats document. */
+#ifndef HHTDAE_SCENE_OUTPUT_VTP_H
+#define HHTDAE_SCENE_OUTPUT_VTP_H
+
+#include <petscsys.h>
+#include <string>
+#include <vector>
+
+namespace hhtdae
+{
+
+struct PolyData {
+  struct Cells {
+    std::vector<int> point, end;
+  };
+  std::vector<float> points; /* x, y, z of each */
+  Cells              lines, polygons;
+  std::vector<int>   body;  /* of lines, then polygons; -1: ground */
+  std::vector<float> speed; /* of its centre of mass */
+};
+
+PetscErrorCode WriteVTP(const std::string &file, const PolyData &data);
+std::string    XMLText(const std::string &text);
+
+} // namespace hhtdae
+
+#endif
