@@ -128,11 +128,7 @@ TEST(Spring, AgreesWithAutomaticDifferentiation)
 TEST(Spring, Potential)
 {
   ExpectSymmetric<LinearSpring<false>>(SpringData<false>);
-  ExpectPotential<LinearSpring<false>>(SpringData<false>,
-                                       [](const LinearSpring<false>::Data &p, const Frame<double> *f) {
-                                         const double l = (f[0].x - f[1].x).norm();
-                                         return .5 * p.stiffness * (l - p.length) * (l - p.length) + p.preload * l;
-                                       });
+  ExpectPotential<LinearSpring<false>>(SpringData<false>, LinearSpring<false>::energy);
   ExpectDissipative<LinearSpring<true>>(SpringData<true>);
   ExpectObjective<LinearSpring<true>>(SpringData<true>);
 }
@@ -229,11 +225,7 @@ TEST(Torsion, AgreesWithAutomaticDifferentiation)
 TEST(Torsion, Potential)
 {
   ExpectSymmetric<LinearTorsion<false>>(TorsionData<false>);
-  ExpectPotential<LinearTorsion<false>>(TorsionData<false>,
-                                        [](const LinearTorsion<false>::Data &p, const Frame<double> *f) {
-                                          const double a = UnwoundAngle<double>(f[0], f[1], p.memory[0]) - p.angle;
-                                          return .5 * p.stiffness * a * a - p.preload * a;
-                                        });
+  ExpectPotential<LinearTorsion<false>>(TorsionData<false>, LinearTorsion<false>::energy);
   ExpectDissipative<LinearTorsion<true>>(TorsionData<true>);
   ExpectObjective<LinearTorsion<true>>(TorsionData<true>);
 }
