@@ -1,23 +1,177 @@
-/* User-defined variables, first-order states and user's forces. */
+/* User-defined variables and first-order states: who owns them, where their expressions find their arguments, what can be wrong. */
+#include "expression_batch.h"
 #include "runtime.h"
+#include <cmath>
 
 namespace hhtdae
 {
 
+namespace
+{
+
+/* The rank of a measure's first body or element; -1 if it has none */
+PetscMPIInt OwnerOf(const Runtime &R, const Measure &m)
+{
+  const SceneData &s = R.scene;
+  for (Marker k : {m.i, m.j, m.frame})
+    if (s.valid(k) && s.markers[k.id].body >= 0) return R.number.owner[s.markers[k.id].body];
+  if (m.kind < Measure::Multiplier || m.kind > Measure::Component) return -1;
+  const std::vector<Part> &parts = s.elements[m.target].parts;
+  return parts.empty() ? -1 : OwnerOf(R, *parts[0].store, parts[0].index);
+}
+
+void Place(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, const char *what, const ExpressionData &d, PetscInt number)
+{
+  batch.add(kind, LocalFunction(l, std::string(what) + " " + d.name, &d.expression, 1), l.local(number), l.group(number, 1));
+}
+
+/* the same on every rank */
+bool UsesAcceleration(const SceneData &s)
+{
+  for (const auto *list : {&s.variables, &s.states})
+    for (const ExpressionData &d : *list)
+      if (NeedsAcceleration(d.expression)) return true;
+  for (const StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++)
+      if (store->expressions(e))
+        for (const Expression &f : *store->expressions(e))
+          if (NeedsAcceleration(f)) return true;
+  return false;
+}
+
+} // namespace
+
 PetscMPIInt OwnerOf(const Runtime &R, const Expression &e)
 {
   if (R.size == 1) return 0;
-  for (const Measure &m : e.arguments)
-    for (Marker k : {m.i, m.j, m.frame})
-      if (R.scene.valid(k) && R.scene.markers[k.id].body >= 0) return R.number.owner[R.scene.markers[k.id].body];
+  for (const Measure &m : e.arguments) {
+    const PetscMPIInt owner = OwnerOf(R, m);
+    if (owner >= 0) return owner;
+  }
   return 0;
 }
 
-PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &)
+PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l)
 {
+  const SceneData &s = R.scene;
   PetscFunctionBegin;
-  PetscCheck(R.scene.variables.empty() && R.scene.states.empty(), R.scene.comm, PETSC_ERR_SUP, "variables and states are on their way");
+  R.uses_acceleration = UsesAcceleration(s);
+  auto batch          = std::make_unique<ExpressionBatch>(R.bodies);
+  for (std::size_t i = 0; i < s.variables.size(); i++)
+    if (R.number.variable_owner[i] == R.rank) Place(l, *batch, ExpressionBatch::Definition, "variable", s.variables[i], R.number.variable[i]);
+  for (std::size_t i = 0; i < s.states.size(); i++)
+    if (R.number.state_owner[i] == R.rank) Place(l, *batch, ExpressionBatch::RateOfState, "state", s.states[i], R.number.state[i]);
+  if (!batch->empty()) R.batches.push_back(std::move(batch));
   PetscFunctionReturn(0);
+}
+
+/* ---- what can be wrong ---- */
+
+namespace
+{
+
+const char *NameOf(Measure::Kind k)
+{
+  constexpr const char *name[] = {"time", "displacement", "distance", "velocity", "rate", "acceleration", "angle", "angular velocity",
+                                  "angular acceleration", "multiplier", "joint force", "joint moment", "force", "value of a variable",
+                                  "value of a state", "kinetic energy", "potential energy"};
+  return name[k];
+}
+
+bool Good(const SceneData &s, Marker m) { return s.valid(m) && s.markers[m.id].body >= -1; }
+
+std::string CheckMarkers(const SceneData &s, const Measure &m)
+{
+  const bool pair = m.kind == Measure::Distance || m.kind == Measure::Rate || m.kind == Measure::Angle;
+  if (!Good(s, m.i)) return "marker i is not one of this scene";
+  if ((pair || m.j.id != -1) && !Good(s, m.j)) return "marker j is not one of this scene";
+  if (m.frame.id != -1 && !Good(s, m.frame)) return "marker `frame` is not one of this scene";
+  if (pair && m.i.id == m.j.id) return "markers i and j are the same";
+  if (!pair && (m.component < 0 || m.component > 2)) return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+  if (m.kind != Measure::Angle) return "";
+  if (std::abs(s.frame(m.i).R.col(0).dot(s.frame(m.j).R.col(2))) > 1 - 1e-8)
+    return "the x axis of marker i is along the z axis of j, the angle about it is undefined";
+  return "";
+}
+
+std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
+{
+  if (m.target < 0 || m.target >= (PetscInt)s.elements.size()) return "its element is not one of this scene; add it first";
+  const ElementData &e       = s.elements[m.target];
+  const std::string  who     = std::string(e.type) + " " + e.name;
+  const bool         of_load = m.kind == Measure::Component;
+  if (of_load != (e.kind == ElementData::Force)) return who + (of_load ? " is not a force" : " is not a joint or motion");
+  if (e.parts.empty()) return ""; /* it has errors of its own */
+  if (m.kind == Measure::JointForce || m.kind == Measure::JointMoment) {
+    if (m.component < 0 || m.component > 2) return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+    return m.frame.id != -1 && !Good(s, m.frame) ? "marker `frame` is not one of this scene" : "";
+  }
+  PetscInt rows = 0, row = m.component;
+  for (const Part &p : e.parts) {
+    if (p.store->isConstraint() == of_load) continue;
+    if (in_equation && of_load && row >= 0 && row < p.store->rows() && !p.store->carried(p.index))
+      return who + " is eliminated; an expression needs its components as force states: set state = true on it";
+    rows += p.store->rows();
+    row -= p.store->rows();
+  }
+  if (m.component >= 0 && m.component < rows) return "";
+  return who + " has " + (of_load ? "components" : "rows") + " 0 to " + std::to_string(rows - 1) + ", not " + std::to_string(m.component);
+}
+
+void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors)
+{
+  constexpr std::size_t most = Real::DerType::MaxRowsAtCompileTime;
+  if (!e.f) errors.push_back(who + ": its function is empty");
+  if (e.arguments.size() > most)
+    errors.push_back(who + ": " + std::to_string(e.arguments.size()) + " arguments, at most " + std::to_string(most) +
+                     "; put parts of it into variables");
+  for (std::size_t k = 0; k < e.arguments.size(); k++) {
+    const std::string error = CheckMeasure(s, e.arguments[k], true);
+    if (!error.empty())
+      errors.push_back(who + ", argument " + std::to_string(k + 1) + " (" + NameOf(e.arguments[k].kind) + "): " + error);
+  }
+}
+
+} // namespace
+
+std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
+{
+  switch (m.kind) {
+  case Measure::Time:
+    return "";
+  case Measure::KineticEnergy:
+  case Measure::PotentialEnergy:
+    return in_equation ? "is for output alone" : "";
+  case Measure::Value:
+    return m.target >= 0 && m.target < (PetscInt)s.variables.size() ? "" : "not a variable of this scene";
+  case Measure::StateValue:
+    return m.target >= 0 && m.target < (PetscInt)s.states.size() ? "" : "not a state of this scene";
+  case Measure::Multiplier:
+  case Measure::JointForce:
+  case Measure::JointMoment:
+  case Measure::Component:
+    return CheckElement(s, m, in_equation);
+  default:
+    return CheckMarkers(s, m);
+  }
+}
+
+void CheckExpressions(const SceneData &s, std::vector<std::string> &errors)
+{
+  for (const ExpressionData &d : s.variables) CheckExpression(s, "variable " + d.name, d.expression, errors);
+  for (const ExpressionData &d : s.states) CheckExpression(s, "state " + d.name, d.expression, errors);
+  for (const auto *list : {&s.variables, &s.states})
+    for (const ExpressionData &d : *list)
+      if (!std::isfinite(d.initial))
+        errors.push_back((list == &s.variables ? "variable " : "state ") + d.name + ": its initial value is not finite");
+  for (const StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++) {
+      if (!store->expressions(e)) continue;
+      const ElementData &element = s.elements[store->element(e)];
+      const auto        &list    = *store->expressions(e);
+      for (std::size_t c = 0; c < list.size(); c++)
+        CheckExpression(s, std::string(element.type) + " " + element.name + ", component " + std::to_string(c), list[c], errors);
+    }
 }
 
 } // namespace hhtdae

@@ -106,7 +106,8 @@ Twist<double> SceneData::twist(Marker m) const
 
 /* ---- elements ---- */
 
-ElementBuilder::ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j)
+ElementBuilder::ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j,
+                               bool pair)
     : data_(scene.data())
 {
   element_.name = name.empty() ? std::string(type) + " " + std::to_string(data_.elements.size()) : name;
@@ -115,6 +116,7 @@ ElementBuilder::ElementBuilder(Scene &scene, const std::string &name, const char
   element_.i    = i;
   element_.j    = j;
   require(i, "marker i");
+  if (!pair) return;
   require(j, "marker j");
   if (good_) require(i.id != j.id, "markers i and j are the same");
 }

@@ -116,7 +116,8 @@ struct SceneData {
 class ElementBuilder
 {
 public:
-  ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j);
+  /* pair: false if marker j is none */
+  ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j, bool pair = true);
 
   bool planar() const { return data_.planar; }
   bool good() const { return good_; } /* no error so far: i and j are markers */
@@ -132,6 +133,9 @@ public:
   template <class K>
   void load(std::initializer_list<Marker> markers, const typename K::Data &data = {}, const std::vector<ScalarRef> &inputs = {},
             bool state = false);
+
+  /* an instance of a store of another kind */
+  template <class S> void put(typename S::Item item);
 
   Element done();
 

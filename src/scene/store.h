@@ -175,6 +175,15 @@ template <class S> S &ElementBuilder::store()
   return static_cast<S &>(*s);
 }
 
+template <class S> void ElementBuilder::put(typename S::Item item)
+{
+  if (!good_) return;
+  S &s         = store<S>();
+  item.element = (PetscInt)data_.elements.size();
+  s.all.push_back(std::move(item));
+  element_.parts.push_back({&s, s.size() - 1});
+}
+
 template <class K> PetscInt ElementBuilder::constrain(std::initializer_list<Marker> markers, const typename K::Data &data)
 {
   return constrain<K>(markers, data, {});

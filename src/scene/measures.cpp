@@ -1,0 +1,462 @@
+#include "measures.h"
+#include "kernels/angle.h"
+#include "runtime.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+bool IsJoint(Measure::Kind k) { return k == Measure::JointForce || k == Measure::JointMoment; }
+bool IsScalar(Measure::Kind k)
+{
+  return k == Measure::Multiplier || k == Measure::Component || k == Measure::Value || k == Measure::StateValue;
+}
+
+/* ---- motion of a marker ---- */
+
+template <class T> struct MarkerMotion {
+  Frame<T> f;
+  Twist<T> w;
+  Vec3<T>  a, alpha;
+};
+
+/* A marker at s from the centre of mass of a body with R, v, w, a, alpha; space axes */
+template <class T> void Attach(const Vec3<T> &r, const Vec3<T> &s, MarkerMotion<T> &m)
+{
+  const Vec3<T> ws = m.w.w.cross(s), wws = m.w.w.cross(ws), as = m.alpha.cross(s);
+  m.f.x = r + s;
+  m.w.v += ws;
+  m.a += as + wws;
+}
+
+MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerations)
+{
+  const LocalMarker   &k = e.bodies.marker[marker];
+  const LocalBody     &l = e.bodies.body[k.body];
+  const BodyMotion    &b = e.bodies.now[k.body];
+  MarkerMotion<double> m;
+  m.f.R     = b.A * k.R;
+  m.w       = {b.v, b.w};
+  m.a.setZero();
+  m.alpha.setZero();
+  if (accelerations && l.kind != BodyKind::Ground) {
+    const double *a = e.a + l.first, *v = e.v + l.first;
+    for (int i = 0; i < (PlanarScene(l.kind) ? 2 : 3); i++) m.a(i) = a[i];
+    if (l.kind == BodyKind::Planar) m.alpha(2) = a[2];
+    if (l.kind == BodyKind::Rigid)
+      m.alpha = AngularVelocity(b.euler, Vector3(a[3], a[4], a[5])) + Convective(b.euler, Vector3(v[3], v[4], v[5]), b.w);
+  }
+  Attach<double>(b.r, b.A * k.s, m);
+  return m;
+}
+
+/* The same from coordinates, rates and accelerations that are duals; formulas of euler.h and bodies.cpp */
+template <class T> void RigidMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
+{
+  using std::cos;
+  using std::sin;
+  const T       sp = sin(q[0]), cp = cos(q[0]), st = sin(q[1]), ct = cos(q[1]), ss = sin(q[2]), cs = cos(q[2]), zero(0);
+  const Vec3<T> z(zero, zero, T(1)), g2(cp, sp, zero), g3(T(sp * st), T(-cp * st), ct), y(T(-sp * ct), T(cp * ct), st), g23 = g2.cross(g3);
+  Mat3<T>       E;
+  E.col(0) = g2 * cs + y * ss;
+  E.col(1) = y * cs - g2 * ss;
+  E.col(2) = g3;
+  A.noalias() = E * l.C.cast<T>();
+  m.w.w = z * p[0] + g2 * p[1] + g3 * p[2];
+  const Vec3<T> zw  = z.cross(m.w.w);
+  const T       p12 = p[1] * p[2];
+  m.alpha = z * s[0] + g2 * s[1] + g3 * s[2] + zw * p[0] + g23 * p12;
+}
+
+template <class T> void PlanarMotion(const T &angle, const T &rate, const T &acceleration, Mat3<T> &A, MarkerMotion<T> &m)
+{
+  using std::cos;
+  using std::sin;
+  const T c = cos(angle), s = sin(angle);
+  A(0, 0) = A(1, 1) = c;
+  A(0, 1) = -s;
+  A(1, 0) = s;
+  m.w.w(2)   = rate;
+  m.alpha(2) = acceleration;
+}
+
+/* Directions first..: coordinate c with its rate and acceleration, as du = 1, du' = sv, du'' = sa */
+template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt marker, int first)
+{
+  using T              = Dual<N>;
+  const LocalMarker &k = e.bodies.marker[marker];
+  const LocalBody   &l = e.bodies.body[k.body];
+  const int          n = Coordinates(l.kind), directions = n == 2 || l.kind == BodyKind::Planar ? 2 : n ? 3 : 0;
+  T                  q[6], p[6], s[6];
+  for (int c = 0; c < n; c++) {
+    q[c] = T(e.u[l.first + c], N, first + c);
+    p[c] = T(e.v[l.first + c]);
+    s[c] = T(e.a[l.first + c]);
+    p[c].derivatives()(first + c) = e.sv;
+    s[c].derivatives()(first + c) = e.sa;
+  }
+  MarkerMotion<T> m;
+  Vec3<T>         r;
+  Mat3<T>         A;
+  for (Vec3<T> *x : {&r, &m.w.v, &m.w.w, &m.a, &m.alpha}) x->fill(T(0));
+  for (int i = 0; i < 9; i++) A(i) = T(i % 4 ? 0 : 1);
+  for (int i = 0; i < directions; i++) {
+    r(i)     = q[i];
+    m.w.v(i) = p[i];
+    m.a(i)   = s[i];
+  }
+  if (l.kind == BodyKind::Rigid) RigidMotion<T>(l, q + 3, p + 3, s + 3, A, m);
+  if (l.kind == BodyKind::Planar) PlanarMotion<T>(q[2], p[2], s[2], A, m);
+  m.f.R.noalias()    = A * k.R.cast<T>();
+  const Vec3<T> arm = A * k.s.cast<T>();
+  Attach<T>(r, arm, m);
+  return m;
+}
+
+/* ---- values ---- */
+
+/* component of x in the axes of frame, or space axes */
+template <class T> T Component(const Vec3<T> &x, const MarkerMotion<T> *frame, int c)
+{
+  if (!frame) return x(c);
+  const Vec3<T> axis = frame->f.R.col(c);
+  return axis.dot(x);
+}
+
+template <class T> Vec3<T> Difference(const Vec3<T> &x, const Vec3<T> *y)
+{
+  if (!y) return x;
+  return x - *y;
+}
+
+/* Measures of markers; j and frame may be none */
+template <class T> T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, const MarkerMotion<T> *j, const MarkerMotion<T> *frame)
+{
+  using std::sqrt;
+  const Vec3<T> d = Difference<T>(i.f.x, j ? &j->f.x : nullptr);
+  switch (m.kind) {
+  case Measure::Displacement:
+    return Component<T>(d, frame, m.component);
+  case Measure::Distance:
+    return sqrt(T(d.dot(d)));
+  case Measure::Velocity:
+    return Component<T>(Difference<T>(i.w.v, j ? &j->w.v : nullptr), frame, m.component);
+  case Measure::Rate: {
+    const Vec3<T> w = i.w.v - j->w.v;
+    const T       dw = d.dot(w), l = sqrt(T(d.dot(d)));
+    return dw / l;
+  }
+  case Measure::Acceleration:
+    return Component<T>(Difference<T>(i.a, j ? &j->a : nullptr), frame, m.component);
+  case Measure::Angle:
+    return UnwoundAngle<T>(i.f, j->f, m.angle);
+  case Measure::AngularVelocity:
+    return Component<T>(Difference<T>(i.w.w, j ? &j->w.w : nullptr), frame, m.component);
+  case Measure::AngularAcceleration:
+    return Component<T>(Difference<T>(i.alpha, j ? &j->alpha : nullptr), frame, m.component);
+  default:
+    return T(0);
+  }
+}
+
+bool Accelerates(Measure::Kind k) { return k == Measure::Acceleration || k == Measure::AngularAcceleration; }
+
+/* ---- reactions of joints: f . axis, or (m + arm x f) . axis, summed over the markers on i's body ---- */
+
+Vector3 AxisOf(const LocalMeasure &m, const Evaluation &e)
+{
+  return m.frame < 0 ? Vector3(Vector3::Unit(m.component)) : Vector3(e.bodies.frame(m.frame).R.col(m.component));
+}
+
+constexpr int kMarkers = 6, kRows = 8; /* of a constraint, at most: couplers of three joints; StoreBase::active() has 8 bits */
+
+bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
+{
+  return e.bodies.marker[marker].body == e.bodies.marker[m.i].body;
+}
+
+/* the joint's force on i's body, or moment about i's origin */
+Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
+{
+  const Vector3  x = e.bodies.frame(m.i).x;
+  Wrench<double> on[kMarkers];
+  Vector3        sum = Vector3::Zero();
+  for (const auto &p : m.probes) {
+    p->reaction(e, on);
+    for (int k = 0; k < p->markers(); k++) {
+      if (!OnBody(e, m, p->marker(k))) continue;
+      if (m.kind == Measure::JointForce) sum += on[k].f;
+      else sum += on[k].m + (e.bodies.frame(p->marker(k)).x - x).cross(on[k].f);
+    }
+  }
+  return sum;
+}
+
+/* J by (x, theta) of a marker, to its body's coordinates */
+void AddMarker(const Evaluation &e, PetscInt marker, const Matrix<1, 6> &J, int at, double *row)
+{
+  if (at < 0) return;
+  Matrix<1, 6> by = Matrix<1, 6>::Zero();
+  const int    n  = e.bodies.columns(marker, e.bodies.frame(marker), J, by);
+  for (int c = 0; c < n; c++) row[at + c] += by(c);
+}
+
+void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor, const std::vector<int> &at, double *row)
+{
+  const bool    force = m.kind == Measure::JointForce;
+  const Vector3 axis = factor * AxisOf(m, e), x = e.bodies.frame(m.i).x;
+  std::size_t   next = 3;
+  for (const auto &p : m.probes) {
+    Wrench<double>          on[kMarkers];
+    Matrix<6 * kMarkers, 1> y = Matrix<6 * kMarkers, 1>::Zero(), by = y;
+    double                  lambda[kRows];
+    p->reaction(e, on);
+    for (int k = 0; k < p->markers(); k++) {
+      if (!OnBody(e, m, p->marker(k))) continue;
+      const Vector3 arm = e.bodies.frame(p->marker(k)).x - x;
+      y.segment<3>(6 * k)     = force ? axis : Vector3(axis.cross(arm));
+      y.segment<3>(6 * k + 3) = force ? Vector3(Vector3::Zero()) : axis;
+    }
+    p->reactionGradient(e, y.data(), by.data(), lambda);
+    for (int k = 0; k < p->markers(); k++) {
+      Matrix<1, 6> J = by.segment<6>(6 * k).transpose();
+      if (!force && OnBody(e, m, p->marker(k))) { /* the arm changes */
+        const Vector3 turn = on[k].f.cross(axis);
+        Matrix<1, 6>  back = Matrix<1, 6>::Zero();
+        back.head<3>()     = -turn.transpose();
+        J.head<3>() += turn.transpose();
+        AddMarker(e, m.i, back, at[0], row);
+      }
+      AddMarker(e, p->marker(k), J, at[next++], row);
+    }
+    for (int r = 0; r < p->multipliers(); r++, next++)
+      if (at[next] >= 0) row[at[next]] += lambda[r];
+  }
+  if (m.frame < 0) return;
+  Matrix<1, 6> turn = Matrix<1, 6>::Zero();
+  turn.tail<3>()    = axis.cross(ReactionOf(m, e)).transpose();
+  AddMarker(e, m.frame, turn, at[2], row);
+}
+
+/* ---- where things are ---- */
+
+/* The part of an element that has row or component `row`, which becomes the part's own */
+const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row)
+{
+  for (const Part &p : s.elements[element].parts) {
+    if (p.store->isConstraint() != constraint) continue;
+    if (row < p.store->rows()) return &p;
+    row -= p.store->rows();
+  }
+  return nullptr;
+}
+
+void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
+{
+  const SceneData   &s = l.run->scene;
+  const ElementData &e = s.elements[m.target];
+  k.i     = l.marker(e.i.id);
+  k.frame = l.marker(s.valid(m.frame) ? m.frame.id : e.j.id);
+  for (const Part &p : e.parts)
+    if (p.store->isConstraint() && p.store->unknowns(p.index)) k.probes.push_back(p.store->probe(l, p.index));
+}
+
+void PlaceComponent(Localizer &l, const Measure &m, LocalMeasure &k)
+{
+  PetscInt    row  = m.component;
+  const Part *part = FindPart(l.run->scene, m.target, false, row);
+  if (part->store->carried(part->index)) {
+    k.input = l.input({ScalarRef::ForceState, m.target, m.component});
+  } else {
+    k.component = (int)row;
+    k.probes.push_back(part->store->probe(l, part->index));
+  }
+}
+
+constexpr int kComponents = 12; /* of a force, at most */
+
+} // namespace
+
+bool NeedsAcceleration(const Measure &m) { return Accelerates(m.kind); }
+
+bool NeedsAcceleration(const Expression &f)
+{
+  for (const Measure &m : f.arguments)
+    if (NeedsAcceleration(m)) return true;
+  return false;
+}
+
+LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
+{
+  const SceneData &s = l.run->scene;
+  LocalMeasure     k;
+  k.kind      = m.kind;
+  k.component = m.component;
+  switch (m.kind) {
+  case Measure::Time:
+  case Measure::KineticEnergy:
+  case Measure::PotentialEnergy:
+    break;
+  case Measure::Multiplier:
+    k.input = l.input({ScalarRef::Multiplier, m.target, m.component});
+    break;
+  case Measure::Value:
+    k.input = l.input({ScalarRef::Variable, m.target, 0});
+    break;
+  case Measure::StateValue:
+    k.input = l.input({ScalarRef::State, m.target, 0});
+    break;
+  case Measure::Component:
+    PlaceComponent(l, m, k);
+    break;
+  case Measure::JointForce:
+  case Measure::JointMoment:
+    PlaceJoint(l, m, k);
+    break;
+  default:
+    k.i = l.marker(m.i.id);
+    if (s.valid(m.j)) k.j = l.marker(m.j.id);
+    if (s.valid(m.frame)) k.frame = l.marker(m.frame.id);
+    if (m.kind == Measure::Angle) k.angle = PrincipalAngle<double>(s.frame(m.i), s.frame(m.j));
+  }
+  return k;
+}
+
+double MeasureValue(const LocalMeasure &m, const Evaluation &e)
+{
+  if (m.kind == Measure::Time) return e.t;
+  if (m.kind == Measure::Component && !m.probes.empty()) {
+    double c[kComponents];
+    m.probes[0]->components(e, c);
+    return c[m.component];
+  }
+  if (IsScalar(m.kind)) return e.input(m.input);
+  if (IsJoint(m.kind)) return AxisOf(m, e).dot(ReactionOf(m, e));
+  if (m.i < 0) return 0;
+  const bool           a = Accelerates(m.kind);
+  MarkerMotion<double> i = Motion(e, m.i, a), j, frame;
+  if (m.j >= 0) j = Motion(e, m.j, a);
+  if (m.frame >= 0) frame = Motion(e, m.frame, false);
+  return Formula<double>(m, i, m.j < 0 ? nullptr : &j, m.frame < 0 ? nullptr : &frame);
+}
+
+void LocalMeasure::accept(const Bodies &B)
+{
+  if (kind == Measure::Angle) angle = UnwoundAngle<double>(B.frame(i), B.frame(j), angle);
+  for (auto &p : probes) p->accept(B);
+}
+
+PetscInt LocalMeasure::memory() const
+{
+  PetscInt n = kind == Measure::Angle;
+  for (const auto &p : probes) n += p->memory();
+  return n;
+}
+
+void LocalMeasure::copyMemory(double *x, bool in)
+{
+  if (kind == Measure::Angle) {
+    if (in) angle = *x;
+    else *x = angle;
+    x++;
+  }
+  for (auto &p : probes) {
+    p->copyMemory(x, in);
+    x += p->memory();
+  }
+}
+
+/* ---- columns and derivatives ---- */
+
+int Columns::add(PetscInt group, int size)
+{
+  for (const Part &p : parts)
+    if (p.group == group) return p.start;
+  parts.push_back({group, size, width});
+  width += size;
+  return width - size;
+}
+
+int Columns::body(const Bodies &B, PetscInt b)
+{
+  const LocalBody &k = B.body[b];
+  if (k.kind == BodyKind::Ground) return -1;
+  const int start = add(k.group, GroupSize(k.kind));
+  for (int g = 1; g < Groups(k.kind); g++) add(k.group + g, GroupSize(k.kind)); /* right behind: a body's groups come together */
+  return start;
+}
+
+int Columns::scalar(const Pattern &p, const Input &i)
+{
+  return i.group < 0 ? -1 : add(i.group, (int)p.group[i.group].size) + (int)i.offset;
+}
+
+void MeasureSet::connect(const Bodies &B, const Pattern &p)
+{
+  columns_ = Columns();
+  at_.assign(all_.size(), {});
+  for (std::size_t k = 0; k < all_.size(); k++) {
+    const LocalMeasure &m = all_[k];
+    if (m.kind == Measure::Time) continue;
+    if (IsScalar(m.kind)) {
+      at_[k].push_back(columns_.scalar(p, m.input));
+      continue;
+    }
+    for (PetscInt marker : {m.i, m.j, m.frame}) at_[k].push_back(marker < 0 ? -1 : columns_.body(B, B.marker[marker].body));
+    for (const auto &q : m.probes) {
+      for (int i = 0; i < q->markers(); i++) at_[k].push_back(columns_.body(B, B.marker[q->marker(i)].body));
+      for (int r = 0; r < q->multipliers(); r++) at_[k].push_back(columns_.scalar(p, q->multiplier(r)));
+    }
+  }
+}
+
+void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *row) const
+{
+  const LocalMeasure     &m  = all_[k];
+  const std::vector<int> &at = at_[k];
+  if (m.kind == Measure::Time || factor == 0) return;
+  if (IsScalar(m.kind)) {
+    if (at[0] >= 0) row[at[0]] += factor;
+    return;
+  }
+  if (IsJoint(m.kind)) {
+    AddJointGradient(m, e, factor, at, row);
+    return;
+  }
+  constexpr int N = 3 * max_coordinates;
+  using T         = Dual<N>;
+  const PetscInt  marker[3] = {m.i, m.j, m.frame};
+  MarkerMotion<T> motion[3];
+  for (int i = 0; i < 3; i++)
+    if (marker[i] >= 0) motion[i] = Motion<N>(e, marker[i], i * max_coordinates);
+  const T x = Formula<T>(m, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
+  for (int i = 0; i < 3; i++) {
+    if (at[i] < 0) continue;
+    const int n = Coordinates(e.bodies.body[e.bodies.marker[marker[i]].body].kind);
+    for (int c = 0; c < n; c++) row[at[i] + c] += factor * x.derivatives()(i * max_coordinates + c);
+  }
+}
+
+void MeasureSet::accept(const Bodies &B)
+{
+  for (LocalMeasure &m : all_) m.accept(B);
+}
+
+PetscInt MeasureSet::memory() const
+{
+  PetscInt n = 0;
+  for (const LocalMeasure &m : all_) n += m.memory();
+  return n;
+}
+
+void MeasureSet::copyMemory(double *x, bool in)
+{
+  for (LocalMeasure &m : all_) {
+    m.copyMemory(x, in);
+    x += m.memory();
+  }
+}
+
+} // namespace hhtdae
