@@ -1,6 +1,7 @@
 /* Kernels of joints: derivatives over random states, what their multipliers are, and whether the checks themselves can
  * fail */
 #include "kernel_checks.h"
+#include "scene/kernels/convel.h"
 #include "scene/kernels/primitives.h"
 #include "scene/kernels/primitives_axes.h"
 
@@ -26,6 +27,121 @@ TEST(JointKernels, AxesDerivatives)
   CheckConstraint<Parallel>();
   CheckConstraint<Orient>();
   CheckConstraint<OrientInPlane>();
+  CheckConstraint<EqualRotation<false>>();
+  CheckConstraint<EqualRotation<true>>();
+}
+
+/* ---- what the multipliers are ---- */
+
+namespace
+{
+
+Mat3<double> About(const Vec3<double> &axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
+
+/* i and j somewhere, with parallel axes; i is at `local` in j's axes and turned by `turn` in them */
+struct Pair {
+  Frame<double> f[2];
+  explicit Pair(Random &random, const Vec3<double> &local = Vec3<double>::Zero(),
+                const Mat3<double> &turn = Mat3<double>::Identity())
+  {
+    f[1] = random.frame();
+    f[0] = {f[1].x + f[1].R * local, f[1].R * turn};
+  }
+  Vec3<double> j(int axis) const { return f[1].R.col(axis); }
+};
+
+/* the reaction -J^T lambda with multiplier 1 in row r: force and moment on i, force and moment on j */
+template <class K> Matrix<12, 1> Reaction(const Pair &p, int r, const typename K::Data &data = {})
+{
+  typename K::Gradient J;
+  double               phi[K::rows];
+  K::template value<double>(data, p.f, 0, phi);
+  EXPECT_NEAR(phi[r], 0, 1e-14) << "the joint is not closed";
+  K::gradient(data, p.f, 0, J);
+  return -J.row(r).transpose();
+}
+
+/* a force at i's origin and its opposite at the same point of j, or a moment and its opposite */
+void ExpectForce(const Pair &p, const Matrix<12, 1> &reaction, const Vec3<double> &force)
+{
+  Matrix<12, 1> expected;
+  expected << force, Vec3<double>::Zero(), -force, -(p.f[0].x - p.f[1].x).cross(force);
+  EXPECT_LT((reaction - expected).norm(), 1e-13) << reaction.transpose() << "\nshould be\n" << expected.transpose();
+}
+void ExpectMoment(const Matrix<12, 1> &reaction, const Vec3<double> &moment)
+{
+  Matrix<12, 1> expected;
+  expected << Vec3<double>::Zero(), moment, Vec3<double>::Zero(), -moment;
+  EXPECT_LT((reaction - expected).norm(), 1e-13) << reaction.transpose() << "\nshould be\n" << expected.transpose();
+}
+
+} // namespace
+
+TEST(JointKernels, MultipliersOfPointsAreForces)
+{
+  Random random(2);
+  for (int k = 0; k < 10; k++) {
+    const Mat3<double> turn = random.rotation();
+    const Pair same(random, {0, 0, 0}, turn), plane(random, {.3, -.8, .7}, turn), line(random, {0, 0, -1.3}, turn);
+    for (int r = 0; r < 3; r++) ExpectForce(same, Reaction<Coincide>(same, r), Vec3<double>::Unit(r));
+    for (int r = 0; r < 2; r++) ExpectForce(same, Reaction<Coincide2>(same, r), Vec3<double>::Unit(r));
+    ExpectForce(plane, Reaction<OnPlane<2>>(plane, 0, {.7}), plane.j(2));
+    ExpectForce(plane, Reaction<OnPlane<1>>(plane, 0, {-.8}), plane.j(1));
+    for (int r = 0; r < 2; r++) ExpectForce(line, Reaction<OnLine>(line, r), line.j(r));
+    const Vec3<double> d = plane.f[0].x - plane.f[1].x; /* tension pulls i towards j */
+    ExpectForce(plane, Reaction<Distance>(plane, 0, {d.norm()}), -d.normalized());
+  }
+}
+
+TEST(JointKernels, MultipliersOfAxesAreMoments)
+{
+  Random random(3);
+  for (int k = 0; k < 10; k++) {
+    const double       spin = random(-3, 3);
+    const Vec3<double> z    = Vec3<double>::UnitZ();
+    const Pair         about_z(random, random.vector(), About(z, spin)), aligned(random, random.vector());
+    for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(about_z, r), about_z.j(r));
+    for (int r = 0; r < 3; r++) ExpectMoment(Reaction<Orient>(aligned, r), aligned.j(r));
+    ExpectMoment(Reaction<OrientInPlane>(aligned, 0), aligned.j(2));
+    const Pair cross(random, {0, 0, 0},
+                     About(z, spin) * About(Vec3<double>::UnitX(), M_PI / 2) * About(z, random(-3, 3)));
+    ExpectMoment(Reaction<AxesPerpendicular<2, 2>>(cross, 0), cross.j(2).cross(Vec3<double>(cross.f[0].R.col(2))));
+  }
+}
+
+/* Antiparallel axes are the other branch of the same joint: closed, and with reactions of the same size */
+TEST(JointKernels, AlignmentsHaveTwoBranches)
+{
+  Random     random(4);
+  const Pair flipped(random, {0, 0, 0}, About(Vec3<double>::UnitX(), M_PI));
+  for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(flipped, r), -flipped.j(r));
+}
+
+/* Shafts bent by a constant angle that turn by the same angle, however far, satisfy the row; those that do not turn
+ * alike do not. */
+TEST(JointKernels, ConstantVelocityTurnsBothShaftsAlike)
+{
+  Random             random(5);
+  const Vec3<double> z = Vec3<double>::UnitZ(), x = Vec3<double>::UnitX();
+  for (int k = 0; k < 20; k++) {
+    const double       bend = random(-1.2, 1.2), spin = random(-10, 10), other = random(.1, 2), plane = random(-3, 3);
+    const Mat3<double> B    = About({std::cos(plane), std::sin(plane), 0}, bend);
+    const Mat3<double> turn = About(z, -spin) * B * About(z, spin), flip = About(x, M_PI);
+    double             phi;
+    const Pair         alike(random, {0, 0, 0}, turn), away(random, {0, 0, 0}, turn * flip);
+    const Pair         apart(random, {0, 0, 0}, turn * About(z, other));
+    EqualRotation<false>::value<double>({}, alike.f, 0, &phi);
+    EXPECT_NEAR(phi, 0, 1e-14);
+    EqualRotation<true>::value<double>({}, away.f, 0, &phi);
+    EXPECT_NEAR(phi, 0, 1e-14);
+    EqualRotation<false>::value<double>({}, apart.f, 0, &phi);
+    EXPECT_NEAR(phi, -std::sin(other) * std::pow(std::cos(bend / 2), 2), 1e-13);
+    /* moment about the axis halfway, of the shafts, whichever way z_i points */
+    const Vec3<double> half       = (alike.f[0].R.col(2) + alike.j(2)).normalized();
+    const Vec3<double> other_half = (away.j(2) - away.f[0].R.col(2)).normalized();
+    ExpectMoment(Reaction<EqualRotation<false>>(alike, 0), std::cos(bend / 2) * half);
+    ExpectMoment(Reaction<EqualRotation<true>>(away, 0), std::cos(bend / 2) * other_half);
+  }
 }
 
 /* ---- the checks themselves ---- */
