@@ -100,6 +100,10 @@ public:
   /* Start-up work that was asked for (assembly, equilibrium), TSSolve(), output. */
   PetscErrorCode solve(TS ts);
 
+  /* Values of all channels, in their order, on every rank: at time t between the ends of the last step, after scene.solve() or in a
+     monitor. Collective. */
+  PetscErrorCode sample(TS ts, PetscReal t, std::vector<double> &values);
+
   PetscErrorCode view(PetscViewer viewer) const;
 
   /* Everything, for the library's own rooms and for tests */

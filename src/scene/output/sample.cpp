@@ -1,0 +1,59 @@
+/* Scene::sample(): the channels at one time, without a file. */
+#include "scene/output/channels.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* Every rank's own values, rank by rank, to the order of the channels on every rank */
+PetscErrorCode Share(const Runtime &R, const std::vector<double> &own, std::vector<double> &values)
+{
+  const std::vector<PetscMPIInt> &owner = ChannelOwners(R);
+  std::vector<PetscMPIInt>        count(R.size, 0), first(R.size + 1, 0);
+  std::vector<double>             all(owner.size());
+  PetscFunctionBegin;
+  for (PetscMPIInt r : owner) count[r]++;
+  for (PetscMPIInt r = 0; r < R.size; r++) first[r + 1] = first[r] + count[r];
+  PetscCallMPI(MPI_Allgatherv(own.data(), (PetscMPIInt)own.size(), MPI_DOUBLE, all.data(), count.data(), first.data(), MPI_DOUBLE, R.scene.comm));
+  values.resize(owner.size());
+  for (std::size_t c = 0; c < owner.size(); c++) values[c] = all[first[owner[c]]++];
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
+{
+  Vec                 W[3];
+  const double       *w[3], *local[3];
+  std::vector<double> own, acceleration;
+  PetscFunctionBegin;
+  PetscCheck(data_->run, data_->comm, PETSC_ERR_ORDER, "the scene has no TS yet: call Scene::createTS() and solve first");
+  Runtime &R = *data_->run;
+  for (Vec &x : W) {
+    PetscCall(VecCreate(data_->comm, &x));
+    PetscCall(VecSetSizes(x, R.n, PETSC_DETERMINE));
+    PetscCall(VecSetType(x, VECSTANDARD));
+  }
+  PetscCall(TSHHT3Interpolate(ts, t, W[0], W[1], W[2]));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
+  /* The exchange carries accelerations only where elements read them. */
+  if (R.size > 1 && !R.uses_acceleration) {
+    PetscCall(LocalState(R, w[2], w[2], w[2], local));
+    acceleration.assign(local[0], local[0] + R.u.size());
+  }
+  PetscCall(LocalState(R, w[0], w[1], w[2], local));
+  if (!acceleration.empty()) local[2] = acceleration.data();
+  R.bodies.move(local[0], local[1]);
+  PetscCall(ChannelValues(R, Evaluation{t, local[0], local[1], local[2], R.bodies, R.n}, own));
+  PetscCall(Share(R, own, values));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecRestoreArrayRead(W[k], &w[k]));
+    PetscCall(VecDestroy(&W[k]));
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
