@@ -1,0 +1,99 @@
+/* A scene in any state: its residual, and its Jacobian against differences of the residual. */
+#ifndef HHTDAE_TESTS_SCENE_JACOBIAN_H
+#define HHTDAE_TESTS_SCENE_JACOBIAN_H
+
+#include "scene/runtime.h"
+#include "support.h"
+#include <random>
+
+namespace hhtest
+{
+
+/* On one rank; the scene has been set up */
+class AnyState
+{
+public:
+  hhtdae::Runtime &R;
+  double           t = 0.3;
+  Vec              U = nullptr, V = nullptr, A = nullptr, F = nullptr;
+
+  AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4) : R(*s.data().run)
+  {
+    must(MatCreateVecs(R.J, &U, &F));
+    must(VecDuplicate(U, &V));
+    must(VecDuplicate(U, &A));
+    must(hhtdae::InitialState(R, U, V));
+    std::mt19937                           random(seed);
+    std::uniform_real_distribution<double> any(-1, 1);
+    for (Vec x : {U, V, A})
+      for (PetscInt i = 0; i < R.n; i++) add(x, i, (x == U ? spread : 1) * any(random));
+  }
+  ~AnyState()
+  {
+    for (Vec *x : {&U, &V, &A, &F}) VecDestroy(x);
+  }
+  AnyState(const AnyState &) = delete;
+
+  static void add(Vec x, PetscInt i, double d)
+  {
+    double *a;
+    must(VecGetArray(x, &a));
+    a[i] += d;
+    must(VecRestoreArray(x, &a));
+  }
+  Array residual()
+  {
+    must(hhtdae::Residual(R, t, U, V, A, F));
+    return whole(F);
+  }
+  double get(Vec x, PetscInt i) const { return whole(x)[i]; }
+  /* what the definition of a variable says in this state */
+  double definition(hhtdae::Variable v)
+  {
+    const PetscInt row = R.number.variable[v.id];
+    return get(U, row) - residual()[row];
+  }
+  /* along the motion: du = u' d + u'' d^2/2, du' = u'' d */
+  void advance(double d)
+  {
+    must(VecAXPY(U, d, V));
+    must(VecAXPY(U, d * d / 2, A));
+    must(VecAXPY(V, d, A));
+    t += d;
+  }
+
+  /* largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to the entry or to one */
+  double jacobianError(double sv, double sa, double d = 1e-6)
+  {
+    double worst = 0;
+    Mat    J;
+    must(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
+    must(hhtdae::Jacobian(R, t, U, V, A, sv, sa, J));
+    for (PetscInt c = 0; c < R.n; c++) {
+      const auto shifted = [&](double by) {
+        add(U, c, by);
+        add(V, c, sv * by);
+        add(A, c, sa * by);
+      };
+      shifted(d);
+      const Array up = residual();
+      shifted(-2 * d);
+      const Array down = residual();
+      shifted(d);
+      for (PetscInt r = 0; r < R.n; r++) {
+        double       entry;
+        const double difference = (up[r] - down[r]) / (2 * d);
+        must(MatGetValue(J, r, c, &entry));
+        const double error = std::abs(entry - difference) / std::max(1., std::abs(difference));
+        if (!(error < 1e-5)) std::printf("row %d, column %d: %.9g, by differences %.9g\n", (int)r, (int)c, entry, difference);
+        widen(worst, error);
+      }
+    }
+    must(MatDestroy(&J));
+    return worst;
+  }
+};
+
+} // namespace hhtest
+
+#endif
