@@ -1,36 +1,144 @@
-static char help[] = "Planar chain of pinned rods that falls; no reference.\n"
+static char help[] = "A chain of N bodies, or a net with closed loops, falls from the horizontal; how much work a body makes.\n"
+                     "Runs on any number of ranks with the same result.\n"
                      "  -n <10>: number of rods, 1 kg and 1 m each\n"
-                     "  -angle <0>: start angle from the horizontal, degrees (-90: hanging)\n"
+                     "  -joint <revolute>: revolute, about z, or spherical\n"
+                     "  -planar: a planar scene, 3 coordinates a rod\n"
+                     "  -net <rows,columns>: instead, a net of point masses and rods on ball joints, hung along one side\n"
                      "  -end <1>: end time, s\n";
 
-#include "problems/chain.h"
 #include "problem.h"
+#include "scene_watch.h"
+
+#include <cstring>
+
+using namespace hhtdae;
+
+/* A rod of 1 kg and 1 m, x along it */
+static Body AddRod(Scene &scene, const Vector3 &from, const Matrix3 &rotation)
+{
+  RigidBody rod;
+  rod.mass     = 1;
+  rod.inertia  = Vector3(1e-3, 1. / 12, 1. / 12).asDiagonal();
+  rod.rotation = rotation;
+  rod.position = from + rotation.col(0) / 2;
+  const Body b = scene.add("", rod);
+  scene.shape(b, Shape::cylinder(0.03, 1, {0, 0, 0}, Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix()));
+  return b;
+}
+
+/* From the origin along x; returns the end of the last rod */
+static Marker AddChain(Scene &scene, PetscInt n, bool spherical)
+{
+  Marker last = scene.marker(scene.ground());
+  for (PetscInt k = 0; k < n; k++) {
+    const Body   b     = AddRod(scene, {(double)k, 0, 0}, Matrix3::Identity());
+    const Marker first = scene.marker(b, {-0.5, 0, 0});
+    if (spherical) scene.add("", Spherical{first, last});
+    else scene.add("", Revolute{first, last});
+    last = scene.marker(b, {0.5, 0, 0});
+  }
+  return last;
+}
+
+/* Knots in the xz plane, the first row held by the ground; rods along the rows and the columns */
+static Marker AddNet(Scene &scene, PetscInt rows, PetscInt columns)
+{
+  std::vector<Marker> knot(columns);
+  const Matrix3       along_z = Eigen::AngleAxisd(-PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix();
+  for (PetscInt r = 0; r <= rows; r++)
+    for (PetscInt c = 0; c < columns; c++) {
+      const Vector3 x((double)c, 0, (double)r);
+      const Marker  above = knot[c];
+      if (r == 0) {
+        knot[c] = scene.marker(scene.ground(), x);
+        continue;
+      }
+      PointMass p;
+      p.mass     = 0.5;
+      p.position = x;
+      knot[c]    = scene.marker(scene.add("", p));
+      const Body down = AddRod(scene, x - Vector3::UnitZ(), along_z);
+      scene.add("", Spherical{scene.marker(down, {-0.5, 0, 0}), above});
+      scene.add("", Spherical{scene.marker(down, {0.5, 0, 0}), knot[c]});
+      if (c == 0) continue;
+      const Body across = AddRod(scene, x - Vector3::UnitX(), Matrix3::Identity());
+      scene.add("", Spherical{scene.marker(across, {-0.5, 0, 0}), knot[c - 1]});
+      scene.add("", Spherical{scene.marker(across, {0.5, 0, 0}), knot[c]});
+    }
+  return knot[columns - 1];
+}
+
+static PetscErrorCode Run(void)
+{
+  PetscInt         n = 10, net[2] = {0, 0}, given = 2, unknowns;
+  PetscReal        end = 1;
+  char             joint[16] = "revolute";
+  PetscBool        planar = PETSC_FALSE, is_net;
+  TS               ts;
+  Vec              U;
+  TSHHT3Statistics s;
+  PetscLogDouble   before, after, all;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-n", &n, nullptr));
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-net", net, &given, &is_net));
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-joint", joint, sizeof joint, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-planar", &planar, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
+  const bool spherical = !std::strcmp(joint, "spherical");
+  PetscCheck(spherical || !std::strcmp(joint, "revolute"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-joint %s: must be revolute or spherical", joint);
+  PetscCheck(n > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-n %d: number of rods, must be positive", (int)n);
+  PetscCheck(!is_net || (given == 2 && net[0] > 0 && net[1] > 0), PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-net: give rows,columns, both positive");
+  PetscCheck(!planar || (!is_net && !spherical), PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP, "-planar is for a chain of revolute joints");
+  PetscCall(PetscMemoryGetCurrentUsage(&before));
+
+  Scene scene(PETSC_COMM_WORLD, planar ? Space::Planar : Space::Spatial);
+  scene.gravity({0, -9.81, 0});
+  const Marker   tip    = is_net ? AddNet(scene, net[0], net[1]) : AddChain(scene, n, spherical);
+  const PetscInt bodies = is_net ? net[0] * (3 * net[1] - 1) : n;
+  for (int k = 0; k < (planar ? 2 : 3); k++) scene.channel(std::string("tip.") + "xyz"[k], Measure::displacement(tip, k), "m");
+  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
+  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+
+  PetscCall(scene.createTS(&ts));
+  PetscCall(TSSetMaxTime(ts, end));
+  PetscCall(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
+  PetscCall(TSSetFromOptions(ts));
+  std::vector<double> x;
+  double              start = 0, drift = 0, exchanged = 0;
+  hhtex::Watch        watch(scene, end / 10, [&](double t, const std::vector<double> &c) {
+    const double T = c[c.size() - 2], V = c.back();
+    if (t == 0) start = T + V;
+    hhtex::Widen(drift, T + V, start);
+    exchanged = std::fmax(exchanged, T);
+  });
+  PetscCall(watch.attach(ts));
+  PetscCall(scene.solve(ts));
+
+  PetscReal t;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(scene.sample(ts, t, x));
+  PetscCall(TSHHT3GetStatistics(ts, &s));
+  PetscCall(PetscMemoryGetCurrentUsage(&after));
+  after -= before;
+  PetscCallMPI(MPI_Allreduce(&after, &all, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecGetSize(U, &unknowns));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "chain: bodies=%d unknowns=%d step=%.4g us body_step=%.4g us memory=%.0f bytes/body\n", (int)bodies, (int)unknowns,
+                        1e6 * (double)s.time / s.steps, 1e6 * (double)s.time / s.steps / bodies, (double)all / bodies));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "tip: t=%g x=%.12g y=%.12g z=%.12g\n", (double)t, x[0], x[1], planar ? 0 : x[2]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: energy=%.3e kinetic=%.3e\n", drift, exchanged));
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
-  PetscInt  rods  = 10;
-  PetscReal angle = 0., end = 1.;
-
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, nullptr, help));
   PetscCall(TSHHT3Initialize());
   PetscCall(hhtex::SummaryByDefault());
-  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-n", &rods, nullptr));
-  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-angle", &angle, nullptr));
-  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::Chain problem(rods, angle, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(Run());
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -1,0 +1,98 @@
+static char help[] = "Quarter car: body and wheel on vertical guides, suspension of spring and damper, tire in contact with a moving road.\n"
+                     "The tire lifts off behind the bump. Compared with the equations in two heights.\n"
+                     "  -road <bump>: bump, a step up by a quintic; sine; curb, a step that makes the tire jump\n"
+                     "  -height <0.05>: of the road's motion, m\n"
+                     "  -tire <torus>: torus or sphere\n"
+                     "  -end <2>: end time, s\n";
+
+#include "problem.h"
+#include "scene_references.h"
+#include "scene_watch.h"
+
+#include <cstring>
+
+using namespace hhtdae;
+
+static PetscErrorCode Run(void)
+{
+  char      road[16] = "bump", tire[16] = "torus";
+  PetscReal height = 0.05, end = 2;
+  TS        ts;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-road", road, sizeof road, nullptr));
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-tire", tire, sizeof tire, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-height", &height, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
+  const bool torus = !std::strcmp(tire, "torus");
+  PetscCheck(torus || !std::strcmp(tire, "sphere"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-tire %s: must be torus or sphere", tire);
+
+  hhtex::QuarterCarReference::Parameters p;
+  if (!std::strcmp(road, "bump")) p.road = TimeFunction::step(0.2, 0, 0.35, height);
+  else if (!std::strcmp(road, "curb")) p.road = TimeFunction::step(0.2, 0, 0.24, height);
+  else if (!std::strcmp(road, "sine")) p.road = TimeFunction::formula([height](const TimeFunction::Number &t) -> TimeFunction::Number { return (1. - cos(t * 10.)) * (0.5 * height); });
+  else SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-road %s: must be bump, curb or sine", road);
+
+  /* ---- the scene starts in static equilibrium ---- */
+  const double radius = 0.3, hub = radius - p.sink(), deck = hub + 0.4, weight = p.body * 9.81;
+  Scene        scene(PETSC_COMM_WORLD);
+  scene.gravity({0, 0, -9.81});
+  RigidBody strip, wheel, body;
+  strip.mass     = 1;
+  wheel.mass     = p.wheel;
+  wheel.inertia  = Vector3(1, 2, 1).asDiagonal();
+  wheel.position = {0, 0, hub};
+  body.mass      = p.body;
+  body.inertia   = Vector3(50, 50, 50).asDiagonal();
+  body.position  = {0, 0, deck};
+  const Body R = scene.add("road", strip), W = scene.add("wheel", wheel), B = scene.add("body", body), ground = scene.ground();
+  const Marker datum = scene.marker(ground), surface = scene.marker(R), axle = scene.marker(W), mount = scene.marker(B);
+  scene.shape(R, Shape::box({1, 0.3, 0.01}, {0, 0, -0.01}));
+  scene.shape(B, Shape::box({0.6, 0.3, 0.15}));
+  scene.add("road's guide", Translational{surface, datum});
+  scene.add("wheel's guide", Translational{axle, datum});
+  scene.add("body's guide", Translational{mount, datum});
+  scene.add("road's motion", TranslationalMotion{surface, datum, p.road});
+  scene.add("suspension", SpringDamper{mount, axle, p.stiffness, p.damping, deck - hub, -weight});
+  ContactLaw law;
+  law.stiffness = p.tire;
+  law.damping   = p.tire_damping;
+  Matrix3 z_along_y; /* the wheel's axis */
+  z_along_y << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  const Marker rim = scene.marker(W, {0, 0, 0}, z_along_y);
+  const Element contact = torus ? scene.add("tire", TorusPlane{rim, surface, radius - 0.1, 0.1, law}) : scene.add("tire", SpherePlane{rim, surface, radius, law});
+  scene.channel("body.z", Measure::displacement(mount, 2), "m");
+  scene.channel("wheel.z", Measure::displacement(axle, 2), "m");
+  scene.channel("tire", Measure::force(contact, 2), "N");
+
+  PetscCall(scene.createTS(&ts));
+  PetscCall(TSSetMaxTime(ts, end));
+  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
+  PetscCall(TSSetFromOptions(ts));
+
+  hhtex::QuarterCarReference exact(p);
+  double                     error = 0, load = 0, off = 0;
+  hhtex::Watch               watch(scene, 0.001, [&](double t, const std::vector<double> &x) {
+    const double N = exact.tire(t);
+    hhtex::Widen(error, x[0] - deck, exact.body(t));
+    hhtex::Widen(error, x[1] - hub, exact.wheel(t));
+    hhtex::Widen(load, x[2] / weight, N / weight);
+    if (N == 0) off += 0.001;
+  });
+  PetscCall(watch.attach(ts));
+  PetscCall(scene.solve(ts));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "lifted: %.3f s\nerror: heights=%.3e tire=%.3e\n", off, error, load));
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscInitialize(&argc, &argv, nullptr, help));
+  PetscCall(TSHHT3Initialize());
+  PetscCall(hhtex::SummaryByDefault());
+  PetscCall(Run());
+  PetscCall(PetscFinalize());
+  return 0;
+}

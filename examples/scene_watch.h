@@ -1,0 +1,54 @@
+/* Looks at a scene's channels in the course of a run: f(t, values) at the multiples of dt within its steps, on every rank. */
+#ifndef HHTEX_SCENE_WATCH_H
+#define HHTEX_SCENE_WATCH_H
+
+#include <hhtdae/scene.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+namespace hhtex
+{
+
+class Watch
+{
+public:
+  using Look = std::function<void(double t, const std::vector<double> &channels)>;
+
+  Watch(hhtdae::Scene &scene, double dt, Look look) : scene_(scene), dt_(dt), look_(std::move(look)) {}
+  Watch(const Watch &) = delete;
+  PetscErrorCode attach(TS ts) { return TSMonitorSet(ts, monitor, this, nullptr); }
+
+private:
+  hhtdae::Scene &scene_;
+  double         dt_;
+  Look           look_;
+  PetscInt       done_ = 0;
+
+  /* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. */
+  static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
+  {
+    Watch              *w = static_cast<Watch *>(ctx);
+    std::vector<double> values;
+    PetscFunctionBegin;
+    if (step <= 0) PetscFunctionReturn(0);
+    for (; w->done_ * w->dt_ <= t * (1 + 1e-12); w->done_++) {
+      const double at = std::fmin(w->done_ * w->dt_, t);
+      PetscCall(w->scene_.sample(ts, at, values));
+      w->look_(at, values);
+    }
+    PetscFunctionReturn(0);
+  }
+};
+
+/* The largest of |a - b|; stays NaN once it was */
+inline void Widen(double &worst, double a, double b = 0)
+{
+  const double d = std::fabs(a - b);
+  if (!(d <= worst)) worst = d;
+}
+
+} // namespace hhtex
+
+#endif
