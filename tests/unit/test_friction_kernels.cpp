@@ -1,6 +1,7 @@
 /* Friction in joints: derivatives, the limits mu N and rest, power, and the loads that the reaction makes */
 #include "kernel_checks.h"
 #include "scene/kernels/friction.h"
+#include "scene/scene_data.h"
 
 using namespace hhtdae;
 
@@ -154,4 +155,123 @@ TEST(JointFriction, RegularizationIsSmoothAtRest)
     EXPECT_NEAR(ratio.derivatives()(0), x < .02 ? series : formula, 1e-12) << x;
   }
   EXPECT_EQ(TanhRatio<double>(0.), 1);
+}
+
+/* ---- entries ---- */
+
+namespace
+{
+
+bool Mentions(Scene &scene, const std::string &text)
+{
+  for (const std::string &e : scene.data().errors)
+    if (e.find(text) != std::string::npos) return true;
+  return false;
+}
+
+struct Shaft {
+  Scene  scene{PETSC_COMM_SELF};
+  Body   body = scene.add("shaft", RigidBody{});
+  Marker i = scene.marker(body), j = scene.marker(scene.ground());
+};
+
+} // namespace
+
+TEST(JointFrictionEntry, TakesThePositionRowsOfItsJoint)
+{
+  Shaft         s;
+  const Element revolute = s.scene.add("pin", Revolute{s.i, s.j}),
+                slider   = s.scene.add("rail", Translational{s.i, s.j});
+  s.scene.add("friction", JointFriction{revolute, .1, .2});
+  s.scene.add("sliding", JointFriction{slider, .1});
+  ASSERT_TRUE(s.scene.data().errors.empty()) << s.scene.data().errors[0];
+  const int rows[] = {3, 2};
+  for (int k = 0; k < 2; k++) {
+    const ElementData &e = s.scene.data().elements[2 + k];
+    ASSERT_EQ(e.parts.size(), 1u);
+    const StoreBase &store = *e.parts[0].store;
+    ASSERT_EQ(store.inputs(), rows[k]);
+    for (int r = 0; r < rows[k]; r++) {
+      const ScalarRef ref = store.input(e.parts[0].index, r);
+      EXPECT_EQ(ref.kind, ScalarRef::Multiplier);
+      EXPECT_EQ(ref.id, k);
+      EXPECT_EQ(ref.component, r);
+    }
+  }
+}
+
+TEST(JointFrictionEntry, RefusesByName)
+{
+  Shaft         s;
+  const Element pin = s.scene.add("pin", Revolute{s.i, s.j}), weld = s.scene.add("weld", Fixed{s.i, s.j});
+  s.scene.add("f", JointFriction{weld, .1, .2});
+  EXPECT_TRUE(Mentions(s.scene, "joint friction f: \"weld\" is of type fixed; friction is for revolute"))
+      << s.scene.data().errors.back();
+  s.scene.add("g", JointFriction{Element{}, .1, .2});
+  EXPECT_TRUE(Mentions(s.scene, "joint friction g: its joint is not an element"));
+  s.scene.add("h", JointFriction{pin, -.1, 0, -1});
+  EXPECT_TRUE(Mentions(s.scene, "joint friction h: coefficient is -0.1"));
+  EXPECT_TRUE(Mentions(s.scene, "joint friction h: radius of pin or ball is 0"));
+  EXPECT_TRUE(Mentions(s.scene, "joint friction h: slip velocity is -1"));
+  EXPECT_TRUE(s.scene.data().elements.back().parts.empty());
+}
+
+namespace
+{
+
+/* rates of the coordinates of a scene at the end of a run */
+Eigen::VectorXd RatesAfter(Scene &scene, double end)
+{
+  TS  ts;
+  Vec U, V;
+  EXPECT_EQ(scene.createTS(&ts), 0);
+  EXPECT_EQ(TSSetMaxTime(ts, end), 0);
+  EXPECT_EQ(TSSetTolerances(ts, 1e-7, nullptr, 1e-7, nullptr), 0);
+  EXPECT_EQ(scene.solve(ts), 0);
+  EXPECT_EQ(TS2GetSolution(ts, &U, &V), 0);
+  const PetscScalar *v;
+  PetscInt           n;
+  EXPECT_EQ(VecGetLocalSize(V, &n), 0);
+  EXPECT_EQ(VecGetArrayRead(V, &v), 0);
+  const Eigen::VectorXd rates = Eigen::Map<const Eigen::VectorXd>(v, n);
+  EXPECT_EQ(VecRestoreArrayRead(V, &v), 0);
+  EXPECT_EQ(TSDestroy(&ts), 0);
+  return rates;
+}
+
+} // namespace
+
+/* a flywheel in bearings of load m g slows down at mu r m g/I; a block on a rail at mu g */
+TEST(JointFrictionEntry, SlowsDownAsCoulombSays)
+{
+  const double g = 9.81, mu = .2, r = .5, t = .5;
+  for (bool planar : {false, true}) {
+    Scene     scene(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
+    RigidBody wheel;
+    wheel.mass             = 2;
+    wheel.inertia          = 3 * Matrix3::Identity();
+    wheel.angular_velocity = {0, 0, 4};
+    const Body    body     = scene.add("wheel", wheel);
+    const Element pin      = scene.add("pin", Revolute{scene.marker(body), scene.marker(scene.ground())});
+    scene.gravity({0, -g, 0});
+    scene.add("friction", JointFriction{pin, mu, r});
+    const Eigen::VectorXd v = RatesAfter(scene, t);
+    const double          w = 4 - mu * r * 2 * g / 3 * t;
+    EXPECT_NEAR(planar ? v(2) : v.segment<3>(3).sum(), w, 1e-4); /* turns about z alone: the Euler rates add up to it */
+  }
+  Matrix3 axes;
+  axes << 0, 0, 1, 1, 0, 0, 0, 1, 0; /* z_j along x */
+  for (bool planar : {false, true}) {
+    Scene     scene(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
+    RigidBody block;
+    block.mass           = 2;
+    block.velocity       = {-3, 0, 0};
+    const Body    body   = scene.add("block", block);
+    const Matrix3 rail   = planar ? Matrix3(Matrix3::Identity()) : axes;
+    const Element slider = scene.add("rail", Translational{scene.marker(body, Vector3::Zero(), rail),
+                                                           scene.marker(scene.ground(), Vector3::Zero(), rail)});
+    scene.gravity({0, -g, 0});
+    scene.add("friction", JointFriction{slider, mu});
+    EXPECT_NEAR(RatesAfter(scene, t)(0), -3 + mu * g * t, 1e-4);
+  }
 }

@@ -57,7 +57,7 @@ template <> Element Scene::add(const std::string &name, const JointFriction &s)
     Check(e, s, i, j, true);
     Enter<SphericalFriction>(e, s, i, j, 2);
   } else if (known) {
-    e.require(false, "\"" + joint + "\" is a " + type +
+    e.require(false, "\"" + joint + "\" is of type " + type +
                          "; friction is for revolute, translational, cylindrical and spherical joints");
   }
   return e.done();
