@@ -53,6 +53,26 @@ struct PointMass { /* 3 coordinates, no rotation; planar 2 */
   bool    fixed_start = false;
 };
 
+/* What is done about initial values that violate the constraints, and about constraints that say the same thing twice */
+enum class Assembly {
+  Off,
+  Report, /* a misfit beyond the tolerance is an error that names the elements */
+  Project /* bodies and velocities move to the nearest consistent ones in the metric of the masses; fixed_start holds a body */
+};
+enum class Redundant {
+  Drop,   /* redundant rows at the start are left out of the run, with a notice */
+  Refuse, /* are an error */
+  Keep    /* are not looked for */
+};
+struct StartPolicy {
+  Assembly  assembly    = Assembly::Report;  /* -scene_assemble off,report,project */
+  double    tolerance   = 1e-6;              /* -scene_assemble_tol: of misfits, times the scene's size for lengths; radians */
+  Redundant redundant   = Redundant::Drop;   /* -scene_redundant drop,refuse,keep */
+  bool      equilibrium = false;             /* -scene_equilibrium: the run starts at rest in static equilibrium */
+  bool      view        = false;             /* -scene_view: prints what the start has done */
+  double    time        = 0;                 /* -scene_start_time: of the initial values */
+};
+
 struct SceneData; /* src/scene/scene_data.h */
 
 class Scene
@@ -89,15 +109,18 @@ public:
   void            line(const std::vector<Marker> &markers);
   OutputSettings &output();
 
-  /* Checks the scene, numbers and distributes it; collective; called by createTS() when it has not been. After this the scene is
-     fixed. */
+  /* How the run starts; options come after it */
+  StartPolicy &start();
+
+  /* Checks the scene, assembles it, drops redundant constraints, numbers and distributes it, looks for static equilibrium, all as
+     start() says; collective; called by createTS() when it has not been. After this the scene is fixed. */
   PetscErrorCode setUp();
 
   /* A TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it, the scene must
      outlive it. Set final time, step and options on it as on any TS. */
   PetscErrorCode createTS(TS *ts);
 
-  /* Start-up work that was asked for (assembly, equilibrium), TSSolve(), output. */
+  /* TSSolve(), output. */
   PetscErrorCode solve(TS ts);
 
   /* Values of all channels, in their order, on every rank: at time t between the ends of the last step, after scene.solve() or in a

@@ -1,19 +1,172 @@
 /* What can be wrong with a description, found before anything is numbered and reported all at once. */
 #include "measures.h"
 #include "runtime.h"
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <set>
+#include <sstream>
 
 namespace hhtdae
 {
 
+namespace
+{
+
+constexpr double angle_tolerance = 1e-8; /* of directions that have to be exact */
+
+std::string Text(double x)
+{
+  std::ostringstream o;
+  o.precision(6);
+  o << x;
+  return o.str();
+}
+std::string Text(const Vector3 &x) { return Text(x(0)) + ", " + Text(x(1)) + ", " + Text(x(2)); }
+
+class Check
+{
+public:
+  explicit Check(SceneData &s) : s_(s), errors_(s.errors) {}
+
+  void all()
+  {
+    for (const BodyData &b : s_.bodies) body(b);
+    for (std::size_t m = 0; m < s_.markers.size(); m++) marker((PetscInt)m);
+    for (const ElementData &e : s_.elements) element(e);
+    names();
+    CheckExpressions(s_, errors_);
+  }
+  const std::vector<std::string> &errors() const { return errors_; }
+
+private:
+  SceneData               &s_;
+  std::vector<std::string> errors_;
+
+  void require(bool condition, const std::string &who, const std::string &what)
+  {
+    if (!condition) errors_.push_back(who + ": " + what);
+  }
+
+  void body(const BodyData &b)
+  {
+    const std::string who = "body " + b.name;
+    require(std::isfinite(b.mass) && b.mass > 0, who, "mass is " + Text(b.mass) + ", must be positive");
+    require(b.r.allFinite() && b.v.allFinite() && b.w.allFinite(), who,
+            "position, velocity and angular velocity must be finite");
+    if (b.point) {
+      inPlane(b, who);
+      return;
+    }
+    const double off = b.A.allFinite() ? (b.A.transpose() * b.A - Matrix3::Identity()).norm() : INFINITY;
+    require(off < angle_tolerance, who,
+            "rotation is not orthonormal (R^T R misses the identity by " + Text(off) + "); give body axes as columns");
+    if (off < angle_tolerance)
+      require(b.A.determinant() > 0, who, "rotation is left-handed; its third column must be the first x the second");
+    if (s_.planar)
+      require(std::isfinite(b.inertia(2, 2)) && b.inertia(2, 2) > 0, who,
+              "inertia(2,2) is " + Text(b.inertia(2, 2)) + ", must be positive");
+    else
+      inertia(b, who);
+    inPlane(b, who);
+  }
+
+  void inertia(const BodyData &b, const std::string &who)
+  {
+    if (!b.inertia.allFinite()) {
+      require(false, who, "inertia must be finite");
+      return;
+    }
+    const double scale = b.inertia.norm(), skew = (b.inertia - b.inertia.transpose()).norm();
+    require(skew <= 1e-10 * scale, who,
+            "inertia is not symmetric (off by " + Text(skew) +
+                "); products of inertia have the same sign on both sides");
+    if (skew > 1e-10 * scale) return;
+    const Vector3     I      = Eigen::SelfAdjointEigenSolver<Matrix3>(b.inertia).eigenvalues();
+    const std::string values = "principal moments of inertia are " + Text(I);
+    if (I(0) < -1e-12 * scale) {
+      require(false, who, values + ", must be positive");
+      return;
+    }
+    require(I(0) > 1e-12 * scale, who,
+            values + ": a turn about the first axis has no inertia; give a small moment (a thousandth of the others, "
+                     "say), or make it a PointMass");
+    require(I(2) <= (I(0) + I(1)) * (1 + 1e-6), who,
+            values + ": the largest exceeds the sum of the others, which no body has; check the units, and that they "
+                     "are about the centre of mass");
+  }
+
+  /* bodies of planar scenes */
+  void inPlane(const BodyData &b, const std::string &who)
+  {
+    if (!s_.planar) return;
+    require(std::abs(b.r(2)) < angle_tolerance && std::abs(b.v(2)) < angle_tolerance, who,
+            "z is " + Text(b.r(2)) + " and its velocity " + Text(b.v(2)) + "; in a planar scene both are 0");
+    require(b.w(0) == 0 && b.w(1) == 0, who, "angular velocity is " + Text(b.w) + "; in a planar scene it is along z");
+    require(b.point || std::abs(b.A(2, 2) - 1) < angle_tolerance, who,
+            "its z axis is not along z, as in a planar scene it must be");
+  }
+
+  void marker(PetscInt id)
+  {
+    const MarkerData &m = s_.markers[id];
+    if (!s_.planar || m.body < -1 || !m.s.allFinite() || !m.R.allFinite())
+      return; /* those were named when they were made */
+    const auto        name = s_.marker_names.find(id);
+    const std::string who =
+        "marker " + (name == s_.marker_names.end() ? std::to_string(id) + " on " + s_.bodyName(m.body) : name->second);
+    require(std::abs(m.s(2)) < angle_tolerance, who,
+            "z is " + Text(m.s(2)) + "; markers of a planar scene lie in its plane, z = 0");
+    require(std::abs(m.R(2, 2) - 1) < angle_tolerance, who,
+            "its z axis is " + Text(Vector3(m.R.col(2))) + "; in a planar scene it is along z");
+  }
+
+  void element(const ElementData &e)
+  {
+    if (!s_.valid(e.i) || !s_.valid(e.j)) return; /* named when it was made */
+    const PetscInt i = s_.markers[e.i.id].body, j = s_.markers[e.j.id].body;
+    if (i < -1 || j < -1 || i != j) return;
+    const std::string who = std::string(e.type) + " " + e.name;
+    if (e.kind == ElementData::Force) return; /* does nothing, harms nothing */
+    for (const std::string &known : s_.errors)
+      if (known.compare(0, who.size() + 1, who + ":") == 0) return;
+    require(false, who,
+            i < 0 ? "both markers are on the ground; one must be on a body"
+                  : "both markers are on " + s_.bodyName(i) + "; they must be on different bodies");
+  }
+
+  template <class List> void unique(const char *what, const List &list)
+  {
+    std::set<std::string> seen, told;
+    for (const auto &x : list)
+      if (!seen.insert(x.name).second && told.insert(x.name).second)
+        require(false, std::string(what) + " " + x.name,
+                "the name is given more than once; outputs and messages need it to be unique");
+  }
+  void names()
+  {
+    unique("body", s_.bodies);
+    unique("element", s_.elements);
+    unique("variable", s_.variables);
+    unique("state", s_.states);
+  }
+};
+
+} // namespace
+
 PetscErrorCode CheckDescription(SceneData &s)
 {
-  std::string all;
+  std::string       all;
+  Check             check(s);
+  std::size_t       k    = 0;
+  const std::size_t room = 1500; /* of PETSc's message */
   PetscFunctionBegin;
   PetscCheck(!s.bodies.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
-  std::vector<std::string> errors = s.errors;
-  CheckExpressions(s, errors);
-  for (const std::string &e : errors) all += "\n  " + e;
-  PetscCheck(all.empty(), s.comm, PETSC_ERR_ARG_WRONG, "the scene cannot be built:%s", all.c_str());
+  check.all();
+  const std::vector<std::string> &errors = check.errors();
+  for (; k < errors.size() && all.size() + errors[k].size() < room; k++) all += "\n  " + errors[k];
+  for (std::size_t i = k; i < errors.size(); i++) PetscCall(PetscInfo(nullptr, "scene: %s\n", errors[i].c_str()));
+  if (k < errors.size()) all += "\n  and " + std::to_string(errors.size() - k) + " more, see -info";
+  PetscCheck(errors.empty(), s.comm, PETSC_ERR_ARG_WRONG, "the scene cannot be built:%s", all.c_str());
   PetscFunctionReturn(0);
 }
 

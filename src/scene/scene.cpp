@@ -1,5 +1,5 @@
 /* The scene as its user describes it. */
-#include "runtime.h"
+#include "start.h"
 #include <cmath>
 
 namespace hhtdae
@@ -141,20 +141,28 @@ Element ElementBuilder::done()
 
 /* ---- from description to work ---- */
 
+StartPolicy &Scene::start() { return data_->start; }
+
 PetscErrorCode Scene::setUp()
 {
   SceneData &s = *data_;
   PetscFunctionBegin;
   if (s.run) PetscFunctionReturn(0);
   PetscCall(TSHHT3Initialize());
+  PetscCall(ReadStartOptions(s));
   PetscCall(CheckDescription(s));
-  s.run = std::make_unique<Runtime>(s);
-  Runtime &R = *s.run;
+  auto     run = std::make_unique<Runtime>(s);
+  Runtime &R   = *run;
   PetscCallMPI(MPI_Comm_rank(s.comm, &R.rank));
   PetscCallMPI(MPI_Comm_size(s.comm, &R.size));
   PetscCall(Partition(s, R.size, R.number.owner));
+  PetscCall(Assemble(R));
+  PetscCall(DropRedundant(R));
   PetscCall(Number(R));
   PetscCall(Layout(R));
+  if (s.start.equilibrium) PetscCall(FindEquilibrium(R));
+  if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
+  s.run = std::move(run); /* not before everything is done: after an error setUp() starts anew */
   PetscFunctionReturn(0);
 }
 

@@ -71,6 +71,22 @@ struct ShapeData {
   Shape    shape;
 };
 
+/* What the start-up work has found */
+struct StartResult {
+  struct Row {
+    PetscInt element;
+    int      row; /* among the element's rows */
+  };
+  PetscInt         coordinates = 0, rows = 0, core = 0; /* core: rows left after the trees were cut off */
+  PetscInt         redundant = 0;                       /* rows, dropped or not */
+  std::vector<Row> dropped;
+  double           misfit = 0, velocity_misfit = 0;     /* largest of an element: relative to the scene's size, and to its speed */
+  double           speed = 0;                           /* what velocity misfits are held against */
+  double           moved = 0, turned = 0;               /* most, by assembly and equilibrium */
+  PetscInt         assembly_iterations = 0, equilibrium_iterations = 0;
+  PetscInt         degreesOfFreedom() const { return coordinates - (rows - redundant); }
+};
+
 struct Runtime; /* numbering, matrices, evaluation: runtime.h */
 
 struct SceneData {
@@ -89,6 +105,8 @@ struct SceneData {
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
   OutputSettings              output;
   std::vector<std::string>    errors; /* found while the scene was described */
+  StartPolicy                 start;
+  StartResult                 started;
   std::unique_ptr<Runtime>    run;
 
   SceneData();

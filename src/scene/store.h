@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_STORE_H
 
 #include "constraint_batch.h"
+#include "described_rows.h"
 #include "force_batch.h"
 #include "probe.h"
 #include <type_traits>
@@ -43,6 +44,7 @@ public:
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint, before any numbering */
   /* one instance to be read where it is not assembled: loads of a constraint, components of a force that is not carried */
   virtual std::unique_ptr<Probe>         probe(Localizer &l, PetscInt e) const = 0;
   virtual const std::vector<Expression> *expressions(PetscInt) const { return nullptr; } /* of user's forces */
@@ -99,6 +101,7 @@ public:
   int           rows() const override { return K::rows; }
   unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
+  void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override { DescribeRows<K>(s, this->all[e], t, rows); }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
   {

@@ -46,6 +46,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(TSSetType(*ts, TSHHT3));
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
   PetscCall(TSSetI2Jacobian(*ts, J, J, I2Jacobian, &R));
+  PetscCall(TSSetTime(*ts, data_->start.time));
   PetscCall(TS2SetSolution(*ts, U, V));
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) PetscCall(TSHHT3SetIS(*ts, (TSHHT3Role)r, R.roles[r]));

@@ -1,0 +1,323 @@
+/* Initial poses and velocities against the constraints: what does not meet is named, and moved where that is asked for.
+ */
+#include "start.h"
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr int    most_iterations = 100, most_named = 10;
+constexpr double largest_turn = 0.3, largest_move = 0.3; /* in one iteration: radians, parts of the scene's size */
+
+/* Misfit of an element in its own units, and relative to the size of the scene */
+struct Misfit {
+  double position = 0, velocity = 0, relative_position = 0, relative_velocity = 0;
+};
+
+/* How fast anything is: what velocities are held against; 0 where nothing moves */
+double Speed(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
+{
+  double speed = 0;
+  for (const BodyData &b : s.bodies) speed = std::max(speed, std::max(b.v.norm(), size * b.w.norm()));
+  for (const RowBlock &b : blocks)
+    for (int r = 0; r < b.rows; r++)
+      if (b.has(r)) speed = std::max(speed, std::abs(b.rate(r)) * (b.length ? 1 : size));
+  return speed;
+}
+
+std::vector<Misfit> Misfits(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
+{
+  std::vector<Misfit> all(s.elements.size());
+  const double        speed = s.started.speed;
+  for (const RowBlock &b : blocks) {
+    Misfit      &m      = all[b.element];
+    const double length = b.length ? size : 1, velocity = speed > 0 ? (b.length ? speed : speed / size) : 1;
+    for (int r = 0; r < b.rows; r++) {
+      if (!b.has(r)) continue;
+      m.position          = std::hypot(m.position, b.value(r));
+      m.velocity          = std::hypot(m.velocity, b.speed(r));
+      m.relative_position = std::hypot(m.relative_position, b.value(r) / length);
+      m.relative_velocity = std::hypot(m.relative_velocity, b.speed(r) / velocity);
+    }
+  }
+  return all;
+}
+
+/* Maximum, NaN included */
+double Largest(const std::vector<Misfit> &m, double Misfit::*of)
+{
+  double x = 0;
+  for (const Misfit &e : m) x = e.*of > x || std::isnan(e.*of) ? e.*of : x;
+  return x;
+}
+
+std::string Number(double x)
+{
+  std::ostringstream o;
+  o.precision(3);
+  o << x;
+  return o.str();
+}
+
+/* The worst elements beyond a relative misfit, one a line */
+std::string Worst(const SceneData &s, const std::vector<Misfit> &m, double Misfit::*relative, double Misfit::*absolute,
+                  const char *what, double beyond)
+{
+  std::vector<PetscInt> order;
+  for (std::size_t e = 0; e < m.size(); e++)
+    if (!(m[e].*relative <= beyond)) order.push_back((PetscInt)e);
+  std::stable_sort(order.begin(), order.end(), [&](PetscInt a, PetscInt b) { return m[a].*relative > m[b].*relative; });
+  std::string text;
+  for (std::size_t k = 0; k < order.size() && k < most_named; k++)
+    text += "\n  " + std::string(s.elements[order[k]].type) + " " + s.elements[order[k]].name + ": " + what + " by " +
+            Number(m[order[k]].*absolute);
+  if (order.size() > most_named) text += "\n  and " + std::to_string(order.size() - most_named) + " more";
+  return text;
+}
+
+std::string WorstPositions(const SceneData &s, const std::vector<Misfit> &m, double beyond)
+{
+  return Worst(s, m, &Misfit::relative_position, &Misfit::position, "not met", beyond);
+}
+std::string WorstVelocities(const SceneData &s, const std::vector<Misfit> &m, double beyond)
+{
+  return Worst(s, m, &Misfit::relative_velocity, &Misfit::velocity, "velocities violate it", beyond);
+}
+
+/* d: 6 numbers a body */
+void Move(SceneData &s, const std::vector<double> &d, double factor)
+{
+  for (std::size_t i = 0; i < s.bodies.size(); i++) {
+    BodyData     &b = s.bodies[i];
+    const Vector3 x(d[6 * i], d[6 * i + 1], d[6 * i + 2]), theta(d[6 * i + 3], d[6 * i + 4], d[6 * i + 5]);
+    b.r += factor * x;
+    const double angle = factor * theta.norm();
+    if (angle > 0) b.A = Eigen::AngleAxisd(angle, theta.normalized()) * b.A;
+  }
+}
+
+double StepLimit(const std::vector<double> &d, double size)
+{
+  double factor = 1;
+  for (std::size_t i = 0; i < d.size(); i += 6) {
+    const double x = std::hypot(d[i], d[i + 1], d[i + 2]), turn = std::hypot(d[i + 3], d[i + 4], d[i + 5]);
+    if (factor * x > largest_move * size) factor = largest_move * size / x;
+    if (factor * turn > largest_turn) factor = largest_turn / turn;
+  }
+  return factor;
+}
+
+/* The misfit as a length in the metric of the masses, to compare one iteration with the next */
+double Merit(const std::vector<RowBlock> &blocks, const std::vector<double> &weight)
+{
+  double      sum = 0;
+  std::size_t row = 0;
+  for (const RowBlock &b : blocks)
+    for (int r = 0; r < b.rows; r++, row++)
+      if (b.has(r) && weight[row] > 0) sum += b.value(r) * b.value(r) / weight[row];
+  return std::sqrt(sum);
+}
+
+void RightHandSide(const std::vector<RowBlock> &blocks, Eigen::VectorXd RowBlock::*of, std::vector<double> &rhs)
+{
+  rhs.clear();
+  for (const RowBlock &b : blocks)
+    for (int r = 0; r < b.rows; r++) rhs.push_back(-(b.*of)(r));
+}
+
+} // namespace
+
+std::vector<Pose> Poses(const SceneData &s)
+{
+  std::vector<Pose> p;
+  for (const BodyData &b : s.bodies) p.push_back({b.r, b.v, b.w, b.A});
+  return p;
+}
+
+void SetPoses(SceneData &s, const std::vector<Pose> &p)
+{
+  for (std::size_t i = 0; i < p.size(); i++) {
+    BodyData &b = s.bodies[i];
+    b.r         = p[i].r;
+    b.v         = p[i].v;
+    b.w         = p[i].w;
+    b.A         = p[i].A;
+  }
+}
+
+/* Bodies by how far they went, the farthest first */
+PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what)
+{
+  struct Move {
+    PetscInt body;
+    double   distance, angle;
+  };
+  const double      size = SceneSize(s);
+  std::vector<Move> moves;
+  PetscFunctionBegin;
+  for (std::size_t i = 0; i < before.size(); i++) {
+    const BodyData &b = s.bodies[i];
+    const Move      m{(PetscInt)i, (b.r - before[i].r).norm(),
+                 std::abs(Eigen::AngleAxisd(Matrix3(b.A * before[i].A.transpose())).angle())};
+    s.started.moved  = std::max(s.started.moved, m.distance);
+    s.started.turned = std::max(s.started.turned, m.angle);
+    if (m.distance > 1e-12 * size || m.angle > 1e-7) moves.push_back(m);
+  }
+  std::stable_sort(moves.begin(), moves.end(), [&](const Move &a, const Move &b) {
+    return a.distance + size * a.angle > b.distance + size * b.angle;
+  });
+  if (s.start.view)
+    PetscCall(PetscPrintf(s.comm, "scene: %s moved %zu of %zu bodies\n", what, moves.size(), before.size()));
+  for (std::size_t k = 0; k < moves.size(); k++) {
+    const char *name = s.bodies[moves[k].body].name.c_str();
+    if (s.start.view && k < most_named)
+      PetscCall(PetscPrintf(s.comm, "  %s by %.3g and by %.3g degrees\n", name, moves[k].distance,
+                            moves[k].angle * 180 / M_PI));
+    else
+      PetscCall(PetscInfo(nullptr, "scene: %s moved %s by %.3g and by %.3g degrees\n", what, name, moves[k].distance,
+                          moves[k].angle * 180 / M_PI));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* Gauss-Newton: every step is the smallest that meets the linearized constraints; halved where it does not bring them
+ * nearer */
+PetscErrorCode ProjectPositions(Runtime &R, Hold hold, bool *ok)
+{
+  SceneData            &s    = R.scene;
+  const double          size = SceneSize(s), enough = 1e-3 * s.start.tolerance;
+  NearestSystem         system(R);
+  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, hold);
+  std::vector<double>   rhs, d, weight;
+  double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
+  PetscFunctionBegin;
+  for (int it = 0, stuck = 0; it < most_iterations && misfit > 1e-15 && stuck < 5; it++) {
+    PetscCall(system.factor(blocks));
+    RightHandSide(blocks, &RowBlock::value, rhs);
+    PetscCall(system.solve(blocks, rhs, nullptr, d));
+    weight                         = system.weights();
+    const double            merit  = Merit(blocks, weight);
+    const std::vector<Pose> before = Poses(s);
+    double                  factor = StepLimit(d, size), next = merit;
+    for (int cut = 0; cut < 6; cut++, factor /= 2) {
+      SetPoses(s, before);
+      Move(s, d, factor);
+      blocks = DescribeAll(s, s.start.time, hold);
+      next   = Merit(blocks, weight);
+      if (next < merit) break;
+      if (misfit < enough) break; /* down to rounding */
+    }
+    if (misfit < enough && !(next < merit)) {
+      SetPoses(s, before);
+      break;
+    }
+    stuck  = next < 0.99 * merit ? 0 : stuck + 1;
+    misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
+    s.started.assembly_iterations++;
+    PetscCall(
+        PetscInfo(nullptr, "scene: assembly %d: misfit %g of the scene's size, step cut to %g\n", it, misfit, factor));
+    if (!std::isfinite(misfit)) break;
+  }
+  *ok = misfit <= s.start.tolerance;
+  PetscFunctionReturn(0);
+}
+
+namespace
+{
+
+PetscErrorCode ProjectVelocities(Runtime &R)
+{
+  SceneData          &s = R.scene;
+  NearestSystem       system(R);
+  std::vector<double> rhs, d;
+  PetscFunctionBegin;
+  for (int it = 0; it < 3; it++) {
+    const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::FixedStart);
+    if (it == 0) PetscCall(system.factor(blocks));
+    RightHandSide(blocks, &RowBlock::speed, rhs);
+    PetscCall(system.solve(blocks, rhs, nullptr, d));
+    for (std::size_t i = 0; i < s.bodies.size(); i++) {
+      s.bodies[i].v += Vector3(d[6 * i], d[6 * i + 1], d[6 * i + 2]);
+      s.bodies[i].w += Vector3(d[6 * i + 3], d[6 * i + 4], d[6 * i + 5]);
+    }
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode MeasureMisfit(SceneData &s, std::vector<Misfit> &m)
+{
+  const double                size   = SceneSize(s);
+  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  PetscFunctionBegin;
+  s.started.speed =
+      std::max(s.started.speed, Speed(s, blocks, size)); /* of what was given too, where it has vanished */
+  m                         = Misfits(s, blocks, size);
+  s.started.misfit          = Largest(m, &Misfit::relative_position);
+  s.started.velocity_misfit = Largest(m, &Misfit::relative_velocity);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m)
+{
+  const double tol = s.start.tolerance;
+  PetscFunctionBegin;
+  const std::string positions = WorstPositions(s, m, tol), velocities = WorstVelocities(s, m, tol);
+  PetscCheck(positions.empty() && velocities.empty(), s.comm, PETSC_ERR_ARG_WRONG,
+             "the initial values violate constraints by more than %g of the scene's size (%.3g) or speed:%s%s\n"
+             "Give consistent values, or let the bodies be moved: -scene_assemble project",
+             tol, SceneSize(s), positions.c_str(), velocities.c_str());
+  if (s.started.misfit > 0 || s.started.velocity_misfit > 0)
+    PetscCall(PetscInfo(nullptr, "scene: initial values within the tolerance, misfit %g, of velocities %g%s%s\n",
+                        s.started.misfit, s.started.velocity_misfit, WorstPositions(s, m, 1e-3 * tol).c_str(),
+                        WorstVelocities(s, m, 1e-3 * tol).c_str()));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Assemble(Runtime &R)
+{
+  SceneData              &s      = R.scene;
+  const std::vector<Pose> before = Poses(s);
+  std::vector<Misfit>     m;
+  bool                    ok;
+  PetscFunctionBegin;
+  if (s.start.assembly == Assembly::Off) PetscFunctionReturn(0);
+  PetscCall(MeasureMisfit(s, m));
+  if (s.start.assembly == Assembly::Report) {
+    PetscCall(Report(s, m));
+    PetscFunctionReturn(0);
+  }
+  if (s.started.misfit > 0) {
+    PetscCall(ProjectPositions(R, Hold::FixedStart, &ok));
+    if (!ok) {
+      PetscCall(MeasureMisfit(s, m));
+      const std::string left = WorstPositions(s, m, s.start.tolerance);
+      SetPoses(s, before);
+      SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
+              "the scene cannot be assembled; after %d iterations these constraints are not met:%s\n"
+              "Start nearer to where they are met, or free a body that is held by fixed_start",
+              (int)s.started.assembly_iterations, left.c_str());
+    }
+  }
+  PetscCall(MeasureMisfit(s, m));
+  if (s.started.velocity_misfit > 0) PetscCall(ProjectVelocities(R));
+  PetscCall(MeasureMisfit(s, m));
+  if (!(s.started.velocity_misfit <= s.start.tolerance)) {
+    const std::string left = WorstVelocities(s, m, s.start.tolerance);
+    SetPoses(s, before);
+    SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
+            "no initial velocities satisfy all constraints:%s\n"
+            "Look for motions that contradict each other, or bodies held by fixed_start",
+            left.c_str());
+  }
+  PetscCall(ReportMoves(s, before, "assembly"));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

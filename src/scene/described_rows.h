@@ -1,0 +1,67 @@
+/*
+  Rows of a constraint where the description puts its bodies, for what is done before any numbering: assembly,
+  redundancy. Every rank has the whole description, so that these are plain computations, the same on every rank.
+  Included by store.h.
+*/
+#ifndef HHTDAE_SCENE_DESCRIBED_ROWS_H
+#define HHTDAE_SCENE_DESCRIBED_ROWS_H
+
+#include "kernel.h"
+
+namespace hhtdae
+{
+
+struct DescribedRows {
+  static constexpr int max_rows = 8, max_markers = 6;
+  const char          *name   = "";
+  bool                 length = true; /* rows are lengths (velocities), else sines of angles (angular velocities) */
+  double               value[max_rows] = {};          /* Phi; 0 at velocity level */
+  double               rate[max_rows]  = {};          /* Phi_t; Psi with all velocities zero */
+  Eigen::Matrix<double, max_rows, 6 * max_markers> J; /* Phi_q or Psi_q', columns (x, theta) of the markers */
+};
+
+/* Variables and states are what they are at the start, multipliers and force states nothing yet */
+inline double InitialInput(const SceneData &s, const ScalarRef &r)
+{
+  if (r.kind == ScalarRef::Variable && r.id >= 0) return s.variables[r.id].initial;
+  if (r.kind == ScalarRef::State && r.id >= 0) return s.states[r.id].initial;
+  return 0;
+}
+
+template <class K, class D> void DescribeRows(const SceneData &s, const D &d, double t, DescribedRows &rows)
+{
+  static_assert(K::rows <= DescribedRows::max_rows && K::markers <= DescribedRows::max_markers,
+                "more rows or markers than described");
+  constexpr int        M = K::markers, R = K::rows, Z = K::inputs;
+  Frame<double>        f[M];
+  typename K::Gradient J;
+  rows.name   = K::name;
+  rows.length = false;
+  for (int k = 0; k < M; k++) {
+    f[k] = s.frame(Marker{d.marker[k]});
+    if (Depends(K::depends, 2 * k)) rows.length = true;
+  }
+  if constexpr (K::holonomic) {
+    double second[R];
+    K::value(d.data, f, t, rows.value);
+    K::time(d.data, f, t, rows.rate, second);
+    K::gradient(d.data, f, t, J);
+  } else {
+    Twist<double>        w[M];
+    double               z[Z > 0 ? Z : 1], zj[R * (Z > 0 ? Z : 1)];
+    typename K::Gradient P;
+    for (int k = 0; k < M; k++) w[k] = {Vec3<double>::Zero(), Vec3<double>::Zero()};
+    for (int i = 0; i < Z; i++) z[i] = InitialInput(s, d.input[i]);
+    if constexpr (Z > 0)
+      K::template value<double>(d.data, f, w, t, z, rows.rate);
+    else
+      K::template value<double>(d.data, f, w, t, rows.rate);
+    K::gradient(d.data, f, w, t, z, J, P, zj);
+    for (int r = 0; r < R; r++) rows.value[r] = 0;
+  }
+  rows.J.template topLeftCorner<R, 6 * M>() = J;
+}
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,360 @@
+/*
+  Constraints that say the same thing twice.
+
+  A body whose rows are independent in its own columns takes part in no redundancy, and neither do its rows: it is cut
+  off, then its neighbours are looked at again. Trees vanish in this way. What is left, loops that may be redundant,
+  goes through a sparse elimination, row by row in a fill-reducing order of the elements: rows that vanish are
+  redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the description and computes the
+  same.
+
+  Rows are made comparable: lengths in units of the scene's size, each row of norm one.
+
+  At a singular position rows are dependent that are not elsewhere. So where redundant rows are found they are looked
+  for again at a neighbouring position that satisfies the constraints, and only those that are redundant there too are
+  dropped.
+*/
+#include "start.h"
+#include <Eigen/Dense>
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <queue>
+#include <random>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr double clearly_independent = 1e-3; /* least pivot for a body to be cut off */
+constexpr double neighbour           = 0.02; /* how far away: radians, parts of the scene's size */
+
+using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
+
+struct RowRef {
+  std::size_t block;
+  int         row;
+};
+
+/* Scaled rows: lengths in units of the scene's size, norm one */
+void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
+{
+  for (RowBlock &b : blocks) {
+    for (std::size_t k = 0; k < b.body.size(); k++) {
+      const std::vector<int> &d = Directions(KindOf(s, s.bodies[b.body[k]]));
+      for (int c = b.column[k]; c < b.column[k + 1]; c++)
+        if (d[c - b.column[k]] < 3) b.J.col(c) *= size;
+    }
+    for (int r = 0; r < b.rows; r++) {
+      const double norm = b.J.row(r).norm();
+      if (norm > 0) b.J.row(r) /= norm;
+    }
+  }
+}
+
+/* The rows left after trees have been cut off, in the order of the blocks */
+class Pruning
+{
+public:
+  Pruning(const SceneData &s, const std::vector<RowBlock> &blocks)
+      : s_(s), blocks_(blocks), at_(s.bodies.size()), open_(blocks.size())
+  {
+    for (std::size_t k = 0; k < blocks.size(); k++) {
+      open_[k] = blocks[k].active & ((1u << blocks[k].rows) - 1);
+      for (PetscInt b : blocks[k].body) at_[b].push_back(k);
+    }
+    std::vector<char>    queued(s.bodies.size(), 1);
+    std::deque<PetscInt> queue;
+    for (std::size_t b = 0; b < s.bodies.size(); b++) queue.push_back((PetscInt)b);
+    while (!queue.empty()) {
+      const PetscInt b = queue.front();
+      queue.pop_front();
+      queued[b] = 0;
+      for (std::size_t k : cut(b))
+        for (PetscInt c : blocks_[k].body)
+          if (c != b && !queued[c]) {
+            queued[c] = 1;
+            queue.push_back(c);
+          }
+    }
+  }
+  std::vector<RowRef> core() const
+  {
+    std::vector<RowRef> rows;
+    for (std::size_t k = 0; k < blocks_.size(); k++)
+      for (int r = 0; r < blocks_[k].rows; r++)
+        if (open_[k] >> r & 1) rows.push_back({k, r});
+    return rows;
+  }
+
+private:
+  const SceneData                      &s_;
+  const std::vector<RowBlock>          &blocks_;
+  std::vector<std::vector<std::size_t>> at_; /* blocks at each body */
+  std::vector<unsigned>                 open_;
+
+  /* Blocks that lost rows because their rows at body b are independent in b's columns */
+  std::vector<std::size_t> cut(PetscInt b)
+  {
+    const int                   width = (int)Directions(KindOf(s_, s_.bodies[b])).size();
+    Eigen::Matrix<double, 6, 6> B;
+    std::vector<RowRef>         rows;
+    for (std::size_t k : at_[b]) {
+      const RowBlock &e    = blocks_[k];
+      const auto      body = std::find(e.body.begin(), e.body.end(), b) - e.body.begin();
+      for (int r = 0; r < e.rows; r++) {
+        if (!(open_[k] >> r & 1) || e.J.row(r).segment(e.column[body], width).isZero(0)) continue;
+        if ((int)rows.size() == width) return {};
+        B.row(rows.size()).head(width) = e.J.row(r).segment(e.column[body], width);
+        rows.push_back({k, r});
+      }
+    }
+    if (rows.empty()) return {};
+    const Eigen::MatrixXd A = B.topLeftCorner(rows.size(), width).transpose();
+    if (std::abs(Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(A).matrixR()(rows.size() - 1, rows.size() - 1)) <
+        clearly_independent)
+      return {};
+    std::vector<std::size_t> changed;
+    for (const RowRef &r : rows) {
+      open_[r.block] &= ~(1u << r.row);
+      if (changed.empty() || changed.back() != r.block) changed.push_back(r.block);
+    }
+    return changed;
+  }
+};
+
+/* Order of elimination: fill is kept small by COLAMD on elements and bodies, within an element positions come before
+   directions, for what comes last is what gets dropped */
+std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &core,
+                                          std::size_t bodies)
+{
+  std::vector<std::size_t>            first; /* of the rows of an element */
+  std::vector<Eigen::Triplet<double>> entry;
+  for (std::size_t k = 0; k < core.size(); k++) {
+    if (!k || blocks[core[k].block].element != blocks[core[k - 1].block].element) first.push_back(k);
+    for (PetscInt b : blocks[core[k].block].body) entry.emplace_back((int)b, (int)first.size() - 1, 1.0);
+  }
+  Sparse A((int)bodies, (int)first.size());
+  A.setFromTriplets(entry.begin(), entry.end());
+  A.makeCompressed();
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> p;
+  Eigen::COLAMDOrdering<int>()(A, p);
+  std::vector<std::size_t> place(first.size()), order;
+  for (std::size_t e = 0; e < first.size(); e++) place[p.indices()(e)] = e;
+  for (std::size_t e : place)
+    for (bool length : {true, false})
+      for (std::size_t k = first[e]; k < (e + 1 < first.size() ? first[e + 1] : core.size()); k++)
+        if (blocks[core[k].block].length == length) order.push_back(k);
+  return order;
+}
+
+/*
+  Gaussian elimination of one sparse row after the other, each with its largest remaining entry as the pivot: a row of
+  which nothing remains is a combination of those before it.
+*/
+class Elimination
+{
+public:
+  explicit Elimination(int columns) : pivot_(columns, -1), work_(columns, 0.0), seen_(columns, 0) {}
+
+  /* false if the row depends on those that were taken */
+  bool take(const std::vector<std::pair<int, double>> &row, double threshold)
+  {
+    std::vector<int> touched;
+    const auto       touch = [&](int c) {
+      if (seen_[c]) return;
+      seen_[c] = 1;
+      touched.push_back(c);
+      if (pivot_[c] >= 0) next_.push(pivot_[c]);
+    };
+    for (const auto &e : row) {
+      touch(e.first);
+      work_[e.first] += e.second;
+    }
+    while (!next_.empty()) {
+      const Row &p = rows_[next_.top()];
+      next_.pop();
+      const double factor = work_[p.column];
+      work_[p.column]     = 0;
+      if (factor == 0) continue;
+      for (const auto &e : p.rest) {
+        touch(e.first);
+        work_[e.first] -= factor * e.second;
+      }
+    }
+    return keep(touched, threshold);
+  }
+
+private:
+  struct Row {
+    int                                 column;
+    std::vector<std::pair<int, double>> rest; /* divided by the pivot */
+  };
+  std::vector<int>                                              pivot_; /* row of which a column is the pivot */
+  std::vector<double>                                           work_;
+  std::vector<char>                                             seen_;
+  std::vector<Row>                                              rows_;
+  std::priority_queue<int, std::vector<int>, std::greater<int>> next_;
+
+  bool keep(std::vector<int> &touched, double threshold)
+  {
+    int best = -1;
+    std::sort(touched.begin(), touched.end());
+    for (int c : touched)
+      if (pivot_[c] < 0 && (best < 0 || std::abs(work_[c]) > std::abs(work_[best]))) best = c;
+    const bool good = best >= 0 && std::abs(work_[best]) > threshold;
+    if (good) {
+      Row r{best, {}};
+      for (int c : touched)
+        if (c != best && pivot_[c] < 0 && std::abs(work_[c]) > drop) r.rest.emplace_back(c, work_[c] / work_[best]);
+      pivot_[best] = (int)rows_.size();
+      rows_.push_back(std::move(r));
+    }
+    for (int c : touched) {
+      work_[c] = 0;
+      seen_[c] = 0;
+    }
+    return good;
+  }
+  static constexpr double drop = 1e-14; /* rounding of rows of norm one */
+};
+
+/* Which rows of the core depend on the others, in the order of the description */
+std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &core,
+                              double threshold)
+{
+  std::vector<RowRef> found;
+  if (core.empty()) return found;
+  std::vector<std::pair<int, double>> row;
+  std::vector<std::size_t>            dead;
+  Elimination                         elimination(6 * (int)s.bodies.size());
+  for (std::size_t j : EliminationOrder(blocks, core, s.bodies.size())) {
+    const RowBlock &b = blocks[core[j].block];
+    row.clear();
+    for (std::size_t k = 0; k < b.body.size(); k++)
+      for (int c = b.column[k]; c < b.column[k + 1]; c++)
+        if (b.J(core[j].row, c) != 0) row.emplace_back(6 * (int)b.body[k] + c - b.column[k], b.J(core[j].row, c));
+    if (!elimination.take(row, threshold)) dead.push_back(j);
+  }
+  std::sort(dead.begin(), dead.end());
+  for (std::size_t k : dead) found.push_back(core[k]);
+  return found;
+}
+
+/* Redundant rows where the description puts the bodies */
+std::vector<RowRef> Find(SceneData &s, std::vector<RowBlock> &blocks)
+{
+  Scale(s, blocks, SceneSize(s));
+  const std::vector<RowRef> core = Pruning(s, blocks).core();
+  s.started.core                 = (PetscInt)core.size();
+  /* rows that are redundant are so to the accuracy to which the constraints are met */
+  const double threshold = std::min(1e-5, std::max(1e-9, 100 * s.started.misfit));
+  return Dependent(s, blocks, core, threshold);
+}
+
+/* Moves the bodies a little in a direction that the constraints allow; false if they allow none */
+PetscErrorCode MoveAside(Runtime &R, const std::vector<RowBlock> &blocks, bool *moved)
+{
+  SceneData                             &s    = R.scene;
+  const double                           size = SceneSize(s);
+  std::mt19937                           random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  NearestSystem                          system(R);
+  std::vector<double>                    from(6 * s.bodies.size()), d, rhs;
+  double                                 most = 0;
+  PetscFunctionBegin;
+  for (std::size_t i = 0; i < from.size(); i++) from[i] = uniform(random) * (i % 6 < 3 ? size : 1);
+  for (const RowBlock &b : blocks) rhs.insert(rhs.end(), b.rows, 0.0);
+  PetscCall(system.factor(blocks));
+  PetscCall(system.solve(blocks, rhs, &from, d));
+  for (std::size_t i = 0; i < d.size(); i++) most = std::max(most, std::abs(d[i]) / (i % 6 < 3 ? size : 1));
+  *moved = most > 1e-6;
+  if (!*moved) PetscFunctionReturn(0);
+  for (std::size_t i = 0; i < s.bodies.size(); i++) {
+    const Vector3 x(d[6 * i], d[6 * i + 1], d[6 * i + 2]), theta(d[6 * i + 3], d[6 * i + 4], d[6 * i + 5]);
+    s.bodies[i].r += neighbour / most * x;
+    if (theta.norm() > 0)
+      s.bodies[i].A = Eigen::AngleAxisd(neighbour / most * theta.norm(), theta.normalized()) * s.bodies[i].A;
+  }
+  PetscFunctionReturn(0);
+}
+
+/* Takes the rows out of `found` that are independent next to the start */
+PetscErrorCode KeepSingular(Runtime &R, std::vector<RowRef> &found)
+{
+  SceneData              &s       = R.scene;
+  const std::vector<Pose> before  = Poses(s);
+  const StartResult       started = s.started;
+  bool                    moved, ok = false;
+  PetscFunctionBegin;
+  PetscCall(MoveAside(R, DescribeAll(s, s.start.time, Hold::None), &moved));
+  if (moved) PetscCall(ProjectPositions(R, Hold::None, &ok));
+  if (ok) {
+    std::vector<RowBlock>     blocks = DescribeAll(s, s.start.time, Hold::None);
+    const std::vector<RowRef> next   = Find(s, blocks);
+    if (next.size() < found.size()) {
+      PetscCall(PetscPrintf(
+          s.comm,
+          "scene: the start is a singular position: %zu constraints are redundant there and %zu next to it; "
+          "a start elsewhere is safer\n",
+          found.size(), next.size()));
+      found = next;
+    }
+  } else
+    PetscCall(PetscInfo(nullptr, "scene: no neighbouring position to test redundant constraints at\n"));
+  SetPoses(s, before);
+  s.started = started;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &found)
+{
+  const std::size_t named = 5;
+  std::string       list;
+  PetscFunctionBegin;
+  for (std::size_t k = 0; k < found.size(); k++) {
+    const RowBlock   &b    = blocks[found[k].block];
+    const std::string name = RowName(s, b.element, b.first + found[k].row, b.name);
+    if (k < named) list += "\n  " + name;
+    PetscCall(PetscInfo(nullptr, "scene: redundant: %s\n", name.c_str()));
+  }
+  if (found.size() > named) list += "\n  and " + std::to_string(found.size() - named) + " more, see -info";
+  PetscCheck(
+      s.start.redundant == Redundant::Drop, s.comm, PETSC_ERR_ARG_WRONG,
+      "%zu of %d constraints follow from the others:%s\nUse joints that leave more freedom, or -scene_redundant drop",
+      found.size(), (int)s.started.rows, list.c_str());
+  PetscCall(PetscPrintf(s.comm, "scene: %zu redundant of %d constraints dropped:%s\n", found.size(),
+                        (int)s.started.rows, list.c_str()));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode DropRedundant(Runtime &R)
+{
+  SceneData            &s      = R.scene;
+  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  PetscFunctionBegin;
+  s.started.coordinates = s.started.rows = s.started.redundant = 0;
+  s.started.dropped.clear();
+  for (const BodyData &b : s.bodies) s.started.coordinates += Coordinates(KindOf(s, b));
+  for (const RowBlock &b : blocks)
+    for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
+  if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);
+  std::vector<RowRef> found = Find(s, blocks);
+  if (!found.empty()) PetscCall(KeepSingular(R, found));
+  s.started.redundant = (PetscInt)found.size();
+  if (found.empty()) PetscFunctionReturn(0);
+  PetscCall(Tell(s, blocks, found));
+  for (const RowRef &f : found) {
+    const RowBlock &b = blocks[f.block];
+    b.store->setActive(b.instance, (unsigned char)(b.store->active(b.instance) & ~(1u << f.row)));
+    s.started.dropped.push_back({b.element, b.first + f.row});
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,125 @@
+/* All constraint rows of a scene where its description puts the bodies. */
+#include "start.h"
+#include <algorithm>
+
+namespace hhtdae
+{
+
+const std::vector<int> &Directions(BodyKind k)
+{
+  static const std::vector<int> none, point = {0, 1, 2}, rigid = {0, 1, 2, 3, 4, 5}, planar = {0, 1, 5},
+                                      planar_point = {0, 1};
+  switch (k) {
+  case BodyKind::Point:
+    return point;
+  case BodyKind::Rigid:
+    return rigid;
+  case BodyKind::Planar:
+    return planar;
+  case BodyKind::PlanarPoint:
+    return planar_point;
+  default:
+    return none;
+  }
+}
+
+namespace
+{
+
+void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, PetscInt marker)
+{
+  const MarkerData &m  = s.markers[marker];
+  const std::size_t at = std::find(b.body.begin(), b.body.end(), m.body) - b.body.begin();
+  if (at == b.body.size()) return; /* it cannot move */
+  const BodyData         &body      = s.bodies[m.body];
+  const Vector3           lever     = body.A * m.s;
+  const std::vector<int> &direction = Directions(KindOf(s, body));
+  for (int r = 0; r < b.rows; r++) {
+    const Vector3 x = d.J.block<1, 3>(r, 6 * k).transpose(), theta = d.J.block<1, 3>(r, 6 * k + 3).transpose();
+    Eigen::Matrix<double, 6, 1> full;
+    full << x, theta + lever.cross(x); /* dx = dr + dtheta x lever */
+    for (std::size_t c = 0; c < direction.size(); c++) b.J(r, b.column[at] + (int)c) += full(direction[c]);
+  }
+}
+
+/* The bodies that can move, and where their columns begin */
+void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hold, RowBlock &b)
+{
+  int columns = 0;
+  for (int k = 0; k < store.markers(); k++) {
+    const PetscInt id = s.markers[store.marker(e, k)].body;
+    if (id < 0 || (hold == Hold::FixedStart && s.bodies[id].fixed_start)) continue;
+    if (std::find(b.body.begin(), b.body.end(), id) != b.body.end()) continue;
+    b.body.push_back(id);
+    b.column.push_back(columns);
+    columns += (int)Directions(KindOf(s, s.bodies[id])).size();
+  }
+  b.column.push_back(columns);
+}
+
+/* Phi_q q' + Phi_t, whoever is held */
+void Speeds(const SceneData &s, const DescribedRows &d, RowBlock &b)
+{
+  b.speed = b.rate;
+  for (int k = 0; k < b.store->markers(); k++) {
+    const Twist<double> w = s.twist(Marker{b.store->marker(b.instance, k)});
+    for (int r = 0; r < b.rows; r++)
+      b.speed(r) += d.J.block<1, 3>(r, 6 * k).dot(w.v) + d.J.block<1, 3>(r, 6 * k + 3).dot(w.w);
+  }
+}
+
+} // namespace
+
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold)
+{
+  std::vector<RowBlock> all;
+  DescribedRows         d;
+  for (std::size_t element = 0; element < s.elements.size(); element++) {
+    int first = 0;
+    for (const Part &p : s.elements[element].parts) {
+      if (!p.store->isConstraint()) continue;
+      RowBlock b;
+      b.store     = p.store;
+      b.instance  = p.index;
+      b.element   = (PetscInt)element;
+      b.first     = first;
+      b.rows      = p.store->rows();
+      b.active    = p.store->active(p.index);
+      b.holonomic = p.store->isHolonomic();
+      first += b.rows;
+      p.store->describe(s, p.index, t, d);
+      b.name   = d.name;
+      b.length = d.length;
+      b.value  = Eigen::Map<const Eigen::VectorXd>(d.value, b.rows);
+      b.rate   = Eigen::Map<const Eigen::VectorXd>(d.rate, b.rows);
+      FindBodies(s, *p.store, p.index, hold, b);
+      b.J.setZero(b.rows, b.column.back());
+      for (int k = 0; k < p.store->markers(); k++) AddColumns(s, b, d, k, p.store->marker(p.index, k));
+      Speeds(s, d, b);
+      all.push_back(std::move(b));
+    }
+  }
+  return all;
+}
+
+double SceneSize(const SceneData &s)
+{
+  Eigen::AlignedBox3d box;
+  for (const BodyData &b : s.bodies) box.extend(b.r);
+  for (std::size_t m = 0; m < s.markers.size(); m++)
+    if (s.markers[m].body >= -1) box.extend(s.frame(Marker{(PetscInt)m}).x);
+  const double size = box.isEmpty() ? 0 : box.diagonal().norm();
+  return size > 0 ? size : 1;
+}
+
+std::string RowName(const SceneData &s, PetscInt element, int row, const char *kernel)
+{
+  const ElementData &e     = s.elements[element];
+  int                total = 0;
+  for (const Part &p : e.parts)
+    if (p.store->isConstraint()) total += p.store->rows();
+  return std::string(e.type) + " " + e.name + ": row " + std::to_string(row + 1) + " of " + std::to_string(total) +
+         " (" + kernel + ")";
+}
+
+} // namespace hhtdae

@@ -1,0 +1,92 @@
+/* What happens between the description of a scene and its first step. */
+#ifndef HHTDAE_SCENE_START_H
+#define HHTDAE_SCENE_START_H
+
+#include "runtime.h"
+#include <petscksp.h>
+
+namespace hhtdae
+{
+
+/* options.cpp */
+PetscErrorCode ReadStartOptions(SceneData &s);
+PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
+
+/* ---- rows.cpp: all constraints where the description puts the bodies ---- */
+
+/* The rows of one kernel instance; columns are velocity of the centre of mass and angular velocity in space axes, as
+   far as the kind of body has them, of the bodies that can move */
+struct RowBlock {
+  StoreBase            *store;
+  PetscInt              instance, element;
+  int                   first; /* of its rows among the element's */
+  int                   rows;
+  unsigned char         active;
+  const char           *name;
+  bool                  length, holonomic;
+  std::vector<PetscInt> body;
+  std::vector<int>      column; /* of J, where each body's begin; and their number */
+  Eigen::MatrixXd       J;
+  Eigen::VectorXd       value, rate, speed; /* Phi, Phi_t (Psi at rest), Phi_q q' + Phi_t (Psi) */
+
+  bool has(int r) const { return active >> r & 1; }
+};
+enum class Hold { None, FixedStart }; /* bodies that count as ground */
+
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold);
+double                SceneSize(const SceneData &s); /* diagonal of the box around bodies and markers */
+std::string           RowName(const SceneData &s, PetscInt element, int row, const char *kernel);
+
+/* Directions of motion of a body: indices among (v, w) */
+const std::vector<int> &Directions(BodyKind k);
+
+/* ---- nearest.cpp: Phi_q M^-1 Phi_q^T, distributed by the owners of the elements; the same blocks, but for their
+ * values, in all calls ---- */
+class NearestSystem
+{
+public:
+  explicit NearestSystem(Runtime &r) : R(r) {}
+  ~NearestSystem();
+  NearestSystem(const NearestSystem &) = delete;
+  PetscErrorCode factor(const std::vector<RowBlock> &blocks);
+  /* d: 6 numbers a body, the smallest change in the metric of the masses with Phi_q d = rhs (rows of the blocks in
+     their order); where `from` is given, nearest to it */
+  PetscErrorCode             solve(const std::vector<RowBlock> &blocks, const std::vector<double> &rhs,
+                                   const std::vector<double> *from, std::vector<double> &d);
+  const std::vector<double> &weights() const { return weight_; } /* Phi_q M^-1 Phi_q^T, diagonal */
+
+private:
+  Runtime              &R;
+  std::vector<PetscInt> row_; /* first unknown of blocks */
+  std::vector<double>   weight_;
+  PetscInt              n_ = 0, start_ = 0;
+  Mat                   S_   = nullptr;
+  KSP                   ksp_ = nullptr;
+  Vec                   b_ = nullptr, x_ = nullptr, all_ = nullptr;
+  VecScatter            scatter_ = nullptr;
+  bool                  mine(PetscInt row) const { return row >= start_ && row < start_ + n_; }
+  PetscErrorCode        number(const std::vector<RowBlock> &blocks);
+  PetscErrorCode        assemble(const std::vector<RowBlock> &blocks);
+};
+
+/* ---- assemble.cpp ---- */
+struct Pose {
+  Vector3 r, v, w;
+  Matrix3 A;
+};
+std::vector<Pose> Poses(const SceneData &s);
+void              SetPoses(SceneData &s, const std::vector<Pose> &p);
+PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what);
+/* bodies to the constraints: largest misfit left; ok: within the tolerance */
+PetscErrorCode ProjectPositions(Runtime &R, Hold hold, bool *ok);
+PetscErrorCode Assemble(Runtime &R); /* reports or projects, as the policy says */
+
+/* ---- redundancy.cpp ---- */
+PetscErrorCode DropRedundant(Runtime &R);
+
+/* ---- equilibrium.cpp: after Layout() ---- */
+PetscErrorCode FindEquilibrium(Runtime &R);
+
+} // namespace hhtdae
+
+#endif

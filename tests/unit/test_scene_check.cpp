@@ -1,0 +1,176 @@
+/* What is wrong with the description of a scene is said by name, all of it at once. */
+#include "scene_start.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* The error of setUp(), empty if there is none */
+std::string complaint(Scene &s)
+{
+  ErrorTrap            trap;
+  const PetscErrorCode code = s.setUp();
+  EXPECT_EQ(code != 0, !trap.message.empty());
+  return trap.message;
+}
+
+std::string complaint(const RigidBody &b, hhtdae::Space space = hhtdae::Space::Spatial)
+{
+  Scene s(PETSC_COMM_SELF, space);
+  s.add("arm", b);
+  return complaint(s);
+}
+
+#define SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
+
+RigidBody massOf(double m)
+{
+  RigidBody b;
+  b.mass = m;
+  return b;
+}
+RigidBody inertiaOf(const Matrix3 &I)
+{
+  RigidBody b;
+  b.inertia = I;
+  return b;
+}
+
+} // namespace
+
+TEST(SceneCheck, AGoodBodyPasses) { EXPECT_EQ(complaint(RigidBody()), ""); }
+
+TEST(SceneCheck, EmptyScene)
+{
+  Scene s(PETSC_COMM_SELF);
+  SAYS(complaint(s), "no bodies");
+}
+
+TEST(SceneCheck, Mass)
+{
+  SAYS(complaint(massOf(0)), "body arm: mass is 0, must be positive");
+  SAYS(complaint(massOf(-2.5)), "mass is -2.5");
+  SAYS(complaint(massOf(NAN)), "mass is nan");
+}
+
+TEST(SceneCheck, Inertia)
+{
+  Matrix3 I = Matrix3::Identity();
+  I(0, 1)   = 0.1;
+  SAYS(complaint(inertiaOf(I)), "body arm: inertia is not symmetric (off by 0.141421)");
+  SAYS(complaint(inertiaOf(Vector3(1, -1, 1).asDiagonal())),
+       "principal moments of inertia are -1, 1, 1, must be positive");
+  SAYS(complaint(inertiaOf(Vector3(0, 1, 1).asDiagonal())), "give a small moment");
+  SAYS(complaint(inertiaOf(Vector3(1, 1, 3).asDiagonal())), "the largest exceeds the sum of the others");
+  SAYS(complaint(inertiaOf(Vector3(1, NAN, 1).asDiagonal())), "inertia must be finite");
+  EXPECT_EQ(complaint(inertiaOf(Vector3(1e-6, 1, 1).asDiagonal())), "");
+  EXPECT_EQ(complaint(inertiaOf(Vector3(1, 1, 2).asDiagonal())), ""); /* a plate */
+}
+
+TEST(SceneCheck, SlenderRodsInAPlane)
+{
+  EXPECT_EQ(complaint(inertiaOf(Vector3(0, 0, 1).asDiagonal()), hhtdae::Space::Planar), "");
+  SAYS(complaint(inertiaOf(Vector3(1, 1, 0).asDiagonal()), hhtdae::Space::Planar), "inertia(2,2) is 0");
+}
+
+TEST(SceneCheck, Rotation)
+{
+  RigidBody b;
+  b.rotation(0, 0) = 1.1;
+  SAYS(complaint(b), "body arm: rotation is not orthonormal");
+  b.rotation = Vector3(1, 1, -1).asDiagonal();
+  SAYS(complaint(b), "left-handed");
+}
+
+TEST(SceneCheck, ThePlaneOfAPlanarScene)
+{
+  RigidBody b;
+  b.position = {0, 0, 0.5};
+  SAYS(complaint(b, hhtdae::Space::Planar), "body arm: z is 0.5");
+  b                  = RigidBody();
+  b.angular_velocity = {1, 0, 0};
+  SAYS(complaint(b, hhtdae::Space::Planar), "angular velocity is 1, 0, 0");
+  b          = RigidBody();
+  b.rotation = Eigen::AngleAxisd(0.3, Vector3::UnitX()).toRotationMatrix();
+  SAYS(complaint(b, hhtdae::Space::Planar), "its z axis is not along z");
+
+  Scene      s(PETSC_COMM_SELF, hhtdae::Space::Planar);
+  const Body arm = s.add("arm", RigidBody());
+  s.marker(arm, {0, 0, 1});
+  s.marker(arm, {0, 0, 0}, axesAlong({1, 0, 0}), "tip");
+  const std::string text = complaint(s);
+  SAYS(text, "marker 0 on arm: z is 1");
+  SAYS(text, "marker tip: its z axis is 1, 0, 0");
+}
+
+TEST(SceneCheck, NamesAreUnique)
+{
+  Scene      s(PETSC_COMM_SELF);
+  const Body a = s.add("arm", RigidBody()), b = s.add("arm", RigidBody());
+  pin(s, "hinge", a, s.ground(), {0, 0, 0});
+  pin(s, "hinge", b, s.ground(), {0, 0, 0});
+  const std::string text = complaint(s);
+  SAYS(text, "body arm: the name is given more than once");
+  SAYS(text, "element hinge: the name is given more than once");
+}
+
+TEST(SceneCheck, JointsBetweenTwoBodies)
+{
+  Scene      s(PETSC_COMM_SELF);
+  const Body arm = s.add("arm", RigidBody());
+  s.add("knot", hhtdae::Revolute{s.marker(arm), s.marker(arm)});
+  s.add("anchor", hhtdae::Revolute{s.marker(s.ground()), s.marker(s.ground())});
+  s.add("turn", hhtdae::RotationalMotion{s.marker(arm), s.marker(arm, {1, 0, 0}), 0.0});
+  const std::string text = complaint(s);
+  SAYS(text, "revolute knot: both markers are on arm");
+  SAYS(text, "revolute anchor: both markers are on");
+  SAYS(text, "rotational motion turn: both markers are on arm");
+  EXPECT_EQ(text.find("knot", text.find("knot") + 1), std::string::npos) << "said once: " << text;
+}
+
+TEST(SceneCheck, MarkersOfNoBody)
+{
+  Scene s(PETSC_COMM_SELF);
+  s.add("arm", RigidBody());
+  s.marker(Body{7}, {0, 0, 0}, Matrix3::Identity(), "lost");
+  SAYS(complaint(s), "marker lost: its body is not one of this scene");
+}
+
+TEST(SceneCheck, EverythingAtOnce)
+{
+  Scene s(PETSC_COMM_SELF);
+  s.add("a", massOf(-1));
+  s.add("b", massOf(0));
+  s.gravity({0, NAN, 0});
+  const std::string text = complaint(s);
+  SAYS(text, "body a: mass is -1");
+  SAYS(text, "body b: mass is 0");
+  SAYS(text, "gravity must be finite");
+}
+
+TEST(SceneCheck, ManyErrorsAreCounted)
+{
+  Scene s(PETSC_COMM_SELF);
+  for (int k = 0; k < 200; k++) s.add("", massOf(-1));
+  const std::string text = complaint(s);
+  SAYS(text, "body body 0: mass is -1");
+  SAYS(text, "more, see -info");
+}
+
+TEST(SceneCheck, OptionsOfTheStart)
+{
+  Scene s(PETSC_COMM_SELF);
+  s.add("arm", RigidBody());
+  s.start().equilibrium = false;
+  Options in("-scene_assemble project -scene_assemble_tol 1e-4 -scene_redundant refuse -scene_start_time 2");
+  ASSERT_EQ(s.setUp(), 0);
+  EXPECT_EQ(s.start().assembly, hhtdae::Assembly::Project);
+  EXPECT_EQ(s.start().tolerance, 1e-4);
+  EXPECT_EQ(s.start().redundant, hhtdae::Redundant::Refuse);
+  EXPECT_EQ(s.start().time, 2);
+  Scene other(PETSC_COMM_SELF);
+  other.add("arm", RigidBody());
+  Options bad("-scene_assemble_tol -1");
+  SAYS(complaint(other), "-scene_assemble_tol is -1");
+}
