@@ -136,6 +136,13 @@ public:
     (void)in;
   }
 
+  static constexpr bool curvedAtAll()
+  {
+    for (int a = 0; a < 2 * M; a++)
+      for (int b = 0; b < 2 * M; b++)
+        if (K::curved(a, b)) return true;
+    return false;
+  }
   Bodies *bodies = nullptr;
 
   /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
@@ -164,13 +171,6 @@ private:
   {
     if (k == l && Turns(b, g) && Turns(c, h) && Depends(K::depends, 2 * k)) return true; /* AddLever() */
     return Reaches([&](int x, int y) { return K::curved(2 * k + x, 2 * l + y); }, b, g, c, h);
-  }
-  static constexpr bool curvedAtAll()
-  {
-    for (int a = 0; a < 2 * M; a++)
-      for (int b = 0; b < 2 * M; b++)
-        if (K::curved(a, b)) return true;
-    return false;
   }
 
   static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)
@@ -202,6 +202,7 @@ private:
       if (e.active >> r & 1) active[rows++] = r;
     for (int k = 0; k < M; k++) {
       const LocalBody &b = bodyOf(ev.bodies, e, k);
+      if (!Groups(b.kind)) continue;
       Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
       int              n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
       if constexpr (K::holonomic) {

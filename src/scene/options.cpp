@@ -54,12 +54,4 @@ PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Scene::view(PetscViewer viewer) const
-{
-  PetscFunctionBegin;
-  PetscCheck(data_->run, data_->comm, PETSC_ERR_ARG_WRONGSTATE, "the scene can be viewed after setUp()");
-  PetscCall(ViewStart(*data_, viewer));
-  PetscFunctionReturn(0);
-}
-
 } // namespace hhtdae

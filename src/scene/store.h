@@ -41,6 +41,8 @@ public:
   virtual unsigned char active(PetscInt e) const          = 0; /* bits of the rows that stay */
   virtual void          setActive(PetscInt, unsigned char) {}
   virtual bool          carried(PetscInt) const           = 0; /* as force states */
+  virtual bool          usesVelocities() const { return true; }
+  virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
@@ -98,6 +100,8 @@ template <class K> class ConstraintStore : public StoreOf<K>
 public:
   bool          isConstraint() const override { return true; }
   bool          isHolonomic() const override { return K::holonomic; }
+  bool          usesVelocities() const override { return !K::holonomic; }
+  bool          curves() const override { return ConstraintBatch<K>::curvedAtAll(); }
   int           rows() const override { return K::rows; }
   unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
@@ -136,28 +140,32 @@ template <class K> class ForceStore : public StoreOf<K>
 public:
   bool          isConstraint() const override { return false; }
   bool          isHolonomic() const override { return false; }
+  bool          usesVelocities() const override { return K::damped; }
   int           rows() const override { return K::count; }
   unsigned char active(PetscInt) const override { return 0; }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
   {
-    auto direct = std::make_unique<ForceBatch<K>>();
-    auto states = std::make_unique<ForceStateBatch<K>>();
-    direct->bodies = states->bodies = l.bodies;
+    placeAll<ForceBatch<K>>(l, batches, false);
+    if constexpr (K::carriable) placeAll<ForceStateBatch<K>>(l, batches, true);
+  }
+
+private:
+  template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried)
+  {
+    auto batch    = std::make_unique<B>();
+    batch->bodies = l.bodies;
     for (PetscInt e = 0; e < this->size(); e++) {
-      if (!l.needed(*this, e)) continue;
+      if (this->all[e].carried != carried || !l.needed(*this, e)) continue;
       ForceInstance<K> i;
-      this->place(l, this->all[e], i);
-      if (!this->all[e].carried) {
-        direct->all.push_back(i);
-        continue;
+      StoreOf<K>::place(l, this->all[e], i);
+      if (carried) {
+        i.state       = l.local(this->start[e]);
+        i.state_group = l.group(this->start[e], K::count);
       }
-      i.state       = l.local(this->start[e]);
-      i.state_group = l.group(this->start[e], K::count);
-      states->all.push_back(i);
+      batch->all.push_back(i);
     }
-    if (!direct->all.empty()) batches.push_back(std::move(direct));
-    if (!states->all.empty()) batches.push_back(std::move(states));
+    if (!batch->all.empty()) batches.push_back(std::move(batch));
   }
 
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override

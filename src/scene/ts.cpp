@@ -25,6 +25,23 @@ PetscErrorCode I2Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, Pe
   PetscFunctionReturn(0);
 }
 
+/* The scene belongs to what -ts_view shows */
+PetscErrorCode ViewWithTS(const Scene &scene, TS ts)
+{
+  PetscOptions      options;
+  PetscViewer       viewer;
+  PetscViewerFormat format;
+  const char       *prefix;
+  PetscBool         asked;
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetOptions((PetscObject)ts, &options));
+  PetscCall(PetscObjectGetOptionsPrefix((PetscObject)ts, &prefix));
+  PetscCall(PetscOptionsGetViewer(PetscObjectComm((PetscObject)ts), options, prefix, "-ts_view", &viewer, &format, &asked));
+  if (asked) PetscCall(scene.view(viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode Scene::createTS(TS *ts)
@@ -66,6 +83,7 @@ PetscErrorCode Scene::solve(TS ts)
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
   if (!failed || data_->run->size == 1) PetscCall(FinishOutput(*data_->run));
   PetscCall(failed);
+  PetscCall(ViewWithTS(*this, ts));
   PetscFunctionReturn(0);
 }
 

@@ -59,6 +59,7 @@ template <class T> void PlaceMoment(const Vec3<T> &m, Wrench<T> *on)
 
 /* moment about z_j on i: -mu r N tanh(r w/v_s), w the relative angular velocity about z_j */
 template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1> {
+  static constexpr bool carriable = false;
   static constexpr const char *name    = "friction in a revolute joint";
   static constexpr int         inputs  = Rows;
   static constexpr unsigned    depends = Rotation(0) | Rotation(1), acts = depends;
@@ -79,6 +80,7 @@ template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1
 
 /* force along an axis of j on i: -mu N tanh(v/v_s) */
 template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<Rows>, 2, 1> {
+  static constexpr bool carriable = false;
   static constexpr const char *name    = "friction in a translational joint";
   static constexpr int         inputs  = Rows;
   static constexpr unsigned    depends = Position(0) | Position(1) | Rotation(1), acts = depends;
@@ -101,6 +103,7 @@ template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<R
 /* force along and moment about z_j on i. The surfaces slip along a helix, at (v, r w): friction mu N has that
    direction, so that a turning shaft slides easily. */
 struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
+  static constexpr bool carriable = false;
   static constexpr const char *name   = "friction in a cylindrical joint";
   static constexpr int         inputs = 2;
   using Data                          = FrictionData;
@@ -123,6 +126,7 @@ struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
 
 /* moment on i against the relative angular velocity w, in space axes: -mu r N tanh(r |w|/v_s) w/|w| */
 struct SphericalFriction : Force<SphericalFriction, 2, 3> {
+  static constexpr bool carriable = false;
   static constexpr const char *name    = "friction in a spherical joint";
   static constexpr int         inputs  = 3;
   static constexpr unsigned    depends = Rotation(0) | Rotation(1), acts = depends;

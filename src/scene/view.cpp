@@ -1,0 +1,61 @@
+/* What the scene consists of, and what its solution does without because the scene has none of it: -scene_view, -ts_view. */
+#include "start.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+struct Contents {
+  PetscInt multipliers = 0, forces = 0;
+  bool     velocities = false, curved = false, turning = false;
+};
+
+Contents Count(const SceneData &s)
+{
+  Contents c;
+  for (const BodyData &b : s.bodies) c.turning |= KindOf(s, b) == BodyKind::Rigid;
+  for (const StoreBase *store : s.order) {
+    PetscInt n = 0;
+    for (PetscInt e = 0; e < store->size(); e++) n += store->unknowns(e);
+    (store->isConstraint() ? c.multipliers : c.forces) += n;
+    c.velocities |= store->usesVelocities();
+    c.curved |= store->isConstraint() && store->curves();
+  }
+  return c;
+}
+
+} // namespace
+
+PetscErrorCode Scene::view(PetscViewer viewer) const
+{
+  const SceneData &s = *data_;
+  std::string      left;
+  PetscFunctionBegin;
+  PetscCheck(s.run, s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene can be viewed after setUp()");
+  PetscCall(ViewStart(s, viewer));
+  const Runtime &R = *s.run;
+  const Contents c = Count(s);
+  const auto     without = [&](bool is, const char *what) {
+    if (!is) left += (left.empty() ? "" : ", ") + std::string(what);
+  };
+  without(c.multipliers, "multipliers");
+  without(c.forces, "force states");
+  without(!s.variables.empty(), "variables");
+  without(!s.states.empty(), "first-order states");
+  without(c.velocities, "velocity terms of forces");
+  without(c.curved, "second derivatives of constraints");
+  without(c.turning, "Euler angles and gyroscopic terms");
+  without(R.remembers, "angles over full turns");
+  without(R.uses_acceleration, "accelerations in definitions");
+  without(R.size > 1, "exchange between ranks");
+  without((bool)R.recorder, "output");
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  unknowns: %d, of these %d multipliers, %d force states, %d variables, %d states\n",
+                                   (int)R.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
+  if (R.turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R.reframed));
+  if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
