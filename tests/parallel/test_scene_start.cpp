@@ -1,4 +1,5 @@
 /* A scene's start is the same on any number of ranks. */
+#include "hhtdae/scene.h"
 #include "scene_start.h"
 
 using namespace hhtest;

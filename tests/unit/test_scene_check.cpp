@@ -1,4 +1,5 @@
 /* What is wrong with the description of a scene is said by name, all of it at once. */
+#include "hhtdae/scene.h"
 #include "scene_start.h"
 
 using namespace hhtest;

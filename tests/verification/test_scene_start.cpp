@@ -1,4 +1,5 @@
 /* Assembly, redundant constraints and static equilibrium against closed forms. */
+#include "hhtdae/scene.h"
 #include "scene_start.h"
 #include <chrono>
 
