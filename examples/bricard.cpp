@@ -2,13 +2,13 @@ static char help[] = "Bricard's mechanism (IFToMM A04): five rods, six hinges, o
                      "Its constraints are redundant by one row. Compared with the equations in two relative angles.\n"
                      "  -section <0.1>: edge of the rods' square section, m\n"
                      "  -end <10>: end time, s\n"
-                     "  -redundant <remove>: the hinge at P5 keeps one of its two rows of axes; keep: all of them\n";
+                     "-scene_redundant refuse shows the row that the scene leaves out.\n";
 
 #include "problem.h"
 #include "scene_references.h"
 #include "scene_watch.h"
 
-#include <cstring>
+#include <hhtdae/scene.h>
 
 using namespace hhtdae;
 using Reference = hhtex::BricardReference;
@@ -16,14 +16,11 @@ using Reference = hhtex::BricardReference;
 static PetscErrorCode Run(void)
 {
   PetscReal section = 0.1, end = 10;
-  char      redundant[16] = "remove";
   TS        ts;
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-section", &section, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-redundant", redundant, sizeof redundant, nullptr));
-  const bool keep = !std::strcmp(redundant, "keep");
 
   Scene scene(PETSC_COMM_WORLD);
   scene.gravity({0, -9.81, 0});
@@ -45,17 +42,9 @@ static PetscErrorCode Run(void)
       next         = scene.add("rod " + std::to_string(k), rod);
       scene.shape(next, Shape::box(along / 2 + Vector3::Ones() * 0.5 * section));
     }
-    const Matrix3    &R    = axes[Reference::axis(k)];
-    const std::string name = "hinge " + std::to_string(k);
-    const Marker      i = scene.markerAt(next, P, R), j = scene.markerAt(before, P, R);
-    if (k < 5 || keep) {
-      scene.add(name, Revolute{i, j});
-    } else {
-      Matrix3 side; /* its z along the x axis of j */
-      side << R.col(1), R.col(2), R.col(0);
-      scene.add(name, Spherical{j, i});
-      scene.add(name + " axis", Perpendicular{scene.markerAt(before, P, R), scene.markerAt(next, P, side)});
-    }
+    const Matrix3 &R = axes[Reference::axis(k)];
+    const Marker   j = scene.markerAt(before, P, R);
+    scene.add("hinge " + std::to_string(k), Revolute{scene.markerAt(next, P, R), j});
     joints.push_back(j);
     before = next;
   }

@@ -9,6 +9,8 @@ static char help[] = "A chain of N bodies, or a net with closed loops, falls fro
 #include "problem.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 #include <cstring>
 
 using namespace hhtdae;

@@ -8,6 +8,8 @@ static char help[] = "Double pendulum of two rods in space, 1 kg and 1 m each, r
 #include "problems/extrapolation.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 #include <cstring>
 
 using namespace hhtdae;

@@ -7,6 +7,8 @@ static char help[] = "Stiff flyball governor (IFToMM A05): a shaft, two rods wit
 #include "scene_references.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 using namespace hhtdae;
 
 /* a bar of 0.3 kg, 1 m long and 0.01 m thick, along an axis */

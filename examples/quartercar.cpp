@@ -9,6 +9,8 @@ static char help[] = "Quarter car: body and wheel on vertical guides, suspension
 #include "scene_references.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 #include <cstring>
 
 using namespace hhtdae;

@@ -8,6 +8,8 @@ static char help[] = "Rolling without slip, with constraints on velocities: a ba
 #include "problem.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 using namespace hhtdae;
 
 static PetscErrorCode Solve(Scene &scene, PetscReal end, const hhtex::Watch::Look &look)

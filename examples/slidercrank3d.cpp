@@ -7,6 +7,8 @@ static char help[] = "Spatial slider-crank (Masoudi, Haug; IFToMM library): cran
 #include "scene_references.h"
 #include "scene_watch.h"
 
+#include <hhtdae/scene.h>
+
 using namespace hhtdae;
 
 /* axes with z along the first and x along the second of two directions across each other */
