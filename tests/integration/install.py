@@ -1,4 +1,4 @@
-"""Installs into an empty prefix, then builds and runs a small C program that knows nothing but that prefix.
+"""Installs into an empty prefix, then builds and runs a small C program, and a scene in C++, that know nothing but that prefix.
 
 Once with CMake's find_package(hhtdae), once with pkg-config hhtdae.
 usage: install.py build-tree cmake configuration directory-of-PETSc.pc
@@ -32,8 +32,9 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     check(os.path.exists(header), "no header at " + header)
     libdirs = [folder for folder, _, files in os.walk(prefix) if "libhhtdae.so" in files]
     check(len(libdirs) == 1, "libhhtdae.so is in %s" % libdirs)
-    installed = [name for _, _, files in os.walk(prefix) for name in files]
-    check(all("hhtdae" in name for name in installed), "foreign files were installed: %s" % installed)
+    installed = [os.path.join(folder, name)[len(prefix):] for folder, _, files in os.walk(prefix) for name in files]
+    foreign = [path for path in installed if "hhtdae" not in path and "hhtscene" not in path]
+    check(not foreign, "foreign files were installed: %s" % foreign)
 
     # The outside project is copied, so that nothing can be found by a relative path.
     outside = shutil.copytree(os.path.join(here, "outside"), os.path.join(work, "outside"))
@@ -46,4 +47,14 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     flags = run(["pkg-config", "--cflags", "--libs", "hhtdae"], PKG_CONFIG_PATH=paths).split()
     with_pkg_config = os.path.join(work, "with-pkg-config")
     run([os.environ.get("CC", "cc"), os.path.join(outside, "outside.c"), "-o", with_pkg_config, *flags, "-lm"])
+    works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
+
+    # A scene, as a component of the same package and through its own pkg-config file
+    scene = os.path.join(work, "scene-with-cmake")
+    run([cmake, "-S", os.path.join(outside, "scene"), "-B", scene, "-DCMAKE_PREFIX_PATH=" + prefix])
+    run([cmake, "--build", scene])
+    works(os.path.join(scene, "outside_scene"))
+    flags = run(["pkg-config", "--cflags", "--libs", "hhtscene"], PKG_CONFIG_PATH=paths).split()
+    with_pkg_config = os.path.join(work, "scene-with-pkg-config")
+    run([os.environ.get("CXX", "c++"), "-std=c++17", os.path.join(outside, "scene", "outside_scene.cpp"), "-o", with_pkg_config, *flags])
     works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
