@@ -1,5 +1,6 @@
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
+#include "klupair.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -30,5 +31,6 @@ PetscErrorCode LinearRegister(void)
   PetscFunctionBegin;
   PetscCall(MatOrderingRegister(MATORDERINGMETISND, MatGetOrdering_MetisND));
   PetscCall(LinearRegisterMumpsND());
+  PetscCall(LinearRegisterKLUPair());
   PetscFunctionReturn(0);
 }

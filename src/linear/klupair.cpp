@@ -1,0 +1,375 @@
+/*
+  "klupair": the factor matrix. Options, with the prefix of the solver:
+    -mat_klupair_pivot_tol <0.001>             a pivot is left where it was planned if it is so large a part of its
+  column -mat_klupair_row_scale <none,sum,max>      scaling of rows, none by default -mat_klupair_ordering
+  <auto,amd,metis>     auto: METIS where AMD foresees much work and METIS less -mat_klupair_refactor <true> keep the
+  pivots from one matrix to the next while they are good
+*/
+#include "klupair.h"
+
+#if defined(HHTDAE_HAVE_KLU)
+#include "klupair_data.h"
+#include <algorithm>
+#include <petsc/private/matimpl.h>
+
+/* Old pivots are kept while entries grow at most so many times as much as with the pivots chosen for their own matrix
+ */
+static const double GROWTH = 100;
+
+static KluPair *Data(Mat F) { return static_cast<KluPair *>(F->data); }
+
+/* ---- rows of the matrix ---- */
+
+static PetscErrorCode GetRows(Mat A, LinearRows *rows)
+{
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &rows->n, &rows->start, &rows->col, &done));
+  PetscCheck(done, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "The matrix does not give its rows; convert it to type seqaij");
+  PetscCall(MatSeqAIJGetArrayRead(A, &rows->val));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode RestoreRows(Mat A, LinearRows *rows)
+{
+  PetscBool done;
+
+  PetscFunctionBegin;
+  PetscCall(MatSeqAIJRestoreArrayRead(A, &rows->val));
+  PetscCall(MatRestoreRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &rows->n, &rows->start, &rows->col, &done));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Analyse(Mat A, const LinearRows &rows, KluPair *k)
+{
+  PetscFunctionBegin;
+  PetscCall(KluPairAnalyse(A, rows, k));
+  k->start.assign(rows.start, rows.start + rows.n + 1);
+  k->col.assign(rows.col, rows.col + rows.start[rows.n]);
+  PetscCall(PetscObjectGetId((PetscObject)A, &k->matrix));
+  PetscCall(MatGetNonzeroState(A, &k->pattern));
+  PetscCall(PetscObjectStateGet((PetscObject)A, &k->values));
+  PetscFunctionReturn(0);
+}
+
+/* The entries are compared only when PETSc does not know the pattern for the one analysed */
+static PetscErrorCode SamePattern(Mat A, const LinearRows &rows, KluPair *k, bool *same)
+{
+  PetscObjectId    id;
+  PetscObjectState pattern;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)A, &id));
+  PetscCall(MatGetNonzeroState(A, &pattern));
+  *same = id == k->matrix && pattern == k->pattern;
+  if (*same) PetscFunctionReturn(0);
+  *same = (size_t)rows.n + 1 == k->start.size() && std::equal(k->start.begin(), k->start.end(), rows.start) &&
+          std::equal(k->col.begin(), k->col.end(), rows.col);
+  k->matrix  = id;
+  k->pattern = pattern;
+  PetscFunctionReturn(0);
+}
+
+/* ---- factorization ---- */
+
+static KluInt *Start(const LinearRows &r) { return KluIndices(r.start); }
+static KluInt *Col(const LinearRows &r) { return KluIndices(r.col); }
+static double *Val(const LinearRows &r) { return const_cast<double *>(r.val); }
+
+/* Smallest ratio, over columns, of the largest entry of the matrix to the largest in U; 0 if a pivot is zero or not
+ * finite */
+static double ReciprocalGrowth(const LinearRows &rows, KluPair *k)
+{
+  if (!KLU(rcond)(k->symbolic, k->numeric, &k->common) || !(k->common.rcond > 0)) return 0;
+  if (!KLU(rgrowth)(Start(rows), Col(rows), Val(rows), k->symbolic, k->numeric, &k->common)) return 0;
+  return k->common.rgrowth;
+}
+
+static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
+{
+  KluPair *k = Data(F);
+
+  PetscFunctionBegin;
+  *good = false;
+  if (!k->numeric || !k->refactor) PetscFunctionReturn(0);
+  if (KLU(refactor)(Start(rows), Col(rows), Val(rows), k->symbolic, k->numeric, &k->common) &&
+      k->common.status == KLU_OK) {
+    const double growth = ReciprocalGrowth(rows, k);
+    *good               = growth > 0 && growth * GROWTH >= k->growth;
+    PetscCall(
+        PetscInfo(F, "Old pivots %s: reciprocal growth %g, was %g\n", *good ? "kept" : "given up", growth, k->growth));
+  }
+  if (*good)
+    ++k->refactorizations;
+  else
+    ++k->rejected;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorWithPivoting(const LinearRows &rows, KluPair *k)
+{
+  PetscFunctionBegin;
+  KLU(free_numeric)(&k->numeric, &k->common);
+  k->numeric = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
+  ++k->factorizations;
+  if (!k->numeric) PetscFunctionReturn(0);
+  KLU(sort)(k->symbolic, k->numeric, &k->common);
+  KLU(flops)(k->symbolic, k->numeric, &k->common);
+  k->growth = ReciprocalGrowth(rows, k);
+  PetscFunctionReturn(0);
+}
+
+/* Much more fill than foreseen: the pivots were planned for values that are no longer those of the matrix */
+static PetscErrorCode PlanAnew(Mat F, Mat A, const LinearRows &rows)
+{
+  KluPair         *k = Data(F);
+  PetscObjectState values;
+
+  PetscFunctionBegin;
+  if (!k->numeric) PetscFunctionReturn(0);
+  const double entries = (double)k->numeric->lnz + (double)k->numeric->unz;
+  PetscCall(PetscObjectStateGet((PetscObject)A, &values));
+  if (entries <= k->tolerated || values == k->values) PetscFunctionReturn(0);
+  PetscCall(PetscInfo(F, "%g entries in L and U, %g were foreseen: the pivots are planned anew\n", entries,
+                      2 * k->work.factor));
+  PetscCall(Analyse(A, rows, k));
+  PetscCall(FactorWithPivoting(rows, k));
+  /* where a new plan does not help, it is not tried again for the same fill */
+  if (k->numeric) k->tolerated = PetscMax(k->tolerated, 1.5 * ((double)k->numeric->lnz + (double)k->numeric->unz));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ReportError(Mat F, Mat A)
+{
+  KluPair *k = Data(F);
+
+  PetscFunctionBegin;
+  if (k->numeric && k->growth > 0) PetscFunctionReturn(0);
+  KLU(free_numeric)(&k->numeric, &k->common);
+  if (k->common.status < 0) {
+    PetscCheck(!A->erroriffailure, PETSC_COMM_SELF, PETSC_ERR_LIB,
+               "KLU's factorization of the matrix with %" PetscInt_FMT " rows failed with status %d", A->rmap->N,
+               (int)k->common.status);
+    F->factorerrortype = k->common.status == KLU_OUT_OF_MEMORY ? MAT_FACTOR_OUTMEMORY : MAT_FACTOR_OTHER;
+  } else {
+    PetscCheck(!A->erroriffailure, PETSC_COMM_SELF, PETSC_ERR_MAT_LU_ZRPVT,
+               "The matrix with %" PetscInt_FMT
+               " rows is singular: KLU met a zero or infinite pivot in row %" PetscInt_FMT,
+               A->rmap->N, (PetscInt)k->common.singular_col);
+    F->factorerrortype             = MAT_FACTOR_NUMERIC_ZEROPIVOT;
+    F->factorerror_zeropivot_row   = (PetscInt)k->common.singular_col;
+    F->factorerror_zeropivot_value = 0;
+  }
+  PetscCall(PetscInfo(F, "KLU failed: status %d, row %" PetscInt_FMT "\n", (int)k->common.status,
+                      (PetscInt)k->common.singular_col));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
+{
+  KluPair   *k = Data(F);
+  LinearRows rows;
+  bool       same, good;
+
+  PetscFunctionBegin;
+  F->factorerrortype = MAT_FACTOR_NOERROR;
+  PetscCall(GetRows(A, &rows));
+  PetscCall(SamePattern(A, rows, k, &same));
+  if (!same) PetscCall(Analyse(A, rows, k));
+  PetscCall(Refactor(F, rows, &good));
+  if (!good) {
+    PetscCall(FactorWithPivoting(rows, k));
+    PetscCall(PlanAnew(F, A, rows));
+  }
+  PetscCall(RestoreRows(A, &rows));
+  PetscCall(ReportError(F, A));
+  F->assembled = PETSC_TRUE;
+  if (k->numeric) PetscCall(PetscLogFlops(k->common.flops));
+  PetscFunctionReturn(0);
+}
+
+/* ---- solve ---- */
+
+static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
+{
+  KluPair     *k = Data(F);
+  PetscScalar *array;
+
+  PetscFunctionBegin;
+  if (F->factorerrortype || !k->numeric) {
+    PetscCall(PetscInfo(F, "Solve with a factor that failed: the result is Inf\n"));
+    PetscCall(VecSet(x, PETSC_INFINITY));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(VecCopy(b, x));
+  PetscCall(VecGetArray(x, &array));
+  /* KLU holds the factors of the transpose */
+  const KluInt n  = k->symbolic->n;
+  const KluInt ok = transposed ? KLU(solve)(k->symbolic, k->numeric, n, 1, array, &k->common)
+                               : KLU(tsolve)(k->symbolic, k->numeric, n, 1, array, &k->common);
+  PetscCall(VecRestoreArray(x, &array));
+  PetscCheck(ok, PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU's solve with %" PetscInt_FMT " rows failed with status %d",
+             (PetscInt)n, (int)k->common.status);
+  PetscCall(PetscLogFlops(2.0 * ((double)k->numeric->lnz + (double)k->numeric->unz)));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MatSolve_KLUPair(Mat F, Vec b, Vec x) { return Solve(F, b, x, false); }
+
+static PetscErrorCode MatSolveTranspose_KLUPair(Mat F, Vec b, Vec x) { return Solve(F, b, x, true); }
+
+/* ---- analysis ---- */
+
+static PetscErrorCode ReadOptions(Mat F)
+{
+  static const char *const orderings[] = {"auto", "amd", "metis"}, *const scalings[] = {"none", "sum", "max"};
+  KluPair *k        = Data(F);
+  PetscInt ordering = k->ordering, scaling = (PetscInt)k->common.scale;
+
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)F);
+  PetscCall(PetscOptionsReal("-mat_klupair_pivot_tol", "Part of its column that a planned pivot must have", "None",
+                             k->common.tol, &k->common.tol, NULL));
+  PetscCall(PetscOptionsEList("-mat_klupair_row_scale", "Scaling of rows", "None", scalings, 3, scalings[scaling],
+                              &scaling, NULL));
+  PetscCall(PetscOptionsEList("-mat_klupair_ordering", "Ordering of the pairs", "None", orderings, 3,
+                              orderings[ordering], &ordering, NULL));
+  PetscCall(PetscOptionsBool("-mat_klupair_refactor", "Keep pivots while they are good", "None", k->refactor,
+                             &k->refactor, NULL));
+  PetscOptionsEnd();
+  PetscCheck(k->common.tol >= 0 && k->common.tol <= 1, PetscObjectComm((PetscObject)F), PETSC_ERR_ARG_OUTOFRANGE,
+             "-mat_klupair_pivot_tol %g is not between 0 and 1", k->common.tol);
+  k->ordering     = (KluPairOrdering)ordering;
+  k->common.scale = (KluInt)scaling;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorInfo *)
+{
+  KluPair        *k = Data(F);
+  LinearRows      rows;
+  const PetscInt *order;
+
+  PetscFunctionBegin;
+  PetscCall(ReadOptions(F));
+  k->given.clear();
+  if (row) {
+    PetscCall(ISGetIndices(row, &order));
+    k->given.assign(order, order + A->rmap->n);
+    PetscCall(ISRestoreIndices(row, &order));
+  }
+  PetscCall(GetRows(A, &rows));
+  PetscCall(Analyse(A, rows, k));
+  PetscCall(RestoreRows(A, &rows));
+  F->ops->lufactornumeric = FactorNumeric;
+  F->ops->solve           = MatSolve_KLUPair;
+  F->ops->solvetranspose  = MatSolveTranspose_KLUPair;
+  PetscFunctionReturn(0);
+}
+
+/* ---- what can be asked of the factor ---- */
+
+static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_KLUPAIR, 0; }
+
+static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
+{
+  const KluPair *k        = Data(F);
+  const double   matrix   = k->col.empty() ? 1 : (double)k->col.size();
+  const double   foreseen = 2 * k->work.factor - (double)F->rmap->n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(info, sizeof *info));
+  info->block_size = 1;
+  /* L has ones on its diagonal */
+  info->nz_used      = k->numeric ? (double)k->numeric->lnz + (double)k->numeric->unz - (double)F->rmap->n : foreseen;
+  info->nz_allocated = info->nz_used;
+  info->memory       = (double)k->common.memusage;
+  info->fill_ratio_given  = foreseen / matrix;
+  info->fill_ratio_needed = info->nz_used / matrix;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode View(Mat F, PetscViewer viewer)
+{
+  const KluPair    *k = Data(F);
+  PetscBool         ascii;
+  PetscViewerFormat format;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
+  if (!ascii) PetscFunctionReturn(0);
+  PetscCall(PetscViewerGetFormat(viewer, &format));
+  if (format != PETSC_VIEWER_ASCII_INFO && format != PETSC_VIEWER_ASCII_INFO_DETAIL) PetscFunctionReturn(0);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "KLU, ordering %s, pivot tolerance %g\n", k->ordering_used, k->common.tol));
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  %" PetscInt_FMT " rows without diagonal, %" PetscInt_FMT
+                                   " of them in pairs; foreseen: %g entries in L, %g operations\n",
+                                   k->pivots.zeros, k->pivots.pairs, k->work.factor, k->work.flops));
+  if (k->numeric)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  %g entries in L and U, %g operations; %d pivots not as planned\n",
+                                     (double)k->numeric->lnz + (double)k->numeric->unz, k->common.flops,
+                                     (int)k->common.noffdiag));
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  analyses: %" PetscInt_FMT ", factorizations with pivoting: %" PetscInt_FMT
+                                   ", with old pivots: %" PetscInt_FMT ", of these given up: %" PetscInt_FMT "\n",
+                                   k->analyses, k->factorizations, k->refactorizations + k->rejected, k->rejected));
+  PetscFunctionReturn(0);
+}
+
+/* ---- create and destroy ---- */
+
+static PetscErrorCode Destroy(Mat F)
+{
+  KluPair *k = Data(F);
+
+  PetscFunctionBegin;
+  KLU(free_numeric)(&k->numeric, &k->common);
+  KLU(free_symbolic)(&k->symbolic, &k->common);
+  delete k;
+  F->data = NULL;
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", NULL));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MatGetFactor_KLUPair(Mat A, MatFactorType type, Mat *factor)
+{
+  Mat      F;
+  KluPair *k = new KluPair();
+
+  PetscFunctionBegin;
+  PetscCall(MatCreate(PetscObjectComm((PetscObject)A), &F));
+  PetscCall(MatSetSizes(F, A->rmap->n, A->cmap->n, A->rmap->N, A->cmap->N));
+  PetscCall(PetscStrallocpy(LINEAR_KLUPAIR, &((PetscObject)F)->type_name));
+  PetscCall(MatSetUp(F));
+  PetscCheck(KLU(defaults)(&k->common), PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU did not start");
+  k->common.scale          = 0;
+  F->data                  = k;
+  F->factortype            = type;
+  F->assembled             = PETSC_TRUE; /* so that -ksp_view shows it */
+  F->canuseordering        = PETSC_TRUE;
+  F->ops->lufactorsymbolic = FactorSymbolic;
+  F->ops->getinfo          = GetInfo;
+  F->ops->view             = View;
+  F->ops->destroy          = Destroy;
+  PetscCall(PetscFree(F->solvertype));
+  PetscCall(PetscStrallocpy(LINEAR_KLUPAIR, &F->solvertype));
+  PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", GetSolverType));
+  *factor = F;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearRegisterKLUPair(void)
+{
+  PetscFunctionBegin;
+  PetscCall(MatSolverTypeRegister(LINEAR_KLUPAIR, MATSEQAIJ, MAT_FACTOR_LU, MatGetFactor_KLUPair));
+  PetscFunctionReturn(0);
+}
+
+#else
+
+PetscErrorCode LinearRegisterKLUPair(void) { return 0; }
+
+#endif

@@ -1,0 +1,198 @@
+/* The analysis of "klupair": pivots, an ordering of the groups of unknowns that share them, and both as KLU wants them
+ */
+#if defined(HHTDAE_HAVE_KLU)
+#include "klupair_data.h"
+#include <algorithm>
+
+/* METIS is tried where AMD foresees so many operations per unknown: a chain stays below, a plate does not */
+static const double TRY_METIS = 1000;
+
+/* An ordering with more entries than this is not compared any further */
+static const double COUNT_LIMIT = 1e9;
+
+/* Fill beyond this multiple of what was foreseen means that the pivots no longer fit the values */
+static const double TOO_MUCH_FILL = 1.5;
+
+/* The cycles of the permutation of pivots: single unknowns, pairs, rarely more */
+struct Groups {
+  std::vector<PetscInt> of, start, member;
+};
+
+static Groups FindGroups(const std::vector<PetscInt> &pivot)
+{
+  Groups         g;
+  const PetscInt n = (PetscInt)pivot.size();
+  g.of.assign(n, -1);
+  g.start.assign(1, 0);
+  for (PetscInt i = 0; i < n; ++i) {
+    if (g.of[i] >= 0) continue;
+    const PetscInt group = (PetscInt)g.start.size() - 1;
+    for (PetscInt j = i; g.of[j] < 0; j = pivot[j]) {
+      g.of[j] = group;
+      g.member.push_back(j);
+    }
+    g.start.push_back((PetscInt)g.member.size());
+  }
+  return g;
+}
+
+static LinearGraph Compress(const LinearGraph &graph, const Groups &g)
+{
+  LinearGraph           c;
+  std::vector<PetscInt> seen;
+  c.n = (PetscInt)g.start.size() - 1;
+  c.xadj.assign(1, 0);
+  seen.assign(c.n, -1);
+  for (PetscInt v = 0; v < c.n; ++v) {
+    seen[v] = v;
+    for (PetscInt m = g.start[v]; m < g.start[v + 1]; ++m)
+      for (PetscInt k = graph.xadj[g.member[m]]; k < graph.xadj[g.member[m] + 1]; ++k) {
+        const PetscInt other = g.of[graph.adj[k]];
+        if (seen[other] != v) c.adj.push_back(other);
+        seen[other] = v;
+      }
+    std::sort(c.adj.begin() + c.xadj[v], c.adj.end());
+    c.xadj.push_back((PetscInt)c.adj.size());
+  }
+  return c;
+}
+
+static std::vector<PetscInt> Expand(const Groups &g, const std::vector<PetscInt> &order)
+{
+  std::vector<PetscInt> unknowns;
+  unknowns.reserve(g.member.size());
+  for (PetscInt v : order)
+    unknowns.insert(unknowns.end(), g.member.begin() + g.start[v], g.member.begin() + g.start[v + 1]);
+  return unknowns;
+}
+
+static PetscErrorCode OrderByAMD(const LinearGraph &c, std::vector<PetscInt> *order)
+{
+  PetscFunctionBegin;
+  order->resize(c.n);
+  const KluInt dummy = 0; /* AMD refuses a null pointer even where there are no entries */
+  const int    status =
+      (int)AMD(order)((KluInt)c.n, KluIndices(c.xadj.data()), c.adj.empty() ? &dummy : KluIndices(c.adj.data()),
+                      KluIndices(order->data()), NULL, NULL);
+  PetscCheck(status == AMD_OK || status == AMD_OK_BUT_JUMBLED, PETSC_COMM_SELF,
+             status == AMD_OUT_OF_MEMORY ? PETSC_ERR_MEM : PETSC_ERR_LIB,
+             "AMD returned %d for a graph of %" PetscInt_FMT " vertices and %zu edges", status, c.n, c.adj.size() / 2);
+  PetscFunctionReturn(0);
+}
+
+/* Groups by their first unknown in the order that PETSc gave */
+static std::vector<PetscInt> OrderAsGiven(const Groups &g, const std::vector<PetscInt> &given)
+{
+  std::vector<PetscInt> order;
+  std::vector<bool>     done(g.start.size(), false);
+  for (PetscInt i : given)
+    if (!done[g.of[i]]) {
+      done[g.of[i]] = true;
+      order.push_back(g.of[i]);
+    }
+  return order;
+}
+
+/* Leaves the order of the unknowns in *order and the work it takes in k */
+static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *k, std::vector<PetscInt> *order)
+{
+  const LinearGraph     c = Compress(graph, g);
+  std::vector<PetscInt> groups;
+  PetscBool             bounded;
+
+  PetscFunctionBegin;
+  if (!k->given.empty()) {
+    k->ordering_used = "given by PETSc";
+    groups           = OrderAsGiven(g, k->given);
+  } else if (k->ordering == KLUPAIR_METIS) {
+    k->ordering_used = "METIS";
+    PetscCall(LinearMetisOrder(c, {}, &groups));
+  } else {
+    k->ordering_used = "AMD";
+    PetscCall(OrderByAMD(c, &groups));
+  }
+  *order = Expand(g, groups);
+  LinearCountWork(graph, order->data(), COUNT_LIMIT, &k->work, &bounded);
+  if (!k->given.empty() || k->ordering != KLUPAIR_AUTO || (bounded && k->work.flops < TRY_METIS * (double)graph.n))
+    PetscFunctionReturn(0);
+
+  LinearWork other;
+  PetscCall(LinearMetisOrder(c, {}, &groups));
+  std::vector<PetscInt> by_metis = Expand(g, groups);
+  LinearCountWork(graph, by_metis.data(), COUNT_LIMIT, &other, &bounded);
+  if (!bounded || other.flops >= k->work.flops) PetscFunctionReturn(0);
+  k->ordering_used = "METIS";
+  k->work          = other;
+  order->swap(by_metis);
+  PetscFunctionReturn(0);
+}
+
+/*
+  KLU factors the transpose: its columns are our rows. A pair (q, lambda) is taken with the pivots a(q,q) and what is
+  left at (lambda,lambda) where the diagonal is the larger, and with a(q,lambda), a(lambda,q) otherwise. The entries
+  that fill in are the same.
+*/
+static void Permutations(const LinearRows &A, const Groups &g, const std::vector<PetscInt> &order,
+                         const std::vector<PetscInt> &pivot, std::vector<PetscInt> *P, std::vector<PetscInt> *Q)
+{
+  const auto size = [&A](PetscInt i, PetscInt j) {
+    for (PetscInt k = A.start[i]; k < A.start[i + 1]; ++k)
+      if (A.col[k] == j) return PetscAbsScalar(A.val[k]);
+    return (PetscReal)0;
+  };
+  Q->clear();
+  P->clear();
+  for (size_t k = 0; k < order.size();) {
+    const PetscInt v = g.of[order[k]], count = g.start[v + 1] - g.start[v];
+    PetscInt       i = order[k], j = pivot[i];
+    if (count == 2) {
+      if (size(i, i) < size(j, j)) std::swap(i, j);
+      const bool diagonal = size(i, i) >= PetscMax(size(i, j), size(j, i)) && size(i, i) > 0;
+      Q->insert(Q->end(), {i, j});
+      if (diagonal)
+        P->insert(P->end(), {i, j});
+      else
+        P->insert(P->end(), {j, i});
+    } else
+      for (PetscInt m = 0; m < count; ++m) {
+        Q->push_back(order[k + m]);
+        P->push_back(pivot[order[k + m]]);
+      }
+    k += count;
+  }
+}
+
+PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k)
+{
+  LinearGraph           graph;
+  PetscBool             done;
+  std::vector<PetscInt> order, P, Q;
+
+  PetscFunctionBegin;
+  KLU(free_numeric)(&k->numeric, &k->common);
+  KLU(free_symbolic)(&k->symbolic, &k->common);
+  PetscCall(LinearGraphFromMat(A, &graph, &done));
+  LinearFindPivots(rows, &k->pivots);
+  const Groups g = FindGroups(k->pivots.col);
+  PetscCall(Order(graph, g, k, &order));
+  Permutations(rows, g, order, k->pivots.col, &P, &Q);
+
+  k->common.btf = 0;
+  k->symbolic   = KLU(analyze_given)((KluInt)rows.n, KluIndices(rows.start), KluIndices(rows.col), KluIndices(P.data()),
+                                   KluIndices(Q.data()), &k->common);
+  PetscCheck(k->symbolic, PETSC_COMM_SELF, k->common.status == KLU_OUT_OF_MEMORY ? PETSC_ERR_MEM : PETSC_ERR_LIB,
+             "KLU's analysis of the matrix with %" PetscInt_FMT " rows failed with status %d", rows.n,
+             (int)k->common.status);
+  for (KluInt b = 0; b < k->symbolic->nblocks; ++b)
+    k->symbolic->Lnz[b] = k->work.factor; /* how much KLU allocates at first */
+  k->tolerated = TOO_MUCH_FILL * 2 * k->work.factor;
+  ++k->analyses;
+  PetscCall(PetscInfo(A,
+                      "%" PetscInt_FMT " rows without diagonal, %" PetscInt_FMT " in pairs, %" PetscInt_FMT
+                      " without a pivot, found in %g looks; %s: %g entries in L, %g operations\n",
+                      k->pivots.zeros, k->pivots.pairs, k->pivots.unmatched, k->pivots.looked, k->ordering_used,
+                      k->work.factor, k->work.flops));
+  PetscFunctionReturn(0);
+}
+
+#endif

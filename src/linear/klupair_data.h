@@ -1,0 +1,48 @@
+/* What a factor of "klupair" holds, and KLU's names for the size of PETSc's integers */
+#ifndef HHTDAE_LINEAR_KLUPAIR_DATA_H
+#define HHTDAE_LINEAR_KLUPAIR_DATA_H
+
+#include "graph.h"
+#include "klupair_matching.h"
+#include <klu.h>
+
+#if defined(PETSC_USE_64BIT_INDICES)
+typedef SuiteSparse_long KluInt;
+#define KLU(name) klu_l_##name
+#define AMD(name) amd_l_##name
+#else
+typedef int KluInt;
+#define KLU(name) klu_##name
+#define AMD(name) amd_##name
+#endif
+static_assert(sizeof(KluInt) == sizeof(PetscInt), "KLU's integers have the size of PETSc's");
+
+enum KluPairOrdering { KLUPAIR_AUTO, KLUPAIR_AMD, KLUPAIR_METIS };
+
+struct KluPair {
+  KLU(common) common;
+  KLU(symbolic) *symbolic = NULL;
+  KLU(numeric) *numeric   = NULL;
+
+  std::vector<PetscInt> start, col; /* the pattern analysed */
+  std::vector<PetscInt> given;      /* an order of the unknowns from PETSc; empty: ours */
+  PetscObjectId         matrix  = 0;
+  PetscObjectState      pattern = 0, values = 0; /* of that matrix, when the pattern and the pivots were looked at */
+
+  KluPairOrdering ordering = KLUPAIR_AUTO;
+  PetscBool       refactor = PETSC_TRUE;
+
+  LinearPivots pivots;
+  LinearWork   work; /* foreseen for L of the symmetrized pattern */
+  const char  *ordering_used = "";
+  double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
+  double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
+  PetscInt     analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
+};
+
+inline KluInt *KluIndices(const PetscInt *i) { return reinterpret_cast<KluInt *>(const_cast<PetscInt *>(i)); }
+
+/* Pivots, ordering and KLU's analysis for the pattern and values of A */
+PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k);
+
+#endif
