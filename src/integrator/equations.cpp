@@ -193,7 +193,7 @@ PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
   if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
-  if (I.role.empty()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
+  if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
   else PetscCall(MatDiagonalScale(A, I.row, I.col));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,9 +274,9 @@ PetscErrorCode StageVectors(TS ts, Vec X)
   else
     for (int k = 0; k < 3; k++) {
       PetscCall(VecGetArrayRead(I.base[k], &base));
-      if (!I.role.empty()) PetscCall(VecGetArrayRead(slope[k], &s));
+      if (!I.coordinatesAlone()) PetscCall(VecGetArrayRead(slope[k], &s));
       Line(n, base, s, one[k], x, y[k]);
-      if (!I.role.empty()) PetscCall(VecRestoreArrayRead(slope[k], &s));
+      if (!I.coordinatesAlone()) PetscCall(VecRestoreArrayRead(slope[k], &s));
       PetscCall(VecRestoreArrayRead(I.base[k], &base));
     }
   for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &y[k]));
@@ -293,7 +293,7 @@ PetscErrorCode PrepareStage(TS ts)
   PetscInt     n;
 
   PetscFunctionBegin;
-  if (!I.role.empty()) PetscCall(FillScalings(I));
+  if (!I.coordinatesAlone()) PetscCall(FillScalings(I));
   PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));
   PetscCall(VecGetArrayRead(I.V0, &e.v0));
@@ -348,7 +348,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
     if (I.mode == Mode::Step && I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
-    if (!I.role.empty()) PetscCall(FillScalings(I));
+    if (!I.coordinatesAlone()) PetscCall(FillScalings(I));
     PetscCall(ScaleMatrix(I, P));
     if (J != P) PetscCall(ScaleMatrix(I, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));

@@ -21,7 +21,8 @@ enum class Mode {
 
 /* The stopping test and the reuse ladder, section 5 of the paper */
 struct Corrector {
-  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance */
+  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
+  PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
   PetscInt  max_it    = 10;
   PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
@@ -88,6 +89,13 @@ struct Integrator {
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
   PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
+  /* the same answer on every rank, also on one without unknowns, whose list of roles is empty too */
+  bool coordinatesAlone() const
+  {
+    for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
+      if (r != TSHHT3_COORDINATE && count[r]) return false;
+    return true;
+  }
 
   /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
@@ -151,6 +159,12 @@ inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* c of (40) in force */
+inline PetscReal CorrectorTolerance(const Integrator &I)
+{
+  return I.corrector.c_given || !I.constraints() ? I.corrector.c : ConstrainedTolerance(I.corrector.c, I.p.rho);
+}
 
 /* how every failure by a singular matrix ends */
 constexpr char singular[] = "the Newton matrix is singular";

@@ -94,7 +94,7 @@ TEST(SceneStart, ARunWithRowsDropped)
     Vec     U, V;
     bricard(s);
     must(s.createTS(&ts));
-    must(TSSetMaxTime(ts, 0.3));
+    must(TSSetMaxTime(ts, 0.1));
     must(TSSetFromOptions(ts));
     must(s.solve(ts));
     must(TS2GetSolution(ts, &U, &V));
