@@ -62,7 +62,8 @@ public:
     t += d;
   }
 
-  /* largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to the entry or to one */
+  /* largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to the entry or to one
+   */
   double jacobianError(double sv, double sa, double d = 1e-6)
   {
     double worst = 0;
@@ -85,7 +86,8 @@ public:
         const double difference = (up[r] - down[r]) / (2 * d);
         must(MatGetValue(J, r, c, &entry));
         const double error = std::abs(entry - difference) / std::max(1., std::abs(difference));
-        if (!(error < 1e-5)) std::printf("row %d, column %d: %.9g, by differences %.9g\n", (int)r, (int)c, entry, difference);
+        if (!(error < 1e-5))
+          std::printf("row %d, column %d: %.9g, by differences %.9g\n", (int)r, (int)c, entry, difference);
         widen(worst, error);
       }
     }

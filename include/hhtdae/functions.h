@@ -69,7 +69,7 @@ struct Measure {
     Velocity,            /* of i relative to j (time derivative taken in space), component in frame */
     Rate,                /* d Distance / dt */
     Acceleration,        /* of i relative to j, component in frame */
-    Angle,               /* of i's x axis about j's z axis, from j's x axis; counted over full turns in joints, else in (-pi, pi] */
+    Angle,               /* of i's x axis about j's z axis, from j's x axis; in (-pi, pi] at the start, counted over full turns from there */
     AngularVelocity,     /* of i relative to j, component in frame */
     AngularAcceleration, /* likewise */
     Multiplier,          /* of row `component` of a joint or motion */

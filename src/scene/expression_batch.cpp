@@ -7,7 +7,8 @@ namespace hhtdae
 
 constexpr int kComponents = 6; /* of a user's force, at most */
 
-LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expression *e, std::size_t count) : name_(name)
+LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expression *e, std::size_t count)
+    : name_(name)
 {
   for (std::size_t c = 0; c < count; c++) {
     pieces_.push_back({e[c].f, arguments.size(), (int)e[c].arguments.size()});
@@ -20,7 +21,8 @@ void LocalFunction::report(const Evaluation &e, int piece, const Real *m, double
 {
   std::ostringstream text;
   for (int k = 0; k < pieces_[piece].count; k++) text << (k ? ", " : "") << m[k].value();
-  PetscCallAbort(PETSC_COMM_SELF, PetscInfo(nullptr, "%s is %g at t = %g, its arguments are (%s)\n", name_.c_str(), f, e.t, text.str().c_str()));
+  PetscCallAbort(PETSC_COMM_SELF, PetscInfo(nullptr, "%s is %g at t = %g, its arguments are (%s)\n", name_.c_str(), f,
+                                            e.t, text.str().c_str()));
 }
 
 void LocalFunction::value(const Evaluation &e, double *f) const
@@ -77,7 +79,8 @@ void ExpressionBatch::jacobian(Evaluation &e)
     const LocalFunction::Gradient one = (r.kind == RateOfState ? e.sv : 1.0) * LocalFunction::Gradient::Identity(n, n);
     e.sink.add(*slot++, one, n, n);
     G_ = -G_;
-    for (const Columns::Part &c : r.f.arguments.columns().parts) e.sink.add(*slot++, G_.middleCols(c.start, c.size), n, c.size);
+    for (const Columns::Part &c : r.f.arguments.columns().parts)
+      e.sink.add(*slot++, G_.middleCols(c.start, c.size), n, c.size);
   }
 }
 

@@ -41,7 +41,10 @@ public:
 
   explicit ExpressionBatch(const Bodies &b) : bodies_(b) {}
   /* rows of a group of unknowns of this rank */
-  void add(Kind kind, LocalFunction f, PetscInt local, PetscInt group) { all_.push_back({kind, std::move(f), local, group}); }
+  void add(Kind kind, LocalFunction f, PetscInt local, PetscInt group)
+  {
+    all_.push_back({kind, std::move(f), local, group});
+  }
   bool empty() const { return all_.empty(); }
 
   void     pattern(Pattern &p) override;

@@ -1,4 +1,5 @@
-/* User-defined variables and first-order states: who owns them, where their expressions find their arguments, what can be wrong. */
+/* User-defined variables and first-order states: who owns them, where their expressions find their arguments, what can
+ * be wrong. */
 #include "expression_batch.h"
 #include "runtime.h"
 #include <cmath>
@@ -20,9 +21,11 @@ PetscMPIInt OwnerOf(const Runtime &R, const Measure &m)
   return parts.empty() ? -1 : OwnerOf(R, *parts[0].store, parts[0].index);
 }
 
-void Place(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, const char *what, const ExpressionData &d, PetscInt number)
+void Place(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, const char *what, const ExpressionData &d,
+           PetscInt number)
 {
-  batch.add(kind, LocalFunction(l, std::string(what) + " " + d.name, &d.expression, 1), l.local(number), l.group(number, 1));
+  batch.add(kind, LocalFunction(l, std::string(what) + " " + d.name, &d.expression, 1), l.local(number),
+            l.group(number, 1));
 }
 
 /* the same on every rank */
@@ -58,9 +61,11 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l)
   R.uses_acceleration = UsesAcceleration(s);
   auto batch          = std::make_unique<ExpressionBatch>(R.bodies);
   for (std::size_t i = 0; i < s.variables.size(); i++)
-    if (R.number.variable_owner[i] == R.rank) Place(l, *batch, ExpressionBatch::Definition, "variable", s.variables[i], R.number.variable[i]);
+    if (R.number.variable_owner[i] == R.rank)
+      Place(l, *batch, ExpressionBatch::Definition, "variable", s.variables[i], R.number.variable[i]);
   for (std::size_t i = 0; i < s.states.size(); i++)
-    if (R.number.state_owner[i] == R.rank) Place(l, *batch, ExpressionBatch::RateOfState, "state", s.states[i], R.number.state[i]);
+    if (R.number.state_owner[i] == R.rank)
+      Place(l, *batch, ExpressionBatch::RateOfState, "state", s.states[i], R.number.state[i]);
   if (!batch->empty()) R.batches.push_back(std::move(batch));
   PetscFunctionReturn(0);
 }
@@ -72,9 +77,23 @@ namespace
 
 const char *NameOf(Measure::Kind k)
 {
-  constexpr const char *name[] = {"time", "displacement", "distance", "velocity", "rate", "acceleration", "angle", "angular velocity",
-                                  "angular acceleration", "multiplier", "joint force", "joint moment", "force", "value of a variable",
-                                  "value of a state", "kinetic energy", "potential energy"};
+  constexpr const char *name[] = {"time",
+                                  "displacement",
+                                  "distance",
+                                  "velocity",
+                                  "rate",
+                                  "acceleration",
+                                  "angle",
+                                  "angular velocity",
+                                  "angular acceleration",
+                                  "multiplier",
+                                  "joint force",
+                                  "joint moment",
+                                  "force",
+                                  "value of a variable",
+                                  "value of a state",
+                                  "kinetic energy",
+                                  "potential energy"};
   return name[k];
 }
 
@@ -87,7 +106,8 @@ std::string CheckMarkers(const SceneData &s, const Measure &m)
   if ((pair || m.j.id != -1) && !Good(s, m.j)) return "marker j is not one of this scene";
   if (m.frame.id != -1 && !Good(s, m.frame)) return "marker `frame` is not one of this scene";
   if (pair && m.i.id == m.j.id) return "markers i and j are the same";
-  if (!pair && (m.component < 0 || m.component > 2)) return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+  if (!pair && (m.component < 0 || m.component > 2))
+    return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
   if (m.kind != Measure::Angle) return "";
   if (std::abs(s.frame(m.i).R.col(0).dot(s.frame(m.j).R.col(2))) > 1 - 1e-8)
     return "the x axis of marker i is along the z axis of j, the angle about it is undefined";
@@ -96,14 +116,17 @@ std::string CheckMarkers(const SceneData &s, const Measure &m)
 
 std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
 {
-  if (m.target < 0 || m.target >= (PetscInt)s.elements.size()) return "its element is not one of this scene; add it first";
+  if (m.target < 0 || m.target >= (PetscInt)s.elements.size())
+    return "its element is not one of this scene; add it first";
   const ElementData &e       = s.elements[m.target];
   const std::string  who     = std::string(e.type) + " " + e.name;
   const bool         of_load = m.kind == Measure::Component;
-  if (of_load != (e.kind == ElementData::Force)) return who + (of_load ? " is not a force" : " is not a joint or motion");
+  if (of_load != (e.kind == ElementData::Force))
+    return who + (of_load ? " is not a force" : " is not a joint or motion");
   if (e.parts.empty()) return ""; /* it has errors of its own */
   if (m.kind == Measure::JointForce || m.kind == Measure::JointMoment) {
-    if (m.component < 0 || m.component > 2) return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+    if (m.component < 0 || m.component > 2)
+      return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
     return m.frame.id != -1 && !Good(s, m.frame) ? "marker `frame` is not one of this scene" : "";
   }
   PetscInt rows = 0, row = m.component;
@@ -115,7 +138,8 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
     row -= p.store->rows();
   }
   if (m.component >= 0 && m.component < rows) return "";
-  return who + " has " + (of_load ? "components" : "rows") + " 0 to " + std::to_string(rows - 1) + ", not " + std::to_string(m.component);
+  return who + " has " + (of_load ? "components" : "rows") + " 0 to " + std::to_string(rows - 1) + ", not " +
+         std::to_string(m.component);
 }
 
 void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors)
@@ -128,7 +152,8 @@ void CheckExpression(const SceneData &s, const std::string &who, const Expressio
   for (std::size_t k = 0; k < e.arguments.size(); k++) {
     const std::string error = CheckMeasure(s, e.arguments[k], true);
     if (!error.empty())
-      errors.push_back(who + ", argument " + std::to_string(k + 1) + " (" + NameOf(e.arguments[k].kind) + "): " + error);
+      errors.push_back(who + ", argument " + std::to_string(k + 1) + " (" + NameOf(e.arguments[k].kind) +
+                       "): " + error);
   }
 }
 
@@ -163,14 +188,16 @@ void CheckExpressions(const SceneData &s, std::vector<std::string> &errors)
   for (const auto *list : {&s.variables, &s.states})
     for (const ExpressionData &d : *list)
       if (!std::isfinite(d.initial))
-        errors.push_back((list == &s.variables ? "variable " : "state ") + d.name + ": its initial value is not finite");
+        errors.push_back((list == &s.variables ? "variable " : "state ") + d.name +
+                         ": its initial value is not finite");
   for (const StoreBase *store : s.order)
     for (PetscInt e = 0; e < store->size(); e++) {
       if (!store->expressions(e)) continue;
       const ElementData &element = s.elements[store->element(e)];
       const auto        &list    = *store->expressions(e);
       for (std::size_t c = 0; c < list.size(); c++)
-        CheckExpression(s, std::string(element.type) + " " + element.name + ", component " + std::to_string(c), list[c], errors);
+        CheckExpression(s, std::string(element.type) + " " + element.name + ", component " + std::to_string(c), list[c],
+                        errors);
     }
 }
 

@@ -37,8 +37,8 @@ MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerat
   const LocalBody     &l = e.bodies.body[k.body];
   const BodyMotion    &b = e.bodies.now[k.body];
   MarkerMotion<double> m;
-  m.f.R     = b.A * k.R;
-  m.w       = {b.v, b.w};
+  m.f.R = b.A * k.R;
+  m.w   = {b.v, b.w};
   m.a.setZero();
   m.alpha.setZero();
   if (accelerations && l.kind != BodyKind::Ground) {
@@ -46,40 +46,44 @@ MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerat
     for (int i = 0; i < (PlanarScene(l.kind) ? 2 : 3); i++) m.a(i) = a[i];
     if (l.kind == BodyKind::Planar) m.alpha(2) = a[2];
     if (l.kind == BodyKind::Rigid)
-      m.alpha = AngularVelocity(b.euler, Vector3(a[3], a[4], a[5])) + Convective(b.euler, Vector3(v[3], v[4], v[5]), b.w);
+      m.alpha =
+          AngularVelocity(b.euler, Vector3(a[3], a[4], a[5])) + Convective(b.euler, Vector3(v[3], v[4], v[5]), b.w);
   }
   Attach<double>(b.r, b.A * k.s, m);
   return m;
 }
 
 /* The same from coordinates, rates and accelerations that are duals; formulas of euler.h and bodies.cpp */
-template <class T> void RigidMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
+template <class T>
+void RigidMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
 {
   using std::cos;
   using std::sin;
   const T       sp = sin(q[0]), cp = cos(q[0]), st = sin(q[1]), ct = cos(q[1]), ss = sin(q[2]), cs = cos(q[2]), zero(0);
-  const Vec3<T> z(zero, zero, T(1)), g2(cp, sp, zero), g3(T(sp * st), T(-cp * st), ct), y(T(-sp * ct), T(cp * ct), st), g23 = g2.cross(g3);
-  Mat3<T>       E;
-  E.col(0) = g2 * cs + y * ss;
-  E.col(1) = y * cs - g2 * ss;
-  E.col(2) = g3;
-  A.noalias() = E * l.C.cast<T>();
-  m.w.w = z * p[0] + g2 * p[1] + g3 * p[2];
+  const Vec3<T> z(zero, zero, T(1)), g2(cp, sp, zero), g3(T(sp * st), T(-cp * st), ct), y(T(-sp * ct), T(cp * ct), st),
+      g23 = g2.cross(g3);
+  Mat3<T> E;
+  E.col(0)          = g2 * cs + y * ss;
+  E.col(1)          = y * cs - g2 * ss;
+  E.col(2)          = g3;
+  A.noalias()       = E * l.C.cast<T>();
+  m.w.w             = z * p[0] + g2 * p[1] + g3 * p[2];
   const Vec3<T> zw  = z.cross(m.w.w);
   const T       p12 = p[1] * p[2];
-  m.alpha = z * s[0] + g2 * s[1] + g3 * s[2] + zw * p[0] + g23 * p12;
+  m.alpha           = z * s[0] + g2 * s[1] + g3 * s[2] + zw * p[0] + g23 * p12;
 }
 
-template <class T> void PlanarMotion(const T &angle, const T &rate, const T &acceleration, Mat3<T> &A, MarkerMotion<T> &m)
+template <class T>
+void PlanarMotion(const T &angle, const T &rate, const T &acceleration, Mat3<T> &A, MarkerMotion<T> &m)
 {
   using std::cos;
   using std::sin;
   const T c = cos(angle), s = sin(angle);
   A(0, 0) = A(1, 1) = c;
-  A(0, 1) = -s;
-  A(1, 0) = s;
-  m.w.w(2)   = rate;
-  m.alpha(2) = acceleration;
+  A(0, 1)           = -s;
+  A(1, 0)           = s;
+  m.w.w(2)          = rate;
+  m.alpha(2)        = acceleration;
 }
 
 /* Directions first..: coordinate c with its rate and acceleration, as du = 1, du' = sv, du'' = sa */
@@ -91,9 +95,9 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   const int          n = Coordinates(l.kind), directions = n == 2 || l.kind == BodyKind::Planar ? 2 : n ? 3 : 0;
   T                  q[6], p[6], s[6];
   for (int c = 0; c < n; c++) {
-    q[c] = T(e.u[l.first + c], N, first + c);
-    p[c] = T(e.v[l.first + c]);
-    s[c] = T(e.a[l.first + c]);
+    q[c]                          = T(e.u[l.first + c], N, first + c);
+    p[c]                          = T(e.v[l.first + c]);
+    s[c]                          = T(e.a[l.first + c]);
     p[c].derivatives()(first + c) = e.sv;
     s[c].derivatives()(first + c) = e.sa;
   }
@@ -109,7 +113,7 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   }
   if (l.kind == BodyKind::Rigid) RigidMotion<T>(l, q + 3, p + 3, s + 3, A, m);
   if (l.kind == BodyKind::Planar) PlanarMotion<T>(q[2], p[2], s[2], A, m);
-  m.f.R.noalias()    = A * k.R.cast<T>();
+  m.f.R.noalias()   = A * k.R.cast<T>();
   const Vec3<T> arm = A * k.s.cast<T>();
   Attach<T>(r, arm, m);
   return m;
@@ -132,7 +136,8 @@ template <class T> Vec3<T> Difference(const Vec3<T> &x, const Vec3<T> *y)
 }
 
 /* Measures of markers; j and frame may be none */
-template <class T> T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, const MarkerMotion<T> *j, const MarkerMotion<T> *frame)
+template <class T>
+T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, const MarkerMotion<T> *j, const MarkerMotion<T> *frame)
 {
   using std::sqrt;
   const Vec3<T> d = Difference<T>(i.f.x, j ? &j->f.x : nullptr);
@@ -144,7 +149,7 @@ template <class T> T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, co
   case Measure::Velocity:
     return Component<T>(Difference<T>(i.w.v, j ? &j->w.v : nullptr), frame, m.component);
   case Measure::Rate: {
-    const Vec3<T> w = i.w.v - j->w.v;
+    const Vec3<T> w  = i.w.v - j->w.v;
     const T       dw = d.dot(w), l = sqrt(T(d.dot(d)));
     return dw / l;
   }
@@ -170,7 +175,8 @@ Vector3 AxisOf(const LocalMeasure &m, const Evaluation &e)
   return m.frame < 0 ? Vector3(Vector3::Unit(m.component)) : Vector3(e.bodies.frame(m.frame).R.col(m.component));
 }
 
-constexpr int kMarkers = 6, kRows = 8; /* of a constraint, at most: couplers of three joints; StoreBase::active() has 8 bits */
+constexpr int kMarkers = 6,
+              kRows    = 8; /* of a constraint, at most: couplers of three joints; StoreBase::active() has 8 bits */
 
 bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
 {
@@ -187,8 +193,10 @@ Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
     p->reaction(e, on);
     for (int k = 0; k < p->markers(); k++) {
       if (!OnBody(e, m, p->marker(k))) continue;
-      if (m.kind == Measure::JointForce) sum += on[k].f;
-      else sum += on[k].m + (e.bodies.frame(p->marker(k)).x - x).cross(on[k].f);
+      if (m.kind == Measure::JointForce)
+        sum += on[k].f;
+      else
+        sum += on[k].m + (e.bodies.frame(p->marker(k)).x - x).cross(on[k].f);
     }
   }
   return sum;
@@ -203,7 +211,8 @@ void AddMarker(const Evaluation &e, PetscInt marker, const Matrix<1, 6> &J, int 
   for (int c = 0; c < n; c++) row[at + c] += by(c);
 }
 
-void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor, const std::vector<int> &at, double *row)
+void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor, const std::vector<int> &at,
+                      double *row)
 {
   const bool    force = m.kind == Measure::JointForce;
   const Vector3 axis = factor * AxisOf(m, e), x = e.bodies.frame(m.i).x;
@@ -215,7 +224,7 @@ void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor,
     p->reaction(e, on);
     for (int k = 0; k < p->markers(); k++) {
       if (!OnBody(e, m, p->marker(k))) continue;
-      const Vector3 arm = e.bodies.frame(p->marker(k)).x - x;
+      const Vector3 arm       = e.bodies.frame(p->marker(k)).x - x;
       y.segment<3>(6 * k)     = force ? axis : Vector3(axis.cross(arm));
       y.segment<3>(6 * k + 3) = force ? Vector3(Vector3::Zero()) : axis;
     }
@@ -257,8 +266,8 @@ void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
 {
   const SceneData   &s = l.run->scene;
   const ElementData &e = s.elements[m.target];
-  k.i     = l.marker(e.i.id);
-  k.frame = l.marker(s.valid(m.frame) ? m.frame.id : e.j.id);
+  k.i                  = l.marker(e.i.id);
+  k.frame              = l.marker(s.valid(m.frame) ? m.frame.id : e.j.id);
   for (const Part &p : e.parts)
     if (p.store->isConstraint() && p.store->unknowns(p.index)) k.probes.push_back(p.store->probe(l, p.index));
 }
@@ -358,8 +367,10 @@ PetscInt LocalMeasure::memory() const
 void LocalMeasure::copyMemory(double *x, bool in)
 {
   if (kind == Measure::Angle) {
-    if (in) angle = *x;
-    else *x = angle;
+    if (in)
+      angle = *x;
+    else
+      *x = angle;
     x++;
   }
   for (auto &p : probes) {
@@ -383,8 +394,9 @@ int Columns::body(const Bodies &B, PetscInt b)
 {
   const LocalBody &k = B.body[b];
   if (k.kind == BodyKind::Ground) return -1;
-  const int start = add(k.group, GroupSize(k.kind));
-  for (int g = 1; g < Groups(k.kind); g++) add(k.group + g, GroupSize(k.kind)); /* right behind: a body's groups come together */
+  const int start = add(k.group, GroupSize(k.kind, 0));
+  for (int g = 1; g < Groups(k.kind); g++)
+    add(k.group + g, GroupSize(k.kind, g)); /* right behind: a body's groups come together */
   return start;
 }
 
@@ -404,7 +416,8 @@ void MeasureSet::connect(const Bodies &B, const Pattern &p)
       at_[k].push_back(columns_.scalar(p, m.input));
       continue;
     }
-    for (PetscInt marker : {m.i, m.j, m.frame}) at_[k].push_back(marker < 0 ? -1 : columns_.body(B, B.marker[marker].body));
+    for (PetscInt marker : {m.i, m.j, m.frame})
+      at_[k].push_back(marker < 0 ? -1 : columns_.body(B, B.marker[marker].body));
     for (const auto &q : m.probes) {
       for (int i = 0; i < q->markers(); i++) at_[k].push_back(columns_.body(B, B.marker[q->marker(i)].body));
       for (int r = 0; r < q->multipliers(); r++) at_[k].push_back(columns_.scalar(p, q->multiplier(r)));
@@ -425,8 +438,8 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
     AddJointGradient(m, e, factor, at, row);
     return;
   }
-  constexpr int N = 3 * max_coordinates;
-  using T         = Dual<N>;
+  constexpr int N           = 3 * max_coordinates;
+  using T                   = Dual<N>;
   const PetscInt  marker[3] = {m.i, m.j, m.frame};
   MarkerMotion<T> motion[3];
   for (int i = 0; i < 3; i++)

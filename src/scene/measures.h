@@ -1,8 +1,9 @@
 /*
   Measures with their place among this rank's unknowns: values, and derivatives by the unknowns they depend on.
 
-    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   while the scene is laid out, on the rank that will read it
-    double       x = MeasureValue(m, evaluation);                        t, u, v, a of the local unknowns; bodies have moved there
+    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   while the scene is laid out, on the rank that
+  will read it double       x = MeasureValue(m, evaluation);                        t, u, v, a of the local unknowns;
+  bodies have moved there
 */
 #ifndef HHTDAE_SCENE_MEASURES_H
 #define HHTDAE_SCENE_MEASURES_H
@@ -14,11 +15,11 @@ namespace hhtdae
 {
 
 struct LocalMeasure {
-  Measure::Kind kind      = Measure::Time;
-  int           component = 0;
-  PetscInt      i = -1, j = -1, frame = -1; /* local markers; -1: the space origin, space axes */
-  Input         input;                      /* a scalar unknown */
-  double        angle = 0;                  /* counted over full turns, at the last accepted step */
+  Measure::Kind                       kind      = Measure::Time;
+  int                                 component = 0;
+  PetscInt                            i = -1, j = -1, frame = -1; /* local markers; -1: the space origin, space axes */
+  Input                               input;                      /* a scalar unknown */
+  double                              angle = 0; /* counted over full turns, at the last accepted step */
   std::vector<std::unique_ptr<Probe>> probes;
 
   void     accept(const Bodies &B);
@@ -26,8 +27,8 @@ struct LocalMeasure {
   void     copyMemory(double *x, bool in);
 };
 
-/* Marker motions beyond what the local unknowns of this rank hold are asked for through the localizer, in both of its passes.
-   Kinetic and potential energy are not placed: they belong to the whole scene. */
+/* Marker motions beyond what the local unknowns of this rank hold are asked for through the localizer, in both of its
+   passes. Kinetic and potential energy are not placed: they belong to the whole scene. */
 LocalMeasure PlaceMeasure(Localizer &l, const Measure &m);
 
 double MeasureValue(const LocalMeasure &m, const Evaluation &e);
@@ -35,7 +36,8 @@ double MeasureValue(const LocalMeasure &m, const Evaluation &e);
 bool NeedsAcceleration(const Measure &m);
 bool NeedsAcceleration(const Expression &f);
 
-/* What is wrong with a measure, empty if nothing; in_equation: as an argument of an expression, which needs its derivatives */
+/* What is wrong with a measure, empty if nothing; in_equation: as an argument of an expression, which needs its
+ * derivatives */
 std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation);
 /* Variables, states and user's forces: adds what is wrong with them */
 void CheckExpressions(const SceneData &s, std::vector<std::string> &errors);
@@ -77,9 +79,10 @@ public:
   void     copyMemory(double *x, bool in);
 
 private:
-  std::vector<LocalMeasure>     all_;
-  std::vector<std::vector<int>> at_; /* columns of each: bodies of i, j, frame; or a scalar; then, of probes, bodies and multipliers */
-  Columns                       columns_;
+  std::vector<LocalMeasure> all_;
+  std::vector<std::vector<int>>
+          at_; /* columns of each: bodies of i, j, frame; or a scalar; then, of probes, bodies and multipliers */
+  Columns columns_;
 };
 
 } // namespace hhtdae

@@ -1,6 +1,7 @@
 /*
-  A joint or force read from outside, for measures: the loads of a constraint on the bodies of its markers, the components of a force
-  that is eliminated. A probe is an instance of its own, so that any rank can read one whose bodies and multipliers it has.
+  A joint or force read from outside, for measures: the loads of a constraint on the bodies of its markers, the
+  components of a force that is eliminated. A probe is an instance of its own, so that any rank can read one whose
+  bodies and multipliers it has.
 */
 #ifndef HHTDAE_SCENE_PROBE_H
 #define HHTDAE_SCENE_PROBE_H
@@ -14,7 +15,7 @@ namespace hhtdae
 class Probe
 {
 public:
-  virtual ~Probe() = default;
+  virtual ~Probe()                     = default;
   virtual int      markers() const     = 0;
   virtual PetscInt marker(int k) const = 0; /* local number */
 
@@ -22,8 +23,8 @@ public:
   virtual void  reaction(const Evaluation &, Wrench<double> *) const {}
   virtual int   multipliers() const { return 0; }
   virtual Input multiplier(int) const { return {}; }
-  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 a marker) and by the
-     multipliers. The reactions of the kernels that have inputs do not depend on them. */
+  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 a marker) and
+     by the multipliers. The reactions of the kernels that have inputs do not depend on them. */
   virtual void reactionGradient(const Evaluation &, const double *, double *, double *) const {}
 
   /* of a force */
@@ -55,8 +56,10 @@ public:
   {
     if constexpr (K::memory > 0)
       for (int i = 0; i < K::memory; i++) {
-        if (in) e.data.memory[i] = x[i];
-        else x[i] = e.data.memory[i];
+        if (in)
+          e.data.memory[i] = x[i];
+        else
+          x[i] = e.data.memory[i];
       }
     (void)x;
     (void)in;
@@ -98,10 +101,12 @@ public:
     State               s;
     typename K::Hessian H;
     gather(ev, s);
-    if constexpr (K::holonomic) K::curvature(this->e.data, s.f, ev.t, s.lambda, H);
-    else K::curvature(this->e.data, s.f, s.w, ev.t, s.z, s.lambda, H);
+    if constexpr (K::holonomic)
+      K::curvature(this->e.data, s.f, ev.t, s.lambda, H);
+    else
+      K::curvature(this->e.data, s.f, s.w, ev.t, s.z, s.lambda, H);
     const Eigen::Map<const Matrix<6 * M, 1>> by(y);
-    const Matrix<R, 1>                       rows = -s.J * by;
+    const Matrix<R, 1>                       rows  = -s.J * by;
     Eigen::Map<Matrix<6 * M, 1>>(frames).noalias() = -H.transpose() * by;
     for (int i = 0; i < rows_; i++) lambda[i] = rows(row_[i]);
   }
@@ -112,8 +117,10 @@ private:
   void gather(const Evaluation &ev, State &s) const
   {
     ConstraintBatch<K>::gather(ev, this->e, s.f, s.w, s.lambda, s.z);
-    if constexpr (K::holonomic) K::gradient(this->e.data, s.f, ev.t, s.J);
-    else K::gradient(this->e.data, s.f, s.w, ev.t, s.z, s.J, s.P, nullptr);
+    if constexpr (K::holonomic)
+      K::gradient(this->e.data, s.f, ev.t, s.J);
+    else
+      K::gradient(this->e.data, s.f, s.w, ev.t, s.z, s.J, s.P, nullptr);
   }
 };
 

@@ -48,12 +48,15 @@ constexpr double mass = 1.5, length = .8, inertia = .3, gravity = 9.81, kp = 25,
 /* theta, theta', x by the classical Runge-Kutta method; theta from the downward vertical */
 std::array<double, 3> Reference(double end, int steps)
 {
-  using Y = std::array<double, 3>;
+  using Y      = std::array<double, 3>;
   const auto f = [](const Y &y) -> Y {
     const double tau = -kp * (y[2] - target) - kd * y[1];
-    return {y[1], (tau - mass * gravity * length * std::sin(y[0])) / (inertia + mass * length * length), (y[0] - y[2]) / lag};
+    return {y[1], (tau - mass * gravity * length * std::sin(y[0])) / (inertia + mass * length * length),
+            (y[0] - y[2]) / lag};
   };
-  const auto plus = [](const Y &y, double h, const Y &k) -> Y { return {y[0] + h * k[0], y[1] + h * k[1], y[2] + h * k[2]}; };
+  const auto plus = [](const Y &y, double h, const Y &k) -> Y {
+    return {y[0] + h * k[0], y[1] + h * k[1], y[2] + h * k[2]};
+  };
   Y            y = {0, 0, 0};
   const double h = end / steps;
   for (int i = 0; i < steps; i++) {
@@ -74,21 +77,24 @@ struct MotorPendulum {
   {
     scene.gravity({0, -gravity, 0});
     RigidBody b;
-    b.mass     = mass;
-    b.inertia  = inertia * Matrix3::Identity();
-    b.position = {0, -length, 0};
-    b.rotation = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitZ()).toRotationMatrix(); /* x along the rod */
-    rod        = scene.add("rod", b);
+    b.mass           = mass;
+    b.inertia        = inertia * Matrix3::Identity();
+    b.position       = {0, -length, 0};
+    b.rotation       = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitZ()).toRotationMatrix(); /* x along the rod */
+    rod              = scene.add("rod", b);
     const Marker top = scene.marker(rod, {-length, 0, 0}), base = scene.marker(scene.ground(), {0, 0, 0}, b.rotation);
-    pin              = scene.add("pin", Revolute{top, base});
-    angle            = scene.variable("angle", Measure::angle(top, base));
-    rate             = scene.variable("rate", Measure::angularVelocity(top, 2));
-    filtered         = scene.state("filtered", Expression{{Measure::value(angle), Measure::value(State{0})},
-                                                          [](const Real *m) -> Real { return (m[0] - m[1]) / lag; }}, 0);
-    scene.add("motor", UserScalarForce{top, base,
-                                       Expression{{Measure::value(filtered), Measure::angularVelocity(top, 2, base)},
-                                                  [](const Real *m) -> Real { return -kp * (m[0] - target) - kd * m[1]; }},
-                                       true, state});
+    pin      = scene.add("pin", Revolute{top, base});
+    angle    = scene.variable("angle", Measure::angle(top, base));
+    rate     = scene.variable("rate", Measure::angularVelocity(top, 2));
+    filtered = scene.state("filtered",
+                           Expression{{Measure::value(angle), Measure::value(State{0})},
+                                      [](const Real *m) -> Real { return (m[0] - m[1]) / lag; }},
+                           0);
+    scene.add("motor",
+              UserScalarForce{top, base,
+                              Expression{{Measure::value(filtered), Measure::angularVelocity(top, 2, base)},
+                                         [](const Real *m) -> Real { return -kp * (m[0] - target) - kd * m[1]; }},
+                              true, state});
   }
 };
 
@@ -100,9 +106,10 @@ TEST(Expressions, ControlledPendulum)
   for (Space space : {Space::Planar, Space::Spatial})
     for (bool state : {false, true}) {
       MotorPendulum p(state, space);
-      SceneRun run(p.scene, .5, tight);
-      MEASURED("%s, %s: angle off by %.1e, rate by %.1e, filter by %.1e", space == Space::Planar ? "planar" : "spatial", state ? "carried" : "eliminated",
-               std::abs(run(p.angle) - exact[0]), std::abs(run(p.rate) - exact[1]), std::abs(run(p.filtered) - exact[2]));
+      SceneRun      run(p.scene, .5, tight);
+      MEASURED("%s, %s: angle off by %.1e, rate by %.1e, filter by %.1e", space == Space::Planar ? "planar" : "spatial",
+               state ? "carried" : "eliminated", std::abs(run(p.angle) - exact[0]), std::abs(run(p.rate) - exact[1]),
+               std::abs(run(p.filtered) - exact[2]));
       EXPECT_NEAR(run(p.angle), exact[0], 1e-6);
       EXPECT_NEAR(run(p.rate), exact[1], 1e-5);
       EXPECT_NEAR(run(p.filtered), exact[2], 1e-6);
@@ -116,7 +123,7 @@ TEST(Expressions, OrderOfTheControlledPendulum)
   Array      error;
   for (int steps : {100, 200, 400}) {
     MotorPendulum p(false);
-    SceneRun run(p.scene, .5, fixedSteps(.5 / steps));
+    SceneRun      run(p.scene, .5, fixedSteps(.5 / steps));
     error.push_back(std::hypot(run(p.angle) - exact[0], run(p.filtered) - exact[2]));
   }
   MEASURED("errors %.2e %.2e %.2e", error[0], error[1], error[2]);
@@ -129,10 +136,10 @@ TEST(Expressions, AnglesCountTurns)
   for (Space space : {Space::Planar, Space::Spatial}) {
     Scene     s(PETSC_COMM_SELF, space);
     RigidBody b;
-    b.angular_velocity = {0, 0, 3};
+    b.angular_velocity   = {0, 0, 3};
     const Body     wheel = s.add("wheel", b);
     const Variable angle = s.variable("angle", Measure::angle(s.marker(wheel), s.marker(s.ground())));
-    SceneRun run(s, 5, tight + " -ts_adapt_dt_max 0.25 ");
+    SceneRun       run(s, 5, tight + " -ts_adapt_dt_max 0.25 ");
     EXPECT_NEAR(run(angle), 15, 1e-6);
   }
 }
@@ -143,19 +150,20 @@ TEST(Expressions, ReactionsOfACantilever)
   Scene s(PETSC_COMM_SELF);
   s.gravity({0, 0, -gravity});
   RigidBody b;
-  b.mass     = mass;
-  b.position = {length, 0, 0};
-  const Body    beam = s.add("beam", b);
-  const Marker  root = s.marker(beam, {-length, 0, 0}), wall = s.marker(s.ground(), {0, 0, 0}, Eigen::AngleAxisd(.4, Vector3::UnitY()).toRotationMatrix());
-  const Matrix3 R    = s.data().markers[wall.id].R;
-  const Element clamp = s.add("clamp", Fixed{root, s.marker(s.ground())});
+  b.mass                  = mass;
+  b.position              = {length, 0, 0};
+  const Body   beam       = s.add("beam", b);
+  const Marker root       = s.marker(beam, {-length, 0, 0}),
+               wall       = s.marker(s.ground(), {0, 0, 0}, Eigen::AngleAxisd(.4, Vector3::UnitY()).toRotationMatrix());
+  const Matrix3         R = s.data().markers[wall.id].R;
+  const Element         clamp = s.add("clamp", Fixed{root, s.marker(s.ground())});
   std::vector<Variable> f, m, g;
   for (int c = 0; c < 3; c++) {
     f.push_back(s.variable("", Measure::jointForce(clamp, c)));
     m.push_back(s.variable("", Measure::jointMoment(clamp, c)));
     g.push_back(s.variable("", Measure::jointForce(clamp, c, wall)));
   }
-  SceneRun run(s, .01, tight);
+  SceneRun      run(s, .01, tight);
   const Vector3 force(0, 0, mass * gravity), moment(0, -mass * gravity * length, 0), local = R.transpose() * force;
   for (int c = 0; c < 3; c++) {
     EXPECT_NEAR(run(f[c]), force(c), 1e-8);
@@ -167,7 +175,8 @@ TEST(Expressions, ReactionsOfACantilever)
 namespace
 {
 
-/* A body in space under forces and moments in its own axes, with a reaction on another body; a force that reads accelerations */
+/* A body in space under forces and moments in its own axes, with a reaction on another body; a force that reads
+ * accelerations */
 struct Drifting {
   Scene                 scene{PETSC_COMM_SELF};
   Body                  a, b;
@@ -190,15 +199,18 @@ struct Drifting {
     f.j           = scene.marker(b, {0, -.1, .3});
     f.state       = state;
     for (int c = 0; c < 3; c++) {
-      f.force.push_back(Expression{{Measure::displacement(f.i, c, f.j, f.i), Measure::velocity(f.i, c, f.j, f.i), Measure::time()},
-                                   [](const Real *m) -> Real { return -5. * m[0] * (1. + .3 * sin(m[2])) - .2 * m[1]; }});
-      f.moment.push_back(Expression{{Measure::angularVelocity(f.i, c, f.j, f.i)}, [](const Real *m) -> Real { return -.3 * m[0]; }});
+      f.force.push_back(
+          Expression{{Measure::displacement(f.i, c, f.j, f.i), Measure::velocity(f.i, c, f.j, f.i), Measure::time()},
+                     [](const Real *m) -> Real { return -5. * m[0] * (1. + .3 * sin(m[2])) - .2 * m[1]; }});
+      f.moment.push_back(
+          Expression{{Measure::angularVelocity(f.i, c, f.j, f.i)}, [](const Real *m) -> Real { return -.3 * m[0]; }});
     }
     scene.add("bond", f);
     acceleration = scene.variable("acceleration", Measure::acceleration(f.i, 0, f.j));
-      for (int c = 0; c < 3; c++)
-      momentum.push_back(scene.variable("", Expression{{Measure::velocity(scene.marker(a), c), Measure::velocity(scene.marker(b), c)},
-                                                       [](const Real *m) -> Real { return m[0] + 2. * m[1]; }}));
+    for (int c = 0; c < 3; c++)
+      momentum.push_back(
+          scene.variable("", Expression{{Measure::velocity(scene.marker(a), c), Measure::velocity(scene.marker(b), c)},
+                                        [](const Real *m) -> Real { return m[0] + 2. * m[1]; }}));
   }
 };
 
@@ -217,24 +229,26 @@ TEST(Expressions, CarriedAndEliminatedAgree)
   EXPECT_GT(std::abs(eliminated.position(e.a, 0)), .05);
 }
 
-/* An added mass: a force -m_a x'' makes a falling body as slow as one that weighs m_a more, in either form of the method. */
+/* An added mass: a force -m_a x'' makes a falling body as slow as one that weighs m_a more, in either form of the
+ * method. */
 TEST(Expressions, AddedMass)
 {
   for (const char *form : {"-ts_hhtdae_form paper", "-ts_hhtdae_form second_order"}) {
     Scene s(PETSC_COMM_SELF);
     s.gravity({0, -gravity, 0});
     PointMass p;
-    p.mass               = 2;
-    const Body     body  = s.add("body", p);
-    const Marker   i     = s.marker(body);
-    UserForce      f;
-    const Measure  a     = Measure::acceleration(i, 1);
-    f.i = i;
-    f.force = {Expression{{}, [](const Real *) -> Real { return 0.; }}, Expression{{a}, [](const Real *m) -> Real { return -3. * m[0]; }},
-               Expression{{}, [](const Real *) -> Real { return 0.; }}};
+    p.mass             = 2;
+    const Body    body = s.add("body", p);
+    const Marker  i    = s.marker(body);
+    UserForce     f;
+    const Measure a = Measure::acceleration(i, 1);
+    f.i             = i;
+    f.force         = {Expression{{}, [](const Real *) -> Real { return 0.; }},
+                       Expression{{a}, [](const Real *m) -> Real { return -3. * m[0]; }},
+                       Expression{{}, [](const Real *) -> Real { return 0.; }}};
     s.add("added mass", f);
     const Variable v = s.variable("a", a);
-    SceneRun run(s, 1, tight + form);
+    SceneRun       run(s, 1, tight + form);
     EXPECT_NEAR(run(v), -gravity * 2 / 5, 1e-8) << form;
     EXPECT_NEAR(run.position(body, 1), -gravity * .4 / 2, 1e-7) << form;
   }
@@ -246,7 +260,8 @@ TEST(Expressions, FunctionsThatAreNotFiniteFailTheRun)
   Scene s(PETSC_COMM_SELF);
   s.gravity({0, -gravity, 0});
   const Marker i = s.marker(s.add("stone", PointMass()));
-  s.variable("root", Expression{{Measure::displacement(i, 1)}, [](const Real *m) -> Real { return sqrt(m[0] + .5); }}, .7);
+  s.variable("root", Expression{{Measure::displacement(i, 1)}, [](const Real *m) -> Real { return sqrt(m[0] + .5); }},
+             .7);
   TS ts;
   must(s.createTS(&ts));
   must(TSSetMaxTime(ts, 10));

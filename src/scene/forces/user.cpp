@@ -1,7 +1,7 @@
 /*
-  User's forces. Components are expressions: by default eliminated, so that a load depends on all that the expressions read; with
-  `state = true` carried as force states with rows F - f(...) = 0. Components that read accelerations are always carried, because an
-  equation of motion has to be affine in q'', which is what the integrator makes use of.
+  User's forces. Components are expressions: by default eliminated, so that a load depends on all that the expressions
+  read; with `state = true` carried as force states with rows F - f(...) = 0. Components that read accelerations are
+  always carried, because an equation of motion has to be affine in q'', which is what the integrator makes use of.
 */
 #include "scene/expression_batch.h"
 #include "scene/kernels/user_force.h"
@@ -114,12 +114,12 @@ private:
     }
     for (const Columns::Part &c : columns.parts)
       for (int k = 0; k < M; k++) {
-        const LocalBody &b    = Base::bodyOf(ev.bodies, e, k);
-        const int        size = GroupSize(b.kind);
+        const LocalBody &b = Base::bodyOf(ev.bodies, e, k);
         for (int g = 0; g < Groups(b.kind); g++) {
           if (!Base::loads(b.kind, g, k)) continue;
-          const LocalFunction::Gradient block = T[k].middleCols(g * size, size).transpose() * G_.middleCols(c.start, c.size);
-          ev.sink.add(*slot++, block, size, c.size);
+          const LocalFunction::Gradient block =
+              T[k].middleCols(GroupOffset(b.kind, g), GroupSize(b.kind, g)).transpose() * G_.middleCols(c.start, c.size);
+          ev.sink.add(*slot++, block, GroupSize(b.kind, g), c.size);
         }
       }
   }
@@ -187,22 +187,28 @@ public:
     if (!loads->all.empty()) batches.push_back(std::move(loads));
   }
 
-  std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override { return std::make_unique<UserProbe>(function(l, e)); }
+  std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
+  {
+    return std::make_unique<UserProbe>(function(l, e));
+  }
 
 private:
   LocalFunction function(Localizer &l, PetscInt e) const
   {
     const ElementData &element = l.run->scene.elements[all[e].element];
-    return LocalFunction(l, std::string(element.type) + " " + element.name, all[e].expressions.data(), all[e].expressions.size());
+    return LocalFunction(l, std::string(element.type) + " " + element.name, all[e].expressions.data(),
+                         all[e].expressions.size());
   }
 };
 
-template <class K> void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename K::Data &data, std::vector<Expression> f, bool state)
+template <class K>
+void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename K::Data &data,
+           std::vector<Expression> f, bool state)
 {
   UserItem<K> item;
   for (int k = 0; k < K::markers; k++) item.marker[k] = markers[k].id;
-  item.data        = data;
-  item.carried     = state;
+  item.data    = data;
+  item.carried = state;
   for (const Expression &x : f) item.carried |= NeedsAcceleration(x);
   item.expressions = std::move(f);
   e.put<UserStore<K>>(std::move(item));
@@ -218,32 +224,39 @@ template <> Element Scene::add(const std::string &name, const UserForce &s)
   ElementBuilder e(*this, name, "user force", ElementData::Force, s.i, reaction ? s.j : Marker{}, reaction);
   UserWrenchData d;
   for (const auto *list : {&s.force, &s.moment})
-    e.require(list->empty() || list->size() == 3, std::to_string(list->size()) + (list == &s.force ? " components of force" : " components of moment") +
-                                                      ", must be none or three");
+    e.require(list->empty() || list->size() == 3,
+              std::to_string(list->size()) + (list == &s.force ? " components of force" : " components of moment") +
+                  ", must be none or three");
   e.require(!s.force.empty() || !s.moment.empty(), "neither force nor moment is given");
   if (framed) e.require(s.frame, "marker `frame`");
   if (!e.good()) return e.done();
   std::vector<Expression> f = s.force;
   f.insert(f.end(), s.moment.begin(), s.moment.end());
-  d.force    = s.force.empty() ? -1 : 0;
-  d.moment   = s.moment.empty() ? -1 : (int)s.force.size();
-  d.reaction = reaction;
-  d.framed   = framed;
+  d.force                           = s.force.empty() ? -1 : 0;
+  d.moment                          = s.moment.empty() ? -1 : (int)s.force.size();
+  d.reaction                        = reaction;
+  d.framed                          = framed;
   const std::vector<Marker> markers = {s.i, reaction ? s.j : s.i, framed ? s.frame : s.i};
-  if (f.size() == 6) Enter<UserWrench<6>>(e, markers, d, std::move(f), s.state);
-  else Enter<UserWrench<3>>(e, markers, d, std::move(f), s.state);
+  if (f.size() == 6)
+    Enter<UserWrench<6>>(e, markers, d, std::move(f), s.state);
+  else
+    Enter<UserWrench<3>>(e, markers, d, std::move(f), s.state);
   return e.done();
 }
 
 /* The one component is the force, or the moment on i's body. */
 template <> Element Scene::add(const std::string &name, const UserScalarForce &s)
 {
-  ElementBuilder e(*this, name, s.rotational ? "user scalar moment" : "user scalar force", ElementData::Force, s.i, s.j);
+  ElementBuilder e(*this, name, s.rotational ? "user scalar moment" : "user scalar force", ElementData::Force, s.i,
+                   s.j);
   if (e.good() && !s.rotational)
-    e.require((e.frame(s.i).x - e.frame(s.j).x).norm() > 0, "the origins of markers i and j coincide, the line between them has no direction");
+    e.require((e.frame(s.i).x - e.frame(s.j).x).norm() > 0,
+              "the origins of markers i and j coincide, the line between them has no direction");
   if (!e.good()) return e.done();
-  if (s.rotational) Enter<UserAboutAxis>(e, {s.i, s.j}, {}, {s.value}, s.state);
-  else Enter<UserAlongLine>(e, {s.i, s.j}, {}, {s.value}, s.state);
+  if (s.rotational)
+    Enter<UserAboutAxis>(e, {s.i, s.j}, {}, {s.value}, s.state);
+  else
+    Enter<UserAlongLine>(e, {s.i, s.j}, {}, {s.value}, s.state);
   return e.done();
 }
 

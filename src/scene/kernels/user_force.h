@@ -1,5 +1,6 @@
 /*
-  Loads of user's forces from their components, which are inputs: expressions that the assembly evaluates, or force states.
+  Loads of user's forces from their components, which are inputs: expressions that the assembly evaluates, or force
+  states.
 */
 #ifndef HHTDAE_SCENE_USER_FORCE_H
 #define HHTDAE_SCENE_USER_FORCE_H
@@ -9,8 +10,8 @@
 namespace hhtdae
 {
 
-/* Force at i's origin and moment on i's body, in the axes of the third marker or of space; the reaction acts on j's body at the
-   same point. A marker that is not used stands for nothing: it may be any. */
+/* Force at i's origin and moment on i's body, in the axes of the third marker or of space; the reaction acts on j's
+   body at the same point. A marker that is not used stands for nothing: it may be any. */
 struct UserWrenchData {
   int  force = -1, moment = -1; /* first component of each; -1: none */
   bool reaction = false, framed = false;
@@ -23,7 +24,8 @@ template <int C> struct UserWrench : Force<UserWrench<C>, 3, C> {
   static constexpr unsigned    acts    = Position(0) | Rotation(0) | Position(1) | Rotation(1);
   using Data                           = UserWrenchData;
 
-  template <class T> static void components(const Data &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c)
+  template <class T>
+  static void components(const Data &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c)
   {
     for (int i = 0; i < C; i++) c[i] = z[i];
   }
@@ -54,20 +56,24 @@ private:
 
 /* Along the line from j to i, repulsive when positive */
 struct UserAlongLine : Force<UserAlongLine, 2, 1> {
-  static constexpr const char *name           = "user scalar force";
-  static constexpr int         inputs         = 1;
-  static constexpr bool        damped         = false, needs_rotation = false;
-  static constexpr unsigned    depends        = Position(0) | Position(1);
-  static constexpr unsigned    acts           = Position(0) | Position(1);
+  static constexpr const char *name   = "user scalar force";
+  static constexpr int         inputs = 1;
+  static constexpr bool        damped = false, needs_rotation = false;
+  static constexpr unsigned    depends = Position(0) | Position(1);
+  static constexpr unsigned    acts    = Position(0) | Position(1);
 
-  template <class T> static void components(const Empty &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c) { c[0] = z[0]; }
+  template <class T>
+  static void components(const Empty &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c)
+  {
+    c[0] = z[0];
+  }
   template <class T> static void apply(const Empty &, const Frame<T> *f, const T *c, Wrench<T> *on)
   {
     using std::sqrt;
     const Vec3<T> d = f[0].x - f[1].x;
     const T       k = c[0] / sqrt(T(d.dot(d)));
-    on[0].f = d * k;
-    on[1].f = -on[0].f;
+    on[0].f         = d * k;
+    on[1].f         = -on[0].f;
     for (int i = 0; i < 2; i++) on[i].m.fill(T(0));
   }
 };
@@ -80,7 +86,11 @@ struct UserAboutAxis : Force<UserAboutAxis, 2, 1> {
   static constexpr unsigned    depends = Rotation(1);
   static constexpr unsigned    acts    = Rotation(0) | Rotation(1);
 
-  template <class T> static void components(const Empty &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c) { c[0] = z[0]; }
+  template <class T>
+  static void components(const Empty &, const Frame<T> *, const Twist<T> *, const T &, const T *z, T *c)
+  {
+    c[0] = z[0];
+  }
   template <class T> static void apply(const Empty &, const Frame<T> *f, const T *c, Wrench<T> *on)
   {
     on[0].m = f[1].R.col(2) * c[0];
