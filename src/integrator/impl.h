@@ -21,8 +21,7 @@ enum class Mode {
 
 /* The stopping test and the reuse ladder, section 5 of the paper */
 struct Corrector {
-  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
-  PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
+  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance */
   PetscInt  max_it    = 10;
   PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
@@ -159,12 +158,6 @@ inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
-
-/* c of (40) in force */
-inline PetscReal CorrectorTolerance(const Integrator &I)
-{
-  return I.corrector.c_given || !I.constraints() ? I.corrector.c : ConstrainedTolerance(I.corrector.c, I.p.rho);
-}
 
 /* how every failure by a singular matrix ends */
 constexpr char singular[] = "the Newton matrix is singular";
