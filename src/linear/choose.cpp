@@ -1,5 +1,6 @@
 /* The choice of a direct solver: by the work that a factorization takes, not by the number of unknowns */
 #include "graph.h"
+#include "klupair.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -33,10 +34,11 @@ static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6, LARGE_PER_
 /* Counting stops here: a factor with this many entries is large by any measure */
 static const double COUNT_LIMIT = 1e7;
 
-static const char *const small_packages[] = {MATSOLVERKLU, MATSOLVERUMFPACK, MATSOLVERSUPERLU, LINEAR_MUMPSND,
-                                             MATSOLVERMUMPS};
+static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
+                                             MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
 static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS,   MATSOLVERSUPERLU_DIST,
-                                             MATSOLVERUMFPACK, MATSOLVERSUPERLU, MATSOLVERKLU};
+                                             MATSOLVERUMFPACK, MATSOLVERSUPERLU, LINEAR_KLUPAIR,
+                                             MATSOLVERKLU};
 
 /* ---- what the user settled ---- */
 

@@ -17,7 +17,7 @@ struct Solver {
   const char *name, *pc, *package;
 };
 static const Solver solvers[] = {
-    {"KLU", PCLU, "klu"}, {"MUMPS LU", PCLU, "mumpsnd"}, {"MUMPS LDL^T", PCCHOLESKY, "mumpsnd"}};
+    {"KLU", PCLU, "klu"}, {"KLU pairs", PCLU, "klupair"}, {"MUMPS LU", PCLU, "mumpsnd"}, {"MUMPS LDL^T", PCCHOLESKY, "mumpsnd"}};
 static const int num_solvers = sizeof solvers / sizeof *solvers;
 
 /* Seconds of one numeric factorization and three solves, the median over repetitions that take 0.2 s in all */

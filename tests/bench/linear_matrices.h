@@ -6,6 +6,7 @@
 #define HHTDAE_BENCH_LINEAR_MATRICES_H
 
 #include "../../examples/elasticblock_brick.h"
+#include <cmath>
 #include <petscmat.h>
 #include <vector>
 
@@ -66,6 +67,41 @@ inline Entries chain(PetscInt bodies, PetscInt modes)
       }
     }
   }
+  return e;
+}
+
+/*
+  Bodies in space, each hinged to the one before by a revolute joint: position and three angles per body, with blocks of
+  3 x 3 for mass and inertia, and per joint three multipliers of its point and two of its axis. As in a moving chain no
+  two bodies have the same orientation. loops > 0 closes a ring of so many bodies, again and again, by spherical joints.
+  Unknowns: all coordinates, then all multipliers.
+*/
+inline Entries spatial_chain(PetscInt bodies, PetscInt loops = 0)
+{
+  Entries    e;
+  const auto joint = [&e](PetscInt first, PetscInt second, PetscInt rows) {
+    const PetscInt body[2] = {first, second};
+    for (PetscInt d = 0; d < rows; ++d) {
+      const PetscInt lambda = e.n++;
+      for (int s = 0; s < 2; ++s) {
+        if (body[s] < 0) continue;
+        const PetscInt q    = 6 * body[s];
+        const double   sign = s ? 1.0 : -1.0;
+        if (d < 3) e.add_symmetric(lambda, q + d, sign);
+        for (PetscInt a = 0; a < 3; ++a)
+          e.add_symmetric(lambda, q + 3 + a, sign * 0.5 * std::cos((1.0 + 0.6 * d) * (a + 1.0) + 0.7 * (double)body[s] + s));
+      }
+    }
+  };
+  e.n = 6 * bodies;
+  for (PetscInt b = 0; b < bodies; ++b)
+    for (PetscInt i = 0; i < 3; ++i)
+      for (PetscInt j = 0; j < 3; ++j) {
+        e.add(6 * b + i, 6 * b + j, i == j ? 2.0 : 0.0);
+        e.add(6 * b + 3 + i, 6 * b + 3 + j, i == j ? 0.4 + 0.1 * (double)i : 0.05 * std::sin((double)(b + i + j)));
+      }
+  for (PetscInt b = 0; b < bodies; ++b) joint(b - 1, b, 5);
+  for (PetscInt b = 0; loops > 0 && b + loops <= bodies; b += loops) joint(b, b + loops - 1, 3);
   return e;
 }
 

@@ -277,7 +277,7 @@ protected:
   }
 };
 
-TEST_F(LinearChoiceTest, ChainTakesKLU)
+TEST_F(LinearChoiceTest, ChainTakesKLUPair)
 {
   Entries entries = chain(1000, 0); /* 5000 unknowns */
   Mat     A;
@@ -286,7 +286,7 @@ TEST_F(LinearChoiceTest, ChainTakesKLU)
     const Chosen c = choose(A, symmetric, {}, nothing);
     EXPECT_EQ(c.ksp, KSPPREONLY);
     EXPECT_EQ(c.pc, PCLU);
-    EXPECT_EQ(c.package, MATSOLVERKLU);
+    EXPECT_EQ(c.package, has(A, "klupair", MAT_FACTOR_LU) ? "klupair" : MATSOLVERKLU);
     EXPECT_FALSE(c.choice.cholesky);
   }
   OK(MatDestroy(&A));
