@@ -11,6 +11,10 @@
   the last step instead, down to a hundredth of the tolerance under error control and without limit (and fifty times more
   strictly) at fixed steps.
 
+  With constraints and little damping c is smaller, ConstrainedTolerance(): what is left of a correction in q excites the
+  multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
+  (h fell to 1e-6). A c that the user has set stands.
+
   The ladder, from the cheapest rung:
     reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
     renew      before a correction otherwise; within a correction when it is slow, a few times
@@ -127,7 +131,8 @@ PetscReal Tolerance(const Integrator &I)
 {
   const Corrector &c = I.corrector;
   if (I.mode == Mode::Start) return 1e-13;
-  return I.fixed_h ? fixed * c.c * PetscMin(c.wlte, 1) : c.c * PetscClipInterval(c.wlte, 0.01, 1);
+  const PetscReal tol = CorrectorTolerance(I);
+  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, 0.01, 1);
 }
 
 /* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
@@ -263,6 +268,23 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 }
 
 } // namespace
+
+/* Whether the state at t1 and the residual F there are numbers, named if not */
+PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok)
+{
+  Integrator &I     = Get(ts);
+  Vec         all[] = {F, I.U1, I.V1, I.A1};
+
+  PetscFunctionBegin;
+  *ok = PETSC_TRUE;
+  for (Vec x : all) {
+    PetscReal norm;
+    PetscCall(VecNorm(x, NORM_2, &norm));
+    if (PetscIsInfOrNanReal(norm)) *ok = PETSC_FALSE;
+  }
+  if (!*ok) PetscCall(NameBadRow(ts, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* A slow correction goes on with a matrix made at its present iterate */
 PetscErrorCode FreshMatrixNextIteration(TS ts)

@@ -89,6 +89,19 @@ inline PetscReal ScalePosition(const Parameters &p, PetscReal h) { return p.beta
 inline PetscReal ScaleVelocity(const Parameters &p, PetscReal h) { return p.gamma * h; }
 inline PetscReal ScaleState(const Parameters &p, PetscReal h) { return p.gamma_s * h; }
 
+/* How much less the multipliers' oscillation is damped than at alpha = -0.05 (or its spectral radius), 1 down to 0. Phi = 0
+   leaves normal accelerations with the double eigenvalue -rho: what one step leaves in q or q' grows by 1/(1-rho) before it
+   dies out, and what every step leaves, by 1/(1-rho)^2. */
+inline PetscReal RelativeDamping(PetscReal rho) { return PetscMin(1, (1 - rho) * (PetscReal)(1.05 / 0.1)); }
+
+/* c of (40) for a system with constraints, so that c/(1-rho)^2 does not exceed what it is at alpha = -0.05. At rho = 1 nothing
+   is damped, and what is left of each correction adds up: little. */
+inline PetscReal ConstrainedTolerance(PetscReal c, PetscReal rho)
+{
+  const PetscReal d = RelativeDamping(rho);
+  return c * PetscMax(d * d, (PetscReal)1e-5);
+}
+
 /* (40), (41b): the error left after a correction of size e (in units of the tolerance) at rate xi */
 inline PetscReal CorrectorError(PetscReal xi, PetscReal e) { return xi < 1 ? xi / (1 - xi) * e : PETSC_MAX_REAL; }
 

@@ -281,7 +281,10 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "gamma=%g, beta=%g, local error %g h^2 (a_{n+1} - a_n)\n", (double)p.gamma, (double)p.beta, (double)p.k));
   if (I.predictor.fixed) PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree %" PetscInt_FMT "\n", I.predictor.degree_max));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree up to %" PetscInt_FMT ", chosen in each step (now %" PetscInt_FMT ")\n", I.predictor.degree_max, I.predictor.degree));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "corrector: error left below %g of the tolerance, at most %" PetscInt_FMT " iterations\n", (double)c.c, c.max_it));
+  const PetscReal tol = CorrectorTolerance(I);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "corrector: error left below %g of the tolerance%s, at most %" PetscInt_FMT " iterations\n", (double)tol,
+                                   tol < c.c ? " (small, as little of the multipliers' oscillation is damped)" : "", c.max_it));
+  if (I.constraints() && p.rho == 1) PetscCall(PetscViewerASCIIPrintf(viewer, "the multipliers' oscillation is not damped at all\n"));
   if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.slow_rate, (double)c.hold));
   PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));

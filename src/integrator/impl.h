@@ -21,7 +21,8 @@ enum class Mode {
 
 /* The stopping test and the reuse ladder, section 5 of the paper */
 struct Corrector {
-  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance */
+  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
+  PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
   PetscInt  max_it    = 10;
   PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
@@ -140,6 +141,7 @@ struct Integrator {
   PetscObjectState sol_state = 0, dot_state = 0;
   PetscObjectId    sol_id = 0;
   PetscReal        h_regular = 0; /* running maximum of steps that went through the corrector, forgetting a tenth in each */
+  PetscInt         tiny_row = 0;  /* tiny steps in a row to which failures have led */
   PetscReal        h_limit = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscBool        auto_h = PETSC_FALSE;
   PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */
@@ -158,6 +160,12 @@ inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* c of (40) in force */
+inline PetscReal CorrectorTolerance(const Integrator &I)
+{
+  return I.corrector.c_given || !I.constraints() ? I.corrector.c : ConstrainedTolerance(I.corrector.c, I.p.rho);
+}
 
 /* how every failure by a singular matrix ends */
 constexpr char singular[] = "the Newton matrix is singular";
@@ -190,6 +198,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 PetscErrorCode CorrectorSetUp(TS ts);
 PetscErrorCode Correct(TS ts, PetscBool *converged);
 PetscErrorCode Iterate(TS ts, PetscBool *converged);
+PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok);
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 PetscErrorCode FreshMatrixNextIteration(TS ts);
 /* estimate.cpp */
@@ -216,6 +225,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
 /* misfit.cpp */
 PetscErrorCode AdaptVelocities(TS ts);
+PetscErrorCode StartMisfit(TS ts, Vec rate);
 /* history.cpp: what a change of coordinates does to the state and the history */
 PetscErrorCode MapStart(TS ts);
 PetscErrorCode MapHistory(TS ts);

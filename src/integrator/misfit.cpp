@@ -11,6 +11,8 @@
   from a central difference of Phi along the motion. Two residuals and one solve per change of h; nothing else. The reported
   q'_n stays as it is.
 
+  A start, StartMisfit(), puts in that misfit, which consistent velocities do not have.
+
   A change of coordinates bends the motion: (2a) misses q by k h^3 q''', which Phi = 0 does not allow in the normals' directions,
   and that is the misfit, -k h^2 (q''')_normal. While velocities follow the new coordinates Q as tangents, Q'_n = T q'_n, the third
   derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
@@ -28,8 +30,13 @@ namespace
    the spike is then one of the new, larger step's own order */
 constexpr PetscReal regular = 1e-3;
 
-/* Relative changes of h that are worth it, without and with first-order states in the error test */
-constexpr PetscReal least[2] = {0.1, 1e-3};
+/* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, and without
+   damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
+PetscReal Least(const Integrator &I)
+{
+  const PetscReal least = 1e-3;
+  return I.count[TSHHT3_STATE] ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
+}
 
 /* r = scale times the rows of holonomic constraints of F, added to what is there */
 PetscErrorCode AddHolonomicRows(const Integrator &I, PetscReal scale, Vec F, Vec r)
@@ -128,6 +135,21 @@ PetscErrorCode ComputeBend(TS ts)
 
 } // namespace
 
+/* A consistent start has no misfit where the method wants -k h^2 (q''')_normal: the first step would make it good by an
+   oscillation of the multipliers, which at little damping takes many steps to die out. With the matrix of the start. */
+PetscErrorCode StartMisfit(TS ts, Vec rate)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (!I.count[TSHHT3_HOLONOMIC] || ts->snes->mf_operator) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
+  PetscCall(VecCopy(rate, I.bend));
+  PetscCall(KeepCoordinates(I, I.bend));
+  PetscCall(ComputeBend(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* For a step of length I.h after one of h_last */
 PetscErrorCode AdaptVelocities(TS ts)
 {
@@ -138,7 +160,7 @@ PetscErrorCode AdaptVelocities(TS ts)
   I.misfit = 0;
   if (I.bent == Bend::Rates && I.corrector.have_matrix) PetscCall(ComputeBend(ts));
   if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < least[I.count[TSHHT3_STATE] > 0] || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
   I.misfit = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);

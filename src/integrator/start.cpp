@@ -178,6 +178,7 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   PetscCall(VecRestoreArray(p.D[0], &d0));
   PetscCall(VecRestoreArray(I.X0, &x));
   PetscCall(VecRestoreArrayRead(rate, &j));
+  if (e > 0) PetscCall(StartMisfit(ts, rate));
   if (e > 0 && (p.degree_max > 0 || I.count[TSHHT3_STATE])) {
     if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
     PetscCall(VecCopy(rate, p.D[1]));
@@ -343,6 +344,7 @@ PetscErrorCode Start(TS ts)
   PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
   I.stat.restarts++;
   I.repaired = PETSC_FALSE;
+  I.tiny_row = 0;
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ClearAlgebraicRates(I, I.V0));
@@ -425,6 +427,11 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
   PetscCall(ConsistentAccelerations(ts, t1, U, V, PETSC_FALSE, ok));
   I.h  = h;
   I.t1 = t1;
+  if (*ok) {
+    /* the start has differentiated the constraints at times around t1: it need not have seen their values there */
+    PetscCall(EvaluateResidual(ts, t1, I.U1, I.V1, I.A1, U));
+    PetscCall(CheckNumbers(ts, U, ok));
+  }
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&U));
   PetscFunctionReturn(PETSC_SUCCESS);

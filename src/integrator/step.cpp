@@ -14,6 +14,9 @@ namespace hht3
 namespace
 {
 
+/* Failures that cut h below rounding again and again: time hardly moves */
+constexpr PetscInt max_tiny_row = 50;
+
 constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
 /* Whether someone other than the integrator has changed the solution since the last step: an event, a post-step function,
@@ -186,10 +189,13 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
 /* After a rejection: is there a point in another attempt? */
 PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 {
+  const Integrator &I = Get(ts);
+
   PetscFunctionBegin;
   ts->reject++;
   if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
   else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
+  else if (I.tiny_row >= max_tiny_row) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
   else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -214,14 +220,15 @@ PetscErrorCode Fail(TS ts, const char *what)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
+  const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
   ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
   PetscCall(VecCopy(I.repaired ? I.accepted[0] : I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.repaired ? I.accepted[1] : I.V0, ts->vec_dot));
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
-             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).",
-             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime);
+             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
+             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime, hint);
   PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -243,8 +250,10 @@ PetscErrorCode Step(TS ts)
     PetscCall(Attempt(ts, &tiny, &ok));
     if (ok) {
       PetscCall(Choose(ts, tiny, &next, &accept));
-      if (accept) PetscCall(Accept(ts, tiny, next));
-      else ts->time_step = next;
+      if (accept) {
+        PetscCall(Accept(ts, tiny, next));
+        I.tiny_row = !tiny ? 0 : I.tiny_row + (rejections > 0);
+      } else ts->time_step = next;
     }
     if (!ok || !accept) {
       accept = PETSC_FALSE;

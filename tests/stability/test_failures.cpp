@@ -238,3 +238,47 @@ TEST(Failures, SingularMatrixIsAFailedStepOfAnySize)
     EXPECT_EQ(run.t(), 0.);
   }
 }
+
+namespace
+{
+
+/* A pendulum with any one row spoiled from t = 1/2 on */
+struct SpoiledRow : Pendulum {
+  int    row;
+  double value;
+  SpoiledRow(int i, double with) : Pendulum(-60., 1., 2.), row(i), value(with) {}
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    Pendulum::residual(t, u, v, a, f);
+    if (t >= .5) f[row] = value;
+  }
+};
+
+} // namespace
+
+/* Whatever row it is, constraints too, which the start differentiates: no crawling with steps below rounding */
+TEST(Failures, NotANumberInAnyRowStopsTheRunSoon)
+{
+  for (double value : {(double)NAN, (double)INFINITY})
+    for (int row = 0; row < 3; row++) {
+      SCOPED_TRACE(text("row %d is %g", row, value));
+      const SpoiledRow p(row, value);
+      Simulation       run(p, tolerance(1e-6) + "-ts_max_steps 5000");
+      double           last = 0.;
+      run.watch = [&](Simulation &, PetscInt, double t) { last = t; };
+      ErrorTrap trap;
+      EXPECT_EQ(run.solve(), PETSC_ERR_NOT_CONVERGED);
+      EXPECT_TRUE(trap.says("not a number")) << trap.message;
+      EXPECT_TRUE(trap.says("t = 0.")) << trap.message;
+      const TSHHT3Statistics s = run.statistics();
+      MEASURED("row %d is %g from t = 0.5 on: %d steps, %d tiny, %d failed, stops at %.17g", row, value, (int)s.steps, (int)s.tiny_steps,
+               (int)s.corrector_fails, last);
+      EXPECT_LT(s.steps, 1000);
+      EXPECT_LT(last, .5);
+      EXPECT_GT(last, .4);
+      EXPECT_EQ(run.t(), last);
+      const ProblemErrors e = run.errors();
+      EXPECT_LT(e.q, 1e-3);
+      EXPECT_LT(e.v, 1e-2);
+    }
+}
