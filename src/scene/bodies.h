@@ -26,8 +26,14 @@ inline int Coordinates(BodyKind k)
   return n[(int)k];
 }
 /* Coordinates come in groups whose rows of the matrix have the same columns */
-inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : k == BodyKind::Rigid ? 2 : 1; }
-inline int GroupSize(BodyKind k) { return k == BodyKind::PlanarPoint ? 2 : 3; }
+inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : k == BodyKind::Rigid || k == BodyKind::Planar ? 2 : 1; }
+/* group 0: position, group 1: rotation */
+inline int GroupSize(BodyKind k, int group)
+{
+  if (k == BodyKind::Planar || k == BodyKind::PlanarPoint) return group == 0 ? 2 : 1;
+  return 3;
+}
+inline int GroupOffset(BodyKind k, int group) { return group == 0 ? 0 : GroupSize(k, 0); }
 
 /* what does not change in a step */
 struct LocalBody {

@@ -10,7 +10,7 @@ namespace hhtdae
 
 template <class K> class ConstraintBatch : public Batch
 {
-  static constexpr int M = K::markers, R = K::rows, Z = K::inputs;
+  static constexpr int M = K::markers, R = K::rows, Z = K::inputs, all_rows = (1 << R) - 1;
 
 public:
   struct Instance {
@@ -31,8 +31,10 @@ public:
         const LocalBody &b = bodyOf(B, e, k);
         for (int g = 0; g < Groups(b.kind); g++) {
           if (!uses(b.kind, g, k)) continue;
-          request_.push_back(p.need(e.group, b.group + g));
-          request_.push_back(p.need(b.group + g, e.group));
+          /* rows that follow the origin direction by direction, complete */
+          const bool diagonal = K::translates && g == 0 && GroupSize(b.kind, g) == R && (e.active & all_rows) == all_rows;
+          request_.push_back(p.need(e.group, b.group + g, diagonal));
+          request_.push_back(p.need(b.group + g, e.group, diagonal));
         }
       }
       for (int i = 0; i < Z; i++) request_.push_back(p.need(e.group, e.input[i].group));
@@ -217,11 +219,11 @@ private:
           T.row(r) = Matrix<1, 6>(T.row(active[r]));
           S.row(r) = Matrix<1, 6>(S.row(active[r]));
         }
-      const int size = GroupSize(b.kind);
       for (int g = 0; g < Groups(b.kind); g++) {
         if (!uses(b.kind, g, k)) continue;
-        ev.sink.add(*slot++, S.middleCols(g * size, size), rows, size);
-        ev.sink.add(*slot++, T.middleCols(g * size, size).transpose(), size, rows);
+        const int size = GroupSize(b.kind, g), at = GroupOffset(b.kind, g);
+        ev.sink.add(*slot++, S.middleCols(at, size), rows, size);
+        ev.sink.add(*slot++, T.middleCols(at, size).transpose(), size, rows);
       }
       (void)n;
     }
@@ -267,8 +269,8 @@ private:
               }
               made = true;
             }
-            const int sb = GroupSize(b.kind), sc = GroupSize(c.kind);
-            ev.sink.add(*slot++, D.block(g * sb, h * sc, sb, sc), sb, sc);
+            const int sb = GroupSize(b.kind, g), sc = GroupSize(c.kind, h);
+            ev.sink.add(*slot++, D.block(GroupOffset(b.kind, g), GroupOffset(c.kind, h), sb, sc), sb, sc);
           }
       }
     (void)w;

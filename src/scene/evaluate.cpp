@@ -59,8 +59,10 @@ void BodyBlocks(const Runtime &R, const Evaluation &e)
     Eigen::Matrix<double, 6, 6, Eigen::RowMajor> B;
     const BodyKind                               kind = R.bodies.body[b].kind;
     R.bodies.jacobian(b, e.v, e.a, e.sv, e.sa, B);
-    const int size = GroupSize(kind);
-    for (int g = 0; g < Groups(kind); g++) e.sink.add(*slot++, B.block(g * size, g * size, size, size), size, size);
+    for (int g = 0; g < Groups(kind); g++) {
+      const int size = GroupSize(kind, g), at = GroupOffset(kind, g);
+      e.sink.add(*slot++, B.block(at, at, size, size), size, size);
+    }
   }
 }
 

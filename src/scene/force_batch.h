@@ -157,8 +157,8 @@ protected:
               }
               made = true;
             }
-            const int sb = GroupSize(b.kind), sc = GroupSize(c.kind);
-            ev.sink.add(*slot++, D.block(g * sb, h * sc, sb, sc), sb, sc);
+            const int sb = GroupSize(b.kind, g), sc = GroupSize(c.kind, h);
+            ev.sink.add(*slot++, D.block(GroupOffset(b.kind, g), GroupOffset(c.kind, h), sb, sc), sb, sc);
           }
       }
   }
@@ -171,9 +171,11 @@ protected:
       const LocalBody &b = bodyOf(ev.bodies, e, k);
       Matrix<n, 6>     T = Matrix<n, 6>::Zero();
       ev.bodies.columns(e.marker[k], f[k], Matrix<n, 6>(-J.template middleRows<6>(6 * k).transpose()), T);
-      const int size = GroupSize(b.kind);
-      for (int g = 0; g < Groups(b.kind); g++)
-        if (loads(b.kind, g, k)) ev.sink.add((slot++)->column(offset), T.middleCols(g * size, size).transpose(), size, n);
+      for (int g = 0; g < Groups(b.kind); g++) {
+        if (!loads(b.kind, g, k)) continue;
+        const int size = GroupSize(b.kind, g);
+        ev.sink.add((slot++)->column(offset), T.middleCols(GroupOffset(b.kind, g), size).transpose(), size, n);
+      }
     }
   }
 };
@@ -319,9 +321,9 @@ private:
       }
       ev.bodies.columns(e.marker[k], f[k], Matrix<C, 6>(J + ev.sv * V), out);
       if constexpr (K::damped) ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, V, out);
-      const int size = GroupSize(b.kind);
       for (int g = 0; g < Groups(b.kind); g++)
-        if (Base::uses(b.kind, g, k)) ev.sink.add(*slot++, out.middleCols(g * size, size), C, size);
+        if (Base::uses(b.kind, g, k))
+          ev.sink.add(*slot++, out.middleCols(GroupOffset(b.kind, g), GroupSize(b.kind, g)), C, GroupSize(b.kind, g));
     }
   }
 

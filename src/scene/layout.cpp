@@ -131,8 +131,8 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
   k.first = own ? global - R.start : R.n + (PetscInt)(std::lower_bound(R.others.begin(), R.others.end(), global) - R.others.begin());
   k.group = (PetscInt)R.pattern.group.size();
   for (int g = 0; g < Groups(k.kind); g++) {
-    const int size = GroupSize(k.kind);
-    R.pattern.addGroup(global + g * size, k.first + g * size, size, own);
+    const int at = GroupOffset(k.kind, g);
+    R.pattern.addGroup(global + at, k.first + at, GroupSize(k.kind, g), own);
   }
   return k;
 }
@@ -207,7 +207,7 @@ PetscErrorCode MakePattern(Runtime &R)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    for (int g = 0; g < Groups(k.kind); g++) request.push_back(R.pattern.need(k.group + g, k.group + g));
+    for (int g = 0; g < Groups(k.kind); g++) request.push_back(R.pattern.need(k.group + g, k.group + g, g == 0));
   }
   for (auto &b : R.batches) b->pattern(R.pattern);
   R.pattern.build(R.start, R.n);

@@ -7,35 +7,43 @@ namespace hhtdae
 /* Columns of each row group, sorted, then offsets of every block */
 void Pattern::build(PetscInt start, PetscInt n)
 {
-  std::vector<PetscInt> first(group.size() + 1, 0);
+  struct Column {
+    PetscInt group;
+    bool     diagonal;
+    PetscInt at; /* first entry in the row, of its part of the matrix */
+  };
+  const std::size_t     groups = group.size();
+  std::vector<PetscInt> first(groups + 1, 0);
   for (const Request &r : request_)
     if (r.row >= 0 && group[r.row].own) first[r.row + 1]++;
-  for (std::size_t g = 0; g < group.size(); g++) first[g + 1] += first[g];
-  std::vector<PetscInt> columns(first.back()), fill(first.begin(), first.end() - 1);
+  for (std::size_t g = 0; g < groups; g++) first[g + 1] += first[g];
+  std::vector<Column>   columns(first.back());
+  std::vector<PetscInt> fill(first.begin(), first.end() - 1), last(groups);
   for (const Request &r : request_)
-    if (r.row >= 0 && group[r.row].own) columns[fill[r.row]++] = r.column;
+    if (r.row >= 0 && group[r.row].own) columns[fill[r.row]++] = {r.column, r.diagonal, 0};
 
-  /* unique columns by global number; own ones before others'. Column groups of one owner are contiguous, so sizes add up. */
-  std::vector<PetscInt> last(group.size());
-  const auto before = [&](PetscInt a, PetscInt b) {
-    return group[a].own != group[b].own ? group[a].own : group[a].global < group[b].global;
+  /* unique columns by global number; own ones before others'; diagonal if all who asked want no more */
+  const auto before = [&](const Column &a, const Column &b) {
+    const Group &x = group[a.group], &y = group[b.group];
+    return x.own != y.own ? x.own : x.global < y.global;
   };
-  for (std::size_t g = 0; g < group.size(); g++) {
-    auto begin = columns.begin() + first[g], end = columns.begin() + first[g + 1];
-    std::sort(begin, end, before);
-    last[g] = (PetscInt)(std::unique(begin, end) - columns.begin());
-  }
-
+  const auto width = [&](const Column &c) { return c.diagonal ? 1 : group[c.group].size; };
+  std::vector<PetscInt> width_own(groups, 0), width_other(groups, 0);
   di.assign(n + 1, 0);
   oi.assign(n + 1, 0);
-  std::vector<PetscInt> width_own(group.size(), 0), width_other(group.size(), 0);
-  for (std::size_t g = 0; g < group.size(); g++) {
-    if (!group[g].own) continue;
-    for (PetscInt k = first[g]; k < last[g]; k++) {
-      const Group &c = group[columns[k]];
-      (c.own ? width_own : width_other)[g] += c.size;
+  for (std::size_t g = 0; g < groups; g++) {
+    std::sort(columns.begin() + first[g], columns.begin() + first[g + 1], before);
+    last[g] = first[g];
+    for (PetscInt k = first[g]; k < first[g + 1]; k++) {
+      if (last[g] > first[g] && columns[last[g] - 1].group == columns[k].group) columns[last[g] - 1].diagonal &= columns[k].diagonal;
+      else columns[last[g]++] = columns[k];
     }
-    for (PetscInt r = 0; r < group[g].size; r++) {
+    for (PetscInt k = first[g]; k < last[g]; k++) {
+      PetscInt &sum = (group[columns[k].group].own ? width_own : width_other)[g];
+      columns[k].at = sum;
+      sum += width(columns[k]);
+    }
+    for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
       di[group[g].local + r + 1] = width_own[g];
       oi[group[g].local + r + 1] = width_other[g];
     }
@@ -44,34 +52,31 @@ void Pattern::build(PetscInt start, PetscInt n)
     di[i + 1] += di[i];
     oi[i + 1] += oi[i];
   }
+
   dj.resize(di[n]);
   oj.resize(oi[n]);
-  for (std::size_t g = 0; g < group.size(); g++) {
-    if (!group[g].own) continue;
-    for (PetscInt r = 0; r < group[g].size; r++) {
+  for (std::size_t g = 0; g < groups; g++)
+    for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
       PetscInt d = di[group[g].local + r], o = oi[group[g].local + r];
       for (PetscInt k = first[g]; k < last[g]; k++) {
-        const Group &c = group[columns[k]];
-        for (PetscInt e = 0; e < c.size; e++) {
+        const Group &c = group[columns[k].group];
+        for (PetscInt e = columns[k].diagonal ? r : 0; e < (columns[k].diagonal ? r + 1 : c.size); e++) {
           if (c.own) dj[d++] = c.global + e - start;
           else oj[o++] = c.global + e;
         }
       }
     }
-  }
 
   slot_.resize(request_.size());
   for (std::size_t q = 0; q < request_.size(); q++) {
     const PetscInt g = request_[q].row, c = request_[q].column;
     Slot          &s = slot_[q];
     if (g < 0 || !group[g].own) continue;
-    s.off            = !group[c].own;
-    s.stride         = s.off ? width_other[g] : width_own[g];
-    PetscInt at      = s.off ? oi[group[g].local] : di[group[g].local];
-    const auto found = std::lower_bound(columns.begin() + first[g], columns.begin() + last[g], c, before);
-    for (auto k = columns.begin() + first[g]; k != found; ++k)
-      if (group[*k].own == group[c].own) at += group[*k].size;
-    s.base = at;
+    s.off    = !group[c].own;
+    s.stride = s.off ? width_other[g] : width_own[g];
+    const auto found = std::lower_bound(columns.begin() + first[g], columns.begin() + last[g], Column{c, false, 0}, before);
+    s.diagonal       = found->diagonal;
+    s.base           = (s.off ? oi : di)[group[g].local] + found->at;
   }
 }
 

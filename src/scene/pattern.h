@@ -23,9 +23,9 @@ struct Group {
 struct Slot {
   PetscInt base   = -1; /* -1: the rows belong to another rank */
   PetscInt stride = 0;
-  bool     off    = false;
+  bool     off    = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
 
-  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off}; }
+  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal}; }
 };
 
 class Pattern
@@ -39,9 +39,9 @@ public:
     return (PetscInt)group.size() - 1;
   }
   /* asks for a block; its slot is known after build() under the number that is returned. Group -1: nothing, its slot takes nothing */
-  PetscInt need(PetscInt row, PetscInt column)
+  PetscInt need(PetscInt row, PetscInt column, bool diagonal = false)
   {
-    request_.push_back({column < 0 ? -1 : row, column});
+    request_.push_back({column < 0 ? -1 : row, column, diagonal});
     return (PetscInt)request_.size() - 1;
   }
   /* diagonal entries that no element asks for are left out: multipliers have none */
@@ -58,6 +58,7 @@ public:
 private:
   struct Request {
     PetscInt row, column;
+    bool     diagonal; /* entries (r, r) alone, unless somebody else wants all */
   };
   std::vector<Request> request_;
   std::vector<Slot>    slot_;
@@ -72,7 +73,9 @@ struct Sink {
   {
     if (s.base < 0) return;
     double *p = (s.off ? off : diagonal) + s.base;
-    if (columns == 3) {
+    if (s.diagonal) {
+      for (int r = 0; r < rows; r++, p += s.stride) *p += B(r, r);
+    } else if (columns == 3) {
       for (int r = 0; r < rows; r++, p += s.stride)
         for (int c = 0; c < 3; c++) p[c] += B(r, c);
     } else {

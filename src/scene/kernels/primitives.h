@@ -19,7 +19,7 @@ template <int R> struct CoincideRows : Constraint<CoincideRows<R>, 2, R> {
   using Base                                  = Constraint<CoincideRows<R>, 2, R>;
   static constexpr const char *name           = R == 3 ? "coincidence" : "coincidence in the plane";
   static constexpr unsigned    depends        = Position(0) | Position(1);
-  static constexpr bool        needs_rotation = false;
+  static constexpr bool        needs_rotation = false, translates = true;
   static constexpr bool        curved(int, int) { return false; }
 
   template <class T> static void value(const Empty &, const Frame<T> *f, const T &, T *phi)
