@@ -153,10 +153,13 @@ static PetscErrorCode ReportError(Mat F, Mat A)
                "KLU's factorization of the matrix with %" PetscInt_FMT " rows failed with status %d", A->rmap->N,
                (int)k->common.status);
     F->factorerrortype = k->common.status == KLU_OUT_OF_MEMORY ? MAT_FACTOR_OUTMEMORY : MAT_FACTOR_OTHER;
+  } else if (k->common.singular_col >= (KluInt)A->rmap->N) {
+    PetscCheck(!A->erroriffailure, PETSC_COMM_SELF, PETSC_ERR_FP,
+               "The matrix with %" PetscInt_FMT " rows or its factors are not finite", A->rmap->N);
+    F->factorerrortype = MAT_FACTOR_OTHER;
   } else {
     PetscCheck(!A->erroriffailure, PETSC_COMM_SELF, PETSC_ERR_MAT_LU_ZRPVT,
-               "The matrix with %" PetscInt_FMT
-               " rows is singular: KLU met a zero or infinite pivot in row %" PetscInt_FMT,
+               "The matrix with %" PetscInt_FMT " rows is singular: KLU met a zero pivot in row %" PetscInt_FMT,
                A->rmap->N, (PetscInt)k->common.singular_col);
     F->factorerrortype             = MAT_FACTOR_NUMERIC_ZEROPIVOT;
     F->factorerror_zeropivot_row   = (PetscInt)k->common.singular_col;

@@ -131,6 +131,9 @@ int main(int argc, char **argv)
       "spatial chain with rings of 8, bodies", {80, 1000, 10000}, limit, [](PetscInt n) { return spatial_chain(n, 8); },
       [](PetscInt n) { return 6 * n; }));
   PetscCall(family(
+      "one ring in space, bodies", {1000, 10000, 30000, 100000}, limit, [](PetscInt n) { return spatial_chain(n, n); },
+      [](PetscInt n) { return 6 * n; }));
+  PetscCall(family(
       "chain of bodies with 20 modes, bodies", {10, 100, 1000}, limit, [](PetscInt n) { return chain(n, 20); },
       [](PetscInt n) { return 23 * n; }));
   PetscCall(family(

@@ -517,6 +517,21 @@ TEST_F(KluPair, SingularMatricesAreReported)
   }
 }
 
+TEST_F(KluPair, ValuesThatAreNotFinite)
+{
+  for (double value : {(double)NAN, (double)INFINITY}) {
+    factor(chain(5, 0));
+    const double before = 2.0;
+    set(4, 4, value);
+    OK(MatLUFactorNumeric(F, A, &info));
+    EXPECT_NE(error(), MAT_FACTOR_NOERROR) << value;
+    set(4, 4, before);
+    OK(MatLUFactorNumeric(F, A, &info));
+    EXPECT_EQ(error(), MAT_FACTOR_NOERROR);
+    EXPECT_LT(residual(), 1e-12);
+  }
+}
+
 /* The KSP fails as PETSc's do, and recovers when the matrix does */
 TEST_F(KluPair, SolverFailsAndRecovers)
 {
