@@ -267,7 +267,7 @@ bool Balanced(const Equilibrium &E, const Unbalanced &at, double h)
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
   SceneData &s = E.R.scene;
-  double     h, first;
+  double     h = 0, first;
   bool       good;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
@@ -300,7 +300,7 @@ PetscErrorCode FindEquilibrium(Runtime &R)
   const auto              variables = s.variables, states = s.states;
   Equilibrium             E(R);
   Unbalanced              at;
-  bool                    found;
+  bool                    found     = false;
   PetscFunctionBegin;
   PetscCall(Create(E));
   PetscCall(Relax(E, &found, at));
