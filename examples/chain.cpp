@@ -127,7 +127,7 @@ static PetscErrorCode Run(void)
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecGetSize(U, &unknowns));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "chain: bodies=%d unknowns=%d step=%.4g us body_step=%.4g us memory=%.0f bytes/body\n", (int)bodies, (int)unknowns,
-                        1e6 * (double)s.time / s.steps, 1e6 * (double)s.time / s.steps / bodies, (double)all / bodies));
+                        1e6 * (double)s.cpu / s.steps, 1e6 * (double)s.cpu / s.steps / bodies, (double)all / bodies));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "tip: t=%g x=%.12g y=%.12g z=%.12g\n", (double)t, x[0], x[1], planar ? 0 : x[2]));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: energy=%.3e kinetic=%.3e\n", drift, exchanged));
   PetscCall(TSDestroy(&ts));
