@@ -286,9 +286,11 @@ static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
   PetscCall(PetscMemzero(info, sizeof *info));
   info->block_size = 1;
   /* L has ones on its diagonal */
-  info->nz_used      = k->numeric ? (double)k->numeric->lnz + (double)k->numeric->unz - (double)F->rmap->n : foreseen;
-  info->nz_allocated = info->nz_used;
-  info->memory       = (double)k->common.memusage;
+  info->nz_used = foreseen;
+  if (k->numeric)
+    info->nz_used = (double)k->numeric->lnz + (double)k->numeric->unz + (double)k->numeric->nzoff - (double)F->rmap->n;
+  info->nz_allocated      = info->nz_used;
+  info->memory            = (double)k->common.memusage;
   info->fill_ratio_given  = foreseen / matrix;
   info->fill_ratio_needed = info->nz_used / matrix;
   PetscFunctionReturn(0);

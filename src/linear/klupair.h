@@ -5,8 +5,8 @@
   depth-first search from one column after the other, which for nets and rings of bodies costs the square of their
   number. Here every unknown without a diagonal value is paired with an unknown that it is coupled to, all of them at
   once and in a few sweeps; the pairs are ordered as one vertex each, and KLU gets both permutations. The factorization
-  of a matrix with the same pattern keeps the pivots (klu_refactor) while they remain good. Without a diagonal block
-  structure (BTF) the factors are those of one block.
+  of a matrix with the same pattern keeps the pivots (klu_refactor) while they remain good. KLU's diagonal
+  blocks (BTF) are used only where the whole diagonal has values.
 
   Milliseconds with tests/bench/klupair.cpp (Debian 12, KLU 1.3.8, a busy machine; "again": values changed; residuals of
   a solve with entries of order one):

@@ -13,6 +13,9 @@ static const double COUNT_LIMIT = 1e9;
 /* Fill beyond this multiple of what was foreseen means that the pivots no longer fit the values */
 static const double TOO_MUCH_FILL = 1.5;
 
+/* Bound on KLU's search for diagonal blocks, in multiples of the entries of the matrix */
+static const double BLOCK_SEARCH = 10;
+
 /* The cycles of the permutation of pivots: single unknowns, pairs, rarely more */
 struct Groups {
   std::vector<PetscInt> of, start, member;
@@ -162,21 +165,37 @@ static void Permutations(const LinearRows &A, const Groups &g, const std::vector
   }
 }
 
-PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k)
+/*
+  A matrix with a full diagonal can fall into blocks that are solved one after the other, as where some unknowns are
+  only computed from others. KLU finds the blocks by itself, with a bound on the search that is quadratic at its worst.
+*/
+static void TryBlocks(const LinearRows &rows, KluPair *k)
 {
-  LinearGraph           graph;
-  PetscBool             done;
-  std::vector<PetscInt> order, P, Q;
+  if (k->pivots.zeros || !k->given.empty() || k->ordering != KLUPAIR_AUTO) return;
+  const double unlimited = k->common.maxwork;
+  k->common.btf          = 1;
+  k->common.maxwork      = BLOCK_SEARCH;
+  k->symbolic            = KLU(analyze)((KluInt)rows.n, KluIndices(rows.start), KluIndices(rows.col), &k->common);
+  k->common.maxwork      = unlimited;
+  k->common.btf          = 0;
+  if (!k->symbolic) return;
+  const double entries = k->symbolic->lnz + k->symbolic->unz;
+  const bool   whole   = k->symbolic->structural_rank == (KluInt)rows.n;
+  if (whole && k->symbolic->nblocks > 1 && entries < 2 * k->work.factor) {
+    k->ordering_used = "AMD in diagonal blocks";
+    k->work.factor   = 0.5 * entries;
+    k->work.flops    = k->symbolic->est_flops / 2;
+  } else
+    KLU(free_symbolic)(&k->symbolic, &k->common);
+}
+
+static PetscErrorCode AnalyseGiven(const LinearRows &rows, const Groups &g, const std::vector<PetscInt> &order,
+                                   KluPair *k)
+{
+  std::vector<PetscInt> P, Q;
 
   PetscFunctionBegin;
-  KLU(free_numeric)(&k->numeric, &k->common);
-  KLU(free_symbolic)(&k->symbolic, &k->common);
-  PetscCall(LinearGraphFromMat(A, &graph, &done));
-  LinearFindPivots(rows, &k->pivots);
-  const Groups g = FindGroups(k->pivots.col);
-  PetscCall(Order(graph, g, k, &order));
   Permutations(rows, g, order, k->pivots.col, &P, &Q);
-
   k->common.btf = 0;
   k->symbolic   = KLU(analyze_given)((KluInt)rows.n, KluIndices(rows.start), KluIndices(rows.col), KluIndices(P.data()),
                                    KluIndices(Q.data()), &k->common);
@@ -185,6 +204,24 @@ PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k)
              (int)k->common.status);
   for (KluInt b = 0; b < k->symbolic->nblocks; ++b)
     k->symbolic->Lnz[b] = k->work.factor; /* how much KLU allocates at first */
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k)
+{
+  LinearGraph           graph;
+  PetscBool             done;
+  std::vector<PetscInt> order;
+
+  PetscFunctionBegin;
+  KLU(free_numeric)(&k->numeric, &k->common);
+  KLU(free_symbolic)(&k->symbolic, &k->common);
+  PetscCall(LinearGraphFromMat(A, &graph, &done));
+  LinearFindPivots(rows, &k->pivots);
+  const Groups g = FindGroups(k->pivots.col);
+  PetscCall(Order(graph, g, k, &order));
+  TryBlocks(rows, k);
+  if (!k->symbolic) PetscCall(AnalyseGiven(rows, g, order, k));
   k->tolerated = TOO_MUCH_FILL * 2 * k->work.factor;
   ++k->analyses;
   PetscCall(PetscInfo(A,

@@ -2,6 +2,7 @@
 #include "../../src/linear/klupair.h"
 #include "../../src/linear/klupair_matching.h"
 #include "../bench/linear_matrices.h"
+#include <algorithm>
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
 #include <petscksp.h>
@@ -615,6 +616,34 @@ TEST_F(KluPair, GivenOrderingIsFollowed)
   EXPECT_GT(natural.nz_used, 1.2 * own.nz_used);
   OK(ISDestroy(&row));
   OK(ISDestroy(&col));
+}
+
+/* A triangular matrix in disguise has no fill, and is solved with transposes and new values as any other */
+TEST_F(KluPair, BlocksOfAReducibleMatrix)
+{
+  std::mt19937          random(17);
+  const PetscInt        n = 300;
+  std::vector<PetscInt> name(n);
+  Entries               e;
+  MatInfo               got;
+  e.n = n;
+  for (PetscInt i = 0; i < n; ++i) name[i] = i;
+  std::shuffle(name.begin(), name.end(), random);
+  for (PetscInt i = 0; i < n; ++i) {
+    e.add(name[i], name[i], 4.0);
+    for (int k = 0; k < 3 && i; ++k) e.add(name[i], name[random() % i], 1.0);
+  }
+  factor(e);
+  OK(MatGetInfo(F, MAT_LOCAL, &got));
+  EXPECT_NE(view().find("diagonal blocks"), std::string::npos) << view();
+  EXPECT_LE(got.nz_used, (double)e.row.size());
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_LT(residual(), 1e-12);
+    EXPECT_LT(residual(true), 1e-12);
+    set(name[7], name[7], 5.0);
+    OK(MatLUFactorNumeric(F, A, &info));
+  }
+  EXPECT_EQ(counts().analyses, 1);
 }
 
 /* Where the planned pivots are kept, the factors have exactly the entries foreseen for one diagonal block */
