@@ -14,7 +14,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscInt magic = 1211306, version = 2;
+constexpr PetscInt magic = 1211306, version = 3;
 
 /* Numbers of the integrator and of TS, in one order for writing and reading */
 struct Numbers {
@@ -26,8 +26,8 @@ struct Numbers {
     TSHHT3Statistics &s = I.stat;
     Predictor       &p = I.predictor;
     ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
-             &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.changes, &I.change.step, &s.tiny_steps, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit, &I.change.t};
+             &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.changes, &I.change.step, &s.tiny_steps, &I.tiny_row, &p.degree, &p.available};
+    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit, &I.h_proven, &I.change.t};
     for (PetscReal &t : p.t) reals.push_back(&t);
   }
 };

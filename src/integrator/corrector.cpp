@@ -251,7 +251,8 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
   PC             pc;
 
   PetscFunctionBegin;
-  if (reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN) {
+  I.corrector.no_solve = (PetscBool)(reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN);
+  if (I.corrector.no_solve) {
     PetscCall(SNESGetKSP(ts->snes, &ksp));
     PetscCall(KSPGetPC(ksp, &pc));
     PetscCall(PCGetFailedReason(pc, &pcreason));
@@ -390,7 +391,10 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   }
   c.want_matrix = (PetscBool)(!*converged || c.xi_max >= c.slow_rate || retry);
   if (!*converged) {
-    I.h_limit = 0.7 * I.h;
+    /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what steps since the last
+       failure have shown to work */
+    if (!c.no_solve || I.h_limit <= 0 || I.h_proven < 0.9 * I.h) I.h_limit = 0.7 * I.h;
+    I.h_proven = 0;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

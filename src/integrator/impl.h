@@ -31,6 +31,7 @@ struct Corrector {
 
   PetscBool have_matrix = PETSC_FALSE; /* the SNES matrix is (10) of some earlier step */
   PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
+  PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
@@ -142,6 +143,7 @@ struct Integrator {
   PetscObjectId    sol_id = 0;
   PetscReal        h_regular = 0; /* running maximum of steps that went through the corrector, forgetting a tenth in each */
   PetscInt         tiny_row = 0;  /* tiny steps in a row to which failures have led */
+  PetscReal        h_proven = 0;  /* largest step accepted since the last failed correction */
   PetscReal        h_limit = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscBool        auto_h = PETSC_FALSE;
   PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */

@@ -70,8 +70,7 @@ PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had */
-PetscErrorCode SolveNormal(TS ts, Vec dV)
+PetscErrorCode TrySolve(TS ts, Vec dV, PetscBool *ok)
 {
   Integrator        &I = Get(ts);
   KSP                ksp;
@@ -84,7 +83,29 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   I.stat.solves++;
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   PetscCall(VecNorm(dV, NORM_INFINITY, &norm));
-  if (reason < 0 || PetscIsInfOrNanReal(norm)) PetscCall(VecZeroEntries(dV));
+  *ok = (PetscBool)(reason >= 0 && !PetscIsInfOrNanReal(norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had. The matrix at hand may be the one
+   with which the last correction failed, as it was singular: then another one. */
+PetscErrorCode SolveNormal(TS ts, Vec dV)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal h = I.h, t1 = I.t1;
+  PetscBool       ok;
+
+  PetscFunctionBegin;
+  PetscCall(TrySolve(ts, dV, &ok));
+  if (!ok) {
+    PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+    I.mode                  = Mode::Step;
+    I.h                     = h;
+    I.t1                    = t1;
+    I.corrector.want_matrix = PETSC_TRUE;
+    PetscCall(TrySolve(ts, dV, &ok));
+  }
+  if (!ok) PetscCall(VecZeroEntries(dV));
   else PetscCall(KeepCoordinates(I, dV));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -282,3 +282,36 @@ TEST(Failures, NotANumberInAnyRowStopsTheRunSoon)
       EXPECT_LT(e.v, 1e-2);
     }
 }
+
+namespace
+{
+
+/* A pendulum with a Jacobian that is singular in every fifth call */
+struct SingularNowAndThen : Pendulum {
+  mutable int calls = 0;
+  SingularNowAndThen() : Pendulum(-60., 1., 2.) {}
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, Entries &J) const override
+  {
+    Pendulum::jacobian(t, u, v, a, sv, sa, J);
+    if (t > .1 && ++calls % 5 == 0)
+      for (size_t k = 0; k < J.row.size(); k++)
+        if (J.row[k] == 2) J.value[k] = 0.;
+  }
+};
+
+} // namespace
+
+/* Failures that have nothing to do with h must not bring it down for ever */
+TEST(Failures, SingularMatrixNowAndThen)
+{
+  const SingularNowAndThen p;
+  Simulation               run(p, tolerance(1e-6) + "-ts_hhtdae_reuse 1,0,1 -ts_max_steps 20000");
+  must(run.solve());
+  const TSHHT3Statistics s = run.statistics();
+  MEASURED("every fifth matrix singular: %d steps, %d failed corrections, h at least %.1e, error q %.1e", (int)s.steps, (int)s.corrector_fails,
+           s.h_min, run.errors().q);
+  EXPECT_EQ(run.t(), 2.);
+  EXPECT_GT(s.corrector_fails, 20);
+  EXPECT_LT(s.steps, 3000);
+  EXPECT_LT(run.errors().q, 2e-3);
+}
