@@ -33,6 +33,7 @@ struct Parts {
 
   explicit Parts(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
+    scene.start().assembly = Assembly::Off; /* most of these scenes do not fit together */
     const bool planar = space == Space::Planar;
     first             = scene.add("first", Block({.2, .1, 0}, planar ? AboutZ(.4) : Tilted()));
     second            = scene.add("second", Block({1, 2, 0}));

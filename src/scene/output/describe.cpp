@@ -4,15 +4,16 @@
 namespace hhtdae
 {
 
-Channel Scene::channel(const std::string &name, const Measure &m, const std::string &unit)
+Channel Scene::channel(const std::string &given, const Measure &m, const std::string &unit)
 {
-  SceneData        &s   = *data_;
+  SceneData        &s    = *data_;
+  const std::string name = given.empty() ? "channel " + std::to_string(s.channels.size()) : given;
   const std::string who = "channel " + name + ": ";
-  if (name.empty() || name.front() == '/' || name.back() == '/' || name.find("//") != std::string::npos)
-    s.errors.push_back(who + "a name is neither empty nor begins or ends with /, which separates groups in the file");
+  if (name.front() == '/' || name.back() == '/' || name.find("//") != std::string::npos)
+    s.errors.push_back(who + "a name neither begins nor ends with /, which separates groups in the file");
   if (name == "time") s.errors.push_back(who + "this name is taken by the times of the samples");
   for (const ChannelData &c : s.channels)
-    if (c.name == name) s.errors.push_back(who + "there is one of this name");
+    if (!given.empty() && c.name == name) s.errors.push_back(who + "there is one of this name");
   const std::string error = CheckMeasure(s, m, false);
   if (!error.empty()) s.errors.push_back(who + error);
   s.channels.push_back({name, unit, m});
