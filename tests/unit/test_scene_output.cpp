@@ -192,7 +192,7 @@ TEST(SceneOutput, SaysWhatIsWrong)
   rods.scene.shape(Body{5}, Shape::sphere(1));
   ErrorTrap trap;
   EXPECT_NE(rods.scene.setUp(), 0);
-  for (const char *part : {"channel a: marker i", "there is one of this name", "begins or ends with /", "taken by the times", "channel c:", "shape: its body"})
+  for (const char *part : {"channel a: marker i", "there is one of this name", "begins nor ends with /", "taken by the times", "channel c:", "shape: its body"})
     EXPECT_TRUE(trap.says(part)) << part << "\n" << trap.message;
 }
 
