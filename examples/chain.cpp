@@ -1,10 +1,11 @@
-static char help[] = "A chain of N bodies, or a net with closed loops, falls from the horizontal; how much work a body makes.\n"
-                     "Runs on any number of ranks with the same result.\n"
-                     "  -n <10>: number of rods, 1 kg and 1 m each\n"
-                     "  -joint <revolute>: revolute, about z, or spherical\n"
-                     "  -planar: a planar scene, 3 coordinates a rod\n"
-                     "  -net <rows,columns>: instead, a net of point masses and rods on ball joints, hung along one side\n"
-                     "  -end <1>: end time, s\n";
+static char help[] =
+    "A chain of N bodies, or a net with closed loops, falls from the horizontal; how much work a body makes.\n"
+    "Runs on any number of ranks with the same result.\n"
+    "  -n <10>: number of rods, 1 kg and 1 m each\n"
+    "  -joint <revolute>: revolute, about z, or spherical\n"
+    "  -planar: a planar scene, 3 coordinates a rod\n"
+    "  -net <rows,columns>: instead, a net of point masses and rods on ball joints, hung along one side\n"
+    "  -end <1>: end time, s\n";
 
 #include "problem.h"
 #include "scene_watch.h"
@@ -24,7 +25,8 @@ static Body AddRod(Scene &scene, const Vector3 &from, const Matrix3 &rotation)
   rod.rotation = rotation;
   rod.position = from + rotation.col(0) / 2;
   const Body b = scene.add("", rod);
-  scene.shape(b, Shape::cylinder(0.03, 1, {0, 0, 0}, Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix()));
+  scene.shape(
+      b, Shape::cylinder(0.03, 1, {0, 0, 0}, Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix()));
   return b;
 }
 
@@ -35,8 +37,10 @@ static Marker AddChain(Scene &scene, PetscInt n, bool spherical)
   for (PetscInt k = 0; k < n; k++) {
     const Body   b     = AddRod(scene, {(double)k, 0, 0}, Matrix3::Identity());
     const Marker first = scene.marker(b, {-0.5, 0, 0});
-    if (spherical) scene.add("", Spherical{first, last});
-    else scene.add("", Revolute{first, last});
+    if (spherical)
+      scene.add("", Spherical{first, last});
+    else
+      scene.add("", Revolute{first, last});
     last = scene.marker(b, {0.5, 0, 0});
   }
   return last;
@@ -56,9 +60,9 @@ static Marker AddNet(Scene &scene, PetscInt rows, PetscInt columns)
         continue;
       }
       PointMass p;
-      p.mass     = 0.5;
-      p.position = x;
-      knot[c]    = scene.marker(scene.add("", p));
+      p.mass          = 0.5;
+      p.position      = x;
+      knot[c]         = scene.marker(scene.add("", p));
       const Body down = AddRod(scene, x - Vector3::UnitZ(), along_z);
       scene.add("", Spherical{scene.marker(down, {-0.5, 0, 0}), above});
       scene.add("", Spherical{scene.marker(down, {0.5, 0, 0}), knot[c]});
@@ -73,9 +77,9 @@ static Marker AddNet(Scene &scene, PetscInt rows, PetscInt columns)
 static PetscErrorCode Run(void)
 {
   PetscInt         n = 10, net[2] = {0, 0}, given = 2, unknowns;
-  PetscReal        end = 1;
+  PetscReal        end       = 1;
   char             joint[16] = "revolute";
-  PetscBool        planar = PETSC_FALSE, is_net;
+  PetscBool        planar    = PETSC_FALSE, is_net;
   TS               ts;
   Vec              U;
   TSHHT3Statistics s;
@@ -88,19 +92,26 @@ static PetscErrorCode Run(void)
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-planar", &planar, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
   const bool spherical = !std::strcmp(joint, "spherical");
-  PetscCheck(spherical || !std::strcmp(joint, "revolute"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-joint %s: must be revolute or spherical", joint);
+  PetscCheck(spherical || !std::strcmp(joint, "revolute"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG,
+             "-joint %s: must be revolute or spherical", joint);
   PetscCheck(n > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-n %d: number of rods, must be positive", (int)n);
-  PetscCheck(!is_net || (given == 2 && net[0] > 0 && net[1] > 0), PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-net: give rows,columns, both positive");
-  PetscCheck(!planar || (!is_net && !spherical), PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP, "-planar is for a chain of revolute joints");
+  PetscCheck(!is_net || (given == 2 && net[0] > 0 && net[1] > 0), PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
+             "-net: give rows,columns, both positive");
+  PetscCheck(!planar || (!is_net && !spherical), PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP,
+             "-planar is for a chain of revolute joints");
   PetscCall(PetscMemoryGetCurrentUsage(&before));
 
   Scene scene(PETSC_COMM_WORLD, planar ? Space::Planar : Space::Spatial);
   scene.gravity({0, -9.81, 0});
   const Marker   tip    = is_net ? AddNet(scene, net[0], net[1]) : AddChain(scene, n, spherical);
   const PetscInt bodies = is_net ? net[0] * (3 * net[1] - 1) : n;
-  for (int k = 0; k < (planar ? 2 : 3); k++) scene.channel(std::string("tip.") + "xyz"[k], Measure::displacement(tip, k), "m");
-  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
-  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+  for (int k = 0; k < (planar ? 2 : 3); k++)
+    scene.channel(std::string("tip.") + "xyz"[k], Measure::displacement(tip, k), "m");
+  Measure energy;
+  energy.kind = Measure::KineticEnergy;
+  scene.channel("kinetic", energy, "J");
+  energy.kind = Measure::PotentialEnergy;
+  scene.channel("potential", energy, "J");
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));
@@ -126,9 +137,12 @@ static PetscErrorCode Run(void)
   PetscCallMPI(MPI_Allreduce(&after, &all, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecGetSize(U, &unknowns));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "chain: bodies=%d unknowns=%d step=%.4g us body_step=%.4g us memory=%.0f bytes/body\n", (int)bodies, (int)unknowns,
-                        1e6 * (double)s.cpu / s.steps, 1e6 * (double)s.cpu / s.steps / bodies, (double)all / bodies));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "tip: t=%g x=%.12g y=%.12g z=%.12g\n", (double)t, x[0], x[1], planar ? 0 : x[2]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "chain: bodies=%d unknowns=%d step=%.4g us body_step=%.4g us memory=%.0f bytes/body\n",
+                        (int)bodies, (int)unknowns, 1e6 * (double)s.cpu / s.steps,
+                        1e6 * (double)s.cpu / s.steps / bodies, (double)all / bodies));
+  PetscCall(
+      PetscPrintf(PETSC_COMM_WORLD, "tip: t=%g x=%.12g y=%.12g z=%.12g\n", (double)t, x[0], x[1], planar ? 0 : x[2]));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: energy=%.3e kinetic=%.3e\n", drift, exchanged));
   PetscCall(TSDestroy(&ts));
   PetscFunctionReturn(0);
