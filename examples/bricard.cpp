@@ -1,8 +1,9 @@
-static char help[] = "Bricard's mechanism (IFToMM A04): five rods, six hinges, one degree of freedom where counting finds none.\n"
-                     "Its constraints are redundant by one row. Compared with the equations in two relative angles.\n"
-                     "  -section <0.1>: edge of the rods' square section, m\n"
-                     "  -end <10>: end time, s\n"
-                     "-scene_redundant refuse shows the row that the scene leaves out.\n";
+static char help[] =
+    "Bricard's mechanism (IFToMM A04): five rods, six hinges, one degree of freedom where counting finds none.\n"
+    "Its constraints are redundant by one row. Compared with the equations in two relative angles.\n"
+    "  -section <0.1>: edge of the rods' square section, m\n"
+    "  -end <10>: end time, s\n"
+    "-scene_redundant refuse shows the row that the scene leaves out.\n";
 
 #include "problem.h"
 #include "scene_references.h"
@@ -31,13 +32,14 @@ static PetscErrorCode Run(void)
   axes[2].setIdentity();
   std::vector<Marker> joints;
   for (int k = 0; k < 6; k++) {
-    const Vector3 P = Reference::point(k);
+    const Vector3 P    = Reference::point(k);
     Body          next = scene.ground();
     if (k < 5) { /* the rod from P_k to P_k+1 */
       const Vector3 d = Reference::point(k + 1) - P, along = d.cwiseAbs();
       RigidBody     rod;
-      rod.mass     = 1;
-      rod.inertia  = ((1 + section * section) / 12 * (Vector3::Ones() - along) + section * section / 6 * along).asDiagonal();
+      rod.mass = 1;
+      rod.inertia =
+          ((1 + section * section) / 12 * (Vector3::Ones() - along) + section * section / 6 * along).asDiagonal();
       rod.position = P + d / 2;
       next         = scene.add("rod " + std::to_string(k), rod);
       scene.shape(next, Shape::box(along / 2 + Vector3::Ones() * 0.5 * section));
@@ -49,7 +51,8 @@ static PetscErrorCode Run(void)
     before = next;
   }
   for (int k = 2; k < 6; k++)
-    for (int c = 0; c < 3; c++) scene.channel("P" + std::to_string(k) + "." + "xyz"[c], Measure::displacement(joints[k], c), "m");
+    for (int c = 0; c < 3; c++)
+      scene.channel("P" + std::to_string(k) + "." + "xyz"[c], Measure::displacement(joints[k], c), "m");
   scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
   scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
 
@@ -63,7 +66,8 @@ static PetscErrorCode Run(void)
   hhtex::Watch watch(scene, 0.02, [&](double t, const std::vector<double> &x) {
     Vector3 P[6];
     Reference::points(exact.at(t), P);
-    for (int k = 2; k < 6; k++) hhtex::Widen(k < 5 ? error : closure, (Eigen::Map<const Vector3>(&x[3 * (k - 2)]) - P[k]).norm());
+    for (int k = 2; k < 6; k++)
+      hhtex::Widen(k < 5 ? error : closure, (Eigen::Map<const Vector3>(&x[3 * (k - 2)]) - P[k]).norm());
     if (t == 0) start = x[12] + x[13];
     hhtex::Widen(drift, x[12] + x[13], start);
   });

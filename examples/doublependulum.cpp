@@ -1,8 +1,9 @@
-static char help[] = "Double pendulum of two rods in space, 1 kg and 1 m each, released from rest in a horizontal line.\n"
-                     "  -joint <revolute>: revolute: about parallel axes, compared with the equations in two angles\n"
-                     "                     spherical: the second rod starts across the first; energy alone to compare with\n"
-                     "  -planar: bodies of a planar scene, 3 coordinates each (revolute joints)\n"
-                     "  -end <2>: end time, s\n";
+static char help[] =
+    "Double pendulum of two rods in space, 1 kg and 1 m each, released from rest in a horizontal line.\n"
+    "  -joint <revolute>: revolute: about parallel axes, compared with the equations in two angles\n"
+    "                     spherical: the second rod starts across the first; energy alone to compare with\n"
+    "  -planar: bodies of a planar scene, 3 coordinates each (revolute joints)\n"
+    "  -end <2>: end time, s\n";
 
 #include "problem.h"
 #include "problems/extrapolation.h"
@@ -52,17 +53,20 @@ static PetscErrorCode Run(void)
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-planar", &planar, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
   const bool spherical = !std::strcmp(joint, "spherical");
-  PetscCheck(spherical || !std::strcmp(joint, "revolute"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-joint %s: must be revolute or spherical", joint);
-  PetscCheck(!planar || !spherical, PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP, "-planar and -joint spherical exclude each other");
+  PetscCheck(spherical || !std::strcmp(joint, "revolute"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG,
+             "-joint %s: must be revolute or spherical", joint);
+  PetscCheck(!planar || !spherical, PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP,
+             "-planar and -joint spherical exclude each other");
 
   /* ---- the scene ---- */
   Scene scene(PETSC_COMM_WORLD, planar ? Space::Planar : Space::Spatial);
   scene.gravity({0, -g, 0});
   Matrix3 across; /* x of the second rod along space z */
   across << 0, 0, -1, 0, 1, 0, 1, 0, 0;
-  const Body   a = AddRod(scene, "upper rod", {0, 0, 0}, Matrix3::Identity());
-  const Body   b = AddRod(scene, "lower rod", {1, 0, 0}, spherical ? across : Matrix3(Matrix3::Identity()));
-  const Marker top = scene.marker(a, {-0.5, 0, 0}), elbow = scene.marker(a, {0.5, 0, 0}), hand = scene.marker(b, {-0.5, 0, 0});
+  const Body   a   = AddRod(scene, "upper rod", {0, 0, 0}, Matrix3::Identity());
+  const Body   b   = AddRod(scene, "lower rod", {1, 0, 0}, spherical ? across : Matrix3(Matrix3::Identity()));
+  const Marker top = scene.marker(a, {-0.5, 0, 0}), elbow = scene.marker(a, {0.5, 0, 0}),
+               hand = scene.marker(b, {-0.5, 0, 0});
   const Marker tip = scene.marker(b, {0.5, 0, 0}), origin = scene.marker(scene.ground());
   if (spherical) {
     scene.add("shoulder", Spherical{top, origin});

@@ -1,7 +1,8 @@
-static char help[] = "Stiff flyball governor (IFToMM A05): a shaft, two rods with a mass each, a slider on springs and dampers.\n"
-                     "Compared with the equations in the rods' angle, the slider's height and the shaft's cyclic angle.\n"
-                     "  -stiffness <8e5> -damping <4e4>: of each spring-damper, N/m and N s/m\n"
-                     "  -end <10>: end time, s\n";
+static char help[] =
+    "Stiff flyball governor (IFToMM A05): a shaft, two rods with a mass each, a slider on springs and dampers.\n"
+    "Compared with the equations in the rods' angle, the slider's height and the shaft's cyclic angle.\n"
+    "  -stiffness <8e5> -damping <4e4>: of each spring-damper, N/m and N s/m\n"
+    "  -end <10>: end time, s\n";
 
 #include "problem.h"
 #include "scene_references.h"
@@ -37,9 +38,9 @@ static PetscErrorCode Run(void)
   Scene         scene(PETSC_COMM_WORLD);
   scene.gravity({0, 0, -9.81});
 
-  RigidBody shaft = Bar(2), slider;
-  shaft.position         = {0, 0, 0.5};
-  shaft.angular_velocity = w;
+  RigidBody shaft         = Bar(2), slider;
+  shaft.position          = {0, 0, 0.5};
+  shaft.angular_velocity  = w;
   slider.mass             = 3;
   slider.inertia          = Matrix3::Identity() * (3 * 0.02 / 12);
   slider.position         = {0, 0, 0.5};
@@ -55,12 +56,13 @@ static PetscErrorCode Run(void)
   for (int side : {1, -1}) {
     const std::string name = side > 0 ? "right" : "left";
     RigidBody         rod  = Bar(0);
-    rod.rotation           = Eigen::AngleAxisd(side * down, Vector3::UnitY()).toRotationMatrix(); /* x axis outwards, or inwards */
-    const Vector3 out      = rod.rotation.col(0) * side, hinge(0.05 * side, 0, 1);
-    rod.position           = hinge + out / 2;
-    rod.velocity           = w.cross(rod.position);
-    rod.angular_velocity   = w;
-    const Body R           = scene.add(name + " rod", rod);
+    rod.rotation =
+        Eigen::AngleAxisd(side * down, Vector3::UnitY()).toRotationMatrix(); /* x axis outwards, or inwards */
+    const Vector3 out    = rod.rotation.col(0) * side, hinge(0.05 * side, 0, 1);
+    rod.position         = hinge + out / 2;
+    rod.velocity         = w.cross(rod.position);
+    rod.angular_velocity = w;
+    const Body R         = scene.add(name + " rod", rod);
     scene.shape(R, Shape::box({0.5, 0.01, 0.01}));
     Matrix3 y_as_z; /* z along y */
     y_as_z << 0, 1, 0, 0, 0, 1, 1, 0, 0;
@@ -94,7 +96,9 @@ static PetscErrorCode Run(void)
     const auto   y = exact.at(t);
     const double r = 0.05 + std::cos(y.p);
     hhtex::Widen(slide, x[0], y.s);
-    hhtex::Widen(tip, (Vector3(x[1], x[2], x[3]) - Vector3(r * std::cos(y.turn), r * std::sin(y.turn), 1 - std::sin(y.p))).norm());
+    hhtex::Widen(
+                   tip,
+                   (Vector3(x[1], x[2], x[3]) - Vector3(r * std::cos(y.turn), r * std::sin(y.turn), 1 - std::sin(y.p))).norm());
   });
   PetscCall(watch.attach(ts));
   PetscCall(scene.solve(ts));

@@ -1,8 +1,9 @@
-static char help[] = "Heavy top on a ball joint (Bruels, Cardona 2010): 24 revolutions a second, passing upside down.\n"
-                     "Compared with tabulated digits of the centre of mass, the angular velocity and the reaction.\n"
-                     "  -end <2>: end time, s; the table has t = 0.2, 0.5, 1, 1.5, 2\n"
-                     "  -turns <0>: instead, a body with three different moments of inertia tumbles on the joint for so many\n"
-                     "              revolutions, through every attitude; prints changes of its angles' axes and drift of energy\n";
+static char help[] =
+    "Heavy top on a ball joint (Bruels, Cardona 2010): 24 revolutions a second, passing upside down.\n"
+    "Compared with tabulated digits of the centre of mass, the angular velocity and the reaction.\n"
+    "  -end <2>: end time, s; the table has t = 0.2, 0.5, 1, 1.5, 2\n"
+    "  -turns <0>: instead, a body with three different moments of inertia tumbles on the joint for so many\n"
+    "              revolutions, through every attitude; prints changes of its angles' axes and drift of energy\n";
 
 #include "problem.h"
 #include "scene_watch.h"
@@ -11,15 +12,21 @@ static char help[] = "Heavy top on a ball joint (Bruels, Cardona 2010): 24 revol
 
 using namespace hhtdae;
 
-/* Own integration with DOP853 at 3e-14, energy kept to 5e-11: t, x, Omega_x, Omega_z (body), force of the joint on the top */
-static const double table[][9] = {
-    {0.2, .60555056137707, .59895768179494, -.52398302743003, -2.6915909121430, 4.9172609898946, -640.2364079921, -148.6277113470, 136.9293130385},
-    {0.5, -.70246829705663, -.02116518470181, -.71140025765169, -.4710531017439, 5.9010830483260, 523.2812435144, 404.2061783201, 357.3361764531},
-    {1.0, .17334396409833, .64008859207046, -.74849079113368, -.8220781016856, -5.9232913481169, -517.6007394769, -396.8431014895, 404.5749251630},
-    {1.5, -.96816571563814, .25030606213278, -.00142208385119, .3462137843463, 4.6053599853369, 305.2520963488, -100.1277955532, -316.3527961145},
-    {2.0, -.15041682274585, -.72416559163698, -.67302226956031, .122233219492, -5.855624589205, -260.735211311, 613.612698983, 309.716631391}};
+/* Own integration with DOP853 at 3e-14, energy kept to 5e-11: t, x, Omega_x, Omega_z (body), force of the joint on the
+ * top */
+static const double table[][9] = {{0.2, .60555056137707, .59895768179494, -.52398302743003, -2.6915909121430,
+                                   4.9172609898946, -640.2364079921, -148.6277113470, 136.9293130385},
+                                  {0.5, -.70246829705663, -.02116518470181, -.71140025765169, -.4710531017439,
+                                   5.9010830483260, 523.2812435144, 404.2061783201, 357.3361764531},
+                                  {1.0, .17334396409833, .64008859207046, -.74849079113368, -.8220781016856,
+                                   -5.9232913481169, -517.6007394769, -396.8431014895, 404.5749251630},
+                                  {1.5, -.96816571563814, .25030606213278, -.00142208385119, .3462137843463,
+                                   4.6053599853369, 305.2520963488, -100.1277955532, -316.3527961145},
+                                  {2.0, -.15041682274585, -.72416559163698, -.67302226956031, .122233219492,
+                                   -5.855624589205, -260.735211311, 613.612698983, 309.716631391}};
 
-/* mass, moments of inertia about the centre, its place and the angular velocity at the start in body axes, which are those of space */
+/* mass, moments of inertia about the centre, its place and the angular velocity at the start in body axes, which are
+ * those of space */
 static RigidBody Top(double mass, const Vector3 &J, const Vector3 &center, const Vector3 &spin)
 {
   RigidBody b;
@@ -39,7 +46,8 @@ static void Hang(Scene &scene, const RigidBody &body)
   scene.shape(b, Shape::cylinder(0.3, 0.1, body.center));
   const Element joint = scene.add("pivot", Spherical{pivot, scene.marker(scene.ground())});
   for (int k = 0; k < 3; k++) scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k), "m");
-  for (int k = 0; k < 3; k++) scene.channel(std::string("Omega.") + "xyz"[k], Measure::angularVelocity(pivot, k, {}, pivot), "rad/s");
+  for (int k = 0; k < 3; k++)
+    scene.channel(std::string("Omega.") + "xyz"[k], Measure::angularVelocity(pivot, k, {}, pivot), "rad/s");
   for (int k = 0; k < 3; k++) scene.channel(std::string("F.") + "xyz"[k], Measure::jointForce(joint, k), "N");
   scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
   scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
@@ -96,11 +104,14 @@ static PetscErrorCode Tumble(PetscReal turns)
 
   PetscFunctionBeginUser;
   Scene scene(PETSC_COMM_WORLD);
-  Hang(scene, Top(1, {0.1, 0.2, 0.3}, {0.5, 0, 0}, spin)); /* about the middle one of its principal axes: it turns over */
+  Hang(scene,
+       Top(1, {0.1, 0.2, 0.3}, {0.5, 0, 0}, spin)); /* about the middle one of its principal axes: it turns over */
   const auto look = [&](double t, const std::vector<double> &c) {
     const double w = Vector3(c[3], c[4], c[5]).norm();
-    if (t == 0) start = c[9] + c[10];
-    else angle += 0.5 * (w + rate) * (t - last);
+    if (t == 0)
+      start = c[9] + c[10];
+    else
+      angle += 0.5 * (w + rate) * (t - last);
     last = t, rate = w;
     hhtex::Widen(drift, c[9] + c[10], start);
     largest = std::fmax(largest, c[9]);
@@ -110,8 +121,9 @@ static PetscErrorCode Tumble(PetscReal turns)
   /* a revolution takes some 1.3 s */
   PetscCall(Solve(scene, 1.35 * turns, look, 0.02, &ts));
   PetscCall(TSHHT3GetStatistics(ts, &s));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "tumbled: revolutions=%.1f attitude=%.3f..%.3f changes=%d rejected=%d steps=%d kinetic=%.3f\n", turned, low, high,
-                        (int)s.changes, (int)s.rejected, (int)s.steps, largest));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "tumbled: revolutions=%.1f attitude=%.3f..%.3f changes=%d rejected=%d steps=%d kinetic=%.3f\n",
+                        turned, low, high, (int)s.changes, (int)s.rejected, (int)s.steps, largest));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: energy=%.3e\n", drift));
   PetscCall(TSDestroy(&ts));
   PetscFunctionReturn(0);

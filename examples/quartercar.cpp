@@ -1,6 +1,7 @@
-static char help[] = "Quarter car: body and wheel on vertical guides, suspension of spring and damper, tire in contact with a moving road.\n"
-                     "The tire lifts off behind the bump. Compared with the equations in two heights.\n"
-                     "  -road <bump>: bump, a step up by a quintic; sine; curb, a step that makes the tire jump\n"
+static char help[] = "Quarter car: body and wheel on vertical guides, suspension of spring and damper, tire in contact "
+                     "with a moving road.\n"
+                     "Compared with the equations in two heights; over a curb of 0.1 m the tire lifts off.\n"
+                     "  -road <bump>: bump, a step up by a quintic; sine; curb, a steeper step\n"
                      "  -height <0.05>: of the road's motion, m\n"
                      "  -tire <torus>: torus or sphere\n"
                      "  -end <2>: end time, s\n";
@@ -27,13 +28,20 @@ static PetscErrorCode Run(void)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-height", &height, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
   const bool torus = !std::strcmp(tire, "torus");
-  PetscCheck(torus || !std::strcmp(tire, "sphere"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-tire %s: must be torus or sphere", tire);
+  PetscCheck(torus || !std::strcmp(tire, "sphere"), PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG,
+             "-tire %s: must be torus or sphere", tire);
 
   hhtex::QuarterCarReference::Parameters p;
-  if (!std::strcmp(road, "bump")) p.road = TimeFunction::step(0.2, 0, 0.35, height);
-  else if (!std::strcmp(road, "curb")) p.road = TimeFunction::step(0.2, 0, 0.24, height);
-  else if (!std::strcmp(road, "sine")) p.road = TimeFunction::formula([height](const TimeFunction::Number &t) -> TimeFunction::Number { return (1. - cos(t * 10.)) * (0.5 * height); });
-  else SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-road %s: must be bump, curb or sine", road);
+  if (!std::strcmp(road, "bump"))
+    p.road = TimeFunction::step(0.2, 0, 0.35, height);
+  else if (!std::strcmp(road, "curb"))
+    p.road = TimeFunction::step(0.2, 0, 0.24, height);
+  else if (!std::strcmp(road, "sine"))
+    p.road = TimeFunction::formula([height](const TimeFunction::Number &t) -> TimeFunction::Number {
+      return (1. - cos(t * 10.)) * (0.5 * height);
+    });
+  else
+    SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-road %s: must be bump, curb or sine", road);
 
   /* ---- the scene starts in static equilibrium ---- */
   const double radius = 0.3, hub = radius - p.sink(), deck = hub + 0.4, weight = p.body * 9.81;
@@ -47,7 +55,8 @@ static PetscErrorCode Run(void)
   body.mass      = p.body;
   body.inertia   = Vector3(50, 50, 50).asDiagonal();
   body.position  = {0, 0, deck};
-  const Body R = scene.add("road", strip), W = scene.add("wheel", wheel), B = scene.add("body", body), ground = scene.ground();
+  const Body R = scene.add("road", strip), W = scene.add("wheel", wheel), B = scene.add("body", body),
+             ground  = scene.ground();
   const Marker datum = scene.marker(ground), surface = scene.marker(R), axle = scene.marker(W), mount = scene.marker(B);
   scene.shape(R, Shape::box({1, 0.3, 0.01}, {0, 0, -0.01}));
   scene.shape(B, Shape::box({0.6, 0.3, 0.15}));
@@ -61,8 +70,9 @@ static PetscErrorCode Run(void)
   law.damping   = p.tire_damping;
   Matrix3 z_along_y; /* the wheel's axis */
   z_along_y << 0, 1, 0, 0, 0, 1, 1, 0, 0;
-  const Marker rim = scene.marker(W, {0, 0, 0}, z_along_y);
-  const Element contact = torus ? scene.add("tire", TorusPlane{rim, surface, radius - 0.1, 0.1, law}) : scene.add("tire", SpherePlane{rim, surface, radius, law});
+  const Marker  rim     = scene.marker(W, {0, 0, 0}, z_along_y);
+  const Element contact = torus ? scene.add("tire", TorusPlane{rim, surface, radius - 0.1, 0.1, law})
+                                : scene.add("tire", SpherePlane{rim, surface, radius, law});
   scene.channel("body.z", Measure::displacement(mount, 2), "m");
   scene.channel("wheel.z", Measure::displacement(axle, 2), "m");
   scene.channel("tire", Measure::force(contact, 2), "N");

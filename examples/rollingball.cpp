@@ -1,9 +1,10 @@
-static char help[] = "Rolling without slip, with constraints on velocities: a ball goes down a slope with 5/7 g sin(slope), exactly;\n"
-                     "a leaning disc goes round a circle.\n"
-                     "  -slope <20>: degrees\n"
-                     "  -disc: instead, a thin disc of radius 0.5 that leans by -lean in steady turning\n"
-                     "  -lean <20>: degrees; -circle <2>: radius of the path of its centre, m\n"
-                     "  -end <3>: end time, s\n";
+static char help[] =
+    "Rolling without slip, with constraints on velocities: a ball goes down a slope with 5/7 g sin(slope), exactly;\n"
+    "a leaning disc goes round a circle.\n"
+    "  -slope <20>: degrees\n"
+    "  -disc: instead, a thin disc of radius 0.5 that leans by -lean in steady turning\n"
+    "  -lean <20>: degrees; -circle <2>: radius of the path of its centre, m\n"
+    "  -end <3>: end time, s\n";
 
 #include "problem.h"
 #include "scene_watch.h"
@@ -45,15 +46,17 @@ static PetscErrorCode Ball(PetscReal end)
   ball.position         = plane.col(2) * radius;
   ball.velocity         = plane.col(1) * across;
   ball.angular_velocity = plane.col(0) * (-across / radius);
-  const Body    b    = scene.add("ball", ball);
+  const Body    b       = scene.add("ball", ball);
   const Marker  ramp = scene.marker(scene.ground(), {0, 0, 0}, plane), center = scene.marker(b);
   const Element roll = scene.add("rolling", RollingSphere{center, ramp, radius});
   scene.shape(b, Shape::sphere(radius));
-  for (int k = 0; k < 3; k++) scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k, ramp, ramp), "m");
+  for (int k = 0; k < 3; k++)
+    scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k, ramp, ramp), "m");
   for (int k = 0; k < 3; k++) scene.channel(std::string("force.") + "nxy"[k], Measure::multiplier(roll, k), "N");
 
   double       x = 0, force = 0;
-  const double a = 5. / 7 * g * std::sin(angle), N = mass * g * std::cos(angle), friction = -2. / 7 * mass * g * std::sin(angle);
+  const double a = 5. / 7 * g * std::sin(angle), N = mass * g * std::cos(angle),
+               friction = -2. / 7 * mass * g * std::sin(angle);
   PetscCall(Solve(scene, end, [&](double t, const std::vector<double> &c) {
     hhtex::Widen(x, c[0], 0.5 * a * t * t);
     hhtex::Widen(x, c[1], across * t);
@@ -67,8 +70,8 @@ static PetscErrorCode Ball(PetscReal end)
 }
 
 /*
-  About its centre a thin disc has the moments C = m r^2/2, about the axis, and A = C/2. With lean s towards the middle of the circle
-  of radius R, the balance of moments at the turning rate W gives  W^2 ((3/2) R + (r/4) sin s) = g tan s.
+  About its centre a thin disc has the moments C = m r^2/2, about the axis, and A = C/2. With lean s towards the middle
+  of the circle of radius R, the balance of moments at the turning rate W gives  W^2 ((3/2) R + (r/4) sin s) = g tan s.
 */
 static PetscErrorCode Disc(PetscReal end)
 {
@@ -83,9 +86,9 @@ static PetscErrorCode Disc(PetscReal end)
   scene.gravity({0, 0, -g});
   RigidBody     disc;
   const Vector3 axis(std::cos(s), 0, std::sin(s)); /* outwards and up */
-  disc.mass             = mass;
-  disc.inertia          = Vector3(0.25, 0.25, 0.5).asDiagonal() * (mass * r * r);
-  disc.rotation         << Vector3::UnitY().cross(axis), Vector3::UnitY(), axis;
+  disc.mass    = mass;
+  disc.inertia = Vector3(0.25, 0.25, 0.5).asDiagonal() * (mass * r * r);
+  disc.rotation << Vector3::UnitY().cross(axis), Vector3::UnitY(), axis;
   disc.position         = {R, 0, r * std::cos(s)};
   disc.velocity         = {0, W * R, 0};
   disc.angular_velocity = Vector3(0, 0, W) - axis * (W * (R + r * std::sin(s)) / r);

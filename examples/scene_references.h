@@ -1,6 +1,6 @@
 /*
-  What the scenes of the examples are compared with: the same mechanisms in as few coordinates as they have degrees of freedom,
-  derived apart from the scene library and integrated by extrapolation of order 20.
+  What the scenes of the examples are compared with: the same mechanisms in as few coordinates as they have degrees of
+  freedom, derived apart from the scene library and integrated by extrapolation of order 20.
 */
 #ifndef HHTEX_SCENE_REFERENCES_H
 #define HHTEX_SCENE_REFERENCES_H
@@ -20,17 +20,20 @@ namespace hhtex
 
     m(p) p'' + m'(p) p'^2 / 2 + V'(p) = 0.
 
-  The universal joint keeps a normal n of the rod perpendicular to the slider's axis e_x: n = u x e_x / |u x e_x|, u along the rod.
-  Then the rod's spin about u is p' (dn/dp . u x n).
+  The universal joint keeps a normal n of the rod perpendicular to the slider's axis e_x: n = u x e_x / |u x e_x|, u
+  along the rod. Then the rod's spin about u is p' (dn/dp . u x n).
 */
 class SliderCrankReference
 {
 public:
   explicit SliderCrankReference(double speed)
-      : solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 0.01L, {0.L, (long double)speed})
+      : solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 0.01L,
+                  {0.L, (long double)speed})
   {
     using T      = hhtdae::TimeFunction::Number;
-    const auto B = [](const T &p, T *b) { b[0] = T(0), b[1] = T(0.1) - sin(p) * T(0.08), b[2] = T(0.12) + cos(p) * T(0.08); };
+    const auto B = [](const T &p, T *b) {
+      b[0] = T(0), b[1] = T(0.1) - sin(p) * T(0.08), b[2] = T(0.12) + cos(p) * T(0.08);
+    };
     const auto X = [B](const T &p) {
       T b[3];
       B(p, b);
@@ -84,11 +87,13 @@ private:
     const Curve  u = curve(u_), c = curve(c_), n = curve(n_);
     const V      across = u.f.cross(n.f);
     const double spin = n.f1.dot(across), spin1 = n.f2.dot(across) + n.f1.dot(u.f1.cross(n.f));
-    const double m     = 1e-4 + 0.12 * 0.04 * 0.04 + 2 * x.f1 * x.f1 + 0.5 * c.f1.squaredNorm() + 4e-3 * u.f1.squaredNorm() + 4e-4 * spin * spin;
-    const double half1 = 2 * x.f1 * x.f2 + 0.5 * c.f1.dot(c.f2) + 4e-3 * u.f1.dot(u.f2) + 4e-4 * spin * spin1; /* m'/2 */
-    const double V1    = 9.81 * (-0.12 * 0.04 * std::sin((double)y[0]) + 0.5 * c.f1(2));
-    f[0]               = y[1];
-    f[1]               = -(half1 * y[1] * y[1] + V1) / m;
+    const double m = 1e-4 + 0.12 * 0.04 * 0.04 + 2 * x.f1 * x.f1 + 0.5 * c.f1.squaredNorm() +
+                     4e-3 * u.f1.squaredNorm() + 4e-4 * spin * spin;
+    const double half1 =
+        2 * x.f1 * x.f2 + 0.5 * c.f1.dot(c.f2) + 4e-3 * u.f1.dot(u.f2) + 4e-4 * spin * spin1; /* m'/2 */
+    const double V1 = 9.81 * (-0.12 * 0.04 * std::sin((double)y[0]) + 0.5 * c.f1(2));
+    f[0]            = y[1];
+    f[1]            = -(half1 * y[1] * y[1] + V1) / m;
   }
 };
 
@@ -97,8 +102,9 @@ private:
 
     s(a) + s(b) + s(a) s(b) = 0,   s = sin
 
-  closes the loop (Chen, You, Tarnai: Threefold-symmetric Bricard linkages for deployable structures, 2005, for twists of 90 degrees,
-  from the cube's angles). The equations of the open chain in (a, b) with that constraint, reduced to index 1.
+  closes the loop (Chen, You, Tarnai: Threefold-symmetric Bricard linkages for deployable structures, 2005, for twists
+  of 90 degrees, from the cube's angles). The equations of the open chain in (a, b) with that constraint, reduced to
+  index 1.
 */
 class BricardReference
 {
@@ -108,7 +114,8 @@ public:
   using State = Extrapolation::State;
 
   explicit BricardReference(double section)
-      : section_(section), solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 0.01L, {0.L, 0.L, 0.L, 0.L})
+      : section_(section), solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L,
+                                     0.01L, {0.L, 0.L, 0.L, 0.L})
   {
   }
   BricardReference(const BricardReference &) = delete;
@@ -170,13 +177,14 @@ private:
     for (int k = 0; k < 5; k++) {
       /* accelerations at constant rates */
       turn += before.cross(V(R[k].col(axis(k)) * y[2 + k % 2]));
-      before          = w[k];
-      const V arm     = c[k] - p[k], link = p[k + 1] - p[k];
-      const V centre  = at + turn.cross(arm) + w[k].cross(V(w[k].cross(arm))) + V(0, 9.81L, 0);
-      const V d       = (point(k + 1) - point(k)).cast<long double>();
-      const V J0      = (V::Ones() + d.cwiseAbs2() * -1) * ((1 + section_ * section_) / 12) + d.cwiseAbs2() * (section_ * section_ / 6);
-      const M J       = R[k] * J0.asDiagonal() * R[k].transpose();
-      const V moment  = J * turn + w[k].cross(V(J * w[k]));
+      before      = w[k];
+      const V arm = c[k] - p[k], link = p[k + 1] - p[k];
+      const V centre = at + turn.cross(arm) + w[k].cross(V(w[k].cross(arm))) + V(0, 9.81L, 0);
+      const V d      = (point(k + 1) - point(k)).cast<long double>();
+      const V J0     = (V::Ones() + d.cwiseAbs2() * -1) * ((1 + section_ * section_) / 12) +
+                   d.cwiseAbs2() * (section_ * section_ / 6);
+      const M J      = R[k] * J0.asDiagonal() * R[k].transpose();
+      const V moment = J * turn + w[k].cross(V(J * w[k]));
       at += turn.cross(link) + w[k].cross(V(w[k].cross(link)));
       for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 2; j++) A(i, j) += vj[i][k].dot(vj[j][k]) + wj[i][k].dot(V(J * wj[j][k]));
@@ -195,15 +203,16 @@ private:
 };
 
 /*
-  Flyball governor, both rods alike: angle p of the rods below the horizontal, height s of the slider. The angular momentum about the
-  shaft is conserved, so that the shaft's angle is cyclic.
+  Flyball governor, both rods alike: angle p of the rods below the horizontal, height s of the slider. The angular
+  momentum about the shaft is conserved, so that the shaft's angle is cyclic.
 */
 class FlyballReference
 {
 public:
   explicit FlyballReference(double stiffness = 8e5, double damping = 4e4)
       : K_(stiffness), C_(damping), momentum_(inertia(start_).first * 2 * pi_),
-        solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 2e-4L, {start_, 0.5L, 0.L, 0.L, 0.L})
+        solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 2e-4L,
+                  {start_, 0.5L, 0.L, 0.L, 0.L})
   {
   }
   FlyballReference(const FlyballReference &) = delete;
@@ -220,15 +229,15 @@ public:
 private:
   static constexpr long double pi_ = 3.14159265358979323846264338327950288L, start_ = pi_ / 6, g_ = 9.81L;
   static constexpr long double axial_ = 0.3L * 2e-4L / 12, across_ = 0.3L * 1.0001L / 12; /* of shaft and rods */
-  static constexpr long double hinge_ = across_ + 0.3L * 0.25L + 5;                       /* of a rod with its mass about its hinge */
-  long double   K_, C_, momentum_;
-  Extrapolation solution_;
+  static constexpr long double hinge_ = across_ + 0.3L * 0.25L + 5; /* of a rod with its mass about its hinge */
+  long double                  K_, C_, momentum_;
+  Extrapolation                solution_;
 
   /* about the shaft, and its derivative */
   static std::pair<long double, long double> inertia(long double p)
   {
     const long double c = std::cos(p), s = std::sin(p), x = 0.05L + c / 2, X = 0.05L + c;
-    const long double rod = axial_ * s * s + across_ * c * c + 0.3L * x * x + 5 * X * X;
+    const long double rod  = axial_ * s * s + across_ * c * c + 0.3L * x * x + 5 * X * X;
     const long double rod1 = 2 * s * c * (axial_ - across_) - 0.3L * x * s - 10 * X * s;
     return {axial_ + 3 * 0.02L / 12 + 2 * rod, 2 * rod1};
   }
@@ -236,7 +245,7 @@ private:
   {
     const long double c = std::cos(y[0]), s = std::sin(y[0]), up = 1 - s / 2 - y[1], across = c / 2;
     const long double l = std::sqrt(up * up + across * across), lp = (-up * c - across * s) / (2 * l), ls = -up / l;
-    const long double F = K_ * (l - 0.5L) + C_ * (lp * y[2] + ls * y[3]);
+    const long double F    = K_ * (l - 0.5L) + C_ * (lp * y[2] + ls * y[3]);
     const auto        I    = inertia(y[0]);
     const long double spin = momentum_ / I.first;
     f[0]                   = y[2];
@@ -247,7 +256,8 @@ private:
   }
 };
 
-/* Quarter car: heights of body and wheel above their static equilibrium's road; contact k d^1.5 (1 + c d'), never pulling */
+/* Quarter car: heights of body and wheel above their static equilibrium's road; contact k d^1.5 (1 + c d'), never
+ * pulling */
 class QuarterCarReference
 {
 public:
@@ -255,11 +265,12 @@ public:
     double               body = 300, wheel = 40, stiffness = 2e4, damping = 1500; /* of the suspension */
     double               tire = 1.2e6, tire_damping = 0.05;                       /* N/m^1.5, s/m */
     hhtdae::TimeFunction road;
-    double sink() const { return std::pow((body + wheel) * 9.81 / tire, 2. / 3); }
+    double               sink() const { return std::pow((body + wheel) * 9.81 / tire, 2. / 3); }
   };
 
   explicit QuarterCarReference(const Parameters &p, double step = 1e-3)
-      : p_(p), solution_([this](long double t, const long double *y, long double *f) { rates(t, y, f); }, 0.L, step, {0.L, 0.L, 0.L, 0.L})
+      : p_(p), solution_([this](long double t, const long double *y, long double *f) { rates(t, y, f); }, 0.L, step,
+                         {0.L, 0.L, 0.L, 0.L})
   {
   }
   QuarterCarReference(const QuarterCarReference &) = delete;
@@ -281,10 +292,10 @@ private:
   void rates(long double t, const long double *y, long double *f) const
   {
     const long double N = force(t, y), S = p_.body * 9.81L + p_.stiffness * (y[1] - y[0]) + p_.damping * (y[3] - y[2]);
-    f[0]                = y[2];
-    f[1]                = y[3];
-    f[2]                = S / p_.body - 9.81L;
-    f[3]                = (N - S) / p_.wheel - 9.81L;
+    f[0] = y[2];
+    f[1] = y[3];
+    f[2] = S / p_.body - 9.81L;
+    f[3] = (N - S) / p_.wheel - 9.81L;
   }
 };
 

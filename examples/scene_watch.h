@@ -1,4 +1,5 @@
-/* Looks at a scene's channels in the course of a run: f(t, values) at the multiples of dt within its steps, on every rank. */
+/* Looks at a scene's channels in the course of a run: f(t, values) at the multiples of dt within its steps, on every
+ * rank. */
 #ifndef HHTEX_SCENE_WATCH_H
 #define HHTEX_SCENE_WATCH_H
 

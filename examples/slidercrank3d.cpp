@@ -1,7 +1,8 @@
-static char help[] = "Spatial slider-crank (Masoudi, Haug; IFToMM library): crank about x, rod on a ball and a universal joint.\n"
-                     "Compared with the equation in the crank's one angle.\n"
-                     "  -speed <6>: of the crank at the start, rad/s\n"
-                     "  -end <5>: end time, s\n";
+static char help[] =
+    "Spatial slider-crank (Masoudi, Haug; IFToMM library): crank about x, rod on a ball and a universal joint.\n"
+    "Compared with the equation in the crank's one angle.\n"
+    "  -speed <6>: of the crank at the start, rad/s\n"
+    "  -end <5>: end time, s\n";
 
 #include "problem.h"
 #include "scene_references.h"
@@ -44,14 +45,15 @@ static PetscErrorCode Run(void)
   rod.mass               = 0.5;
   rod.inertia            = Vector3(4e-4, 4e-3, 4e-3).asDiagonal(); /* x along the rod */
   rod.position           = (B + S) / 2;
-  rod.rotation           << along, normal, along.cross(normal);
-  rod.velocity           = (vB + vS) / 2;
-  rod.angular_velocity   = wrod;
-  slider.mass            = 2;
-  slider.inertia         = Matrix3::Identity() * 1e-3;
-  slider.position        = S;
-  slider.velocity        = vS;
-  const Body c = scene.add("crank", crank), r = scene.add("rod", rod), s = scene.add("slider", slider), ground = scene.ground();
+  rod.rotation << along, normal, along.cross(normal);
+  rod.velocity         = (vB + vS) / 2;
+  rod.angular_velocity = wrod;
+  slider.mass          = 2;
+  slider.inertia       = Matrix3::Identity() * 1e-3;
+  slider.position      = S;
+  slider.velocity      = vS;
+  const Body c = scene.add("crank", crank), r = scene.add("rod", rod), s = scene.add("slider", slider),
+             ground = scene.ground();
   scene.shape(c, Shape::box({0.01, 0.01, 0.04}));
   scene.shape(r, Shape::box({0.15, 0.008, 0.008}));
   scene.shape(s, Shape::box({0.03, 0.02, 0.02}));

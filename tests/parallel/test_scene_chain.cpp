@@ -19,15 +19,15 @@ Body addRod(Scene &scene, const Vector3 &from, const Vector3 &to)
 {
   RigidBody     b;
   const Vector3 x = (to - from).normalized(), y = x.unitOrthogonal();
-  b.inertia       = Vector3(0.01, 1. / 12, 1. / 12).asDiagonal();
-  b.position      = (from + to) / 2;
-  b.rotation     << x, y, x.cross(y);
+  b.inertia  = Vector3(0.01, 1. / 12, 1. / 12).asDiagonal();
+  b.position = (from + to) / 2;
+  b.rotation << x, y, x.cross(y);
   return scene.add("", b);
 }
 
 End run(MPI_Comm comm, Space space, const Build &build, double end, const std::string &options)
 {
-  Scene                scene(comm, space);
+  Scene scene(comm, space);
   build(scene);
   const int            directions = space == Space::Planar ? 2 : 3;
   const PetscInt       bodies     = (PetscInt)scene.data().bodies.size();
@@ -35,7 +35,9 @@ End run(MPI_Comm comm, Space space, const Build &build, double end, const std::s
   for (PetscInt b = 0; b < bodies; b++)
     for (double side : {0., 0.3}) {
       const Body   body{b};
-      const Marker m = scene.marker(body, scene.data().bodies[b].point ? Vector3::Zero() : Vector3(side, side, space == Space::Planar ? 0 : -side));
+      const Marker m =
+          scene.marker(body, scene.data().bodies[b].point ? Vector3::Zero()
+                                                          : Vector3(side, side, space == Space::Planar ? 0 : -side));
       for (int k = 0; k < directions; k++) {
         scene.channel("x" + std::to_string(velocity.size()), Measure::displacement(m, k));
         velocity.push_back(Measure::velocity(m, k));
@@ -60,9 +62,12 @@ End compare(const char *what, Space space, const Build &build, double end, int s
   int               size, rank;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  const End    all = run(PETSC_COMM_WORLD, space, build, end, options), self = run(PETSC_COMM_SELF, space, build, end, options);
+  const End all   = run(PETSC_COMM_WORLD, space, build, end, options),
+            self  = run(PETSC_COMM_SELF, space, build, end, options);
   const double dx = relativeDifference(all.x, self.x), dv = relativeDifference(all.v, self.v);
-  if (rank == 0) MEASURED("%s on %d ranks: differs by %.1e in positions, %.1e in velocities; %d steps, %d changes of axes", what, size, dx, dv, (int)all.s.steps, (int)all.s.changes);
+  if (rank == 0)
+    MEASURED("%s on %d ranks: differs by %.1e in positions, %.1e in velocities; %d steps, %d changes of axes", what,
+             size, dx, dv, (int)all.s.steps, (int)all.s.changes);
   EXPECT_EQ(all.s.steps, self.s.steps);
   EXPECT_EQ(all.s.changes, self.s.changes);
   EXPECT_LT(dx, q);
@@ -100,8 +105,8 @@ void net(Scene &scene, int rows, int columns)
         continue;
       }
       PointMass p;
-      p.position = x;
-      knot[c]    = scene.marker(scene.add("", p));
+      p.position     = x;
+      knot[c]        = scene.marker(scene.add("", p));
       const auto tie = [&](const Vector3 &from, Marker to) {
         const Body b = addRod(scene, from, x);
         scene.add("", Spherical{scene.markerAt(b, from), to});
@@ -112,13 +117,14 @@ void net(Scene &scene, int rows, int columns)
     }
 }
 
-/* Joints of several kinds, a motion, springs across the scene, one of them as a force state, contact, a variable and a state */
+/* Joints of several kinds, a motion, springs across the scene, one of them as a force state, contact, a variable and a
+ * state */
 void mixed(Scene &scene)
 {
   const Body ground = scene.ground();
   scene.gravity({0.2, 0.1, -9.81});
   const Marker floor = scene.marker(ground);
-  const auto   box = [&](const Vector3 &x, const Vector3 &w, const Vector3 &v = Vector3::Zero()) {
+  const auto   box   = [&](const Vector3 &x, const Vector3 &w, const Vector3 &v = Vector3::Zero()) {
     RigidBody b;
     b.inertia          = Vector3(0.1, 0.2, 0.3).asDiagonal();
     b.position         = x;
@@ -129,10 +135,14 @@ void mixed(Scene &scene)
   /* a crank that is driven, and a chain of three joints behind it */
   const Body crank = box({0, 0, 5}, {0, 0, 2});
   scene.add("", Revolute{scene.marker(crank), scene.marker(ground, {0, 0, 5})});
-  scene.add("", RotationalMotion{scene.marker(crank), scene.marker(ground, {0, 0, 5}), TimeFunction::polynomial({0, 2, 0.5})});
-  const Body  a = box({1.5, 0, 5}, {0, 0, 2}, {0, 3, 0}), b = box({2.5, 0, 5}, {0, 0, 2}, {0, 5, 0}), c = box({3.5, 0, 5}, {0, 0, 2}, {0, 7, 0});
-  const auto  at = [&](Body i, double x, const Matrix3 &R = Matrix3::Identity()) { return scene.markerAt(i, {x, 0, 5}, R); };
-  Matrix3     X;
+  scene.add("", RotationalMotion{scene.marker(crank), scene.marker(ground, {0, 0, 5}),
+                                 TimeFunction::polynomial({0, 2, 0.5})});
+  const Body a = box({1.5, 0, 5}, {0, 0, 2}, {0, 3, 0}), b = box({2.5, 0, 5}, {0, 0, 2}, {0, 5, 0}),
+             c  = box({3.5, 0, 5}, {0, 0, 2}, {0, 7, 0});
+  const auto at = [&](Body i, double x, const Matrix3 &R = Matrix3::Identity()) {
+    return scene.markerAt(i, {x, 0, 5}, R);
+  };
+  Matrix3 X;
   X << 0, 0, 1, 1, 0, 0, 0, 1, 0;
   scene.add("", Universal{at(a, 1), at(crank, 1, X)});
   scene.add("", Cylindrical{at(b, 2, X), at(a, 2, X)});
@@ -154,9 +164,13 @@ void mixed(Scene &scene)
   /* springs across the scene, a force that a state drives */
   scene.add("", SpringDamper{at(c, 4), balls[3], 5, 0.1});
   scene.add("", SpringDamper{at(a, 1.7), balls[0], 3});
-  const Variable d = scene.variable("stretch", Expression{{Measure::distance(at(c, 4), balls[1]), Measure::force(pull, 0)}, [](const Real *m) -> Real { return m[0] + m[1] * 0.01; }});
-  const State    s = scene.state("lag", Expression{{Measure::value(d)}, [](const Real *m) -> Real { return (m[0] - 4.) * 0.5; }}, 0);
-  scene.add("", UserScalarForce{at(c, 3.5), balls[2], Expression{{Measure::value(s)}, [](const Real *m) -> Real { return m[0] * -2.; }}});
+  const Variable d =
+      scene.variable("stretch", Expression{{Measure::distance(at(c, 4), balls[1]), Measure::force(pull, 0)},
+                                           [](const Real *m) -> Real { return m[0] + m[1] * 0.01; }});
+  const State s =
+      scene.state("lag", Expression{{Measure::value(d)}, [](const Real *m) -> Real { return (m[0] - 4.) * 0.5; }}, 0);
+  scene.add("", UserScalarForce{at(c, 3.5), balls[2],
+                                Expression{{Measure::value(s)}, [](const Real *m) -> Real { return m[0] * -2.; }}});
 }
 
 /* Bodies that turn over on springs between them: new axes of angles on one rank, which others read */
@@ -186,20 +200,15 @@ TEST(SceneRanks, ChainOfBalls)
   compare("chain of 20 on ball joints", Space::Spatial, hanging<Spherical>(20), 0.4, 80);
 }
 
-TEST(SceneRanks, PlanarChain)
-{
-  compare("planar chain of 30", Space::Planar, hanging<Revolute>(30), 0.4, 80);
-}
+TEST(SceneRanks, PlanarChain) { compare("planar chain of 30", Space::Planar, hanging<Revolute>(30), 0.4, 80); }
 
 TEST(SceneRanks, Net)
 {
-  compare("net of 4 x 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100);
+  compare(
+      "net of 4 x 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100);
 }
 
-TEST(SceneRanks, Mixed)
-{
-  compare("mixed scene", Space::Spatial, mixed, 0.2, 400);
-}
+TEST(SceneRanks, Mixed) { compare("mixed scene", Space::Spatial, mixed, 0.2, 400); }
 
 TEST(SceneRanks, BodiesTurningOver)
 {
@@ -207,12 +216,13 @@ TEST(SceneRanks, BodiesTurningOver)
   EXPECT_GT(e.s.changes, 0);
 }
 
-/* With the step chosen by its error the sequence may differ by rounding: the same to the tolerance, and the same axes of the angles */
+/* With the step chosen by its error the sequence may differ by rounding: the same to the tolerance, and the same axes
+ * of the angles */
 TEST(SceneRanks, ChosenSteps)
 {
   const std::string options = tolerance(1e-6);
-  const End         all = run(PETSC_COMM_WORLD, Space::Spatial, hanging<Spherical>(8), 0.5, options),
-            self        = run(PETSC_COMM_SELF, Space::Spatial, hanging<Spherical>(8), 0.5, options);
+  const End         all     = run(PETSC_COMM_WORLD, Space::Spatial, hanging<Spherical>(8), 0.5, options),
+            self            = run(PETSC_COMM_SELF, Space::Spatial, hanging<Spherical>(8), 0.5, options);
   EXPECT_NEAR((double)all.s.steps, (double)self.s.steps, 3);
   EXPECT_LT(relativeDifference(all.x, self.x), 1e-6);
 }

@@ -16,7 +16,8 @@ class Watched
 public:
   TSHHT3Statistics s;
 
-  Watched(Scene &scene, double end, double dt, const std::string &options, const hhtex::Watch::Look &look) : run_(scene, end, options), watch_(scene, dt, look)
+  Watched(Scene &scene, double end, double dt, const std::string &options, const hhtex::Watch::Look &look)
+      : run_(scene, end, options), watch_(scene, dt, look)
   {
     must(TSSetMaxSteps(run_.ts, 1000000));
     must(watch_.attach(run_.ts));
@@ -53,11 +54,11 @@ Matrix3 axes(const Vector3 &x, const Vector3 &z)
 RigidBody rod(double mass, double axial, double across, const Vector3 &from, const Vector3 &to, const Vector3 &y)
 {
   RigidBody b;
-  b.mass           = mass;
-  b.inertia        = Vector3(axial, across, across).asDiagonal();
-  b.position       = (from + to) / 2;
-  const Vector3 x  = (to - from).normalized();
-  b.rotation      << x, y, x.cross(y);
+  b.mass          = mass;
+  b.inertia       = Vector3(axial, across, across).asDiagonal();
+  b.position      = (from + to) / 2;
+  const Vector3 x = (to - from).normalized();
+  b.rotation << x, y, x.cross(y);
   return b;
 }
 
@@ -75,29 +76,30 @@ void look(Scene &scene, const Measure &m)
 /* A01: a point on a rod without mass, released level; exact in Jacobi's elliptic functions */
 TEST(SceneReferences, Pendulum)
 {
-  converges("A01 pendulum, x, y, tension/30 N at t = 1",
-            [](double eps) {
-              Scene     scene(PETSC_COMM_SELF);
-              PointMass p;
-              double    error = 0;
-              p.position      = -ex;
-              scene.gravity(-9.81 * ey);
-              const Marker  m = scene.marker(scene.add("bob", p)), o = scene.marker(scene.ground());
-              const Element rod = scene.add("rod", PointDistance{m, o});
-              scene.channel("x", Measure::displacement(m, 0));
-              scene.channel("y", Measure::displacement(m, 1));
-              scene.channel("Fx", Measure::jointForce(rod, 0, o));
-              scene.channel("Fy", Measure::jointForce(rod, 1, o));
-              Watched run(scene, 1, 0.5, sharp(eps), [&](double t, const std::vector<double> &c) {
-                if (t < 0.4) return;
-                const bool half = t < 0.9;
-                Widen(error, c[0], half ? -0.391048791550546388 : 0.986291751131875319);
-                Widen(error, c[1], half ? -0.920369948785192204 : -0.165010853125541169);
-                Widen(error, std::hypot(c[2], c[3]) / 30, (half ? 27.0864875927482066 : 4.8562694074846766) / 30);
-              });
-              return error;
-            },
-            1e-6, 1e-8, 1e-4);
+  converges(
+      "A01 pendulum, x, y, tension/30 N at t = 1",
+      [](double eps) {
+        Scene     scene(PETSC_COMM_SELF);
+        PointMass p;
+        double    error = 0;
+        p.position      = -ex;
+        scene.gravity(-9.81 * ey);
+        const Marker  m = scene.marker(scene.add("bob", p)), o = scene.marker(scene.ground());
+        const Element rod = scene.add("rod", PointDistance{m, o});
+        scene.channel("x", Measure::displacement(m, 0));
+        scene.channel("y", Measure::displacement(m, 1));
+        scene.channel("Fx", Measure::jointForce(rod, 0, o));
+        scene.channel("Fy", Measure::jointForce(rod, 1, o));
+        Watched run(scene, 1, 0.5, sharp(eps), [&](double t, const std::vector<double> &c) {
+          if (t < 0.4) return;
+          const bool half = t < 0.9;
+          Widen(error, c[0], half ? -0.391048791550546388 : 0.986291751131875319);
+          Widen(error, c[1], half ? -0.920369948785192204 : -0.165010853125541169);
+          Widen(error, std::hypot(c[2], c[3]) / 30, (half ? 27.0864875927482066 : 4.8562694074846766) / 30);
+        });
+        return error;
+      },
+      1e-6, 1e-8, 1e-4);
 }
 
 /* A02 with N = 2: five rods, released upright; exact in elliptic integrals. In space its constraints are redundant. */
@@ -133,7 +135,9 @@ static double fourBars(Space space, double eps)
 }
 TEST(SceneReferences, FourBars)
 {
-  converges("A02 four-bars in the plane, tip at t = 1", [](double eps) { return fourBars(Space::Planar, eps); }, 1e-6, 1e-8, 2e-4);
+  converges(
+      "A02 four-bars in the plane, tip at t = 1", [](double eps) { return fourBars(Space::Planar, eps); }, 1e-6, 1e-8,
+      2e-4);
   Printed quiet; /* of the redundant rows that are dropped */
   EXPECT_LT(fourBars(Space::Spatial, 1e-7), 1e-3);
 }
@@ -141,43 +145,46 @@ TEST(SceneReferences, FourBars)
 /* Spatial slider-crank against the equation in the crank's angle */
 TEST(SceneReferences, SliderCrank)
 {
-  converges("spatial slider-crank, slider to t = 1",
-            [](double eps) {
-              const Vector3 A(0, 0.1, 0.12), B(0, 0.1, 0.2), S(0.2, 0, 0), n = (S - B).cross(ex).normalized(), w = 6 * ex;
-              const Matrix3 X = axes(ey, ex);
-              Scene         scene(PETSC_COMM_SELF);
-              double        error = 0;
-              scene.gravity(-9.81 * ez);
-              RigidBody crank, slider, link = rod(0.5, 4e-4, 4e-3, B, S, n);
-              crank.mass             = 0.12;
-              crank.inertia          = Vector3(1e-4, 1e-4, 1e-5).asDiagonal();
-              crank.position         = (A + B) / 2;
-              crank.angular_velocity = w;
-              crank.velocity         = w.cross(B - A) / 2;
-              link.angular_velocity  = {1.92, -0.96, 0.48};
-              link.velocity          = {0.12, -0.24, 0};
-              slider.mass            = 2;
-              slider.position        = S;
-              slider.velocity        = 0.24 * ex;
-              const Body c = scene.add("crank", crank), r = scene.add("rod", link), s = scene.add("slider", slider), g = scene.ground();
-              scene.add("pin", Revolute{scene.markerAt(c, A, X), scene.markerAt(g, A, X)});
-              scene.add("ball", Spherical{scene.markerAt(r, B), scene.markerAt(c, B)});
-              scene.add("cross", Universal{scene.markerAt(r, S, axes(ex, n)), scene.markerAt(s, S, X)});
-              scene.add("guide", Translational{scene.markerAt(s, S, X), scene.marker(g, none, X)});
-              scene.channel("x", Measure::displacement(scene.marker(s), 0));
-              hhtex::SliderCrankReference exact(6);
-              Watched run(scene, 1, 0.02, damped(eps), [&](double t, const std::vector<double> &v) { Widen(error, v[0], exact.slider(t)); });
-              return error;
-            },
-            1e-6, 1e-8, 5e-5);
+  converges(
+      "spatial slider-crank, slider to t = 1",
+      [](double eps) {
+        const Vector3 A(0, 0.1, 0.12), B(0, 0.1, 0.2), S(0.2, 0, 0), n = (S - B).cross(ex).normalized(), w = 6 * ex;
+        const Matrix3 X = axes(ey, ex);
+        Scene         scene(PETSC_COMM_SELF);
+        double        error = 0;
+        scene.gravity(-9.81 * ez);
+        RigidBody crank, slider, link = rod(0.5, 4e-4, 4e-3, B, S, n);
+        crank.mass             = 0.12;
+        crank.inertia          = Vector3(1e-4, 1e-4, 1e-5).asDiagonal();
+        crank.position         = (A + B) / 2;
+        crank.angular_velocity = w;
+        crank.velocity         = w.cross(B - A) / 2;
+        link.angular_velocity  = {1.92, -0.96, 0.48};
+        link.velocity          = {0.12, -0.24, 0};
+        slider.mass            = 2;
+        slider.position        = S;
+        slider.velocity        = 0.24 * ex;
+        const Body c = scene.add("crank", crank), r = scene.add("rod", link), s = scene.add("slider", slider),
+                   g = scene.ground();
+        scene.add("pin", Revolute{scene.markerAt(c, A, X), scene.markerAt(g, A, X)});
+        scene.add("ball", Spherical{scene.markerAt(r, B), scene.markerAt(c, B)});
+        scene.add("cross", Universal{scene.markerAt(r, S, axes(ex, n)), scene.markerAt(s, S, X)});
+        scene.add("guide", Translational{scene.markerAt(s, S, X), scene.marker(g, none, X)});
+        scene.channel("x", Measure::displacement(scene.marker(s), 0));
+        hhtex::SliderCrankReference exact(6);
+        Watched                     run(scene, 1, 0.02, damped(eps),
+                                        [&](double t, const std::vector<double> &v) { Widen(error, v[0], exact.slider(t)); });
+        return error;
+      },
+      1e-6, 1e-8, 5e-5);
 }
 
 /* A04: closure and energy as well, with the row that is redundant left out by the scene */
 TEST(SceneReferences, Bricard)
 {
-  using Reference = hhtex::BricardReference;
-  double closure = 0, drift = 0, start = 0;
-  Printed quiet;
+  using Reference    = hhtex::BricardReference;
+  double     closure = 0, drift = 0, start = 0;
+  Printed    quiet;
   const auto run = [&](double eps) {
     Scene scene(PETSC_COMM_SELF);
     scene.gravity(-9.81 * ey);
@@ -191,7 +198,7 @@ TEST(SceneReferences, Bricard)
       Body           next = scene.ground();
       if (k < 5) {
         const Vector3 d = Reference::point(k + 1) - x, y = Vector3::Unit(Reference::axis(k));
-        next            = scene.add("", rod(1, 0.01 / 6, 1.01 / 12, x, x + d, y));
+        next = scene.add("", rod(1, 0.01 / 6, 1.01 / 12, x, x + d, y));
       }
       P.push_back(scene.markerAt(before, x, R));
       scene.add("", Revolute{scene.markerAt(next, x, R), P.back()});
@@ -207,7 +214,8 @@ TEST(SceneReferences, Bricard)
       Vector3 p[6];
       Reference::points(exact.at(t), p);
       if (t == 0) start = c[12] + c[13];
-      for (int k = 2; k < 6; k++) Widen(k < 5 ? error : closure, (Eigen::Map<const Vector3>(&c[3 * k - 6]) - p[k]).norm());
+      for (int k = 2; k < 6; k++)
+        Widen(k < 5 ? error : closure, (Eigen::Map<const Vector3>(&c[3 * k - 6]) - p[k]).norm());
       Widen(drift, c[12] + c[13], start);
     });
     return error;
@@ -223,70 +231,71 @@ TEST(SceneReferences, Bricard)
 TEST(SceneReferences, Flyball)
 {
   hhtex::FlyballReference exact; /* its stiffness makes it costly: once */
-  converges("A05 governor, slider and tip to t = 1",
-            [&](double eps) {
-              const Vector3 w = 2 * M_PI * ez;
-              Scene         scene(PETSC_COMM_SELF);
-              double        error = 0;
-              scene.gravity(-9.81 * ez);
-              RigidBody shaft, slider;
-              shaft.mass             = 0.3;
-              shaft.inertia          = Vector3(1.0001, 1.0001, 2e-4).asDiagonal() * 0.025;
-              shaft.position         = 0.5 * ez;
-              shaft.angular_velocity = w;
-              slider.mass             = 3;
-              slider.inertia          = Matrix3::Identity() * 0.005;
-              slider.position         = 0.5 * ez;
-              slider.angular_velocity = w;
-              const Body   S = scene.add("shaft", shaft), Z = scene.add("slider", slider);
-              const Marker axis = scene.marker(S);
-              scene.add("bearing", Revolute{axis, scene.marker(scene.ground(), 0.5 * ez)});
-              scene.add("guide", Translational{scene.marker(Z), axis});
-              for (double side : {1., -1.}) {
-                /* rod and mass at its end as one body about a hinge: centre at (0.15 + 5)/5.3 of the rod */
-                const Vector3 hinge(0.05 * side, 0, 1), out(std::cos(M_PI / 6) * side, 0, -0.5);
-                const double  c = 5.15 / 5.3, across = 0.025 * 1.0001 + 0.3 * (c - 0.5) * (c - 0.5) + 5 * (1 - c) * (1 - c);
-                RigidBody     arm = rod(5.3, 0.025 * 2e-4, across, hinge, hinge + out, ey);
-                arm.center        = (c - 0.5) * ex;
-                arm.velocity         = w.cross(Vector3(hinge + c * out));
-                arm.angular_velocity = w;
-                const Body R         = scene.add("", arm);
-                scene.add("", Revolute{scene.markerAt(R, hinge, axes(ez, ey)), scene.markerAt(S, hinge, axes(ez, ey))});
-                scene.add("", SpringDamper{scene.marker(R), scene.markerAt(Z, {0.05 * side, 0, 0.5}), 8e5, 4e4, 0.5});
-                const Marker tip = scene.marker(R, 0.5 * ex);
-                for (int k = 0; k < 3; k++) look(scene, Measure::displacement(tip, k));
-              }
-              scene.channel("s", Measure::displacement(scene.marker(Z), 2));
-              Watched run(scene, 1, 0.05, damped(eps), [&](double t, const std::vector<double> &v) {
-                const auto    y = exact.at(t);
-                const double  r = 0.05 + std::cos(y.p);
-                const Vector3 tip(r * std::cos(y.turn), r * std::sin(y.turn), 1 - std::sin(y.p));
-                Widen(error, (Vector3(v[0], v[1], v[2]) - tip).norm());
-                Widen(error, (Vector3(-v[3], -v[4], v[5]) - tip).norm());
-                Widen(error, v[6], y.s);
-              });
-              EXPECT_LT(run.s.steps, 2000); /* steps are not those of the stiffness, 1/27000 s */
-              return error;
-            },
-            1e-6, 1e-8, 5e-5);
+  converges(
+      "A05 governor, slider and tip to t = 1",
+      [&](double eps) {
+        const Vector3 w = 2 * M_PI * ez;
+        Scene         scene(PETSC_COMM_SELF);
+        double        error = 0;
+        scene.gravity(-9.81 * ez);
+        RigidBody shaft, slider;
+        shaft.mass              = 0.3;
+        shaft.inertia           = Vector3(1.0001, 1.0001, 2e-4).asDiagonal() * 0.025;
+        shaft.position          = 0.5 * ez;
+        shaft.angular_velocity  = w;
+        slider.mass             = 3;
+        slider.inertia          = Matrix3::Identity() * 0.005;
+        slider.position         = 0.5 * ez;
+        slider.angular_velocity = w;
+        const Body   S = scene.add("shaft", shaft), Z = scene.add("slider", slider);
+        const Marker axis = scene.marker(S);
+        scene.add("bearing", Revolute{axis, scene.marker(scene.ground(), 0.5 * ez)});
+        scene.add("guide", Translational{scene.marker(Z), axis});
+        for (double side : {1., -1.}) {
+          /* rod and mass at its end as one body about a hinge: centre at (0.15 + 5)/5.3 of the rod */
+          const Vector3 hinge(0.05 * side, 0, 1), out(std::cos(M_PI / 6) * side, 0, -0.5);
+          const double  c = 5.15 / 5.3, across = 0.025 * 1.0001 + 0.3 * (c - 0.5) * (c - 0.5) + 5 * (1 - c) * (1 - c);
+          RigidBody     arm    = rod(5.3, 0.025 * 2e-4, across, hinge, hinge + out, ey);
+          arm.center           = (c - 0.5) * ex;
+          arm.velocity         = w.cross(Vector3(hinge + c * out));
+          arm.angular_velocity = w;
+          const Body R         = scene.add("", arm);
+          scene.add("", Revolute{scene.markerAt(R, hinge, axes(ez, ey)), scene.markerAt(S, hinge, axes(ez, ey))});
+          scene.add("", SpringDamper{scene.marker(R), scene.markerAt(Z, {0.05 * side, 0, 0.5}), 8e5, 4e4, 0.5});
+          const Marker tip = scene.marker(R, 0.5 * ex);
+          for (int k = 0; k < 3; k++) look(scene, Measure::displacement(tip, k));
+        }
+        scene.channel("s", Measure::displacement(scene.marker(Z), 2));
+        Watched run(scene, 1, 0.05, damped(eps), [&](double t, const std::vector<double> &v) {
+          const auto    y = exact.at(t);
+          const double  r = 0.05 + std::cos(y.p);
+          const Vector3 tip(r * std::cos(y.turn), r * std::sin(y.turn), 1 - std::sin(y.p));
+          Widen(error, (Vector3(v[0], v[1], v[2]) - tip).norm());
+          Widen(error, (Vector3(-v[3], -v[4], v[5]) - tip).norm());
+          Widen(error, v[6], y.s);
+        });
+        EXPECT_LT(run.s.steps, 2000); /* steps are not those of the stiffness, 1/27000 s */
+        return error;
+      },
+      1e-6, 1e-8, 5e-5);
 }
 
-/* The heavy top of Bruels and Cardona to its first table time, reaction included; steps of one length, as every change of the step
-   shakes the multipliers */
+/* The heavy top of Bruels and Cardona to its first table time, reaction included; steps of one length, as every change
+   of the step shakes the multipliers */
 TEST(SceneReferences, HeavyTop)
 {
   const Vector3 x(.60555056137707, .59895768179494, -.52398302743003), Om(-2.6915909121430, 150, 4.9172609898946),
       F(-640.2364079921, -148.6277113470, 136.9293130385);
-  double        error[2][3];
+  double error[2][3];
   for (int fine : {0, 1}) {
     Scene     scene(PETSC_COMM_SELF);
     RigidBody b;
     scene.gravity(-9.81 * ez);
-    b.mass             = 15;
-    b.inertia          = Vector3(0.234375, 0.46875, 0.234375).asDiagonal();
-    b.position         = ey;
-    b.angular_velocity = {0, 150, -4.61538};
-    b.velocity         = b.angular_velocity.cross(ey);
+    b.mass              = 15;
+    b.inertia           = Vector3(0.234375, 0.46875, 0.234375).asDiagonal();
+    b.position          = ey;
+    b.angular_velocity  = {0, 150, -4.61538};
+    b.velocity          = b.angular_velocity.cross(ey);
     const Body    B     = scene.add("top", b);
     const Marker  pivot = scene.marker(B, -ey);
     const Element joint = scene.add("pivot", Spherical{pivot, scene.marker(scene.ground())});
@@ -302,7 +311,11 @@ TEST(SceneReferences, HeavyTop)
   }
   const double bound[] = {1e-7, 1e-4, 2e-3};
   for (int k = 0; k < 3; k++) {
-    MEASURED("heavy top, %s at t = 0.2: error %.2e with h = 1e-4, %.2e with 5e-5", k == 0 ? "x" : k == 1 ? "Omega" : "F", error[0][k], error[1][k]);
+    MEASURED("heavy top, %s at t = 0.2: error %.2e with h = 1e-4, %.2e with 5e-5",
+             k == 0   ? "x"
+             : k == 1 ? "Omega"
+                      : "F",
+             error[0][k], error[1][k]);
     EXPECT_LT(error[1][k], bound[k]);
     EXPECT_LT(error[1][k], error[0][k] * 0.6);
   }
@@ -328,8 +341,8 @@ TEST(SceneReferences, Tumbling)
     Widen(drift, c[0] + c[1], start);
     largest = std::max(largest, c[0]);
   });
-  MEASURED("tumbling for 60 s: %d changes of axes, %d steps, %d rejected, energy to %.1e of %.1f J", (int)run.s.changes, (int)run.s.steps, (int)run.s.rejected,
-           drift, largest);
+  MEASURED("tumbling for 60 s: %d changes of axes, %d steps, %d rejected, energy to %.1e of %.1f J", (int)run.s.changes,
+           (int)run.s.steps, (int)run.s.rejected, drift, largest);
   EXPECT_GT(run.s.changes, 10);
   EXPECT_LT(run.s.rejected, run.s.steps / 10);
   EXPECT_LT(drift, 0.02 * largest);
@@ -338,31 +351,32 @@ TEST(SceneReferences, Tumbling)
 /* A ball down a slope: 5/7 g sin, friction 2/7 m g sin, normal force m g cos */
 TEST(SceneReferences, RollingBall)
 {
-  converges("ball on a slope, x and force/20 N to t = 2",
-            [](double eps) {
-              const double  s = 0.4, r = 0.3, a = 5. / 7 * 9.81 * std::sin(s);
-              const Matrix3 plane = Eigen::AngleAxisd(s, ey).toRotationMatrix();
-              Scene         scene(PETSC_COMM_SELF);
-              RigidBody     b;
-              double        error = 0;
-              scene.gravity(-9.81 * ez);
-              b.mass             = 2;
-              b.inertia          = Matrix3::Identity() * (0.8 * r * r);
-              b.position         = plane.col(2) * r;
-              b.velocity         = 0.7 * plane.col(1);
-              b.angular_velocity = -0.7 / r * plane.col(0);
-              const Marker  ramp = scene.marker(scene.ground(), none, plane), c = scene.marker(scene.add("ball", b));
-              const Element roll = scene.add("rolling", RollingSphere{c, ramp, r});
-              for (int k = 0; k < 3; k++) look(scene, Measure::displacement(c, k, ramp, ramp));
-              for (int k = 0; k < 3; k++) look(scene, Measure::multiplier(roll, k));
-              const Vector3 F(19.62 * std::cos(s), -0.8 * a, 0);
-              Watched run(scene, 2, 0.1, sharp(eps), [&](double t, const std::vector<double> &v) {
-                Widen(error, (Eigen::Map<const Vector3>(&v[0]) - Vector3(a * t * t / 2, 0.7 * t, r)).norm());
-                Widen(error, (Eigen::Map<const Vector3>(&v[3]) - F).norm() / 20);
-              });
-              return error;
-            },
-            1e-6, 1e-8, 1e-4);
+  converges(
+      "ball on a slope, x and force/20 N to t = 2",
+      [](double eps) {
+        const double  s = 0.4, r = 0.3, a = 5. / 7 * 9.81 * std::sin(s);
+        const Matrix3 plane = Eigen::AngleAxisd(s, ey).toRotationMatrix();
+        Scene         scene(PETSC_COMM_SELF);
+        RigidBody     b;
+        double        error = 0;
+        scene.gravity(-9.81 * ez);
+        b.mass             = 2;
+        b.inertia          = Matrix3::Identity() * (0.8 * r * r);
+        b.position         = plane.col(2) * r;
+        b.velocity         = 0.7 * plane.col(1);
+        b.angular_velocity = -0.7 / r * plane.col(0);
+        const Marker  ramp = scene.marker(scene.ground(), none, plane), c = scene.marker(scene.add("ball", b));
+        const Element roll = scene.add("rolling", RollingSphere{c, ramp, r});
+        for (int k = 0; k < 3; k++) look(scene, Measure::displacement(c, k, ramp, ramp));
+        for (int k = 0; k < 3; k++) look(scene, Measure::multiplier(roll, k));
+        const Vector3 F(19.62 * std::cos(s), -0.8 * a, 0);
+        Watched       run(scene, 2, 0.1, sharp(eps), [&](double t, const std::vector<double> &v) {
+          Widen(error, (Eigen::Map<const Vector3>(&v[0]) - Vector3(a * t * t / 2, 0.7 * t, r)).norm());
+          Widen(error, (Eigen::Map<const Vector3>(&v[3]) - F).norm() / 20);
+        });
+        return error;
+      },
+      1e-6, 1e-8, 1e-4);
 }
 
 /* Quarter car over a curb: the tire leaves the road and comes down again */
@@ -373,35 +387,36 @@ TEST(SceneReferences, QuarterCar)
   hhtex::QuarterCarReference exact(p);
   const double               hub = 0.3 - p.sink();
   double                     air = 0;
-  converges("quarter car over a curb, heights to t = 1",
-            [&](double eps) {
-              Scene      scene(PETSC_COMM_SELF);
-              RigidBody  wheel, body, road;
-              ContactLaw law;
-              double     error = 0;
-              scene.gravity(-9.81 * ez);
-              wheel.mass     = p.wheel;
-              wheel.position = hub * ez;
-              body.mass      = p.body;
-              body.position  = ez;
-              const Marker datum = scene.marker(scene.ground()), w = scene.marker(scene.add("wheel", wheel)), b = scene.marker(scene.add("body", body)),
-                           r = scene.marker(scene.add("road", road));
-              for (Marker m : {w, b, r}) scene.add("", Translational{m, datum});
-              scene.add("", TranslationalMotion{r, datum, p.road});
-              scene.add("suspension", SpringDamper{b, w, p.stiffness, p.damping, -1, -p.body * 9.81});
-              law.stiffness = p.tire;
-              law.damping   = p.tire_damping;
-              scene.add("tire", SpherePlane{w, r, 0.3, law});
-              look(scene, Measure::displacement(b, 2));
-              look(scene, Measure::displacement(w, 2));
-              air = 0;
-              Watched run(scene, 1, 0.002, damped(eps), [&](double t, const std::vector<double> &v) {
-                Widen(error, v[0] - 1, exact.body(t));
-                Widen(error, v[1] - hub, exact.wheel(t));
-                if (exact.tire(t) == 0) air += 0.002;
-              });
-              return error;
-            },
-            1e-6, 1e-8, 2e-5);
+  converges(
+      "quarter car over a curb, heights to t = 1",
+      [&](double eps) {
+        Scene      scene(PETSC_COMM_SELF);
+        RigidBody  wheel, body, road;
+        ContactLaw law;
+        double     error = 0;
+        scene.gravity(-9.81 * ez);
+        wheel.mass         = p.wheel;
+        wheel.position     = hub * ez;
+        body.mass          = p.body;
+        body.position      = ez;
+        const Marker datum = scene.marker(scene.ground()), w = scene.marker(scene.add("wheel", wheel)),
+                     b = scene.marker(scene.add("body", body)), r = scene.marker(scene.add("road", road));
+        for (Marker m : {w, b, r}) scene.add("", Translational{m, datum});
+        scene.add("", TranslationalMotion{r, datum, p.road});
+        scene.add("suspension", SpringDamper{b, w, p.stiffness, p.damping, -1, -p.body * 9.81});
+        law.stiffness = p.tire;
+        law.damping   = p.tire_damping;
+        scene.add("tire", SpherePlane{w, r, 0.3, law});
+        look(scene, Measure::displacement(b, 2));
+        look(scene, Measure::displacement(w, 2));
+        air = 0;
+        Watched run(scene, 1, 0.002, damped(eps), [&](double t, const std::vector<double> &v) {
+          Widen(error, v[0] - 1, exact.body(t));
+          Widen(error, v[1] - hub, exact.wheel(t));
+          if (exact.tire(t) == 0) air += 0.002;
+        });
+        return error;
+      },
+      1e-6, 1e-8, 2e-5);
   EXPECT_GT(air, 0.02);
 }
