@@ -1,0 +1,63 @@
+/*
+  A flexible body in modal coordinates, as a scene takes it: plain data, made by the flexible-body library (flexible.h) from a
+  finite-element model, read from a file of reduced bodies, or filled in by the user.
+
+  The field of displacement from the undeformed body is sum_k phi_k(X) eta_k in the axes of the floating frame, whose origin is the
+  undeformed centre of mass. Modes are orthonormal in the mass matrix and diagonalize the stiffness; rigid-body modes are left out.
+  What the equations of motion need of mass distribution and modes are the integrals below, the inertia invariants of the body
+  (Shabana, Dynamics of Multibody Systems, ch. 5; dm is the measure of mass, X the undeformed position from the centre of mass).
+*/
+#ifndef HHTDAE_MODAL_H
+#define HHTDAE_MODAL_H
+
+#include "hhtdae/types.h"
+#include <array>
+#include <string>
+#include <vector>
+
+namespace hhtdae
+{
+
+/* Where joints and forces take hold: six degrees of freedom that follow the modes */
+struct ModalAttachment {
+  std::string                               name;
+  Vector3                                   position = Vector3::Zero(); /* undeformed, axes and origin of the FE model */
+  Eigen::Matrix<double, 3, Eigen::Dynamic>  translation, rotation;      /* 3 x modes: of the point, per unit of each mode */
+};
+
+struct ModalBody {
+  std::string name;
+  double      mass    = 0;
+  Vector3     center  = Vector3::Zero(); /* of mass, undeformed, axes and origin of the FE model */
+  Matrix3     moments = Matrix3::Zero(); /* int X X^T dm */
+
+  Eigen::VectorXd omega; /* circular frequencies of the modes, rad per unit of time */
+
+  Eigen::Matrix<double, 3, Eigen::Dynamic> first;                  /* int phi dm: 3 x modes */
+  std::array<Eigen::Matrix<double, 3, Eigen::Dynamic>, 3> moment;  /* moment[c](d, k) = int X_c phi_k,d dm */
+  /* quadratic[p](k, l) = int phi_k,c phi_l,d dm for (c, d) = xx, yy, zz, xy, yz, zx; empty: not known, then the mass matrix can be
+     Partial or Constant only. The sum of the first three is the identity. */
+  std::array<Eigen::MatrixXd, 6> quadratic;
+
+  std::vector<ModalAttachment> attachments;
+
+  PetscInt modes() const { return (PetscInt)omega.size(); }
+  Matrix3  inertia() const { return moments.trace() * Matrix3::Identity() - moments; } /* undeformed, about the centre of mass */
+  PetscInt attachment(const std::string &name) const                                   /* its index, -1: there is none */
+  {
+    for (std::size_t i = 0; i < attachments.size(); i++)
+      if (attachments[i].name == name) return (PetscInt)i;
+    return -1;
+  }
+};
+
+/* How far the mass matrix follows the deformation (what Adams/Flex offers under these names) */
+enum class ModalMass {
+  Full,    /* all invariants */
+  Partial, /* without those quadratic in the modes */
+  Constant /* that of the undeformed body */
+};
+
+} // namespace hhtdae
+
+#endif
