@@ -119,7 +119,7 @@ struct ReducedMode {
 
 /* Six components xx, yy, zz, xy, yz, zx */
 struct StressModes {
-  std::vector<PetscInt> node;   /* own, by place among ReducedBody's nodes */
+  std::vector<PetscInt> node;   /* own, ascending, by place from 0 among the ReducedBody's own nodes */
   Eigen::MatrixXd       values; /* 6 rows per node x modes */
 };
 
@@ -155,20 +155,23 @@ struct ReducedBody {
   PetscErrorCode view(PetscViewer viewer) const;
 };
 
+/* Only what a scene takes of the file, the same on every rank */
+PetscErrorCode LoadModalBody(MPI_Comm comm, const std::string &file, ModalBody *body);
+
 PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedBody *body);
 
 /* Stress modes at all nodes: stress at the elements' nodes, averaged over the elements of one material around a node */
 PetscErrorCode AddStressModes(const FeModel &model, ReducedBody *body);
 
 /* von Mises stress of all own nodes that have stress modes, for modal coordinates eta */
-void VonMises(const ReducedBody &body, const Eigen::VectorXd &eta, std::vector<double> *stress);
+PetscErrorCode VonMises(const ReducedBody &body, const Eigen::VectorXd &eta, std::vector<double> *stress);
 
 /* Follows the largest von Mises stress of every node through a run */
 class HotSpots
 {
 public:
   explicit HotSpots(const ReducedBody &body);
-  void           add(double time, const Eigen::VectorXd &eta);
+  PetscErrorCode add(double time, const Eigen::VectorXd &eta);
   /* the `count` highest, no two nearer to each other than `distance`; on every rank. Collective */
   PetscErrorCode highest(PetscInt count, double distance, std::vector<HotSpot> *spots) const;
 
