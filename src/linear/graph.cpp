@@ -128,7 +128,7 @@ PetscErrorCode LinearMetisOrder(const LinearGraph &graph, const std::vector<Pets
   grows the tree on the way: the parent of j is the first i that reaches it.
 */
 void LinearCountWork(const LinearGraph &graph, const PetscInt order[], double limit, LinearWork *work,
-                     PetscBool *bounded)
+                     PetscBool *bounded, LinearTree *tree)
 {
   const PetscInt        n = graph.n;
   std::vector<PetscInt> place(n), parent(n, -1), met(n, -1), count(n, 1);
@@ -151,4 +151,9 @@ void LinearCountWork(const LinearGraph &graph, const PetscInt order[], double li
   }
   for (PetscInt j = 0; j < n; ++j) work->flops += (double)count[j] * (double)count[j];
   if (work->factor <= limit) *bounded = PETSC_TRUE;
+  if (tree) {
+    tree->place.swap(place);
+    tree->parent.swap(parent);
+    tree->count.swap(count);
+  }
 }

@@ -36,9 +36,14 @@ struct LinearWork {
   double flops  = 0; /* multiplications and additions of L D L^T, the sum of the squared column counts */
 };
 
+/* The elimination tree, by places in the order: who follows (-1: nobody), entries of each column of L */
+struct LinearTree {
+  std::vector<PetscInt> place, parent, count;
+};
+
 /* Counts the columns of L along the elimination tree and stops, *bounded = PETSC_FALSE, once L exceeds `limit` entries
  */
 void LinearCountWork(const LinearGraph &graph, const PetscInt order[], double limit, LinearWork *work,
-                     PetscBool *bounded);
+                     PetscBool *bounded, LinearTree *tree = NULL);
 
 #endif

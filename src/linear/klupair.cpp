@@ -20,7 +20,7 @@ static KluPair *Data(Mat F) { return static_cast<KluPair *>(F->data); }
 
 /* ---- rows of the matrix ---- */
 
-static PetscErrorCode GetRows(Mat A, LinearRows *rows)
+PetscErrorCode KluPairGetRows(Mat A, LinearRows *rows)
 {
   PetscBool done;
 
@@ -32,7 +32,7 @@ static PetscErrorCode GetRows(Mat A, LinearRows *rows)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode RestoreRows(Mat A, LinearRows *rows)
+PetscErrorCode KluPairRestoreRows(Mat A, LinearRows *rows)
 {
   PetscBool done;
 
@@ -178,7 +178,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
 
   PetscFunctionBegin;
   F->factorerrortype = MAT_FACTOR_NOERROR;
-  PetscCall(GetRows(A, &rows));
+  PetscCall(KluPairGetRows(A, &rows));
   PetscCall(SamePattern(A, rows, k, &same));
   if (!same) PetscCall(Analyse(A, rows, k));
   PetscCall(Refactor(F, rows, &good));
@@ -186,7 +186,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
     PetscCall(FactorWithPivoting(rows, k));
     PetscCall(PlanAnew(F, A, rows));
   }
-  PetscCall(RestoreRows(A, &rows));
+  PetscCall(KluPairRestoreRows(A, &rows));
   PetscCall(ReportError(F, A));
   F->assembled = PETSC_TRUE;
   if (k->numeric) PetscCall(PetscLogFlops(k->common.flops));
@@ -263,9 +263,9 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorIn
     k->given.assign(order, order + A->rmap->n);
     PetscCall(ISRestoreIndices(row, &order));
   }
-  PetscCall(GetRows(A, &rows));
+  PetscCall(KluPairGetRows(A, &rows));
   PetscCall(Analyse(A, rows, k));
-  PetscCall(RestoreRows(A, &rows));
+  PetscCall(KluPairRestoreRows(A, &rows));
   F->ops->lufactornumeric = FactorNumeric;
   F->ops->solve           = MatSolve_KLUPair;
   F->ops->solvetranspose  = MatSolveTranspose_KLUPair;
@@ -338,7 +338,7 @@ static PetscErrorCode Destroy(Mat F)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode MatGetFactor_KLUPair(Mat A, MatFactorType type, Mat *factor)
+PetscErrorCode LinearKLUPairFactor(Mat A, MatFactorType type, Mat *factor)
 {
   Mat      F;
   KluPair *k = new KluPair();
@@ -369,7 +369,7 @@ static PetscErrorCode MatGetFactor_KLUPair(Mat A, MatFactorType type, Mat *facto
 PetscErrorCode LinearRegisterKLUPair(void)
 {
   PetscFunctionBegin;
-  PetscCall(MatSolverTypeRegister(LINEAR_KLUPAIR, MATSEQAIJ, MAT_FACTOR_LU, MatGetFactor_KLUPair));
+  PetscCall(MatSolverTypeRegister(LINEAR_KLUPAIR, MATSEQAIJ, MAT_FACTOR_LU, LinearKLUPairFactor));
   PetscFunctionReturn(0);
 }
 

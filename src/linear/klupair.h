@@ -31,4 +31,7 @@
 /* Does nothing where the library was built without KLU */
 PetscErrorCode LinearRegisterKLUPair(void);
 
+/* The factor of a SEQAIJ matrix that is registered under that name */
+PetscErrorCode LinearKLUPairFactor(Mat A, MatFactorType type, Mat *factor);
+
 #endif

@@ -96,37 +96,100 @@ static std::vector<PetscInt> OrderAsGiven(const Groups &g, const std::vector<Pet
   return order;
 }
 
+/*
+  From far to near the ends, level by level: a chain that ends at the outside is eaten up from its free end, so that the
+  outside meets only the last few columns. Groups that no path joins to the ends come first, in the order that is there.
+*/
+static std::vector<PetscInt> OrderTowards(const LinearGraph &c, const Groups &g, const std::vector<PetscInt> &ends,
+                                          const std::vector<PetscInt> &others)
+{
+  std::vector<PetscInt> near;
+  std::vector<bool>     met(c.n, false);
+  const auto            meet = [&](PetscInt v) {
+    if (!met[v]) near.push_back(v);
+    met[v] = true;
+  };
+  near.reserve(c.n);
+  for (PetscInt i : ends) meet(g.of[i]);
+  for (size_t head = 0; head < near.size(); ++head)
+    for (PetscInt k = c.xadj[near[head]]; k < c.xadj[near[head] + 1]; ++k) meet(c.adj[k]);
+  std::vector<PetscInt> order;
+  order.reserve(c.n);
+  for (PetscInt v : others)
+    if (!met[v]) order.push_back(v);
+  order.insert(order.end(), near.rbegin(), near.rend());
+  return order;
+}
+
+/* Entries in the columns of L that the ends reach */
+static double PathEntries(const LinearTree &tree, const std::vector<PetscInt> &ends)
+{
+  std::vector<bool> met(tree.parent.size(), false);
+  double            entries = 0;
+  for (PetscInt i : ends)
+    for (PetscInt j = tree.place[i]; j >= 0 && !met[j]; j = tree.parent[j]) {
+      met[j] = true;
+      entries += (double)tree.count[j];
+    }
+  return entries;
+}
+
+/* An order and what it costs: the factorization and, for the outside, two sweeps over the columns reached */
+struct Candidate {
+  const char           *name;
+  std::vector<PetscInt> order;
+  LinearWork            work;
+  double                path = 0, total = PETSC_MAX_REAL;
+};
+
+static Candidate Weigh(const char *name, const LinearGraph &graph, const Groups &g, const std::vector<PetscInt> &groups,
+                       const KluPair &k)
+{
+  Candidate  c;
+  LinearTree tree;
+  PetscBool  bounded;
+  c.name  = name;
+  c.order = Expand(g, groups);
+  LinearCountWork(graph, c.order.data(), COUNT_LIMIT, &c.work, &bounded, k.ends.empty() ? NULL : &tree);
+  if (!bounded) return c;
+  if (!k.ends.empty()) c.path = PathEntries(tree, k.ends);
+  c.total = 2 * c.work.flops + 2 * c.path * (double)k.width;
+  return c;
+}
+
 /* Leaves the order of the unknowns in *order and the work it takes in k */
 static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *k, std::vector<PetscInt> *order)
 {
   const LinearGraph     c = Compress(graph, g);
   std::vector<PetscInt> groups;
-  PetscBool             bounded;
+  Candidate             best;
+  const auto            try_this = [&](const char *name, const std::vector<PetscInt> &by_groups) {
+    Candidate other = Weigh(name, graph, g, by_groups, *k);
+    if (other.total < best.total) std::swap(best, other);
+  };
 
   PetscFunctionBegin;
   if (!k->given.empty()) {
-    k->ordering_used = "given by PETSc";
-    groups           = OrderAsGiven(g, k->given);
+    best = Weigh("given by PETSc", graph, g, OrderAsGiven(g, k->given), *k);
   } else if (k->ordering == KLUPAIR_METIS) {
-    k->ordering_used = "METIS";
     PetscCall(LinearMetisOrder(c, {}, &groups));
+    best = Weigh("METIS", graph, g, groups, *k);
   } else {
-    k->ordering_used = "AMD";
     PetscCall(OrderByAMD(c, &groups));
+    best = Weigh("AMD", graph, g, groups, *k);
+    if (k->ordering == KLUPAIR_AUTO && !k->ends.empty())
+      try_this("towards the ends", OrderTowards(c, g, k->ends, groups));
+    const bool much =
+        best.total >= 2 * TRY_METIS * (double)graph.n || 2 * best.path * (double)k->width > best.work.flops;
+    if (k->ordering == KLUPAIR_AUTO && much) {
+      PetscCall(LinearMetisOrder(c, {}, &groups));
+      try_this("METIS", groups);
+    }
   }
-  *order = Expand(g, groups);
-  LinearCountWork(graph, order->data(), COUNT_LIMIT, &k->work, &bounded);
-  if (!k->given.empty() || k->ordering != KLUPAIR_AUTO || (bounded && k->work.flops < TRY_METIS * (double)graph.n))
-    PetscFunctionReturn(0);
-
-  LinearWork other;
-  PetscCall(LinearMetisOrder(c, {}, &groups));
-  std::vector<PetscInt> by_metis = Expand(g, groups);
-  LinearCountWork(graph, by_metis.data(), COUNT_LIMIT, &other, &bounded);
-  if (!bounded || other.flops >= k->work.flops) PetscFunctionReturn(0);
-  k->ordering_used = "METIS";
-  k->work          = other;
-  order->swap(by_metis);
+  k->ordering_used = best.name;
+  k->work          = best.work;
+  k->path          = best.path;
+  order->swap(best.order);
   PetscFunctionReturn(0);
 }
 
@@ -171,7 +234,7 @@ static void Permutations(const LinearRows &A, const Groups &g, const std::vector
 */
 static void TryBlocks(const LinearRows &rows, KluPair *k)
 {
-  if (k->pivots.zeros || !k->given.empty() || k->ordering != KLUPAIR_AUTO) return;
+  if (k->pivots.zeros || k->whole || !k->given.empty() || k->ordering != KLUPAIR_AUTO) return;
   const double unlimited = k->common.maxwork;
   k->common.btf          = 1;
   k->common.maxwork      = BLOCK_SEARCH;

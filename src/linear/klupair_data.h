@@ -29,11 +29,18 @@ struct KluPair {
   PetscObjectId         matrix  = 0;
   PetscObjectState      pattern = 0, values = 0; /* of that matrix, when the pattern and the pivots were looked at */
 
+  /* Unknowns coupled to the outside, by so many rows and columns that are eliminated after all of these: the ordering
+     counts what it takes to carry them along */
+  std::vector<PetscInt> ends;
+  PetscInt              width = 0;
+  bool                  whole = false; /* no diagonal blocks are looked for */
+
   KluPairOrdering ordering = KLUPAIR_AUTO;
   PetscBool       refactor = PETSC_TRUE;
 
   LinearPivots pivots;
   LinearWork   work; /* foreseen for L of the symmetrized pattern */
+  double       path = 0; /* entries in the columns of L that the ends reach */
   const char  *ordering_used = "";
   double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
   double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
@@ -41,6 +48,10 @@ struct KluPair {
 };
 
 inline KluInt *KluIndices(const PetscInt *i) { return reinterpret_cast<KluInt *>(const_cast<PetscInt *>(i)); }
+
+/* Rows of a SEQAIJ matrix, to be given back before its values change */
+PetscErrorCode KluPairGetRows(Mat A, LinearRows *rows);
+PetscErrorCode KluPairRestoreRows(Mat A, LinearRows *rows);
 
 /* Pivots, ordering and KLU's analysis for the pattern and values of A */
 PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k);

@@ -1,6 +1,7 @@
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
 #include "klupair.h"
+#include "kluparts.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -32,5 +33,6 @@ PetscErrorCode LinearRegister(void)
   PetscCall(MatOrderingRegister(MATORDERINGMETISND, MatGetOrdering_MetisND));
   PetscCall(LinearRegisterMumpsND());
   PetscCall(LinearRegisterKLUPair());
+  PetscCall(LinearRegisterKLUParts());
   PetscFunctionReturn(0);
 }

@@ -1,0 +1,441 @@
+/*
+  "kluparts": the factor matrix. Option, with the prefix of the solver:
+    -mat_kluparts_check <true>   looks at the residual of one solve after pivots were chosen anew
+  and those of "klupair" for the interiors (klupair.cpp).
+*/
+#include "kluparts.h"
+
+#if defined(HHTDAE_HAVE_KLU)
+#include "kluparts_data.h"
+#include <algorithm>
+#include <petsc/private/matimpl.h>
+
+/* A residual above this part of the terms that a row sums up is not rounding */
+static const PetscReal RESIDUAL = 1e-8;
+
+/* KLU's measure of the pivots may fall so far before a solve is looked at again */
+static const PetscReal RCOND_FALL = 1e-3;
+
+/* Unknowns are moved so many times, each time at least one; the interface does not grow beyond this by it */
+static const PetscInt ROUNDS = 20, LARGEST = 4000;
+
+static KluParts *Data(Mat F) { return static_cast<KluParts *>(F->data); }
+
+/* ---- analysis ---- */
+
+static PetscErrorCode Reset(KluParts *p)
+{
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&p->factor));
+  PetscCall(MatDestroy(&p->inner));
+  p->klu            = NULL;
+  p->split          = PartsSplit();
+  p->factorizations = 0;
+  p->checked_rcond  = 0;
+  PetscFunctionReturn(0);
+}
+
+/* The interior's factor takes the options of the whole */
+static PetscErrorCode AnalyseInner(Mat F, KluParts *p)
+{
+  MatFactorInfo info;
+
+  PetscFunctionBegin;
+  if (p->split.inner_row.empty()) PetscFunctionReturn(0);
+  PetscCall(PartsInnerMatrix(&p->split, &p->inner));
+  PetscCall(LinearKLUPairFactor(p->inner, MAT_FACTOR_LU, &p->factor));
+  p->klu = static_cast<KluPair *>(p->factor->data);
+  if (F) {
+    PetscCall(MatSetOptionsPrefix(p->factor, ((PetscObject)F)->prefix));
+    PetscCall(PetscObjectSetOptions((PetscObject)p->factor, ((PetscObject)F)->options));
+  }
+  p->klu->ends  = PartsEnds(p->split);
+  p->klu->width = (PetscInt)p->split.local.size();
+  p->klu->whole = true;
+  PetscCall(MatFactorInfoInitialize(&info));
+  PetscCall(MatLUFactorSymbolic(p->factor, p->inner, NULL, NULL, &info));
+  PetscFunctionReturn(0);
+}
+
+/* Interface, interiors and their analysis, for the pattern and values of A; F may be NULL */
+static PetscErrorCode Analyse(Mat F, Mat A, KluParts *p)
+{
+  PetscFunctionBegin;
+  PetscCall(Reset(p));
+  PetscCall(PartsFindInterface(A, p->moved, &p->split.interface));
+  PetscCall(PartsBuildSplit(A, &p->split));
+  PetscCall(PartsCopyValues(A, &p->split));
+  PetscCall(AnalyseInner(F, p));
+  PetscCall(PetscObjectGetId((PetscObject)A, &p->matrix));
+  PetscCall(MatGetNonzeroState(A, &p->pattern));
+  ++p->splits;
+  PetscCall(PetscInfo(A, "Interface of %zu unknowns, %zu of them moved there; interior of %zu\n",
+                      p->split.interface.size(), p->moved.size(), p->split.inner_row.size()));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CheckType(Mat A, PetscBool *yes)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectBaseTypeCompare((PetscObject)A, MATMPIAIJ, yes));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Create(Mat A, KluParts **parts)
+{
+  KluParts *p = new KluParts();
+
+  PetscFunctionBegin;
+  PetscCall(PetscCommGetComm(PetscObjectComm((PetscObject)A), &p->comm));
+  PetscCallMPI(MPI_Comm_rank(p->comm, &p->rank));
+  PetscCallMPI(MPI_Comm_size(p->comm, &p->size));
+  *parts = p;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Delete(MPI_Comm comm, KluParts *p)
+{
+  PetscFunctionBegin;
+  PetscCall(Reset(p));
+  PetscCall(PetscCommRestoreComm(comm, &p->comm));
+  delete p;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearPartsCount(Mat A, double limit, LinearPartsWork *work)
+{
+  KluParts *p;
+
+  PetscFunctionBegin;
+  *work = LinearPartsWork();
+  PetscCall(CheckType(A, &work->possible));
+  if (!work->possible) PetscFunctionReturn(0);
+  PetscCall(PartsCountCouplings(A, &work->couplings));
+  work->possible = work->couplings <= limit ? PETSC_TRUE : PETSC_FALSE;
+  if (!work->possible) PetscFunctionReturn(0);
+  PetscCall(Create(A, &p));
+  PetscCall(Analyse(NULL, A, p));
+  const KluPair *k        = p->klu;
+  double         count[4] = {0, 0, 0, 0};
+  if (k) {
+    count[0] = (double)p->split.inner_row.size();
+    count[1] = k->work.factor;
+    count[2] = k->work.flops;
+    count[3] = k->path * (double)p->split.local.size();
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 4, MPI_DOUBLE, MPI_MAX, p->comm));
+  work->interface = (PetscInt)p->split.interface.size();
+  work->unknowns  = count[0];
+  work->factor    = count[1];
+  work->flops     = count[2];
+  work->path      = count[3];
+  PetscCall(Delete(PetscObjectComm((PetscObject)A), p));
+  PetscFunctionReturn(0);
+}
+
+/* ---- factorization ---- */
+
+/* How it went on the ranks: the worst error other than a zero pivot, the first row with a zero pivot, wishes */
+struct Outcome {
+  PetscInt error, singular, check, anew;
+};
+
+static PetscErrorCode FactorInner(KluParts *p, Outcome *all)
+{
+  MatFactorInfo  info;
+  MatFactorError error = MAT_FACTOR_NOERROR;
+  Outcome        mine  = {0, 0, 0, 0};
+  KluPair       *k     = p->klu;
+
+  PetscFunctionBegin;
+  if (k) {
+    PetscCall(MatFactorInfoInitialize(&info));
+    PetscCall(PetscObjectStateIncrease((PetscObject)p->inner));
+    PetscCall(MatLUFactorNumeric(p->factor, p->inner, &info));
+    PetscCall(MatFactorGetError(p->factor, &error));
+    mine.singular = error == MAT_FACTOR_NUMERIC_ZEROPIVOT || error == MAT_FACTOR_STRUCT_ZEROPIVOT;
+    mine.error    = mine.singular ? 0 : (PetscInt)error;
+    mine.anew     = k->factorizations != p->factorizations;
+    mine.check    = !error && (mine.anew || k->common.rcond < RCOND_FALL * p->checked_rcond);
+  } else
+    mine.anew = p->factorizations == 0;
+  PetscCallMPI(MPI_Allreduce(&mine, all, 4, MPIU_INT, MPI_MAX, p->comm));
+  if (!error && mine.anew) {
+    PetscCall(PartsFindReach(p));
+    p->factorizations = k ? k->factorizations : 1;
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ReportZeroPivot(Mat F, Mat A, PetscInt row)
+{
+  PetscFunctionBegin;
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix with %" PetscInt_FMT " rows is singular: there is no pivot in row %" PetscInt_FMT, A->rmap->N,
+             row);
+  PetscCall(PetscInfo(F, "Zero pivot in row %" PetscInt_FMT "\n", row));
+  F->factorerrortype             = MAT_FACTOR_NUMERIC_ZEROPIVOT;
+  F->factorerror_zeropivot_row   = row;
+  F->factorerror_zeropivot_value = 0;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ReportError(Mat F, Mat A, MatFactorError error)
+{
+  PetscFunctionBegin;
+  PetscCheck(
+      !A->erroriffailure, PetscObjectComm((PetscObject)F), error == MAT_FACTOR_OUTMEMORY ? PETSC_ERR_MEM : PETSC_ERR_FP,
+      error == MAT_FACTOR_OUTMEMORY ? "There is not enough memory to factor the matrix with %" PetscInt_FMT " rows"
+                                    : "The matrix with %" PetscInt_FMT " rows or its factors are not finite",
+      A->rmap->N);
+  PetscCall(PetscInfo(F, "The factorization failed: error %d\n", (int)error));
+  F->factorerrortype = error;
+  PetscFunctionReturn(0);
+}
+
+/* Global rows that leave the interiors, with the first of them; *moved = PETSC_FALSE where there are none or too many
+ */
+static PetscErrorCode Move(KluParts *p, std::vector<PetscInt> rows, PetscBool *moved, PetscInt *first)
+{
+  std::vector<PetscInt> all;
+
+  PetscFunctionBegin;
+  for (PetscInt &row : rows) row += p->split.begin;
+  PetscCall(PartsGather(p->comm, rows, &all));
+  *first = all.empty() ? -1 : all.front();
+  *moved = !all.empty() && (PetscInt)(p->split.interface.size() + all.size()) <=
+                               PetscMax(LARGEST, 2 * (PetscInt)p->split.interface.size())
+               ? PETSC_TRUE
+               : PETSC_FALSE;
+  if (*moved) p->moved.insert(p->moved.end(), all.begin(), all.end());
+  PetscFunctionReturn(0);
+}
+
+/* One attempt with the interface as it is; *again where it has been made larger */
+static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
+{
+  KluParts             *p = Data(F);
+  Outcome               o;
+  std::vector<PetscInt> move;
+  PetscInt              row;
+  PetscBool             finite, moved;
+
+  PetscFunctionBegin;
+  *again = false;
+  PetscCall(PartsCopyValues(A, &p->split));
+  PetscCall(FactorInner(p, &o));
+  if (o.error) {
+    PetscCall(ReportError(F, A, (MatFactorError)o.error));
+    PetscFunctionReturn(0);
+  }
+  if (o.singular) {
+    if (p->factor && p->factor->factorerrortype) PetscCall(PartsUnmatched(p, &move));
+    PetscCall(Move(p, move, &moved, &row));
+    if (last || !moved)
+      PetscCall(ReportZeroPivot(F, A, row));
+    else
+      *again = true;
+    PetscFunctionReturn(0);
+  }
+  PetscCall(PartsFactorSchur(p, &row, &finite));
+  if (!finite || row >= 0) {
+    if (!finite)
+      PetscCall(ReportError(F, A, MAT_FACTOR_OTHER));
+    else
+      PetscCall(ReportZeroPivot(F, A, p->split.interface[row]));
+    PetscFunctionReturn(0);
+  }
+  if (!o.check || !p->check) PetscFunctionReturn(0);
+  PetscCall(PartsResidual(p, &p->residual));
+  if (p->factor) p->checked_rcond = p->klu->common.rcond;
+  if (p->residual <= RESIDUAL || last) PetscFunctionReturn(0);
+  PetscCall(PartsNearNull(p, &row));
+  if (row >= 0) move.push_back(row);
+  PetscCall(Move(p, move, &moved, &row));
+  PetscCall(PetscInfo(F, "Residual of a solve %g, an interior is nearly singular: %s\n", (double)p->residual,
+                      moved ? "its interface is made larger" : "no unknown found that could leave it"));
+  *again = moved;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
+{
+  KluParts        *p = Data(F);
+  PetscObjectId    id;
+  PetscObjectState pattern;
+  bool             again = true;
+
+  PetscFunctionBegin;
+  F->factorerrortype = MAT_FACTOR_NOERROR;
+  PetscCall(PetscObjectGetId((PetscObject)A, &id));
+  PetscCall(MatGetNonzeroState(A, &pattern));
+  if (id != p->matrix || pattern != p->pattern) {
+    p->moved.clear();
+    PetscCall(Analyse(F, A, p));
+  }
+  for (PetscInt round = 1; again; ++round) {
+    PetscCall(Attempt(F, A, round > ROUNDS, &again));
+    if (again) PetscCall(Analyse(F, A, p));
+  }
+  F->assembled = PETSC_TRUE;
+  PetscFunctionReturn(0);
+}
+
+/* ---- solve ---- */
+
+static PetscErrorCode MatSolve_KLUParts(Mat F, Vec b, Vec x)
+{
+  const PetscScalar *from;
+  PetscScalar       *to;
+
+  PetscFunctionBegin;
+  if (F->factorerrortype) {
+    PetscCall(PetscInfo(F, "Solve with a factor that failed: the result is Inf\n"));
+    PetscCall(VecSet(x, PETSC_INFINITY));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(VecGetArrayRead(b, &from));
+  PetscCall(VecGetArrayWrite(x, &to));
+  PetscCall(PartsSolve(Data(F), from, to));
+  PetscCall(VecRestoreArrayWrite(x, &to));
+  PetscCall(VecRestoreArrayRead(b, &from));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS, IS, const MatFactorInfo *)
+{
+  KluParts *p = Data(F);
+
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)F);
+  PetscCall(PetscOptionsBool("-mat_kluparts_check", "Look at the residual of one solve after pivots were chosen anew",
+                             "None", p->check, &p->check, NULL));
+  PetscOptionsEnd();
+  p->moved.clear();
+  PetscCall(Analyse(F, A, p));
+  F->ops->lufactornumeric = FactorNumeric;
+  F->ops->solve           = MatSolve_KLUParts;
+  PetscFunctionReturn(0);
+}
+
+/* ---- what can be asked of the factor ---- */
+
+static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_KLUPARTS, 0; }
+
+static double Entries(const KluParts *p)
+{
+  const KluPair *k = p->klu;
+  const double   w = (double)p->split.local.size(), N = (double)p->split.interface.size();
+  double         entries = p->rank == 0 ? N * N : 0;
+  if (k && k->numeric)
+    entries += (double)k->numeric->lnz + (double)k->numeric->unz - (double)k->start.size() + 1 +
+               2 * w * (double)p->reach.size();
+  else if (k)
+    entries += 2 * k->work.factor;
+  return entries;
+}
+
+/* This rank's part, as for the other distributed factors; PETSc adds them up where a sum is asked for */
+static PetscErrorCode GetInfo(Mat F, MatInfoType type, MatInfo *info)
+{
+  const KluParts *p          = Data(F);
+  double          entries[2] = {Entries(p), (double)p->split.col.size()};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(info, sizeof *info));
+  if (type != MAT_LOCAL)
+    PetscCallMPI(
+        MPI_Allreduce(MPI_IN_PLACE, entries, 2, MPI_DOUBLE, type == MAT_GLOBAL_SUM ? MPI_SUM : MPI_MAX, p->comm));
+  info->block_size   = 1;
+  info->nz_allocated = info->nz_used = entries[0];
+  info->fill_ratio_needed            = entries[0] / PetscMax(entries[1], 1.0);
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode View(Mat F, PetscViewer viewer)
+{
+  const KluParts   *p = Data(F);
+  const KluPair    *k = p->klu;
+  PetscBool         ascii;
+  PetscViewerFormat format;
+  double            largest[3] = {(double)p->split.inner_row.size(), k ? k->work.flops : 0, (double)p->reach.size()};
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
+  if (!ascii) PetscFunctionReturn(0);
+  PetscCall(PetscViewerGetFormat(viewer, &format));
+  if (format != PETSC_VIEWER_ASCII_INFO && format != PETSC_VIEWER_ASCII_INFO_DETAIL) PetscFunctionReturn(0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 3, MPI_DOUBLE, MPI_MAX, p->comm));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "KLU on every rank, interface of %zu unknowns, %zu of them moved there\n",
+                                   p->split.interface.size(), p->moved.size()));
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  largest interior: %g unknowns, %g operations foreseen, %g columns reached\n",
+                                   largest[0], 2 * largest[1], largest[2]));
+  if (k)
+    PetscCall(PetscViewerASCIIPrintf(viewer,
+                                     "  first rank: ordering %s; factorizations with pivoting: %" PetscInt_FMT
+                                     ", with old pivots: %" PetscInt_FMT ", of these given up: %" PetscInt_FMT "\n",
+                                     k->ordering_used, k->factorizations, k->refactorizations + k->rejected,
+                                     k->rejected));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  solves checked: %" PetscInt_FMT ", residual of the last %g\n", p->checks,
+                                   (double)p->residual));
+  PetscFunctionReturn(0);
+}
+
+/* ---- create and destroy ---- */
+
+static PetscErrorCode Destroy(Mat F)
+{
+  PetscFunctionBegin;
+  PetscCall(Delete(PetscObjectComm((PetscObject)F), Data(F)));
+  F->data = NULL;
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", NULL));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MatGetFactor_KLUParts(Mat A, MatFactorType type, Mat *factor)
+{
+  Mat       F;
+  KluParts *p;
+
+  PetscFunctionBegin;
+  PetscCall(Create(A, &p));
+  PetscCall(MatCreate(PetscObjectComm((PetscObject)A), &F));
+  PetscCall(MatSetSizes(F, A->rmap->n, A->cmap->n, A->rmap->N, A->cmap->N));
+  PetscCall(PetscStrallocpy(LINEAR_KLUPARTS, &((PetscObject)F)->type_name));
+  PetscCall(MatSetUp(F));
+  F->data                  = p;
+  F->factortype            = type;
+  F->assembled             = PETSC_TRUE; /* so that -ksp_view shows it */
+  F->ops->lufactorsymbolic = FactorSymbolic;
+  F->ops->getinfo          = GetInfo;
+  F->ops->view             = View;
+  F->ops->destroy          = Destroy;
+  PetscCall(PetscFree(F->solvertype));
+  PetscCall(PetscStrallocpy(LINEAR_KLUPARTS, &F->solvertype));
+  PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", GetSolverType));
+  *factor = F;
+  PetscFunctionReturn(0);
+}
+
+/* A matrix on one rank is one interior */
+PetscErrorCode LinearRegisterKLUParts(void)
+{
+  PetscFunctionBegin;
+  PetscCall(MatSolverTypeRegister(LINEAR_KLUPARTS, MATMPIAIJ, MAT_FACTOR_LU, MatGetFactor_KLUParts));
+  PetscCall(MatSolverTypeRegister(LINEAR_KLUPARTS, MATSEQAIJ, MAT_FACTOR_LU, LinearKLUPairFactor));
+  PetscFunctionReturn(0);
+}
+
+#else
+
+PetscErrorCode LinearRegisterKLUParts(void) { return 0; }
+
+PetscErrorCode LinearPartsCount(Mat, double, LinearPartsWork *work)
+{
+  *work = LinearPartsWork();
+  return 0;
+}
+
+#endif

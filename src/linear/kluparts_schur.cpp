@@ -1,0 +1,335 @@
+/*
+  The interface's part in a factorization and a solve of "kluparts".
+
+  KLU holds the transpose of the interior: row i of the interior is its column, P and Q are its permutations, and
+  A(Q,P) = U^T L^T / Rs with row k of U^T in column k of U. With B the columns of the interior's rows that belong to the
+  interface and C the interface's rows, the Schur complement is D - (L^-1 P C^T / Rs)^T (U^-T Q B). The two factors have
+  entries only in the columns of L and U that B and C reach, which are few where the ordering ends at the interface.
+*/
+#if defined(HHTDAE_HAVE_KLU)
+#include "kluparts_data.h"
+#include <algorithm>
+#include <petscblaslapack.h>
+
+/* A pivot of the Schur complement below this, where the largest entry of every row and column is one, is none */
+static const PetscReal NO_PIVOT = 1e-14;
+
+/* One column of L without its diagonal, or of U without its diagonal, as KLU stores it */
+struct Column {
+  const KluInt *index;
+  const double *value;
+  KluInt        count;
+};
+
+/* The columns of one factor: indices, rounded up to whole doubles, then values */
+struct Factor {
+  const double *data;
+  const KluInt *start, *length;
+
+  Column operator[](PetscInt k) const
+  {
+    const double *at    = data + start[k];
+    const size_t  units = ((size_t)length[k] * sizeof(KluInt) + sizeof(double) - 1) / sizeof(double);
+    return {reinterpret_cast<const KluInt *>(at), at + units, length[k]};
+  }
+};
+
+static Factor Lower(const KluPair &k)
+{
+  return {static_cast<const double *>(k.numeric->LUbx[0]), k.numeric->Lip, k.numeric->Llen};
+}
+
+static Factor Upper(const KluPair &k)
+{
+  return {static_cast<const double *>(k.numeric->LUbx[0]), k.numeric->Uip, k.numeric->Ulen};
+}
+
+static const double *Pivots(const KluPair &k) { return static_cast<const double *>(k.numeric->Udiag); }
+
+/* ---- what the interface reaches ---- */
+
+static std::vector<PetscInt> Inverse(const KluInt *permutation, PetscInt n)
+{
+  std::vector<PetscInt> inverse(n);
+  for (PetscInt k = 0; k < n; ++k) inverse[permutation[k]] = k;
+  return inverse;
+}
+
+static void MarkLower(const Factor &L, PetscInt n, std::vector<char> *met)
+{
+  for (PetscInt k = 0; k < n; ++k) {
+    if (!(*met)[k]) continue;
+    const Column c = L[k];
+    for (KluInt j = 0; j < c.count; ++j) (*met)[c.index[j]] = 1;
+  }
+}
+
+static void MarkUpper(const Factor &U, PetscInt n, std::vector<char> *met)
+{
+  PetscInt k = 0;
+  while (k < n && !(*met)[k]) ++k;
+  for (; k < n; ++k) {
+    if ((*met)[k]) continue;
+    const Column c = U[k];
+    (*met)[k]      = std::any_of(c.index, c.index + c.count, [met](KluInt i) { return (*met)[i] != 0; });
+  }
+}
+
+PetscErrorCode PartsFindReach(KluParts *p)
+{
+  const KluPair    *klu = p->klu;
+  PartsSplit       &s   = p->split;
+  const PetscInt    n   = (PetscInt)s.inner_row.size();
+  std::vector<char> lower(n, 0), upper(n, 0);
+
+  PetscFunctionBegin;
+  p->reach.clear();
+  p->where.assign(n, -1);
+  p->in.resize(n);
+  p->out.resize(n);
+  if (!klu) PetscFunctionReturn(0);
+  PetscCheck(klu->symbolic->nblocks == 1, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "KLU found %d diagonal blocks, one was asked for", (int)klu->symbolic->nblocks);
+  const std::vector<PetscInt> row = Inverse(klu->symbolic->Q, n), col = Inverse(klu->numeric->Pnum, n);
+  for (PetscInt k = 0; k < n; ++k) {
+    p->in[k]  = s.inner_row[klu->symbolic->Q[k]];
+    p->out[k] = s.inner_row[klu->numeric->Pnum[k]];
+  }
+  p->right_at.clear();
+  p->below_at.clear();
+  for (const PartsEntry &e : s.right) upper[row[e.row]] = 1;
+  for (const PartsEntry &e : s.below) lower[col[e.col]] = 1;
+  MarkLower(Lower(*klu), n, &lower);
+  MarkUpper(Upper(*klu), n, &upper);
+  for (PetscInt k = 0; k < n; ++k)
+    if (lower[k] || upper[k]) {
+      p->where[k] = (PetscInt)p->reach.size();
+      p->reach.push_back(k);
+    }
+  for (const PartsEntry &e : s.right) p->right_at.push_back(p->where[row[e.row]]);
+  for (const PartsEntry &e : s.below) p->below_at.push_back(p->where[col[e.col]]);
+  p->right_part.resize(p->reach.size() * s.local.size());
+  p->below_part.resize(p->reach.size() * s.local.size());
+  p->work.resize(n);
+  PetscFunctionReturn(0);
+}
+
+/* ---- what the elimination of the interior leaves ---- */
+
+static void Subtract(PetscScalar *to, PetscScalar factor, const PetscScalar *from, PetscInt width)
+{
+  for (PetscInt j = 0; j < width; ++j) to[j] -= factor * from[j];
+}
+
+/* U^-T Q B */
+static void EliminateRight(KluParts *p, const KluPair &klu)
+{
+  const PetscInt w = (PetscInt)p->split.local.size();
+  const Factor   U = Upper(klu);
+  PetscScalar   *Y = p->right_part.data();
+
+  std::fill(p->right_part.begin(), p->right_part.end(), 0);
+  for (size_t e = 0; e < p->split.right.size(); ++e)
+    Y[(size_t)p->right_at[e] * w + p->split.right[e].col] += p->split.right_val[e];
+  for (size_t r = 0; r < p->reach.size(); ++r) {
+    const Column       c     = U[p->reach[r]];
+    const PetscScalar  pivot = Pivots(klu)[p->reach[r]];
+    PetscScalar *const y     = Y + r * w;
+    for (KluInt j = 0; j < c.count; ++j) {
+      const PetscInt i = p->where[c.index[j]];
+      if (i >= 0) Subtract(y, c.value[j], Y + (size_t)i * w, w);
+    }
+    for (PetscInt j = 0; j < w; ++j) y[j] /= pivot;
+  }
+}
+
+/* L^-1 P C^T / Rs */
+static void EliminateBelow(KluParts *p, const KluPair &klu)
+{
+  const PetscInt w  = (PetscInt)p->split.local.size();
+  const Factor   L  = Lower(klu);
+  const double  *Rs = klu.numeric->Rs;
+  PetscScalar   *V  = p->below_part.data();
+
+  std::fill(p->below_part.begin(), p->below_part.end(), 0);
+  for (size_t e = 0; e < p->split.below.size(); ++e) {
+    const PetscInt r = p->below_at[e];
+    V[(size_t)r * w + p->split.below[e].row] += p->split.below_val[e] / (Rs ? Rs[p->reach[r]] : 1);
+  }
+  for (size_t r = 0; r < p->reach.size(); ++r) {
+    const Column c = L[p->reach[r]];
+    for (KluInt j = 0; j < c.count; ++j) {
+      const PetscInt i = p->where[c.index[j]];
+      if (i >= 0) Subtract(V + (size_t)i * w, c.value[j], V + r * w, w);
+    }
+  }
+}
+
+/* ---- the Schur complement ---- */
+
+/* Column by column; what this rank's interior and interface rows give to it */
+static PetscErrorCode Contribution(KluParts *p, PetscScalar *S)
+{
+  const PartsSplit        &s = p->split;
+  const size_t             N = s.interface.size(), w = s.local.size();
+  std::vector<PetscScalar> product(w * w, 0);
+
+  PetscFunctionBegin;
+  std::fill(S, S + N * N, 0);
+  for (size_t e = 0; e < s.corner.size(); ++e) S[s.corner[e].row + N * (size_t)s.corner[e].col] += s.corner_val[e];
+  if (!p->factor || p->reach.empty() || !w) PetscFunctionReturn(0);
+  EliminateRight(p, *p->klu);
+  EliminateBelow(p, *p->klu);
+  PetscBLASInt      bw, br;
+  const PetscScalar one = 1, zero = 0;
+  PetscCall(PetscBLASIntCast((PetscInt)w, &bw));
+  PetscCall(PetscBLASIntCast((PetscInt)p->reach.size(), &br));
+  /* rows of the parts are columns for BLAS */
+  PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &bw, &bw, &br, &one, p->below_part.data(), &bw, p->right_part.data(),
+                                      &bw, &zero, product.data(), &bw));
+  for (size_t j = 0; j < w; ++j)
+    for (size_t i = 0; i < w; ++i) S[s.local[i] + N * (size_t)s.local[j]] -= product[i + w * j];
+  PetscCall(PetscLogFlops(2.0 * (double)w * (double)w * (double)p->reach.size()));
+  PetscFunctionReturn(0);
+}
+
+/* Rows, then columns, to a largest entry of one; a row or column of zeros stays */
+static void Scale(size_t N, PetscScalar *S, std::vector<PetscReal> *row, std::vector<PetscReal> *col)
+{
+  const auto inverse = [](PetscReal largest) { return largest > 0 ? 1 / largest : 1; };
+  row->assign(N, 0);
+  col->assign(N, 0);
+  for (size_t j = 0; j < N; ++j)
+    for (size_t i = 0; i < N; ++i) (*row)[i] = PetscMax((*row)[i], PetscAbsScalar(S[i + N * j]));
+  for (PetscReal &r : *row) r = inverse(r);
+  for (size_t j = 0; j < N; ++j) {
+    for (size_t i = 0; i < N; ++i) (*col)[j] = PetscMax((*col)[j], PetscAbsScalar(S[i + N * j]) * (*row)[i]);
+    (*col)[j] = inverse((*col)[j]);
+    for (size_t i = 0; i < N; ++i) S[i + N * j] *= (*row)[i] * (*col)[j];
+  }
+}
+
+PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *finite)
+{
+  const size_t             N = p->split.interface.size();
+  std::vector<PetscScalar> mine(N * N);
+  PetscScalar              sum      = 0;
+  PetscInt                 found[2] = {PETSC_MAX_INT, 1}; /* a row without pivot; whether all is finite */
+
+  PetscFunctionBegin;
+  *singular = -1;
+  *finite   = PETSC_TRUE;
+  p->schur.resize(N * N);
+  p->sums.resize(N);
+  p->top.resize(N);
+  p->top_local.resize(p->split.local.size());
+  p->pivots.resize(N);
+  if (!N) PetscFunctionReturn(0);
+  PetscCall(Contribution(p, mine.data()));
+  PetscCheck(N * N < (size_t)PETSC_MPI_INT_MAX, p->comm, PETSC_ERR_ARG_OUTOFRANGE,
+             "An interface of %zu unknowns is too large for solver type %s; choose another one", N, LINEAR_KLUPARTS);
+  PetscCallMPI(MPI_Allreduce(mine.data(), p->schur.data(), (PetscMPIInt)(N * N), MPIU_SCALAR, MPI_SUM, p->comm));
+  for (PetscScalar v : p->schur) sum += v;
+  if (PetscIsInfOrNanScalar(sum)) {
+    found[1] = 0;
+  } else {
+    PetscBLASInt n, info;
+    Scale(N, p->schur.data(), &p->row_scale, &p->col_scale);
+    PetscCall(PetscBLASIntCast((PetscInt)N, &n));
+    PetscCallBLAS("LAPACKgetrf", LAPACKgetrf_(&n, &n, p->schur.data(), &n, p->pivots.data(), &info));
+    PetscCheck(info >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK's getrf refused argument %d", (int)-info);
+    for (size_t k = N; k-- > 0;)
+      if (!(PetscAbsScalar(p->schur[k + N * k]) > NO_PIVOT)) found[0] = (PetscInt)k;
+    PetscCall(PetscLogFlops(2.0 / 3 * (double)N * (double)N * (double)N));
+  }
+  /* what one rank finds holds for all */
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found, 2, MPIU_INT, MPI_MIN, p->comm));
+  *singular = found[0] == PETSC_MAX_INT ? -1 : found[0];
+  *finite   = found[1] ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+/* ---- solve ---- */
+
+/* From right-hand side b down the interior */
+static void SolveDown(KluParts *p, const KluPair &klu, const PetscScalar b[])
+{
+  const PetscInt n     = (PetscInt)p->in.size();
+  const Factor   U     = Upper(klu);
+  const double  *pivot = Pivots(klu);
+  PetscScalar   *z     = p->work.data();
+  for (PetscInt k = 0; k < n; ++k) {
+    const Column c   = U[k];
+    PetscScalar  sum = b[p->in[k]];
+    for (KluInt j = 0; j < c.count; ++j) sum -= c.value[j] * z[c.index[j]];
+    z[k] = sum / pivot[k];
+  }
+}
+
+static void SolveUp(KluParts *p, const KluPair &klu, PetscScalar x[])
+{
+  const PetscInt n  = (PetscInt)p->in.size();
+  const Factor   L  = Lower(klu);
+  const double  *Rs = klu.numeric->Rs;
+  PetscScalar   *z  = p->work.data();
+  for (PetscInt k = n - 1; k >= 0; --k) {
+    const Column c   = L[k];
+    PetscScalar  sum = z[k];
+    for (KluInt j = 0; j < c.count; ++j) sum -= c.value[j] * z[c.index[j]];
+    z[k]         = sum;
+    x[p->out[k]] = Rs ? sum / Rs[k] : sum;
+  }
+}
+
+/* The interface's right-hand side less what the interiors take from it, its solution in p->top */
+static PetscErrorCode SolveInterface(KluParts *p, const PetscScalar b[])
+{
+  const PartsSplit &s = p->split;
+  const size_t      N = s.interface.size(), w = s.local.size();
+  PetscBLASInt      n, one                    = 1, info;
+
+  PetscFunctionBegin;
+  std::fill(p->sums.begin(), p->sums.end(), 0);
+  std::fill(p->top_local.begin(), p->top_local.end(), 0);
+  for (PetscInt i : s.top_row) p->sums[-1 - s.number[i]] = b[i];
+  for (size_t r = 0; r < p->reach.size(); ++r)
+    Subtract(p->top_local.data(), p->work[p->reach[r]], p->below_part.data() + r * w, (PetscInt)w);
+  for (size_t j = 0; j < w; ++j) p->sums[s.local[j]] += p->top_local[j];
+  PetscCallMPI(MPI_Allreduce(p->sums.data(), p->top.data(), (PetscMPIInt)N, MPIU_SCALAR, MPI_SUM, p->comm));
+  for (size_t g = 0; g < N; ++g) p->top[g] *= p->row_scale[g];
+  PetscCall(PetscBLASIntCast((PetscInt)N, &n));
+  PetscCallBLAS("LAPACKgetrs",
+                LAPACKgetrs_("N", &n, &one, p->schur.data(), &n, p->pivots.data(), p->top.data(), &n, &info));
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK's getrs refused argument %d", (int)-info);
+  for (size_t g = 0; g < N; ++g) p->top[g] *= p->col_scale[g];
+  for (size_t j = 0; j < w; ++j) p->top_local[j] = p->top[s.local[j]];
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode PartsSolve(KluParts *p, const PetscScalar b[], PetscScalar x[])
+{
+  const PartsSplit &s   = p->split;
+  const KluPair    *klu = p->klu;
+  const size_t      w   = s.local.size();
+
+  PetscFunctionBegin;
+  if (klu) SolveDown(p, *klu, b);
+  if (!s.interface.empty()) {
+    PetscCall(SolveInterface(p, b));
+    for (size_t r = 0; r < p->reach.size(); ++r) {
+      const PetscScalar *y   = p->right_part.data() + r * w;
+      PetscScalar        sum = 0;
+      for (size_t j = 0; j < w; ++j) sum += y[j] * p->top_local[j];
+      p->work[p->reach[r]] -= sum;
+    }
+    for (PetscInt i : s.top_row) x[i] = p->top[-1 - s.number[i]];
+  }
+  if (klu) {
+    SolveUp(p, *klu, x);
+    PetscCall(PetscLogFlops(2.0 * ((double)klu->numeric->lnz + (double)klu->numeric->unz) +
+                            4.0 * (double)w * (double)p->reach.size()));
+  }
+  PetscFunctionReturn(0);
+}
+
+#endif
