@@ -1,0 +1,238 @@
+/* Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom. */
+#include "attachments.h"
+#include "modes.h"
+#include <Eigen/Eigenvalues>
+#include <set>
+
+namespace hhtdae
+{
+
+/* Nodes on a line: the least moment of their weights relative to the greatest */
+constexpr double on_a_line = 1e-8;
+
+static PetscErrorCode Sum(MPI_Comm comm, double *values, int n)
+{
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode AllTrue(MPI_Comm comm, bool mine, bool *all)
+{
+  int value = mine;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_INT, MPI_MIN, comm));
+  *all = value != 0;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode TakeNodes(const FeModel &model, const std::string &set, Tied *t)
+{
+  const auto found = model.sets.find(set);
+  bool       has, right = true;
+
+  PetscFunctionBegin;
+  PetscCall(AllTrue(model.comm, found != model.sets.end(), &has));
+  if (!has) {
+    std::string known;
+    for (const auto &s : model.sets) known += (known.empty() ? "" : ", ") + s.first;
+    SETERRQ(model.comm, PETSC_ERR_ARG_WRONG, "Attachment %s: the model has no node set '%s'; its sets are: %s",
+            t->name.c_str(), set.c_str(), known.empty() ? "none" : known.c_str());
+  }
+  PetscInt before = -1;
+  for (PetscInt n : found->second) {
+    right  = right && n > before && n >= model.first && n < model.first + model.own;
+    before = n;
+    t->node.push_back(n - model.first);
+  }
+  PetscCall(AllTrue(model.comm, right, &right));
+  PetscCheck(
+      right, model.comm, PETSC_ERR_ARG_WRONG,
+      "Attachment %s: the node set '%s' has to list own nodes by global number, in ascending order and each once",
+      t->name.c_str(), set.c_str());
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CountNodes(const FeModel &model, Tied *t, PetscInt *start)
+{
+  PetscInt mine = (PetscInt)t->node.size();
+  struct {
+    int count, rank;
+  } best;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(&mine, &t->count, 1, MPIU_INT, MPI_SUM, model.comm));
+  PetscCheck(t->count > 0, model.comm, PETSC_ERR_ARG_WRONG, "Attachment %s: its node set is empty", t->name.c_str());
+  PetscCallMPI(MPI_Scan(&mine, start, 1, MPIU_INT, MPI_SUM, model.comm));
+  *start -= mine;
+  best.count = (int)mine;
+  PetscCallMPI(MPI_Comm_rank(model.comm, &best.rank));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &best, 1, MPI_2INT, MPI_MAXLOC, model.comm));
+  t->owner = best.rank;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, const Tied &t, PetscInt start,
+                                 std::vector<double> *weight)
+{
+  bool   right = true;
+  double sum   = 0;
+
+  PetscFunctionBegin;
+  weight->assign(t.node.size(), 1.);
+  if (a.weights.empty()) PetscFunctionReturn(0);
+  PetscCheck(a.tie == Tie::Average, model.comm, PETSC_ERR_ARG_WRONG,
+             "Attachment %s: weights are for averages, this one is rigid", t.name.c_str());
+  PetscCheck((PetscInt)a.weights.size() == t.count, model.comm, PETSC_ERR_ARG_SIZ,
+             "Attachment %s: %d weights for %" PetscInt_FMT
+             " nodes; there has to be one for each node of the set, in the order of their numbers",
+             t.name.c_str(), (int)a.weights.size(), t.count);
+  for (double w : a.weights) {
+    right = right && w >= 0 && w < PETSC_MAX_REAL;
+    sum += w;
+  }
+  PetscCheck(right && sum > 0, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
+             "Attachment %s: weights have to be positive numbers or zero, and not all zero", t.name.c_str());
+  for (std::size_t i = 0; i < t.node.size(); i++) (*weight)[i] = a.weights[start + i];
+  PetscFunctionReturn(0);
+}
+
+/* Centroid and moments sum w (r^2 I - r r^T) about it */
+static PetscErrorCode Moments(const FeModel &model, const Tied &t, const std::vector<double> &weight, double *sum,
+                              Vector3 *centroid, Matrix3 *J)
+{
+  double s[4] = {0, 0, 0, 0};
+
+  PetscFunctionBegin;
+  for (std::size_t i = 0; i < t.node.size(); i++) {
+    const Vector3 X = NodePosition(model, t.node[i]);
+    s[3] += weight[i];
+    for (int c = 0; c < 3; c++) s[c] += weight[i] * X[c];
+  }
+  PetscCall(Sum(model.comm, s, 4));
+  *sum      = s[3];
+  *centroid = Vector3(s[0], s[1], s[2]) / s[3];
+  J->setZero();
+  for (std::size_t i = 0; i < t.node.size(); i++) {
+    const Vector3 r = NodePosition(model, t.node[i]) - *centroid;
+    *J += weight[i] * (r.squaredNorm() * Matrix3::Identity() - r * r.transpose());
+  }
+  PetscCall(Sum(model.comm, J->data(), 9));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CheckRotation(const FeModel &model, const Tied &t, const Matrix3 &J)
+{
+  const Vector3 moments = Eigen::SelfAdjointEigenSolver<Matrix3>(J).eigenvalues();
+
+  PetscFunctionBegin;
+  PetscCheck(t.count > 1, model.comm, PETSC_ERR_ARG_WRONG,
+             "Attachment %s: a single node has no rotation to follow; take its neighbours into the set, three nodes at "
+             "least that are not on a line",
+             t.name.c_str());
+  PetscCheck(moments[0] > on_a_line * moments[2], model.comm, PETSC_ERR_ARG_WRONG,
+             "Attachment %s: its %" PetscInt_FMT
+             " nodes are on a line (or have no weight off it), so the rotation about that line is %s; "
+             "take in a node off the line",
+             t.name.c_str(), t.count, t.tie == Tie::Rigid ? "without stiffness" : "not defined");
+  PetscFunctionReturn(0);
+}
+
+/* t = mean u + theta x (point - centroid), theta = J^-1 sum w r x u: the rigid motion nearest to the displacements */
+static void SetRows(const FeModel &model, const std::vector<double> &weight, double sum, const Vector3 &centroid,
+                    const Matrix3 &J, Tied *t)
+{
+  const Matrix3 inverse = J.inverse(), arm = Cross(t->position - centroid);
+  t->row.resize(t->node.size());
+  for (std::size_t i = 0; i < t->node.size(); i++) {
+    const Vector3 r     = NodePosition(model, t->node[i]) - centroid;
+    const Matrix3 theta = inverse * Cross(r) * weight[i];
+    t->row[i] << weight[i] / sum * Matrix3::Identity() - arm * theta, theta;
+  }
+}
+
+static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied *t)
+{
+  PetscInt            start;
+  std::vector<double> weight;
+  double              sum;
+  Vector3             centroid;
+  Matrix3             J;
+
+  PetscFunctionBegin;
+  t->name = a.name;
+  t->tie  = a.tie;
+  PetscCall(TakeNodes(model, a.set.empty() ? a.name : a.set, t));
+  PetscCall(CountNodes(model, t, &start));
+  PetscCall(GetWeights(model, a, *t, start, &weight));
+  PetscCall(Moments(model, *t, weight, &sum, &centroid, &J));
+  PetscCall(CheckRotation(model, *t, J));
+  t->position = a.at_given ? a.position : centroid;
+  PetscCheck(t->position.allFinite(), model.comm, PETSC_ERR_ARG_OUTOFRANGE, "Attachment %s: its position is not finite",
+             a.name.c_str());
+  if (a.tie == Tie::Average) SetRows(model, weight, sum, centroid, J, t);
+  PetscFunctionReturn(0);
+}
+
+/* A node follows one rigid attachment alone, and then is not averaged by another one */
+static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied> &tied)
+{
+  std::vector<int> holder(model.own, -1);
+  const int        none = (int)tied.size() * (int)tied.size();
+  int              pair = none, at = -1;
+
+  PetscFunctionBegin;
+  for (int pass = 0; pass < 2; pass++)
+    for (std::size_t a = 0; a < tied.size(); a++) {
+      if ((tied[a].tie == Tie::Rigid) != (pass == 0)) continue;
+      for (PetscInt n : tied[a].node) {
+        if (holder[n] >= 0 && pair == none) {
+          pair = holder[n] * (int)tied.size() + (int)a;
+          at   = (int)n;
+        }
+        if (pass == 0 && holder[n] < 0) holder[n] = (int)a;
+      }
+    }
+  int all = pair;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, model.comm));
+  if (all == none) PetscFunctionReturn(0);
+  PetscInt label = pair == all ? NodeLabel(model, at) : -1;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &label, 1, MPIU_INT, MPI_MAX, model.comm));
+  const Tied &x = tied[all / (int)tied.size()], &y = tied[all % (int)tied.size()];
+  SETERRQ(model.comm, PETSC_ERR_ARG_WRONG,
+          "Attachments %s and %s overlap: node %" PetscInt_FMT
+          " is in both; the nodes of a rigid attachment can be in no other one",
+          x.name.c_str(), y.name.c_str(), label);
+}
+
+PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
+                                  std::vector<Tied> *tied)
+{
+  std::set<std::string> names;
+
+  PetscFunctionBegin;
+  tied->resize(attachments.size());
+  for (std::size_t a = 0; a < attachments.size(); a++) {
+    PetscCheck(!attachments[a].name.empty(), model.comm, PETSC_ERR_ARG_WRONG, "Attachment %d has no name", (int)a);
+    PetscCheck(names.insert(attachments[a].name).second, model.comm, PETSC_ERR_ARG_WRONG,
+               "There are two attachments of the name %s", attachments[a].name.c_str());
+    PetscCall(ResolveOne(model, attachments[a], &(*tied)[a]));
+  }
+  PetscCall(CheckOverlap(model, *tied));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode AverageMotions(const FeModel &model, const std::vector<Tied> &tied, const Eigen::MatrixXd &u,
+                              Eigen::MatrixXd *motion)
+{
+  PetscFunctionBegin;
+  motion->setZero(6 * tied.size(), u.cols());
+  for (std::size_t a = 0; a < tied.size(); a++)
+    for (std::size_t i = 0; i < tied[a].row.size(); i++)
+      motion->middleRows(6 * a, 6).noalias() += tied[a].row[i] * u.middleRows(3 * tied[a].node[i], 3);
+  PetscCall(SumOverRanks(model.comm, motion));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

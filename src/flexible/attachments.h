@@ -1,0 +1,61 @@
+/*
+  Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom.
+
+  Both ties need nodes that are not on one line: else the rotation about it would be without stiffness (rigid) or
+  undefined (average).
+*/
+#ifndef HHTDAE_FLEXIBLE_ATTACHMENTS_H
+#define HHTDAE_FLEXIBLE_ATTACHMENTS_H
+
+#include "hhtdae/flexible.h"
+#include <Eigen/Dense>
+
+namespace hhtdae
+{
+
+struct Tied {
+  std::string           name;
+  Tie                   tie;
+  Vector3               position; /* axes and origin of the FE model */
+  PetscInt              count;    /* nodes of all ranks */
+  PetscMPIInt           owner;    /* a rank with most of the nodes */
+  std::vector<PetscInt> node;     /* own ones, counted from the first own node */
+  std::vector<Eigen::Matrix<double, 6, 3>>
+      row; /* of an average, for each own node: motion of the point per displacement of the node */
+};
+
+inline Vector3 NodePosition(const FeModel &model, PetscInt i)
+{
+  return Eigen::Map<const Vector3>(&model.coordinates[3 * i]);
+}
+
+inline PetscInt NodeLabel(const FeModel &model, PetscInt i)
+{
+  return (PetscInt)model.label.size() == model.own ? model.label[i] : model.first + i;
+}
+
+/* v x w = Cross(v) w */
+inline Matrix3 Cross(const Vector3 &v)
+{
+  return (Matrix3() << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0).finished();
+}
+
+/* Displacement at X for the six motions of a rigid body about `point` */
+inline Eigen::Matrix<double, 3, 6> RigidMotion(const Vector3 &X, const Vector3 &point)
+{
+  Eigen::Matrix<double, 3, 6> u;
+  u << Matrix3::Identity(), -Cross(X - point);
+  return u;
+}
+
+PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
+                                  std::vector<Tied> *tied);
+
+/* Motion of all averages for displacements u at own dofs: six rows for each attachment, rigid ones zero; on all ranks
+ */
+PetscErrorCode AverageMotions(const FeModel &model, const std::vector<Tied> &tied, const Eigen::MatrixXd &u,
+                              Eigen::MatrixXd *motion);
+
+} // namespace hhtdae
+
+#endif

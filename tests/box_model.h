@@ -1,0 +1,195 @@
+/* A box of 8-node bricks as a finite-element model, assembled in parallel: for tests and benchmarks of the reduction.
+ */
+#ifndef HHTDAE_TESTS_BOX_MODEL_H
+#define HHTDAE_TESTS_BOX_MODEL_H
+
+#include "hhtdae/flexible.h"
+#include <Eigen/Dense>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+namespace hhtest
+{
+
+using hhtdae::FeModel;
+using hhtdae::Material;
+using hhtdae::Matrix3;
+using hhtdae::Vector3;
+
+struct Box {
+  int                                n[3];
+  double                             size[3];
+  Material                           material = {2.1e11, 0.3, 7850};
+  std::function<bool(int, int, int)> present  = [](int, int, int) { return true; }; /* which bricks there are */
+  std::function<Vector3(Vector3)>    map      = [](Vector3 x) { return x; };        /* position of nodes */
+};
+
+inline void boxMust(PetscErrorCode code)
+{
+  if (code) throw std::runtime_error("PETSc error " + std::to_string((int)code));
+}
+
+constexpr int brick_corner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                    {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+
+/* K (24 x 24) and m_ij (8 x 8) of one brick, 2 x 2 x 2 points */
+inline void brickMatrices(const Eigen::Matrix<double, 8, 3> &X, const Material &m, Eigen::Matrix<double, 24, 24> *K,
+                          Eigen::Matrix<double, 8, 8> *M)
+{
+  const double lame  = m.young * m.poisson / ((1 + m.poisson) * (1 - 2 * m.poisson)),
+               shear = m.young / (2 * (1 + m.poisson));
+  K->setZero();
+  M->setZero();
+  for (int q = 0; q < 8; q++) {
+    Eigen::Matrix<double, 8, 1> N;
+    Eigen::Matrix<double, 8, 3> dN;
+    for (int a = 0; a < 8; a++) {
+      double f[3], d[3];
+      for (int c = 0; c < 3; c++) {
+        const double s = 2 * brick_corner[a][c] - 1, xi = (2 * brick_corner[q][c] - 1) / std::sqrt(3.);
+        f[c] = (1 + s * xi) / 2;
+        d[c] = s / 2;
+      }
+      N[a] = f[0] * f[1] * f[2];
+      dN.row(a) << d[0] * f[1] * f[2], f[0] * d[1] * f[2], f[0] * f[1] * d[2];
+    }
+    const Matrix3                     J = dN.transpose() * X;
+    const double                      w = J.determinant();
+    const Eigen::Matrix<double, 8, 3> G = dN * J.inverse().transpose();
+    *M += m.density * w * N * N.transpose();
+    for (int a = 0; a < 8; a++)
+      for (int b = 0; b < 8; b++) {
+        const Vector3 ga = G.row(a), gb = G.row(b);
+        K->block<3, 3>(3 * a, 3 * b) +=
+            w * (lame * ga * gb.transpose() + shear * (gb * ga.transpose() + ga.dot(gb) * Matrix3::Identity()));
+      }
+  }
+}
+
+class BoxBuilder
+{
+public:
+  BoxBuilder(const Box &box, FeModel *model) : box_(box), model_(*model)
+  {
+    number();
+    divide();
+    place();
+    assemble();
+    addSet("left", [](const Vector3 &x) { return x[0] < 1e-9; });
+    addSet("right", [this](const Vector3 &x) { return x[0] > box_.size[0] * (1 - 1e-9); });
+  }
+  /* by positions in the undistorted grid */
+  void addSet(const std::string &name, const std::function<bool(const Vector3 &)> &inside)
+  {
+    std::vector<PetscInt> &set = model_.sets[name];
+    set.clear();
+    for (PetscInt i = model_.first; i < model_.first + model_.own; i++)
+      if (inside(grid(point_[i]))) set.push_back(i);
+  }
+
+private:
+  const Box             box_;
+  FeModel              &model_;
+  std::vector<PetscInt> node_;  /* of grid points, -1: not used */
+  std::vector<PetscInt> point_; /* of nodes */
+
+  int     at(int i, int j, int k) const { return (i * (box_.n[1] + 1) + j) * (box_.n[2] + 1) + k; }
+  Vector3 grid(PetscInt p) const
+  {
+    const int k = (int)(p % (box_.n[2] + 1)), j = (int)(p / (box_.n[2] + 1) % (box_.n[1] + 1)),
+              i = (int)(p / (box_.n[2] + 1) / (box_.n[1] + 1));
+    return Vector3(box_.size[0] * i / box_.n[0], box_.size[1] * j / box_.n[1], box_.size[2] * k / box_.n[2]);
+  }
+  template <class F> void bricks(const F &f) const
+  {
+    for (int i = 0; i < box_.n[0]; i++)
+      for (int j = 0; j < box_.n[1]; j++)
+        for (int k = 0; k < box_.n[2]; k++)
+          if (box_.present(i, j, k)) f(i, j, k);
+  }
+  void number()
+  {
+    node_.assign((box_.n[0] + 1) * (box_.n[1] + 1) * (box_.n[2] + 1), -1);
+    bricks([this](int i, int j, int k) {
+      for (const int *c : brick_corner) node_[at(i + c[0], j + c[1], k + c[2])] = 0;
+    });
+    for (std::size_t p = 0; p < node_.size(); p++)
+      if (node_[p] == 0) {
+        node_[p] = (PetscInt)point_.size();
+        point_.push_back((PetscInt)p);
+      }
+  }
+  void divide()
+  {
+    PetscInt own  = PETSC_DECIDE, end;
+    model_.source = "box";
+    model_.nodes  = (PetscInt)point_.size();
+    boxMust(PetscSplitOwnership(model_.comm, &own, &model_.nodes));
+    boxMust(MPI_Scan(&own, &end, 1, MPIU_INT, MPI_SUM, model_.comm));
+    model_.own   = own;
+    model_.first = end - own;
+  }
+  Vector3 position(PetscInt node) const { return box_.map(grid(point_[node])); }
+  void    place()
+  {
+    model_.coordinates.clear();
+    model_.label.clear();
+    for (PetscInt i = model_.first; i < model_.first + model_.own; i++) {
+      const Vector3 x = position(i);
+      model_.coordinates.insert(model_.coordinates.end(), x.data(), x.data() + 3);
+      model_.label.push_back(i + 1);
+    }
+  }
+  Mat matrix(PetscInt diagonal) const
+  {
+    Mat A;
+    boxMust(MatCreateAIJ(model_.comm, 3 * model_.own, 3 * model_.own, PETSC_DETERMINE, PETSC_DETERMINE, diagonal,
+                         nullptr, diagonal, nullptr, &A));
+    boxMust(MatSetOption(A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+    return A;
+  }
+  /* An element is on the rank of its first node, which then adds to rows of others */
+  void assemble()
+  {
+    model_.K         = matrix(81);
+    model_.M         = matrix(27);
+    model_.materials = {box_.material};
+    bricks([this](int i, int j, int k) {
+      hhtdae::FeElement e{};
+      e.type = hhtdae::ElementType::Brick8;
+      for (int a = 0; a < 8; a++)
+        e.node[a] = node_[at(i + brick_corner[a][0], j + brick_corner[a][1], k + brick_corner[a][2])];
+      if (e.node[0] < model_.first || e.node[0] >= model_.first + model_.own) return;
+      model_.elements.push_back(e);
+      addElement(e);
+    });
+    for (Mat A : {model_.K, model_.M}) {
+      boxMust(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+      boxMust(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    }
+  }
+  void addElement(const hhtdae::FeElement &e)
+  {
+    Eigen::Matrix<double, 8, 3>   X;
+    Eigen::Matrix<double, 24, 24> K;
+    Eigen::Matrix<double, 8, 8>   M;
+    PetscInt                      rows[24];
+    for (int a = 0; a < 8; a++) {
+      X.row(a) = position(e.node[a]).transpose();
+      for (int c = 0; c < 3; c++) rows[3 * a + c] = 3 * e.node[a] + c;
+    }
+    brickMatrices(X, box_.material, &K, &M);
+    boxMust(MatSetValues(model_.K, 24, rows, 24, rows, K.data(),
+                         ADD_VALUES)); /* symmetric: the order of storage does not matter */
+    for (int c = 0; c < 3; c++) {
+      PetscInt component[8];
+      for (int a = 0; a < 8; a++) component[a] = rows[3 * a + c];
+      boxMust(MatSetValues(model_.M, 8, component, 8, component, M.data(), ADD_VALUES));
+    }
+  }
+};
+
+} // namespace hhtest
+
+#endif
