@@ -1,0 +1,146 @@
+/* Stress out of modal coordinates: von Mises at the nodes, and the highest places of a run without keeping its history.
+ */
+#include "flexible/agree.h"
+#include "hhtdae/flexible.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* Nodes whose stress is summed at a time: their six components stay in the first cache */
+constexpr Eigen::Index chunk = 256;
+
+double OfMises(const double *s)
+{
+  const double a = s[0] - s[1], b = s[1] - s[2], c = s[2] - s[0];
+  return std::sqrt(0.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+}
+
+/* Mode after mode, so that a node's stress is the same to the last digit wherever it stands among the nodes: ranks
+ * agree. */
+template <class Each> void ForEachStress(const StressModes &modes, const Eigen::VectorXd &eta, Each each)
+{
+  const Eigen::Index nodes = (Eigen::Index)modes.node.size();
+  double             sum[6 * chunk];
+  for (Eigen::Index begin = 0; begin < nodes; begin += chunk) {
+    const Eigen::Index count = 6 * std::min(chunk, nodes - begin);
+    std::fill_n(sum, count, 0.0);
+    for (Eigen::Index k = 0; k < eta.size(); k++) {
+      const double  factor = eta[k];
+      const double *column = modes.values.data() + k * modes.values.rows() + 6 * begin;
+      for (Eigen::Index i = 0; i < count; i++) sum[i] += factor * column[i];
+    }
+    for (Eigen::Index i = 0; i < count; i += 6) each(begin + i / 6, OfMises(sum + i));
+  }
+}
+
+PetscErrorCode CheckCoordinates(const ReducedBody &body, const Eigen::VectorXd &eta)
+{
+  PetscFunctionBegin;
+  PetscCheck(eta.size() == body.modal.omega.size(), PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+             "%d modal coordinates for the stress of body %s with %d modes", (int)eta.size(), body.modal.name.c_str(),
+             (int)body.modal.omega.size());
+  PetscCheck(eta.allFinite(), PETSC_COMM_SELF, PETSC_ERR_FP,
+             "a modal coordinate of body %s is not finite: no stress can be told", body.modal.name.c_str());
+  PetscCheck(body.stress.node.empty() || (body.stress.values.rows() == 6 * (Eigen::Index)body.stress.node.size() &&
+                                          body.stress.values.cols() == eta.size()),
+             PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP, "the stress modes of body %s do not fit its nodes and modes",
+             body.modal.name.c_str());
+  PetscFunctionReturn(0);
+}
+
+/* Ahead of another: higher, or as high with a smaller label */
+struct Candidate {
+  double     stress, time, x[3];
+  PetscInt64 label, place; /* place: among the nodes of all ranks, should labels be the same */
+};
+
+bool Ahead(const Candidate &a, const Candidate &b)
+{
+  if (a.stress != b.stress) return a.stress > b.stress;
+  return a.label != b.label ? a.label < b.label : a.place < b.place;
+}
+
+} // namespace
+
+PetscErrorCode VonMises(const ReducedBody &body, const Eigen::VectorXd &eta, std::vector<double> *stress)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckCoordinates(body, eta));
+  stress->resize(body.stress.node.size());
+  ForEachStress(body.stress, eta, [stress](Eigen::Index i, double s) { (*stress)[(std::size_t)i] = s; });
+  PetscFunctionReturn(0);
+}
+
+/* -1: not followed yet */
+HotSpots::HotSpots(const ReducedBody &body)
+    : body_(body), stress_(body.stress.node.size(), -1.0), time_(body.stress.node.size(), 0.0)
+{
+}
+
+PetscErrorCode HotSpots::add(double time, const Eigen::VectorXd &eta)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckCoordinates(body_, eta));
+  PetscCheck(stress_.size() == body_.stress.node.size(), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONGSTATE,
+             "stress modes of body %s were changed after its hot spots were begun", body_.modal.name.c_str());
+  ForEachStress(body_.stress, eta, [this, time](Eigen::Index i, double s) {
+    if (s <= stress_[(std::size_t)i]) return;
+    stress_[(std::size_t)i] = s;
+    time_[(std::size_t)i]   = time;
+  });
+  PetscFunctionReturn(0);
+}
+
+/* One after the other: the highest of the nodes left is found among the ranks' best, and its neighbourhood leaves. */
+PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<HotSpot> *spots) const
+{
+  const std::size_t      n = stress_.size();
+  std::vector<Candidate> left;
+  std::vector<Candidate> best;
+  PetscMPIInt            size;
+  std::string            error;
+  PetscInt64             total = 0, mine = (PetscInt64)n;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(body_.comm, &size));
+  PetscCallMPI(MPI_Allreduce(&mine, &total, 1, MPIU_INT64, MPI_SUM, body_.comm));
+  if (!total)
+    error = "body " + body_.modal.name + " has no stress modes: there are no hot spots without AddStressModes()";
+  else if (!(distance >= 0))
+    error = "a distance of hot spots is a number from 0 up";
+  else if (n &&
+           (body_.coordinates.size() != 3 * (std::size_t)body_.own || body_.label.size() != (std::size_t)body_.own))
+    error = "body " + body_.modal.name + " has no coordinates of its nodes";
+  PetscCall(RaiseTogether(body_.comm, PETSC_ERR_ARG_WRONG, error));
+  for (std::size_t i = 0; i < n; i++) {
+    const PetscInt node = body_.stress.node[i];
+    const double  *x    = &body_.coordinates[3 * (std::size_t)node];
+    if (stress_[i] >= 0)
+      left.push_back({stress_[i], time_[i], {x[0], x[1], x[2]}, body_.label[(std::size_t)node], body_.first + node});
+  }
+  spots->clear();
+  best.resize((std::size_t)size);
+  for (PetscInt k = 0; k < count; k++) {
+    Candidate own{-1, 0, {0, 0, 0}, std::numeric_limits<PetscInt64>::max(), 0};
+    for (const Candidate &c : left)
+      if (Ahead(c, own)) own = c;
+    PetscCallMPI(MPI_Allgather(&own, sizeof own, MPI_BYTE, best.data(), sizeof own, MPI_BYTE, body_.comm));
+    const Candidate top = *std::min_element(best.begin(), best.end(), Ahead);
+    if (top.stress < 0) break;
+    spots->push_back({(PetscInt)top.label, Vector3(top.x[0], top.x[1], top.x[2]), top.stress, top.time});
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](const Candidate &c) {
+                                return c.place == top.place ||
+                                       std::hypot(c.x[0] - top.x[0], c.x[1] - top.x[1], c.x[2] - top.x[2]) < distance;
+                              }),
+               left.end());
+  }
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,318 @@
+/*
+  Matrices in text, one entry a line. Every rank reads its own range of the file's bytes, and PETSc brings the entries
+  to the owners of their rows: no rank sees more than its share, and the conversion of numbers, which takes the time, is
+  divided.
+*/
+#include "flexible/agree.h"
+#include "flexible/import.h"
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <sstream>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr int64_t binary_id = 1211216; /* PETSc's, of a matrix */
+
+using File = std::unique_ptr<FILE, int (*)(FILE *)>;
+
+File Open(const std::string &name) { return File(std::fopen(name.c_str(), "rb"), std::fclose); }
+
+int64_t BigEndian(const unsigned char *b, int bytes)
+{
+  uint64_t v = 0;
+  for (int k = 0; k < bytes; k++) v = v << 8 | b[k];
+  return bytes == 4 ? (int64_t)(int32_t)(uint32_t)v : (int64_t)v;
+}
+
+/* A line without its end; false at the end of the file */
+bool Line(FILE *in, std::string *line)
+{
+  int c;
+  line->clear();
+  while ((c = std::fgetc(in)) != EOF && c != '\n') *line += (char)c;
+  return c != EOF || !line->empty();
+}
+
+std::string ReadBinaryHead(FILE *in, MatrixFile *m)
+{
+  const int     word = (int)sizeof(PetscInt);
+  unsigned char head[4 + 3 * sizeof(PetscInt)];
+  if (std::fread(head, 1, sizeof head, in) != sizeof head) return "it is truncated";
+  m->kind            = MatrixFile::Binary;
+  m->rows            = BigEndian(head + 4, word);
+  m->entries         = BigEndian(head + 4 + 2 * word, word);
+  const int64_t cols = BigEndian(head + 4 + word, word);
+  if (m->rows < 0 || cols < 0) return "its sizes are not possible (written by a PETSc with other integers?)";
+  if (cols != m->rows) return "it has " + std::to_string(m->rows) + " rows and " + std::to_string(cols) + " columns";
+  if (m->entries < 0) return "it is stored as a dense matrix, a sparse one is asked for";
+  const int64_t bytes =
+      (int64_t)sizeof head + word * (m->rows + m->entries) + (int64_t)sizeof(PetscScalar) * m->entries;
+  if (m->bytes < bytes) return "it is truncated, or written by a PETSc with other integers or numbers";
+  return "";
+}
+
+std::string ReadMarketHead(FILE *in, MatrixFile *m)
+{
+  std::string line, banner, object, format, field, symmetry;
+  Line(in, &line);
+  for (char &c : line) c = (char)std::tolower((unsigned char)c);
+  std::istringstream(line) >> banner >> object >> format >> field >> symmetry;
+  if (object != "matrix" || format != "coordinate")
+    return "Matrix Market's \"" + object + " " + format + "\" is not a matrix in coordinates";
+  if (field != "real" && field != "double" && field != "integer")
+    return "Matrix Market's field \"" + field + "\" is not real";
+  if (symmetry != "symmetric" && symmetry != "general")
+    return "Matrix Market's symmetry \"" + symmetry + "\" is not symmetric or general";
+  do {
+    if (!Line(in, &line)) return "it ends before the line of sizes";
+  } while (line.empty() || line[0] == '%' || line.find_first_not_of(" \t\r") == std::string::npos);
+  long long rows = -1, cols = -1, entries = -1;
+  if (std::sscanf(line.c_str(), "%lld %lld %lld", &rows, &cols, &entries) != 3 || rows < 0 || entries < 0)
+    return "its line of sizes is not \"rows columns entries\": " + line;
+  if (rows != cols) return "it has " + std::to_string(rows) + " rows and " + std::to_string(cols) + " columns";
+  m->kind      = MatrixFile::Market;
+  m->symmetric = symmetry == "symmetric";
+  m->rows      = rows;
+  m->entries   = entries;
+  m->begin     = std::ftell(in);
+  return "";
+}
+
+std::string ReadHead(MatrixFile *m)
+{
+  unsigned char start[14] = {};
+  File          in        = Open(m->file);
+  if (!in) return "there is no such file, or no right to read it";
+  if (std::fseek(in.get(), 0, SEEK_END) || (m->bytes = std::ftell(in.get())) < 0) return "it is not a file";
+  std::rewind(in.get());
+  const std::size_t got = std::fread(start, 1, sizeof start, in.get());
+  if (std::ferror(in.get())) return "it is not a file";
+  std::rewind(in.get());
+  if (!got) return "it is empty";
+  if (got >= 4 && BigEndian(start, 4) == binary_id) return ReadBinaryHead(in.get(), m);
+  if (got == sizeof start && !std::memcmp(start, "%%MatrixMarket", sizeof start)) return ReadMarketHead(in.get(), m);
+  if (std::memchr(start, 0, got)) return "it is neither text nor a matrix of PETSc";
+  return "";
+}
+
+/* A number with Fortran's exponent D too; null if there is none */
+const char *Number(const char *at, double *value)
+{
+  char *end;
+  *value = std::strtod(at, &end);
+  if (end == at) return nullptr;
+  if (*end == 'D' || *end == 'd') {
+    const std::string exponent = std::string(at, (std::size_t)(end - at)) + "e";
+    std::size_t       length   = 0;
+    while (std::isdigit((unsigned char)end[1 + length]) || (!length && (end[1] == '+' || end[1] == '-'))) length++;
+    *value = std::strtod((exponent + std::string(end + 1, length)).c_str(), nullptr);
+    end += 1 + length;
+  }
+  return end;
+}
+
+/* Reads lines, keeps entries, remembers the first thing that is wrong */
+struct Collector {
+  const MatrixShape &shape;
+  Triplets          *to;
+  std::string        error;
+  int                lower = 0, upper = 0;
+
+  void take(const char *line)
+  {
+    while (std::isspace((unsigned char)*line)) line++;
+    if (!*line || *line == '%' || *line == '#' || *line == '*' || !error.empty()) return;
+    char       *end, *next;
+    double      value = 0;
+    long long   i = std::strtoll(line, &end, 10), j = 0;
+    const char *rest = nullptr;
+    if (end != line) {
+      if (*end == ',') end++;
+      j = std::strtoll(end, &next, 10);
+      if (next != end) rest = Number(next + (*next == ','), &value);
+    }
+    while (rest && std::isspace((unsigned char)*rest)) rest++;
+    if (!rest || *rest) return fail("is not \"row column value\"", line);
+    const long long rows = shape.rows < 0 ? (long long)PETSC_MAX_INT : (long long)shape.rows;
+    if (i < 1 || j < 1 || i > rows || j > rows)
+      return fail("has a row or column that is not among 1 .. " + std::to_string(rows), line);
+    if (!std::isfinite(value)) return fail("has a value that is not a finite number", line);
+    add((PetscInt)(i - 1), (PetscInt)(j - 1), value);
+  }
+
+private:
+  void add(PetscInt i, PetscInt j, double value)
+  {
+    to->entries++;
+    to->largest = std::max({to->largest, i, j});
+    if (value == 0.0) return; /* CalculiX writes all of the pattern, zeros too */
+    (i > j ? lower : upper) |= i != j;
+    if (shape.row) {
+      i = (*shape.row)[(std::size_t)i];
+      j = (*shape.row)[(std::size_t)j];
+    }
+    to->i.push_back(i);
+    to->j.push_back(j);
+    to->value.push_back(value);
+  }
+
+  void fail(const std::string &why, const char *line)
+  {
+    error = "the line \"" + std::string(line).substr(0, 80) + "\" " + why;
+  }
+};
+
+/* Lines that begin in bytes [begin, end) of the file */
+std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end, bool first, Collector *to)
+{
+  File              in = Open(name);
+  std::vector<char> buffer(1 << 22);
+  std::string       carry;
+  bool              inside = first; /* past the end of the line that another rank reads */
+  PetscInt64        at     = first ? begin : begin - 1;
+  if (begin >= end) return "";
+  if (!in || std::fseek(in.get(), (long)at, SEEK_SET)) return "this rank cannot open it";
+  while (to->error.empty()) {
+    const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), in.get());
+    const char       *p = buffer.data(), *stop = p + got;
+    if (!got) break;
+    for (const char *newline; p < stop && (newline = (const char *)std::memchr(p, '\n', (std::size_t)(stop - p)));
+         p = newline + 1) {
+      if (inside) {
+        carry.append(p, newline);
+        to->take(carry.c_str());
+      }
+      carry.clear();
+      inside = true;
+      if (at + (newline + 1 - buffer.data()) >= end) return to->error;
+    }
+    if (inside) carry.append(p, stop);
+    at += (PetscInt64)got;
+  }
+  if (std::ferror(in.get())) return "reading it failed";
+  if (inside && to->error.empty()) to->take(carry.c_str());
+  return to->error;
+}
+
+/* One triangle becomes two */
+void Mirror(Triplets *t)
+{
+  const std::size_t n = t->i.size();
+  for (std::size_t k = 0; k < n; k++) {
+    if (t->i[k] == t->j[k]) continue;
+    t->i.push_back(t->j[k]);
+    t->j.push_back(t->i[k]);
+    t->value.push_back(t->value[k]);
+  }
+}
+
+} // namespace
+
+PetscErrorCode OpenMatrix(MPI_Comm comm, const std::string &file, MatrixFile *matrix)
+{
+  PetscMPIInt rank;
+  std::string error;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  matrix->file = file;
+  if (!rank) {
+    error = ReadHead(matrix);
+    if (error.empty() && matrix->rows > PETSC_MAX_INT) error = "it has more rows than this build of PETSc can count";
+    if (!error.empty()) error = "cannot read the matrix " + file + ": " + error;
+  }
+  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscInt64 all[6] = {matrix->kind, matrix->symmetric, matrix->rows, matrix->entries, matrix->begin, matrix->bytes};
+  PetscCallMPI(MPI_Bcast(all, 6, MPIU_INT64, 0, comm));
+  matrix->kind      = (MatrixFile::Kind)all[0];
+  matrix->symmetric = all[1];
+  matrix->rows      = all[2];
+  matrix->entries   = all[3];
+  matrix->begin     = all[4];
+  matrix->bytes     = all[5];
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShape &shape, Triplets *triplets)
+{
+  MatrixShape known = shape;
+  PetscMPIInt rank, size;
+  PetscInt64  count;
+  std::string error;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (known.rows < 0) known.rows = (PetscInt)m.rows;
+  Collector        to{known, triplets, "", 0, 0};
+  const PetscInt64 begin = m.begin + PartBegin(m.bytes - m.begin, size, rank),
+                   end   = m.begin + PartBegin(m.bytes - m.begin, size, rank + 1);
+  error                  = ReadLines(m.file, begin, end, rank == 0, &to);
+  if (!error.empty()) error = "cannot read the matrix " + m.file + ": " + error;
+  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscCallMPI(MPI_Allreduce(&triplets->entries, &count, 1, MPIU_INT64, MPI_SUM, comm));
+  PetscCheck(m.kind != MatrixFile::Market || count == m.entries, comm, PETSC_ERR_FILE_UNEXPECTED,
+             "cannot read the matrix %s: it has %lld entries, its head promises %lld (truncated?)", m.file.c_str(),
+             (long long)count, (long long)m.entries);
+  PetscCheck(count, comm, PETSC_ERR_FILE_UNEXPECTED, "cannot read the matrix %s: there are no entries", m.file.c_str());
+  int      triangle[2] = {to.lower, to.upper};
+  PetscInt largest     = triplets->largest;
+  triplets->entries    = count;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, triangle, 2, MPI_INT, MPI_MAX, comm));
+  PetscCallMPI(MPI_Allreduce(&largest, &triplets->largest, 1, MPIU_INT, MPI_MAX, comm));
+  const bool both = triangle[0] && triangle[1];
+  PetscCheck(!m.symmetric || !both, comm, PETSC_ERR_FILE_UNEXPECTED,
+             "cannot read the matrix %s: it is said to be symmetric, but has entries in both triangles",
+             m.file.c_str());
+  if (!both && m.kind == MatrixFile::Text) Mirror(triplets);
+  if (m.symmetric) Mirror(triplets);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets *t, Mat *A)
+{
+  PetscFunctionBegin;
+  for (PetscInt row = 3 * model.first; row < 3 * (model.first + model.own);
+       row++) { /* solvers ask for a whole diagonal */
+    t->i.push_back(row);
+    t->j.push_back(row);
+    t->value.push_back(0);
+  }
+  PetscCall(MatCreate(model.comm, A));
+  PetscCall(PetscObjectSetName((PetscObject)*A, name.c_str()));
+  PetscCall(MatSetSizes(*A, 3 * model.own, 3 * model.own, 3 * model.nodes, 3 * model.nodes));
+  PetscCall(MatSetBlockSize(*A, 3));
+  PetscCall(MatSetType(*A, MATAIJ));
+  PetscCall(MatSetPreallocationCOO(*A, (PetscInt)t->i.size(), t->i.data(), t->j.data()));
+  PetscCall(MatSetValuesCOO(*A, t->value.data(), INSERT_VALUES));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  *t = Triplets();
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckSymmetric(MPI_Comm comm, const std::string &name, Mat A)
+{
+  Mat       T;
+  PetscReal size, difference;
+  PetscFunctionBegin;
+  PetscCall(MatNorm(A, NORM_FROBENIUS, &size));
+  PetscCall(MatTranspose(A, MAT_INITIAL_MATRIX, &T));
+  PetscCall(MatAXPY(T, -1, A, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatNorm(T, NORM_FROBENIUS, &difference));
+  PetscCall(MatDestroy(&T));
+  PetscCheck(std::isfinite(size), comm, PETSC_ERR_FP, "the matrix %s has entries that are not finite numbers",
+             name.c_str());
+  PetscCheck(difference <= 1e-8 * size, comm, PETSC_ERR_ARG_WRONG,
+             "the matrix %s is not symmetric: |A - A^T| = %g |A| (both triangles are needed, or one alone)",
+             name.c_str(), (double)(difference / size));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,23 @@
+/* Orders of an element's nodes: ours is Gmsh's, corners and then middles of edges; VTK, Abaqus and CalculiX have
+ * another one of the middles. */
+#ifndef HHTDAE_FLEXIBLE_NODE_ORDER_H
+#define HHTDAE_FLEXIBLE_NODE_ORDER_H
+
+#include "hhtdae/flexible.h"
+
+namespace hhtdae
+{
+
+/* Place k of the order that VTK, Abaqus and CalculiX share has node GmshPlace(type, k) of Gmsh's order */
+constexpr int GmshPlace(ElementType type, int k)
+{
+  constexpr int tetrahedron[] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
+  constexpr int brick[]       = {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15};
+  if (type == ElementType::Tetrahedron10) return tetrahedron[k];
+  if (type == ElementType::Brick20) return brick[k];
+  return k;
+}
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,129 @@
+/* The file of a reduced body, its field and its hot spots on several ranks are those of one rank, to the last byte. */
+#include "hhtdae/flexible.h"
+#include "reduced_body.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+int Rank()
+{
+  PetscMPIInt rank;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  return rank;
+}
+
+} // namespace
+
+TEST(ReducedFile, WrittenByAll)
+{
+  HandMade all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
+  Scratch  together(PETSC_COMM_WORLD, "all.h5"), single("alone" + std::to_string(Rank()) + ".h5");
+  must(all.body.save(together.name));
+  must(alone.body.save(single.name));
+  EXPECT_GT(single.text().size(), 5000u);
+  EXPECT_EQ(together.text(), single.text());
+}
+
+TEST(ReducedFile, ReadByAll)
+{
+  HandMade    all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
+  Scratch     file(PETSC_COMM_WORLD, "read.h5"), again(PETSC_COMM_WORLD, "again.h5");
+  ReducedBody read, whole;
+  ModalBody   modal;
+  must(all.body.save(file.name));
+  must(whole.load(PETSC_COMM_SELF, file.name));
+  EXPECT_TRUE(Same(alone.body, whole));
+  EXPECT_TRUE(SameElements(alone.body.elements, whole.elements));
+  must(read.load(PETSC_COMM_WORLD, file.name));
+  EXPECT_TRUE(Same(alone.body.modal, read.modal));
+  EXPECT_LE(std::abs(3 * read.own - (PetscInt)read.coordinates.size()), 0);
+  for (PetscInt i = 0; i < read.own; i++)
+    EXPECT_EQ(read.label[(std::size_t)i], alone.body.label[(std::size_t)(read.first + i)]);
+  EXPECT_TRUE(SameMatrix(read.shape, alone.body.shape.middleRows(3 * read.first, 3 * read.own)));
+  must(LoadModalBody(PETSC_COMM_WORLD, file.name, &modal));
+  EXPECT_TRUE(Same(alone.body.modal, modal));
+  /* another distribution than it was written with, the same file */
+  must(read.save(again.name));
+  EXPECT_EQ(file.text(), again.text());
+}
+
+/* More ranks than nodes or elements */
+TEST(ReducedFile, RanksWithoutNodes)
+{
+  HandMade    all(PETSC_COMM_WORLD, 1, 3);
+  Scratch     file(PETSC_COMM_WORLD, "few.h5"), again(PETSC_COMM_WORLD, "few_again.h5");
+  ReducedBody read;
+  must(all.body.save(file.name));
+  must(read.load(PETSC_COMM_WORLD, file.name));
+  must(read.save(again.name));
+  EXPECT_EQ(file.text(), again.text());
+}
+
+/* A file that is refused is refused on all ranks, with one reason */
+TEST(ReducedFile, RefusedByAll)
+{
+  HandMade all(PETSC_COMM_WORLD, 2, 2);
+  Scratch  file(PETSC_COMM_WORLD, "whole.h5"), broken(PETSC_COMM_WORLD, "broken.h5");
+  must(all.body.save(file.name));
+  const std::string whole   = file.text();
+  int               refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 61) {
+    std::string text = whole;
+    text[at]         = (char)(text[at] ^ 4);
+    MPI_Barrier(PETSC_COMM_WORLD);
+    if (!Rank()) broken.write(text);
+    MPI_Barrier(PETSC_COMM_WORLD);
+    ReducedBody read;
+    ErrorTrap   trap;
+    int         code = read.load(PETSC_COMM_WORLD, broken.name) != 0, most, least;
+    MPI_Allreduce(&code, &most, 1, MPI_INT, MPI_MAX, PETSC_COMM_WORLD);
+    MPI_Allreduce(&code, &least, 1, MPI_INT, MPI_MIN, PETSC_COMM_WORLD);
+    EXPECT_EQ(most, least) << "byte " << at;
+    refused += code;
+  }
+  EXPECT_GT(refused, 50);
+  ErrorTrap   trap;
+  ReducedBody read;
+  EXPECT_NE(read.load(PETSC_COMM_WORLD, "/nowhere/body.h5"), 0);
+  EXPECT_TRUE(trap.says("there is no such file")) << trap.message;
+  /* one rank's numbers are bad: nobody writes, nobody waits */
+  if (Rank() == 0) all.body.coordinates[0] = 1. / 0.;
+  EXPECT_NE(all.body.save(broken.name), 0);
+  EXPECT_NE(all.body.save("/nowhere/body.h5"), 0);
+}
+
+TEST(Field, AsOnOneRank)
+{
+  HandMade              all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
+  Scratch               together(PETSC_COMM_WORLD, "all.vtu"), single("alone" + std::to_string(Rank()) + ".vtu");
+  const Eigen::VectorXd eta  = Numbers(4, 1, 50);
+  const Matrix3         axes = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+  must(WriteField(all.body, eta, together.name, Vector3(1, 2, 3), axes));
+  must(WriteField(alone.body, eta, single.name, Vector3(1, 2, 3), axes));
+  EXPECT_GT(single.text().size(), 1000u);
+  EXPECT_EQ(together.text(), single.text());
+}
+
+TEST(HotSpots, AsOnOneRank)
+{
+  HandMade             all(PETSC_COMM_WORLD, 20), alone(PETSC_COMM_SELF, 20);
+  HotSpots             hot(all.body), reference(alone.body);
+  std::vector<HotSpot> a, b;
+  for (int step = 0; step < 30; step++) {
+    const Eigen::VectorXd eta = Numbers(4, 1, 60 + step);
+    must(hot.add(0.1 * step, eta));
+    must(reference.add(0.1 * step, eta));
+  }
+  must(hot.highest(7, 1.6, &a));
+  must(reference.highest(7, 1.6, &b));
+  ASSERT_EQ(a.size(), 7u);
+  ASSERT_EQ(b.size(), 7u);
+  for (std::size_t i = 0; i < 7; i++) {
+    EXPECT_EQ(a[i].label, b[i].label);
+    EXPECT_EQ(a[i].stress, b[i].stress);
+    EXPECT_EQ(a[i].time, b[i].time);
+    EXPECT_EQ(a[i].position, b[i].position);
+  }
+}

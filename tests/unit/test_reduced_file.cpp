@@ -1,0 +1,217 @@
+/* The file of a reduced body: what was written is read, and whatever is wrong with a file is refused with a reason. */
+#include "hhtdae/flexible.h"
+#include "reduced_body.h"
+#include <limits>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* The message with which a file is refused */
+std::string Refused(const std::string &file)
+{
+  ReducedBody body;
+  body.source = "untouched";
+  ErrorTrap trap;
+  EXPECT_NE(body.load(PETSC_COMM_SELF, file), 0);
+  EXPECT_EQ(body.source, "untouched");
+  EXPECT_EQ(body.modal.modes(), 0);
+  return trap.message;
+}
+
+std::string SaveRefused(const ReducedBody &body)
+{
+  Scratch   file("refused.h5");
+  ErrorTrap trap;
+  EXPECT_NE(body.save(file.name), 0);
+  EXPECT_FALSE(file.exists());
+  EXPECT_FALSE(std::ifstream(file.name + ".part").good());
+  return trap.message;
+}
+
+#define EXPECT_SAYS(message, part) EXPECT_NE((message).find(part), std::string::npos) << message
+
+} // namespace
+
+TEST(ReducedFile, Roundtrip)
+{
+  HandMade    made(PETSC_COMM_SELF);
+  Scratch     file("round.h5");
+  ReducedBody read;
+  ModalBody   modal;
+  must(made.body.save(file.name));
+  must(read.load(PETSC_COMM_SELF, file.name));
+  EXPECT_TRUE(Same(made.body, read));
+  EXPECT_TRUE(SameElements(made.body.elements, read.elements));
+  must(LoadModalBody(PETSC_COMM_SELF, file.name, &modal));
+  EXPECT_TRUE(Same(made.body.modal, modal));
+  EXPECT_EQ(modal.attachment("tip of the row"), 1);
+  EXPECT_FALSE(std::ifstream(file.name + ".part").good());
+}
+
+TEST(ReducedFile, WithoutNodesOrModes)
+{
+  HandMade bare(PETSC_COMM_SELF, 3, 2), stiff(PETSC_COMM_SELF, 3, 0);
+  bare.body.own = 0;
+  bare.body.coordinates.clear();
+  bare.body.label.clear();
+  bare.body.shape.resize(0, 0);
+  bare.body.elements.clear();
+  bare.body.stress = StressModes();
+  for (auto &q : bare.body.modal.quadratic) q.resize(0, 0);
+  stiff.body.modal.attachments.clear();
+  for (ReducedBody *body : {&bare.body, &stiff.body}) {
+    Scratch     file("less.h5");
+    ReducedBody read;
+    must(body->save(file.name));
+    must(read.load(PETSC_COMM_SELF, file.name));
+    EXPECT_TRUE(Same(body->modal, read.modal));
+    EXPECT_EQ(read.own, body->own);
+    EXPECT_EQ(read.elements.size(), body->elements.size());
+    EXPECT_EQ(read.stress.node, body->stress.node);
+  }
+}
+
+/* The same body makes the same bytes: no times, no order of hash tables */
+TEST(ReducedFile, SameBytes)
+{
+  HandMade made(PETSC_COMM_SELF);
+  Scratch  one("one.h5"), two("two.h5");
+  must(made.body.save(one.name));
+  must(made.body.save(two.name));
+  EXPECT_GT(one.text().size(), 5000u);
+  EXPECT_EQ(one.text(), two.text());
+}
+
+/* A byte of the file that is changed is found, or it is one that no number depends on. */
+TEST(ReducedFile, EveryByteCounts)
+{
+  HandMade made(PETSC_COMM_SELF, 2, 2);
+  Scratch  file("whole.h5"), broken("broken.h5");
+  must(made.body.save(file.name));
+  const std::string whole   = file.text();
+  int               refused = 0, same = 0;
+  for (std::size_t at = 0; at < whole.size(); at += at < 2500 ? 3 : 11) {
+    std::string text = whole;
+    text[at]         = (char)(text[at] ^ (1 << at % 8));
+    broken.write(text);
+    ReducedBody read;
+    ErrorTrap   trap;
+    if (read.load(PETSC_COMM_SELF, broken.name)) {
+      refused++;
+      ASSERT_NE(trap.message.find(broken.name), std::string::npos) << trap.message;
+    } else {
+      same++;
+      ASSERT_TRUE(Same(made.body, read) && SameElements(made.body.elements, read.elements)) << "byte " << at;
+    }
+  }
+  MEASURED("of %d bytes: %d changes refused, %d without effect", (int)whole.size(), refused, same);
+  EXPECT_GT(refused, 800);
+}
+
+TEST(ReducedFile, FlippedByteNamesTheDataset)
+{
+  HandMade made(PETSC_COMM_SELF);
+  Scratch  file("flip.h5");
+  must(made.body.save(file.name));
+  std::string       text = file.text();
+  const double      v    = made.body.shape(7, 2);
+  const std::size_t at   = text.find(std::string((const char *)&v, sizeof v));
+  ASSERT_NE(at, std::string::npos);
+  text[at] = (char)(text[at] ^ 1);
+  file.write(text);
+  EXPECT_SAYS(Refused(file.name), "/nodes/shape is damaged: its checksum does not agree");
+  ModalBody modal; /* what a scene takes is whole */
+  must(LoadModalBody(PETSC_COMM_SELF, file.name, &modal));
+  EXPECT_TRUE(Same(made.body.modal, modal));
+}
+
+TEST(ReducedFile, Truncated)
+{
+  HandMade made(PETSC_COMM_SELF, 2, 2);
+  Scratch  file("long.h5"), cut("cut.h5");
+  must(made.body.save(file.name));
+  const std::string whole = file.text();
+  for (std::size_t length = 0; length < whole.size(); length += 97) {
+    cut.write(whole.substr(0, length));
+    EXPECT_SAYS(Refused(cut.name), cut.name);
+  }
+  cut.write(whole.substr(0, whole.size() - 1));
+  EXPECT_SAYS(Refused(cut.name), "truncated");
+}
+
+TEST(ReducedFile, OtherFiles)
+{
+  Scratch  text("text.h5"), newer("newer.h5"), other("other.h5");
+  HandMade made(PETSC_COMM_SELF);
+  EXPECT_SAYS(Refused("/nowhere/body.h5"), "/nowhere/body.h5: there is no such file");
+  EXPECT_SAYS(Refused(testing::TempDir()), "it is not a file");
+  text.write("not a body\n");
+  EXPECT_SAYS(Refused(text.name), "it is not an HDF5 file");
+  text.write("");
+  EXPECT_SAYS(Refused(text.name), "it is not an HDF5 file");
+}
+
+TEST(ReducedFile, NothingToWriteThatCannotBeRead)
+{
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  {
+    HandMade m(PETSC_COMM_SELF);
+    m.body.shape(2, 1) = nan;
+    EXPECT_SAYS(SaveRefused(m.body), "not finite");
+  }
+  {
+    HandMade m(PETSC_COMM_SELF);
+    m.body.modal.quadratic[4](1, 0) = std::numeric_limits<double>::infinity();
+    EXPECT_SAYS(SaveRefused(m.body), "inertia invariants");
+  }
+  {
+    HandMade m(PETSC_COMM_SELF);
+    m.body.modal.moment[1].resize(3, 2);
+    EXPECT_SAYS(SaveRefused(m.body), "second moments of 2 modes among 4");
+  }
+  {
+    HandMade m(PETSC_COMM_SELF);
+    m.body.elements[1].node[3] = m.nodes;
+    EXPECT_SAYS(SaveRefused(m.body), "an element's node that is not there");
+  }
+  {
+    HandMade m(PETSC_COMM_SELF);
+    std::swap(m.body.stress.node[0], m.body.stress.node[1]);
+    EXPECT_SAYS(SaveRefused(m.body), "ascending");
+  }
+  {
+    HandMade m(PETSC_COMM_SELF);
+    m.body.label.pop_back();
+    EXPECT_SAYS(SaveRefused(m.body), "labels");
+  }
+  HandMade  m(PETSC_COMM_SELF);
+  ErrorTrap trap;
+  EXPECT_NE(m.body.save("/nowhere/body.h5"), 0);
+  EXPECT_SAYS(trap.message, "cannot write the reduced body to /nowhere/body.h5");
+}
+
+/* A part of the file's name that cannot be replaced: the error comes after the writing */
+TEST(ReducedFile, NameIsAFolder)
+{
+  HandMade  m(PETSC_COMM_SELF);
+  Scratch   folder("folder.h5");
+  ErrorTrap trap;
+  ASSERT_EQ(std::system(("mkdir " + folder.name).c_str()), 0);
+  EXPECT_NE(m.body.save(folder.name), 0);
+  EXPECT_SAYS(trap.message, "cannot write the reduced body to");
+  EXPECT_FALSE(std::ifstream(folder.name + ".part").good());
+  EXPECT_EQ(std::system(("rmdir " + folder.name).c_str()), 0);
+}
+
+TEST(ReducedFile, View)
+{
+  HandMade made(PETSC_COMM_SELF);
+  Printed  printed;
+  must(made.body.view(nullptr));
+  for (const char *part :
+       {"row of bricks", "by hand", "m, kg, s", "mass 7.5", "tip of the row", "modes: 4", "4 bricks with 8 nodes",
+        "1 tetrahedra with 4 nodes", "24 nodes with shapes, 16 of them with stress modes"})
+    EXPECT_TRUE(printed.says(part)) << part << "\n" << printed.text();
+}
