@@ -53,8 +53,8 @@ static PetscErrorCode Run(void)
   for (int k = 2; k < 6; k++)
     for (int c = 0; c < 3; c++)
       scene.channel("P" + std::to_string(k) + "." + "xyz"[c], Measure::displacement(joints[k], c), "m");
-  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
-  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));

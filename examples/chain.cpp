@@ -107,11 +107,8 @@ static PetscErrorCode Run(void)
   const PetscInt bodies = is_net ? net[0] * (3 * net[1] - 1) : n;
   for (int k = 0; k < (planar ? 2 : 3); k++)
     scene.channel(std::string("tip.") + "xyz"[k], Measure::displacement(tip, k), "m");
-  Measure energy;
-  energy.kind = Measure::KineticEnergy;
-  scene.channel("kinetic", energy, "J");
-  energy.kind = Measure::PotentialEnergy;
-  scene.channel("potential", energy, "J");
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));

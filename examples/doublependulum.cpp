@@ -77,11 +77,8 @@ static PetscErrorCode Run(void)
   }
   scene.channel("tip.x", Measure::displacement(tip, 0), "m");
   scene.channel("tip.y", Measure::displacement(tip, 1), "m");
-  Measure energy;
-  for (Measure::Kind k : {Measure::KineticEnergy, Measure::PotentialEnergy}) {
-    energy.kind = k;
-    scene.channel(k == Measure::KineticEnergy ? "kinetic" : "potential", energy, "J");
-  }
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));

@@ -49,8 +49,8 @@ static void Hang(Scene &scene, const RigidBody &body)
   for (int k = 0; k < 3; k++)
     scene.channel(std::string("Omega.") + "xyz"[k], Measure::angularVelocity(pivot, k, {}, pivot), "rad/s");
   for (int k = 0; k < 3; k++) scene.channel(std::string("F.") + "xyz"[k], Measure::jointForce(joint, k), "N");
-  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
-  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 }
 
 static PetscErrorCode Solve(Scene &scene, PetscReal end, const hhtex::Watch::Look &look, double dt, TS *ts)

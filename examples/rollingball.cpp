@@ -98,8 +98,8 @@ static PetscErrorCode Disc(PetscReal end)
   const Element roll = scene.add("rolling", RollingDisc{center, scene.marker(scene.ground()), r});
   for (int k = 0; k < 3; k++) scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k), "m");
   for (int k = 0; k < 3; k++) scene.channel(std::string("force.") + "nxy"[k], Measure::multiplier(roll, k), "N");
-  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
-  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 
   double x = 0, force = 0, drift = 0, start = 0;
   PetscCall(Solve(scene, end, [&](double t, const std::vector<double> &c) {

@@ -66,8 +66,8 @@ static PetscErrorCode Run(void)
   scene.add("guide", Translational{scene.markerAt(s, S, z_along_x), scene.marker(ground, {0, 0, 0}, z_along_x)});
 
   scene.channel("slider.x", Measure::displacement(scene.marker(s), 0), "m");
-  scene.channel("kinetic", Measure{Measure::KineticEnergy}, "J");
-  scene.channel("potential", Measure{Measure::PotentialEnergy}, "J");
+  scene.channel("kinetic", Measure::kineticEnergy(), "J");
+  scene.channel("potential", Measure::potentialEnergy(), "J");
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));

@@ -78,12 +78,13 @@ struct Measure {
     Component,           /* component of a force element: force state where it is carried as one, else its value */
     Value,               /* of a variable V */
     StateValue,          /* of a first-order state */
+    Modal,               /* modal coordinate `component` of a flexible body */
     KineticEnergy, PotentialEnergy /* of the whole scene; for output alone */
   };
   Kind     kind      = Time;
   Marker   i, j, frame;
   int      component = 0;
-  PetscInt target    = -1; /* element, variable or state */
+  PetscInt target    = -1; /* element, variable, state or flexible body */
 
   static Measure time() { return {}; }
   static Measure displacement(Marker i, int component, Marker j = {}, Marker frame = {}) { return {Displacement, i, j, frame, component}; }
@@ -100,6 +101,9 @@ struct Measure {
   static Measure force(Element force, int component) { return {Component, {}, {}, {}, component, force.id}; }
   static Measure value(Variable v) { return {Value, {}, {}, {}, 0, v.id}; }
   static Measure value(State s) { return {StateValue, {}, {}, {}, 0, s.id}; }
+  static Measure modal(Body flexible, int mode) { return {Modal, {}, {}, {}, mode, flexible.id}; }
+  static Measure kineticEnergy() { return {KineticEnergy, {}, {}, {}}; }
+  static Measure potentialEnergy() { return {PotentialEnergy, {}, {}, {}}; }
 };
 
 /* f(m_1, ..., m_n) of measures, differentiated automatically:

@@ -21,6 +21,7 @@
 #include "hhtdae/functions.h"
 #include "hhtdae/hhtdae.h"
 #include "hhtdae/joints.h"
+#include "hhtdae/modal.h"
 #include "hhtdae/output.h"
 #include "hhtdae/types.h"
 #include <memory>
@@ -51,6 +52,27 @@ struct PointMass { /* 3 coordinates, no rotation; planar 2 */
   Vector3 position = Vector3::Zero();
   Vector3 velocity = Vector3::Zero();
   bool    fixed_start = false;
+};
+
+struct DampingBand { /* modes up to this frequency, in cycles per unit of time */
+  double below, ratio;
+};
+
+/*
+  A flexible body: 6 + modes coordinates, those of its floating frame, whose origin is the undeformed centre of mass, and of the
+  modes of its model. Joints, forces and markers take hold of its attachments, Scene::attachment().
+*/
+struct FlexibleBody {
+  std::shared_ptr<const ModalBody> model;
+  Vector3   position         = Vector3::Zero();     /* of the origin of the FE model at the start, space axes */
+  Matrix3   rotation         = Matrix3::Identity(); /* axes of the FE model as columns, at the start */
+  Vector3   velocity         = Vector3::Zero();     /* of the undeformed centre of mass, space axes */
+  Vector3   angular_velocity = Vector3::Zero();     /* space axes */
+  ModalMass mass             = ModalMass::Full;
+  std::vector<DampingBand> damping;  /* ratio of critical, by bands of increasing frequency; beyond the last one its ratio; empty: none */
+  Eigen::VectorXd          ratios;   /* the same, mode by mode; it goes before the bands */
+  Eigen::VectorXd deformation, deformation_rate; /* modal coordinates at the start; empty: undeformed */
+  bool            fixed_start = false;
 };
 
 /* What is done about initial values that violate the constraints, and about constraints that say the same thing twice */
@@ -87,6 +109,11 @@ public:
   Body ground() const { return Body{-1}; }
   Body add(const std::string &name, const RigidBody &body);
   Body add(const std::string &name, const PointMass &body);
+  Body add(const std::string &name, const FlexibleBody &body);
+
+  /* The frame that follows an attachment of a flexible body, its origin at the attachment's point, its axes those of the FE model
+     as long as there is no deformation: a body for markers and shapes. It costs 12 unknowns where it is asked for, nothing else. */
+  Body attachment(Body flexible, const std::string &name);
 
   /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes */
   Marker marker(Body body, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity(),
@@ -135,6 +162,7 @@ public:
 
 private:
   std::unique_ptr<SceneData> data_;
+  Body addFrame(Body flexible, PetscInt attachment);
 };
 
 } // namespace hhtdae

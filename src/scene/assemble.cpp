@@ -135,7 +135,7 @@ void RightHandSide(const std::vector<RowBlock> &blocks, Eigen::VectorXd RowBlock
 std::vector<Pose> Poses(const SceneData &s)
 {
   std::vector<Pose> p;
-  for (const BodyData &b : s.bodies) p.push_back({b.r, b.v, b.w, b.A});
+  for (const BodyData &b : s.bodies) p.push_back({b.r, b.v, b.w, b.A, b.flexible});
   return p;
 }
 
@@ -147,6 +147,7 @@ void SetPoses(SceneData &s, const std::vector<Pose> &p)
     b.v         = p[i].v;
     b.w         = p[i].w;
     b.A         = p[i].A;
+    b.flexible  = p[i].flexible;
   }
 }
 

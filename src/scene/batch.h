@@ -4,6 +4,7 @@
 
 #include "bodies.h"
 #include "pattern.h"
+#include <algorithm>
 #include <vector>
 
 namespace hhtdae
@@ -41,8 +42,6 @@ public:
   virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
   /* after an accepted step; bodies have moved there */
   virtual void accept(Bodies &) {}
-  /* constraints: Phi_t and Phi_tt (Psi itself and nothing at velocity level) into local rows */
-  virtual void timeDerivatives(Evaluation &, double *first, double *second) { (void)first; (void)second; }
   /* potential energy of the instances that belong to this rank; bodies have moved */
   virtual double energy(const Evaluation &) const { return 0; }
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
@@ -63,7 +62,7 @@ inline void Batch::resolve(const Pattern &p)
 
 /* ---- groups of coordinates of a marker's body ---- */
 
-inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || k == BodyKind::Rigid) && group == 1; }
+inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || HasEulerAngles(k)) && group == 1; }
 inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
 
 /* An entry of the derivative that pairs x or theta of a row marker with x or theta of a column marker reaches groups (g, h) of
@@ -82,6 +81,31 @@ inline void AddLever(const Bodies &B, PetscInt b, const Vector3 &s, const Vector
   if (k != BodyKind::Rigid) return;
   const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
   H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
+}
+
+/* ---- what the instances of a kernel remember of accepted steps ---- */
+
+template <class K, class Instance> void Remember(Instance &e, const Bodies &B)
+{
+  if constexpr (K::memory > 0) {
+    Frame<double> f[K::markers];
+    for (int k = 0; k < K::markers; k++) f[k] = B.frame<true>(e.marker[k]);
+    K::accept(e.data, f);
+  }
+  (void)e;
+  (void)B;
+}
+
+/* out to x or in from it; returns what comes behind */
+template <class K, class Instance> double *CopyMemory(Instance &e, double *x, bool in)
+{
+  if constexpr (K::memory > 0) {
+    if (in) std::copy(x, x + K::memory, e.data.memory);
+    else std::copy(e.data.memory, e.data.memory + K::memory, x);
+  }
+  (void)e;
+  (void)in;
+  return x + K::memory;
 }
 
 } // namespace hhtdae

@@ -10,9 +10,11 @@ void Bodies::move(const double *u, const double *v)
     BodyMotion      &b = now[i];
     b.f.setZero();
     b.m.setZero();
+    if (k.modal >= 0) modal[k.modal].load.setZero();
     if (k.kind == BodyKind::Ground) continue;
     const double *q = u + k.first, *p = v + k.first;
     switch (k.kind) {
+    case BodyKind::Flexible:
     case BodyKind::Rigid:
       b.r = Vector3(q[0], q[1], q[2]);
       b.v = Vector3(p[0], p[1], p[2]);
@@ -42,19 +44,104 @@ void Bodies::move(const double *u, const double *v)
   }
 }
 
+/* ---- flexible bodies ---- */
+
+ModalMotion Bodies::modalMotion(PetscInt i, const double *u, const double *v, const double *a) const
+{
+  const LocalBody                        &k = body[i];
+  const BodyMotion                       &b = now[i];
+  const int                               m = modes(i);
+  static const double                     none[6] = {0, 0, 0, 0, 0, 0};
+  const double                           *acc = a ? a + k.first : none, *rate = v + k.first + 3;
+  const Vector3                           p(rate[0], rate[1], rate[2]);
+  const Vector3                           alpha = AngularVelocity(b.euler, Vector3(acc[3], acc[4], acc[5])) + Convective(b.euler, p, b.w);
+  const double                           *q = u + k.first + 6, *r = v + k.first + 6;
+  return {b.A, b.w, alpha, Vector3(acc[0], acc[1], acc[2]) - gravity, {q, m}, {r, m}, {a ? acc + 6 : r, m}};
+}
+
+void Bodies::modalResidual(PetscInt i, const double *u, const double *v, const double *a, double *row)
+{
+  const BodyMotion &b = now[i];
+  ModalPart        &p = modal[body[i].modal];
+  Vector3           f, n;
+  Eigen::Map<Eigen::VectorXd> h(row + 6, modes(i));
+  p.dynamics->force(modalMotion(i, u, v, a), f, n, h);
+  n -= b.m;
+  for (int c = 0; c < 3; c++) row[c] = f(c) - b.f(c);
+  row[3] = n(2);
+  row[4] = b.euler.g2.dot(n);
+  row[5] = b.euler.g3.dot(n);
+  h -= p.load;
+}
+
+/* How w and alpha change with the Euler angles and their rates: sv dw/deps' + dw/deps, and so on */
+struct AngularGradient {
+  Matrix3 G, w, alpha;
+};
+
+static AngularGradient ByAngles(const BodyMotion &b, const Vector3 &rate, const Vector3 &acc, double sv, double sa)
+{
+  const EulerAxes &e = b.euler;
+  const Vector3    c = Convective(e, rate, b.w), gacc = AngularVelocity(e, acc), p = e.p();
+  AngularGradient  g;
+  Matrix3          alpha_r;
+  g.G     = e.G();
+  g.w     = RateGradient(e, rate, b.w) + sv * g.G;
+  g.alpha = RateGradient(e, acc, gacc);
+  g.alpha.col(0) += CrossZ(c);
+  g.alpha.col(1) += rate(0) * rate(2) * CrossZ(p) - rate(1) * rate(2) * e.g3;
+  alpha_r.col(0) = CrossZ(b.w);
+  alpha_r.col(1) = rate(0) * CrossZ(e.g2) + rate(2) * p;
+  alpha_r.col(2) = rate(0) * CrossZ(e.g3) + rate(1) * p;
+  g.alpha += sv * alpha_r + sa * g.G;
+  return g;
+}
+
+void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const double *a, double sv, double sa)
+{
+  const LocalBody  &k = body[i];
+  const BodyMotion &b = now[i];
+  ModalPart        &p = modal[k.modal];
+  ModalGradient    &D = p.gradient;
+  const int         m = modes(i);
+  Vector3           f, n;
+  const ModalMotion q = modalMotion(i, u, v, a);
+  p.dynamics->force(q, f, n, p.block.col(0).head(m));
+  p.dynamics->gradient(q, sv, sa, D);
+  const AngularGradient g = ByAngles(b, Vector3(v[k.first + 3], v[k.first + 4], v[k.first + 5]),
+                                     Vector3(a[k.first + 3], a[k.first + 4], a[k.first + 5]), sv, sa);
+  const auto by_angles = [&](const auto &X) { return X.template middleCols<3>(3) * g.G + X.template middleCols<3>(6) * g.w + X.template rightCols<3>() * g.alpha; };
+  Eigen::MatrixXd &B = p.block;
+  Matrix<6, 6>     R;
+  R.leftCols<3>()    = sa * D.rigid.leftCols<3>();
+  R.rightCols<3>()   = by_angles(D.rigid);
+  R.bottomRows<3>()  = Matrix<3, 6>(g.G.transpose() * R.bottomRows<3>());
+  R.bottomRightCorner<3, 3>() += MomentGradient(b.euler, n - b.m);
+  B.topLeftCorner<6, 6>()         = R;
+  B.topRightCorner(3, m)          = D.rigid_modal.topRows<3>();
+  B.block(3, 6, 3, m).noalias()   = g.G.transpose() * D.rigid_modal.bottomRows<3>();
+  B.block(6, 0, m, 3)             = sa * D.modal_rigid.leftCols<3>();
+  B.block(6, 3, m, 3)             = by_angles(D.modal_rigid);
+  B.bottomRightCorner(m, m)       = D.modal;
+}
+
 void Bodies::setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J)
 {
   body[b].C = C;
   body[b].J = C * J * C.transpose();
 }
 
-void Bodies::residual(const double *v, const double *a, double *F) const
+void Bodies::residual(const double *u, const double *v, const double *a, double *F)
 {
   for (PetscInt i = 0; i < own; i++) {
     const LocalBody  &k = body[i];
     const BodyMotion &b = now[i];
     const double     *acc = a + k.first;
     double           *row = F + k.first;
+    if (k.kind == BodyKind::Flexible) {
+      modalResidual(i, u, v, a, row);
+      continue;
+    }
     const int         directions = k.kind == BodyKind::Planar || k.kind == BodyKind::PlanarPoint ? 2 : 3;
     for (int c = 0; c < directions; c++) row[c] = k.mass * (acc[c] - gravity(c)) - b.f(c);
     if (k.kind == BodyKind::Planar) row[2] = k.J(2, 2) * acc[2] - b.m(2);
@@ -81,21 +168,15 @@ void Bodies::jacobian(PetscInt i, const double *v, const double *a, double sv, d
   if (k.kind != BodyKind::Rigid) return;
   const Eigen::Map<const Vector3> rate(v + k.first + 3), acc(a + k.first + 3);
   const EulerAxes                &e = b.euler;
-  const Vector3 c  = Convective(e, rate, b.w), gacc = AngularVelocity(e, acc), alpha = gacc + c, p = e.p();
-  const Matrix3 A  = b.A * k.C.transpose(), I = A * k.J * A.transpose(), G = e.G();
+  const AngularGradient           g = ByAngles(b, rate, acc, sv, sa);
+  const Vector3 alpha = AngularVelocity(e, acc) + Convective(e, rate, b.w);
+  const Matrix3 A  = b.A * k.C.transpose(), I = A * k.J * A.transpose();
   const Matrix3 Xw = Cross<double>(b.w), XIw = Cross<double>(I * b.w);
   const Vector3 N  = I * alpha + b.w.cross(I * b.w);
   const Matrix3 Ntheta = I * Cross<double>(alpha) - Cross<double>(I * alpha) + Xw * (I * Xw - XIw);
   const Matrix3 Nw     = Xw * I - XIw;
-  /* d alpha / d eps = d(G eps'')/d eps + d c / d eps */
-  Matrix3 alpha_e = RateGradient(e, acc, gacc), alpha_r;
-  alpha_e.col(0) += CrossZ(c);
-  alpha_e.col(1) += rate(0) * rate(2) * CrossZ(p) - rate(1) * rate(2) * e.g3;
-  alpha_r.col(0) = CrossZ(b.w);
-  alpha_r.col(1) = rate(0) * CrossZ(e.g2) + rate(2) * p;
-  alpha_r.col(2) = rate(0) * CrossZ(e.g3) + rate(1) * p;
-  const Matrix3 D = Ntheta * G + Nw * (RateGradient(e, rate, b.w) + sv * G) + I * (alpha_e + sv * alpha_r + sa * G);
-  B.block<3, 3>(3, 3).noalias() = G.transpose() * D;
+  const Matrix3 D = Ntheta * g.G + Nw * g.w + I * g.alpha;
+  B.block<3, 3>(3, 3).noalias() = g.G.transpose() * D;
   B.block<3, 3>(3, 3) += MomentGradient(e, N - b.m);
 }
 

@@ -10,23 +10,26 @@
 
 #include "euler.h"
 #include "frames.h"
+#include "modal_dynamics.h"
 #include <petscsys.h>
+#include <memory>
 #include <vector>
 
 namespace hhtdae
 {
 
-enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint };
+enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint, Flexible };
 
-constexpr int max_coordinates = 6; /* of a body */
-
+constexpr int max_coordinates = 6; /* of a body with markers */
+/* without modal coordinates, which are a third group of a flexible body; see Bodies::modes() */
 inline int Coordinates(BodyKind k)
 {
-  constexpr int n[] = {0, 3, 6, 3, 2};
+  constexpr int n[] = {0, 3, 6, 3, 2, 6};
   return n[(int)k];
 }
+inline bool HasEulerAngles(BodyKind k) { return k == BodyKind::Rigid || k == BodyKind::Flexible; }
 /* Coordinates come in groups whose rows of the matrix have the same columns */
-inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : k == BodyKind::Rigid || k == BodyKind::Planar ? 2 : 1; }
+inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : HasEulerAngles(k) || k == BodyKind::Planar ? 2 : 1; }
 /* group 0: position, group 1: rotation */
 inline int GroupSize(BodyKind k, int group)
 {
@@ -42,6 +45,7 @@ struct LocalBody {
   PetscInt first = -1; /* coordinate, among the local unknowns */
   PetscInt group = -1;
   PetscInt id    = -1; /* in the scene */
+  PetscInt modal = -1; /* of a flexible body: its place in Bodies::modal */
   double   mass  = 0;
   Matrix3  J;          /* inertia in the axes of the Euler angles; planar: J(2,2) */
   Matrix3  C;          /* body axes to the axes of the Euler angles */
@@ -61,18 +65,29 @@ struct LocalMarker {
   Matrix3  R; /* axes, in body axes */
 };
 
+/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix */
+struct ModalPart {
+  std::unique_ptr<ModalDynamics> dynamics;
+  Eigen::VectorXd                load;
+  ModalGradient                  gradient;
+  Eigen::MatrixXd                block; /* coordinates x coordinates */
+};
+
 class Bodies
 {
 public:
   std::vector<LocalBody>   body; /* own, others', ground */
   std::vector<BodyMotion>  now;
   std::vector<LocalMarker> marker;
+  std::vector<ModalPart>   modal;
   PetscInt                 own = 0;
   Vector3                  gravity = Vector3::Zero();
 
   /* motion of all bodies from their coordinates and rates; clears the loads */
   void move(const double *u, const double *v);
   void setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J);
+  int  modes(PetscInt b) const { return body[b].modal < 0 ? 0 : modal[body[b].modal].dynamics->modes(); }
+  int  coordinates(PetscInt b) const { return Coordinates(body[b].kind) + modes(b); }
 
   /* ---- markers ---- */
   template <bool with_axes = true> Frame<double> frame(PetscInt m) const
@@ -115,6 +130,7 @@ public:
       out.col(2)                 = J.col(5) - sy * J.col(0) + sx * J.col(1);
       return 3;
     }
+    case BodyKind::Flexible: /* at its floating frame */
     case BodyKind::Rigid: {
       /* dx = dr + dtheta x s, dtheta = G deps: column c of the angles is J_theta g_c + J_x (g_c x s) */
       const Vector3 s = f.x - b.r;
@@ -144,9 +160,15 @@ public:
   }
 
   /* ---- own bodies' rows ---- */
-  void residual(const double *v, const double *a, double *F) const;
+  void residual(const double *u, const double *v, const double *a, double *F);
   /* adds sv dF/dv + sa dF/da + dF/du of body b to B (coordinates x coordinates, row major of leading dimension 6) */
   void jacobian(PetscInt b, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const;
+  /* the same of a flexible body, all its coordinates: ModalPart::block */
+  void modalJacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa);
+  ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* without a: q'' is not used */
+
+private:
+  void modalResidual(PetscInt b, const double *u, const double *v, const double *a, double *row);
 };
 
 } // namespace hhtdae

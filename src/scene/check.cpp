@@ -49,6 +49,7 @@ private:
 
   void body(const BodyData &b)
   {
+    if (b.carrier >= 0) return; /* the frame of an attachment follows its body */
     const std::string who = "body " + b.name;
     require(std::isfinite(b.mass) && b.mass > 0, who, "mass is " + Text(b.mass) + ", must be positive");
     require(b.r.allFinite() && b.v.allFinite() && b.w.allFinite(), who,

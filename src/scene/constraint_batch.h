@@ -50,7 +50,6 @@ public:
 
   void residual(Evaluation &ev) override
   {
-    const Bodies &B = *bodies;
     for (const Instance &e : all) {
       Frame<double>        f[M];
       Twist<double>        w[M];
@@ -69,7 +68,6 @@ public:
         if (e.active >> r & 1) ev.row(row++, phi[r]);
       react(ev.bodies, e, f, lambda, J);
     }
-    (void)B;
   }
 
   void jacobian(Evaluation &ev) override
@@ -91,51 +89,13 @@ public:
 
   void accept(Bodies &B) override
   {
-    if constexpr (K::memory > 0)
-      for (Instance &e : all) {
-        Frame<double> f[M];
-        for (int k = 0; k < M; k++) f[k] = B.frame<true>(e.marker[k]);
-        K::accept(e.data, f);
-      }
-    (void)B;
-  }
-
-  void timeDerivatives(Evaluation &ev, double *first, double *second) override
-  {
-    if constexpr (K::holonomic && !K::driven) return;
-    for (const Instance &e : all) {
-      Frame<double> f[M];
-      Twist<double> w[M];
-      double        lambda[R], z[Z > 0 ? Z : 1], d1[R], d2[R];
-      gather(ev, e, f, w, lambda, z);
-      if constexpr (K::holonomic) {
-        K::time(e.data, f, ev.t, d1, d2);
-      } else {
-        /* Psi with all velocities zero */
-        for (int k = 0; k < M; k++) w[k] = {Vector3::Zero(), Vector3::Zero()};
-        value(e, f, w, ev.t, z, d1);
-        for (int r = 0; r < R; r++) d2[r] = 0;
-      }
-      PetscInt row = e.lambda;
-      for (int r = 0; r < R; r++)
-        if (e.active >> r & 1) {
-          first[row] = d1[r];
-          second[row++] = d2[r];
-        }
-    }
+    for (Instance &e : all) Remember<K>(e, B);
   }
 
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   void     copyMemory(double *x, bool in) override
   {
-    if constexpr (K::memory > 0)
-      for (Instance &e : all)
-        for (int i = 0; i < K::memory; i++, x++) {
-          if (in) e.data.memory[i] = *x;
-          else *x = e.data.memory[i];
-        }
-    (void)x;
-    (void)in;
+    for (Instance &e : all) x = CopyMemory<K>(e, x, in);
   }
 
   static constexpr bool curvedAtAll()

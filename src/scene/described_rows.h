@@ -18,6 +18,7 @@ struct DescribedRows {
   double               value[max_rows] = {};          /* Phi; 0 at velocity level */
   double               rate[max_rows]  = {};          /* Phi_t; Psi with all velocities zero */
   Eigen::Matrix<double, max_rows, 6 * max_markers> J; /* Phi_q or Psi_q', columns (x, theta) of the markers */
+  Eigen::MatrixXd modal; /* by the modal coordinates of marker 0's body; empty: the rows do not depend on them */
 };
 
 /* Variables and states are what they are at the start, multipliers and force states nothing yet */

@@ -63,7 +63,7 @@ PetscErrorCode MeasureForces(Equilibrium &E, Vec F, Unbalanced &out)
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k          = R.bodies.body[b];
     const int        directions = PlanarScene(k.kind) ? 2 : 3;
-    for (int c = 0; c < Coordinates(k.kind); c++) {
+    for (int c = 0; c < R.bodies.coordinates(b); c++) {
       const double x = std::abs(f[k.first + c]) / (c < directions ? 1 : E.size);
       if (x > mine.value || std::isnan(x)) mine = {x, (int)k.id};
     }
@@ -87,11 +87,24 @@ PetscErrorCode MeasureForces(Equilibrium &E, Vec F, Unbalanced &out)
   PetscFunctionReturn(0);
 }
 
+/* As the integrator would: KLU where it is there, which it is on one rank alone */
+PetscErrorCode ChoosePackage(Mat J, PC pc)
+{
+  PetscFunctionBegin;
+  for (const char *package : {"klupair", MATSOLVERKLU, MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST}) {
+    PetscBool is;
+    PetscCall(MatGetFactorAvailable(J, package, MAT_FACTOR_LU, &is));
+    if (!is) continue;
+    PetscCall(PCFactorSetMatSolverType(pc, package));
+    break;
+  }
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Create(Equilibrium &E)
 {
   Runtime  &R = E.R;
   PC        pc;
-  PetscBool klu = PETSC_FALSE;
   PetscFunctionBegin;
   PetscCall(VecCreate(R.scene.comm, &E.U));
   PetscCall(VecSetSizes(E.U, R.n, PETSC_DETERMINE));
@@ -107,8 +120,7 @@ PetscErrorCode Create(Equilibrium &E)
   PetscCall(KSPSetOperators(E.ksp, E.J, E.J));
   PetscCall(KSPGetPC(E.ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
-  if (R.size == 1) PetscCall(MatGetFactorAvailable(E.J, MATSOLVERKLU, MAT_FACTOR_LU, &klu));
-  PetscCall(PCFactorSetMatSolverType(pc, klu ? MATSOLVERKLU : MATSOLVERMUMPS));
+  PetscCall(ChoosePackage(E.J, pc));
   PetscCall(KSPSetFromOptions(E.ksp));
   PetscFunctionReturn(0);
 }
@@ -134,6 +146,26 @@ PetscErrorCode Reach(const Equilibrium &E, Vec d, double *reach)
   PetscFunctionReturn(0);
 }
 
+/* The deformation of flexible bodies, from their owners to every rank */
+PetscErrorCode WriteBackModes(Runtime &R, const PetscScalar *u)
+{
+  SceneData &s = R.scene;
+  PetscFunctionBegin;
+  for (std::size_t b = 0; b < s.bodies.size(); b++) {
+    if (!s.bodies[b].flexible) continue;
+    auto              f     = std::make_shared<FlexibleData>(*s.bodies[b].flexible);
+    const PetscMPIInt owner = R.number.owner.empty() ? 0 : R.number.owner[b];
+    if (owner == R.rank) {
+      const PetscScalar *eta = u + R.number.body[b] - R.start + 6;
+      std::copy(eta, eta + f->deformation.size(), f->deformation.begin());
+    }
+    PetscCallMPI(MPI_Bcast(f->deformation.data(), (PetscMPIInt)f->deformation.size(), MPI_DOUBLE, owner, s.comm));
+    std::fill(f->deformation_rate.begin(), f->deformation_rate.end(), 0.0);
+    s.bodies[b].flexible = f;
+  }
+  PetscFunctionReturn(0);
+}
+
 /* Poses out of U into the description of every rank, at rest; initial values of variables and states too */
 PetscErrorCode WriteBack(Equilibrium &E)
 {
@@ -153,8 +185,9 @@ PetscErrorCode WriteBack(Equilibrium &E)
     const BodyMotion &m = R.bodies.now[b];
     mine.push_back((double)R.bodies.body[b].id);
     mine.insert(mine.end(), m.r.data(), m.r.data() + 3);
-    const bool    turns = R.bodies.body[b].kind == BodyKind::Rigid || R.bodies.body[b].kind == BodyKind::Planar;
-    const Matrix3 A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
+    const BodyKind kind  = R.bodies.body[b].kind;
+    const bool     turns = HasEulerAngles(kind) || kind == BodyKind::Planar;
+    const Matrix3  A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
     mine.insert(mine.end(), A.data(), A.data() + 9);
   }
   std::vector<double> scalars(s.variables.size() + s.states.size(), 0), sum(scalars.size());
@@ -162,6 +195,7 @@ PetscErrorCode WriteBack(Equilibrium &E)
     if (R.number.variable_owner[i] == R.rank) scalars[i] = u[R.number.variable[i] - R.start];
   for (std::size_t i = 0; i < s.states.size(); i++)
     if (R.number.state_owner[i] == R.rank) scalars[s.variables.size() + i] = u[R.number.state[i] - R.start];
+  PetscCall(WriteBackModes(R, u));
   PetscCall(VecRestoreArrayRead(E.zero, &v));
   PetscCall(VecRestoreArrayRead(E.U, &u));
   const PetscMPIInt n = (PetscMPIInt)mine.size();
@@ -194,7 +228,7 @@ PetscErrorCode RenewAxes(Equilibrium &E)
   PetscCall(VecGetArrayRead(E.U, &u));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    if (k.kind == BodyKind::Rigid && std::abs(std::sin(u[k.first + 4])) < singular_sine) mine = PETSC_TRUE;
+    if (HasEulerAngles(k.kind) && std::abs(std::sin(u[k.first + 4])) < singular_sine) mine = PETSC_TRUE;
   }
   PetscCall(VecRestoreArrayRead(E.U, &u));
   PetscCallMPI(MPI_Allreduce(&mine, &any, 1, MPIU_BOOL, MPI_LOR, R.scene.comm));
@@ -206,7 +240,7 @@ PetscErrorCode RenewAxes(Equilibrium &E)
   PetscCall(VecGetArray(E.U, &x));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    std::copy(u + k.first, u + k.first + Coordinates(k.kind), x + k.first);
+    std::copy(u + k.first, u + k.first + R.bodies.coordinates(b), x + k.first);
   }
   PetscCall(VecRestoreArray(E.U, &x));
   PetscCall(VecRestoreArrayRead(E.next, &u));
@@ -226,7 +260,7 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   E.scale = at.force;
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
-    lightest = std::min(lightest, b.mass);
+    if (b.mass > 0) lightest = std::min(lightest, b.mass);
   }
   *h = E.scale > 0 ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
   PetscFunctionReturn(0);

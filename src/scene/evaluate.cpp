@@ -41,7 +41,7 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
   R.bodies.move(local[0], local[1]);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
   for (auto &b : R.batches) b->residual(e);
-  R.bodies.residual(local[1], local[2], f);
+  R.bodies.residual(local[0], local[1], local[2], f);
   PetscCall(VecRestoreArrayWrite(F, &f));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
@@ -52,12 +52,26 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
 namespace
 {
 
-void BodyBlocks(const Runtime &R, const Evaluation &e)
+/* the nine blocks of a flexible body */
+void ModalBlocks(Runtime &R, PetscInt b, const Evaluation &e, const Slot *&slot)
+{
+  const int size[3] = {3, 3, R.bodies.modes(b)}, at[3] = {0, 3, 6};
+  R.bodies.modalJacobian(b, e.u, e.v, e.a, e.sv, e.sa);
+  const Eigen::MatrixXd &B = R.bodies.modal[R.bodies.body[b].modal].block;
+  for (int g = 0; g < 3; g++)
+    for (int h = 0; h < 3; h++) e.sink.add(*slot++, B.block(at[g], at[h], size[g], size[h]), size[g], size[h]);
+}
+
+void BodyBlocks(Runtime &R, const Evaluation &e)
 {
   const Slot *slot = R.body_slot.data();
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     Eigen::Matrix<double, 6, 6, Eigen::RowMajor> B;
     const BodyKind                               kind = R.bodies.body[b].kind;
+    if (kind == BodyKind::Flexible) {
+      ModalBlocks(R, b, e, slot);
+      continue;
+    }
     R.bodies.jacobian(b, e.v, e.a, e.sv, e.sa, B);
     for (int g = 0; g < Groups(kind); g++) {
       const int size = GroupSize(kind, g), at = GroupOffset(kind, g);

@@ -16,6 +16,7 @@ PetscMPIInt OwnerOf(const Runtime &R, const Measure &m)
   const SceneData &s = R.scene;
   for (Marker k : {m.i, m.j, m.frame})
     if (s.valid(k) && s.markers[k.id].body >= 0) return R.number.owner[s.markers[k.id].body];
+  if (m.kind == Measure::Modal) return R.number.owner[m.target];
   if (m.kind < Measure::Multiplier || m.kind > Measure::Component) return -1;
   const std::vector<Part> &parts = s.elements[m.target].parts;
   return parts.empty() ? -1 : OwnerOf(R, *parts[0].store, parts[0].index);
@@ -92,6 +93,7 @@ const char *NameOf(Measure::Kind k)
                                   "force",
                                   "value of a variable",
                                   "value of a state",
+                                  "modal coordinate",
                                   "kinetic energy",
                                   "potential energy"};
   return name[k];
@@ -112,6 +114,13 @@ std::string CheckMarkers(const SceneData &s, const Measure &m)
   if (std::abs(s.frame(m.i).R.col(0).dot(s.frame(m.j).R.col(2))) > 1 - 1e-8)
     return "the x axis of marker i is along the z axis of j, the angle about it is undefined";
   return "";
+}
+
+std::string CheckModal(const SceneData &s, const Measure &m)
+{
+  if (m.target < 0 || m.target >= (PetscInt)s.bodies.size() || !s.bodies[m.target].flexible) return "its body is not a flexible one of this scene";
+  const PetscInt n = s.bodies[m.target].flexible->model->modes();
+  return m.component >= 0 && m.component < n ? "" : s.bodies[m.target].name + " has modes 0 to " + std::to_string(n - 1) + ", not " + std::to_string(m.component);
 }
 
 std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
@@ -171,6 +180,8 @@ std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
     return m.target >= 0 && m.target < (PetscInt)s.variables.size() ? "" : "not a variable of this scene";
   case Measure::StateValue:
     return m.target >= 0 && m.target < (PetscInt)s.states.size() ? "" : "not a state of this scene";
+  case Measure::Modal:
+    return CheckModal(s, m);
   case Measure::Multiplier:
   case Measure::JointForce:
   case Measure::JointMoment:

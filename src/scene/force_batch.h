@@ -38,13 +38,7 @@ public:
 
   void accept(Bodies &B) override
   {
-    if constexpr (K::memory > 0)
-      for (Instance &e : all) {
-        Frame<double> f[M];
-        for (int k = 0; k < M; k++) f[k] = B.frame<true>(e.marker[k]);
-        K::accept(e.data, f);
-      }
-    (void)B;
+    for (Instance &e : all) Remember<K>(e, B);
   }
   double energy(const Evaluation &ev) const override
   {
@@ -62,14 +56,7 @@ public:
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   void     copyMemory(double *x, bool in) override
   {
-    if constexpr (K::memory > 0)
-      for (Instance &e : all)
-        for (int i = 0; i < K::memory; i++, x++) {
-          if (in) e.data.memory[i] = *x;
-          else *x = e.data.memory[i];
-        }
-    (void)x;
-    (void)in;
+    for (Instance &e : all) x = CopyMemory<K>(e, x, in);
   }
 
 protected:

@@ -19,7 +19,7 @@ void Start(const Runtime &R, const LocalBody &k, double *u, double *v)
     u[2] = std::atan2(b.A(1, 0), b.A(0, 0));
     v[2] = b.w(2);
   }
-  if (k.kind != BodyKind::Rigid) return;
+  if (!HasEulerAngles(k.kind)) return;
   const Vector3 eps = EulerAngles(b.A * k.C.transpose());
   Matrix3       A;
   EulerAxes     e;
@@ -29,6 +29,9 @@ void Start(const Runtime &R, const LocalBody &k, double *u, double *v)
     u[n - 3 + i] = eps(i);
     v[n - 3 + i] = rate(i);
   }
+  if (!b.flexible) return;
+  std::copy(b.flexible->deformation.begin(), b.flexible->deformation.end(), u + n);
+  std::copy(b.flexible->deformation_rate.begin(), b.flexible->deformation_rate.end(), v + n);
 }
 
 } // namespace

@@ -70,6 +70,8 @@ public:
       return place(R.number.variable[r.id], 1, 0);
     case ScalarRef::State:
       return place(R.number.state[r.id], 1, 0);
+    case ScalarRef::Modal:
+      return modal(r);
     default:
       break;
     }
@@ -95,6 +97,16 @@ public:
   std::vector<PetscInt> other_bodies, others; /* what collecting has found */
 
 private:
+  /* a body's groups are made with the body */
+  Input modal(const ScalarRef &r)
+  {
+    if (collecting_) {
+      if (OwnerOfBody(R, r.id) != R.rank) other_bodies.push_back(r.id);
+      return {};
+    }
+    const LocalBody &b = R.bodies.body[R.local_body[r.id]];
+    return {b.first + 6 + r.component, b.group + 2, r.component};
+  }
   Input place(PetscInt global, PetscInt size, PetscInt offset)
   {
     const PetscInt g = group(global, size);
@@ -134,6 +146,14 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
     const int at = GroupOffset(k.kind, g);
     R.pattern.addGroup(global + at, k.first + at, GroupSize(k.kind, g), own);
   }
+  if (k.kind == BodyKind::Flexible) {
+    const int m = (int)b.flexible->model->modes();
+    k.modal = (PetscInt)R.bodies.modal.size();
+    R.pattern.addGroup(global + 6, k.first + 6, m, own);
+    ModalPart p{std::make_unique<ModalDynamics>(b.flexible->model, b.flexible->mass, ModalDamping(*b.flexible)), Eigen::VectorXd::Zero(m), {}, {}};
+    if (own) p.block.resize(6 + m, std::max(6 + m, 1));
+    R.bodies.modal.push_back(std::move(p));
+  }
   return k;
 }
 
@@ -143,6 +163,7 @@ void MakeBodies(Runtime &R, const std::vector<PetscInt> &other)
   Bodies &B = R.bodies;
   B.body.clear();
   B.marker.clear();
+  B.modal.clear();
   R.local_body.assign(R.scene.bodies.size(), -1);
   for (PetscInt id = 0; id < (PetscInt)R.scene.bodies.size(); id++)
     if (OwnerOfBody(R, id) == R.rank) {
@@ -207,6 +228,11 @@ PetscErrorCode MakePattern(Runtime &R)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
+    if (k.kind == BodyKind::Flexible) {
+      for (int g = 0; g < 3; g++)
+        for (int h = 0; h < 3; h++) request.push_back(R.pattern.need(k.group + g, k.group + h));
+      continue;
+    }
     for (int g = 0; g < Groups(k.kind); g++) request.push_back(R.pattern.need(k.group + g, k.group + g, g == 0));
   }
   for (auto &b : R.batches) b->pattern(R.pattern);
@@ -214,8 +240,8 @@ PetscErrorCode MakePattern(Runtime &R)
   R.body_slot.clear();
   for (PetscInt r : request) R.body_slot.push_back(R.pattern.slot(r));
   for (auto &b : R.batches) b->resolve(R.pattern);
-  R.pattern.release();
   PetscCall(R.pattern.createMat(R.scene.comm, R.n, &R.J));
+  R.pattern.release();
   PetscFunctionReturn(0);
 }
 
@@ -228,7 +254,7 @@ PetscErrorCode MakeRoles(Runtime &R)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    add(TSHHT3_COORDINATE, k.first + R.start, Coordinates(k.kind));
+    add(TSHHT3_COORDINATE, k.first + R.start, R.bodies.coordinates(b));
   }
   for (StoreBase *s : R.scene.order)
     for (PetscInt e = 0; e < s->size(); e++)
@@ -260,7 +286,7 @@ PetscErrorCode Layout(Runtime &R)
     SortUnique(other);
     R.others = collect.others;
     for (PetscInt b : other)
-      for (int i = 0; i < Coordinates(KindOf(R.scene, R.scene.bodies[b])); i++) R.others.push_back(R.number.body[b] + i);
+      for (int i = 0; i < CoordinatesOf(R.scene, R.scene.bodies[b]); i++) R.others.push_back(R.number.body[b] + i);
     SortUnique(R.others);
   }
   MakeBodies(R, other);

@@ -11,7 +11,8 @@ namespace
 bool IsJoint(Measure::Kind k) { return k == Measure::JointForce || k == Measure::JointMoment; }
 bool IsScalar(Measure::Kind k)
 {
-  return k == Measure::Multiplier || k == Measure::Component || k == Measure::Value || k == Measure::StateValue;
+  return k == Measure::Multiplier || k == Measure::Component || k == Measure::Value || k == Measure::StateValue ||
+         k == Measure::Modal;
 }
 
 /* ---- motion of a marker ---- */
@@ -316,6 +317,9 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
     break;
   case Measure::StateValue:
     k.input = l.input({ScalarRef::State, m.target, 0});
+    break;
+  case Measure::Modal:
+    k.input = l.input({ScalarRef::Modal, m.target, m.component});
     break;
   case Measure::Component:
     PlaceComponent(l, m, k);

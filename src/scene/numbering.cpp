@@ -18,7 +18,13 @@ PetscMPIInt OwnerOf(const Runtime &R, const StoreBase &s, PetscInt e)
 BodyKind KindOf(const SceneData &s, const BodyData &b)
 {
   if (s.planar) return b.point ? BodyKind::PlanarPoint : BodyKind::Planar;
+  if (b.flexible) return BodyKind::Flexible;
   return b.point ? BodyKind::Point : BodyKind::Rigid;
+}
+
+PetscInt CoordinatesOf(const SceneData &s, const BodyData &b)
+{
+  return Coordinates(KindOf(s, b)) + (b.flexible ? b.flexible->model->modes() : 0);
 }
 
 namespace
@@ -29,7 +35,7 @@ template <class F> void Visit(Runtime &R, F f)
 {
   SceneData &s = R.scene;
   Numbering &N = R.number;
-  for (std::size_t b = 0; b < s.bodies.size(); b++) f(N.owner.empty() ? 0 : N.owner[b], Coordinates(KindOf(s, s.bodies[b])), N.body[b]);
+  for (std::size_t b = 0; b < s.bodies.size(); b++) f(N.owner.empty() ? 0 : N.owner[b], (int)CoordinatesOf(s, s.bodies[b]), N.body[b]);
   for (StoreBase *store : s.order)
     for (PetscInt e = 0; e < store->size(); e++) f(OwnerOf(R, *store, e), store->unknowns(e), store->start[e]);
   for (std::size_t i = 0; i < s.variables.size(); i++) f(N.variable_owner[i], 1, N.variable[i]);

@@ -66,7 +66,7 @@ PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt
     }
     for (std::size_t b = 0; b < n; b++) {
       xadj[b + 1] += xadj[b];
-      size_of[b] = Coordinates(KindOf(s, s.bodies[b]));
+      size_of[b] = (idx_t)CoordinatesOf(s, s.bodies[b]);
     }
     idx_t options[METIS_NOPTIONS];
     METIS_SetDefaultOptions(options);

@@ -84,6 +84,7 @@ void Pattern::release()
 {
   std::vector<Request>().swap(request_);
   std::vector<Slot>().swap(slot_);
+  for (std::vector<PetscInt> *x : {&di, &dj, &oi, &oj}) std::vector<PetscInt>().swap(*x);
 }
 
 PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const

@@ -47,7 +47,7 @@ public:
   /* diagonal entries that no element asks for are left out: multipliers have none */
   void build(PetscInt start, PetscInt n);
   Slot slot(PetscInt number) const { return slot_[number]; }
-  void release(); /* what is not needed any more: requests, slots, rows */
+  void release(); /* requests, slots and rows: only the groups stay */
 
   /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
   std::vector<PetscInt> di, dj, oi, oj;

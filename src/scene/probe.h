@@ -42,28 +42,9 @@ public:
   int      markers() const override { return K::markers; }
   PetscInt marker(int k) const override { return e.marker[k]; }
 
-  void accept(const Bodies &B) override
-  {
-    if constexpr (K::memory > 0) {
-      Frame<double> f[K::markers];
-      for (int k = 0; k < K::markers; k++) f[k] = B.frame<true>(e.marker[k]);
-      K::accept(e.data, f);
-    }
-    (void)B;
-  }
+  void     accept(const Bodies &B) override { Remember<K>(e, B); }
   PetscInt memory() const override { return K::memory; }
-  void     copyMemory(double *x, bool in) override
-  {
-    if constexpr (K::memory > 0)
-      for (int i = 0; i < K::memory; i++) {
-        if (in)
-          e.data.memory[i] = x[i];
-        else
-          x[i] = e.data.memory[i];
-      }
-    (void)x;
-    (void)in;
-  }
+  void     copyMemory(double *x, bool in) override { CopyMemory<K>(e, x, in); }
 
 protected:
   Instance e;

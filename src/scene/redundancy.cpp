@@ -46,7 +46,7 @@ void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
     for (std::size_t k = 0; k < b.body.size(); k++) {
       const std::vector<int> &d = Directions(KindOf(s, s.bodies[b.body[k]]));
       for (int c = b.column[k]; c < b.column[k + 1]; c++)
-        if (d[c - b.column[k]] < 3) b.J.col(c) *= size;
+        if (c - b.column[k] < (int)d.size() && d[c - b.column[k]] < 3) b.J.col(c) *= size;
     }
     for (int r = 0; r < b.rows; r++) {
       const double norm = b.J.row(r).norm();
@@ -99,21 +99,23 @@ private:
   /* Blocks that lost rows because their rows at body b are independent in b's columns */
   std::vector<std::size_t> cut(PetscInt b)
   {
-    const int                   width = (int)Directions(KindOf(s_, s_.bodies[b])).size();
-    Eigen::Matrix<double, 6, 6> B;
-    std::vector<RowRef>         rows;
+    const int           width = Width(s_, b);
+    std::vector<RowRef> rows;
     for (std::size_t k : at_[b]) {
       const RowBlock &e    = blocks_[k];
       const auto      body = std::find(e.body.begin(), e.body.end(), b) - e.body.begin();
       for (int r = 0; r < e.rows; r++) {
         if (!(open_[k] >> r & 1) || e.J.row(r).segment(e.column[body], width).isZero(0)) continue;
         if ((int)rows.size() == width) return {};
-        B.row(rows.size()).head(width) = e.J.row(r).segment(e.column[body], width);
         rows.push_back({k, r});
       }
     }
     if (rows.empty()) return {};
-    const Eigen::MatrixXd A = B.topLeftCorner(rows.size(), width).transpose();
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> A(width, rows.size());
+    for (std::size_t i = 0; i < rows.size(); i++) {
+      const RowBlock &e = blocks_[rows[i].block];
+      A.col(i) = e.J.row(rows[i].row).segment(e.column[std::find(e.body.begin(), e.body.end(), b) - e.body.begin()], width).transpose();
+    }
     if (std::abs(Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(A).matrixR()(rows.size() - 1, rows.size() - 1)) <
         clearly_independent)
       return {};
@@ -144,6 +146,7 @@ std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, c
   Eigen::COLAMDOrdering<int>()(A, p);
   std::vector<std::size_t> place(first.size()), order;
   for (std::size_t e = 0; e < first.size(); e++) place[p.indices()(e)] = e;
+  std::stable_partition(place.begin(), place.end(), [&](std::size_t e) { return blocks[core[first[e]].block].store->everIndependent(); });
   for (std::size_t e : place)
     for (bool length : {true, false})
       for (std::size_t k = first[e]; k < (e + 1 < first.size() ? first[e + 1] : core.size()); k++)
@@ -230,13 +233,15 @@ std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &b
   if (core.empty()) return found;
   std::vector<std::pair<int, double>> row;
   std::vector<std::size_t>            dead;
-  Elimination                         elimination(6 * (int)s.bodies.size());
+  std::vector<int>                    first(s.bodies.size() + 1, 0); /* column */
+  for (std::size_t b = 0; b < s.bodies.size(); b++) first[b + 1] = first[b] + Width(s, (PetscInt)b);
+  Elimination elimination(first.back());
   for (std::size_t j : EliminationOrder(blocks, core, s.bodies.size())) {
     const RowBlock &b = blocks[core[j].block];
     row.clear();
     for (std::size_t k = 0; k < b.body.size(); k++)
       for (int c = b.column[k]; c < b.column[k + 1]; c++)
-        if (b.J(core[j].row, c) != 0) row.emplace_back(6 * (int)b.body[k] + c - b.column[k], b.J(core[j].row, c));
+        if (b.J(core[j].row, c) != 0) row.emplace_back(first[b.body[k]] + c - b.column[k], b.J(core[j].row, c));
     if (!elimination.take(row, threshold)) dead.push_back(j);
   }
   std::sort(dead.begin(), dead.end());
@@ -293,7 +298,7 @@ PetscErrorCode KeepSingular(Runtime &R, std::vector<RowRef> &found)
   PetscCall(MoveAside(R, DescribeAll(s, s.start.time, Hold::None), &moved));
   if (moved) PetscCall(ProjectPositions(R, Hold::None, &ok));
   if (ok) {
-    std::vector<RowBlock>     blocks = DescribeAll(s, s.start.time, Hold::None);
+    std::vector<RowBlock>     blocks = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
     const std::vector<RowRef> next   = Find(s, blocks);
     if (next.size() < found.size()) {
       PetscCall(PetscPrintf(
@@ -336,11 +341,11 @@ PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, con
 PetscErrorCode DropRedundant(Runtime &R)
 {
   SceneData            &s      = R.scene;
-  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
   PetscFunctionBegin;
   s.started.coordinates = s.started.rows = s.started.redundant = 0;
   s.started.dropped.clear();
-  for (const BodyData &b : s.bodies) s.started.coordinates += Coordinates(KindOf(s, b));
+  for (const BodyData &b : s.bodies) s.started.coordinates += CoordinatesOf(s, b);
   for (const RowBlock &b : blocks)
     for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);

@@ -15,7 +15,7 @@ namespace hhtdae
 namespace
 {
 
-bool HasAxes(const LocalBody &k) { return k.kind == BodyKind::Rigid; }
+bool HasAxes(const LocalBody &k) { return HasEulerAngles(k.kind); }
 
 PetscInt Memories(const Runtime &R)
 {
@@ -261,7 +261,7 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
     if (k.kind == BodyKind::Planar) x[k.first + 2] = 0;
-    if (k.kind == BodyKind::Rigid) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
+    if (HasEulerAngles(k.kind)) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
   }
   PetscCall(VecRestoreArray(R.rtol, &x));
   R.rtol_of = rtol;

@@ -13,6 +13,7 @@ const std::vector<int> &Directions(BodyKind k)
   case BodyKind::Point:
     return point;
   case BodyKind::Rigid:
+  case BodyKind::Flexible:
     return rigid;
   case BodyKind::Planar:
     return planar;
@@ -26,7 +27,7 @@ const std::vector<int> &Directions(BodyKind k)
 namespace
 {
 
-void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, PetscInt marker)
+void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, PetscInt marker, Modes modes)
 {
   const MarkerData &m  = s.markers[marker];
   const std::size_t at = std::find(b.body.begin(), b.body.end(), m.body) - b.body.begin();
@@ -40,10 +41,12 @@ void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, 
     full << x, theta + lever.cross(x); /* dx = dr + dtheta x lever */
     for (std::size_t c = 0; c < direction.size(); c++) b.J(r, b.column[at] + (int)c) += full(direction[c]);
   }
+  if (k == 0 && modes == Modes::Free && d.modal.size())
+    b.J.middleCols(b.column[at] + (int)direction.size(), d.modal.cols()) += d.modal;
 }
 
 /* The bodies that can move, and where their columns begin */
-void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hold, RowBlock &b)
+void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hold, Modes modes, RowBlock &b)
 {
   int columns = 0;
   for (int k = 0; k < store.markers(); k++) {
@@ -52,7 +55,7 @@ void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hol
     if (std::find(b.body.begin(), b.body.end(), id) != b.body.end()) continue;
     b.body.push_back(id);
     b.column.push_back(columns);
-    columns += (int)Directions(KindOf(s, s.bodies[id])).size();
+    columns += modes == Modes::Free ? Width(s, id) : (int)Directions(KindOf(s, s.bodies[id])).size();
   }
   b.column.push_back(columns);
 }
@@ -66,11 +69,20 @@ void Speeds(const SceneData &s, const DescribedRows &d, RowBlock &b)
     for (int r = 0; r < b.rows; r++)
       b.speed(r) += d.J.block<1, 3>(r, 6 * k).dot(w.v) + d.J.block<1, 3>(r, 6 * k + 3).dot(w.w);
   }
+  if (!d.modal.size()) return;
+  const std::vector<double> &rate = s.bodies[s.markers[b.store->marker(b.instance, 0)].body].flexible->deformation_rate;
+  b.speed += d.modal * Eigen::Map<const Eigen::VectorXd>(rate.data(), rate.size());
 }
 
 } // namespace
 
-std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold)
+int Width(const SceneData &s, PetscInt b)
+{
+  const BodyData &body = s.bodies[b];
+  return (int)Directions(KindOf(s, body)).size() + (body.flexible ? (int)body.flexible->model->modes() : 0);
+}
+
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes)
 {
   std::vector<RowBlock> all;
   DescribedRows         d;
@@ -87,14 +99,15 @@ std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold)
       b.active    = p.store->active(p.index);
       b.holonomic = p.store->isHolonomic();
       first += b.rows;
+      d.modal.resize(0, 0);
       p.store->describe(s, p.index, t, d);
       b.name   = d.name;
       b.length = d.length;
       b.value  = Eigen::Map<const Eigen::VectorXd>(d.value, b.rows);
       b.rate   = Eigen::Map<const Eigen::VectorXd>(d.rate, b.rows);
-      FindBodies(s, *p.store, p.index, hold, b);
+      FindBodies(s, *p.store, p.index, hold, modes, b);
       b.J.setZero(b.rows, b.column.back());
-      for (int k = 0; k < p.store->markers(); k++) AddColumns(s, b, d, k, p.store->marker(p.index, k));
+      for (int k = 0; k < p.store->markers(); k++) AddColumns(s, b, d, k, p.store->marker(p.index, k), modes);
       Speeds(s, d, b);
       all.push_back(std::move(b));
     }

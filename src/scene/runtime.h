@@ -31,7 +31,7 @@ struct Runtime {
   Pattern                             pattern;
   Bodies                              bodies;
   std::vector<std::unique_ptr<Batch>> batches;
-  std::vector<Slot>                   body_slot; /* diagonal blocks of own bodies, group by group */
+  std::vector<Slot>                   body_slot; /* diagonal blocks of own bodies, group by group; all nine of a flexible one */
   std::vector<PetscInt>               local_body; /* of bodies in the scene, -1: not here */
   bool                                uses_acceleration = false; /* somebody reads q'' of other bodies */
 
@@ -43,7 +43,8 @@ struct Runtime {
   std::vector<double>    send, receive;
   std::vector<double>    u, v, a; /* local unknowns, where there are others */
 
-  Mat  J = nullptr;      /* the pattern; every TS gets a duplicate */
+  Mat  J = nullptr;      /* of the first TS; others get a duplicate */
+  bool given = false;
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* quaternions of the axes of own rigid bodies, and memories: what a checkpoint has to keep */
   bool turns = false, remembers = false; /* on any rank: rigid bodies in space, elements with memory */
@@ -69,6 +70,7 @@ PetscErrorCode Number(Runtime &R);
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
 BodyKind       KindOf(const SceneData &s, const BodyData &b);
+PetscInt       CoordinatesOf(const SceneData &s, const BodyData &b); /* modal ones too */
 /* initial.cpp: state of the description, with the axes of the Euler angles chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */

@@ -51,6 +51,8 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
   const bool     good = body.id >= -1 && body.id < (PetscInt)s.bodies.size();
   const std::string who = "marker " + (name.empty() ? std::to_string(id) : name);
   if (!good) s.errors.push_back(who + ": its body is not one of this scene");
+  else if (body.id >= 0 && s.bodies[body.id].flexible)
+    s.errors.push_back(who + ": a flexible body is held at its attachments; use scene.attachment(" + s.bodies[body.id].name + ", ...) as the marker's body");
   if (!position.allFinite() || !axes.allFinite() || (axes.transpose() * axes - Matrix3::Identity()).norm() > 1e-8 || axes.determinant() < 0)
     s.errors.push_back(who + ": position must be finite and axes orthonormal and right-handed");
   MarkerData m{good ? body.id : -2, position, axes};

@@ -14,6 +14,13 @@
 namespace hhtdae
 {
 
+struct FlexibleData {
+  std::shared_ptr<const ModalBody> model;
+  ModalMass                        mass;
+  std::vector<double>              damping, deformation, deformation_rate; /* ratios, modal coordinates at the start */
+};
+Eigen::VectorXd ModalDamping(const FlexibleData &f); /* 2 zeta omega */
+
 struct BodyData {
   std::string name;
   bool        point = false, fixed_start = false;
@@ -23,6 +30,8 @@ struct BodyData {
   Vector3     r;        /* centre of mass at the start */
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
+  std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
+  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: a flexible body; it has no mass */
 };
 
 struct MarkerData {
@@ -33,9 +42,9 @@ struct MarkerData {
 
 /* A scalar unknown of the scene, by what it is for the user */
 struct ScalarRef {
-  enum Kind { Multiplier, ForceState, Variable, State } kind = Variable;
-  PetscInt id        = -1; /* element, variable or state */
-  PetscInt component = 0;  /* row of the element's constraints, in the order of its parts; component of its force */
+  enum Kind { Multiplier, ForceState, Variable, State, Modal } kind = Variable;
+  PetscInt id        = -1; /* element, variable, state or flexible body */
+  PetscInt component = 0;  /* row of the element's constraints, in the order of its parts; component of its force; mode */
 };
 
 class StoreBase; /* all instances of one kernel, store.h */

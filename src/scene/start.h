@@ -32,13 +32,15 @@ struct RowBlock {
   bool has(int r) const { return active >> r & 1; }
 };
 enum class Hold { None, FixedStart }; /* bodies that count as ground */
+enum class Modes { Held, Free };      /* modal coordinates: not among the columns, or behind those of their body */
 
-std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold);
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes = Modes::Held);
 double                SceneSize(const SceneData &s); /* diagonal of the box around bodies and markers */
 std::string           RowName(const SceneData &s, PetscInt element, int row, const char *kernel);
 
 /* Directions of motion of a body: indices among (v, w) */
 const std::vector<int> &Directions(BodyKind k);
+int                     Width(const SceneData &s, PetscInt body); /* their number, and that of modal coordinates */
 
 /* ---- nearest.cpp: Phi_q M^-1 Phi_q^T, distributed by the owners of the elements; the same blocks, but for their
  * values, in all calls ---- */
@@ -71,8 +73,9 @@ private:
 
 /* ---- assemble.cpp ---- */
 struct Pose {
-  Vector3 r, v, w;
-  Matrix3 A;
+  Vector3                             r, v, w;
+  Matrix3                             A;
+  std::shared_ptr<const FlexibleData> flexible;
 };
 std::vector<Pose> Poses(const SceneData &s);
 void              SetPoses(SceneData &s, const std::vector<Pose> &p);

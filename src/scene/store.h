@@ -42,6 +42,7 @@ public:
   virtual void          setActive(PetscInt, unsigned char) {}
   virtual bool          carried(PetscInt) const           = 0; /* as force states */
   virtual bool          usesVelocities() const { return true; }
+  virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
   virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;

@@ -57,7 +57,11 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(VecDuplicate(U, &V));
   PetscCall(VecDuplicate(U, &F));
   PetscCall(InitialState(R, U, V));
-  PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
+  if (!R.given) {
+    J = R.J; /* a matrix of its own for each further one */
+    PetscCall(PetscObjectReference((PetscObject)J));
+    R.given = true;
+  } else PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
   PetscCall(TSCreate(data_->comm, ts));
   PetscCall(TSSetProblemType(*ts, TS_NONLINEAR));
   PetscCall(TSSetType(*ts, TSHHT3));

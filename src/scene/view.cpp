@@ -9,13 +9,18 @@ namespace
 
 struct Contents {
   PetscInt multipliers = 0, forces = 0;
-  bool     velocities = false, curved = false, turning = false;
+  PetscInt modes = 0;
+  bool     velocities = false, curved = false, turning = false, flexible = false;
 };
 
 Contents Count(const SceneData &s)
 {
   Contents c;
-  for (const BodyData &b : s.bodies) c.turning |= KindOf(s, b) == BodyKind::Rigid;
+  for (const BodyData &b : s.bodies) {
+    c.turning |= HasEulerAngles(KindOf(s, b));
+    c.flexible |= (bool)b.flexible;
+    if (b.flexible) c.modes += b.flexible->model->modes();
+  }
   for (const StoreBase *store : s.order) {
     PetscInt n = 0;
     for (PetscInt e = 0; e < store->size(); e++) n += store->unknowns(e);
@@ -46,6 +51,7 @@ PetscErrorCode Scene::view(PetscViewer viewer) const
   without(!s.states.empty(), "first-order states");
   without(c.velocities, "velocity terms of forces");
   without(c.curved, "second derivatives of constraints");
+  without(c.flexible, "flexible bodies");
   without(c.turning, "Euler angles and gyroscopic terms");
   without(R.remembers, "angles over full turns");
   without(R.uses_acceleration, "accelerations in definitions");
@@ -53,6 +59,7 @@ PetscErrorCode Scene::view(PetscViewer viewer) const
   without((bool)R.recorder, "output");
   PetscCall(PetscViewerASCIIPrintf(viewer, "  unknowns: %d, of these %d multipliers, %d force states, %d variables, %d states\n",
                                    (int)R.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
+  if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
   if (R.turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R.reframed));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);

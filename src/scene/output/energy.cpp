@@ -6,6 +6,17 @@ namespace hhtdae
 namespace
 {
 
+void AddFlexible(const Bodies &B, PetscInt i, const Evaluation &e, Balance &s)
+{
+  const BodyMotion &b = B.now[i];
+  const ModalEnergy m = B.modal[B.body[i].modal].dynamics->energy(B.modalMotion(i, e.u, e.v, nullptr), b.v);
+  s.kinetic += m.kinetic;
+  s.elastic += m.elastic;
+  s.gravity -= B.body[i].mass * B.gravity.dot(b.r + m.center);
+  s.linear += m.momentum;
+  s.angular += b.r.cross(m.momentum) + m.angular;
+}
+
 void AddBody(const LocalBody &k, const BodyMotion &b, const Vector3 &gravity, Balance &s)
 {
   s.kinetic += 0.5 * k.mass * b.v.squaredNorm();
@@ -29,7 +40,10 @@ PetscErrorCode MakeBalance(const Runtime &R, const Evaluation &e, Balance &b)
 {
   PetscFunctionBegin;
   b = Balance();
-  for (PetscInt i = 0; i < R.bodies.own; i++) AddBody(R.bodies.body[i], R.bodies.now[i], R.bodies.gravity, b);
+  for (PetscInt i = 0; i < R.bodies.own; i++) {
+    if (R.bodies.body[i].kind == BodyKind::Flexible) AddFlexible(R.bodies, i, e, b);
+    else AddBody(R.bodies.body[i], R.bodies.now[i], R.bodies.gravity, b);
+  }
   for (const auto &batch : R.batches) b.elastic += batch->energy(e);
   if (R.size == 1) PetscFunctionReturn(0);
   double all[9] = {b.kinetic, b.gravity, b.elastic, b.linear(0), b.linear(1), b.linear(2), b.angular(0), b.angular(1), b.angular(2)};

@@ -1,0 +1,172 @@
+/* Flexible bodies of a scene's description, and the frames of their attachments. */
+#include "attach.h"
+#include <cmath>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+double RatioOf(const FlexibleBody &b, double frequency)
+{
+  for (const DampingBand &band : b.damping)
+    if (!(frequency > band.below)) return band.ratio;
+  return b.damping.empty() ? 0 : b.damping.back().ratio;
+}
+
+std::vector<double> Sized(const Eigen::VectorXd &x, PetscInt n)
+{
+  std::vector<double> y(n, 0);
+  if (x.size() == n) std::copy(x.data(), x.data() + n, y.begin());
+  return y;
+}
+
+bool SameColumns(const ModalBody &m)
+{
+  const PetscInt n = m.modes();
+  bool           same = m.first.cols() == n;
+  for (const auto &x : m.moment) same = same && x.cols() == n;
+  for (const auto &x : m.quadratic) same = same && ((x.rows() == n && x.cols() == n) || x.size() == 0);
+  for (const ModalAttachment &a : m.attachments) same = same && a.translation.cols() == n && a.rotation.cols() == n;
+  return same;
+}
+
+bool Finite(const ModalBody &m)
+{
+  bool good = m.omega.allFinite() && m.first.allFinite() && m.moments.allFinite() && m.center.allFinite();
+  for (const auto &x : m.moment) good = good && x.allFinite();
+  for (const auto &x : m.quadratic) good = good && x.allFinite();
+  for (const ModalAttachment &a : m.attachments) good = good && a.position.allFinite() && a.translation.allFinite() && a.rotation.allFinite();
+  return good;
+}
+
+/* What of the modes moves the body as a whole, which a constant mass matrix has no place for */
+double RigidContent(const ModalBody &m)
+{
+  const double size = std::sqrt(m.moments.trace() / m.mass), scale = std::sqrt(m.mass);
+  double       most = m.first.size() ? m.first.cwiseAbs().maxCoeff() / scale : 0;
+  for (int c = 0; c < 3 && m.modes(); c++) {
+    const int d = (c + 1) % 3;
+    most        = std::max(most, (m.moment[c].row(d) - m.moment[d].row(c)).cwiseAbs().maxCoeff() / (scale * size));
+  }
+  return most;
+}
+
+/* empty: nothing is wrong */
+std::string Fault(const FlexibleBody &b, bool planar)
+{
+  if (!b.model) return "it has no model; give a ModalBody";
+  const ModalBody &m = *b.model;
+  const PetscInt   n = m.modes();
+  if (planar) return "flexible bodies need a scene in space";
+  if (!SameColumns(m)) return "its ModalBody has " + std::to_string(n) + " frequencies, and invariants or attachments with another number of modes";
+  if (!Finite(m)) return "its ModalBody has values that are not finite";
+  if (n && m.omega.minCoeff() <= 0) return "mode " + std::to_string(n) + " or another has no positive frequency; rigid-body modes do not belong to a ModalBody";
+  for (const auto &x : m.quadratic)
+    if (n && !x.size() && b.mass == ModalMass::Full) return "its ModalBody has no invariants quadratic in the modes; use ModalMass::Partial or Constant";
+  if (b.mass == ModalMass::Constant && RigidContent(m) > 1e-6)
+    return "its modes move the centre of mass or turn the body as a whole; a constant mass matrix needs modes that are free of that";
+  for (const Eigen::VectorXd *x : {&b.ratios, &b.deformation, &b.deformation_rate})
+    if (x->size() && x->size() != n) return "it has " + std::to_string(n) + " modes, and damping ratios or a deformation of " + std::to_string(x->size());
+  for (const DampingBand &d : b.damping)
+    if (!(d.ratio >= 0) || !std::isfinite(d.ratio)) return "a damping ratio is negative or not finite";
+  if (b.ratios.size() && !(b.ratios.minCoeff() >= 0)) return "a damping ratio is negative";
+  return "";
+}
+
+} // namespace
+
+Eigen::VectorXd ModalDamping(const FlexibleData &f)
+{
+  return 2 * Eigen::Map<const Eigen::VectorXd>(f.damping.data(), f.damping.size()).cwiseProduct(f.model->omega);
+}
+
+Body Scene::add(const std::string &name, const FlexibleBody &b)
+{
+  const std::string who = name.empty() ? "body " + std::to_string(data_->bodies.size()) : name, fault = Fault(b, data_->planar);
+  RigidBody         r;
+  r.rotation         = b.rotation;
+  r.velocity         = b.velocity;
+  r.angular_velocity = b.angular_velocity;
+  r.position         = b.position;
+  r.fixed_start      = b.fixed_start;
+  if (b.model) {
+    r.mass    = b.model->mass;
+    r.inertia = b.model->inertia();
+    r.center  = b.model->center;
+  }
+  const Body body = add(who, r);
+  if (!fault.empty()) {
+    data_->errors.push_back("flexible body " + who + ": " + fault);
+    return body;
+  }
+  auto           f = std::make_shared<FlexibleData>();
+  const PetscInt n = b.model->modes();
+  f->model            = b.model;
+  f->mass             = b.mass;
+  f->deformation      = Sized(b.deformation, n);
+  f->deformation_rate = Sized(b.deformation_rate, n);
+  for (PetscInt k = 0; k < n; k++) f->damping.push_back(b.ratios.size() ? b.ratios(k) : RatioOf(b, b.model->omega(k) / (2 * M_PI)));
+  data_->bodies[body.id].flexible = f;
+  return body;
+}
+
+Body Scene::attachment(Body body, const std::string &name)
+{
+  SceneData &s = *data_;
+  const bool good = body.id >= 0 && body.id < (PetscInt)s.bodies.size() && s.bodies[body.id].flexible;
+  if (!good) {
+    s.errors.push_back("attachment " + name + ": its body is not a flexible one of this scene");
+    return Body{};
+  }
+  const ModalBody &m = *s.bodies[body.id].flexible->model;
+  const PetscInt   a = m.attachment(name);
+  if (a < 0) {
+    std::string known;
+    for (const ModalAttachment &x : m.attachments) known += (known.empty() ? "" : ", ") + x.name;
+    s.errors.push_back("flexible body " + s.bodies[body.id].name + ": it has no attachment " + name + (known.empty() ? ", in fact none" : ", but " + known));
+    return Body{};
+  }
+  for (std::size_t b = 0; b < s.bodies.size(); b++)
+    if (s.bodies[b].carrier == body.id && s.bodies[b].attachment == a) return Body{(PetscInt)b};
+  return addFrame(body, a);
+}
+
+/* The frame starts where the deformation at the start has its point */
+Body Scene::addFrame(Body body, PetscInt a)
+{
+  SceneData             &s = *data_;
+  const BodyData        &b = s.bodies[body.id];
+  const ModalAttachment &x = b.flexible->model->attachments[a];
+  const PetscInt         n = b.flexible->model->modes();
+  const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), n), rate(b.flexible->deformation_rate.data(), n);
+  const Vector3   place = x.position - b.center, arm = place + x.translation * eta;
+  const SmallTurn turn(x.rotation * eta);
+  BodyData        f;
+  f.name        = b.name + "." + x.name;
+  f.mass        = 0;
+  f.inertia     = Matrix3::Zero();
+  f.center      = Vector3::Zero();
+  f.A           = b.A * turn.rotation();
+  f.r           = b.r + b.A * arm;
+  f.v           = b.v + b.w.cross(b.A * arm) + b.A * (x.translation * rate);
+  f.w           = b.w + b.A * (turn.J() * (x.rotation * rate));
+  f.fixed_start = b.fixed_start;
+  f.carrier     = body.id;
+  f.attachment  = a;
+  s.bodies.push_back(f);
+  const Body frame{(PetscInt)s.bodies.size() - 1};
+  s.markers.push_back({body.id, place, Matrix3::Identity()});
+  s.markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
+  const Marker   i{(PetscInt)s.markers.size() - 2}, j{(PetscInt)s.markers.size() - 1};
+  ElementBuilder e(*this, s.bodies[frame.id].name, "attachment", ElementData::Joint, i, j);
+  AttachStore::Item item;
+  item.marker[0] = i.id;
+  item.marker[1] = j.id;
+  e.put<AttachStore>(item);
+  e.done();
+  return frame;
+}
+
+} // namespace hhtdae

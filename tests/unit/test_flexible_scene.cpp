@@ -1,0 +1,212 @@
+/* A flexible body in a scene: its equations against sums over particles, its Jacobian against differences, refusals. */
+#include "hhtdae/scene.h"
+#include "modal_cloud.h"
+#include "scene_jacobian.h"
+#include "scene/attach.h"
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+const Matrix3 tilted = (Eigen::AngleAxisd(0.7, Vector3(1, 2, -1).normalized())).toRotationMatrix();
+
+FlexibleBody flexible(const ModalCloud &c, ModalMass mass = ModalMass::Full)
+{
+  FlexibleBody b;
+  b.model            = std::make_shared<ModalBody>(c.body);
+  b.mass             = mass;
+  b.position         = {0.3, -0.2, 0.5};
+  b.rotation         = tilted;
+  b.velocity         = {0.1, 0.4, -0.3};
+  b.angular_velocity = {1, -2, 0.7};
+  b.damping          = {{1, 0.01}, {3, 0.1}};
+  return b;
+}
+
+/* Attached at one end to the ground by a ball joint, a spring and a rigid body at the other */
+struct Arm {
+  Scene scene{PETSC_COMM_WORLD};
+  Body  body;
+  explicit Arm(const FlexibleBody &b)
+  {
+    scene.gravity({0.3, 1, -9.81});
+    body              = scene.add("arm", b);
+    const Body   hub  = scene.attachment(body, "hub"), tip = scene.attachment(body, "tip");
+    const Marker i    = scene.marker(hub, {0.1, 0, 0});
+    const auto   at   = scene.data().frame(i);
+    const Marker free = scene.marker(tip);
+    const auto   end  = scene.data().frame(free);
+    scene.add("ball", Spherical{i, scene.marker(scene.ground(), at.x)});
+    scene.add("spring", SpringDamper{free, scene.marker(scene.ground(), Vector3(end.x + Vector3(1, 1, 1))), 100, 5, 1});
+    RigidBody load;
+    load.position = end.x;
+    load.rotation = end.R;
+    scene.add("hinge", Revolute{free, scene.marker(scene.add("load", load))});
+    scene.start().assembly = Assembly::Off;
+    must(scene.setUp());
+  }
+};
+
+/* sum over the particles of m (x'' - g) . dx/dq, by differences along the motion and along q */
+double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt first, PetscInt k, const Vector3 &g)
+{
+  const int    m = (int)c.shape.cols();
+  const double d = 1e-4;
+  const Array  q = whole(s.U), v = whole(s.V), a = whole(s.A);
+  const auto   place = [&](std::size_t p, double t, double by) {
+    Array x(6 + m);
+    for (int i = 0; i < 6 + m; i++) x[i] = q[first + i] + t * v[first + i] + 0.5 * t * t * a[first + i];
+    x[k] += by;
+    Matrix3   A;
+    EulerAxes e;
+    EulerFrame(x.data() + 3, A, e);
+    return c.place(p, Vector3(x[0], x[1], x[2]), A * C, Eigen::Map<const Eigen::VectorXd>(x.data() + 6, m));
+  };
+  double sum = 0;
+  for (std::size_t p = 0; p < c.mass.size(); p++) {
+    const Vector3 acceleration = (place(p, d, 0) - 2 * place(p, 0, 0) + place(p, -d, 0)) / (d * d);
+    const Vector3 direction    = (place(p, 0, d) - place(p, 0, -d)) / (2 * d);
+    sum += c.mass[p] * direction.dot(acceleration - g);
+  }
+  return sum;
+}
+
+} // namespace
+
+/* Free body, all mass terms: every row is the sum over the particles */
+TEST(FlexibleScene, EquationsAreSumsOverParticles)
+{
+  for (bool free : {true, false}) {
+    const ModalCloud c(7, 4, 3, free);
+    Scene            scene(PETSC_COMM_WORLD);
+    const Vector3    g(0.3, 1, -9.81);
+    scene.gravity(g);
+    scene.add("cloud", flexible(c));
+    must(scene.setUp());
+    AnyState     s(scene, 5);
+    const Array  f = s.residual(), q = whole(s.U), v = whole(s.V);
+    const Matrix3 C = s.R.bodies.body[0].C;
+    ASSERT_EQ((PetscInt)f.size(), 10);
+    for (PetscInt k = 0; k < 10; k++) {
+      double elastic = 0;
+      if (k >= 6) {
+        const double w = c.body.omega(k - 6), zeta = w / (2 * M_PI) <= 1 ? 0.01 : 0.1;
+        elastic = w * w * q[k] + 2 * zeta * w * v[k];
+      }
+      EXPECT_NEAR(f[k] - elastic, particles(c, s, C, 0, k, g), 2e-5 * (1 + std::abs(f[k]))) << "row " << k << (free ? "" : ", modes with rigid content");
+    }
+  }
+}
+
+TEST(FlexibleScene, JacobianAgainstDifferences)
+{
+  for (ModalMass mass : {ModalMass::Full, ModalMass::Partial, ModalMass::Constant}) {
+    const ModalCloud c(9, 5, 11, true);
+    Arm              arm(flexible(c, mass));
+    for (unsigned seed : {1, 2, 3}) {
+      AnyState s(arm.scene, seed, 0.3);
+      EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5) << "mass matrix " << (int)mass;
+      EXPECT_LT(s.jacobianError(0, 0), 1e-5);
+    }
+  }
+}
+
+/* The partial mass matrix leaves out what is quadratic in the modes, and so is exact to first order in a deformation at rest */
+TEST(FlexibleScene, PartialMassIsFirstOrder)
+{
+  ModalCloud c(9, 3, 4, true);
+  double     difference[2];
+  for (int k = 0; k < 2; k++) {
+    Array f[2];
+    for (int full = 0; full < 2; full++) {
+      FlexibleBody b = flexible(c, full ? ModalMass::Full : ModalMass::Partial);
+      b.deformation  = Eigen::Vector3d(0.1, -0.2, 0.15) * (k ? 0.5 : 1);
+      Scene scene(PETSC_COMM_WORLD);
+      scene.add("cloud", b);
+      must(scene.setUp());
+      AnyState s(scene, 8, 0);
+      must(VecSet(s.A, 0));
+      f[full] = s.residual();
+    }
+    difference[k] = std::max(std::abs(f[0][3] - f[1][3]), std::max(std::abs(f[0][4] - f[1][4]), std::abs(f[0][5] - f[1][5])));
+  }
+  EXPECT_GT(difference[0], 0);
+  EXPECT_LT(difference[1], 0.6 * difference[0]);
+}
+
+TEST(FlexibleScene, TurnAndItsDifferential)
+{
+  for (double size : {1e-9, 0.03, 0.099, 0.101, 1.2}) {
+    const Vector3   phi = size * Vector3(1, -2, 0.5).normalized(), n(0.3, 1, -2), d(0.2, 0.5, 1);
+    const SmallTurn t(phi);
+    const Matrix3   R = Eigen::AngleAxisd(size, phi.normalized()).toRotationMatrix();
+    EXPECT_LT((t.rotation() - R).norm(), 1e-14);
+    const double  h    = 1e-5;
+    const Matrix3 turn = (SmallTurn(phi + h * d).rotation() - SmallTurn(phi - h * d).rotation()) / (2 * h) * R.transpose();
+    EXPECT_LT((Cross<double>(t.J() * d) - turn).norm(), 1e-9);
+    const Vector3 change = (SmallTurn(phi + h * d).J().transpose() * n - SmallTurn(phi - h * d).J().transpose() * n) / (2 * h);
+    EXPECT_LT((t.momentGradient(n) * d - change).norm(), 1e-9);
+  }
+}
+
+/* Initial frames of attachments belong to the deformed body, positions and velocities */
+TEST(FlexibleScene, AttachmentsStartOnTheDeformedBody)
+{
+  const ModalCloud c(9, 5, 11, true);
+  FlexibleBody     b = flexible(c);
+  b.deformation      = Eigen::VectorXd::LinSpaced(5, -0.2, 0.3);
+  b.deformation_rate = Eigen::VectorXd::LinSpaced(5, 1, -2);
+  Scene scene(PETSC_COMM_WORLD);
+  scene.attachment(scene.add("arm", b), "tip");
+  must(scene.setUp()); /* the assembly phase refuses what does not meet */
+  EXPECT_LT(scene.data().started.misfit, 1e-12);
+  EXPECT_EQ(scene.data().started.degreesOfFreedom(), 11);
+  const Vector3 x = b.position + tilted * (c.X[1] + c.shape.middleRows<3>(3) * b.deformation);
+  EXPECT_LT((scene.data().bodies[1].r - x).norm(), 1e-12);
+}
+
+/* Loops that are redundant for a rigid body are not for a flexible one, and rows drop when modes do not make up for them */
+TEST(FlexibleScene, ModesFreeLoopsOfRedundancy)
+{
+  for (int modes : {8, 0}) {
+    const ModalCloud c(9, modes, 11, true);
+    Scene            scene(PETSC_COMM_WORLD);
+    const Body       body = scene.add("frame", flexible(c));
+    for (const char *name : {"hub", "tip"}) {
+      const Marker m = scene.marker(scene.attachment(body, name));
+      const auto   f = scene.data().frame(m);
+      scene.add(std::string("fixed ") + name, Fixed{m, scene.marker(scene.ground(), f.x, f.R)});
+    }
+    scene.data().bodies[body.id].v.setZero();
+    scene.start().assembly = Assembly::Off;
+    must(scene.setUp());
+    EXPECT_EQ(scene.data().started.redundant, modes ? 0 : 6);
+  }
+}
+
+TEST(FlexibleScene, RefusesByName)
+{
+  const ModalCloud c(9, 3, 11, false);
+  const auto       refused = [&](const std::function<void(FlexibleBody &, Scene &)> &spoil, const char *why) {
+    Scene        scene(PETSC_COMM_WORLD);
+    FlexibleBody b = flexible(c);
+    spoil(b, scene);
+    scene.add("arm", b);
+    ErrorTrap trap;
+    EXPECT_NE(scene.setUp(), 0);
+    EXPECT_NE(trap.message.find(why), std::string::npos) << trap.message;
+  };
+  refused([](FlexibleBody &b, Scene &) { b.model.reset(); }, "no model");
+  refused([](FlexibleBody &b, Scene &) { b.mass = ModalMass::Constant; }, "constant mass matrix");
+  refused([](FlexibleBody &b, Scene &) { b.deformation.setZero(7); }, "deformation of 7");
+  refused([](FlexibleBody &b, Scene &) { b.damping = {{1, -0.1}}; }, "damping ratio");
+  refused([](FlexibleBody &b, Scene &) {
+    auto m = std::make_shared<ModalBody>(*b.model);
+    m->omega(1) = 0;
+    b.model = m;
+  }, "rigid-body modes");
+  refused([&](FlexibleBody &b, Scene &s) { s.attachment(s.add("other", b), "knee"); }, "but hub, tip");
+  refused([&](FlexibleBody &b, Scene &s) { s.marker(s.add("other", b)); }, "use scene.attachment");
+}
