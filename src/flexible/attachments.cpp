@@ -9,6 +9,8 @@ namespace hhtdae
 
 /* Nodes on a line: the least moment of their weights relative to the greatest */
 constexpr double on_a_line = 1e-8;
+/* Averages that depend on each other: the least eigenvalue of their rows' products relative to the greatest */
+constexpr double dependent_rows = 1e-10;
 
 static PetscErrorCode Sum(MPI_Comm comm, double *values, int n)
 {
@@ -206,6 +208,46 @@ static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied>
           x.name.c_str(), y.name.c_str(), label);
 }
 
+/* Rows of averages, each of length one, times each other: singular if one average says what others say */
+static PetscErrorCode GramOfAverages(const FeModel &model, const std::vector<Tied> &tied, MatrixXd *G)
+{
+  std::vector<std::vector<std::pair<int, int>>> uses(model.own); /* averages of a node, and the row's place there */
+
+  PetscFunctionBegin;
+  for (std::size_t a = 0; a < tied.size(); a++)
+    for (std::size_t i = 0; i < tied[a].row.size(); i++) uses[tied[a].node[i]].push_back({(int)a, (int)i});
+  G->setZero(6 * tied.size(), 6 * tied.size());
+  for (const auto &use : uses)
+    for (const auto &x : use)
+      for (const auto &y : use)
+        G->block<6, 6>(6 * x.first, 6 * y.first) +=
+            tied[x.first].row[x.second] * tied[y.first].row[y.second].transpose();
+  PetscCall(SumOverRanks(model.comm, G));
+  for (std::size_t a = 0; a < tied.size(); a++)
+    if (tied[a].tie == Tie::Rigid) G->block<6, 6>(6 * a, 6 * a).setIdentity();
+  const VectorXd scale = G->diagonal().cwiseSqrt().cwiseInverse();
+  *G                   = (scale.asDiagonal() * *G * scale.asDiagonal()).eval();
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CheckIndependent(const FeModel &model, const std::vector<Tied> &tied)
+{
+  MatrixXd G;
+
+  PetscFunctionBegin;
+  if (tied.empty()) PetscFunctionReturn(0);
+  PetscCall(GramOfAverages(model, tied, &G));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(0.5 * (G + G.transpose()));
+  if (gram.eigenvalues()[0] > dependent_rows * gram.eigenvalues().tail<1>()[0]) PetscFunctionReturn(0);
+  std::string names;
+  for (std::size_t a = 0; a < tied.size(); a++)
+    if (gram.eigenvectors().block<6, 1>(6 * a, 0).norm() > 1e-3) names += (names.empty() ? "" : ", ") + tied[a].name;
+  SETERRQ(model.comm, PETSC_ERR_ARG_WRONG,
+          "The averages of the attachments %s depend on each other: they are over the same few nodes; give each one "
+          "nodes of its own",
+          names.c_str());
+}
+
 PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
                                   std::vector<Tied> *tied)
 {
@@ -220,6 +262,7 @@ PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attach
     PetscCall(ResolveOne(model, attachments[a], &(*tied)[a]));
   }
   PetscCall(CheckOverlap(model, *tied));
+  PetscCall(CheckIndependent(model, *tied));
   PetscFunctionReturn(0);
 }
 

@@ -334,6 +334,34 @@ static PetscErrorCode ConstraintModes(const FeModel &model, const std::vector<Ti
   PetscFunctionReturn(0);
 }
 
+/* ---- equal frequencies ---- */
+
+/* Falls off from a point beside the body, so that symmetries of the body are none of it */
+static double Weight(const Vector3 &X, const BodyScales &scales, int c)
+{
+  static const double direction[3] = {1, 0.37, 0.11};
+  return direction[c] / (1 + 2 * ((X - scales.center) / scales.length - Vector3(0.9, 0.5, 0.2)).squaredNorm());
+}
+
+/* Orthogonal in the weight: what is left to choose is the sign */
+PetscErrorCode TurnEqual(const FeModel &model, const BodyScales &scales, PetscInt from, PetscInt to, MatrixXd *X,
+                         MatrixXd *Y)
+{
+  const PetscInt n = to - from;
+  MatrixXd       G = MatrixXd::Zero(n, n);
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < 3 * model.own; i++) {
+    const VectorXd row = X->block(i, from, 1, n).transpose();
+    G += Weight(NodePosition(model, i / 3), scales, i % 3) * row * row.transpose();
+  }
+  PetscCall(SumOverRanks(model.comm, &G));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> turn(0.5 * (G + G.transpose()));
+  X->middleCols(from, n) = (X->middleCols(from, n) * turn.eigenvectors()).eval();
+  Y->middleCols(from, n) = (Y->middleCols(from, n) * turn.eigenvectors()).eval();
+  PetscFunctionReturn(0);
+}
+
 /* ---- normal modes ---- */
 
 static double Eigenvalue(double frequency) { return std::pow(2 * PETSC_PI * frequency, 2); }
@@ -355,14 +383,30 @@ static PetscErrorCode Want(const Pencil &pencil, const Reduction &reduction, MPI
   PetscFunctionReturn(0);
 }
 
-/* Those above the bound go */
+/* Those above the bound are not wanted */
 static void CutAbove(double max_frequency, NormalModes *modes)
 {
-  if (!(max_frequency > 0)) return;
-  PetscInt n = 0;
-  while (n < modes->lambda.size() && modes->lambda[n] <= Eigenvalue(max_frequency)) n++;
-  modes->lambda.conservativeResize(n);
-  modes->x.conservativeResize(Eigen::NoChange, n);
+  while (max_frequency > 0 && modes->wanted > 0 && modes->lambda[modes->wanted - 1] > Eigenvalue(max_frequency))
+    modes->wanted--;
+}
+
+/* The first `wanted` modes of those in the last columns of the space. Where the cut goes through equal frequencies,
+   which of their combinations stay must not depend on the ranks. */
+static PetscErrorCode CutModes(const FeModel &model, const BodyScales &scales, const NormalModes &modes,
+                               ReductionSpace *space)
+{
+  const PetscInt n = (PetscInt)modes.lambda.size(), before = (PetscInt)space->x.cols() - n;
+  PetscInt       from = modes.wanted, to = modes.wanted;
+
+  PetscFunctionBegin;
+  if (from == n) PetscFunctionReturn(0);
+  while (from > 0 && EqualFrequencies(modes.lambda[from - 1], modes.lambda[from])) from--;
+  while (to < n && EqualFrequencies(modes.lambda[to - 1 < from ? from : to - 1], modes.lambda[to])) to++;
+  if (from < modes.wanted && to > modes.wanted)
+    PetscCall(TurnEqual(model, scales, before + from, before + to, &space->x, &space->motion));
+  space->x.conservativeResize(Eigen::NoChange, before + modes.wanted);
+  space->motion.conservativeResize(Eigen::NoChange, before + modes.wanted);
+  PetscFunctionReturn(0);
 }
 
 static PetscErrorCode FindNormalModes(const FeModel &model, const Pencil &pencil, const Reduction &reduction,
@@ -374,7 +418,7 @@ static PetscErrorCode FindNormalModes(const FeModel &model, const Pencil &pencil
   PetscCall(phase.begin("normal modes"));
   PetscCall(FindModes(pencil, wanted, ksp, modes));
   CutAbove(reduction.max_frequency, modes);
-  PetscCall(phase.end(std::to_string(modes->lambda.size()) + " modes, " + modes->how));
+  PetscCall(phase.end(std::to_string(modes->wanted) + " modes, " + modes->how));
   PetscFunctionReturn(0);
 }
 
@@ -412,6 +456,7 @@ PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &
     for (std::size_t i = 0; i < in.dof.size(); i++) space->x(in.dof[i], n + k) = normal.x(i, k);
   space->motion.setZero(n, n + m);
   space->motion.leftCols(n).setIdentity();
+  PetscCall(CutModes(model, scales, normal, space));
   space->holds_rigid = true;
   PetscFunctionReturn(0);
 }
@@ -530,6 +575,7 @@ PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied
   wanted.shift = -0.05 * scales.soft;
   PetscCall(FindNormalModes(model, pencil, reduction, wanted, &ksp, &modes));
   PetscCall(Expand(model, tied, P, master, modes, space));
+  PetscCall(CutModes(model, scales, modes, space));
   space->holds_rigid = false;
   if (P) {
     PetscCall(MatDestroy(&pencil.K));

@@ -14,6 +14,7 @@
 
 #include "diagnose.h"
 #include "modes.h"
+#include <Eigen/Eigenvalues>
 
 namespace hhtdae
 {
@@ -28,6 +29,13 @@ PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &
                                  const BodyScales &scales, ReductionSpace *space);
 PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                              const BodyScales &scales, ReductionSpace *space);
+
+/* Eigenvalues that are equal but for rounding: symmetric bodies have them, and any combination of their modes is one */
+inline bool EqualFrequencies(double lambda1, double lambda2) { return lambda2 - lambda1 < 2e-7 * lambda2; }
+/* Columns [from, to) of X, modes of one frequency, and of Y which goes with it, turned to a choice that is the same on
+ * any number of ranks */
+PetscErrorCode TurnEqual(const FeModel &model, const BodyScales &scales, PetscInt from, PetscInt to, MatrixXd *X,
+                         MatrixXd *Y);
 
 /* |P^T r| of residuals r at own dofs, P the ties of rigid attachments: what acts inside such an attachment is left out
  */

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <slepceps.h>
+#include <sys/resource.h>
 
 namespace hhtdae
 {
@@ -118,14 +119,15 @@ PetscErrorCode Phase::begin(const char name[])
 
 PetscErrorCode Phase::end(const std::string &result)
 {
-  PetscLogDouble now, memory, most;
+  PetscLogDouble now, memory;
+  struct rusage  usage;
 
   PetscFunctionBegin;
   PetscCall(PetscLogStagePop());
   if (!print_) PetscFunctionReturn(0);
   PetscCall(PetscMemoryGetCurrentUsage(&memory));
-  PetscCall(PetscMemoryGetMaximumUsage(&most));
-  double bytes[2] = {memory, most};
+  getrusage(RUSAGE_SELF, &usage);
+  double bytes[2] = {memory, 1024. * usage.ru_maxrss};
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bytes, 2, MPI_DOUBLE, MPI_SUM, comm_));
   PetscCall(PetscTime(&now));
   PetscCall(PetscPrintf(comm_, "reduce: %-18s %8.2f s  %8.1f MB (at most %.1f)  %s\n", name_.c_str(), now - start_,
@@ -428,7 +430,9 @@ static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &mode
   PetscFunctionReturn(0);
 }
 
-constexpr int most_searches = 6;
+constexpr int      most_searches = 6;
+constexpr PetscInt beyond =
+    2; /* modes that are looked for above those wanted, to see whether frequencies are equal there */
 
 PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *ksp, NormalModes *modes)
 {
@@ -444,7 +448,8 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *k
   if (count <= 0) PetscFunctionReturn(KSPDestroy(ksp));
   const bool slices = wanted.below > 0 && count >= from;
   if (slices) PetscCall(KSPDestroy(ksp)); /* it has its own, and counts by inertia itself */
-  PetscCall(RunEps(pencil, wanted, count, slices, ksp, modes));
+  const PetscInt ask = slices ? count : std::min(count + beyond, most);
+  PetscCall(RunEps(pencil, wanted, ask, slices, ksp, modes));
   for (int search = 0; !slices; search++) {
     PetscCall(CountMissing(pencil, *modes, &missing));
     if (missing <= 0 || search == most_searches) break;
@@ -459,8 +464,7 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *k
              "Reduce(): only %d of %" PetscInt_FMT " normal modes converged; raise -" REDUCE_PREFIX
              "eps_max_it or -" REDUCE_PREFIX "eps_ncv",
              (int)modes->lambda.size(), count);
-  modes->lambda.conservativeResize(count);
-  modes->x.conservativeResize(Eigen::NoChange, count);
+  modes->wanted = count;
   PetscFunctionReturn(0);
 }
 

@@ -69,7 +69,9 @@ PetscErrorCode Factor(KSP ksp, Mat A, PetscBool *singular, PetscInt *negative);
 /* Modes below lambda without the rigid ones by an inertia count; -1: not known */
 PetscErrorCode CountBelow(const Pencil &pencil, double lambda, PetscInt *count);
 
+/* A few more than wanted may be there, found on the way */
 struct NormalModes {
+  PetscInt    wanted = 0;
   VectorXd    lambda; /* ascending */
   MatrixXd    x;      /* own rows, orthonormal in M */
   std::string how;    /* for the progress display */

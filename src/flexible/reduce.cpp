@@ -13,12 +13,11 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <slepcsys.h>
 
 namespace hhtdae
 {
 
-/* Frequencies nearer to each other count as equal: their modes are turned to a common choice */
-constexpr double equal_frequencies = 1e-7;
 /* Directions of the space with less mass, relative to unit vectors in M, are combinations of the others */
 constexpr double dependent_modes = 1e-13;
 
@@ -150,32 +149,6 @@ static PetscErrorCode SolvePair(const FeModel &model, const BodyScales &scales, 
 
 /* ---- a choice that does not depend on the ranks ---- */
 
-/* Falls off from a point beside the body, so that symmetries of the body are none of it */
-static double Weight(const Vector3 &X, const BodyScales &scales, int c)
-{
-  static const double direction[3] = {1, 0.37, 0.11};
-  return direction[c] / (1 + 2 * ((X - scales.center) / scales.length - Vector3(0.9, 0.5, 0.2)).squaredNorm());
-}
-
-/* Modes of one frequency, columns [from, to) of X: turned until they are orthogonal in the weight */
-static PetscErrorCode TurnEqual(const FeModel &model, const BodyScales &scales, PetscInt from, PetscInt to, MatrixXd *X,
-                                MatrixXd *Y)
-{
-  const PetscInt n = to - from;
-  MatrixXd       G = MatrixXd::Zero(n, n);
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < 3 * model.own; i++) {
-    const VectorXd row = X->block(i, from, 1, n).transpose();
-    G += Weight(NodePosition(model, i / 3), scales, i % 3) * row * row.transpose();
-  }
-  PetscCall(SumOverRanks(model.comm, &G));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> turn(0.5 * (G + G.transpose()));
-  X->middleCols(from, n) = (X->middleCols(from, n) * turn.eigenvectors()).eval();
-  Y->middleCols(from, n) = (Y->middleCols(from, n) * turn.eigenvectors()).eval();
-  PetscFunctionReturn(0);
-}
-
 /* The largest displacement of each mode is positive; among equal ones, that of the node with the least label */
 static PetscErrorCode FixSigns(const FeModel &model, MatrixXd *X, MatrixXd *Y)
 {
@@ -210,7 +183,7 @@ static PetscErrorCode Settle(const FeModel &model, const BodyScales &scales, con
   PetscFunctionBegin;
   for (PetscInt from = 0, to; from < lambda.size(); from = to) {
     to = from + 1;
-    while (to < lambda.size() && lambda[to] - lambda[to - 1] < 2 * equal_frequencies * lambda[to]) to++;
+    while (to < lambda.size() && EqualFrequencies(lambda[to - 1], lambda[to])) to++;
     if (to - from > 1) PetscCall(TurnEqual(model, scales, from, to, X, Y));
   }
   PetscCall(FixSigns(model, X, Y));
@@ -219,30 +192,53 @@ static PetscErrorCode Settle(const FeModel &model, const BodyScales &scales, con
 
 /* ---- selection ---- */
 
-static PetscErrorCode Select(const FeModel &model, const Reduction &reduction, VectorXd *lambda, MatrixXd *Y)
+/* Numbers of the modes that are kept */
+static PetscErrorCode Select(const FeModel &model, const Reduction &reduction, const VectorXd &lambda,
+                             std::vector<PetscInt> *kept)
 {
-  std::set<PetscInt>    wanted(reduction.keep.begin(), reduction.keep.end());
-  std::vector<PetscInt> kept;
+  std::set<PetscInt> wanted(reduction.keep.begin(), reduction.keep.end());
 
   PetscFunctionBegin;
-  PetscCheck(wanted.empty() || *wanted.rbegin() < lambda->size(), model.comm, PETSC_ERR_ARG_OUTOFRANGE,
+  PetscCheck(wanted.empty() || *wanted.rbegin() < lambda.size(), model.comm, PETSC_ERR_ARG_OUTOFRANGE,
              "Reduction::keep lists mode %" PetscInt_FMT ", but there are %d elastic modes (numbers from 0)",
-             *wanted.rbegin(), (int)lambda->size());
-  for (PetscInt k = 0; k < lambda->size(); k++) {
-    const double frequency = std::sqrt((*lambda)[k]) / (2 * PETSC_PI);
+             *wanted.rbegin(), (int)lambda.size());
+  for (PetscInt k = 0; k < lambda.size(); k++) {
+    const double frequency = std::sqrt(lambda[k]) / (2 * PETSC_PI);
     if (!wanted.empty() && !wanted.count(k)) continue;
     if (reduction.keep_below > 0 && frequency >= reduction.keep_below) continue;
-    kept.push_back(k);
+    kept->push_back(k);
   }
-  VectorXd l((Eigen::Index)kept.size());
-  MatrixXd y(Y->rows(), (Eigen::Index)kept.size());
-  for (std::size_t k = 0; k < kept.size(); k++) {
-    l[k]     = (*lambda)[kept[k]];
-    y.col(k) = Y->col(kept[k]);
-  }
-  *lambda = l;
-  *Y      = y;
   PetscFunctionReturn(0);
+}
+
+/* With all modes of the same frequencies, which are turned together */
+static std::vector<PetscInt> WithEqual(const VectorXd &lambda, const std::vector<PetscInt> &kept)
+{
+  std::set<PetscInt> all(kept.begin(), kept.end());
+  for (PetscInt k : kept) {
+    for (PetscInt l = k; l > 0 && EqualFrequencies(lambda[l - 1], lambda[l]); l--) all.insert(l - 1);
+    for (PetscInt l = k; l + 1 < lambda.size() && EqualFrequencies(lambda[l], lambda[l + 1]); l++) all.insert(l + 1);
+  }
+  return std::vector<PetscInt>(all.begin(), all.end());
+}
+
+static MatrixXd Columns(const MatrixXd &A, const std::vector<PetscInt> &columns)
+{
+  MatrixXd some(A.rows(), (Eigen::Index)columns.size());
+  for (std::size_t k = 0; k < columns.size(); k++) some.col(k) = A.col(columns[k]);
+  return some;
+}
+
+/* The kept ones among those that are there */
+static void Thin(const std::vector<PetscInt> &there, const std::vector<PetscInt> &kept, VectorXd *lambda, MatrixXd *X,
+                 MatrixXd *motion)
+{
+  std::vector<PetscInt> place;
+  if (there.size() == kept.size()) return;
+  for (PetscInt k : kept) place.push_back((PetscInt)(std::lower_bound(there.begin(), there.end(), k) - there.begin()));
+  *lambda = Columns(lambda->transpose(), place).transpose().eval();
+  *X      = Columns(*X, place);
+  *motion = Columns(*motion, place);
 }
 
 /* ---- the modes in the full model ---- */
@@ -358,9 +354,10 @@ static PetscErrorCode FindSpace(const FeModel &model, const std::vector<Tied> &t
 static PetscErrorCode ToModes(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                               const BodyScales &scales, ReductionSpace *space, VectorXd *lambda)
 {
-  Phase       phase(model.comm, reduction.progress);
-  ReducedPair pair;
-  MatrixXd    Y, X;
+  Phase                 phase(model.comm, reduction.progress);
+  ReducedPair           pair;
+  MatrixXd              Y, X;
+  std::vector<PetscInt> kept, there;
 
   PetscFunctionBegin;
   PetscCall(phase.begin("reduced pair"));
@@ -368,13 +365,17 @@ static PetscErrorCode ToModes(const FeModel &model, const std::vector<Tied> &tie
   if (space->x.cols()) {
     PetscCall(Project(model, scales, space->x, &pair));
     PetscCall(SolvePair(model, scales, pair, *space, lambda, &Y));
-    PetscCall(Select(model, reduction, lambda, &Y));
+    PetscCall(Select(model, reduction, *lambda, &kept));
+    there   = WithEqual(*lambda, kept);
+    Y       = Columns(Y, there);
+    *lambda = Columns(lambda->transpose(), there).transpose().eval();
     PetscCall(Combine(space->x, Y, &X));
     space->x.swap(X);
     X.resize(0, 0);
     space->motion = (space->motion * Y).eval();
     PetscCall(TakeOutRigid(model, scales, tied, &space->x, &space->motion));
     PetscCall(Settle(model, scales, *lambda, &space->x, &space->motion));
+    Thin(there, kept, lambda, &space->x, &space->motion);
   } else
     PetscCheck(reduction.keep.empty(), model.comm, PETSC_ERR_ARG_OUTOFRANGE,
                "Reduction::keep lists modes, but the body has none");
@@ -399,6 +400,19 @@ static void CopyNodes(const FeModel &model, bool keep, MatrixXd *x, ReducedBody 
   body->shape.swap(*x);
 }
 
+/* Programs that started PETSc alone */
+static PetscErrorCode StartSlepc()
+{
+  PetscBool started;
+
+  PetscFunctionBegin;
+  PetscCall(SlepcInitialized(&started));
+  if (started) PetscFunctionReturn(0);
+  PetscCall(SlepcInitializeNoArguments());
+  PetscCall(PetscRegisterFinalize(SlepcFinalize));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedBody *body)
 {
   std::vector<Tied> tied;
@@ -409,6 +423,7 @@ PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedB
   Phase             phase(model.comm, reduction.progress);
 
   PetscFunctionBegin;
+  PetscCall(StartSlepc());
   PetscCall(CheckModel(model, reduction, &tied, &scales));
   PetscCall(FindSpace(model, tied, reduction, scales, &method, &space));
   PetscCall(ToModes(model, tied, reduction, scales, &space, &lambda));

@@ -16,7 +16,11 @@ using namespace hhtdae;
 
 static Box Frame(const PetscInt n[3], PetscInt bar)
 {
-  Box box     = {{(int)n[0], (int)n[1], (int)n[2]}, {0.02 * n[0], 0.02 * n[1], 0.02 * n[2]}};
+  Box box = {{(int)n[0], (int)n[1], (int)n[2]}, {0.02 * n[0], 0.02 * n[1], 0.02 * n[2]}};
+  /* tapered a little, so that equal frequencies of equal bars do not hide the usual case */
+  box.map = [](Vector3 x) {
+    return Vector3(x[0], x[1] * (1 + 0.05 * x[0] - 0.02 * x[2]), x[2] * (1 + 0.08 * x[0] + 0.03 * x[1]));
+  };
   box.present = [=](int i, int j, int k) {
     const int cell[3] = {i, j, k};
     int       inside  = 0; /* directions in which the brick is not at an edge */
@@ -34,7 +38,7 @@ static void AddAttachments(const Box &box, PetscInt bar, PetscInt count, Tie tie
   const double h = 0.02, width = h * bar;
   for (PetscInt a = 0; a < count; a++) {
     const int    edge  = a % 4;
-    const double along = box.size[0] * (a / 4 + 0.5) / ((count + 3) / 4);
+    const double along = box.size[0] * (a / 4 + 0.5 + 0.1 * (a % 4)) / ((count + 3) / 4 + 0.3);
     const double y = edge & 1 ? box.size[1] - width : 0, z = edge & 2 ? box.size[2] - width : 0;
     const auto   name = "attachment " + std::to_string(a);
     builder->addSet(name, [=](const Vector3 &x) {
