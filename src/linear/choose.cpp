@@ -1,6 +1,7 @@
 /* The choice of a direct solver: by the work that a factorization takes, not by the number of unknowns */
 #include "graph.h"
 #include "klupair.h"
+#include "kluparts.h"
 #include "linear.h"
 #include "mumpsnd.h"
 
@@ -29,20 +30,45 @@
   So MUMPS begins at about 2.5e6 operations with LDL^T and 7e6 with LU, where there are at least 40 per entry. With the
   reference BLAS in place of OpenBLAS it is 5e6 and 2e7, and MUMPS takes three times as long on large blocks.
 
-  KLU is the package "klupair", which keeps its pivots from one matrix to the next; the table was made with PETSc's "klu",
-  which does not. It takes half the time of the table on chains and two thirds to three quarters up to some 20 operations
-  per entry; from 60 on the two are equal, so that MUMPS begins at the same place.
+  KLU is the package "klupair", which keeps its pivots from one matrix to the next; the table was made with PETSc's
+  "klu", which does not. It takes half the time of the table on chains and two thirds to three quarters up to some 20
+  operations per entry; from 60 on the two are equal, so that MUMPS begins at the same place.
 */
 static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6, LARGE_PER_ENTRY = 40;
+
+/*
+  Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.
+  Seconds of one factorization and three solves are estimated from counts per rank. MUMPS takes its time per unknown
+  rather than per operation where fronts are small. Measured with two ranks on two cores that others used, too
+  (milliseconds; operations as above, on one rank; "MUMPS" is the better of LU and L D L^T):
+
+      family, size                  n   interface     work   kluparts   MUMPS
+      chain in space, 10000    110000           5   4.4e+06        41     590
+      rings of eight, 10000    113750          25   7.8e+06       114     940
+      20 modes, 1000 bodies     25000           2   3.4e+06        16     140
+      10 bodies, 80 modes        8500           2   1.1e+07        50     118
+      net of rods, 30 x 30      23940         174   4.7e+06        51     158
+      net of rods, 20 x 300    158400         117   7.0e+07       434    1190
+      net of rods, 60 x 60      96480         354   5.4e+07       624     538
+      net of rods, 100 x 100   268800         594   3.5e+08      5581    1828
+      bar, 200 x 4 x 4 bricks   15150          75   6.3e+07       295     225
+      plate, 24 x 24 bricks      3900         219   1.3e+07       124      45
+      block, 8^3 bricks          2430         450   8.9e+06       162      39
+*/
+static const double KLU_OPERATION = 2e-9, SWEEP_OPERATION = 2e-9, DENSE_OPERATION = 0.4e-9;
+static const double MUMPS_UNKNOWN = 13e-6, MUMPS_OPERATION = 0.5e-9;
+
+/* More than this between ranks is left to MUMPS without a closer look */
+static const double   MANY_COUPLINGS  = 2e5;
+static const PetscInt LARGE_INTERFACE = 2000;
 
 /* Counting stops here: a factor with this many entries is large by any measure */
 static const double COUNT_LIMIT = 1e7;
 
 static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
                                              MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
-static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS,   MATSOLVERSUPERLU_DIST,
-                                             MATSOLVERUMFPACK, MATSOLVERSUPERLU, LINEAR_KLUPAIR,
-                                             MATSOLVERKLU};
+static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST, MATSOLVERUMFPACK,
+                                             MATSOLVERSUPERLU, LINEAR_KLUPAIR, MATSOLVERKLU};
 
 /* ---- what the user settled ---- */
 
@@ -128,11 +154,39 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 
 struct Size {
   LinearWork work;
-  PetscBool  large;
-  char       text[128];
+  PetscBool  large, parts;
+  char       text[160];
 };
 
-/* On one process by counting; with rows elsewhere only the packages for distributed matrices come into question */
+static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
+{
+  LinearPartsWork w;
+  PetscMPIInt     ranks;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &ranks));
+  size->large = PETSC_TRUE;
+  PetscCall(LinearPartsCount(P, MANY_COUPLINGS, LARGE_INTERFACE, &w));
+  if (!w.possible) {
+    PetscCall(PetscSNPrintf(size->text, sizeof size->text,
+                            w.couplings > 0 ? "matrix distributed over %d processes, %g entries between them"
+                                            : "matrix distributed over %d processes",
+                            ranks, w.couplings));
+    PetscFunctionReturn(0);
+  }
+  const double N = (double)w.interface, dense = N * N * N / 3;
+  const double parts = KLU_OPERATION * (2 * w.flops + 12 * w.factor) + SWEEP_OPERATION * w.sweeps +
+                       DENSE_OPERATION * (w.products + 2 * dense);
+  const double mumps = MUMPS_UNKNOWN * (w.unknowns + N / ranks) +
+                       MUMPS_OPERATION * (symmetric ? 1 : 2) * (w.flops + w.sweeps / 2 + dense / ranks);
+  size->parts = parts < mumps ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(PetscSNPrintf(size->text, sizeof size->text,
+                          "interface of %" PetscInt_FMT " between %d processes, %.2g s a matrix; MUMPS %.2g s",
+                          w.interface, ranks, parts, mumps));
+  PetscFunctionReturn(0);
+}
+
+/* By counting; with rows elsewhere only the packages for distributed matrices come into question */
 static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
 {
   PetscMPIInt     processes;
@@ -145,11 +199,12 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   *size = Size();
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &processes));
   PetscCall(PetscObjectTypeCompare((PetscObject)P, MATSEQAIJ, &seqaij));
-  if (processes > 1 || !seqaij) {
-    size->large = processes > 1 ? PETSC_TRUE : PETSC_FALSE;
-    PetscCall(PetscSNPrintf(size->text, sizeof size->text,
-                            processes > 1 ? "matrix distributed over %d processes" : "matrix not of type seqaij",
-                            processes));
+  if (processes > 1) {
+    PetscCall(MeasureDistributed(P, symmetric, size));
+    PetscFunctionReturn(0);
+  }
+  if (!seqaij) {
+    PetscCall(PetscStrncpy(size->text, "matrix not of type seqaij", sizeof size->text));
     PetscFunctionReturn(0);
   }
   PetscCall(LinearGraphFromMat(P, &graph, &done));
@@ -169,6 +224,20 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
 
 /* ---- the package ---- */
 
+/* *package stays as it is if the one asked for does not factor P in this way */
+static PetscErrorCode IfAvailable(Mat P, const char name[], MatFactorType type, const char **package)
+{
+  PetscBool available;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetFactorAvailable(P, name, type, &available));
+  if (available)
+    *package = name;
+  else
+    PetscCall(PetscInfo(P, "%s does not factor this matrix here\n", name));
+  PetscFunctionReturn(0);
+}
+
 /* The first of the list that factors P in this way; NULL if none does */
 static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large, const char **package)
 {
@@ -176,16 +245,7 @@ static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large,
   *package         = NULL;
   const auto begin = large ? std::begin(large_packages) : std::begin(small_packages);
   const auto end   = large ? std::end(large_packages) : std::end(small_packages);
-  for (auto p = begin; p != end; ++p) {
-    PetscBool available;
-    PetscCall(MatGetFactorAvailable(P, *p, type, &available));
-    if (!available) {
-      PetscCall(PetscInfo(P, "%s does not factor this matrix here\n", *p));
-      continue;
-    }
-    *package = *p;
-    break;
-  }
+  for (auto p = begin; p != end && !*package; ++p) PetscCall(IfAvailable(P, *p, type, package));
   PetscFunctionReturn(0);
 }
 
@@ -257,7 +317,8 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
     PetscCall(PCFactorReorderForNonzeroDiagonal(pc, PETSC_SMALL));
     const char *type;
     PetscCall(MatGetType(P, &type));
-    PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "LU with petsc: no other installed package factors matrices of type %s", type));
+    PetscCall(PetscSNPrintf(choice->text, sizeof choice->text,
+                            "LU with petsc: no other installed package factors matrices of type %s", type));
     PetscFunctionReturn(0);
   }
   PetscCall(OptionGiven(ksp, "-ksp_type", &by_option));
@@ -285,12 +346,15 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   if (!choice->user_pc) {
     /* LDL^T where it halves a large work and a package for indefinite matrices is there */
     PetscBool indefinite = PETSC_FALSE;
-    if (symmetric && size.large) PetscCall(FirstAvailable(P, MAT_FACTOR_CHOLESKY, PETSC_TRUE, &package));
+    if (symmetric && size.large && !size.parts) PetscCall(FirstAvailable(P, MAT_FACTOR_CHOLESKY, PETSC_TRUE, &package));
     if (package) PetscCall(FactorsIndefinite(package, &indefinite));
     cholesky = choice->cholesky = indefinite;
   }
-  PetscCall(
-      FirstAvailable(P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, cholesky ? PETSC_TRUE : size.large, &package));
+  package = NULL;
+  if (size.parts && !cholesky) PetscCall(IfAvailable(P, LINEAR_KLUPARTS, MAT_FACTOR_LU, &package));
+  if (!package)
+    PetscCall(FirstAvailable(P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, cholesky ? PETSC_TRUE : size.large,
+                             &package));
   if (!package && !choice->user_pc) {
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);

@@ -121,26 +121,25 @@ static std::vector<PetscInt> OrderTowards(const LinearGraph &c, const Groups &g,
   return order;
 }
 
-/* Entries in the columns of L that the ends reach */
-static double PathEntries(const LinearTree &tree, const std::vector<PetscInt> &ends)
-{
-  std::vector<bool> met(tree.parent.size(), false);
-  double            entries = 0;
-  for (PetscInt i : ends)
-    for (PetscInt j = tree.place[i]; j >= 0 && !met[j]; j = tree.parent[j]) {
-      met[j] = true;
-      entries += (double)tree.count[j];
-    }
-  return entries;
-}
-
-/* An order and what it costs: the factorization and, for the outside, two sweeps over the columns reached */
+/* An order and what it costs: the factorization and, for the outside, two sweeps over the columns of L that the ends
+ * reach */
 struct Candidate {
   const char           *name;
   std::vector<PetscInt> order;
   LinearWork            work;
-  double                path = 0, total = PETSC_MAX_REAL;
+  double                columns = 0, entries = 0, total = PETSC_MAX_REAL;
 };
+
+static void FollowPaths(const LinearTree &tree, const std::vector<PetscInt> &ends, Candidate *c)
+{
+  std::vector<bool> met(tree.parent.size(), false);
+  for (PetscInt i : ends)
+    for (PetscInt j = tree.place[i]; j >= 0 && !met[j]; j = tree.parent[j]) {
+      met[j] = true;
+      c->columns += 1;
+      c->entries += (double)tree.count[j];
+    }
+}
 
 static Candidate Weigh(const char *name, const LinearGraph &graph, const Groups &g, const std::vector<PetscInt> &groups,
                        const KluPair &k)
@@ -152,8 +151,8 @@ static Candidate Weigh(const char *name, const LinearGraph &graph, const Groups 
   c.order = Expand(g, groups);
   LinearCountWork(graph, c.order.data(), COUNT_LIMIT, &c.work, &bounded, k.ends.empty() ? NULL : &tree);
   if (!bounded) return c;
-  if (!k.ends.empty()) c.path = PathEntries(tree, k.ends);
-  c.total = 2 * c.work.flops + 2 * c.path * (double)k.width;
+  if (!k.ends.empty()) FollowPaths(tree, k.ends, &c);
+  c.total = 2 * c.work.flops + (2 * c.entries + c.columns * (double)k.width) * (double)k.width;
   return c;
 }
 
@@ -180,7 +179,7 @@ static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *
     if (k->ordering == KLUPAIR_AUTO && !k->ends.empty())
       try_this("towards the ends", OrderTowards(c, g, k->ends, groups));
     const bool much =
-        best.total >= 2 * TRY_METIS * (double)graph.n || 2 * best.path * (double)k->width > best.work.flops;
+        best.total >= 2 * TRY_METIS * (double)graph.n || 2 * best.entries * (double)k->width > best.work.flops;
     if (k->ordering == KLUPAIR_AUTO && much) {
       PetscCall(LinearMetisOrder(c, {}, &groups));
       try_this("METIS", groups);
@@ -188,7 +187,8 @@ static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *
   }
   k->ordering_used = best.name;
   k->work          = best.work;
-  k->path          = best.path;
+  k->path_columns  = best.columns;
+  k->path_entries  = best.entries;
   order->swap(best.order);
   PetscFunctionReturn(0);
 }

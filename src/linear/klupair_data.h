@@ -40,7 +40,7 @@ struct KluPair {
 
   LinearPivots pivots;
   LinearWork   work; /* foreseen for L of the symmetrized pattern */
-  double       path = 0; /* entries in the columns of L that the ends reach */
+  double       path_columns = 0, path_entries = 0; /* columns of L that the ends reach, and entries in them */
   const char  *ordering_used = "";
   double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
   double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */

@@ -13,6 +13,11 @@
 /* A residual above this part of the terms that a row sums up is not rounding */
 static const PetscReal RESIDUAL = 1e-8;
 
+/* An interior is nearly singular from this size of its inverse on, rows and columns scaled to one: half of the digits
+   are lost. It counts if the residual is bad; from the second on, only rounding lies between the interior and a
+   singular one. */
+static const PetscReal NEARLY_SINGULAR = 1e8, SINGULAR = 1e14;
+
 /* KLU's measure of the pivots may fall so far before a solve is looked at again */
 static const PetscReal RCOND_FALL = 1e-3;
 
@@ -35,7 +40,7 @@ static PetscErrorCode Reset(KluParts *p)
   PetscFunctionReturn(0);
 }
 
-/* The interior's factor takes the options of the whole */
+/* The interior's factor takes the options of the whole, if that is there already */
 static PetscErrorCode AnalyseInner(Mat F, KluParts *p)
 {
   MatFactorInfo info;
@@ -57,20 +62,27 @@ static PetscErrorCode AnalyseInner(Mat F, KluParts *p)
   PetscFunctionReturn(0);
 }
 
-/* Interface, interiors and their analysis, for the pattern and values of A; F may be NULL */
-static PetscErrorCode Analyse(Mat F, Mat A, KluParts *p)
+/* Interface and interiors for the pattern and values of A */
+static PetscErrorCode FindSplit(Mat A, KluParts *p)
 {
   PetscFunctionBegin;
   PetscCall(Reset(p));
   PetscCall(PartsFindInterface(A, p->moved, &p->split.interface));
   PetscCall(PartsBuildSplit(A, &p->split));
   PetscCall(PartsCopyValues(A, &p->split));
-  PetscCall(AnalyseInner(F, p));
-  PetscCall(PetscObjectGetId((PetscObject)A, &p->matrix));
-  PetscCall(MatGetNonzeroState(A, &p->pattern));
   ++p->splits;
   PetscCall(PetscInfo(A, "Interface of %zu unknowns, %zu of them moved there; interior of %zu\n",
                       p->split.interface.size(), p->moved.size(), p->split.inner_row.size()));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Analyse(Mat F, Mat A, KluParts *p)
+{
+  PetscFunctionBegin;
+  PetscCall(FindSplit(A, p));
+  PetscCall(AnalyseInner(F, p));
+  PetscCall(PetscObjectGetId((PetscObject)A, &p->matrix));
+  PetscCall(MatGetNonzeroState(A, &p->pattern));
   PetscFunctionReturn(0);
 }
 
@@ -102,33 +114,43 @@ static PetscErrorCode Delete(MPI_Comm comm, KluParts *p)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearPartsCount(Mat A, double limit, LinearPartsWork *work)
+static void CountInner(const KluParts &p, double count[5])
+{
+  const double w = (double)p.split.local.size();
+  if (!p.klu) return;
+  count[0] = (double)p.split.inner_row.size();
+  count[1] = p.klu->work.factor;
+  count[2] = p.klu->work.flops;
+  count[3] = 2 * p.klu->path_entries * w;
+  count[4] = p.klu->path_columns * w * w;
+}
+
+PetscErrorCode LinearPartsCount(Mat A, double max_couplings, PetscInt max_interface, LinearPartsWork *work)
 {
   KluParts *p;
+  double    count[5] = {0, 0, 0, 0, 0};
 
   PetscFunctionBegin;
   *work = LinearPartsWork();
   PetscCall(CheckType(A, &work->possible));
   if (!work->possible) PetscFunctionReturn(0);
   PetscCall(PartsCountCouplings(A, &work->couplings));
-  work->possible = work->couplings <= limit ? PETSC_TRUE : PETSC_FALSE;
+  work->possible = work->couplings <= max_couplings ? PETSC_TRUE : PETSC_FALSE;
   if (!work->possible) PetscFunctionReturn(0);
   PetscCall(Create(A, &p));
-  PetscCall(Analyse(NULL, A, p));
-  const KluPair *k        = p->klu;
-  double         count[4] = {0, 0, 0, 0};
-  if (k) {
-    count[0] = (double)p->split.inner_row.size();
-    count[1] = k->work.factor;
-    count[2] = k->work.flops;
-    count[3] = k->path * (double)p->split.local.size();
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 4, MPI_DOUBLE, MPI_MAX, p->comm));
+  PetscCall(FindSplit(A, p));
   work->interface = (PetscInt)p->split.interface.size();
-  work->unknowns  = count[0];
-  work->factor    = count[1];
-  work->flops     = count[2];
-  work->path      = count[3];
+  work->possible  = work->interface <= max_interface ? PETSC_TRUE : PETSC_FALSE;
+  if (work->possible) {
+    PetscCall(AnalyseInner(NULL, p));
+    CountInner(*p, count);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 5, MPI_DOUBLE, MPI_MAX, p->comm));
+  }
+  work->unknowns = count[0];
+  work->factor   = count[1];
+  work->flops    = count[2];
+  work->sweeps   = count[3];
+  work->products = count[4];
   PetscCall(Delete(PetscObjectComm((PetscObject)A), p));
   PetscFunctionReturn(0);
 }
@@ -211,6 +233,28 @@ static PetscErrorCode Move(KluParts *p, std::vector<PetscInt> rows, PetscBool *m
   PetscFunctionReturn(0);
 }
 
+/* After pivots were chosen anew: whether the interiors are regular; *again if unknowns have left them */
+static PetscErrorCode Check(Mat F, bool last, bool *again)
+{
+  KluParts             *p = Data(F);
+  std::vector<PetscInt> move;
+  PetscReal             inverse;
+  PetscInt              row;
+  PetscBool             moved;
+
+  PetscFunctionBegin;
+  PetscCall(PartsResidual(p, &p->residual));
+  PetscCall(PartsNearNull(p, p->residual > RESIDUAL ? NEARLY_SINGULAR : SINGULAR, &inverse, &move));
+  if (p->klu) p->checked_rcond = p->klu->common.rcond;
+  PetscCall(PetscInfo(p->inner ? (PetscObject)p->inner : (PetscObject)F,
+                      "Residual of a solve %g; inverse of the scaled interior %g\n", (double)p->residual,
+                      (double)inverse));
+  if (last) PetscFunctionReturn(0);
+  PetscCall(Move(p, move, &moved, &row));
+  *again = moved;
+  PetscFunctionReturn(0);
+}
+
 /* One attempt with the interface as it is; *again where it has been made larger */
 static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
 {
@@ -229,7 +273,7 @@ static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
     PetscFunctionReturn(0);
   }
   if (o.singular) {
-    if (p->factor && p->factor->factorerrortype) PetscCall(PartsUnmatched(p, &move));
+    if (p->factor && p->factor->factorerrortype) PetscCall(PartsAfterFailure(p, &move));
     PetscCall(Move(p, move, &moved, &row));
     if (last || !moved)
       PetscCall(ReportZeroPivot(F, A, row));
@@ -245,16 +289,7 @@ static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
       PetscCall(ReportZeroPivot(F, A, p->split.interface[row]));
     PetscFunctionReturn(0);
   }
-  if (!o.check || !p->check) PetscFunctionReturn(0);
-  PetscCall(PartsResidual(p, &p->residual));
-  if (p->factor) p->checked_rcond = p->klu->common.rcond;
-  if (p->residual <= RESIDUAL || last) PetscFunctionReturn(0);
-  PetscCall(PartsNearNull(p, &row));
-  if (row >= 0) move.push_back(row);
-  PetscCall(Move(p, move, &moved, &row));
-  PetscCall(PetscInfo(F, "Residual of a solve %g, an interior is nearly singular: %s\n", (double)p->residual,
-                      moved ? "its interface is made larger" : "no unknown found that could leave it"));
-  *again = moved;
+  if (o.check && p->check) PetscCall(Check(F, last, again));
   PetscFunctionReturn(0);
 }
 
@@ -302,6 +337,14 @@ static PetscErrorCode MatSolve_KLUParts(Mat F, Vec b, Vec x)
   PetscFunctionReturn(0);
 }
 
+/* Without this PETSc 3.18 would solve with the matrix itself where it does not know whether it is symmetric */
+static PetscErrorCode MatSolveTranspose_KLUParts(Mat F, Vec, Vec)
+{
+  PetscFunctionBegin;
+  SETERRQ(PetscObjectComm((PetscObject)F), PETSC_ERR_SUP,
+          "Solver type %s does not solve with the transpose; choose another one", LINEAR_KLUPARTS);
+}
+
 static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS, IS, const MatFactorInfo *)
 {
   KluParts *p = Data(F);
@@ -315,6 +358,7 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS, IS, const MatFactorInfo *
   PetscCall(Analyse(F, A, p));
   F->ops->lufactornumeric = FactorNumeric;
   F->ops->solve           = MatSolve_KLUParts;
+  F->ops->solvetranspose  = MatSolveTranspose_KLUParts;
   PetscFunctionReturn(0);
 }
 
@@ -432,7 +476,7 @@ PetscErrorCode LinearRegisterKLUParts(void)
 
 PetscErrorCode LinearRegisterKLUParts(void) { return 0; }
 
-PetscErrorCode LinearPartsCount(Mat, double, LinearPartsWork *work)
+PetscErrorCode LinearPartsCount(Mat, double, PetscInt, LinearPartsWork *work)
 {
   *work = LinearPartsWork();
   return 0;

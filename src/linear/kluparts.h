@@ -22,16 +22,17 @@
 /* Does nothing where the library was built without KLU */
 PetscErrorCode LinearRegisterKLUParts(void);
 
-/* What "kluparts" would have to do for a matrix; for the choice of a package */
+/* What "kluparts" would have to do for a matrix; of the interiors, the largest number of each */
 struct LinearPartsWork {
-  PetscBool possible  = PETSC_FALSE; /* else nothing below is counted */
+  PetscBool possible  = PETSC_FALSE; /* else what follows is not counted */
   double    couplings = 0;           /* entries between ranks */
   PetscInt  interface = 0;
-  double    unknowns = 0, factor = 0, flops = 0; /* of the largest interior: rows, entries of L, L D L^T */
-  double    path = 0; /* entries of L that the interface meets there, times rows of the interface that meet them */
+  double    unknowns = 0, factor = 0, flops = 0; /* rows, entries of L, operations of L D L^T */
+  double    sweeps = 0, products = 0;            /* multiplications for the Schur complement: sparse and dense */
 };
 
-/* Collective; possible = PETSC_FALSE if the type is another, or with more couplings than `limit` */
-PetscErrorCode LinearPartsCount(Mat A, double limit, LinearPartsWork *work);
+/* Collective; possible = PETSC_FALSE if the type is another, or with more than so many couplings or interface unknowns
+ */
+PetscErrorCode LinearPartsCount(Mat A, double max_couplings, PetscInt max_interface, LinearPartsWork *work);
 
 #endif

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
-/* An inverse of the interior, its rows and columns scaled to one, as large as this takes half of the digits away */
-static const PetscReal NEARLY_SINGULAR = 1e8;
+/* Of inverse iteration: the first meets every null vector, the others leave little else */
+static const int SWEEPS = 3;
+
+/* Of every entry, to make a singular matrix regular */
+static const PetscReal DISTURBANCE = 1e-7;
 
 /* Between 1/2 and 1 in size, of either sign, the same in every run */
 static PetscScalar Number(PetscInt i)
@@ -22,6 +25,21 @@ static std::vector<PetscReal> RowSizes(const PartsSplit &s)
     for (PetscInt k = s.start[i]; k < s.start[i + 1]; ++k) size[i] = PetscMax(size[i], PetscAbsScalar(s.val[k]));
   for (size_t e = 0; e < s.right.size(); ++e)
     size[s.right[e].row] = PetscMax(size[s.right[e].row], PetscAbsScalar(s.right_val[e]));
+  return size;
+}
+
+/* Largest entries of its columns where the rows are divided by their sizes; interface rows by what is listed */
+static std::vector<PetscReal> ColumnSizes(const PartsSplit &s, const std::vector<PetscReal> &rows)
+{
+  std::vector<PetscReal> size(rows.size(), 0), top(s.local.size(), 0);
+  const auto             take = [&size](PetscInt j, PetscReal v) { size[j] = PetscMax(size[j], v); };
+  for (size_t i = 0; i < rows.size(); ++i)
+    for (PetscInt k = s.start[i]; k < s.start[i + 1]; ++k)
+      take(s.col[k], rows[i] > 0 ? PetscAbsScalar(s.val[k]) / rows[i] : 0);
+  for (size_t e = 0; e < s.below.size(); ++e)
+    top[s.below[e].row] = PetscMax(top[s.below[e].row], PetscAbsScalar(s.below_val[e]));
+  for (size_t e = 0; e < s.below.size(); ++e)
+    if (top[s.below[e].row] > 0) take(s.below[e].col, PetscAbsScalar(s.below_val[e]) / top[s.below[e].row]);
   return size;
 }
 
@@ -78,43 +96,60 @@ PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual)
   PetscFunctionReturn(0);
 }
 
-/* Inverse iteration with the interior alone, rows scaled by their largest entries and columns, too */
-PetscErrorCode PartsNearNull(KluParts *p, PetscInt *row)
+/*
+  Inverse iteration with the interior alone, rows divided by r and columns by c: the size of the inverse, and the place
+  of the largest number in the vector that it maps to that. With the transpose instead, r and c change places.
+*/
+static PetscErrorCode Iterate(KluPair *k, bool transposed, const std::vector<PetscReal> &r,
+                              const std::vector<PetscReal> &c, PetscReal *inverse, PetscInt *largest)
 {
-  PartsSplit    &s = p->split;
-  const PetscInt n = (PetscInt)s.inner_row.size();
-  KluPair       *k = p->klu;
+  const PetscInt           n = (PetscInt)r.size();
+  std::vector<PetscScalar> z(n), w(n);
 
   PetscFunctionBegin;
-  *row = -1;
-  if (!k || !k->numeric) PetscFunctionReturn(0);
-  std::vector<PetscReal>   rows(n, 0), cols(n, 0);
-  std::vector<PetscScalar> z(n), w(n);
-  for (PetscInt i = 0; i < n; ++i)
-    for (PetscInt e = s.start[i]; e < s.start[i + 1]; ++e) rows[i] = PetscMax(rows[i], PetscAbsScalar(s.val[e]));
-  for (PetscInt i = 0; i < n; ++i)
-    for (PetscInt e = s.start[i]; e < s.start[i + 1]; ++e)
-      cols[s.col[e]] = PetscMax(cols[s.col[e]], PetscAbsScalar(s.val[e]) / rows[i]);
-  for (PetscInt i = 0; i < n; ++i) w[i] = Number(s.begin + s.inner_row[i]);
-  for (int sweep = 0; sweep < 3; ++sweep) {
-    for (PetscInt i = 0; i < n; ++i) z[i] = rows[i] * w[i];
-    PetscCheck(KLU(tsolve)(k->symbolic, k->numeric, (KluInt)n, 1, z.data(), &k->common), PETSC_COMM_SELF, PETSC_ERR_LIB,
-               "KLU's solve with %" PetscInt_FMT " rows failed with status %d", n, (int)k->common.status);
-    PetscInt largest = 0;
+  for (PetscInt i = 0; i < n; ++i) w[i] = Number(i);
+  for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+    for (PetscInt i = 0; i < n; ++i) z[i] = r[i] * w[i];
+    /* KLU holds the transpose */
+    const KluInt ok = transposed ? KLU(solve)(k->symbolic, k->numeric, (KluInt)n, 1, z.data(), &k->common)
+                                 : KLU(tsolve)(k->symbolic, k->numeric, (KluInt)n, 1, z.data(), &k->common);
+    PetscCheck(ok, PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU's solve with %" PetscInt_FMT " rows failed with status %d", n,
+               (int)k->common.status);
+    *largest = 0;
     for (PetscInt i = 0; i < n; ++i) {
-      w[i] = cols[i] * z[i];
-      if (!(PetscAbsScalar(w[i]) <= PetscAbsScalar(w[largest]))) largest = i;
+      w[i] = c[i] * z[i];
+      if (!(PetscAbsScalar(w[i]) <= PetscAbsScalar(w[*largest]))) *largest = i;
     }
-    const PetscReal growth = PetscAbsScalar(w[largest]);
-    if (!(growth <= NEARLY_SINGULAR)) *row = s.inner_row[largest];
+    const PetscReal growth = PetscAbsScalar(w[*largest]);
+    *inverse               = PetscIsInfOrNanReal(growth) ? PETSC_MAX_REAL : growth;
     if (PetscIsInfOrNanReal(growth) || growth == 0) break;
     for (PetscInt i = 0; i < n; ++i) w[i] /= growth;
   }
   PetscFunctionReturn(0);
 }
 
-/* Rows and columns that no pivot can be found for, or else the row that KLU met a zero pivot in */
-PetscErrorCode PartsUnmatched(KluParts *p, std::vector<PetscInt> *unmatched)
+PetscErrorCode PartsNearNull(KluParts *p, PetscReal threshold, PetscReal *inverse, std::vector<PetscInt> *move)
+{
+  const PartsSplit &s = p->split;
+  PetscInt          largest;
+
+  PetscFunctionBegin;
+  *inverse = 0;
+  if (!p->klu || !p->klu->numeric) PetscFunctionReturn(0);
+  const std::vector<PetscReal> rows = RowSizes(s), cols = ColumnSizes(s, rows);
+  PetscCall(Iterate(p->klu, false, rows, cols, inverse, &largest));
+  if (*inverse <= threshold) PetscFunctionReturn(0);
+  move->push_back(s.inner_row[largest]);
+  PetscReal transposed;
+  PetscCall(Iterate(p->klu, true, cols, rows, &transposed, &largest));
+  if (transposed > threshold) move->push_back(s.inner_row[largest]);
+  PetscFunctionReturn(0);
+}
+
+/* ---- after KLU failed ---- */
+
+/* Rows and columns that no pivot can be found for */
+static PetscErrorCode Unmatched(KluParts *p, std::vector<PetscInt> *move)
 {
   const PartsSplit &s = p->split;
   LinearPivots      pivots;
@@ -129,14 +164,39 @@ PetscErrorCode PartsUnmatched(KluParts *p, std::vector<PetscInt> *unmatched)
     for (PetscInt k = rows.start[i]; k < rows.start[i + 1]; ++k)
       if (rows.col[k] == j && PetscAbsScalar(rows.val[k]) > 0) zero = false;
     if (!zero) continue;
-    unmatched->push_back(s.inner_row[i]);
-    if (j != i) unmatched->push_back(s.inner_row[j]);
+    move->push_back(s.inner_row[i]);
+    if (j != i) move->push_back(s.inner_row[j]);
   }
   PetscCall(KluPairRestoreRows(p->inner, &rows));
-  if (unmatched->empty()) {
-    PetscInt row = p->factor->factorerror_zeropivot_row;
-    if (row >= 0 && row < (PetscInt)s.inner_row.size()) unmatched->push_back(s.inner_row[row]);
-  }
+  PetscFunctionReturn(0);
+}
+
+/* Where it is a matter of values, KLU may meet its zero far from the cause. A matrix next to this one has factors, and
+   the null vector of this one, nearly. */
+static PetscErrorCode Disturb(KluParts *p, std::vector<PetscInt> *move)
+{
+  MatFactorInfo  info;
+  MatFactorError error;
+  PetscReal      inverse;
+
+  PetscFunctionBegin;
+  for (size_t k = 0; k < p->split.val.size(); ++k) p->split.val[k] *= 1 + DISTURBANCE * Number((PetscInt)k);
+  PetscCall(PetscObjectStateIncrease((PetscObject)p->inner));
+  PetscCall(MatFactorInfoInitialize(&info));
+  PetscCall(MatLUFactorNumeric(p->factor, p->inner, &info));
+  PetscCall(MatFactorGetError(p->factor, &error));
+  if (!error) PetscCall(PartsNearNull(p, 0, &inverse, move));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode PartsAfterFailure(KluParts *p, std::vector<PetscInt> *move)
+{
+  const PetscInt row = p->factor->factorerror_zeropivot_row;
+
+  PetscFunctionBegin;
+  PetscCall(Unmatched(p, move));
+  if (move->empty()) PetscCall(Disturb(p, move));
+  if (move->empty() && row >= 0 && row < (PetscInt)p->split.inner_row.size()) move->push_back(p->split.inner_row[row]);
   PetscFunctionReturn(0);
 }
 

@@ -120,10 +120,11 @@ PetscErrorCode PartsSolve(KluParts *p, const PetscScalar b[], PetscScalar x[]);
  */
 PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual);
 
-/* The interior unknown (own row) that a nearly singular interior has most of in its null vector; -1 if it is regular */
-PetscErrorCode PartsNearNull(KluParts *p, PetscInt *row);
+/* The size of the interior's inverse, rows and columns scaled to one; above the threshold the unknowns that its largest
+   vectors have most of (own rows) are added to the list */
+PetscErrorCode PartsNearNull(KluParts *p, PetscReal threshold, PetscReal *inverse, std::vector<PetscInt> *move);
 
-/* After a factorization of the interior failed: own rows that have to leave it */
-PetscErrorCode PartsUnmatched(KluParts *p, std::vector<PetscInt> *rows);
+/* After KLU met a zero pivot: own rows that have to leave the interior. Its values and factor are lost. */
+PetscErrorCode PartsAfterFailure(KluParts *p, std::vector<PetscInt> *move);
 
 #endif

@@ -11,8 +11,8 @@
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* A pivot of the Schur complement below this, where the largest entry of every row and column is one, is none */
-static const PetscReal NO_PIVOT = 1e-14;
+/* A pivot of the Schur complement below this, where the terms of every row and column sum up to one, is none */
+static const PetscReal NO_PIVOT = 1e-13;
 
 /* One column of L without its diagonal, or of U without its diagonal, as KLU stores it */
 struct Column {
@@ -193,20 +193,89 @@ static PetscErrorCode Contribution(KluParts *p, PetscScalar *S)
   PetscFunctionReturn(0);
 }
 
-/* Rows, then columns, to a largest entry of one; a row or column of zeros stays */
-static void Scale(size_t N, PetscScalar *S, std::vector<PetscReal> *row, std::vector<PetscReal> *col)
+/* Sums over the absolute values of all terms in each row of the Schur complement, its columns multiplied by col */
+static PetscErrorCode RowSums(KluParts *p, const std::vector<PetscReal> &col, std::vector<PetscReal> *row)
 {
-  const auto inverse = [](PetscReal largest) { return largest > 0 ? 1 / largest : 1; };
-  row->assign(N, 0);
-  col->assign(N, 0);
-  for (size_t j = 0; j < N; ++j)
-    for (size_t i = 0; i < N; ++i) (*row)[i] = PetscMax((*row)[i], PetscAbsScalar(S[i + N * j]));
-  for (PetscReal &r : *row) r = inverse(r);
-  for (size_t j = 0; j < N; ++j) {
-    for (size_t i = 0; i < N; ++i) (*col)[j] = PetscMax((*col)[j], PetscAbsScalar(S[i + N * j]) * (*row)[i]);
-    (*col)[j] = inverse((*col)[j]);
-    for (size_t i = 0; i < N; ++i) S[i + N * j] *= (*row)[i] * (*col)[j];
+  const PartsSplit      &s = p->split;
+  const size_t           w = s.local.size();
+  std::vector<PetscReal> local(w, 0);
+
+  PetscFunctionBegin;
+  row->assign(s.interface.size(), 0);
+  for (size_t e = 0; e < s.corner.size(); ++e)
+    (*row)[s.corner[e].row] += PetscAbsScalar(s.corner_val[e]) * col[s.corner[e].col];
+  for (size_t r = 0; r < p->reach.size(); ++r) {
+    PetscReal sum = 0;
+    for (size_t j = 0; j < w; ++j) sum += PetscAbsScalar(p->right_part[r * w + j]) * col[s.local[j]];
+    for (size_t i = 0; i < w; ++i) local[i] += PetscAbsScalar(p->below_part[r * w + i]) * sum;
   }
+  for (size_t i = 0; i < w; ++i) (*row)[s.local[i]] += local[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, row->data(), (PetscMPIInt)row->size(), MPIU_REAL, MPI_SUM, p->comm));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode ColumnSums(KluParts *p, const std::vector<PetscReal> &row, std::vector<PetscReal> *col)
+{
+  const PartsSplit      &s = p->split;
+  const size_t           w = s.local.size();
+  std::vector<PetscReal> local(w, 0);
+
+  PetscFunctionBegin;
+  col->assign(s.interface.size(), 0);
+  for (size_t e = 0; e < s.corner.size(); ++e)
+    (*col)[s.corner[e].col] += PetscAbsScalar(s.corner_val[e]) * row[s.corner[e].row];
+  for (size_t r = 0; r < p->reach.size(); ++r) {
+    PetscReal sum = 0;
+    for (size_t i = 0; i < w; ++i) sum += PetscAbsScalar(p->below_part[r * w + i]) * row[s.local[i]];
+    for (size_t j = 0; j < w; ++j) local[j] += PetscAbsScalar(p->right_part[r * w + j]) * sum;
+  }
+  for (size_t j = 0; j < w; ++j) (*col)[s.local[j]] += local[j];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, col->data(), (PetscMPIInt)col->size(), MPIU_REAL, MPI_SUM, p->comm));
+  PetscFunctionReturn(0);
+}
+
+static void Invert(std::vector<PetscReal> *sums)
+{
+  for (PetscReal &v : *sums) v = v > 0 && !PetscIsInfOrNanReal(1 / v) ? 1 / v : 1;
+}
+
+/* By the terms of its sums, not by what is left of them: where they cancel, nothing but rounding is left */
+static PetscErrorCode Scale(KluParts *p)
+{
+  const size_t N = p->split.interface.size();
+
+  PetscFunctionBegin;
+  p->col_scale.assign(N, 1);
+  PetscCall(RowSums(p, p->col_scale, &p->row_scale));
+  Invert(&p->row_scale);
+  PetscCall(ColumnSums(p, p->row_scale, &p->col_scale));
+  Invert(&p->col_scale);
+  for (size_t j = 0; j < N; ++j)
+    for (size_t i = 0; i < N; ++i) p->schur[i + N * j] *= p->row_scale[i] * p->col_scale[j];
+  PetscFunctionReturn(0);
+}
+
+/* With row exchanges; the first column without a pivot, or the number of columns */
+static PetscErrorCode FactorDense(KluParts *p, PetscInt *first)
+{
+  const size_t N = p->split.interface.size();
+  PetscBLASInt n, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast((PetscInt)N, &n));
+  PetscCallBLAS("LAPACKgetrf", LAPACKgetrf_(&n, &n, p->schur.data(), &n, p->pivots.data(), &info));
+  PetscCheck(info >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK's getrf refused argument %d", (int)-info);
+  PetscReal least = PETSC_MAX_REAL;
+  *first          = (PetscInt)N;
+  for (size_t k = N; k-- > 0;) {
+    const PetscReal pivot = PetscAbsScalar(p->schur[k + N * k]);
+    least                 = PetscMin(least, pivot);
+    if (!(pivot > NO_PIVOT)) *first = (PetscInt)k;
+  }
+  PetscCall(
+      PetscInfo(NULL, "Schur complement of %zu rows: least pivot %g of the terms that it sums up\n", N, (double)least));
+  PetscCall(PetscLogFlops(2.0 / 3 * (double)N * (double)N * (double)N));
+  PetscFunctionReturn(0);
 }
 
 PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *finite)
@@ -214,7 +283,7 @@ PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *fini
   const size_t             N = p->split.interface.size();
   std::vector<PetscScalar> mine(N * N);
   PetscScalar              sum      = 0;
-  PetscInt                 found[2] = {PETSC_MAX_INT, 1}; /* a row without pivot; whether all is finite */
+  PetscInt                 found[2] = {(PetscInt)N, 1}; /* a row without pivot; whether all is finite */
 
   PetscFunctionBegin;
   *singular = -1;
@@ -229,22 +298,15 @@ PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *fini
   PetscCheck(N * N < (size_t)PETSC_MPI_INT_MAX, p->comm, PETSC_ERR_ARG_OUTOFRANGE,
              "An interface of %zu unknowns is too large for solver type %s; choose another one", N, LINEAR_KLUPARTS);
   PetscCallMPI(MPI_Allreduce(mine.data(), p->schur.data(), (PetscMPIInt)(N * N), MPIU_SCALAR, MPI_SUM, p->comm));
+  PetscCall(Scale(p));
   for (PetscScalar v : p->schur) sum += v;
-  if (PetscIsInfOrNanScalar(sum)) {
+  if (PetscIsInfOrNanScalar(sum))
     found[1] = 0;
-  } else {
-    PetscBLASInt n, info;
-    Scale(N, p->schur.data(), &p->row_scale, &p->col_scale);
-    PetscCall(PetscBLASIntCast((PetscInt)N, &n));
-    PetscCallBLAS("LAPACKgetrf", LAPACKgetrf_(&n, &n, p->schur.data(), &n, p->pivots.data(), &info));
-    PetscCheck(info >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK's getrf refused argument %d", (int)-info);
-    for (size_t k = N; k-- > 0;)
-      if (!(PetscAbsScalar(p->schur[k + N * k]) > NO_PIVOT)) found[0] = (PetscInt)k;
-    PetscCall(PetscLogFlops(2.0 / 3 * (double)N * (double)N * (double)N));
-  }
+  else
+    PetscCall(FactorDense(p, &found[0]));
   /* what one rank finds holds for all */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found, 2, MPIU_INT, MPI_MIN, p->comm));
-  *singular = found[0] == PETSC_MAX_INT ? -1 : found[0];
+  *singular = found[0] < (PetscInt)N ? found[0] : -1;
   *finite   = found[1] ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
