@@ -33,15 +33,25 @@ PetscErrorCode ElementNodes::setUp(const FeModel &model)
   PetscFunctionReturn(0);
 }
 
+/* Rows of numbers; PETSc cannot sum rows of one, which have to be plain numbers */
+static PetscErrorCode RowOf(int width, MPI_Datatype *type)
+{
+  PetscFunctionBegin;
+  *type = MPIU_REAL;
+  if (width == 1) PetscFunctionReturn(0);
+  PetscCallMPI(MPI_Type_contiguous(width, MPIU_REAL, type));
+  PetscCallMPI(MPI_Type_commit(type));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode ElementNodes::bring(int width, const double *own, double *here) const
 {
   MPI_Datatype type;
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Type_contiguous(width, MPI_DOUBLE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(RowOf(width, &type));
   PetscCall(PetscSFBcastBegin(sf, type, own, here, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(sf, type, own, here, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&type));
+  if (width > 1) PetscCallMPI(MPI_Type_free(&type));
   PetscFunctionReturn(0);
 }
 
@@ -49,11 +59,10 @@ PetscErrorCode ElementNodes::add(int width, const double *here, double *own) con
 {
   MPI_Datatype type;
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Type_contiguous(width, MPI_DOUBLE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(RowOf(width, &type));
   PetscCall(PetscSFReduceBegin(sf, type, here, own, MPI_SUM));
   PetscCall(PetscSFReduceEnd(sf, type, here, own, MPI_SUM));
-  PetscCallMPI(MPI_Type_free(&type));
+  if (width > 1) PetscCallMPI(MPI_Type_free(&type));
   PetscFunctionReturn(0);
 }
 

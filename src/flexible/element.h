@@ -111,6 +111,7 @@ template <class Shape> double ElementStiffness(const NodeVectors<Shape> &X, cons
       const Eigen::Matrix3d H = K.template block<3, 3>(3 * i, 3 * j);
       Eigen::Matrix3d       B = lame.lambda * H + lame.mu * H.transpose();
       B.diagonal().array() += lame.mu * H.trace();
+      if (i == j) B = (B + B.transpose().eval()) / 2; /* symmetric to the last digit */
       K.template block<3, 3>(3 * i, 3 * j) = B;
       K.template block<3, 3>(3 * j, 3 * i) = B.transpose();
     }
@@ -131,7 +132,8 @@ double ElementMass(const NodeVectors<Shape> &X, double density, Mass<Shape> &m)
     Lower(least, det);
     all.col(q) = table.N[q] * std::sqrt(std::max(det, 0.) * table.points.weight[q] * density);
   }
-  m.noalias() = all * all.transpose();
+  m.noalias()                                       = all * all.transpose();
+  m.template triangularView<Eigen::StrictlyLower>() = m.transpose(); /* to the last digit */
   return least * InverseExtent<Shape>(X);
 }
 
@@ -205,49 +207,66 @@ private:
 /* ---- large displacements ---- */
 
 /*
-  St. Venant-Kirchhoff, total Lagrangian: E = (F^T F - 1) / 2, S = lambda tr(E) 1 + 2 mu E, the energy (lambda tr(E)^2 /
-  2 + mu E:E) integrated over the undeformed element at the stiffness' points. u: displacements from X; the force is the
-  derivative of the energy, the tangent (where asked for) that of the force. At u = 0 the tangent is ElementStiffness.
+  St. Venant-Kirchhoff, total Lagrangian: E = (F^T F - 1) / 2, S = lambda tr(E) 1 + 2 mu E, the energy
+  (lambda tr(E)^2 / 2 + mu E:E) integrated over the undeformed element at the stiffness' points. u: displacements from
+  X; the force is the derivative of the energy, the tangent (where asked for) that of the force. At u = 0 the tangent is
+  ElementStiffness.
+
+  Block ij of the tangent is the integral of (g_i S g_j) 1 + lambda h_i h_j^T + mu h_j h_i^T + mu (g_i g_j) F F^T with h
+  = F g: the products of h come from one product of matrices, as in ElementStiffness, the others are six matrices of
+  nodes by nodes.
 */
 template <class Shape>
 double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, const Lame &lame, NodeVectors<Shape> &force,
                   Stiffness<Shape> *tangent = nullptr, double *energy = nullptr)
 {
-  using Rule          = typename Shape::StiffnessRule;
-  constexpr int n     = Shape::nodes;
-  const auto   &table = Table<Shape, Rule>::get();
-  double        least = std::numeric_limits<double>::infinity();
+  using Rule                                      = typename Shape::StiffnessRule;
+  constexpr int                             n     = Shape::nodes;
+  const auto                               &table = Table<Shape, Rule>::get();
+  double                                    least = std::numeric_limits<double>::infinity();
+  Eigen::Matrix<double, 3 * n, Rule::count> all;
+  std::array<Mass<Shape>, 6>                symmetric; /* xx, yy, zz, xy, yz, zx */
   force.setZero();
-  if (tangent) tangent->setZero();
   if (energy) *energy = 0;
+  if (tangent)
+    for (Mass<Shape> &C : symmetric) C.setZero();
   for (int q = 0; q < Rule::count; q++) {
     Gradients<n> G;
-    const double det = SpatialGradients<Shape, Rule>(X, q, G), w = det * table.points.weight[q];
+    const double det = SpatialGradients<Shape, Rule>(X, q, G), w = std::max(det, 0.) * table.points.weight[q];
     Lower(least, det);
     const Eigen::Matrix3d D = u * G.transpose(), F = Eigen::Matrix3d::Identity() + D;
-    /* without the difference of F^T F and 1, which would lose the digits of small strains */
+    /* not the difference of F^T F and 1, which would lose the digits of small strains */
     const Eigen::Matrix3d E = (D + D.transpose() + D.transpose() * D) / 2;
     const Eigen::Matrix3d S = lame.lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * lame.mu * E;
-    const Eigen::Matrix3d P = F * S;
-    force.noalias() += (w * P) * G;
+    const Eigen::Matrix3d P = w * F * S;
+    force.noalias() += P * G;
     if (energy) *energy += w * (lame.lambda / 2 * E.trace() * E.trace() + lame.mu * E.squaredNorm());
     if (!tangent) continue;
-    /* block ij: (g_i S g_j) 1 + lambda h_i h_j^T + mu h_j h_i^T + mu (g_i g_j) F F^T with h = F g */
-    const Gradients<n>    h = F * G, T = w * S * G;
+    const Gradients<n> h = std::sqrt(w) * F * G, SG = w * S * G;
+    all.col(q)               = Eigen::Map<const Eigen::Matrix<double, 3 * n, 1>>(h.data());
     const Eigen::Matrix3d FF = w * lame.mu * F * F.transpose();
-    for (int j = 0; j < n; j++)
-      for (int i = 0; i <= j; i++) {
-        Eigen::Matrix3d B = G.col(i).dot(G.col(j)) * FF;
-        B.noalias() += (w * lame.lambda) * h.col(i) * h.col(j).transpose();
-        B.noalias() += (w * lame.mu) * h.col(j) * h.col(i).transpose();
-        B.diagonal().array() += G.col(i).dot(T.col(j));
-        tangent->template block<3, 3>(3 * i, 3 * j) += B;
-      }
+    const Mass<Shape>     GG = G.transpose() * G, GSG = G.transpose() * SG;
+    for (int d = 0; d < 3; d++) {
+      symmetric[d] += FF(d, d) * GG + GSG;
+      symmetric[3 + d] += FF(d, (d + 1) % 3) * GG;
+    }
   }
-  if (tangent)
-    for (int j = 0; j < n; j++)
-      for (int i = 0; i < j; i++)
-        tangent->template block<3, 3>(3 * j, 3 * i) = tangent->template block<3, 3>(3 * i, 3 * j).transpose();
+  if (!tangent) return least * InverseExtent<Shape>(X);
+  tangent->noalias() = all * all.transpose();
+  for (int j = 0; j < n; j++)
+    for (int i = 0; i <= j; i++) {
+      const Eigen::Matrix3d H = tangent->template block<3, 3>(3 * i, 3 * j);
+      Eigen::Matrix3d       B = lame.lambda * H + lame.mu * H.transpose();
+      for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3;
+        B(d, d) += symmetric[d](i, j);
+        B(d, e) += symmetric[3 + d](i, j);
+        B(e, d) += symmetric[3 + d](i, j);
+      }
+      if (i == j) B = (B + B.transpose().eval()) / 2;
+      tangent->template block<3, 3>(3 * i, 3 * j) = B;
+      tangent->template block<3, 3>(3 * j, 3 * i) = B.transpose();
+    }
   return least * InverseExtent<Shape>(X);
 }
 
