@@ -297,6 +297,8 @@ static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, 
   PetscCall(EPSSetOptionsPrefix(*eps, REDUCE_PREFIX));
   PetscCall(EPSSetOperators(*eps, pencil.K, pencil.M));
   PetscCall(EPSSetProblemType(*eps, EPS_GHEP));
+  /* one more solve for each mode, which cleans vectors of the null space of M: there is none but for multipliers */
+  PetscCall(EPSSetPurify(*eps, pencil.multipliers ? PETSC_TRUE : PETSC_FALSE));
   PetscCall(EPSSetType(*eps, EPSKRYLOVSCHUR));
   PetscCall(EPSSetTolerances(*eps, 1e-11, 200));
   PetscCall(EPSGetST(*eps, &st));

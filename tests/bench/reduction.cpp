@@ -8,6 +8,7 @@
   top and the highest are cut off. One line per phase: seconds, memory of all ranks after it and at most.
 */
 #include "box_model.h"
+#include "hhtdae/flexible.h"
 #include <hhtdae/hhtdae.h>
 #include <slepcsys.h>
 

@@ -1,5 +1,6 @@
 /* Reductions on all ranks together and on every rank alone */
 #include "box_model.h"
+#include "hhtdae/flexible.h"
 #include "support.h"
 
 using namespace hhtest;
