@@ -16,7 +16,7 @@
 #ifndef HHTDAE_FLEXIBLE_H
 #define HHTDAE_FLEXIBLE_H
 
-#include "hhtdae/modal.h"
+#include "hhtdae/scene.h"
 #include <map>
 #include <memory>
 #include <petscmat.h>
@@ -184,6 +184,45 @@ private:
    model or moved by the pose (origin of the FE model, axes as columns). Collective */
 PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, const std::string &file, const Vector3 &origin = Vector3::Zero(),
                           const Matrix3 &axes = Matrix3::Identity());
+
+/* ---- the whole model in a scene ---- */
+
+enum class FeLaw {
+  Small, /* K (x - X) about the position at the start, which must not turn away from it much */
+  Large  /* St. Venant-Kirchhoff material, total Lagrangian: displacements and rotations at large */
+};
+
+struct FullBody {
+  FeLaw   law              = FeLaw::Large;
+  Vector3 position         = Vector3::Zero();     /* of the origin of the FE model at the start, undeformed, space axes */
+  Matrix3 rotation         = Matrix3::Identity(); /* axes of the FE model as columns */
+  Vector3 velocity         = Vector3::Zero();     /* of the origin of the FE model */
+  Vector3 angular_velocity = Vector3::Zero();     /* space axes */
+  double  mass_damping = 0, stiffness_damping = 0; /* C = a M + b K; with FeLaw::Large b must be 0 */
+  std::vector<Attachment> attachments;
+};
+
+/*
+  The FE model itself as a body, 3 coordinates a node, distributed as the model is. Attachments are frames without mass for joints,
+  forces and markers; each node tied rigidly costs three multipliers, an average six for all its nodes. The model must outlive the
+  scene. Collective; call it on all ranks in the same order as the scene's other parts.
+*/
+class FullFeBody
+{
+public:
+  PetscErrorCode add(Scene &scene, const std::string &name, const FeModel &model, const FullBody &body);
+  Body           attachment(const std::string &name) const; /* Body{} if there is none, which the scene will refuse by name */
+
+  /* positions of own nodes at time t within the last step, after scene.createTS(); space axes, 3 per node */
+  PetscErrorCode positions(TS ts, PetscReal t, std::vector<double> *x) const;
+  /* displacements (from the undeformed body at the start) as a .vtu file. Collective */
+  PetscErrorCode writeField(TS ts, PetscReal t, const std::string &file) const;
+
+private:
+  Scene                      *scene_ = nullptr;
+  class FullExtension        *extension_ = nullptr; /* owned by the scene */
+  std::map<std::string, Body> frames_;
+};
 
 } // namespace hhtdae
 

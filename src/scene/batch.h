@@ -32,6 +32,8 @@ struct Evaluation {
   }
 };
 
+struct Balance; /* output/energy.h */
+
 class Batch
 {
 public:
@@ -44,6 +46,8 @@ public:
   virtual void accept(Bodies &) {}
   /* potential energy of the instances that belong to this rank; bodies have moved */
   virtual double energy(const Evaluation &) const { return 0; }
+  /* energy and momentum of own coordinates that are not those of bodies */
+  virtual void addTo(Balance &, const Evaluation &) const {}
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }

@@ -49,7 +49,7 @@ private:
 
   void body(const BodyData &b)
   {
-    if (b.carrier >= 0) return; /* the frame of an attachment follows its body */
+    if (b.massless) return; /* the frame of an attachment follows its body */
     const std::string who = "body " + b.name;
     require(std::isfinite(b.mass) && b.mass > 0, who, "mass is " + Text(b.mass) + ", must be positive");
     require(b.r.allFinite() && b.v.allFinite() && b.w.allFinite(), who,
@@ -161,7 +161,7 @@ PetscErrorCode CheckDescription(SceneData &s)
   std::size_t       k    = 0;
   const std::size_t room = 1500; /* of PETSc's message */
   PetscFunctionBegin;
-  PetscCheck(!s.bodies.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
+  PetscCheck(!s.bodies.empty() || !s.extensions.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
   check.all();
   const std::vector<std::string> &errors = check.errors();
   for (; k < errors.size() && all.size() + errors[k].size() < room; k++) all += "\n  " + errors[k];

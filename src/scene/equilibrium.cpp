@@ -9,6 +9,7 @@
   equilibrium, large ones are Newton's method; h grows as the unbalanced forces fall and shrinks where a step would go
   too far.
 */
+#include "extension.h"
 #include "start.h"
 #include <algorithm>
 #include <cmath>
@@ -67,6 +68,11 @@ PetscErrorCode MeasureForces(Equilibrium &E, Vec F, Unbalanced &out)
       const double x = std::abs(f[k.first + c]) / (c < directions ? 1 : E.size);
       if (x > mine.value || std::isnan(x)) mine = {x, (int)k.id};
     }
+  }
+  for (const auto &e : R.scene.extensions) {
+    const PetscScalar *g = f + e->start[R.rank] - R.start;
+    for (PetscInt i = 0; i < e->coordinates(); i++)
+      if (!(std::abs(g[i]) <= mine.value)) mine = {std::abs(g[i]), -1};
   }
   for (TSHHT3Role r : {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE, TSHHT3_STATE}) {
     const PetscInt *i;
@@ -141,6 +147,13 @@ PetscErrorCode Reach(const Equilibrium &E, Vec d, double *reach)
       mine           = std::isnan(y) ? INFINITY : std::max(mine, y);
     }
   }
+  for (const auto &e : R.scene.extensions) {
+    const PetscScalar *g = x + e->start[R.rank] - R.start;
+    for (PetscInt i = 0; i < e->coordinates(); i++) {
+      const double y = std::abs(g[i]) / E.size / largest_turn;
+      mine           = std::isnan(y) ? INFINITY : std::max(mine, y);
+    }
+  }
   PetscCall(VecRestoreArrayRead(d, &x));
   PetscCallMPI(MPI_Allreduce(&mine, reach, 1, MPI_DOUBLE, MPI_MAX, R.scene.comm));
   PetscFunctionReturn(0);
@@ -196,6 +209,7 @@ PetscErrorCode WriteBack(Equilibrium &E)
   for (std::size_t i = 0; i < s.states.size(); i++)
     if (R.number.state_owner[i] == R.rank) scalars[s.variables.size() + i] = u[R.number.state[i] - R.start];
   PetscCall(WriteBackModes(R, u));
+  for (auto &x : s.extensions) x->rest(u + x->start[R.rank] - R.start);
   PetscCall(VecRestoreArrayRead(E.zero, &v));
   PetscCall(VecRestoreArrayRead(E.U, &u));
   const PetscMPIInt n = (PetscMPIInt)mine.size();

@@ -153,6 +153,9 @@ Body Scene::addFrame(Body body, PetscInt a)
   f.v           = b.v + b.w.cross(b.A * arm) + b.A * (x.translation * rate);
   f.w           = b.w + b.A * (turn.J() * (x.rotation * rate));
   f.fixed_start = b.fixed_start;
+  f.massless      = true;
+  f.light_mass    = 1e-3 * b.mass;
+  f.light_inertia = 1e-3 * b.inertia.trace();
   f.carrier     = body.id;
   f.attachment  = a;
   s.bodies.push_back(f);

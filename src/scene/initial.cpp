@@ -1,4 +1,5 @@
 /* The state that the description gives. */
+#include "extension.h"
 #include "runtime.h"
 
 namespace hhtdae
@@ -52,6 +53,7 @@ PetscErrorCode InitialState(Runtime &R, Vec U, Vec V)
     if (R.number.variable_owner[i] == R.rank) u[R.number.variable[i] - R.start] = R.scene.variables[i].initial;
   for (std::size_t i = 0; i < R.number.state.size(); i++)
     if (R.number.state_owner[i] == R.rank) u[R.number.state[i] - R.start] = R.scene.states[i].initial;
+  for (auto &x : R.scene.extensions) x->initial(u + x->start[R.rank] - R.start, v + x->start[R.rank] - R.start);
   PetscCall(VecRestoreArray(U, &u));
   PetscCall(VecRestoreArray(V, &v));
   PetscFunctionReturn(0);

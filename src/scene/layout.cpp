@@ -1,4 +1,5 @@
 /* What this rank needs of the scene: bodies, markers, joints and forces, the pattern of its rows, the exchange with other ranks. */
+#include "extension.h"
 #include "runtime.h"
 #include <algorithm>
 #include <unordered_map>
@@ -124,6 +125,7 @@ PetscErrorCode Localize(Runtime &R, Localizer &l)
   PetscFunctionBegin;
   R.batches.clear();
   for (StoreBase *s : R.scene.order) s->localize(l, R.batches);
+  for (auto &x : R.scene.extensions) x->localize(l, R.batches);
   PetscCall(LocalizeExpressions(R, l));
   PetscCall(LocalizeChannels(R, l));
   PetscFunctionReturn(0);
@@ -264,6 +266,10 @@ PetscErrorCode MakeRoles(Runtime &R)
     if (R.number.variable_owner[i] == R.rank) add(TSHHT3_VARIABLE, R.number.variable[i], 1);
   for (std::size_t i = 0; i < R.number.state.size(); i++)
     if (R.number.state_owner[i] == R.rank) add(TSHHT3_STATE, R.number.state[i], 1);
+  for (auto &x : R.scene.extensions) {
+    add(TSHHT3_COORDINATE, x->start[R.rank], x->coordinates());
+    add(TSHHT3_HOLONOMIC, x->start[R.rank] + x->coordinates(), x->multipliers());
+  }
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
     PetscCall(ISDestroy(&R.roles[r]));
     PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)role[r].size(), role[r].data(), PETSC_COPY_VALUES, &R.roles[r]));

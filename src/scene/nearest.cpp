@@ -24,12 +24,9 @@ Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
 {
   const std::vector<int>     &d = Directions(KindOf(s, b));
   Eigen::Matrix<double, 6, 6> M = Eigen::Matrix<double, 6, 6>::Zero();
-  if (b.carrier >= 0) { /* the frame of an attachment: light, so that the body that carries it decides */
-    BodyData light = s.bodies[b.carrier];
-    light.A        = b.A;
-    light.mass *= 1e-3;
-    light.inertia = 1e-3 * light.inertia.trace() * Matrix3::Identity();
-    return Mobility(s, light);
+  if (b.massless) {
+    M.diagonal() << Vector3::Constant(1 / b.light_mass), Vector3::Constant(1 / b.light_inertia);
+    return M;
   }
   M.topLeftCorner<3, 3>().diagonal().setConstant(1 / b.mass);
   if (s.planar)

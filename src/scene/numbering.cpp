@@ -1,4 +1,5 @@
 /* Global numbers of all unknowns, the same computation on every rank. */
+#include "extension.h"
 #include "runtime.h"
 
 namespace hhtdae
@@ -59,6 +60,12 @@ PetscErrorCode Number(Runtime &R)
   for (StoreBase *store : s.order) store->start.assign(store->size(), -1);
 
   N.first.assign(R.size + 1, 0);
+  for (auto &x : s.extensions) {
+    const PetscInt mine = x->unknowns();
+    x->start.assign(R.size, 0);
+    PetscCallMPI(MPI_Allgather(&mine, 1, MPIU_INT, x->start.data(), 1, MPIU_INT, s.comm));
+    for (PetscMPIInt r = 0; r < R.size; r++) N.first[r + 1] += x->start[r];
+  }
   Visit(R, [&](PetscMPIInt owner, int count, PetscInt &) { N.first[owner + 1] += count; });
   for (PetscMPIInt r = 0; r < R.size; r++) N.first[r + 1] += N.first[r];
   std::vector<PetscInt> next(N.first.begin(), N.first.end() - 1);
@@ -66,6 +73,12 @@ PetscErrorCode Number(Runtime &R)
     number = count ? next[owner] : -1;
     next[owner] += count;
   });
+  for (auto &x : s.extensions)
+    for (PetscMPIInt r = 0; r < R.size; r++) {
+      const PetscInt count = x->start[r];
+      x->start[r]          = next[r];
+      next[r] += count;
+    }
   R.start = N.first[R.rank];
   R.n     = N.first[R.rank + 1] - R.start;
   PetscFunctionReturn(0);

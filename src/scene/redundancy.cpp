@@ -13,6 +13,7 @@
   for again at a neighbouring position that satisfies the constraints, and only those that are redundant there too are
   dropped.
 */
+#include "extension.h"
 #include "start.h"
 #include <Eigen/Dense>
 #include <Eigen/OrderingMethods>
@@ -346,6 +347,12 @@ PetscErrorCode DropRedundant(Runtime &R)
   s.started.coordinates = s.started.rows = s.started.redundant = 0;
   s.started.dropped.clear();
   for (const BodyData &b : s.bodies) s.started.coordinates += CoordinatesOf(s, b);
+  for (const auto &x : s.extensions) {
+    PetscInt mine[2] = {x->coordinates(), x->multipliers()}, all[2];
+    PetscCallMPI(MPI_Allreduce(mine, all, 2, MPIU_INT, MPI_SUM, s.comm));
+    s.started.coordinates += all[0];
+    s.started.rows += all[1];
+  }
   for (const RowBlock &b : blocks)
     for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);

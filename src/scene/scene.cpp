@@ -1,4 +1,5 @@
 /* The scene as its user describes it. */
+#include "extension.h"
 #include "start.h"
 #include <cmath>
 

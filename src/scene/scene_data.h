@@ -31,7 +31,9 @@ struct BodyData {
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
   std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
-  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: a flexible body; it has no mass */
+  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: its flexible body */
+  bool        massless = false; /* such a frame; what assembly takes for its mass is a little of the body that carries it */
+  double      light_mass = 0, light_inertia = 0;
 };
 
 struct MarkerData {
@@ -48,6 +50,7 @@ struct ScalarRef {
 };
 
 class StoreBase; /* all instances of one kernel, store.h */
+class Extension; /* unknowns of other kinds, extension.h */
 
 /* One kernel instance of an element */
 struct Part {
@@ -108,6 +111,7 @@ struct SceneData {
   std::vector<ExpressionData> variables, states;
   std::map<std::type_index, std::unique_ptr<StoreBase>> stores;
   std::vector<StoreBase *>    order; /* of first use: the order of assembly */
+  std::vector<std::unique_ptr<Extension>> extensions;
   Vector3                     gravity = Vector3::Zero();
   std::vector<ChannelData>    channels;
   std::vector<ShapeData>      shapes;

@@ -1,4 +1,5 @@
 /* What the scene consists of, and what its solution does without because the scene has none of it: -scene_view, -ts_view. */
+#include "extension.h"
 #include "start.h"
 
 namespace hhtdae
@@ -57,6 +58,7 @@ PetscErrorCode Scene::view(PetscViewer viewer) const
   without(R.uses_acceleration, "accelerations in definitions");
   without(R.size > 1, "exchange between ranks");
   without((bool)R.recorder, "output");
+  without(!s.extensions.empty(), "finite-element bodies");
   PetscCall(PetscViewerASCIIPrintf(viewer, "  unknowns: %d, of these %d multipliers, %d force states, %d variables, %d states\n",
                                    (int)R.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));

@@ -44,7 +44,10 @@ PetscErrorCode MakeBalance(const Runtime &R, const Evaluation &e, Balance &b)
     if (R.bodies.body[i].kind == BodyKind::Flexible) AddFlexible(R.bodies, i, e, b);
     else AddBody(R.bodies.body[i], R.bodies.now[i], R.bodies.gravity, b);
   }
-  for (const auto &batch : R.batches) b.elastic += batch->energy(e);
+  for (const auto &batch : R.batches) {
+    b.elastic += batch->energy(e);
+    batch->addTo(b, e);
+  }
   if (R.size == 1) PetscFunctionReturn(0);
   double all[9] = {b.kinetic, b.gravity, b.elastic, b.linear(0), b.linear(1), b.linear(2), b.angular(0), b.angular(1), b.angular(2)};
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, all, 9, MPI_DOUBLE, MPI_SUM, R.scene.comm));

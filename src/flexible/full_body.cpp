@@ -1,0 +1,311 @@
+#include "flexible/full_body.h"
+#include "flexible/assembly.h"
+#include "flexible/exchange.h"
+#include "scene/runtime.h"
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace hhtdae
+{
+
+
+PetscMPIInt FullExtension::ownerOf(PetscInt node) const
+{
+  return (PetscMPIInt)(std::upper_bound(node_first.begin(), node_first.end(), node) - node_first.begin()) - 1;
+}
+
+PetscInt FullExtension::number(PetscInt node) const
+{
+  const PetscMPIInt r = ownerOf(node);
+  return start[r] + 3 * (node - node_first[r]);
+}
+
+PetscInt FullExtension::multiplier(PetscMPIInt r, PetscInt i) const { return start[r] + 3 * (node_first[r + 1] - node_first[r]) + i; }
+
+void FullExtension::initial(double *x, double *y) const
+{
+  std::copy(u.begin(), u.end(), x);
+  std::copy(v.begin(), v.end(), y);
+}
+
+void FullExtension::rest(const double *x)
+{
+  std::copy(x, x + u.size(), u.begin());
+  std::fill(v.begin(), v.end(), 0.0);
+}
+
+void FullExtension::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches)
+{
+  gravity = l.run->scene.gravity;
+  if (spec.law == FeLaw::Small) LocalizeMatrices(*this, l, batches);
+  else LocalizeElements(*this, l, batches);
+  LocalizeTies(*this, l, batches);
+}
+
+namespace
+{
+
+/* What one rank knows of a node of a set */
+struct SetNode {
+  PetscInt node;
+  double   X[3];
+};
+
+std::string Fault(const FeModel &m, const FullBody &b)
+{
+  if (!m.M || (b.law == FeLaw::Small && !m.K)) return "the FE model has no matrices; read or set them first";
+  if (!(b.rotation.transpose() * b.rotation - Matrix3::Identity()).isZero(1e-8) || b.rotation.determinant() < 0)
+    return "rotation must be orthonormal and right-handed";
+  if (!b.position.allFinite() || !b.velocity.allFinite() || !b.angular_velocity.allFinite()) return "position and velocities must be finite";
+  if (!(b.mass_damping >= 0) || !(b.stiffness_damping >= 0)) return "damping coefficients must not be negative";
+  if (b.law == FeLaw::Large && b.stiffness_damping != 0) return "damping in proportion to K goes with FeLaw::Small alone";
+  for (const Attachment &a : b.attachments)
+    if (!m.sets.count(a.set.empty() ? a.name : a.set)) return "attachment " + a.name + ": the model has no node set " + (a.set.empty() ? a.name : a.set);
+  return "";
+}
+
+/* Elements go to every rank that owns one of their nodes */
+PetscErrorCode BringElements(FullExtension &x)
+{
+  const FeModel                      &m = *x.model;
+  std::vector<std::vector<FeElement>> out(x.node_first.size() - 1);
+  std::vector<std::size_t>            from;
+  PetscFunctionBegin;
+  for (const FeElement &e : m.elements) {
+    std::vector<PetscMPIInt> to;
+    for (int i = 0; i < FeNodes(e.type); i++) to.push_back(x.ownerOf(e.node[i]));
+    std::sort(to.begin(), to.end());
+    to.erase(std::unique(to.begin(), to.end()), to.end());
+    for (PetscMPIInt r : to) out[r].push_back(e);
+  }
+  PetscCall(Exchange(m.comm, out, &x.elements, &from));
+  FeModel here(m.comm); /* for the exchange of their nodes alone */
+  here.elements = x.elements;
+  here.own      = m.own;
+  ElementNodes nodes;
+  PetscCall(nodes.setUp(here));
+  x.near = nodes.global;
+  x.near_x.resize(3 * x.near.size() + 1);
+  PetscCall(nodes.bring(3, m.coordinates.data(), x.near_x.data()));
+  for (std::size_t i = 0; i < x.near.size(); i++) {
+    const Vector3 p = x.placed(&x.near_x[3 * i]);
+    std::copy(p.data(), p.data() + 3, &x.near_x[3 * i]);
+  }
+  PetscFunctionReturn(0);
+}
+
+/* All nodes of an attachment on every rank, in the order of their numbers */
+PetscErrorCode Gather(const FeModel &m, const Attachment &a, std::vector<SetNode> *all)
+{
+  std::vector<SetNode> mine;
+  PetscFunctionBegin;
+  for (PetscInt n : m.sets.at(a.set.empty() ? a.name : a.set)) {
+    const double *X = &m.coordinates[3 * (n - m.first)];
+    mine.push_back({n, {X[0], X[1], X[2]}});
+  }
+  PetscCall(GatherAll(m.comm, mine, all));
+  std::sort(all->begin(), all->end(), [](const SetNode &p, const SetNode &q) { return p.node < q.node; });
+  PetscFunctionReturn(0);
+}
+
+/* The least of the second moments about the centroid, relative to the largest: zero for a line */
+double Spread(const TieNodes &t)
+{
+  Vector3 c = Vector3::Zero();
+  for (std::size_t i = 0; i < t.arm.size(); i++) c += t.weight[i] * t.arm[i];
+  Matrix3 S = Matrix3::Zero();
+  for (std::size_t i = 0; i < t.arm.size(); i++) S += t.weight[i] * (t.arm[i] - c) * (t.arm[i] - c).transpose();
+  const Vector3 s = Eigen::SelfAdjointEigenSolver<Matrix3>(S).eigenvalues();
+  return s(2) > 0 ? s(1) / s(2) : 0;
+}
+
+PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
+{
+  const FeModel       &m = *x.model;
+  std::vector<SetNode> nodes;
+  TieNodes             t;
+  PetscMPIInt          rank;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(m.comm, &rank));
+  PetscCall(Gather(m, a, &nodes));
+  PetscCheck(!nodes.empty(), m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: its node set is empty", a.name.c_str());
+  PetscCheck(a.weights.empty() || a.weights.size() == nodes.size(), m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: %zu weights for %zu nodes", a.name.c_str(),
+             a.weights.size(), nodes.size());
+  double sum = 0;
+  *point     = Vector3::Zero();
+  for (std::size_t i = 0; i < nodes.size(); i++) {
+    t.node.push_back(nodes[i].node);
+    t.weight.push_back(a.weights.empty() ? 1 : a.weights[i]);
+    sum += t.weight.back();
+    *point += t.weight.back() * Eigen::Map<const Vector3>(nodes[i].X);
+  }
+  PetscCheck(sum > 0, m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: the sum of its weights is %g, must be positive", a.name.c_str(), sum);
+  *point = a.at_given ? a.position : Vector3(*point / sum);
+  for (std::size_t i = 0; i < nodes.size(); i++) {
+    t.weight[i] /= sum;
+    t.arm.push_back(Eigen::Map<const Vector3>(nodes[i].X) - *point);
+  }
+  t.tie = a.tie;
+  PetscCheck(nodes.size() >= 3 && Spread(t) > 1e-8, m.comm, PETSC_ERR_ARG_WRONG,
+             "attachment %s: its %zu nodes are on a line, so that they do not hold a frame; take nodes of a face", a.name.c_str(), nodes.size());
+  if (t.tie == Tie::Rigid) {
+    std::vector<PetscInt> next(x.node_first.size(), 0);
+    next[rank] = x.own_multipliers;
+    /* every rank counts its own; the others' numbers come from them */
+    PetscCallMPI(MPI_Allgather(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, next.data(), 1, MPIU_INT, m.comm));
+    for (PetscInt n : t.node) {
+      PetscInt &i = next[x.ownerOf(n)];
+      t.lambda.push_back(i);
+      i += 3;
+    }
+    x.own_multipliers = next[rank];
+  } else {
+    t.owner = x.ownerOf(t.node[0]);
+    t.first = x.own_multipliers;
+    PetscCallMPI(MPI_Bcast(&t.first, 1, MPIU_INT, t.owner, m.comm));
+    if (t.owner == rank) x.own_multipliers += 6;
+  }
+  x.ties.push_back(t);
+  PetscFunctionReturn(0);
+}
+
+/* The frame of an attachment, moving with the undeformed body */
+Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, const Vector3 &point, double mass, double size)
+{
+  BodyData f;
+  f.name          = name;
+  f.inertia       = Matrix3::Zero();
+  f.center        = Vector3::Zero();
+  f.r             = x.placed(point.data());
+  f.A             = x.spec.rotation;
+  f.v             = x.spec.velocity + x.spec.angular_velocity.cross(f.r - x.spec.position);
+  f.w             = x.spec.angular_velocity;
+  f.massless      = true;
+  f.light_mass    = 1e-3 * mass;
+  f.light_inertia = 1e-3 * mass * size * size;
+  f.fixed_start   = true; /* the nodes do not move in the assembly phase */
+  scene.data().bodies.push_back(f);
+  return Body{(PetscInt)scene.data().bodies.size() - 1};
+}
+
+/* Mass and extent, for what has to be small or large beside them */
+PetscErrorCode Measure1(const FeModel &m, double *mass, double *size)
+{
+  Vec    one, M1;
+  double box[6], all[6];
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(m.M, &one, &M1));
+  PetscCall(VecSet(one, 1));
+  PetscCall(MatMult(m.M, one, M1));
+  PetscCall(VecDot(one, M1, mass));
+  *mass /= 3;
+  PetscCall(VecDestroy(&one));
+  PetscCall(VecDestroy(&M1));
+  for (int k = 0; k < 6; k++) box[k] = -PETSC_INFINITY;
+  for (std::size_t i = 0; i < m.coordinates.size(); i++) {
+    box[i % 3]     = std::max(box[i % 3], m.coordinates[i]);
+    box[3 + i % 3] = std::max(box[3 + i % 3], -m.coordinates[i]);
+  }
+  PetscCallMPI(MPI_Allreduce(box, all, 6, MPI_DOUBLE, MPI_MAX, m.comm));
+  *size = std::hypot(all[0] + all[3], all[1] + all[4], all[2] + all[5]);
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeModel &model, const FullBody &body)
+{
+  auto        x = std::make_unique<FullExtension>();
+  PetscMPIInt rank, size;
+  double      mass, extent;
+  PetscFunctionBegin;
+  const std::string fault = scene.data().planar ? "it needs a scene in space" : Fault(model, body);
+  PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
+  PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
+  PetscCallMPI(MPI_Comm_size(model.comm, &size));
+  x->spec  = body;
+  x->model = &model;
+  x->node_first.resize(size + 1);
+  PetscCallMPI(MPI_Allgather(&model.first, 1, MPIU_INT, x->node_first.data(), 1, MPIU_INT, model.comm));
+  x->node_first[size] = model.nodes;
+  for (PetscInt n = 0; n < model.own; n++) {
+    const Vector3 p = x->placed(&model.coordinates[3 * n]), w = body.velocity + body.angular_velocity.cross(p - body.position);
+    x->u.insert(x->u.end(), p.data(), p.data() + 3);
+    x->v.insert(x->v.end(), w.data(), w.data() + 3);
+  }
+  if (body.law == FeLaw::Large) {
+    PetscInt mine = (PetscInt)model.elements.size(), all;
+    PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, model.comm));
+    PetscCheck(all > 0, model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: large displacements need elements, which this model does not have",
+               name.c_str());
+    PetscCall(BringElements(*x));
+  } else {
+    PetscCall(ExtractBlocks(*x));
+  }
+  PetscCall(Measure1(model, &mass, &extent));
+  for (const Attachment &a : body.attachments) {
+    Vector3 point;
+    PetscCall(MakeTie(*x, a, &point));
+    const Body frame = AddFrame(scene, *x, name + "." + a.name, point, mass, extent);
+    scene.data().markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
+    x->ties.back().frame = Marker{(PetscInt)scene.data().markers.size() - 1};
+    frames_[a.name]      = frame;
+  }
+  scene_     = &scene;
+  extension_ = x.get();
+  scene.data().extensions.push_back(std::move(x));
+  PetscFunctionReturn(0);
+}
+
+Body FullFeBody::attachment(const std::string &name) const
+{
+  const auto found = frames_.find(name);
+  return found == frames_.end() ? Body{} : found->second;
+}
+
+PetscErrorCode FullFeBody::positions(TS ts, PetscReal t, std::vector<double> *x) const
+{
+  Vec           U;
+  const double *u;
+  PetscFunctionBegin;
+  PetscCheck(scene_ && scene_->data().run, PETSC_COMM_SELF, PETSC_ERR_ORDER, "the scene has no TS yet: call Scene::createTS() first");
+  const Runtime &R = *scene_->data().run;
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecDuplicate(U, &U));
+  PetscCall(TSHHT3Interpolate(ts, t, U, nullptr, nullptr));
+  PetscCall(VecGetArrayRead(U, &u));
+  const double *own = u + extension_->start[R.rank] - R.start;
+  x->assign(own, own + extension_->coordinates());
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecDestroy(&U));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FullFeBody::writeField(TS ts, PetscReal t, const std::string &file) const
+{
+  const FeModel      &m = *extension_->model;
+  std::vector<double> x;
+  ReducedBody         b; /* whose one mode is the displacement */
+  PetscFunctionBegin;
+  PetscCall(positions(ts, t, &x));
+  b.comm = m.comm;
+  b.own = m.own;
+  b.first = m.first;
+  b.fe_nodes = m.nodes;
+  b.label = m.label;
+  b.elements = m.elements;
+  b.coordinates.resize(x.size());
+  b.shape.resize((PetscInt)x.size(), 1);
+  for (PetscInt n = 0; n < m.own; n++) {
+    const Vector3 p = extension_->placed(&m.coordinates[3 * n]);
+    for (int c = 0; c < 3; c++) {
+      b.coordinates[3 * n + c] = p(c);
+      b.shape(3 * n + c, 0)    = x[3 * n + c] - p(c);
+    }
+  }
+  b.modal.omega = Eigen::VectorXd::Ones(1);
+  PetscCall(WriteField(b, Eigen::VectorXd::Ones(1), file));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

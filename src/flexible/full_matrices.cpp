@@ -1,0 +1,152 @@
+/* A finite-element body by its matrices: M (x'' - g) + (a M + b K) x' + K (x - X), rows of own nodes. */
+#include "flexible/full_nodes.h"
+#include <algorithm>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+class MatrixBatch : public Batch
+{
+public:
+  const FullExtension   &x;
+  std::vector<NodePlace> near;
+  PetscInt               own; /* place of the first own node in near */
+
+  MatrixBatch(const FullExtension &e, Localizer &l) : x(e)
+  {
+    for (PetscInt n : x.near) near.push_back(PlaceNode(x, l, n));
+    own = (PetscInt)(std::lower_bound(x.near.begin(), x.near.end(), x.model->first) - x.near.begin());
+  }
+
+  void pattern(Pattern &p) override
+  {
+    for (PetscInt n = 0; n < x.model->own; n++)
+      for (PetscInt k = x.block_first[n]; k < x.block_first[n + 1]; k++) request_.push_back(p.need(near[own + n].group, near[x.block_near[k]].group));
+  }
+
+  void residual(Evaluation &ev) override
+  {
+    const double a = x.spec.mass_damping, b = x.spec.stiffness_damping;
+    for (PetscInt n = 0; n < x.model->own; n++) {
+      Vector3 f = Vector3::Zero();
+      for (PetscInt k = x.block_first[n]; k < x.block_first[n + 1]; k++) {
+        const NodePlace &j = near[x.block_near[k]];
+        const Vector3    v = At(ev.v, j);
+        f += x.block_M[k] * (At(ev.a, j) - x.gravity + a * v) + x.block_K[k] * (displacement(ev, x.block_near[k]) + b * v);
+      }
+      AddRows(ev, near[own + n], f);
+    }
+  }
+
+  void jacobian(Evaluation &ev) override
+  {
+    const double m = ev.sa + ev.sv * x.spec.mass_damping, s = 1 + ev.sv * x.spec.stiffness_damping;
+    for (std::size_t k = 0; k < slot_.size(); k++) ev.sink.add(slot_[k], Matrix3(m * x.block_M[k] + s * x.block_K[k]), 3, 3);
+  }
+
+  void addTo(Balance &B, const Evaluation &ev) const override
+  {
+    for (PetscInt n = 0; n < x.model->own; n++) {
+      const NodePlace &i = near[own + n];
+      Vector3          p = Vector3::Zero(), weight = p, f = p;
+      for (PetscInt k = x.block_first[n]; k < x.block_first[n + 1]; k++) {
+        p += x.block_M[k] * At(ev.v, near[x.block_near[k]]);
+        weight += x.block_M[k] * x.gravity;
+        f += x.block_K[k] * displacement(ev, x.block_near[k]);
+      }
+      B.kinetic += 0.5 * p.dot(At(ev.v, i));
+      B.gravity -= weight.dot(At(ev.u, i));
+      B.elastic += 0.5 * f.dot(displacement(ev, own + n));
+      B.linear += p;
+      B.angular += At(ev.u, i).cross(p);
+    }
+  }
+
+private:
+  Vector3 displacement(const Evaluation &ev, PetscInt k) const { return At(ev.u, near[k]) - Eigen::Map<const Vector3>(&x.near_x[3 * k]); }
+};
+
+/* Blocks of one node's rows, by the global number of the column's node */
+using Row = std::map<PetscInt, std::pair<Matrix3, Matrix3>>;
+
+PetscErrorCode AddRow(Mat A, PetscInt row, bool mass, Row *blocks)
+{
+  PetscInt           n;
+  const PetscInt    *columns;
+  const PetscScalar *values;
+  PetscFunctionBegin;
+  PetscCall(MatGetRow(A, row, &n, &columns, &values));
+  for (PetscInt k = 0; k < n; k++) {
+    auto found = blocks->find(columns[k] / 3);
+    if (found == blocks->end()) found = blocks->emplace(columns[k] / 3, std::make_pair(Matrix3(Matrix3::Zero()), Matrix3(Matrix3::Zero()))).first;
+    (mass ? found->second.second : found->second.first)(row % 3, columns[k] % 3) = values[k];
+  }
+  PetscCall(MatRestoreRow(A, row, &n, &columns, &values));
+  PetscFunctionReturn(0);
+}
+
+/* Places of the nodes in x.near, from their owners */
+PetscErrorCode BringPlaces(FullExtension &x)
+{
+  const FeModel        &m = *x.model;
+  std::vector<PetscInt> index;
+  Vec                   all, here;
+  IS                    from;
+  VecScatter            scatter;
+  double               *a;
+  PetscFunctionBegin;
+  PetscCall(VecCreateMPIWithArray(m.comm, 3, 3 * m.own, PETSC_DETERMINE, x.u.data(), &all));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * (PetscInt)x.near.size(), &here));
+  PetscCall(ISCreateBlock(m.comm, 3, (PetscInt)x.near.size(), x.near.data(), PETSC_COPY_VALUES, &from));
+  PetscCall(VecScatterCreate(all, from, here, nullptr, &scatter));
+  PetscCall(VecScatterBegin(scatter, all, here, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, all, here, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArray(here, &a));
+  x.near_x.assign(a, a + 3 * x.near.size());
+  PetscCall(VecRestoreArray(here, &a));
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(ISDestroy(&from));
+  PetscCall(VecDestroy(&here));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode ExtractBlocks(FullExtension &x)
+{
+  const FeModel   &m = *x.model;
+  const Matrix3    R = x.spec.rotation;
+  PetscFunctionBegin;
+  x.block_first.assign(1, 0);
+  for (PetscInt n = 0; n < m.own; n++) {
+    Row row;
+    for (int c = 0; c < 3; c++) {
+      PetscCall(AddRow(m.K, 3 * (m.first + n) + c, false, &row));
+      PetscCall(AddRow(m.M, 3 * (m.first + n) + c, true, &row));
+    }
+    for (const auto &b : row) {
+      x.block_near.push_back(b.first);
+      x.block_K.push_back(R * b.second.first * R.transpose());
+      x.block_M.push_back(R * b.second.second * R.transpose());
+    }
+    x.block_first.push_back((PetscInt)x.block_near.size());
+  }
+  x.near = x.block_near;
+  for (PetscInt n = 0; n < m.own; n++) x.near.push_back(m.first + n);
+  std::sort(x.near.begin(), x.near.end());
+  x.near.erase(std::unique(x.near.begin(), x.near.end()), x.near.end());
+  for (PetscInt &n : x.block_near) n = (PetscInt)(std::lower_bound(x.near.begin(), x.near.end(), n) - x.near.begin());
+  PetscCall(BringPlaces(x));
+  PetscFunctionReturn(0);
+}
+
+void LocalizeMatrices(const FullExtension &x, Localizer &l, std::vector<std::unique_ptr<Batch>> &batches)
+{
+  batches.push_back(std::make_unique<MatrixBatch>(x, l));
+}
+
+} // namespace hhtdae

@@ -1,0 +1,29 @@
+/*
+  Unknowns that a scene gets from another library: coordinates of a kind that it does not know, with mass and forces of their own,
+  and holonomic constraints between them and bodies. Every rank has its part; the numbers are behind those of the scene on each rank.
+*/
+#ifndef HHTDAE_SCENE_EXTENSION_H
+#define HHTDAE_SCENE_EXTENSION_H
+
+#include "scene_data.h"
+
+namespace hhtdae
+{
+
+class Extension
+{
+public:
+  virtual ~Extension()                        = default;
+  virtual PetscInt coordinates() const        = 0; /* of this rank */
+  virtual PetscInt multipliers() const        = 0; /* of this rank, behind its coordinates; their rows are holonomic constraints */
+  virtual void     initial(double *u, double *v) const = 0; /* own coordinates */
+  virtual void     rest(const double *u) = 0; /* these become the initial coordinates, at rest */
+  virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  PetscInt         unknowns() const { return coordinates() + multipliers(); }
+
+  std::vector<PetscInt> start; /* global number of the first unknown on every rank; numbering.cpp */
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,136 @@
+/* A finite-element model as it is in a scene: Jacobian against differences, rigid motion, ties, refusals. */
+#include "box_model.h"
+#include "hhtdae/flexible.h"
+#include "scene/extension.h"
+#include "scene_jacobian.h"
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+struct Beam8 {
+  FeModel model{PETSC_COMM_WORLD};
+  explicit Beam8(std::vector<int> n = {2, 1, 1}, Material soft = {1000, 0.3, 2}) { BoxBuilder({{n[0], n[1], n[2]}, {2, 0.7, 0.5}, soft}, &model); }
+};
+
+FullBody placed(FeLaw law)
+{
+  FullBody b;
+  b.law              = law;
+  b.position         = {0.4, -0.1, 0.7};
+  b.rotation         = Eigen::AngleAxisd(0.8, Vector3(1, -2, 0.5).normalized()).toRotationMatrix();
+  b.velocity         = {0.3, 1, -0.2};
+  b.angular_velocity = {1, 0.5, -2};
+  b.mass_damping     = 0.3;
+  return b;
+}
+
+/* Held by a rigid attachment on a ball joint, an average carries a rigid body and a spring */
+struct Held {
+  Beam8      beam;
+  Scene      scene{PETSC_COMM_WORLD};
+  FullFeBody fe;
+  explicit Held(FeLaw law)
+  {
+    FullBody b = placed(law);
+    if (law == FeLaw::Small) b.stiffness_damping = 0.02;
+    b.attachments.resize(2);
+    b.attachments[0].name     = "left";
+    b.attachments[0].at_given = true;
+    b.attachments[0].position = {0, 0.2, -0.1};
+    b.attachments[1].name     = "right";
+    b.attachments[1].tie      = Tie::Average;
+    b.attachments[1].at_given = true;
+    b.attachments[1].position = {2.1, 0.3, 0.2};
+    scene.gravity({0.3, 1, -9.81});
+    must(fe.add(scene, "beam", beam.model, b));
+    const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
+    const auto   l = scene.data().frame(left), r = scene.data().frame(right);
+    scene.add("ball", Spherical{left, scene.marker(scene.ground(), l.x)});
+    RigidBody load;
+    load.position = r.x;
+    load.rotation = r.R;
+    scene.add("hinge", Revolute{right, scene.marker(scene.add("load", load))});
+    scene.add("spring", SpringDamper{right, scene.marker(scene.ground(), Vector3(r.x + Vector3(1, 1, 1))), 100, 5, 1});
+    scene.start().assembly = Assembly::Off;
+    must(scene.setUp());
+  }
+};
+
+} // namespace
+
+TEST(FullBody, JacobianAgainstDifferences)
+{
+  for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
+    Held h(law);
+    for (unsigned seed : {1, 2}) {
+      AnyState s(h.scene, seed, 0.1);
+      EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5) << (law == FeLaw::Small ? "small" : "large");
+    }
+  }
+}
+
+/* A turn at large strains nothing; neither does a small displacement that is rigid to first order */
+TEST(FullBody, RigidMotionMakesNoForce)
+{
+  for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
+    Beam8      beam;
+    Scene      scene(PETSC_COMM_WORLD);
+    FullFeBody fe;
+    FullBody   b     = placed(law);
+    b.mass_damping   = 0;
+    must(fe.add(scene, "beam", beam.model, b));
+    must(scene.setUp());
+    AnyState s(scene, 1, 0);
+    must(VecSet(s.V, 0));
+    must(VecSet(s.A, 0));
+    double       *u;
+    const Matrix3 R = Eigen::AngleAxisd(law == FeLaw::Large ? 2.5 : 1e-7, Vector3(1, 1, 0.3).normalized()).toRotationMatrix();
+    must(VecGetArray(s.U, &u));
+    for (PetscInt i = 0; i < s.R.n; i += 3) {
+      const Vector3 x(u[i], u[i + 1], u[i + 2]), y = R * x + Vector3(5, -3, 1);
+      std::copy(y.data(), y.data() + 3, u + i);
+    }
+    must(VecRestoreArray(s.U, &u));
+    double most = 0;
+    for (double f : s.residual()) widen(most, std::abs(f));
+    EXPECT_LT(most, 1e-10);
+  }
+}
+
+/* The position of a marker on a frame follows what its nodes do: ties are met, and average what they say */
+TEST(FullBody, TiesHold)
+{
+  Held        h(FeLaw::Large);
+  AnyState    s(h.scene, 1, 0);
+  const Array f = s.residual();
+  for (std::size_t x = 0; x < h.scene.data().extensions.size(); x++) {
+    const Extension &e = *h.scene.data().extensions[x];
+    for (PetscInt i = 0; i < e.multipliers(); i++) EXPECT_NEAR(f[e.start[0] + e.coordinates() + i], 0, 1e-12);
+    EXPECT_EQ(e.multipliers(), 3 * 4 + 6);
+  }
+}
+
+TEST(FullBody, RefusesByName)
+{
+  const auto refused = [](const std::function<void(FeModel &, FullBody &)> &spoil, const char *why) {
+    Beam8      beam;
+    Scene      scene(PETSC_COMM_WORLD);
+    FullFeBody fe;
+    FullBody   b = placed(FeLaw::Large);
+    spoil(beam.model, b);
+    ErrorTrap trap;
+    EXPECT_NE(fe.add(scene, "beam", beam.model, b), 0);
+    EXPECT_TRUE(trap.says(why)) << trap.message;
+  };
+  refused([](FeModel &m, FullBody &) { m.elements.clear(); }, "need elements");
+  refused([](FeModel &, FullBody &b) { b.stiffness_damping = 1; }, "FeLaw::Small");
+  refused([](FeModel &, FullBody &b) { b.attachments = {{"middle"}}; }, "no node set middle");
+  refused([](FeModel &m, FullBody &b) {
+    m.sets["edge"] = {m.sets["left"][0], m.sets["left"][1]};
+    b.attachments  = {{"edge"}};
+  }, "on a line");
+  refused([](FeModel &, FullBody &b) { b.rotation(0, 0) += 1; }, "orthonormal");
+}
