@@ -94,6 +94,68 @@ TEST(ReducedFile, RefusedByAll)
   EXPECT_NE(all.body.save("/nowhere/body.h5"), 0);
 }
 
+/* Matrices, nodes and sets from files: each rank reads a range of lines, all lines arrive */
+TEST(Import, AsOnOneRank)
+{
+  const PetscInt n = 40;
+  Scratch        k(PETSC_COMM_WORLD, "k.mtx"), m(PETSC_COMM_WORLD, "m.mtx"), nodes(PETSC_COMM_WORLD, "nodes"),
+      sets(PETSC_COMM_WORLD, "sets");
+  std::ostringstream K, M, X;
+  PetscInt           count = 0;
+  for (PetscInt i = 1; i <= 3 * n; i++) {
+    for (PetscInt j = i; j <= std::min(3 * n, i + 7); j += 2, count++)
+      K << j << " " << i << " " << (i == j ? 9 : Number(i, j)) << "\n";
+    M << i << " " << i << " " << 1 + 0.01 * i << "\n";
+  }
+  for (PetscInt i = 0; i < n; i++) X << 10 + 3 * i << " " << i << " 0.5 " << -i << "\n";
+  if (!Rank()) {
+    k.write("%%MatrixMarket matrix coordinate real symmetric\n" + std::to_string(3 * n) + " " + std::to_string(3 * n) +
+            " " + std::to_string(count) + "\n" + K.str());
+    m.write(M.str());
+    nodes.write(X.str());
+    sets.write("ends 10 127\nall 10 13 16 127 124\nnone\n");
+  }
+  MPI_Barrier(PETSC_COMM_WORLD);
+  FeModel all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
+  must(all.readMatrices(k.name, m.name, nodes.name, sets.name));
+  must(alone.readMatrices(k.name, m.name, nodes.name, sets.name));
+  EXPECT_EQ(all.nodes, n);
+  for (PetscInt i = 0; i < all.own; i++) EXPECT_EQ(all.label[(std::size_t)i], 10 + 3 * (all.first + i));
+  EXPECT_EQ(all.coordinates, std::vector<double>(alone.coordinates.begin() + 3 * all.first,
+                                                 alone.coordinates.begin() + 3 * (all.first + all.own)));
+  ASSERT_EQ(all.sets.size(), 3u);
+  for (const auto &set : alone.sets) {
+    std::vector<PetscInt> mine;
+    for (PetscInt i : set.second)
+      if (i >= all.first && i < all.first + all.own) mine.push_back(i);
+    EXPECT_EQ(all.sets[set.first], mine) << set.first;
+  }
+  for (bool mass : {false, true})
+    for (PetscInt row = 3 * all.first; row < 3 * (all.first + all.own); row++) {
+      PetscInt           a, b;
+      const PetscInt    *i, *j;
+      const PetscScalar *v, *w;
+      must(MatGetRow(mass ? all.M : all.K, row, &a, &i, &v));
+      must(MatGetRow(mass ? alone.M : alone.K, row, &b, &j, &w));
+      ASSERT_EQ(a, b);
+      for (PetscInt c = 0; c < a; c++) {
+        EXPECT_EQ(i[c], j[c]);
+        EXPECT_EQ(v[c], w[c]);
+      }
+      must(MatRestoreRow(mass ? all.M : all.K, row, &a, &i, &v));
+      must(MatRestoreRow(mass ? alone.M : alone.K, row, &b, &j, &w));
+    }
+  /* a line of one rank's range is bad: all refuse */
+  FeModel   refused(PETSC_COMM_WORLD);
+  ErrorTrap trap;
+  MPI_Barrier(PETSC_COMM_WORLD);
+  if (!Rank()) m.write(M.str() + "5 five 5\n");
+  MPI_Barrier(PETSC_COMM_WORLD);
+  EXPECT_NE(refused.readMatrices(k.name, m.name, nodes.name, sets.name), 0);
+  EXPECT_TRUE(trap.says("5 five 5")) << trap.message;
+  MPI_Barrier(PETSC_COMM_WORLD);
+}
+
 TEST(Field, AsOnOneRank)
 {
   HandMade              all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);

@@ -306,7 +306,7 @@ Arguments::Arguments(int argc, char **argv)
     else if (Contains(without_value, word.substr(1)) &&
              (!value || (std::strcmp(argv[i + 1], "0") && std::strcmp(argv[i + 1], "1") &&
                          std::strcmp(argv[i + 1], "true") && std::strcmp(argv[i + 1], "false"))))
-      words.push_back("true"); /* else PETSC takes the next word, a file's name, for its value */
+      words.push_back("true"); /* else PETSc takes the next word, a file's name, for its value */
     else if (Contains(without_value, word.substr(1)))
       words.push_back(argv[++i]);
   }
@@ -374,6 +374,7 @@ PetscErrorCode ReadTask(const Arguments &arguments, Task *t)
 {
   std::string info;
   bool        mode, trace;
+  PetscBool   asked;
   PetscFunctionBegin;
   PetscCall(Flag("-traceback", &trace));
   PetscCall(Text("-body_info", &info));
@@ -398,6 +399,8 @@ PetscErrorCode ReadTask(const Arguments &arguments, Task *t)
   PetscCall(CheckSpelling());
   PetscCheck(t->kind != Task::ReduceModel || arguments.positional.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "\"%s\" belongs to no option; hhtreduce -help explains them", arguments.positional.c_str());
+  PetscCall(PetscOptionsHasHelp(nullptr, &asked));
+  if (asked && t->kind == Task::None) PetscFunctionReturn(0); /* PETSc has answered */
   PetscCheck(t->kind != Task::None, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "nothing to do: give a model (-mesh, -calculix, -stiffness and -mass), -info or -vtu; hhtreduce -help "
              "explains them");
