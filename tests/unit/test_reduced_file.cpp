@@ -5,6 +5,11 @@
 
 using namespace hhtest;
 
+/* petscviewerhdf5.h wants HDF5's headers, which a test need not have */
+PETSC_EXTERN PetscErrorCode PetscViewerHDF5Open(MPI_Comm, const char[], PetscFileMode, PetscViewer *);
+PETSC_EXTERN PetscErrorCode PetscViewerHDF5WriteAttribute(PetscViewer, const char[], const char[], PetscDataType,
+                                                          const void *);
+
 namespace
 {
 
@@ -141,10 +146,27 @@ TEST(ReducedFile, Truncated)
   EXPECT_SAYS(Refused(cut.name), "truncated");
 }
 
+/* Files that only HDF5 itself can make, through PETSc: another one, and one of a later version */
+TEST(ReducedFile, OtherFormatAndNewerVersion)
+{
+  HandMade    made(PETSC_COMM_SELF);
+  Scratch     other("other.h5"), newer("newer.h5");
+  PetscViewer viewer;
+  int         version = 2;
+  must(PetscViewerHDF5Open(PETSC_COMM_SELF, other.name.c_str(), FILE_MODE_WRITE, &viewer));
+  must(PetscViewerHDF5WriteAttribute(viewer, "/", "version", PETSC_INT, &version));
+  must(PetscViewerDestroy(&viewer));
+  EXPECT_SAYS(Refused(other.name), "it is an HDF5 file, but not one of a reduced body");
+  must(made.body.save(newer.name));
+  must(PetscViewerHDF5Open(PETSC_COMM_SELF, newer.name.c_str(), FILE_MODE_UPDATE, &viewer));
+  must(PetscViewerHDF5WriteAttribute(viewer, "/", "version", PETSC_INT, &version));
+  must(PetscViewerDestroy(&viewer));
+  EXPECT_SAYS(Refused(newer.name), "it has version 2 of the format, this program knows version 1");
+}
+
 TEST(ReducedFile, OtherFiles)
 {
-  Scratch  text("text.h5"), newer("newer.h5"), other("other.h5");
-  HandMade made(PETSC_COMM_SELF);
+  Scratch text("text.h5");
   EXPECT_SAYS(Refused("/nowhere/body.h5"), "/nowhere/body.h5: there is no such file");
   EXPECT_SAYS(Refused(testing::TempDir()), "it is not a file");
   text.write("not a body\n");
