@@ -32,6 +32,7 @@ void Place(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, con
 /* the same on every rank */
 bool UsesAcceleration(const SceneData &s)
 {
+  if (!s.extensions.empty()) return true; /* mass that couples coordinates of several ranks */
   for (const auto *list : {&s.variables, &s.states})
     for (const ExpressionData &d : *list)
       if (NeedsAcceleration(d.expression)) return true;
