@@ -233,8 +233,8 @@ PetscErrorCode NumberNodes(DM dm, FeModel *model, std::vector<PetscInt> *number,
     (*number)[p] = at >= 0 ? at : -(at + 1);
     if (at >= 0) model->own++;
   }
-  model->first = 0;
-  PetscCallMPI(MPI_Exscan(&model->own, &model->first, 1, MPIU_INT, MPI_SUM, model->comm));
+  PetscCallMPI(MPI_Scan(&model->own, &model->first, 1, MPIU_INT, MPI_SUM, model->comm));
+  model->first -= model->own;
   PetscCallMPI(MPI_Allreduce(&model->own, &model->nodes, 1, MPIU_INT, MPI_SUM, model->comm));
   PetscFunctionReturn(0);
 }

@@ -374,9 +374,10 @@ private:
       block.dim            = bytes.get<int>();
       block.entity         = bytes.get<int>();
       const int parametric = bytes.get<int>();
-      block.extra          = parametric ? block.dim : 0;
-      block.count          = bytes.integer8();
-      block.place          = bytes.at() - file_.begin;
+      if (block.dim < 0 || block.dim > 3) Fail("$Nodes is damaged");
+      block.extra = parametric ? block.dim : 0;
+      block.count = bytes.integer8();
+      block.place = bytes.at() - file_.begin;
       bytes.skip(block.count, 8 + 8 * (3 + block.extra));
       nodes_.push_back(block);
     }
