@@ -32,7 +32,7 @@ template <class F> static double Microseconds(double seconds, F &&f)
   return 1e6 * (now - start) / (double)calls;
 }
 
-template <class Shape> static PetscErrorCode Measure(double seconds)
+template <class Shape> static PetscErrorCode TimeKernels(double seconds)
 {
   const Material                            steel{2.1e11, 0.3, 7850};
   const fe::Lame                            lame(steel);
@@ -66,10 +66,10 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-seconds", &seconds, NULL));
   PetscCall(PetscPrintf(PETSC_COMM_SELF,
                         "microseconds per element         K        M    K + M   SVK force  + tangent   stress\n"));
-  PetscCall(Measure<fe::Tetrahedron4>(seconds));
-  PetscCall(Measure<fe::Tetrahedron10>(seconds));
-  PetscCall(Measure<fe::Brick8>(seconds));
-  PetscCall(Measure<fe::Brick20>(seconds));
+  PetscCall(TimeKernels<fe::Tetrahedron4>(seconds));
+  PetscCall(TimeKernels<fe::Tetrahedron10>(seconds));
+  PetscCall(TimeKernels<fe::Brick8>(seconds));
+  PetscCall(TimeKernels<fe::Brick20>(seconds));
   PetscCall(PetscFinalize());
   return 0;
 }
