@@ -1,7 +1,7 @@
 """Installs into an empty prefix, then builds and runs a small C program, and a scene in C++, that know nothing but that prefix.
 
 Once with CMake's find_package(hhtdae), once with pkg-config hhtdae.
-usage: install.py build-tree cmake configuration directory-of-PETSc.pc
+usage: install.py build-tree cmake configuration directory-of-PETSc.pc [directory-of-SLEPc.pc]
 """
 
 import os
@@ -13,6 +13,7 @@ import tempfile
 from common import check, run
 
 build, cmake, configuration, petsc_pc = sys.argv[1:5]
+slepc_pc = sys.argv[5] if len(sys.argv) > 5 else ""
 here = os.path.dirname(os.path.abspath(__file__))
 
 
@@ -33,7 +34,7 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     libdirs = [folder for folder, _, files in os.walk(prefix) if "libhhtdae.so" in files]
     check(len(libdirs) == 1, "libhhtdae.so is in %s" % libdirs)
     installed = [os.path.join(folder, name)[len(prefix):] for folder, _, files in os.walk(prefix) for name in files]
-    foreign = [path for path in installed if "hhtdae" not in path and "hhtscene" not in path]
+    foreign = [path for path in installed if not any(own in path for own in ("hhtdae", "hhtscene", "hhtflexible", "hhtreduce"))]
     check(not foreign, "foreign files were installed: %s" % foreign)
 
     # The outside project is copied, so that nothing can be found by a relative path.
@@ -58,3 +59,17 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     with_pkg_config = os.path.join(work, "scene-with-pkg-config")
     run([os.environ.get("CXX", "c++"), "-std=c++17", os.path.join(outside, "scene", "outside_scene.cpp"), "-o", with_pkg_config, *flags])
     works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
+
+    # Flexible bodies, where the build has them
+    if not os.path.exists(os.path.join(libdirs[0], "libhhtflexible.so")):
+        sys.exit()
+    flexible = os.path.join(work, "flexible-with-cmake")
+    run([cmake, "-S", os.path.join(outside, "flexible"), "-B", flexible, "-DCMAKE_PREFIX_PATH=" + prefix])
+    run([cmake, "--build", flexible])
+    works(os.path.join(flexible, "outside_flexible"))
+    flags = run(["pkg-config", "--cflags", "--libs", "hhtflexible"], PKG_CONFIG_PATH=paths + os.pathsep + slepc_pc).split()
+    with_pkg_config = os.path.join(work, "flexible-with-pkg-config")
+    run([os.environ.get("CXX", "c++"), "-std=c++17", os.path.join(outside, "flexible", "outside_flexible.cpp"), "-o", with_pkg_config, *flags])
+    works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
+    reduced = run([os.path.join(prefix, "bin", "hhtreduce"), "-help"])
+    check("-attach" in reduced, "hhtreduce does not explain itself: " + reduced)
