@@ -113,6 +113,61 @@ TEST(FlexibleScene, JacobianAgainstDifferences)
   }
 }
 
+/* A variable and a force that read modal coordinates and an attachment */
+TEST(FlexibleScene, ExpressionsOfModalCoordinates)
+{
+  const ModalCloud c(9, 5, 11, true);
+  Scene            scene(PETSC_COMM_WORLD);
+  const Body       body = scene.add("arm", flexible(c));
+  const Marker     tip = scene.marker(scene.attachment(body, "tip"), {0.1, 0.2, 0});
+  const Expression f{{Measure::modal(body, 2), Measure::modal(body, 4), Measure::velocity(tip, 1)},
+                     [](const Real *m) -> Real { return m[0] * m[1] * 3. + sin(m[0]) + m[2] * m[2]; }};
+  const Variable   v = scene.variable("v", f);
+  scene.add("pull", UserScalarForce{tip, scene.marker(scene.ground(), {5, 5, 5}), Expression{{Measure::value(v), Measure::modal(body, 0)}, [](const Real *m) -> Real {
+                                      return m[0] * 2. - m[1];
+                                    }}});
+  must(scene.setUp());
+  AnyState s(scene, 4, 0.3);
+  EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5);
+  Scene other(PETSC_COMM_WORLD);
+  other.channel("eta", Measure::modal(other.add("arm", flexible(c)), 5));
+  ErrorTrap trap;
+  EXPECT_NE(other.setUp(), 0);
+  EXPECT_TRUE(trap.says("modes 0 to 4")) << trap.message;
+}
+
+/* Hung at one attachment in static equilibrium: the modes carry the weight as their stiffness says */
+TEST(FlexibleScene, StaticEquilibrium)
+{
+  const ModalCloud c(9, 5, 11, true);
+  FlexibleBody     b = flexible(c);
+  b.velocity.setZero();
+  b.angular_velocity.setZero();
+  Scene        scene(PETSC_COMM_WORLD);
+  const Body   body = scene.add("arm", b);
+  const Marker hub  = scene.marker(scene.attachment(body, "hub"));
+  const auto   at   = scene.data().frame(hub);
+  const Vector3 g(0.3, 1, -4);
+  scene.gravity(g);
+  scene.add("clamp", Fixed{hub, scene.marker(scene.ground(), at.x, at.R)});
+  scene.start().equilibrium = true;
+  must(scene.setUp());
+  AnyState s(scene, 1, 0);
+  must(VecSet(s.A, 0));
+  must(VecSet(s.V, 0));
+  /* the clamp's force -m g and the moment of the weight about it work on the modes at the attachment */
+  const BodyData        &d = scene.data().bodies[body.id];
+  const ModalAttachment &a = c.body.attachments[0];
+  const Eigen::Map<const Eigen::VectorXd> eta(d.flexible->deformation.data(), 5);
+  const SmallTurn turn(a.rotation * eta);
+  const Vector3   force = -c.body.mass * (d.A.transpose() * g), arm = a.position + a.translation * eta;
+  const Vector3   moment = -arm.cross(force);
+  const Eigen::VectorXd load = a.translation.transpose() * force + a.rotation.transpose() * (turn.J().transpose() * moment);
+  const Eigen::VectorXd expected = load.cwiseQuotient(c.body.omega.cwiseAbs2());
+  EXPECT_GT(expected.norm(), 0.01);
+  EXPECT_LT((eta - expected).norm(), 1e-8 * expected.norm());
+}
+
 /* The partial mass matrix leaves out what is quadratic in the modes, and so is exact to first order in a deformation at rest */
 TEST(FlexibleScene, PartialMassIsFirstOrder)
 {
