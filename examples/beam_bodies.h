@@ -1,0 +1,104 @@
+/* A solid beam in a scene, in three ways: the whole finite-element model, modes of it, two-node beams between rigid
+ * pieces. */
+#ifndef HHTEX_BEAM_BODIES_H
+#define HHTEX_BEAM_BODIES_H
+
+#include "beam_mesh.h"
+
+#include <memory>
+
+namespace hhtex
+{
+
+/* Bodies at the ends of the beam, with the space axes at the start, to join and to look at */
+struct BeamEnds {
+  hhtdae::Body root, tip;
+};
+
+/* The root is held rigidly, the tip is watched as the mean motion of its face */
+inline std::vector<hhtdae::Attachment> BeamAttachments()
+{
+  std::vector<hhtdae::Attachment> ends(2);
+  ends[0].name = "root";
+  ends[1].name = "tip";
+  ends[1].tie  = hhtdae::Tie::Average;
+  return ends;
+}
+
+/* The full model keeps a reference to model */
+inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &model, hhtdae::FeLaw law,
+                                  hhtdae::FullFeBody *fe, BeamEnds *ends)
+{
+  hhtdae::FullBody body;
+  PetscFunctionBegin;
+  body.law         = law;
+  body.attachments = BeamAttachments();
+  PetscCall(fe->add(scene, "beam", model, body));
+  *ends = {fe->attachment("root"), fe->attachment("tip")};
+  PetscFunctionReturn(0);
+}
+
+/* Craig and Bampton's modes: those of the attachments, and normal modes. Of several parts one after the other, each is
+   a body with modes of its own, from the model of one part. */
+inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &part, double length, int parts,
+                                   PetscInt modes, BeamEnds *ends)
+{
+  hhtdae::Reduction   reduction;
+  hhtdae::ReducedBody reduced;
+  PetscFunctionBegin;
+  reduction.attachments = BeamAttachments();
+  reduction.modes       = modes;
+  reduction.all_nodes   = false;
+  if (parts > 1) reduction.attachments[1].tie = hhtdae::Tie::Rigid;
+  PetscCall(hhtdae::Reduce(part, reduction, &reduced));
+  hhtdae::FlexibleBody body;
+  body.model = std::make_shared<hhtdae::ModalBody>(reduced.modal);
+  for (int k = 0; k < parts; k++) {
+    body.position             = {k * length, 0, 0};
+    const std::string  number = parts > 1 ? " " + std::to_string(k) : "";
+    const hhtdae::Body member = scene.add("beam" + number, body), root = scene.attachment(member, "root");
+    if (k == 0)
+      ends->root = root;
+    else
+      scene.add("weld" + number, hhtdae::Fixed{scene.marker(root), scene.marker(ends->tip)});
+    ends->tip = scene.attachment(member, "tip");
+  }
+  PetscFunctionReturn(0);
+}
+
+/* The mass is lumped at the nodes, half of a piece at either end */
+inline void AddBeamElements(hhtdae::Scene &scene, const SolidBeam &beam, int pieces, BeamEnds *ends)
+{
+  const double   l = beam.length / pieces, rho = beam.material.density;
+  hhtdae::Marker last;
+  for (int k = 0; k <= pieces; k++) {
+    const double      part = k == 0 || k == pieces ? l / 2 : l;
+    hhtdae::RigidBody node;
+    node.mass     = rho * beam.area() * part;
+    node.inertia  = (rho * part * hhtdae::Vector3(beam.Iyy() + beam.Izz(), beam.Iyy(), beam.Izz())).asDiagonal();
+    node.position = {k * l, 0, 0};
+    const hhtdae::Body   body = scene.add("node " + std::to_string(k), node);
+    const hhtdae::Marker here = scene.marker(body);
+    if (k == 0) ends->root = body;
+    ends->tip = body;
+    if (k > 0) {
+      hhtdae::Beam piece;
+      piece.i       = here;
+      piece.j       = last;
+      piece.length  = l;
+      piece.E       = beam.material.young;
+      piece.G       = beam.shearModulus();
+      piece.area    = beam.area();
+      piece.Iyy     = beam.Iyy();
+      piece.Izz     = beam.Izz();
+      piece.J       = beam.torsion();
+      piece.shear_y = piece.shear_z = 5. / 6 * beam.area();
+      scene.add("piece " + std::to_string(k), piece);
+    }
+    last = here;
+  }
+}
+
+} // namespace hhtex
+
+#endif
