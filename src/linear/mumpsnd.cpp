@@ -113,93 +113,6 @@ static PetscErrorCode CopyValues(Mat A, MumpsND *m)
   PetscFunctionReturn(0);
 }
 
-/* ---- solve ---- */
-
-static PetscErrorCode DropScatter(MumpsND *m)
-{
-  PetscFunctionBegin;
-  PetscCall(VecScatterDestroy(&m->scatter));
-  PetscCall(VecDestroy(&m->sol));
-  PetscFunctionReturn(0);
-}
-
-/* MUMPS decides anew in every factorization which process returns which part of the solution */
-static PetscErrorCode CreateScatter(MumpsND *m, Vec x)
-{
-  IS                    to;
-  std::vector<PetscInt> rows(m->sol_rows.begin(), m->sol_rows.end());
-
-  PetscFunctionBegin;
-  for (PetscInt &r : rows) --r;
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &to));
-  PetscCall(VecScatterCreate(m->sol, NULL, x, to, &m->scatter));
-  PetscCall(ISDestroy(&to));
-  PetscFunctionReturn(0);
-}
-
-static PetscErrorCode SolveDistributed(Mat F, Vec b, Vec x)
-{
-  MumpsND           *m = Data(F);
-  const PetscScalar *rhs;
-  PetscScalar       *sol;
-
-  PetscFunctionBegin;
-  if (!m->sol) {
-    const PetscInt local = m->id.info[22]; /* INFO(23) */
-    PetscCall(VecCreateSeq(PETSC_COMM_SELF, local, &m->sol));
-    m->sol_rows.assign(local, 0);
-  }
-  PetscCall(VecGetArrayRead(b, &rhs));
-  PetscCall(VecGetArray(m->sol, &sol));
-  m->id.rhs_loc  = const_cast<PetscScalar *>(rhs); /* MUMPS only reads it */
-  m->id.irhs_loc = m->rhs_rows.data();
-  m->id.nloc_rhs = m->id.lrhs_loc = (MUMPS_INT)m->rhs_rows.size();
-  m->id.sol_loc                   = sol;
-  m->id.isol_loc                  = m->sol_rows.data();
-  m->id.lsol_loc                  = (MUMPS_INT)m->sol_rows.size();
-  MumpsRun(m, MUMPS_SOLVE);
-  PetscCall(VecRestoreArray(m->sol, &sol));
-  PetscCall(VecRestoreArrayRead(b, &rhs));
-  if (m->infog(1) < 0) PetscFunctionReturn(0);
-  if (!m->scatter) PetscCall(CreateScatter(m, x));
-  PetscCall(VecScatterBegin(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
-  PetscFunctionReturn(0);
-}
-
-static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
-{
-  MumpsND        *m     = Data(F);
-  const MUMPS_INT which = transposed ? 0 : 1;
-
-  PetscFunctionBegin;
-  if (F->factorerrortype) {
-    PetscCall(PetscInfo(F, "Solve with a factor that failed: the result is Inf\n"));
-    PetscCall(VecSet(x, PETSC_INFINITY));
-    PetscFunctionReturn(0);
-  }
-  if (m->icntl(9) != which) PetscCall(DropScatter(m));
-  m->icntl(9) = which;
-  m->id.nrhs  = 1;
-  if (m->size == 1) {
-    PetscScalar *array;
-    PetscCall(VecCopy(b, x));
-    PetscCall(VecGetArray(x, &array));
-    m->id.rhs = array;
-    MumpsRun(m, MUMPS_SOLVE);
-    PetscCall(VecRestoreArray(x, &array));
-  } else
-    PetscCall(SolveDistributed(F, b, x));
-  PetscCheck(m->infog(1) >= 0, PetscObjectComm((PetscObject)F), PETSC_ERR_LIB,
-             "MUMPS failed in its solve phase: INFOG(1)=%d, INFOG(2)=%d; see the MUMPS user's guide", m->infog(1),
-             m->infog(2));
-  PetscFunctionReturn(0);
-}
-
-static PetscErrorCode MatSolve_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, false); }
-
-static PetscErrorCode MatSolveTranspose_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, Data(F)->id.sym == 0); }
-
 /* ---- analysis and factorization ---- */
 
 /* Controls that describe how the matrix and the vectors are passed belong to this file */
@@ -248,7 +161,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscFunctionBegin;
   if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT) PetscFunctionReturn(0); /* the analysis failed */
   F->factorerrortype = MAT_FACTOR_NOERROR;
-  PetscCall(DropScatter(m));
+  PetscCall(MumpsNDDropScatter(m));
   PetscCall(CopyValues(A, m));
   MumpsRun(m, MUMPS_FACTOR);
   for (int k = 0; k < WORKSPACE_RETRIES && (m->infog(1) == -8 || m->infog(1) == -9); ++k) {
@@ -274,8 +187,7 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
   PetscCall(MumpsNDAnalyse(A, m->size == 1 ? given : NULL, m));
   PetscCall(ReportError(F, A, "analysis"));
   F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric;
-  F->ops->solve                                           = MatSolve_MumpsND;
-  F->ops->solvetranspose                                  = MatSolveTranspose_MumpsND;
+  MumpsNDSetSolves(F);
   PetscFunctionReturn(0);
 }
 
@@ -372,7 +284,7 @@ static PetscErrorCode Destroy(Mat F)
   MumpsND *m = Data(F);
 
   PetscFunctionBegin;
-  PetscCall(DropScatter(m));
+  PetscCall(MumpsNDDropScatter(m));
   MumpsRun(m, MUMPS_END);
   PetscCall(PetscCommRestoreComm(PetscObjectComm((PetscObject)F), &m->comm));
   delete m;

@@ -18,7 +18,8 @@ struct MumpsND {
 
   std::vector<MUMPS_INT> rhs_rows; /* distributed right-hand side and solution, more than one process only */
   std::vector<MUMPS_INT> sol_rows;
-  Vec                    sol;
+  std::vector<double>    sol_values; /* of one block, column by column */
+  Vec                    sol;        /* one column of them, placed there */
   VecScatter             scatter;
 
   PetscBool user_ordering, user_null_pivots; /* ICNTL(7) and ICNTL(24) were set from outside */
@@ -40,5 +41,9 @@ inline void MumpsRun(MumpsND *m, MumpsJob job)
 
 /* Runs the analysis of A, whose pattern m holds, with the ordering given by PETSc or else the best we can get */
 PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m);
+
+/* Solves with one right-hand side and with many; the scatter of solutions holds for one factorization */
+void           MumpsNDSetSolves(Mat F);
+PetscErrorCode MumpsNDDropScatter(MumpsND *m);
 
 #endif

@@ -3,7 +3,9 @@
 #include "../../src/linear/linear.h"
 #include "../bench/linear_matrices.h"
 #include <gtest/gtest.h>
+#include <cmath>
 #include <hhtdae/hhtdae.h>
+#include <petsc/private/matimpl.h>
 #include <random>
 #include <string>
 
@@ -559,6 +561,33 @@ TEST_F(MumpsND, SingularMatrixIsReported)
     OK(MatDestroy(&F));
     OK(MatDestroy(&B));
   }
+}
+
+/* All columns of a dense right-hand side at once, and of a factor that failed */
+TEST_F(MumpsND, SolvesManyRightHandSides)
+{
+  const PetscInt columns = 70;
+  Mat            F, B, X, R;
+  MatFactorInfo  info;
+  PetscReal      error, norm;
+  OK(MatFactorInfoInitialize(&info));
+  OK(MatCreateDense(PETSC_COMM_SELF, PETSC_DECIDE, columns, A->rmap->N, columns, NULL, &B));
+  OK(MatSetRandom(B, NULL));
+  OK(MatDuplicate(B, MAT_DO_NOT_COPY_VALUES, &X));
+  OK(MatNorm(B, NORM_FROBENIUS, &norm));
+  OK(MatGetFactor(A, "mumpsnd", MAT_FACTOR_CHOLESKY, &F));
+  OK(MatCholeskyFactorSymbolic(F, A, NULL, &info));
+  OK(MatCholeskyFactorNumeric(F, A, &info));
+  OK(MatMatSolve(F, B, X));
+  OK(MatMatMult(A, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &R));
+  OK(MatAXPY(R, -1.0, B, SAME_NONZERO_PATTERN));
+  OK(MatNorm(R, NORM_FROBENIUS, &error));
+  EXPECT_LT(error, 1e-12 * norm);
+  F->factorerrortype = MAT_FACTOR_NUMERIC_ZEROPIVOT;
+  OK(MatMatSolve(F, B, X));
+  OK(MatNorm(X, NORM_FROBENIUS, &error));
+  EXPECT_FALSE(std::isfinite(error));
+  for (Mat *M : {&F, &B, &X, &R}) OK(MatDestroy(M));
 }
 
 TEST_F(MumpsND, SmallWorkspaceGrows)
