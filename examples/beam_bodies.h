@@ -15,24 +15,24 @@ struct BeamEnds {
   hhtdae::Body root, tip;
 };
 
-/* The root is held rigidly, the tip is watched as the mean motion of its face */
-inline std::vector<hhtdae::Attachment> BeamAttachments()
+/* The root is held rigidly; the tip is watched as the mean motion of its face, if it is not held rigidly as well */
+inline std::vector<hhtdae::Attachment> BeamAttachments(hhtdae::Tie tip = hhtdae::Tie::Average)
 {
   std::vector<hhtdae::Attachment> ends(2);
   ends[0].name = "root";
   ends[1].name = "tip";
-  ends[1].tie  = hhtdae::Tie::Average;
+  ends[1].tie  = tip;
   return ends;
 }
 
 /* The full model keeps a reference to model */
 inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &model, hhtdae::FeLaw law,
-                                  hhtdae::FullFeBody *fe, BeamEnds *ends)
+                                  hhtdae::FullFeBody *fe, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average)
 {
   hhtdae::FullBody body;
   PetscFunctionBegin;
   body.law         = law;
-  body.attachments = BeamAttachments();
+  body.attachments = BeamAttachments(tip);
   PetscCall(fe->add(scene, "beam", model, body));
   *ends = {fe->attachment("root"), fe->attachment("tip")};
   PetscFunctionReturn(0);
@@ -41,15 +41,14 @@ inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &m
 /* Craig and Bampton's modes: those of the attachments, and normal modes. Of several parts one after the other, each is
    a body with modes of its own, from the model of one part. */
 inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &part, double length, int parts,
-                                   PetscInt modes, BeamEnds *ends)
+                                   PetscInt modes, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average)
 {
   hhtdae::Reduction   reduction;
   hhtdae::ReducedBody reduced;
   PetscFunctionBegin;
-  reduction.attachments = BeamAttachments();
+  reduction.attachments = BeamAttachments(parts > 1 ? hhtdae::Tie::Rigid : tip);
   reduction.modes       = modes;
   reduction.all_nodes   = false;
-  if (parts > 1) reduction.attachments[1].tie = hhtdae::Tie::Rigid;
   PetscCall(hhtdae::Reduce(part, reduction, &reduced));
   hhtdae::FlexibleBody body;
   body.model = std::make_shared<hhtdae::ModalBody>(reduced.modal);

@@ -1,0 +1,260 @@
+/* A finite-element model in motion: its frequency, what is conserved, against its own modes, in fast rotation. */
+#include "beam_bodies.h"
+#include "scene/scene_data.h"
+#include "scene_output.h"
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+using namespace hhtest;
+
+namespace
+{
+
+std::string fixed(double h)
+{
+  return text(" -ts_dt %.17g -ts_adapt_type none -ts_max_steps 10000000 -ts_rtol 1e-6 -ts_atol 1e-6 ", h);
+}
+
+hhtex::SolidBeam slender(int elements = 6)
+{
+  hhtex::SolidBeam b;
+  b.length   = 1;
+  b.depth    = 0.05;
+  b.width    = 0.03;
+  b.n[0]     = elements;
+  b.material = {2e9, 0.3, 1000};
+  return b;
+}
+
+/* The same on every rank's own communicator: the tests run on one */
+struct BeamMesh {
+  FeModel model{PETSC_COMM_SELF};
+  explicit BeamMesh(const hhtex::SolidBeam &b) { must(ReadSolidBeam(b, &model)); }
+};
+
+Eigen::MatrixXd dense(Mat A, const std::vector<PetscInt> &rows)
+{
+  Eigen::MatrixXd D((Eigen::Index)rows.size(), (Eigen::Index)rows.size());
+  const auto      n = (PetscInt)rows.size();
+  D.setZero();
+  must(MatGetValues(A, n, rows.data(), n, rows.data(), D.data())); /* symmetric */
+  return D;
+}
+
+/* Circular frequency of the first mode with all nodes of the root held, from the matrices themselves */
+double firstFrequency(const FeModel &m)
+{
+  std::vector<PetscInt> rows;
+  const auto           &root = m.sets.at("root");
+  for (PetscInt n = 0; n < m.nodes; n++)
+    if (!std::binary_search(root.begin(), root.end(), n))
+      for (int c = 0; c < 3; c++) rows.push_back(3 * n + c);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(dense(m.K, rows), dense(m.M, rows),
+                                                                        Eigen::EigenvaluesOnly);
+  return std::sqrt(modes.eigenvalues()(0));
+}
+
+/* A channel over time, at the ends of steps */
+Array history(Scene &scene, double end, const std::string &options, const std::string &name, Array *time = nullptr)
+{
+  TemporaryFile file(name + ".csv");
+  scene.output().csv = file.name;
+  SceneRun run(scene, end, options);
+  must(run.solve());
+  const CSV table(file.text());
+  if (time) *time = table.column("time");
+  return table.column(name);
+}
+
+} // namespace
+
+/*
+  A cantilever swings about its sag; the damping lets the higher modes die out first. With alpha = 0 the method is the
+  trapezoidal rule, whose circular frequency with the step h is 2/h atan(omega h/2) for an undamped mode.
+*/
+TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
+{
+  const BeamMesh m(slender());
+  Scene          scene(PETSC_COMM_SELF);
+  FullFeBody     fe;
+  FullBody       b;
+  const double   omega = firstFrequency(m.model), ratio = 0.002, h = 2 * PETSC_PI / omega / 50;
+  b.law               = FeLaw::Small;
+  b.stiffness_damping = 2 * ratio / omega;
+  b.attachments       = hhtex::BeamAttachments();
+  scene.gravity({0, 0, -9.81});
+  must(fe.add(scene, "beam", m.model, b));
+  scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
+  scene.channel("z", Measure::displacement(scene.marker(fe.attachment("tip")), 2));
+  Array       time;
+  const Array z = history(scene, 30 * 50 * h, fixed(h) + " -ts_hhtdae_alpha 0 ", "z", &time);
+
+  double      sag = 0, amplitude = 0;
+  std::size_t last = z.size() - 10 * 50;
+  for (std::size_t i = last; i < z.size(); i++) sag += z[i] / (double)(z.size() - last);
+  Array crossing; /* upward, by a cubic through four points around it */
+  for (std::size_t i = 10 * 50; i + 2 < z.size(); i++) {
+    widen(amplitude, std::abs(z[i] - sag));
+    if (!(z[i] < sag && z[i + 1] >= sag)) continue;
+    double s = (sag - z[i]) / (z[i + 1] - z[i]);
+    for (int k = 0; k < 20; k++) {
+      const double p = -s * (s - 1) * (s - 2) / 6 * z[i - 1] + (s + 1) * (s - 1) * (s - 2) / 2 * z[i] -
+                       (s + 1) * s * (s - 2) / 2 * z[i + 1] + (s + 1) * s * (s - 1) / 6 * z[i + 2];
+      s -= (p - sag) / (z[i + 1] - z[i]);
+    }
+    crossing.push_back(time[i] + s * h);
+  }
+  ASSERT_GT(crossing.size(), 15u);
+  const double turns = (double)crossing.size() - 1, found = 2 * PETSC_PI * turns / (crossing.back() - crossing[0]);
+  const double expected = 2 / h * std::atan(omega * h / 2);
+  MEASURED("amplitude %.3g m, circular frequency %.8g, of the matrices with this step %.8g: %.1e", amplitude, found,
+           expected, found / expected - 1);
+  EXPECT_GT(amplitude, 1e-4);
+  EXPECT_NEAR(found / expected, 1, 2e-5);
+  EXPECT_GT(std::abs(found / omega - 1), 1e-3) << "the step's effect is not seen";
+}
+
+/* Free flight with spin, which pulls the body apart, so that it vibrates: errors go with the square of the step */
+TEST(FullBodyDynamics, EnergyAndMomentumOfAFreeBody)
+{
+  hhtex::SolidBeam block = slender(3);
+  block.depth            = 0.4;
+  block.width            = 0.3;
+  block.material         = {5e4, 0.3, 1000};
+  const BeamMesh m(block);
+  double         drift[3][3];
+  for (int k = 0; k < 3; k++) {
+    Scene      scene(PETSC_COMM_SELF);
+    FullFeBody fe;
+    FullBody   b;
+    b.angular_velocity = {0.5, -1, 2};
+    b.velocity         = {0.1, 0.2, -0.1};
+    TemporaryFile file(text("full_balance%d.csv", k));
+    must(fe.add(scene, "block", m.model, b));
+    scene.output().balance      = true;
+    scene.output().balance_file = file.name;
+    SceneRun run(scene, 1, fixed(4e-3 / (1 << k)) + " -ts_hhtdae_alpha 0 -ts_hhtdae_corrector_tolerance 1e-3 ");
+    must(run.solve());
+    const CSV   table(file.text());
+    const Array energy = table.column("total"), lx = table.column("Lx"), ly = table.column("Ly"),
+                lz = table.column("Lz"), px = table.column("px"), elastic = table.column("elastic");
+    for (double &d : drift[k]) d = 0;
+    double strain = 0;
+    for (std::size_t i = 0; i < energy.size(); i++) {
+      widen(drift[k][0], std::abs(energy[i] - energy[0]) / energy[0]);
+      widen(drift[k][1],
+            Vector3(lx[i] - lx[0], ly[i] - ly[0], lz[i] - lz[0]).norm() / Vector3(lx[0], ly[0], lz[0]).norm());
+      widen(drift[k][2], std::abs(px[i] / px[0] - 1));
+      widen(strain, elastic[i] / energy[0]);
+    }
+    EXPECT_GT(strain, 1e-3) << "the body does not vibrate";
+  }
+  MEASURED("drift of energy %.2e, %.2e, %.2e, of angular momentum %.2e, %.2e, %.2e, of momentum %.1e", drift[0][0],
+           drift[1][0], drift[2][0], drift[0][1], drift[1][1], drift[2][1], drift[2][2]);
+  for (int q = 0; q < 2; q++) {
+    EXPECT_LT(drift[2][q], 1e-4);
+    EXPECT_LT(drift[2][q], 0.3 * drift[1][q]);
+    EXPECT_LT(drift[1][q], 0.3 * drift[0][q]);
+  }
+  EXPECT_LT(drift[2][2], 1e-9);
+}
+
+/* ---- modes against the model that they come from ---- */
+
+namespace
+{
+
+/* Displacement of the tip of a cantilever after a sudden small force on it, oblique, at many times */
+Array struck(const FeModel &model, PetscInt modes, double force)
+{
+  Scene           scene(PETSC_COMM_SELF);
+  FullFeBody      fe;
+  hhtex::BeamEnds ends;
+  if (modes >= 0) {
+    must(AddModalBeam(scene, model, 1, 1, modes, &ends, Tie::Rigid));
+  } else {
+    must(AddFullBeam(scene, model, FeLaw::Small, &fe, &ends, Tie::Rigid));
+  }
+  const Marker tip = scene.marker(ends.tip);
+  scene.add("clamp", Fixed{scene.marker(ends.root), scene.marker(scene.ground())});
+  UserForce push;
+  push.i = tip;
+  for (double f : {3 * force, force, 2 * force})
+    push.force.push_back(Expression({Measure::time()}, [f](const Real *t) -> Real { return 0. * t[0] + f; }));
+  scene.add("push", push);
+  scene.channel("y", Measure::displacement(tip, 1));
+  scene.channel("z", Measure::displacement(tip, 2));
+  scene.channel("turn", Measure::angularVelocity(tip, 2));
+  TemporaryFile file(text("struck%d.csv", (int)modes));
+  scene.output().csv        = file.name;
+  const std::string options = " -ts_dt 2e-4 -ts_adapt_type none -ts_max_steps 10000000 -ts_rtol 1e-11 -ts_atol 1e-11 "
+                              "-ts_hhtdae_corrector_tolerance 0.1 ";
+  SceneRun          run(scene, 0.06, options);
+  must(run.solve());
+  const CSV table(file.text());
+  Array     all;
+  for (const char *name : {"y", "z"})
+    for (double x : table.column(name)) all.push_back(x / force);
+  return all;
+}
+
+} // namespace
+
+/* Small displacements: all modes of the model give its motion but for terms of second order; fewer modes less of it */
+TEST(FullBodyDynamics, ModesAgainstTheModel)
+{
+  const BeamMesh m(slender(2)); /* 32 nodes, of which 16 are not at an attachment */
+  const double   force  = 1e-3;
+  const Array    whole  = struck(m.model, -1, force);
+  double         before = PETSC_MAX_REAL, error = 0;
+  std::string    all;
+  for (PetscInt modes : {0, 2, 6, 48}) {
+    error = relativeDifference(struck(m.model, modes, force), whole);
+    all += text(" %d: %.1e", (int)modes, error);
+    EXPECT_LT(error, before) << modes;
+    before = error;
+  }
+  const double larger = relativeDifference(struck(m.model, 48, 30 * force), struck(m.model, -1, 30 * force));
+  MEASURED("difference to the whole model, by normal modes:%s; all of them, 30 times the force: %.1e", all.c_str(),
+           larger);
+  EXPECT_LT(error, 1e-5);
+}
+
+/*
+  A stiff bar in fast rotation is longer by L (tan(a L)/(a L) - 1), a = Omega sqrt(rho/E); its strain is 1e-4, of which
+  terms of second order are a ten thousandth. So is the effect of the step: on a circle the method's acceleration is
+  larger than Omega^2 r by c (Omega h)^2, where for its parameters, with f = -alpha,
+  c = -1/12 + (1/4 + beta - gamma/2) - (gamma - 1/2)^2/2 + f (1 - f)/2.
+*/
+TEST(FullBodyDynamics, BarInFastRotation)
+{
+  hhtex::SolidBeam bar = slender(4);
+  bar.material         = {2e9, 0, 1000};
+  const double   spin = 30, aL = spin * bar.length * std::sqrt(bar.material.density / bar.material.young);
+  const double   exact = bar.length * (std::tan(aL) / aL - 1);
+  const BeamMesh m(bar);
+  double         error[2];
+  for (int k = 0; k < 2; k++) {
+    Scene           scene(PETSC_COMM_SELF);
+    FullFeBody      fe;
+    hhtex::BeamEnds ends;
+    must(AddFullBeam(scene, m.model, FeLaw::Large, &fe, &ends));
+    const Body   hub  = scene.add("hub", RigidBody{});
+    const Marker axis = scene.marker(hub), ground = scene.marker(scene.ground());
+    scene.add("bearing", Revolute{axis, ground});
+    scene.add("drive", RotationalMotion{axis, ground, TimeFunction::step(0, 0, 0.8, spin), MotionOf::Velocity});
+    scene.add("clamp", Fixed{scene.marker(ends.root), axis});
+    scene.channel("x", Measure::displacement(scene.marker(ends.tip), 0, axis, axis));
+    const double h = 2e-3 / (1 << k);
+    const Array  x = history(scene, 1.6, fixed(h) + " -ts_hhtdae_alpha -0.3 -ts_hhtdae_corrector_tolerance 1e-4 ", "x");
+    double       mean = 0;
+    const auto   n    = (std::size_t)(0.5 / h);
+    for (std::size_t i = x.size() - n; i < x.size(); i++) mean += (x[i] - bar.length) / (double)n;
+    error[k] = mean / exact - 1;
+  }
+  MEASURED("extension %.4e m of a bar of 1 m; the model's is off by %.2e, %.2e", exact, error[0], error[1]);
+  EXPECT_LT(std::abs(error[1]), 5e-4);
+  const double f = 0.3, beta = (1 + f) * (1 + f) / 4, gamma = 0.5 + f;
+  const double c = -1. / 12 + (0.25 + beta - gamma / 2) - f * f / 2 + f * (1 - f) / 2;
+  EXPECT_NEAR((error[0] - error[1]) / (spin * spin * 2e-3 * 2e-3 * 0.75), c, 0.1 * c);
+}
