@@ -261,26 +261,25 @@ static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-/* A package cannot be exchanged under a factor that exists, so a change starts the preconditioner anew */
+/* A package cannot be exchanged under a factor that exists, and PCSetFromOptions() may have made one by PETSc's own
+   choice without a word of it: a change starts the preconditioner anew */
 static PetscErrorCode SetPackage(PC pc, const char package[])
 {
   MatSolverType current = NULL;
-  PetscBool     same;
+  PetscBool     same    = PETSC_FALSE;
   Mat           A, P;
 
   PetscFunctionBegin;
   PetscCall(PCFactorGetMatSolverType(pc, &current));
-  PetscCall(PetscStrcmp(current, package, &same));
+  if (current) PetscCall(PetscStrcmp(current, package, &same));
   if (same) PetscFunctionReturn(0);
-  if (current) {
-    PetscCall(PCGetOperators(pc, &A, &P));
-    PetscCall(PetscObjectReference((PetscObject)A));
-    PetscCall(PetscObjectReference((PetscObject)P));
-    PetscCall(PCReset(pc));
-    PetscCall(PCSetOperators(pc, A, P));
-    PetscCall(MatDestroy(&A));
-    PetscCall(MatDestroy(&P));
-  }
+  PetscCall(PCGetOperators(pc, &A, &P));
+  PetscCall(PetscObjectReference((PetscObject)A));
+  PetscCall(PetscObjectReference((PetscObject)P));
+  PetscCall(PCReset(pc));
+  PetscCall(PCSetOperators(pc, A, P));
+  PetscCall(MatDestroy(&A));
+  PetscCall(MatDestroy(&P));
   PetscCall(PCFactorSetMatSolverType(pc, package));
   PetscFunctionReturn(0);
 }
