@@ -188,8 +188,8 @@ Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, con
   return Body{(PetscInt)scene.data().bodies.size() - 1};
 }
 
-/* Mass and extent, for what has to be small or large beside them */
-PetscErrorCode Measure1(const FeModel &m, double *mass, double *size)
+/* Mass, and two opposite corners of the box around the body, for what has to be small or large beside them */
+PetscErrorCode MassAndBox(const FeModel &m, double *mass, Vector3 corner[2])
 {
   Vec    one, M1;
   double box[6], all[6];
@@ -207,7 +207,8 @@ PetscErrorCode Measure1(const FeModel &m, double *mass, double *size)
     box[3 + i % 3] = std::max(box[3 + i % 3], -m.coordinates[i]);
   }
   PetscCallMPI(MPI_Allreduce(box, all, 6, MPI_DOUBLE, MPI_MAX, m.comm));
-  *size = std::hypot(all[0] + all[3], all[1] + all[4], all[2] + all[5]);
+  corner[0] = -Vector3(all[3], all[4], all[5]);
+  corner[1] = Vector3(all[0], all[1], all[2]);
   PetscFunctionReturn(0);
 }
 
@@ -217,7 +218,8 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
 {
   auto        x = std::make_unique<FullExtension>();
   PetscMPIInt rank, size;
-  double      mass, extent;
+  double      mass;
+  Vector3     corner[2];
   PetscFunctionBegin;
   const std::string fault = scene.data().planar ? "it needs a scene in space" : Fault(model, body);
   PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
@@ -242,7 +244,10 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   } else {
     PetscCall(ExtractBlocks(*x));
   }
-  PetscCall(Measure1(model, &mass, &extent));
+  PetscCall(MassAndBox(model, &mass, corner));
+  const double extent = (corner[1] - corner[0]).norm();
+  /* a scene takes its size from bodies and markers, and has none of this body else but its attachments */
+  for (const Vector3 &c : corner) scene.data().markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
   for (const Attachment &a : body.attachments) {
     Vector3 point;
     PetscCall(MakeTie(*x, a, &point));

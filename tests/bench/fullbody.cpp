@@ -1,0 +1,236 @@
+/*
+  A step of a whole finite-element model in a scene: seconds, factorizations, memory.
+
+    mpiexec -n 2 fullbody -size 60,12,12 -law large -steps 20
+
+  -size: bricks along x, y, z; -brick8: of 8 nodes in place of 20; -held clamp,hinge,free: at its root, or it spins
+  freely, which needs no multipliers; -steps after the first, which the table leaves out with the choice of the solver;
+  -part <0.01>: of the first bending period, the step's length (-ts_adapt_type basic for steps by error);
+  -blocks: tells the solver of the three unknowns of a node and of rigid motions (free alone). Any -ksp_, -pc_, -mat_
+  and -ts_hhtdae_ option holds.
+*/
+#include "beam_bodies.h"
+
+#include <hhtdae/hhtdae.h>
+#include <petsctime.h>
+#include <slepcsys.h>
+#include <sys/resource.h>
+
+using namespace hhtdae;
+
+enum { CLAMP, HINGE, FREE };
+
+struct Case {
+  hhtex::SolidBeam block;
+  FeLaw            law   = FeLaw::Large;
+  int              held  = CLAMP;
+  PetscInt         steps = 20;
+  PetscReal        part  = 0.01;
+  PetscBool        blocks = PETSC_FALSE;
+};
+
+/* Rubber, 2 cm a brick */
+static PetscErrorCode ReadCase(Case *c)
+{
+  const char *const laws[] = {"large", "small", "Law", "", nullptr};
+  const char *const helds[] = {"clamp", "hinge", "free", "Held", "", nullptr};
+  PetscInt          n[3] = {40, 8, 8}, three = 3;
+  PetscEnum         law = (PetscEnum)0, held = (PetscEnum)CLAMP;
+  PetscBool         brick8 = PETSC_FALSE;
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-size", n, &three, nullptr));
+  PetscCheck(three == 3 && n[0] > 0 && n[1] > 0 && n[2] > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
+             "-size needs three positive numbers");
+  PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-law", laws, &law, nullptr));
+  PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-held", helds, &held, nullptr));
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-steps", &c->steps, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-part", &c->part, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-brick8", &brick8, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-blocks", &c->blocks, nullptr));
+  PetscCheck(c->steps > 0 && c->part > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-steps and -part must be positive");
+  c->held             = held;
+  c->law              = law ? FeLaw::Small : FeLaw::Large;
+  hhtex::SolidBeam &b = c->block;
+  for (int k = 0; k < 3; k++) b.n[k] = (int)n[k];
+  b.length   = 0.02 * b.n[0];
+  b.depth    = 0.02 * b.n[1];
+  b.width    = 0.02 * b.n[2];
+  b.element  = brick8 ? hhtex::BeamElement::Brick8 : hhtex::BeamElement::Brick20;
+  b.material = {5e6, 0.4, 1100};
+  PetscFunctionReturn(0);
+}
+
+/* First bending period of the cantilever, or of the free beam */
+static double Period(const Case &c)
+{
+  const hhtex::SolidBeam &b = c.block;
+  const double root = c.held == FREE ? 4.730 : 1.8751, I = std::fmin(b.Iyy(), b.Izz());
+  return 2 * PETSC_PI * b.length * b.length / (root * root) * std::sqrt(b.material.density * b.area() / (b.material.young * I));
+}
+
+static PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
+{
+  FullBody body;
+  PetscFunctionBeginUser;
+  body.law = c.law;
+  if (c.held == FREE) {
+    body.angular_velocity = {0, c.law == FeLaw::Large ? 0.3 / Period(c) : 0, 0};
+    body.mass_damping     = c.law == FeLaw::Small ? 0.1 / Period(c) : 0;
+  } else {
+    body.attachments = {hhtex::BeamAttachments()[0]};
+  }
+  scene.gravity({0, 0, -9.81});
+  PetscCall(fe->add(scene, "block", model, body));
+  if (c.held == FREE) PetscFunctionReturn(0);
+  const Marker  root = scene.marker(fe->attachment("root")), ground = scene.marker(scene.ground());
+  const Matrix3 lie = Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitX()).toRotationMatrix(); /* z axes along y */
+  if (c.held == CLAMP)
+    scene.add("clamp", Fixed{root, ground});
+  else
+    scene.add("hinge", Revolute{scene.marker(fe->attachment("root"), Vector3::Zero(), lie),
+                                scene.marker(scene.ground(), Vector3::Zero(), lie)});
+  PetscFunctionReturn(0);
+}
+
+/* What algebraic multigrid wants to know */
+static PetscErrorCode TellBlocks(TS ts, Mat K)
+{
+  Mat          J, P;
+  MatNullSpace rigid;
+  PetscFunctionBeginUser;
+  PetscCall(TSGetI2Jacobian(ts, &J, &P, nullptr, nullptr));
+  PetscCall(MatGetNearNullSpace(K, &rigid));
+  PetscCall(MatSetNearNullSpace(P, rigid));
+  PetscCall(MatSetBlockSize(P, 3));
+  PetscFunctionReturn(0);
+}
+
+/* ---- results ---- */
+
+struct Clock {
+  PetscLogDouble   run = 0, start = 0; /* the run, its second step */
+  TSHHT3Statistics first = {};
+
+  /* the first step has ended */
+  static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal, Vec, void *ctx)
+  {
+    Clock *c = static_cast<Clock *>(ctx);
+    PetscFunctionBegin;
+    if (step != 1) PetscFunctionReturn(0);
+    PetscCall(PetscTime(&c->start));
+    PetscCall(TSHHT3GetStatistics(ts, &c->first));
+    PetscFunctionReturn(0);
+  }
+};
+
+/* Peaks of resident memory, MB: the largest of a rank and the sum */
+static PetscErrorCode Memory(double *most, double *all)
+{
+  rusage use;
+  PetscFunctionBeginUser;
+  getrusage(RUSAGE_SELF, &use);
+  *most = *all = 1024. * (double)use.ru_maxrss / 1e6;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, all, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Solver(TS ts, std::string *name)
+{
+  SNES          snes;
+  KSP           ksp;
+  PC            pc;
+  KSPType       ksp_type;
+  PCType        pc_type;
+  MatSolverType package = nullptr;
+  PetscBool     factors;
+  PetscFunctionBeginUser;
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPGetType(ksp, &ksp_type));
+  PetscCall(PCGetType(pc, &pc_type));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factors, PCLU, PCCHOLESKY, ""));
+  if (factors) PetscCall(PCFactorGetMatSolverType(pc, &package));
+  *name = std::string(ksp_type) + " + " + pc_type + (package ? std::string(" by ") + package : "");
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double building)
+{
+  PetscLogDouble   now;
+  TSHHT3Statistics s;
+  PetscInt         unknowns, iterations;
+  PetscMPIInt      ranks;
+  Vec              U;
+  Mat              P;
+  MatInfo          info;
+  std::string      solver;
+  double           most, all;
+  PetscFunctionBeginUser;
+  PetscCall(PetscTime(&now));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
+  PetscCall(TSHHT3GetStatistics(ts, &s));
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecGetSize(U, &unknowns));
+  PetscCall(TSGetI2Jacobian(ts, nullptr, &P, nullptr, nullptr));
+  PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
+  PetscCall(TSGetKSPIterations(ts, &iterations));
+  PetscCall(Solver(ts, &solver));
+  PetscCall(Memory(&most, &all));
+  const double n = (double)PetscMax(s.steps - clock.first.steps, 1);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
+                        "  reading, assembly and set-up %.2f s, first step %.2f s\n"
+                        "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
+                        "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
+                        "\n  memory at most %.0f MB on a rank, %.0f MB on all\n",
+                        ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
+                        clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
+                        100 * (double)(s.jacobians - clock.first.jacobians) / n,
+                        100 * (double)(s.factorizations - clock.first.factorizations) / n,
+                        (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Run()
+{
+  Case           c;
+  TS             ts;
+  Clock          clock;
+  PetscLogDouble start, built;
+  PetscFunctionBeginUser;
+  PetscCall(ReadCase(&c));
+  PetscCall(PetscTime(&start));
+  FeModel    model(PETSC_COMM_WORLD);
+  Scene      scene(PETSC_COMM_WORLD);
+  FullFeBody fe;
+  PetscCall(ReadSolidBeam(c.block, &model));
+  PetscCall(Build(c, model, scene, &fe));
+  PetscCall(scene.createTS(&ts));
+  if (c.blocks && c.held == FREE) PetscCall(TellBlocks(ts, model.K));
+  PetscCall(TSSetMaxTime(ts, 100 * c.steps * c.part * Period(c)));
+  PetscCall(TSSetMaxSteps(ts, c.steps + 1));
+  PetscCall(TSSetTimeStep(ts, c.part * Period(c)));
+  PetscCall(TSSetTolerances(ts, 1e-5 * c.block.length, nullptr, 1e-5, nullptr));
+  TSAdapt adapt;
+  PetscCall(TSGetAdapt(ts, &adapt));
+  PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
+  PetscCall(TSSetFromOptions(ts));
+  PetscCall(TSMonitorSet(ts, Clock::monitor, &clock, nullptr));
+  PetscCall(PetscTime(&built));
+  clock.run = built;
+  PetscCall(scene.solve(ts));
+  PetscCall(Report(ts, c, clock, built - start));
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+  PetscCall(SlepcInitialize(&argc, &argv, nullptr, nullptr));
+  PetscCall(TSHHT3Initialize());
+  PetscCall(Run());
+  PetscCall(SlepcFinalize());
+  return 0;
+}
