@@ -1,0 +1,265 @@
+/*
+  Time per step of a scene with a flexible body of many modes, beside what dense algebra alone would take.
+
+    modalstep -modes 20,60,134 -attachments 2,20
+
+  The body is a bar of bricks, reduced here; rigid bodies hang on half of its attachments by revolute joints, springs to
+  the ground hold the other half; it falls into the springs. The bound does, with as many calls as the run counted, by
+  LAPACK and BLAS:
+
+    factorization  dgetrf of a dense matrix of 6 + modes
+    solve          dgetrs with it
+    residual       18 dgemv of modes x modes: the invariants quadratic in the modes with coordinates and rates
+    Jacobian       27 dgemv (accelerations, too) and 9 sums of matrices of modes x modes
+
+  The attachments' joints and bodies are not in it. Then the same number of modes from a finer mesh.
+
+    -end <0.5>  -tolerance <1e-5>  -mesh <24>,<40>: bricks along the bar  -repeat <3>: the least time of so many runs
+  counts
+*/
+#include "box_model.h"
+#include "hhtdae/flexible.h"
+#include <algorithm>
+#include <ctime>
+#include <hhtdae/hhtdae.h>
+#include <slepcsys.h>
+
+using namespace hhtest;
+using namespace hhtdae;
+
+constexpr double length = 4, width = 0.1;
+
+static std::string Name(PetscInt a) { return "at " + std::to_string(a); }
+
+static PetscErrorCode MakeBody(PetscInt bricks, PetscInt modes, ReducedBody *body)
+{
+  const PetscInt count = 20, across = std::max<PetscInt>(2, bricks / 12);
+  const double   size = length / (double)bricks;
+  FeModel        model(PETSC_COMM_SELF);
+  Reduction      reduction;
+  PetscFunctionBegin;
+  BoxBuilder builder({{(int)bricks, (int)across, (int)across}, {length, width, 0.8 * width}, {7e10, 0.3, 2700}},
+                     &model);
+  for (PetscInt a = 0; a < count; a++) {
+    const double x0 = length * (double)a / (double)(count - 1);
+    builder.addSet(Name(a), [=](const Vector3 &x) { return std::abs(x[0] - x0) < 0.51 * size; });
+    Attachment attachment;
+    attachment.name = Name(a);
+    attachment.tie  = Tie::Average; /* sections overlap no nodes only where there are more bricks than attachments */
+    reduction.attachments.push_back(attachment);
+  }
+  reduction.modes = modes; /* constraint modes come on top, the highest are left out */
+  for (PetscInt k = 0; k < modes; k++) reduction.keep.push_back(k);
+  PetscCall(Reduce(model, reduction, body));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the scene ---- */
+
+struct Timing {
+  TSHHT3Statistics s;
+  PetscInt         unknowns;
+  std::string      package;
+};
+
+static PetscErrorCode Build(Scene &scene, std::shared_ptr<const ModalBody> model, PetscInt attachments)
+{
+  FlexibleBody b;
+  PetscFunctionBegin;
+  b.model   = model;
+  b.damping = {{1e9, 0.005}};
+  scene.gravity({0, 0, -9.81});
+  const Body bar = scene.add("bar", b);
+  for (PetscInt k = 0; k < attachments; k++) {
+    const PetscInt a  = attachments > 1 ? k * 19 / (attachments - 1) : 0;
+    const Vector3  at = model->attachments[a].position;
+    const Body     on = scene.attachment(bar, Name(a));
+    Matrix3        across; /* hinges along the bar */
+    across << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    if (k % 2 == 0) {
+      RigidBody load;
+      load.mass       = 2;
+      load.inertia    = 0.01 * Matrix3::Identity();
+      load.position   = at + Vector3(0, 0.2, -0.1);
+      const Body hung = scene.add("load " + std::to_string(k), load);
+      scene.add("hinge " + std::to_string(k),
+                Revolute{scene.markerAt(on, at, across), scene.markerAt(hung, at, across)});
+    }
+    if (k % 2 == 1 || attachments == 2)
+      scene.add("spring " + std::to_string(k),
+                SpringDamper{scene.markerAt(on, at), scene.markerAt(scene.ground(), Vector3(at + Vector3(0.1, 0.1, 1))),
+                             2e4 / (double)attachments, 10, -1});
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode RunScene(std::shared_ptr<const ModalBody> model, PetscInt attachments, double end,
+                               double tolerance, Timing *t)
+{
+  Scene         scene(PETSC_COMM_SELF);
+  TS            ts;
+  SNES          snes;
+  KSP           ksp;
+  PC            pc;
+  Vec           U;
+  MatSolverType package;
+  PetscFunctionBegin;
+  PetscCall(Build(scene, model, attachments));
+  PetscCall(scene.createTS(&ts));
+  PetscCall(TSSetMaxTime(ts, end));
+  PetscCall(TSSetMaxSteps(ts, 1000000));
+  PetscCall(TSSetTolerances(ts, tolerance, nullptr, tolerance, nullptr));
+  PetscCall(TSSetFromOptions(ts));
+  PetscCall(scene.solve(ts));
+  PetscCall(TSHHT3GetStatistics(ts, &t->s));
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecGetSize(U, &t->unknowns));
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  t->package = package ? package : "?";
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the bound ---- */
+
+/* CPU seconds of a call, from as many as take 50 ms */
+template <class F> static double Seconds(F &&call)
+{
+  const std::clock_t start = std::clock();
+  std::clock_t       now;
+  int                calls = 0;
+  do {
+    call();
+    calls++;
+    now = std::clock();
+  } while (now - start < CLOCKS_PER_SEC / 20);
+  return (double)(now - start) / CLOCKS_PER_SEC / calls;
+}
+
+struct Bound {
+  double factor = 0, solve = 0, residual = 0, jacobian = 0; /* seconds each */
+  double seconds(const TSHHT3Statistics &s) const
+  {
+    return factor * (double)s.factorizations + solve * (double)s.solves + residual * (double)s.residuals +
+           jacobian * (double)s.jacobians;
+  }
+};
+
+/* By PETSc's dense matrices, which are thin covers of LAPACK and BLAS */
+static PetscErrorCode Dense(const ModalBody &body, Bound *t)
+{
+  const PetscInt  m = body.modes(), n = 6 + m;
+  Eigen::MatrixXd A0 = Eigen::MatrixXd::Random(n, n), room(n, n);
+  Mat             A, N[6], sum;
+  Vec             x, y, b, c;
+  MatFactorInfo   info;
+  PetscErrorCode  failed = 0;
+  const auto      check  = [&](PetscErrorCode e) { failed = failed ? failed : e; };
+  PetscFunctionBegin;
+  A0.diagonal().array() += n;
+  PetscCall(MatFactorInfoInitialize(&info));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, room.data(), &A));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, m, nullptr, &sum));
+  for (int p = 0; p < 6; p++)
+    PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, m, const_cast<double *>(body.quadratic[p].data()), &N[p]));
+  PetscCall(MatCreateVecs(sum, &x, &y));
+  PetscCall(MatCreateVecs(A, &b, &c));
+  PetscCall(VecSet(x, 1));
+  PetscCall(VecSet(b, 1));
+  const auto products = [&] {
+    for (int p = 0; p < 6; p++) check(MatMult(N[p], x, y));
+    for (int p = 3; p < 6; p++) check(MatMultTranspose(N[p], x, y));
+  };
+  t->factor   = Seconds([&] {
+    check(MatSetUnfactored(A));
+    room = A0;
+    check(MatLUFactor(A, nullptr, nullptr, &info));
+  });
+  t->solve    = Seconds([&] { check(MatSolve(A, b, c)); });
+  t->residual = Seconds([&] {
+    products();
+    products();
+  });
+  t->jacobian = Seconds([&] {
+    for (int k = 0; k < 3; k++) products();
+    for (int k = 0; k < 9; k++) check(MatAXPY(sum, 0.5, N[k % 6], SAME_NONZERO_PATTERN));
+  });
+  PetscCall(failed);
+  for (Mat &K : N) PetscCall(MatDestroy(&K));
+  PetscCall(MatDestroy(&A));
+  PetscCall(MatDestroy(&sum));
+  for (Vec *v : {&x, &y, &b, &c}) PetscCall(VecDestroy(v));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the program ---- */
+
+static PetscErrorCode Compare(const ReducedBody &body, PetscInt attachments, double end, double tolerance,
+                              PetscInt repeat, double *per_step)
+{
+  const auto model = std::make_shared<const ModalBody>(body.modal);
+  Timing     t;
+  Bound      d;
+  double     least = PETSC_INFINITY;
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < repeat; k++) {
+    PetscCall(RunScene(model, attachments, end, tolerance, &t));
+    least = std::min(least, t.s.cpu);
+  }
+  PetscCall(Dense(*model, &d));
+  const double bound = d.seconds(t.s), steps = (double)t.s.steps;
+  *per_step = least / steps;
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%8d %6d %12d %9d %6d %6d %6d %6d %10.1f %10.1f %7.2f  %s\n",
+                        (int)body.fe_nodes, (int)model->modes(), (int)attachments, (int)t.unknowns, (int)t.s.steps,
+                        (int)t.s.residuals, (int)t.s.factorizations, (int)t.s.solves, 1e6 * *per_step,
+                        1e6 * bound / steps, least / bound, t.package.c_str()));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%96s factor %.3g, solve %.3g, residual %.3g, Jacobian %.3g us\n",
+                        "dense:", 1e6 * d.factor, 1e6 * d.solve, 1e6 * d.residual, 1e6 * d.jacobian));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Run()
+{
+  PetscInt  modes[8] = {20, 60, 134}, attachments[8] = {2, 20}, mesh[2] = {24, 40}, nm = 8, na = 8, two = 2, repeat = 3;
+  PetscReal end = 0.5, tolerance = 1e-5;
+  PetscBool given;
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-modes", modes, &nm, &given));
+  if (!given) nm = 3;
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-attachments", attachments, &na, &given));
+  if (!given) na = 2;
+  for (PetscInt k = 0; k < na; k++)
+    PetscCheck(attachments[k] > 0 && attachments[k] <= 20, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+               "-attachments %d: from 1 to 20", (int)attachments[k]);
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-mesh", mesh, &two, nullptr));
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-repeat", &repeat, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-tolerance", &tolerance, nullptr));
+  PetscCall(PetscPrintf(
+      PETSC_COMM_SELF,
+      "FE nodes  modes  attachments  unknowns  steps   resid  factor solves  us a step  dense us   ratio  solver\n"));
+  for (PetscInt i = 0; i < nm; i++) {
+    ReducedBody body, fine;
+    double      coarse_step = 0, fine_step = 0;
+    PetscCall(MakeBody(mesh[0], modes[i], &body));
+    for (PetscInt k = 0; k < na; k++) PetscCall(Compare(body, attachments[k], end, tolerance, repeat, &coarse_step));
+    if (i + 1 < nm || na == 0 || mesh[1] == mesh[0]) continue;
+    PetscCall(MakeBody(mesh[1], modes[i], &fine));
+    PetscCall(Compare(fine, attachments[na - 1], end, tolerance, repeat, &fine_step));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "finer mesh: time per step times %.3f\n", fine_step / coarse_step));
+  }
+  PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+  PetscFunctionBegin;
+  PetscCall(SlepcInitialize(&argc, &argv, nullptr, nullptr));
+  PetscCall(TSHHT3Initialize());
+  PetscCall(Run());
+  PetscCall(SlepcFinalize());
+  return 0;
+}
