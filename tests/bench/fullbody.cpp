@@ -36,10 +36,10 @@ static PetscErrorCode ReadCase(Case *c)
   const char *const helds[] = {"clamp", "hinge", "free", "Held", "", nullptr};
   PetscInt          n[3] = {40, 8, 8}, three = 3;
   PetscEnum         law = (PetscEnum)0, held = (PetscEnum)CLAMP;
-  PetscBool         brick8 = PETSC_FALSE;
+  PetscBool         brick8 = PETSC_FALSE, sized;
   PetscFunctionBeginUser;
-  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-size", n, &three, nullptr));
-  PetscCheck(three == 3 && n[0] > 0 && n[1] > 0 && n[2] > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
+  PetscCall(PetscOptionsGetIntArray(nullptr, nullptr, "-size", n, &three, &sized));
+  PetscCheck((!sized || three == 3) && n[0] > 0 && n[1] > 0 && n[2] > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
              "-size needs three positive numbers");
   PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-law", laws, &law, nullptr));
   PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-held", helds, &held, nullptr));
