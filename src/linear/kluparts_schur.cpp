@@ -21,13 +21,15 @@ struct Column {
   KluInt        count;
 };
 
-/* The columns of one factor: indices, rounded up to whole doubles, then values */
+/* The columns of one factor: indices, rounded up to whole doubles, then values. For a single unknown KLU stores nothing
+   but the pivot. */
 struct Factor {
   const double *data;
   const KluInt *start, *length;
 
   Column operator[](PetscInt k) const
   {
+    if (!data) return {NULL, NULL, 0};
     const double *at    = data + start[k];
     const size_t  units = ((size_t)length[k] * sizeof(KluInt) + sizeof(double) - 1) / sizeof(double);
     return {reinterpret_cast<const KluInt *>(at), at + units, length[k]};

@@ -299,17 +299,20 @@ Array alone(const Triplets &e)
   return result;
 }
 
-void compare(const char *what, const Triplets &e, const Owners &owner, double tolerance = 1e-9)
+/* Against one rank alone; against MUMPS, too, where asked for: it talks much where cores are few */
+void compare(const char *what, const Triplets &e, const Owners &owner, bool mumps = false)
 {
-  System       s(e, owner), mumps(e, owner, LINEAR_MUMPSND);
+  System       s(e, owner);
   const Array  x    = s.solve();
-  const double left = residual(e, x), klupair = relativeDifference(x, alone(e)),
-               other = relativeDifference(x, mumps.solve());
-  if (rank() == 0)
-    MEASURED("%s on %d ranks: residual %.1e, against klupair %.1e, MUMPS %.1e", what, ranks(), left, klupair, other);
+  const double left = residual(e, x), klupair = relativeDifference(x, alone(e));
+  if (rank() == 0) MEASURED("%s on %d ranks: residual %.1e, against klupair %.1e", what, ranks(), left, klupair);
   EXPECT_LT(left, 1e-10) << what;
-  EXPECT_LT(klupair, tolerance) << what;
-  EXPECT_LT(other, tolerance) << what;
+  EXPECT_LT(klupair, 1e-9) << what;
+  if (!mumps) return;
+  System       other(e, owner, LINEAR_MUMPSND);
+  const double difference = relativeDifference(x, other.solve());
+  if (rank() == 0) MEASURED("%s on %d ranks: against MUMPS %.1e", what, ranks(), difference);
+  EXPECT_LT(difference, 1e-9) << what;
 }
 
 MatFactorError factorError(System &s)
@@ -336,13 +339,13 @@ TEST(KluParts, Chains)
 {
   for (const Triplets &e : {spatial_chain(60), spatial_chain(400, 8), chain(200, 0), chain(30, 12)}) {
     compare("chain", e, pieces(e, ranks()));
-    compare("chain, unsymmetric", unsymmetric(e), pieces(e, ranks()));
+    compare("chain, unsymmetric", unsymmetric(e), pieces(e, ranks()), e.n < 1000);
   }
 }
 
 TEST(KluParts, Nets)
 {
-  for (const Triplets &e : {net(3, 3), net(12, 12), net(30, 4)}) compare("net", e, pieces(e, ranks()));
+  for (const Triplets &e : {net(3, 3), net(12, 12), net(30, 4)}) compare("net", e, pieces(e, ranks()), e.n < 1000);
 }
 
 TEST(KluParts, Bricks)
@@ -357,7 +360,7 @@ TEST(KluParts, RandomSaddlePoints)
     const Triplets e = saddle(40 + 15 * (PetscInt)seed, 10 + 5 * (PetscInt)seed, seed);
     compare("saddle", e, pieces(e, ranks()));
     compare("saddle, scattered", e, scattered(e, ranks()));
-    compare("saddle, unsymmetric", unsymmetric(e), scattered(e, ranks()));
+    compare("saddle, unsymmetric", unsymmetric(e), scattered(e, ranks()), seed == 2);
   }
 }
 
@@ -411,6 +414,24 @@ TEST(KluParts, RankWithoutInterior)
   o[0] = std::min(1, ranks() - 1);
   o[1] = std::min(2, ranks() - 1);
   compare("hubs", e, o);
+}
+
+/* Few unknowns each, down to one: coupled, or not, with the neighbours */
+TEST(KluParts, FewUnknowns)
+{
+  for (PetscInt n = 1; n <= 9; ++n)
+    for (const bool coupled : {true, false}) {
+      Triplets e;
+      Owners   o;
+      for (e.n = 0; e.n < n; ++e.n) {
+        e.add(e.n, e.n, 2.0 + 0.3 * (double)e.n);
+        if (coupled && e.n > 0) e.add_symmetric(e.n, e.n - 1, 0.7);
+        o.push_back((int)(e.n % ranks()));
+      }
+      compare("few", e, o);
+      std::sort(o.begin(), o.end());
+      compare("few, in pieces", e, o);
+    }
 }
 
 /* ---- the same factor for other values, other patterns ---- */
