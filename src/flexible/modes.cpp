@@ -63,8 +63,10 @@ PetscErrorCode Multiply(Mat A, const MatrixXd &X, MatrixXd *Y)
   PetscFunctionReturn(0);
 }
 
+using Columns = Eigen::Ref<const MatrixXd>;
+
 /* By PETSc's dense matrices and not by Eigen: BLAS uses what the processor has, whatever flags we were compiled with */
-static PetscErrorCode BlasProduct(bool transposed, const MatrixXd &A, const MatrixXd &B, MatrixXd *C)
+static PetscErrorCode BlasProduct(bool transposed, const Columns &A, const Columns &B, MatrixXd *C)
 {
   Mat a, b, c;
 
@@ -74,6 +76,8 @@ static PetscErrorCode BlasProduct(bool transposed, const MatrixXd &A, const Matr
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, A.rows(), A.cols(), const_cast<double *>(A.data()), &a));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, B.rows(), B.cols(), const_cast<double *>(B.data()), &b));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, C->rows(), C->cols(), C->data(), &c));
+  if (A.rows()) PetscCall(MatDenseSetLDA(a, A.outerStride()));
+  if (B.rows()) PetscCall(MatDenseSetLDA(b, B.outerStride()));
   for (Mat m : {a, b, c}) {
     PetscCall(MatAssemblyBegin(m, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(m, MAT_FINAL_ASSEMBLY));
@@ -87,9 +91,9 @@ static PetscErrorCode BlasProduct(bool transposed, const MatrixXd &A, const Matr
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LocalProduct(const MatrixXd &A, const MatrixXd &B, MatrixXd *C) { return BlasProduct(true, A, B, C); }
+PetscErrorCode LocalProduct(const Columns &A, const Columns &B, MatrixXd *C) { return BlasProduct(true, A, B, C); }
 
-PetscErrorCode Combine(const MatrixXd &A, const MatrixXd &B, MatrixXd *C) { return BlasProduct(false, A, B, C); }
+PetscErrorCode Combine(const Columns &A, const Columns &B, MatrixXd *C) { return BlasProduct(false, A, B, C); }
 
 PetscErrorCode SumOverRanks(MPI_Comm comm, MatrixXd *A)
 {
@@ -286,6 +290,21 @@ static PetscErrorCode Deflate(const Pencil &pencil, const MatrixXd &found, EPS e
 /* Above this number of modes with a bound on the frequency the spectrum is divided among several shifts */
 constexpr PetscInt slice_from = 400;
 
+/* Vectors before a restart, unless options say how many: the block type needs more of them than SLEPc's own */
+static PetscErrorCode SetSize(PetscInt count, PetscInt most, EPS eps)
+{
+  PetscInt  size;
+  PetscBool blocks;
+
+  PetscFunctionBegin;
+  PetscCall(EPSGetDimensions(eps, nullptr, &size, nullptr));
+  if (size > 0) PetscFunctionReturn(0);
+  PetscCall(PetscObjectTypeCompare((PetscObject)eps, EPS_BLOCK_KRYLOV, &blocks));
+  size = std::min(most, blocks ? (PetscInt)(2.5 * count) + 40 : std::max(count + 20, (PetscInt)(1.6 * count)));
+  PetscCall(EPSSetDimensions(eps, count, size, PETSC_DEFAULT));
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, PetscInt count, bool slices,
                                const MatrixXd &found, KSP *ksp, EPS *eps)
 {
@@ -299,7 +318,8 @@ static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, 
   PetscCall(EPSSetProblemType(*eps, EPS_GHEP));
   /* one more solve for each mode, which cleans vectors of the null space of M: there is none but for multipliers */
   PetscCall(EPSSetPurify(*eps, pencil.multipliers ? PETSC_TRUE : PETSC_FALSE));
-  PetscCall(EPSSetType(*eps, EPSKRYLOVSCHUR));
+  PetscCall(RegisterBlockKrylov());
+  PetscCall(EPSSetType(*eps, slices ? EPSKRYLOVSCHUR : EPS_BLOCK_KRYLOV));
   PetscCall(EPSSetTolerances(*eps, 1e-11, 200));
   PetscCall(EPSGetST(*eps, &st));
   PetscCall(STSetType(st, STSINVERT));
@@ -314,16 +334,15 @@ static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, 
     PetscCall(PCSetType(pc, PCCHOLESKY));
     PetscCall(PCFactorSetMatSolverType(pc, "mumpsnd"));
   } else {
-    const PetscInt size = std::min(pencil.modes - (PetscInt)pencil.rigid.cols() - (PetscInt)found.cols(),
-                                   std::max(count + 20, (PetscInt)(1.6 * count)));
     if (!*ksp) PetscCall(CreateSolver(comm, ksp));
     PetscCall(STSetKSP(st, *ksp));
-    PetscCall(EPSSetDimensions(*eps, count, size, PETSC_DEFAULT));
+    PetscCall(EPSSetDimensions(*eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
     PetscCall(EPSSetTarget(*eps, wanted.shift));
     PetscCall(EPSSetWhichEigenpairs(*eps, EPS_TARGET_MAGNITUDE));
     PetscCall(Deflate(pencil, found, *eps));
   }
   PetscCall(EPSSetFromOptions(*eps));
+  if (!slices) PetscCall(SetSize(count, pencil.modes - (PetscInt)(pencil.rigid.cols() + found.cols()), *eps));
   PetscFunctionReturn(0);
 }
 

@@ -27,9 +27,9 @@ PetscErrorCode Multiply(Mat A, const MatrixXd &X, MatrixXd *Y);
 /* Y = A X for the columns [from, from + count) of X */
 PetscErrorCode MultiplyColumns(Mat A, const MatrixXd &X, PetscInt from, PetscInt count, MatrixXd *Y);
 /* A^T B of this rank's rows alone */
-PetscErrorCode LocalProduct(const MatrixXd &A, const MatrixXd &B, MatrixXd *C);
+PetscErrorCode LocalProduct(const Eigen::Ref<const MatrixXd> &A, const Eigen::Ref<const MatrixXd> &B, MatrixXd *C);
 /* A B, B the same on all ranks */
-PetscErrorCode Combine(const MatrixXd &A, const MatrixXd &B, MatrixXd *C);
+PetscErrorCode Combine(const Eigen::Ref<const MatrixXd> &A, const Eigen::Ref<const MatrixXd> &B, MatrixXd *C);
 PetscErrorCode SumOverRanks(MPI_Comm comm, MatrixXd *A);
 
 /* ---- progress and time ---- */
@@ -82,6 +82,10 @@ struct WantedModes {
   double   below = 0; /* if positive: all below it; count was found by CountBelow() */
   double   shift = 0;
 };
+
+/* The type of the eigensolver, in block_krylov.cpp; -reduce_eps_type takes any other of SLEPc's */
+#define EPS_BLOCK_KRYLOV "blockkrylovschur"
+PetscErrorCode RegisterBlockKrylov();
 
 /* Consumes *ksp (may be null): if it holds a factorization of K and the shift is 0, that one is used */
 PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *ksp, NormalModes *modes);

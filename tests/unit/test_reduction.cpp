@@ -287,7 +287,8 @@ TEST(Reduction, SolversByOptions)
   ReducedBody usual, other;
   for (Tie tie : {Tie::Rigid, Tie::Average}) {
     must(Reduce(m.model, both(6, tie), &usual));
-    for (const char *text : {"-reduce_pc_factor_mat_solver_type mumps",
+    for (const char *text : {"-reduce_pc_factor_mat_solver_type mumps", "-reduce_eps_type krylovschur",
+                             "-reduce_eps_krylov_block 1", "-reduce_eps_krylov_block 25 -reduce_eps_ncv 12",
                              "-reduce_ksp_type minres -reduce_pc_type none -reduce_ksp_max_it 20000"}) {
       Options options(text);
       must(Reduce(m.model, both(6, tie), &other));

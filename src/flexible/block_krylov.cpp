@@ -1,0 +1,421 @@
+/*
+  Krylov-Schur with blocks of vectors, as a type of SLEPc's EPS: thick-restart Lanczos on (K - sigma M)^-1 M, everything
+  orthogonal in M.
+
+  SLEPc's own type solves for one vector at a time, and each solve reads the factors from memory once. Here a block of
+  vectors goes through them together. Blocks also find copies of eigenvalues, which a single vector cannot.
+
+  The projected matrix is T = V^T M OP V as it was computed, without any use of recurrences, so that a restart is a mere
+  change of the basis. Options: -eps_ncv, -eps_tol, -eps_max_it (restarts), monitors; -eps_krylov_block <vectors>.
+*/
+#include "modes.h"
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <slepc/private/epsimpl.h>
+
+namespace hhtdae
+{
+
+using Columns = Eigen::Ref<const MatrixXd>;
+
+constexpr PetscInt usual_block = 6;
+constexpr PetscInt look_after  = 24; /* vectors: the projected problem is solved so often */
+
+struct BlockKrylov {
+  PetscInt block = usual_block, size = 0; /* size: vectors before a restart */
+  Mat      M = nullptr;
+  MatrixXd V; /* first the deflated vectors, then the basis */
+  MatrixXd T; /* of the basis */
+  PetscInt deflated = 0, k = 0, looked = 0;
+  MatrixXd W, MW; /* the next block, orthonormal to V in M, and M times it */
+
+  /* of the last block of V: OP V = V T + (what follows), its Gram matrix as U^T D G D U = diag(s) */
+  MatrixXd remainder;
+  VectorXd theta;
+  MatrixXd Y;
+  VectorXd error; /* of theta */
+};
+
+/* ---- the operator and orthogonality ---- */
+
+/* W = (K - sigma M)^-1 MW */
+static PetscErrorCode SolveShifted(EPS eps, const MatrixXd &MW, MatrixXd *W)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)eps);
+  Mat            B, X;
+
+  PetscFunctionBegin;
+  W->setZero(MW.rows(), MW.cols());
+  if (!MW.cols()) PetscFunctionReturn(0);
+  PetscCall(
+      MatCreateDense(comm, MW.rows(), PETSC_DECIDE, PETSC_DETERMINE, MW.cols(), const_cast<double *>(MW.data()), &B));
+  PetscCall(MatCreateDense(comm, MW.rows(), PETSC_DECIDE, PETSC_DETERMINE, MW.cols(), W->data(), &X));
+  for (Mat A : {B, X}) {
+    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(STMatMatSolve(eps->st, B, X));
+  PetscCall(MatDestroy(&B));
+  PetscCall(MatDestroy(&X));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Gram(EPS eps, const Columns &A, const MatrixXd &B, MatrixXd *G)
+{
+  PetscFunctionBegin;
+  PetscCall(LocalProduct(A, B, G));
+  PetscCall(SumOverRanks(PetscObjectComm((PetscObject)eps), G));
+  PetscFunctionReturn(0);
+}
+
+/* W without what it has in V, by H = V^T M W */
+static PetscErrorCode TakeOut(const MatrixXd &H, BlockKrylov *b)
+{
+  MatrixXd part;
+
+  PetscFunctionBegin;
+  PetscCall(Combine(b->V.leftCols(b->deflated + b->k), H, &part));
+  b->W -= part;
+  PetscCall(Multiply(b->M, b->W, &b->MW));
+  PetscFunctionReturn(0);
+}
+
+/* W and MW orthonormal in M. Directions whose squared size is below `least`, relative to columns of unit size if
+   scaled, go; found: the least. back: W before = W after * back + the rest; all: the same with all directions, which
+   tells the size of W */
+static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov *b, double *found, MatrixXd *back,
+                                MatrixXd *all)
+{
+  MatrixXd G;
+
+  PetscFunctionBegin;
+  PetscCall(Gram(eps, b->W, b->MW, &G));
+  const PetscInt n     = (PetscInt)G.cols();
+  VectorXd       scale = G.diagonal().cwiseMax(0.).cwiseSqrt();
+  for (double &s : scale)
+    if (!scaled || !(s > PETSC_MACHINE_EPSILON * PETSC_MACHINE_EPSILON)) s = 1; /* or nothing of it is left */
+  const VectorXd                                inverse = scale.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(inverse.asDiagonal() * (0.5 * (G + G.transpose())) *
+                                                     inverse.asDiagonal());
+  PetscInt                                      from = 0;
+  *found                                             = n ? gram.eigenvalues()[0] : 0;
+  while (from < n && !(gram.eigenvalues()[from] > least)) from++;
+  const MatrixXd U = gram.eigenvectors().rightCols(n - from);
+  const VectorXd s = gram.eigenvalues().tail(n - from).cwiseSqrt();
+  const MatrixXd S = inverse.asDiagonal() * U * s.cwiseInverse().asDiagonal();
+  *back            = s.asDiagonal() * U.transpose() * scale.asDiagonal();
+  *all             = gram.eigenvalues().cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.eigenvectors().transpose() *
+         scale.asDiagonal();
+  PetscCall(Combine(b->W, S, &G));
+  b->W.swap(G);
+  PetscCall(Combine(b->MW, S, &G));
+  b->MW.swap(G);
+  PetscFunctionReturn(0);
+}
+
+/* W becomes the next block, which may have fewer columns, or none if W is in the space already; H: V^T M W before */
+static PetscErrorCode NextBlock(EPS eps, BlockKrylov *b, MatrixXd *H)
+{
+  MatrixXd       second, back, all;
+  double         least;
+  const PetscInt n = b->deflated + b->k;
+
+  PetscFunctionBegin;
+  PetscCall(Multiply(b->M, b->W, &b->MW));
+  PetscCall(Gram(eps, b->V.leftCols(n), b->MW, H));
+  PetscCall(TakeOut(*H, b));
+  PetscCall(Normalize(eps, true, 1e-15, b, &least, &back, &b->remainder));
+  PetscCall(Gram(eps, b->V.leftCols(n), b->MW, &second));
+  if (least > 1e-4 && (!second.size() || second.cwiseAbs().maxCoeff() < 1e-13)) PetscFunctionReturn(0);
+  /* of unit vectors before: what is mostly in the space was nothing but rounding */
+  PetscCall(TakeOut(second, b));
+  *H += second * back;
+  PetscCall(Normalize(eps, false, 0.25, b, &least, &back, &all));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the projected problem ---- */
+
+/* T with the products of the last block of `count` vectors */
+static void Extend(PetscInt count, const MatrixXd &H, BlockKrylov *b)
+{
+  const PetscInt before = b->k - count;
+  b->T.conservativeResize(b->k, b->k);
+  b->T.rightCols(count)                = H.bottomRows(b->k);
+  b->T.bottomLeftCorner(count, before) = b->T.topRightCorner(before, count).transpose();
+  const MatrixXd corner                = b->T.bottomRightCorner(count, count);
+  b->T.bottomRightCorner(count, count) = 0.5 * (corner + corner.transpose());
+}
+
+/* Ritz values in descending size, and their errors: those of all but the last block are exact to rounding */
+static PetscErrorCode Ritz(EPS eps, PetscInt count, BlockKrylov *b)
+{
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(b->T);
+  std::vector<PetscInt>                         order(b->k);
+
+  PetscFunctionBegin;
+  PetscCheck(solver.info() == Eigen::Success && solver.eigenvalues().allFinite(), PetscObjectComm((PetscObject)eps),
+             PETSC_ERR_CONV_FAILED, "The projected eigenvalue problem has no solution: solves are not finite");
+  for (PetscInt i = 0; i < b->k; i++) order[i] = i;
+  const VectorXd &value = solver.eigenvalues();
+  std::stable_sort(order.begin(), order.end(),
+                   [&](PetscInt i, PetscInt j) { return std::abs(value[i]) > std::abs(value[j]); });
+  b->theta.resize(b->k);
+  b->Y.resize(b->k, b->k);
+  for (PetscInt i = 0; i < b->k; i++) {
+    b->theta[i] = value[order[i]];
+    b->Y.col(i) = solver.eigenvectors().col(order[i]);
+  }
+  b->error = (b->remainder * b->Y.bottomRows(count)).colwise().norm().transpose();
+  PetscFunctionReturn(0);
+}
+
+/* eps->nconv: how many of the leading ones are good enough */
+static PetscErrorCode CountConverged(EPS eps, const BlockKrylov &b)
+{
+  const PetscInt known = std::min(b.k, eps->ncv);
+
+  PetscFunctionBegin;
+  bool good  = true;
+  eps->nconv = 0;
+  for (PetscInt i = 0; i < known; i++) {
+    eps->eigr[i] = b.theta[i];
+    eps->eigi[i] = 0;
+    PetscCall((*eps->converged)(eps, eps->eigr[i], 0, b.error[i], &eps->errest[i], eps->convergedctx));
+    good = good && eps->errest[i] < eps->tol;
+    if (good) eps->nconv++;
+  }
+  PetscCall(EPSMonitor(eps, eps->its, eps->nconv, eps->eigr, eps->eigi, eps->errest, known));
+  PetscFunctionReturn(0);
+}
+
+/* The basis becomes the leading `keep` Ritz vectors */
+static PetscErrorCode Restart(PetscInt keep, BlockKrylov *b)
+{
+  MatrixXd X;
+
+  PetscFunctionBegin;
+  PetscCall(Combine(b->V.middleCols(b->deflated, b->k), b->Y.leftCols(keep), &X));
+  b->V.middleCols(b->deflated, keep) = X;
+  b->k = b->looked = keep;
+  b->T             = b->theta.head(keep).asDiagonal();
+  PetscFunctionReturn(0);
+}
+
+/* ---- EPS ---- */
+
+static PetscErrorCode SetUp(EPS eps)
+{
+  BlockKrylov *b = static_cast<BlockKrylov *>(eps->data);
+  PetscBool    sinvert;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)eps->st, STSINVERT, &sinvert));
+  PetscCheck(sinvert && eps->isgeneralized && eps->ishermitian && eps->which == EPS_TARGET_MAGNITUDE,
+             PetscObjectComm((PetscObject)eps), PETSC_ERR_SUP,
+             "EPS type %s is for symmetric pairs, the transformation " STSINVERT " and eigenvalues around the target; "
+             "choose -eps_type " EPSKRYLOVSCHUR " for others",
+             EPS_BLOCK_KRYLOV);
+  PetscCall(PetscOptionsGetInt(((PetscObject)eps)->options, ((PetscObject)eps)->prefix, "-eps_krylov_block", &b->block,
+                               nullptr));
+  PetscCheck(b->block > 0, PetscObjectComm((PetscObject)eps), PETSC_ERR_ARG_OUTOFRANGE,
+             "-eps_krylov_block %" PetscInt_FMT " has to be positive", b->block);
+  PetscCall(EPSGetOperators(eps, nullptr, &b->M));
+  PetscCall(MatGetSize(b->M, &n, nullptr));
+  b->size = eps->ncv > 0 ? eps->ncv : 2 * eps->nev;
+  b->size = std::max(b->size, eps->nev + 2 * b->block);
+  if (eps->max_it == PETSC_DEFAULT) eps->max_it = 100;
+  /* SLEPc keeps the results alone */
+  eps->ncv = eps->mpd = std::min(n, eps->nev + b->block);
+  PetscCall(EPSAllocateSolution(eps, 0));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode SetUpSort(EPS eps)
+{
+  PetscFunctionBegin;
+  eps->sc->comparison    = SlepcCompareTargetMagnitude;
+  eps->sc->comparisonctx = &eps->target;
+  eps->sc->map           = nullptr;
+  eps->sc->mapobj        = nullptr;
+  eps->sc->rg            = nullptr;
+  PetscFunctionReturn(0);
+}
+
+/* The vectors that SLEPc holds as constraints; columns of V from the left, orthonormal in M */
+static PetscErrorCode TakeDeflated(EPS eps, PetscInt rows, BlockKrylov *b)
+{
+  const PetscInt n = std::max<PetscInt>(0, eps->nds);
+  MatrixXd       back, all;
+  double         least;
+
+  PetscFunctionBegin;
+  if (!n) PetscFunctionReturn(0);
+  b->W.resize(rows, n);
+  for (PetscInt i = 0; i < n; i++) {
+    Vec                v;
+    const PetscScalar *values;
+    PetscCall(BVGetColumn(eps->V, i - n, &v));
+    PetscCall(VecGetArrayRead(v, &values));
+    std::copy_n(values, rows, b->W.data() + i * rows);
+    PetscCall(VecRestoreArrayRead(v, &values));
+    PetscCall(BVRestoreColumn(eps->V, i - n, &v));
+  }
+  for (int pass = 0; pass < 2; pass++) {
+    PetscCall(Multiply(b->M, b->W, &b->MW));
+    PetscCall(Normalize(eps, true, 1e-14, b, &least, &back, &all));
+  }
+  b->deflated                = (PetscInt)b->W.cols();
+  b->V.leftCols(b->deflated) = b->W;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Start(EPS eps, BlockKrylov *b)
+{
+  PetscMPIInt                            rank;
+  PetscInt                               rows;
+  std::uniform_real_distribution<double> number(-1, 1);
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)eps), &rank));
+  PetscCall(MatGetLocalSize(b->M, &rows, nullptr));
+  std::mt19937 random(17 + (unsigned)rank);
+  b->deflated = 0;
+  b->k = b->looked = 0;
+  b->V.setZero(rows, std::max<PetscInt>(0, eps->nds) + b->size + b->block);
+  b->T.resize(0, 0);
+  PetscCall(TakeDeflated(eps, rows, b));
+  b->MW.resize(rows, b->block);
+  for (PetscInt i = 0; i < b->MW.size(); i++) b->MW.data()[i] = number(random);
+  /* into the range of the operator, where M is regular even with multipliers */
+  PetscCall(Multiply(b->M, MatrixXd(b->MW), &b->MW));
+  PetscCall(SolveShifted(eps, b->MW, &b->W));
+  MatrixXd H;
+  PetscCall(NextBlock(eps, b, &H));
+  PetscFunctionReturn(0);
+}
+
+/* Once more through the operator where M is singular; columns of V have unit length in M then, as they had */
+static PetscErrorCode Purify(EPS eps, BlockKrylov *b)
+{
+  PetscFunctionBegin;
+  for (PetscInt from = 0; from < eps->nconv; from += block_columns) {
+    const PetscInt count = std::min(block_columns, eps->nconv - from);
+    PetscCall(MultiplyColumns(b->M, b->V, b->deflated + from, count, &b->MW));
+    PetscCall(SolveShifted(eps, b->MW, &b->W));
+    b->V.middleCols(b->deflated + from, count) = b->W * b->theta.segment(from, count).cwiseInverse().asDiagonal();
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Deliver(EPS eps, BlockKrylov *b)
+{
+  PetscFunctionBegin;
+  PetscCall(Restart(eps->nconv, b));
+  if (eps->purify) PetscCall(Purify(eps, b));
+  for (PetscInt i = 0; i < eps->nconv; i++) {
+    Vec          v;
+    PetscScalar *values;
+    PetscCall(BVGetColumn(eps->V, i, &v));
+    PetscCall(VecGetArray(v, &values));
+    std::copy_n(b->V.data() + (b->deflated + i) * b->V.rows(), b->V.rows(), values);
+    PetscCall(VecRestoreArray(v, &values));
+    PetscCall(BVRestoreColumn(eps->V, i, &v));
+  }
+  b->V.resize(0, 0);
+  b->W.resize(0, 0);
+  b->MW.resize(0, 0);
+  PetscFunctionReturn(0);
+}
+
+/* One block further, and eigenvalues of the projected matrix where there are enough of them */
+static PetscErrorCode Step(EPS eps, BlockKrylov *b)
+{
+  const PetscInt count = (PetscInt)b->W.cols();
+  MatrixXd       H;
+
+  PetscFunctionBegin;
+  b->V.middleCols(b->deflated + b->k, count) = b->W;
+  b->k += count;
+  PetscCall(SolveShifted(eps, MatrixXd(b->MW), &b->W));
+  PetscCall(NextBlock(eps, b, &H));
+  Extend(count, H, b);
+  const bool full = b->k + b->W.cols() > b->size + b->block;
+  if (b->W.cols() && !full && (b->k < eps->nev || b->k - b->looked < look_after)) PetscFunctionReturn(0);
+  b->looked = b->k;
+  PetscCall(Ritz(eps, count, b));
+  PetscCall(CountConverged(eps, *b));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Solve(EPS eps)
+{
+  BlockKrylov *b = static_cast<BlockKrylov *>(eps->data);
+
+  PetscFunctionBegin;
+  PetscCall(Start(eps, b));
+  eps->its   = 1;
+  eps->nconv = 0;
+  while (eps->reason == EPS_CONVERGED_ITERATING) {
+    if (!b->W.cols()) {
+      eps->reason = EPS_DIVERGED_BREAKDOWN; /* M is null on all that is not deflated */
+      break;
+    }
+    PetscCall(Step(eps, b));
+    if (eps->nconv >= eps->nev)
+      eps->reason = EPS_CONVERGED_TOL;
+    else if (!b->W.cols())
+      eps->reason = EPS_DIVERGED_BREAKDOWN; /* the space holds all that it can reach */
+    else if (b->k + b->W.cols() > b->size + b->block) {
+      if (eps->its >= eps->max_it)
+        eps->reason = EPS_DIVERGED_ITS;
+      else {
+        PetscCall(Restart(eps->nconv + (b->k - eps->nconv) / 2, b));
+        eps->its++;
+      }
+    }
+  }
+  PetscCall(Deliver(eps, b));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode BackTransform(EPS eps)
+{
+  PetscFunctionBegin;
+  PetscCall(STBackTransform(eps->st, eps->nconv, eps->eigr, eps->eigi));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Destroy(EPS eps)
+{
+  PetscFunctionBegin;
+  delete static_cast<BlockKrylov *>(eps->data);
+  eps->data = nullptr;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Create(EPS eps)
+{
+  PetscFunctionBegin;
+  eps->data               = new BlockKrylov;
+  eps->categ              = EPS_CATEGORY_KRYLOV;
+  eps->useds              = PETSC_FALSE;
+  eps->ops->setup         = SetUp;
+  eps->ops->setupsort     = SetUpSort;
+  eps->ops->solve         = Solve;
+  eps->ops->backtransform = BackTransform;
+  eps->ops->destroy       = Destroy;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode RegisterBlockKrylov()
+{
+  PetscFunctionBegin;
+  PetscCall(EPSRegister(EPS_BLOCK_KRYLOV, Create));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
