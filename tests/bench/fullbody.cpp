@@ -22,17 +22,17 @@ enum { CLAMP, HINGE, FREE };
 
 struct Case {
   hhtex::SolidBeam block;
-  FeLaw            law   = FeLaw::Large;
-  int              held  = CLAMP;
-  PetscInt         steps = 20;
-  PetscReal        part  = 0.01;
+  FeLaw            law    = FeLaw::Large;
+  int              held   = CLAMP;
+  PetscInt         steps  = 20;
+  PetscReal        part   = 0.01;
   PetscBool        blocks = PETSC_FALSE;
 };
 
 /* Rubber, 2 cm a brick */
 static PetscErrorCode ReadCase(Case *c)
 {
-  const char *const laws[] = {"large", "small", "Law", "", nullptr};
+  const char *const laws[]  = {"large", "small", "Law", "", nullptr};
   const char *const helds[] = {"clamp", "hinge", "free", "Held", "", nullptr};
   PetscInt          n[3] = {40, 8, 8}, three = 3;
   PetscEnum         law = (PetscEnum)0, held = (PetscEnum)CLAMP;
@@ -47,7 +47,8 @@ static PetscErrorCode ReadCase(Case *c)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-part", &c->part, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-brick8", &brick8, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-blocks", &c->blocks, nullptr));
-  PetscCheck(c->steps > 0 && c->part > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-steps and -part must be positive");
+  PetscCheck(c->steps > 0 && c->part > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
+             "-steps and -part must be positive");
   c->held             = held;
   c->law              = law ? FeLaw::Small : FeLaw::Large;
   hhtex::SolidBeam &b = c->block;
@@ -63,9 +64,10 @@ static PetscErrorCode ReadCase(Case *c)
 /* First bending period of the cantilever, or of the free beam */
 static double Period(const Case &c)
 {
-  const hhtex::SolidBeam &b = c.block;
-  const double root = c.held == FREE ? 4.730 : 1.8751, I = std::fmin(b.Iyy(), b.Izz());
-  return 2 * PETSC_PI * b.length * b.length / (root * root) * std::sqrt(b.material.density * b.area() / (b.material.young * I));
+  const hhtex::SolidBeam &b    = c.block;
+  const double            root = c.held == FREE ? 4.730 : 1.8751, I = std::fmin(b.Iyy(), b.Izz());
+  return 2 * PETSC_PI * b.length * b.length / (root * root) *
+         std::sqrt(b.material.density * b.area() / (b.material.young * I));
 }
 
 static PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
@@ -179,17 +181,18 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   PetscCall(Solver(ts, &solver));
   PetscCall(Memory(&most, &all));
   const double n = (double)PetscMax(s.steps - clock.first.steps, 1);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
-                        "  reading, assembly and set-up %.2f s, first step %.2f s\n"
-                        "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
-                        "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
-                        "\n  memory at most %.0f MB on a rank, %.0f MB on all\n",
-                        ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
-                        clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
-                        100 * (double)(s.jacobians - clock.first.jacobians) / n,
-                        100 * (double)(s.factorizations - clock.first.factorizations) / n,
-                        (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
+  PetscCall(PetscPrintf(
+      PETSC_COMM_WORLD,
+      "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
+      "  reading, assembly and set-up %.2f s, first step %.2f s\n"
+      "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
+      "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
+      "\n  memory at most %.0f MB on a rank, %.0f MB on all\n",
+      ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
+      clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
+      100 * (double)(s.jacobians - clock.first.jacobians) / n,
+      100 * (double)(s.factorizations - clock.first.factorizations) / n,
+      (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
   PetscFunctionReturn(0);
 }
 
