@@ -1,9 +1,7 @@
 static char help[] =
     "A cantilever of steel under a load at its tip, three times: all finite elements with displacements at large, one\n"
-    "body in modal coordinates, two-node beams between rigid pieces. Static deflection against the elastica, the "
-    "first\n"
-    "frequency against beam theory, time of a step, for a small and a large load. All three agree under the small "
-    "one;\n"
+    "body in modal coordinates, two-node beams between rigid pieces. Static deflection against the elastica, first\n"
+    "frequency against beam theory, time of a step, for a small and a large load. All three agree under the small;\n"
     "under the large one the modal body is off, as it must be: its displacement is linear in its modes.\n"
     "  -length <1> -depth <0.02> -width <0.02>: m, the load acts along the depth\n"
     "  -E <2.1e11> -nu <0> -rho <7850>: N/m^2, none, kg/m^3; beam theory has no lateral contraction, which\n"

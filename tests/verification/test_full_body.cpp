@@ -218,6 +218,7 @@ TEST(FullBodyDynamics, ModesAgainstTheModel)
   MEASURED("difference to the whole model, by normal modes:%s; all of them, 30 times the force: %.1e", all.c_str(),
            larger);
   EXPECT_LT(error, 1e-5);
+  EXPECT_NEAR(larger / error, 30, 10) << "what is left must be of second order in the displacement";
 }
 
 /*
