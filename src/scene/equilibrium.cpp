@@ -274,7 +274,7 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   E.scale = at.force;
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
-    if (b.mass > 0) lightest = std::min(lightest, b.mass);
+    lightest = std::min(lightest, b.massless ? b.light_mass : b.mass);
   }
   *h = E.scale > 0 ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
   PetscFunctionReturn(0);
