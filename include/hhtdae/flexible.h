@@ -149,7 +149,7 @@ struct ReducedBody {
   std::vector<FeElement> elements;
   StressModes           stress;        /* empty until asked for */
 
-  /* A file in HDF5, see the layout in src/flexible/file.cpp */
+  /* A file in HDF5, see the layout in src/flexible/file.h */
   PetscErrorCode save(const std::string &file) const;
   PetscErrorCode load(MPI_Comm comm, const std::string &file);
   PetscErrorCode view(PetscViewer viewer) const;

@@ -1,4 +1,5 @@
-/* Messages between ranks as vectors of plain structs, and errors that all ranks raise together. */
+/* Messages between ranks as vectors of plain structs, parts of distributed things, and errors that all ranks raise
+ * together. */
 #ifndef HHTDAE_FLEXIBLE_EXCHANGE_H
 #define HHTDAE_FLEXIBLE_EXCHANGE_H
 
@@ -26,6 +27,25 @@ inline PetscErrorCode Agree(MPI_Comm comm, const std::string &problem, PetscErro
   text.resize(length);
   PetscCallMPI(MPI_Bcast(&text[0], length, MPI_CHAR, first, comm));
   SETERRQ(comm, code, "%s", text.c_str());
+}
+
+/* Pieces of a distributed thing, one after the other: this rank's first and the number of all. Collective */
+inline PetscErrorCode Place(MPI_Comm comm, PetscInt64 own, PetscInt64 *first, PetscInt64 *all)
+{
+  PetscMPIInt rank;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Allreduce(&own, all, 1, MPIU_INT64, MPI_SUM, comm));
+  *first = 0;
+  PetscCallMPI(MPI_Exscan(&own, first, 1, MPIU_INT64, MPI_SUM, comm));
+  if (!rank) *first = 0; /* MPI leaves it undefined there */
+  PetscFunctionReturn(0);
+}
+
+/* Begin of part r of n things divided among `parts` as evenly as possible */
+inline PetscInt64 PartBegin(PetscInt64 n, PetscMPIInt parts, PetscMPIInt r)
+{
+  return n / parts * r + (n % parts < r ? n % parts : r);
 }
 
 namespace detail

@@ -4,7 +4,7 @@
   between them, and a .vtu is one file whatever the number of ranks was; its bytes do not depend on it. Rank 0 holds one
   rank's part of one array at a time.
 */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "flexible/node_order.h"
 #include "hhtdae/flexible.h"
 #include <cerrno>
@@ -229,7 +229,7 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT64, MPI_SUM, body.comm));
   if (error.empty() && !count[0])
     error = "body " + body.modal.name + " has no nodes: it has to be reduced with all nodes for a field to be written";
-  PetscCall(RaiseTogether(body.comm, PETSC_ERR_ARG_INCOMP, error));
+  PetscCall(Agree(body.comm, error, PETSC_ERR_ARG_INCOMP));
   std::vector<Array> points{MakePoints(body, origin, axes), MakeDisplacement(body, eta, axes), MakeLabels(body)};
   Array              cells[3];
   if (count[2]) {
@@ -243,7 +243,7 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
   for (Array &a : cells) PetscCall(Total(body.comm, &a));
   if (!rank && !(out = std::fopen(file.c_str(), "wb")))
     error = "cannot write the field into " + file + ": " + std::strerror(errno);
-  PetscCall(RaiseTogether(body.comm, PETSC_ERR_FILE_OPEN, error));
+  PetscCall(Agree(body.comm, error, PETSC_ERR_FILE_OPEN));
   if (out) {
     const std::string head = Header(points, cells, count[0], count[1] ? count[1] : count[0]);
     good                   = std::fwrite(head.data(), 1, head.size(), out) == head.size();
@@ -255,7 +255,7 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
     good = std::fclose(out) == 0 && good;
   }
   if (!good) error = "writing the field into " + file + " failed (disk full?)";
-  PetscCall(RaiseTogether(body.comm, PETSC_ERR_FILE_WRITE, error));
+  PetscCall(Agree(body.comm, error, PETSC_ERR_FILE_WRITE));
   PetscFunctionReturn(0);
 }
 

@@ -1,6 +1,6 @@
 /* Stress out of modal coordinates: von Mises at the nodes, and the highest places of a run without keeping its history.
  */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
 #include <algorithm>
 #include <cmath>
@@ -116,7 +116,7 @@ PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<Ho
   else if (n &&
            (body_.coordinates.size() != 3 * (std::size_t)body_.own || body_.label.size() != (std::size_t)body_.own))
     error = "body " + body_.modal.name + " has no coordinates of its nodes";
-  PetscCall(RaiseTogether(body_.comm, PETSC_ERR_ARG_WRONG, error));
+  PetscCall(Agree(body_.comm, error, PETSC_ERR_ARG_WRONG));
   for (std::size_t i = 0; i < n; i++) {
     const PetscInt node = body_.stress.node[i];
     const double  *x    = &body_.coordinates[3 * (std::size_t)node];

@@ -12,7 +12,7 @@
   which rank 0 reads; the matrices are read by all ranks. Elements serve stress and pictures, so those of other kinds
   than tetrahedra and bricks of linear or quadratic shape are not kept.
 */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "flexible/import.h"
 #include "flexible/node_order.h"
 #include <algorithm>
@@ -498,7 +498,7 @@ PetscErrorCode FeModel::readCalculix(const std::string &given)
     if (same) row.clear(); /* as a rule */
     head[0] = (PetscInt64)row.size();
   }
-  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
   PetscCallMPI(MPI_Bcast(head, 2, MPIU_INT64, 0, comm));
   row.resize((std::size_t)head[0]);
   PetscCallMPI(MPI_Bcast(row.data(), (PetscMPIInt)row.size(), MPIU_INT, 0, comm));

@@ -1,5 +1,5 @@
 /* Matrices in memory or in files of Matrix Market, Abaqus or PETSc, with nodes and sets in plain lists. */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "flexible/import.h"
 #include <algorithm>
 #include <cmath>
@@ -214,7 +214,7 @@ PetscErrorCode ReadLists(MPI_Comm comm, PetscInt rows, const std::string &nodes,
     for (PetscInt i = 0; i < rows / 3 && nodes.empty(); i++) read->label.push_back(i + 1);
     if (error.empty() && !sets.empty()) error = ReadSets(sets, read);
   }
-  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
   PetscFunctionReturn(0);
 }
 
@@ -360,7 +360,7 @@ PetscErrorCode FeModel::addSet(const std::string &name, const std::vector<PetscI
     if ((n < first || n >= first + own) && error.empty())
       error = "set " + name + ": node " + std::to_string(n) + " is not among the rank's own nodes " +
               std::to_string(first) + " .. " + std::to_string(first + own - 1);
-  PetscCall(RaiseTogether(comm, PETSC_ERR_ARG_WRONG, error));
+  PetscCall(Agree(comm, error, PETSC_ERR_ARG_WRONG));
   std::sort(set.begin(), set.end());
   set.erase(std::unique(set.begin(), set.end()), set.end());
   sets[name] = set;

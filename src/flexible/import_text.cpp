@@ -3,7 +3,7 @@
   to the owners of their rows: no rank sees more than its share, and the conversion of numbers, which takes the time, is
   divided.
 */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "flexible/import.h"
 #include <algorithm>
 #include <cctype>
@@ -229,7 +229,7 @@ PetscErrorCode OpenMatrix(MPI_Comm comm, const std::string &file, MatrixFile *ma
     if (error.empty() && matrix->rows > PETSC_MAX_INT) error = "it has more rows than this build of PETSc can count";
     if (!error.empty()) error = "cannot read the matrix " + file + ": " + error;
   }
-  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
   PetscInt64 all[6] = {matrix->kind, matrix->symmetric, matrix->rows, matrix->entries, matrix->begin, matrix->bytes};
   PetscCallMPI(MPI_Bcast(all, 6, MPIU_INT64, 0, comm));
   matrix->kind      = (MatrixFile::Kind)all[0];
@@ -256,7 +256,7 @@ PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShap
                    end   = m.begin + PartBegin(m.bytes - m.begin, size, rank + 1);
   error                  = ReadLines(m.file, begin, end, rank == 0, &to);
   if (!error.empty()) error = "cannot read the matrix " + m.file + ": " + error;
-  PetscCall(RaiseTogether(comm, PETSC_ERR_FILE_UNEXPECTED, error));
+  PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
   PetscCallMPI(MPI_Allreduce(&triplets->entries, &count, 1, MPIU_INT64, MPI_SUM, comm));
   PetscCheck(m.kind != MatrixFile::Market || count == m.entries, comm, PETSC_ERR_FILE_UNEXPECTED,
              "cannot read the matrix %s: it has %lld entries, its head promises %lld (truncated?)", m.file.c_str(),

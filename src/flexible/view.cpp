@@ -1,5 +1,5 @@
 /* What a finite-element model and a reduced body print of themselves. */
-#include "flexible/agree.h"
+#include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
 
 namespace hhtdae

@@ -1,0 +1,455 @@
+/* The file of a reduced body is read; its layout is in file.h. */
+#include "hhtdae/flexible.h"
+
+#if defined(HHTDAE_HDF5)
+#include "flexible/file.h"
+#include <algorithm>
+#include <cstdio>
+#include <sys/stat.h>
+
+namespace hhtdae
+{
+
+using namespace bodyfile;
+
+namespace
+{
+
+/* ---- datasets ---- */
+
+/* Every rank reads for itself; errors are kept, what follows the first one does nothing, and all ranks come together at
+ * the end. */
+class Reader
+{
+public:
+  std::string error;
+  Head        head;
+
+  explicit Reader(const std::string &name) : name_(name) {}
+  ~Reader()
+  {
+    if (file_ >= 0) H5Fclose(file_);
+  }
+  Reader(const Reader &) = delete;
+
+  void open()
+  {
+    struct stat status;
+    FILE       *in;
+    char        start[8] = {};
+    if (stat(name_.c_str(), &status)) return fail("there is no such file");
+    if (!S_ISREG(status.st_mode)) return fail("it is not a file");
+    if (!(in = std::fopen(name_.c_str(), "rb"))) return fail("there is no right to read it");
+    const std::size_t got = std::fread(start, 1, sizeof start, in);
+    std::fclose(in);
+    size_ = (hsize_t)status.st_size;
+    /* H5Fis_hdf5() of HDF5 1.10 leaves something open in a damaged file, which its end then complains of */
+    if (got < sizeof start || std::memcmp(start, "\x89HDF\r\n\x1a\n", sizeof start))
+      return fail("it is not an HDF5 file, or its beginning is damaged");
+    file_ = H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    if (file_ < 0) return fail("the file is truncated or damaged");
+    readHead();
+  }
+
+  bool has(const std::string &path) const
+  {
+    if (file_ < 0 || !error.empty()) return false;
+    const std::string group = path.substr(0, path.rfind('/'));
+    return (group.empty() || H5Lexists(file_, group.c_str(), H5P_DEFAULT) > 0) &&
+           H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0;
+  }
+
+  /* The dataset's dimensions, for those of `dims` that are 0 on entry with `open` */
+  template <class T> Dims dims(const std::string &path)
+  {
+    Dims none;
+    if (!error.empty()) return none;
+    if (!has(path)) return fail("there is no " + path), none;
+    Handle set(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+    if (!set.good()) return fail(path + " is damaged"), none;
+    Handle    space(H5Dget_space(set), H5Sclose), type(H5Dget_type(set), H5Tclose);
+    const int rank = H5Sget_simple_extent_ndims(space);
+    if (rank < 1 || rank > 3 || H5Tequal(type, FileType(T())) <= 0)
+      return fail(path + " is not of the kind that it has to be"), none;
+    Dims d((std::size_t)rank);
+    H5Sget_simple_extent_dims(space, d.data(), nullptr);
+    for (hsize_t e : d)
+      if (e > (hsize_t)PETSC_MAX_INT) return fail(path + " is larger than this build of PETSc can count"), none;
+    /* no memory is asked for entries that the file does not have */
+    if (Product(d) && (H5Dget_storage_size(set) != Product(d) * sizeof(T) || Product(d) > size_))
+      return fail(path + " has " + Text(d) + " entries, which the file does not hold"), none;
+    return d;
+  }
+
+  /* All of a dataset with these dimensions */
+  template <class T> std::vector<T> get(const std::string &path, const Dims &expected)
+  {
+    std::vector<T> data;
+    const Dims     found = dims<T>(path);
+    if (!error.empty()) return data;
+    if (found != expected) return fail(path + " has " + Text(found) + " entries in place of " + Text(expected)), data;
+    data.resize(Product(expected));
+    const Dims start(expected.size(), 0);
+    if (!slab(path, start, expected, data.data())) return {};
+    const uint64_t key = Fnv(path);
+    if (HashEntries(data.data(), data.size(), key, 0) + HashDims(expected, key) != stored(path))
+      fail(path + " is damaged: its checksum does not agree");
+    return data;
+  }
+
+  /* This rank's part; its share of the checksum waits for those of the others */
+  template <class T> void part(const std::string &path, const Dims &expected, const Cut &cut, T *data)
+  {
+    const Dims found = dims<T>(path);
+    if (!error.empty()) return;
+    if (found != expected) return fail(path + " has " + Text(found) + " entries in place of " + Text(expected));
+    Dims              start(expected.size(), 0), count = expected;
+    const std::size_t cutting = expected.size() == 3 ? 1 : 0;
+    start[cutting]            = cut.first;
+    count[cutting]            = cut.own;
+    if (!slab(path, start, count, data)) return;
+    const uint64_t key = Fnv(path);
+    uint64_t       sum = 0;
+    for (hsize_t r = 0; r < cut.rows; r++)
+      sum +=
+          HashEntries(data + r * cut.own * cut.width, cut.own * cut.width, key, (r * cut.all + cut.first) * cut.width);
+    pending_.push_back({path, stored(path) - HashDims(expected, key)});
+    sums_.push_back(sum);
+  }
+
+  /* Single entries of a dataset of one dimension */
+  int64_t entry(const std::string &path, hsize_t i)
+  {
+    int64_t value = 0;
+    slab(path, {i}, {1}, &value);
+    return value;
+  }
+
+  void fail(const std::string &why)
+  {
+    if (error.empty()) error = "cannot read the reduced body from " + name_ + ": " + why;
+  }
+
+  /* Errors of one rank become those of all, checksums of parts are completed. Collective */
+  PetscErrorCode agree(MPI_Comm comm)
+  {
+    PetscFunctionBegin;
+    PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
+    if (!sums_.empty())
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums_.data(), (PetscMPIInt)sums_.size(), MPI_UINT64_T, MPI_SUM, comm));
+    for (std::size_t i = 0; i < sums_.size(); i++)
+      if (sums_[i] != pending_[i].second) fail(pending_[i].first + " is damaged: its checksum does not agree");
+    sums_.clear();
+    pending_.clear();
+    PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
+    PetscFunctionReturn(0);
+  }
+
+private:
+  void readHead()
+  {
+    std::string format;
+    uint64_t    checksum = 0, sum = 0;
+    if (!ReadText(file_, "format", &format) || format != format_name)
+      return fail("it is an HDF5 file, but not one of a reduced body");
+    if (!ReadScalar(file_, "version", H5T_INTEGER, H5T_NATIVE_INT64, &head.version))
+      return fail("its version is not given");
+    if (head.version > format_version)
+      return fail("it has version " + std::to_string(head.version) + " of the format, this program knows version " +
+                  std::to_string(format_version) + ": a newer hhtdae is needed");
+    const bool good = head.version >= 1 && ReadText(file_, "program", &head.program) &&
+                      ReadText(file_, "source", &head.source) && ReadText(file_, "method", &head.method) &&
+                      ReadText(file_, "units", &head.units) && ReadText(file_, "name", &head.name) &&
+                      ReadScalar(file_, "fe_nodes", H5T_INTEGER, H5T_NATIVE_INT64, &head.fe_nodes) &&
+                      ReadScalar(file_, "elastic_scale", H5T_FLOAT, H5T_NATIVE_DOUBLE, &head.elastic_scale) &&
+                      ReadScalar(file_, "checksum", H5T_INTEGER, H5T_NATIVE_UINT64, &checksum);
+    if (!good) return fail("attributes of the file are missing or damaged");
+    sum = head.hash();
+    for (const char *path : every_dataset)
+      if (has(path)) sum += DatasetShare(path, stored(path));
+    if (sum != checksum) fail("the file is damaged: its checksum does not agree");
+    if (head.fe_nodes < 0 || !std::isfinite(head.elastic_scale)) fail("attributes of the file are not possible");
+  }
+
+  uint64_t stored(const std::string &path)
+  {
+    uint64_t value = 0;
+    Handle   set(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+    if (!set.good() || !ReadScalar(set, "checksum", H5T_INTEGER, H5T_NATIVE_UINT64, &value)) fail(path + " is damaged");
+    return value;
+  }
+
+  template <class T> bool slab(const std::string &path, const Dims &start, const Dims &count, T *data)
+  {
+    if (!error.empty()) return false;
+    if (!Product(count)) return true;
+    Handle set(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+    Handle space(set.good() ? H5Dget_space(set) : -1, H5Sclose),
+        memory(H5Screate_simple((int)count.size(), count.data(), nullptr), H5Sclose);
+    if (!space.good() || H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) < 0 ||
+        H5Dread(set, MemoryType(T()), memory, space, H5P_DEFAULT, data) < 0)
+      fail(path + " cannot be read");
+    return error.empty();
+  }
+
+  std::string                                   name_;
+  hid_t                                         file_ = -1;
+  hsize_t                                       size_ = 0;
+  std::vector<std::pair<std::string, uint64_t>> pending_;
+  std::vector<uint64_t>                         sums_;
+};
+
+/* ---- the body ---- */
+
+Modes3 ThreeRows(const std::vector<double> &v, hsize_t begin, hsize_t n)
+{
+  return Eigen::Map<const Modes3>(v.data() + begin * 3 * n, 3, (Eigen::Index)n);
+}
+
+void GetAttachments(Reader *in, hsize_t n, ModalBody *m)
+{
+  const Dims characters = in->dims<uint8_t>("/attachments/name"), positions = in->dims<double>("/attachments/position");
+  if (!in->error.empty()) return;
+  const hsize_t a        = positions[0];
+  const auto    names    = in->get<uint8_t>("/attachments/name", {characters[0]});
+  const auto    position = in->get<double>("/attachments/position", {a, 3}),
+             translation = in->get<double>("/attachments/translation", {a, n, 3}),
+             rotation    = in->get<double>("/attachments/rotation", {a, n, 3});
+  if (!in->error.empty()) return;
+  if ((hsize_t)std::count(names.begin(), names.end(), 0) != a || (a && names.back()))
+    return in->fail("/attachments/name does not have a name for each attachment");
+  auto name = names.begin();
+  for (hsize_t i = 0; i < a; i++) {
+    ModalAttachment at;
+    for (; *name; ++name) at.name += (char)*name;
+    ++name;
+    at.position    = Eigen::Map<const Vector3>(position.data() + 3 * i);
+    at.translation = ThreeRows(translation, i, n);
+    at.rotation    = ThreeRows(rotation, i, n);
+    m->attachments.push_back(at);
+  }
+}
+
+void GetModal(Reader *in, ModalBody *m)
+{
+  const Dims modes = in->dims<double>("/modal/omega");
+  if (!in->error.empty()) return;
+  const hsize_t n    = modes[0];
+  const auto    mass = in->get<double>("/modal/mass", {1}), center = in->get<double>("/modal/center", {3}),
+             moments = in->get<double>("/modal/moments", {3, 3}), omega = in->get<double>("/modal/omega", {n}),
+             first = in->get<double>("/modal/first", {n, 3}), moment = in->get<double>("/modal/moment", {3, n, 3});
+  std::vector<double> quadratic;
+  if (in->has("/modal/quadratic")) quadratic = in->get<double>("/modal/quadratic", {6, n, n});
+  GetAttachments(in, n, m);
+  if (!in->error.empty()) return;
+  m->name    = in->head.name;
+  m->mass    = mass[0];
+  m->center  = Eigen::Map<const Vector3>(center.data());
+  m->moments = Eigen::Map<const Matrix3>(moments.data()).transpose();
+  m->omega   = Eigen::Map<const Eigen::VectorXd>(omega.data(), (Eigen::Index)n);
+  m->first   = ThreeRows(first, 0, n);
+  for (hsize_t c = 0; c < 3; c++) m->moment[c] = ThreeRows(moment, c, n);
+  for (hsize_t p = 0; p < 6 && !quadratic.empty(); p++)
+    m->quadratic[p] =
+        Eigen::Map<const Eigen::MatrixXd>(quadratic.data() + p * n * n, (Eigen::Index)n, (Eigen::Index)n).transpose();
+  const std::string bad = NotFinite(*m);
+  if (!bad.empty()) in->fail("numbers that are not finite: " + bad);
+}
+
+void GetModes(Reader *in, hsize_t n, ReducedBody *b)
+{
+  if (!in->has("/modes/frequency")) return;
+  const auto frequency = in->get<double>("/modes/frequency", {n}), residual = in->get<double>("/modes/residual", {n});
+  if (!in->error.empty()) return;
+  if (!Finite(frequency) || !Finite(residual)) return in->fail("a mode's frequency or residual is not finite");
+  for (hsize_t k = 0; k < n; k++) b->mode.push_back({frequency[k], residual[k]});
+}
+
+void GetNodes(Reader *in, PetscMPIInt rank, PetscMPIInt size, hsize_t n, hsize_t *N, ReducedBody *b)
+{
+  *N = 0;
+  if (!in->has("/nodes/coordinates")) return;
+  const Dims nodes = in->dims<double>("/nodes/coordinates");
+  if (!in->error.empty()) return;
+  *N                       = nodes[0];
+  b->first                 = (PetscInt)PartBegin((PetscInt64)*N, size, rank);
+  b->own                   = (PetscInt)PartBegin((PetscInt64)*N, size, rank + 1) - b->first;
+  const hsize_t        own = (hsize_t)b->own, first = (hsize_t)b->first;
+  std::vector<int64_t> label(own);
+  b->coordinates.resize(3 * own);
+  in->part("/nodes/coordinates", {*N, 3}, {1, own, first, *N, 3}, b->coordinates.data());
+  in->part("/nodes/label", {*N}, {1, own, first, *N, 1}, label.data());
+  b->label.assign(label.begin(), label.end());
+  if (in->has("/nodes/shape")) {
+    const Dims shape = in->dims<double>("/nodes/shape");
+    if (!in->error.empty()) return;
+    if (shape != Dims{n, *N, 3})
+      return in->fail("/nodes/shape has " + Text(shape) + " entries in place of " + Text({n, *N, 3}));
+    b->shape.resize(3 * (Eigen::Index)own, (Eigen::Index)n);
+    in->part("/nodes/shape", {n, *N, 3}, {n, own, first, *N, 3}, b->shape.data());
+  }
+  if (!Finite(b->coordinates) || !b->shape.allFinite()) in->fail("numbers that are not finite: nodes");
+}
+
+/* Elements of this rank, and where their nodes are. Collective */
+PetscErrorCode GetElements(Reader *in, MPI_Comm comm, PetscMPIInt rank, PetscMPIInt size, hsize_t N, ReducedBody *b)
+{
+  std::vector<uint8_t> type;
+  std::vector<int64_t> material, node;
+  PetscInt64           begin = 0, all = 0, mine = 0;
+  PetscFunctionBegin;
+  if (!in->has("/elements/type")) PetscFunctionReturn(0);
+  const Dims    elements = in->dims<uint8_t>("/elements/type");
+  const hsize_t E = elements.empty() ? 0 : elements[0], first = (hsize_t)PartBegin((PetscInt64)E, size, rank),
+                own = (hsize_t)PartBegin((PetscInt64)E, size, rank + 1) - first;
+  type.resize(own);
+  material.resize(own);
+  in->part("/elements/type", {E}, {1, own, first, E, 1}, type.data());
+  in->part("/elements/material", {E}, {1, own, first, E, 1}, material.data());
+  for (uint8_t t : type)
+    if (t > 3)
+      in->fail("/elements/type has an unknown type, " + std::to_string(t));
+    else
+      mine += FeNodes((ElementType)t);
+  PetscCall(in->agree(comm));
+  PetscCall(Place(comm, mine, &begin, &all));
+  node.resize((std::size_t)mine);
+  in->part("/elements/node", {(hsize_t)all}, {1, (hsize_t)mine, (hsize_t)begin, (hsize_t)all, 1}, node.data());
+  PetscCall(in->agree(comm));
+  const int64_t *next = node.data();
+  for (hsize_t e = 0; e < own; e++) {
+    FeElement element{(ElementType)type[e], (PetscInt)material[e], {}};
+    for (int k = 0; k < FeNodes(element.type); k++, next++) {
+      if (*next < 0 || *next >= (int64_t)N)
+        in->fail("/elements/node has a node that is not there, " + std::to_string(*next));
+      element.node[k] = (PetscInt)*next;
+    }
+    b->elements.push_back(element);
+  }
+  PetscCall(in->agree(comm));
+  PetscFunctionReturn(0);
+}
+
+/* First of the nodes with stress that is not before node `from` */
+hsize_t FirstStressed(Reader *in, hsize_t S, int64_t from)
+{
+  hsize_t low = 0, high = S;
+  while (low < high && in->error.empty()) {
+    const hsize_t middle = low + (high - low) / 2;
+    if (in->entry("/stress/node", middle) < from)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+PetscErrorCode GetStress(Reader *in, MPI_Comm comm, hsize_t n, ReducedBody *b)
+{
+  PetscInt64 begin, all;
+  PetscFunctionBegin;
+  if (!in->has("/stress/node")) PetscFunctionReturn(0);
+  const Dims    nodes = in->dims<int64_t>("/stress/node");
+  const hsize_t S = nodes.empty() ? 0 : nodes[0], first = FirstStressed(in, S, b->first),
+                own = std::max(first, FirstStressed(in, S, (int64_t)b->first + b->own)) - first;
+  std::vector<int64_t> node(own);
+  PetscCall(in->agree(comm));
+  PetscCall(Place(comm, (PetscInt64)own, &begin, &all));
+  if (all != (PetscInt64)S || begin != (PetscInt64)first) in->fail("/stress/node is not ascending among the nodes");
+  const Dims values = in->dims<double>("/stress/values");
+  if (in->error.empty() && values != Dims{n, S, 6})
+    in->fail("/stress/values has " + Text(values) + " entries in place of " + Text({n, S, 6}));
+  PetscCall(in->agree(comm));
+  in->part("/stress/node", {S}, {1, own, first, S, 1}, node.data());
+  b->stress.values.resize(6 * (Eigen::Index)own, (Eigen::Index)n);
+  in->part("/stress/values", {n, S, 6}, {n, own, first, S, 6}, b->stress.values.data());
+  PetscCall(in->agree(comm));
+  for (std::size_t i = 0; i < own; i++) {
+    const int64_t place = node[i] - b->first;
+    if (place < 0 || place >= b->own || (i && node[i] <= node[i - 1]))
+      in->fail("/stress/node is not ascending among the nodes");
+    b->stress.node.push_back((PetscInt)place);
+  }
+  if (!b->stress.values.allFinite()) in->fail("numbers that are not finite: stress modes");
+  PetscCall(in->agree(comm));
+  PetscFunctionReturn(0);
+}
+
+/* Damage that HDF5 or the allocation of memory meets must not end the program */
+PetscErrorCode LoadBody(MPI_Comm comm, const std::string &file, ReducedBody *b)
+{
+  Quiet       quiet;
+  Reader      in(file);
+  PetscMPIInt rank, size;
+  hsize_t     n, N = 0;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  b->comm = comm;
+  in.open();
+  PetscCall(in.agree(comm));
+  GetModal(&in, &b->modal);
+  n = (hsize_t)b->modal.omega.size();
+  GetModes(&in, n, b);
+  PetscCall(in.agree(comm));
+  GetNodes(&in, rank, size, n, &N, b);
+  PetscCall(in.agree(comm));
+  PetscCall(GetElements(&in, comm, rank, size, N, b));
+  PetscCall(GetStress(&in, comm, n, b));
+  b->source        = in.head.source;
+  b->method        = in.head.method;
+  b->units         = in.head.units;
+  b->fe_nodes      = (PetscInt)in.head.fe_nodes;
+  b->elastic_scale = in.head.elastic_scale;
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+/* The body stays as it was if the file is refused. */
+PetscErrorCode ReducedBody::load(MPI_Comm c, const std::string &file)
+{
+  ReducedBody body;
+  PetscFunctionBegin;
+  PetscCall(LoadBody(c, file, &body));
+  *this = std::move(body);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LoadModalBody(MPI_Comm comm, const std::string &file, ModalBody *body)
+{
+  Quiet     quiet;
+  Reader    in(file);
+  ModalBody modal;
+  PetscFunctionBegin;
+  in.open();
+  PetscCall(in.agree(comm));
+  GetModal(&in, &modal);
+  PetscCall(in.agree(comm));
+  *body = std::move(modal);
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
+
+#else
+
+namespace hhtdae
+{
+
+PetscErrorCode ReducedBody::load(MPI_Comm c, const std::string &file)
+{
+  PetscFunctionBegin;
+  SETERRQ(c, PETSC_ERR_SUP, "cannot read the reduced body from %s: the library was built without HDF5", file.c_str());
+}
+
+PetscErrorCode LoadModalBody(MPI_Comm comm, const std::string &file, ModalBody *)
+{
+  PetscFunctionBegin;
+  SETERRQ(comm, PETSC_ERR_SUP, "cannot read the reduced body from %s: the library was built without HDF5",
+          file.c_str());
+}
+
+} // namespace hhtdae
+
+#endif
