@@ -274,8 +274,10 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   E.scale = at.force;
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
-    lightest = std::min(lightest, b.massless ? b.light_mass : b.mass);
+    if (!b.massless) lightest = std::min(lightest, b.mass);
   }
+  if (lightest == INFINITY)
+    for (const BodyData &b : s.bodies) lightest = std::min(lightest, b.light_mass);
   *h = E.scale > 0 ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
   PetscFunctionReturn(0);
 }
