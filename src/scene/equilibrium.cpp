@@ -278,7 +278,7 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   }
   if (lightest == INFINITY)
     for (const BodyData &b : s.bodies) lightest = std::min(lightest, b.light_mass);
-  *h = E.scale > 0 ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
+  *h = E.scale > 0 && std::isfinite(lightest) ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
   PetscFunctionReturn(0);
 }
 
