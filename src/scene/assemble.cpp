@@ -19,7 +19,7 @@ struct Misfit {
   double position = 0, velocity = 0, relative_position = 0, relative_velocity = 0;
 };
 
-/* How fast anything is: what velocities are held against; 0 where nothing moves */
+/* How fast anything is: what velocities are held against; 0 where nothing moves, rounding in a motion's rate apart */
 double Speed(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
 {
   double speed = 0;
@@ -27,7 +27,7 @@ double Speed(const SceneData &s, const std::vector<RowBlock> &blocks, double siz
   for (const RowBlock &b : blocks)
     for (int r = 0; r < b.rows; r++)
       if (b.has(r)) speed = std::max(speed, std::abs(b.rate(r)) * (b.length ? 1 : size));
-  return speed;
+  return speed > 1e-12 * size ? speed : 0;
 }
 
 std::vector<Misfit> Misfits(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
