@@ -1,9 +1,10 @@
-static char help[] = "Reduces the frame of the all-terrain vehicle (atv) from its mesh to 134 modes: 20 attachments, 20 normal modes.\n"
-                     "  gmsh -3 -o frame.msh examples/atv_frame.geo\n"
-                     "  mpiexec -n 2 build/bin/atv_frame -mesh frame.msh -o frame.h5\n"
-                     "  -mesh <frame.msh>: mesh of second-order tetrahedra, by gmsh from examples/atv_frame.geo\n"
-                     "  -o <frame.h5>: the reduced body, with stress modes at the corners of the elements\n"
-                     "  -modes <20>: fixed-interface normal modes\n";
+static char help[] =
+    "Reduces the frame of the all-terrain vehicle (atv) from its mesh to 134 modes: 20 attachments, 20 normal modes.\n"
+    "  gmsh -3 -o frame.msh examples/atv_frame.geo\n"
+    "  mpiexec -n 2 build/bin/atv_frame -mesh frame.msh -o frame.h5\n"
+    "  -mesh <frame.msh>: mesh of second-order tetrahedra, by gmsh from examples/atv_frame.geo\n"
+    "  -o <frame.h5>: the reduced body, with stress modes at the corners of the elements\n"
+    "  -modes <20>: fixed-interface normal modes\n";
 
 #include "atv_frame.h"
 #include <algorithm>
@@ -27,14 +28,16 @@ static std::vector<PetscInt> NodesOf(const FeModel &model, const hhtex::AtvAttac
   return nodes;
 }
 
-/* Stress at the corners of the elements alone: a sixth of the nodes, and the largest stress is among them on the surface */
+/* Stress at the corners of the elements alone: a sixth of the nodes, and the largest stress is among them on the
+ * surface */
 static void KeepCorners(ReducedBody *body)
 {
   std::vector<char> corner((size_t)body->own, 0);
   for (const FeElement &e : body->elements)
     for (int k = 0; k < 4; k++)
-      if (e.node[k] >= body->first && e.node[k] < body->first + body->own) corner[(size_t)(e.node[k] - body->first)] = 1;
-  StressModes kept;
+      if (e.node[k] >= body->first && e.node[k] < body->first + body->own)
+        corner[(size_t)(e.node[k] - body->first)] = 1;
+  StressModes               kept;
   std::vector<Eigen::Index> rows;
   for (size_t i = 0; i < body->stress.node.size(); i++) {
     if (!corner[(size_t)body->stress.node[i]]) continue;
@@ -76,8 +79,9 @@ static PetscErrorCode Run()
   body.units = "m, kg, s, N";
   PetscCall(body.save(out));
   PetscCall(PetscTime(&end));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "frame: %d modes from %.1f Hz to %.0f Hz, %.1f kg, %.1f s, %s\n", (int)body.modal.modes(),
-                        body.modal.omega[0] / (2 * PETSC_PI), body.modal.omega[body.modal.modes() - 1] / (2 * PETSC_PI), body.modal.mass, end - start, out));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "frame: %d modes from %.1f Hz to %.0f Hz, %.1f kg, %.1f s, %s\n",
+                        (int)body.modal.modes(), body.modal.omega[0] / (2 * PETSC_PI),
+                        body.modal.omega[body.modal.modes() - 1] / (2 * PETSC_PI), body.modal.mass, end - start, out));
   PetscFunctionReturn(0);
 }
 

@@ -33,8 +33,8 @@ inline std::vector<AtvCorner> AtvCorners() { return {{"FL", 1, 1}, {"FR", 1, -1}
 inline double AtvRail(double x) { return 0.34 + 0.04 * (x - 0.48) / 0.31; }
 
 /*
-  20 attachments: at each corner the pivots of the lower arm (a outward, b inward), the bracket of the upper arm (u), the top of the
-  shock absorber (s); then steering head, engine, seat and rack
+  20 attachments: at each corner the pivots of the lower arm (a outward, b inward), the bracket of the upper arm (u),
+  the top of the shock absorber (s); then steering head, engine, seat and rack
 */
 inline std::vector<AtvAttachment> AtvAttachments()
 {
@@ -47,9 +47,21 @@ inline std::vector<AtvAttachment> AtvAttachments()
     list.push_back({c.name + "s", c.at(0.635, 0.172, z), {c.at(0.635, 0.14, z)}, 0.030, false});
   }
   list.push_back({"head", {0.376, 0, 0.76}, {{0.376, 0, 0.76}}, 0.045, false});
-  list.push_back({"engine", {0, 0, 0.46}, {{0.25, 0.14, 0.34}, {0.25, -0.14, 0.34}, {-0.25, 0.14, 0.34}, {-0.25, -0.14, 0.34}}, 0.030, true});
-  list.push_back({"seat", {-0.15, 0, 0.78}, {{0, 0.14, 0.68}, {0, -0.14, 0.68}, {-0.35, 0.14, 0.68}, {-0.35, -0.14, 0.68}}, 0.030, true});
-  list.push_back({"rack", {-0.70, 0, 0.74}, {{-0.56, 0.14, 0.665}, {-0.56, -0.14, 0.665}, {-0.74, 0.14, 0.63}, {-0.74, -0.14, 0.63}}, 0.030, true});
+  list.push_back({"engine",
+                  {0, 0, 0.46},
+                  {{0.25, 0.14, 0.34}, {0.25, -0.14, 0.34}, {-0.25, 0.14, 0.34}, {-0.25, -0.14, 0.34}},
+                  0.030,
+                  true});
+  list.push_back({"seat",
+                  {-0.15, 0, 0.78},
+                  {{0, 0.14, 0.68}, {0, -0.14, 0.68}, {-0.35, 0.14, 0.68}, {-0.35, -0.14, 0.68}},
+                  0.030,
+                  true});
+  list.push_back({"rack",
+                  {-0.70, 0, 0.74},
+                  {{-0.56, 0.14, 0.665}, {-0.56, -0.14, 0.665}, {-0.74, 0.14, 0.63}, {-0.74, -0.14, 0.63}},
+                  0.030,
+                  true});
   return list;
 }
 
