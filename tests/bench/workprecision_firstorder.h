@@ -115,6 +115,12 @@ public:
     for (PetscInt i : coordinate_) v[i] = y[velocity_[i]];
   }
 
+  void accelerations(const double *yp, double *a) const
+  {
+    std::fill_n(a, n_, 0.);
+    for (PetscInt i : coordinate_) a[i] = yp[velocity_[i]];
+  }
+
   bool isVelocity(PetscInt i) const { return i >= n_ && i < n_ + (PetscInt)coordinate_.size(); }
   bool isDifferential(PetscInt i) const
   {

@@ -27,6 +27,12 @@ struct IDASettings {
   PetscInt         sparseFrom   = 15;  /* unknowns; KLU from here on, where it begins to win */
   double           looser       = 1e3; /* absolute tolerance of what is left out of the error test, which Newton's test
                                           still looks at: with 1 it fails at small tolerances */
+  long   maxSteps  = 20000;            /* after which IDA looks whether the time is over */
+  double maxStep   = 0.;               /* largest step; 0: none */
+  double firstStep = 0.; /* 0: 0.01 sqrt(eps) of the run. IDA's own is so short where velocities are tested that
+                            rounding drowns the accelerations and the first step fails. */
+  /* sees every output point: t, U, U', U'' */
+  std::function<void(double, const double *, const double *, const double *)> look = nullptr;
 };
 
 class IDASolver
@@ -49,6 +55,9 @@ public:
       if (x) N_VDestroy(x);
     if (context_) SUNContext_Free(&context_);
   }
+
+  /* What a run has found at the output points */
+  const Recorder &recorded() const { return recorder_; }
 
   Run run(double eps, const Limits &limits)
   {
@@ -107,7 +116,11 @@ private:
     check(IDASetSuppressAlg(memory_, SUNTRUE), "IDASetSuppressAlg");
     check(IDASetUserData(memory_, this), "IDASetUserData");
     check(IDASetMaxOrd(memory_, settings_.maxOrder), "IDASetMaxOrd");
-    check(IDASetMaxNumSteps(memory_, 20000), "IDASetMaxNumSteps");
+    check(IDASetMaxNumSteps(memory_, settings_.maxSteps), "IDASetMaxNumSteps");
+    if (settings_.maxStep > 0.) check(IDASetMaxStep(memory_, settings_.maxStep), "IDASetMaxStep");
+    const double first =
+        settings_.firstStep > 0. ? settings_.firstStep : 1e-2 * std::sqrt(eps) * (counted_.t1 - counted_.t0);
+    check(IDASetInitStep(memory_, first), "IDASetInitStep");
     createMatrix();
     check(IDASetLinearSolver(memory_, solver_, matrix_), "IDASetLinearSolver");
     check(IDASetJacFn(memory_, jacobian), "IDASetJacFn");
@@ -144,7 +157,7 @@ private:
 
   void solve(const Limits &limits, Run &run)
   {
-    std::vector<double> u(counted_.n), v(counted_.n);
+    std::vector<double> u(counted_.n), v(counted_.n), a(counted_.n);
     const double        start = cpuSeconds();
     counted_.deadline         = start + limits.seconds;
     while (!recorder_.done()) {
@@ -156,6 +169,9 @@ private:
       if (code == IDA_TOO_MUCH_WORK) continue;
       system_.output(N_VGetArrayPointer(y_), u.data(), v.data());
       recorder_.store(u.data(), v.data());
+      if (!settings_.look) continue;
+      system_.accelerations(N_VGetArrayPointer(yp_), a.data());
+      settings_.look(t, u.data(), v.data(), a.data());
     }
     run.time = cpuSeconds() - start;
   }

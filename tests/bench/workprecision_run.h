@@ -82,6 +82,13 @@ struct Reference {
   std::vector<double>              times; /* of the output points, without t0 */
   std::vector<std::vector<double>> u, v, weightU, weightV;
 
+  /* Output points alone: nothing is compared, errors are negative */
+  Reference(const Problem &p, const std::vector<double> &at)
+      : n(p.n), role(p.role), times(at), u(at.size(), std::vector<double>(n, std::nan(""))), v(u),
+        weightU(at.size(), std::vector<double>(n, 1.)), weightV(weightU)
+  {
+  }
+
   explicit Reference(const Problem &p) : n(p.n), role(p.role)
   {
     std::vector<double> ur(n), vr(n), ar(n), maxU(n, 1.), maxV(n, 1.);
@@ -129,9 +136,10 @@ struct Recorder {
   std::vector<std::vector<double>> u, v;
 
   explicit Recorder(const Reference &r) : ref(r) {}
-  bool   done() const { return u.size() == ref.times.size(); }
-  double next() const { return ref.times[u.size()]; }
-  void   store(const double *us, const double *vs)
+  bool          done() const { return u.size() == ref.times.size(); }
+  double        next() const { return ref.times[u.size()]; }
+  const double *nextState() const { return ref.u[u.size()].data(); }
+  void          store(const double *us, const double *vs)
   {
     u.emplace_back(us, us + ref.n);
     v.emplace_back(vs, vs + ref.n);
@@ -152,11 +160,16 @@ struct Recorder {
 };
 
 /* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
-   entry per unknown */
+   entry per unknown. A scene has a TS of its own, for PETSc's second-order integrators, wants to know of accepted
+   steps, and may give results in other coordinates than those of the start. */
 struct Case {
-  std::string                                                            name;
-  std::function<std::unique_ptr<Problem>()>                              make;
-  std::function<void(const Problem &, double, const double *, double *)> phiT = nullptr;
+  std::string                                                                    name;
+  std::function<std::unique_ptr<Problem>()>                                      make;
+  std::function<void(const Problem &, double, const double *, double *)>         phiT     = nullptr;
+  std::function<PetscErrorCode(const Problem &, TS *)>                           createTS = nullptr;
+  std::function<void(const Problem &, const double *u, const double *v)>         accept   = nullptr;
+  std::function<void(const Problem &, double *u, double *v, const double *near)> toStart  = nullptr;
+  bool                                                                           scene    = false;
 };
 
 /* The limit for one run, in CPU seconds; beyond it a solver counts as failed */

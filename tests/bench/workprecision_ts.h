@@ -33,7 +33,10 @@ struct TSRun {
   std::unique_ptr<FirstOrder> system; /* BDF */
   Entries                     entries;
   std::vector<double>         u, v, u0, v0; /* output; last step of ALPHA2 */
-  double                      t0 = 0.;
+  double                      t0              = 0.;
+  TSI2Function                function        = nullptr; /* of a scene's own TS */
+  TSI2Jacobian                jacobian        = nullptr;
+  void                       *functionContext = nullptr, *jacobianContext = nullptr;
   TS                          ts = nullptr;
   Vec                         U = nullptr, V = nullptr, W[2] = {nullptr, nullptr};
 
@@ -52,6 +55,11 @@ inline PetscErrorCode StoreOutput(TSRun &r, Vec U, Vec V)
   if (V) PetscCall(VecGetArrayRead(V, &v));
   if (r.system) {
     r.system->output(u, r.u.data(), r.v.data());
+    r.recorder.store(r.u.data(), r.v.data());
+  } else if (r.which.toStart) {
+    std::copy_n(u, r.problem.n, r.u.begin());
+    std::copy_n(v, r.problem.n, r.v.begin());
+    r.which.toStart(r.problem, r.u.data(), r.v.data(), r.recorder.nextState());
     r.recorder.store(r.u.data(), r.v.data());
   } else
     r.recorder.store(u, v);
@@ -118,6 +126,7 @@ inline PetscErrorCode Watch(TS ts, PetscInt, PetscReal t, Vec U, void *ctx)
     const double *u, *v;
     PetscCall(VecGetArrayRead(U, &u));
     PetscCall(VecGetArrayRead(V, &v));
+    if (r.which.accept) r.which.accept(r.problem, u, v);
     std::copy_n(u, r.problem.n, r.u0.begin());
     std::copy_n(v, r.problem.n, r.v0.begin());
     PetscCall(VecRestoreArrayRead(V, &v));
@@ -243,6 +252,49 @@ inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
   PetscFunctionReturn(0);
 }
 
+/* A scene's own callbacks, counted and with the deadline */
+inline PetscErrorCode NativeFunction(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
+{
+  TSRun                &r = *static_cast<TSRun *>(ctx);
+  const CountedProblem &c = r.counted;
+
+  PetscFunctionBegin;
+  if (++c.residuals % 256 == 0 && !c.late) c.late = cpuSeconds() > c.deadline;
+  if (c.late)
+    PetscCall(VecSet(F, std::nan("")));
+  else
+    PetscCall(r.function(ts, t, U, V, A, F, r.functionContext));
+  PetscFunctionReturn(0);
+}
+
+inline PetscErrorCode NativeJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P,
+                                     void *ctx)
+{
+  TSRun &r = *static_cast<TSRun *>(ctx);
+
+  PetscFunctionBegin;
+  r.counted.jacobians++;
+  PetscCall(r.jacobian(ts, t, U, V, A, sv, sa, J, P, r.jacobianContext));
+  PetscFunctionReturn(0);
+}
+
+inline PetscErrorCode CreateNativeTS(TSRun &r)
+{
+  Vec F;
+  Mat J, P;
+
+  PetscFunctionBegin;
+  PetscCall(r.which.createTS(r.problem, &r.ts));
+  PetscCall(TSGetI2Function(r.ts, &F, &r.function, &r.functionContext));
+  PetscCall(TSGetI2Jacobian(r.ts, &J, &P, &r.jacobian, &r.jacobianContext));
+  PetscCall(TSSetI2Function(r.ts, F, NativeFunction, &r));
+  PetscCall(TSSetI2Jacobian(r.ts, J, P, NativeJacobian, &r));
+  PetscCall(TS2GetSolution(r.ts, &r.U, &r.V));
+  PetscCall(PetscObjectReference((PetscObject)r.U));
+  PetscCall(PetscObjectReference((PetscObject)r.V));
+  PetscFunctionReturn(0);
+}
+
 inline PetscErrorCode CreateTS(TSRun &r, double eps)
 {
   static const TSType type[] = {TSHHT3, TSALPHA2, TSBDF};
@@ -250,6 +302,8 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
   PetscFunctionBegin;
   if (r.settings.stepper == Stepper::BDF)
     PetscCall(CreateFirstOrderTS(r));
+  else if (r.which.createTS)
+    PetscCall(CreateNativeTS(r));
   else
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, r.counted, &r.ts, &r.U, &r.V));
   PetscCall(TSSetType(r.ts, type[(int)r.settings.stepper]));

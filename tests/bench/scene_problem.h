@@ -1,0 +1,552 @@
+/*
+  A scene as a problem of the comparison, so that every integrator of workprecision_*.h runs on it:
+
+    std::unique_ptr<SceneProblem> p;
+    PetscCall(SceneProblem::make("pendulum", [](MPI_Comm comm) { ... return scene; }, 2., &p));
+    IDASolver ida(SceneCase(*p), *p, reference, settings);
+
+  It is serial. Residual and Jacobian are those of the scene's TS, on the arrays of whoever calls. The consistent start,
+  which reference(t0) gives, is the one that hhtdae finds: read off the beginning of its first step.
+
+  A scene remembers angles over full turns, from accepted step to accepted step. Other integrators do not tell when they
+  accept one: here the last state before the time goes on counts as accepted. initial() puts the memory back to the
+  start. One thing another integrator cannot follow: the new axes that a body gets when its Euler angles come near their
+  singularity. fitAxes() turns the axes of all bodies so that they stay away from it for the whole run, and checkAxes()
+  refuses scenes in which that cannot be; hhtdae may change axes all the same, and toStart() brings its results back.
+*/
+#ifndef HHTDAE_BENCH_SCENE_PROBLEM_H
+#define HHTDAE_BENCH_SCENE_PROBLEM_H
+
+#include "problem.h"
+#include "scene/kernels/motion.h"
+#include "scene/output/channels.h"
+#include "scene/runtime.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+namespace hhtbench
+{
+
+class SceneProblem : public hhtex::Problem
+{
+public:
+  /* A scene on this communicator that has not been set up; it may be part of something that holds it */
+  using Build = std::function<std::shared_ptr<hhtdae::Scene>(MPI_Comm)>;
+
+  static PetscErrorCode make(const std::string &name, const Build &build, double end, std::unique_ptr<SceneProblem> *p)
+  {
+    PetscFunctionBegin;
+    p->reset(new SceneProblem);
+    (*p)->name = name;
+    PetscCall((*p)->setUp(build, end));
+    PetscFunctionReturn(0);
+  }
+
+  ~SceneProblem() override
+  {
+    PetscBool gone = PETSC_FALSE;
+    if (PetscFinalized(&gone) || gone) return;
+    for (Vec &x : x_) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
+    PetscCallAbort(PETSC_COMM_SELF, TSDestroy(&ts_));
+  }
+
+  hhtdae::Scene &scene() const { return *scene_; }
+
+  /* A TS of the scene's own, as any user gets it, at the start; type TSHHT3 with defaults */
+  PetscErrorCode createTS(TS *ts) const
+  {
+    PetscFunctionBegin;
+    PetscCall(rewind());
+    PetscCall(scene_->createTS(ts));
+    PetscCall(TSSetMaxTime(*ts, t1));
+    PetscCall(TSSetMaxSteps(*ts, 100000000));
+    PetscFunctionReturn(0);
+  }
+
+  /* Runs hhtdae once; if a body gets new axes for its Euler angles on the way, bodies start with others, those which
+     their attitudes in this run leave farthest from the singularity. nearest: the smallest |sin theta| then. Before a
+     reference is added. */
+  PetscErrorCode fitAxes(double *nearest, double eps = 1e-5)
+  {
+    std::vector<Attitudes> path;
+    PetscInt               changes;
+
+    PetscFunctionBegin;
+    *nearest = 1.;
+    PetscCall(run(eps, path, &changes));
+    if (!changes) PetscFunctionReturn(0);
+    for (size_t b = 0; b < path.size(); b++)
+      if (!path[b].empty()) *nearest = std::min(*nearest, chooseAxes(path[b], &axes_[4 * b]));
+    PetscCall(findStart());
+    PetscFunctionReturn(0);
+  }
+
+  /* The same, and an error if some body comes too near to it for any axes */
+  PetscErrorCode checkAxes(double eps = 1e-5)
+  {
+    double nearest;
+
+    PetscFunctionBegin;
+    PetscCall(fitAxes(&nearest, eps));
+    PetscCheck(nearest > singular(), PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "Scene %s: between t = %g and %g a body turns so that any axes for its Euler angles come near the "
+               "singularity (|sin theta| "
+               "= %.3g); hhtdae changes axes on the way, which no other integrator can follow; compare the scene over "
+               "a shorter time",
+               name.c_str(), t0, t1, nearest);
+    PetscFunctionReturn(0);
+  }
+  static constexpr double singular() { return 0.1; }
+
+  /* Coordinates and rates as hhtdae has them after changes of axes, into the axes of the start; angles on the turn next
+   * to near */
+  void toStart(double *u, double *v, const double *near) const
+  {
+    const hhtdae::Bodies &B = scene_->data().run->bodies;
+    for (PetscInt b = 0; b < B.own; b++) {
+      const hhtdae::LocalBody &k = B.body[b];
+      if (!hhtdae::HasEulerAngles(k.kind)) continue;
+      const hhtdae::Matrix3 C = axes(b);
+      if ((C - k.C).cwiseAbs().maxCoeff() > 1e-14) toAxes(k.C, C, u + k.first + 3, v + k.first + 3);
+      for (PetscInt i = k.first + 3; i < k.first + 6; i++)
+        if (std::isfinite(near[i])) u[i] += 2. * PETSC_PI * std::round((near[i] - u[i]) / (2. * PETSC_PI));
+    }
+  }
+
+  /* The scene's channels in a state; for accelerations and reactions a and the multipliers in u have to be right.
+     States have to come in the order of time if there are channels of angles, which are counted over full turns. */
+  PetscErrorCode channels(double t, const double *u, const double *v, const double *a,
+                          std::vector<double> &values) const
+  {
+    hhtdae::Runtime &R = *scene_->data().run;
+
+    PetscFunctionBegin;
+    values.clear();
+    accept(u, v);
+    PetscCall(hhtdae::ChannelValues(R, hhtdae::Evaluation{t, u, v, a, R.bodies, R.n}, values));
+    PetscFunctionReturn(0);
+  }
+
+  /* An accepted step, for who knows one: memories follow */
+  void accept(const double *u, const double *v) const
+  {
+    hhtdae::Runtime &R = *scene_->data().run;
+    R.bodies.move(u, v);
+    if (!R.remembers) return;
+    for (auto &b : R.batches) b->accept(R.bodies);
+  }
+
+  /* Adds d Phi/dt of the holonomic rows to f: exact, and the same wherever the bodies are, because time enters by
+   * motions alone */
+  void phiT(double t, double *f) const
+  {
+    for (const auto &m : motions_) f[m.first] += (*m.second)(t).f1;
+  }
+  bool hasMotions() const { return !motions_.empty(); }
+
+  /* ---- Problem ---- */
+
+  void initial(double *u, double *v) const override
+  {
+    PetscCallAbort(PETSC_COMM_SELF, rewind());
+    std::copy(u0_.begin(), u0_.end(), u);
+    std::copy(v0_.begin(), v0_.end(), v);
+  }
+
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    const bool remembers = scene_->data().run->remembers;
+    if (remembers && t > last_.t && !last_.u.empty()) accept(last_.u.data(), last_.v.data());
+    if (evaluate(t, u, v, a, f)) std::fill_n(f, n, std::nan("")); /* PETSc has printed what is wrong */
+    if (!remembers || !std::all_of(u, u + n, [](double x) { return std::isfinite(x); })) return;
+    last_.t = t;
+    last_.u.assign(u, u + n);
+    last_.v.assign(v, v + n);
+  }
+
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                hhtex::Entries &J) const override
+  {
+    PetscCallAbort(PETSC_COMM_SELF, evaluate(t, u, v, a, sv, sa, J));
+  }
+
+  bool reference(double t, double *u, double *v, double *a) const override
+  {
+    for (const State &s : states_) {
+      if (std::abs(s.t - t) > 1e-12 * (t1 - t0)) continue;
+      std::copy(s.u.begin(), s.u.end(), u);
+      std::copy(s.v.begin(), s.v.end(), v);
+      std::copy(s.a.begin(), s.a.end(), a);
+      return true;
+    }
+    return false;
+  }
+  std::vector<double> referenceTimes() const override
+  {
+    std::vector<double> times;
+    for (const State &s : states_) times.push_back(s.t);
+    return times;
+  }
+
+  /* The reference: one state more, in the order of time, behind the start. Of u multipliers, variables and force
+     states, and accelerations, are found anew: they follow from the rest, which integrators know better. */
+  PetscErrorCode addReference(double t, const double *u, const double *v, const double *a)
+  {
+    State     s;
+    PetscBool found;
+
+    PetscFunctionBegin;
+    s.t = t;
+    s.u.assign(u, u + n);
+    s.v.assign(v, v + n);
+    s.a.assign(a, a + n);
+    accept(u, v);
+    PetscCall(consistent(s, &found));
+    states_.push_back(s);
+    PetscFunctionReturn(0);
+  }
+
+private:
+  struct State {
+    double              t = 0;
+    std::vector<double> u, v, a;
+  };
+  std::shared_ptr<hhtdae::Scene> scene_;
+  TS                             ts_              = nullptr; /* holds residual and Jacobian */
+  Vec                            x_[4]            = {};      /* without arrays: U, U', U'', F */
+  Mat                            J_               = nullptr; /* of ts_ */
+  TSI2Function                   function_        = nullptr;
+  TSI2Jacobian                   jacobian_        = nullptr;
+  void                          *functionContext_ = nullptr, *jacobianContext_ = nullptr;
+  std::vector<PetscInt>          row_, col_;
+  std::vector<double>            u0_, v0_, axes_; /* the start; axes and memories there */
+  std::vector<State>             states_;
+  mutable State                  last_;                                    /* evaluated */
+  std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
+
+  /* of the third axis of space in body axes: where the axis theta is measured from must not come near it */
+  using Attitudes = std::vector<hhtdae::Vector3>;
+
+  SceneProblem() = default;
+
+  /* hhtdae from start to end; the attitudes of all bodies with Euler angles on the way */
+  PetscErrorCode run(double eps, std::vector<Attitudes> &path, PetscInt *changes) const
+  {
+    struct Watch {
+      hhtdae::Runtime        &R;
+      std::vector<Attitudes> &path;
+    } watch = {*scene_->data().run, path};
+    TSHHT3Statistics  s;
+    TSConvergedReason reason;
+    TS                ts;
+
+    PetscFunctionBegin;
+    path.resize(watch.R.bodies.own);
+    PetscCall(createTS(&ts));
+    PetscCall(TSSetTolerances(ts, eps, nullptr, eps, nullptr));
+    PetscCall(TSSetErrorIfStepFails(ts, PETSC_FALSE));
+    PetscCall(TSMonitorSet(
+        ts,
+        [](TS, PetscInt, PetscReal, Vec U, void *ctx) {
+          Watch        &w = *static_cast<Watch *>(ctx);
+          const double *u;
+          PetscFunctionBegin;
+          PetscCall(VecGetArrayRead(U, &u));
+          for (PetscInt b = 0; b < w.R.bodies.own; b++) {
+            const hhtdae::LocalBody &k = w.R.bodies.body[b];
+            hhtdae::Matrix3          A;
+            hhtdae::EulerAxes        e;
+            if (!hhtdae::HasEulerAngles(k.kind)) continue;
+            hhtdae::EulerFrame(u + k.first + 3, A, e);
+            w.path[b].push_back((A * k.C).row(2).transpose());
+          }
+          PetscCall(VecRestoreArrayRead(U, &u));
+          PetscFunctionReturn(0);
+        },
+        &watch, nullptr));
+    PetscCall(TSSolve(ts, nullptr));
+    PetscCall(TSGetConvergedReason(ts, &reason));
+    PetscCheck(reason > 0, PETSC_COMM_SELF, PETSC_ERR_NOT_CONVERGED,
+               "Scene %s: hhtdae does not reach the end at tolerance %g (%s)", name.c_str(), eps,
+               TSConvergedReasons[reason]);
+    PetscCall(TSHHT3GetStatistics(ts, &s));
+    *changes = s.changes;
+    PetscCall(TSDestroy(&ts));
+    PetscCall(rewind());
+    PetscFunctionReturn(0);
+  }
+
+  /* The body-fixed direction that stays farthest from the third axis of space and its opposite, of many on a half
+     sphere, as z axis of the Euler angles' axes; these as a quaternion. Returns the smallest |sin theta|. */
+  static double chooseAxes(const Attitudes &path, double *quaternion)
+  {
+    hhtdae::Vector3 best  = hhtdae::Vector3::UnitZ();
+    double          worst = 2.;
+    const int       tried = 500;
+    for (int k = 0; k < tried; k++) {
+      const double          z = (k + .5) / tried, r = std::sqrt(1. - z * z), angle = 2.399963229728653 * k;
+      const hhtdae::Vector3 c(r * std::cos(angle), r * std::sin(angle), z);
+      double                near = 0.;
+      for (const hhtdae::Vector3 &up : path) near = std::max(near, std::abs(up.dot(c)));
+      if (near >= worst) continue;
+      worst = near;
+      best  = c;
+    }
+    const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(best, hhtdae::Vector3::UnitZ());
+    quaternion[0]              = q.w();
+    quaternion[1]              = q.x();
+    quaternion[2]              = q.y();
+    quaternion[3]              = q.z();
+    return std::sqrt(1. - worst * worst);
+  }
+
+  /* of the start, as the scene loads them */
+  hhtdae::Matrix3 axes(PetscInt b) const
+  {
+    const double *x = &axes_[4 * b];
+    return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix();
+  }
+
+  /* The same attitude and angular velocity with other axes */
+  static void toAxes(const hhtdae::Matrix3 &from, const hhtdae::Matrix3 &to, double *eps, double *rate)
+  {
+    hhtdae::Matrix3   A;
+    hhtdae::EulerAxes e;
+    hhtdae::EulerFrame(eps, A, e);
+    const hhtdae::Vector3 w      = hhtdae::AngularVelocity(e, hhtdae::Vector3(rate[0], rate[1], rate[2]));
+    const hhtdae::Vector3 angles = hhtdae::EulerAngles(A * from * to.transpose());
+    hhtdae::EulerFrame(angles.data(), A, e);
+    const hhtdae::Vector3 rates = hhtdae::EulerRates(e, w);
+    for (int i = 0; i < 3; i++) {
+      eps[i]  = angles(i);
+      rate[i] = rates(i);
+    }
+  }
+
+  static PetscErrorCode copy(Vec x, std::vector<double> &to)
+  {
+    const double *array;
+    PetscInt      n;
+
+    PetscFunctionBegin;
+    PetscCall(VecGetLocalSize(x, &n));
+    PetscCall(VecGetArrayRead(x, &array));
+    to.assign(array, array + n);
+    PetscCall(VecRestoreArrayRead(x, &array));
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode setUp(const Build &build, double end)
+  {
+    Vec U, F;
+
+    PetscFunctionBegin;
+    scene_ = build(PETSC_COMM_SELF);
+    PetscCheck(scene_ && scene_->data().comm == PETSC_COMM_SELF, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+               "Scene %s: build it on the communicator that is passed, which is PETSC_COMM_SELF", name.c_str());
+    PetscCall(scene_->createTS(&ts_));
+    PetscCall(TSGetTime(ts_, &t0));
+    t1 = end;
+    PetscCall(TSGetSolution(ts_, &U));
+    PetscCall(VecGetSize(U, &n));
+    if (scene_->data().run->axes) PetscCall(copy(scene_->data().run->axes, axes_));
+    PetscCall(TSGetI2Function(ts_, &F, &function_, &functionContext_));
+    PetscCall(TSGetI2Jacobian(ts_, &J_, nullptr, &jacobian_, &jacobianContext_));
+    for (Vec &x : x_) PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, nullptr, &x));
+    PetscCall(findRoles());
+    PetscCall(findPattern());
+    findMotions<hhtdae::DrivenAngle>();
+    findMotions<hhtdae::DrivenAdvance>();
+    PetscCall(findStart());
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode findRoles()
+  {
+    PetscFunctionBegin;
+    PetscCall(TSSetUp(ts_));
+    role.assign(n, TSHHT3_NUM_ROLES);
+    for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+      IS              is;
+      const PetscInt *index;
+      PetscInt        count;
+      PetscCall(TSHHT3GetIS(ts_, (TSHHT3Role)r, &is));
+      PetscCall(ISGetLocalSize(is, &count));
+      PetscCall(ISGetIndices(is, &index));
+      for (PetscInt k = 0; k < count; k++) role[index[k]] = (TSHHT3Role)r;
+      PetscCall(ISRestoreIndices(is, &index));
+    }
+    for (PetscInt i = 0; i < n; i++)
+      PetscCheck(role[i] != TSHHT3_NUM_ROLES, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Scene %s: unknown %d has no role",
+                 name.c_str(), (int)i);
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode findPattern()
+  {
+    const PetscInt *i, *j;
+    PetscInt        rows;
+    PetscBool       done;
+
+    PetscFunctionBegin;
+    PetscCall(MatGetRowIJ(J_, 0, PETSC_FALSE, PETSC_FALSE, &rows, &i, &j, &done));
+    PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_SUP, "Scene %s: its matrix gives no rows", name.c_str());
+    for (PetscInt r = 0; r < rows; r++)
+      for (PetscInt k = i[r]; k < i[r + 1]; k++) {
+        row_.push_back(r);
+        col_.push_back(j[k]);
+      }
+    PetscCall(MatRestoreRowIJ(J_, 0, PETSC_FALSE, PETSC_FALSE, &rows, &i, &j, &done));
+    PetscFunctionReturn(0);
+  }
+
+  /* Rows that are f(t) minus an angle or an advance */
+  template <class K> void findMotions()
+  {
+    for (const auto &b : scene_->data().run->batches)
+      if (const auto *batch = dynamic_cast<const hhtdae::ConstraintBatch<K> *>(b.get()))
+        for (const auto &e : batch->all)
+          if (e.active & 1) motions_.emplace_back(e.lambda, &e.data.function);
+  }
+
+  PetscErrorCode findStart()
+  {
+    State     s;
+    TS        ts;
+    Vec       U, V;
+    PetscBool found;
+
+    PetscFunctionBegin;
+    states_.clear();
+    PetscCall(createTS(&ts));
+    PetscCall(TS2GetSolution(ts, &U, &V));
+    PetscCall(copy(U, u0_));
+    PetscCall(copy(V, v0_));
+    PetscCall(TSDestroy(&ts));
+    s.t = t0;
+    s.u = u0_;
+    s.v = v0_;
+    s.a.assign(n, 0.);
+    PetscCall(consistent(s, &found));
+    PetscCheck(found, PETSC_COMM_SELF, PETSC_ERR_NOT_CONVERGED,
+               "Scene %s: hhtdae makes no first step; run it by itself with -info to see why", name.c_str());
+    PetscCall(rewind());
+    states_.push_back(s);
+    PetscFunctionReturn(0);
+  }
+
+  static PetscErrorCode paste(const std::vector<double> &from, Vec x)
+  {
+    double *array;
+
+    PetscFunctionBegin;
+    PetscCall(VecGetArrayWrite(x, &array));
+    std::copy(from.begin(), from.end(), array);
+    PetscCall(VecRestoreArrayWrite(x, &array));
+    PetscFunctionReturn(0);
+  }
+
+  /* Accelerations, multipliers, variables and force states that belong to q, q' and the states of s, as hhtdae starts
+     from them: the beginning of one step. Not found: s stays as it is. */
+  PetscErrorCode consistent(State &s, PetscBool *found) const
+  {
+    TS                ts;
+    Vec               U, V, W[3];
+    TSConvergedReason reason;
+
+    PetscFunctionBegin;
+    PetscCall(scene_->createTS(&ts));
+    PetscCall(TSHHT3SetCoordinateChange(ts, nullptr, nullptr, nullptr, nullptr));
+    PetscCall(TSHHT3SetStart(ts, TSHHT3_START_OFF));
+    PetscCall(TS2GetSolution(ts, &U, &V));
+    PetscCall(paste(s.u, U));
+    PetscCall(paste(s.v, V));
+    PetscCall(TSSetTime(ts, s.t));
+    PetscCall(TSSetMaxTime(ts, s.t + t1 - t0));
+    PetscCall(TSSetMaxSteps(ts, 1));
+    PetscCall(TSSetTolerances(ts, 1e-8, nullptr, 1e-8, nullptr));
+    PetscCall(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_STEPOVER));
+    PetscCall(TSSetErrorIfStepFails(ts, PETSC_FALSE));
+    PetscCall(TSSolve(ts, nullptr));
+    PetscCall(TSGetConvergedReason(ts, &reason));
+    *found = reason > 0 ? PETSC_TRUE : PETSC_FALSE;
+    if (*found) {
+      for (Vec &w : W) PetscCall(VecCreateSeq(PETSC_COMM_SELF, n, &w));
+      PetscCall(TSHHT3Interpolate(ts, s.t, W[0], W[1], W[2]));
+      PetscCall(copy(W[0], s.u));
+      PetscCall(copy(W[1], s.v));
+      PetscCall(copy(W[2], s.a));
+      for (Vec &w : W) PetscCall(VecDestroy(&w));
+    }
+    PetscCall(TSDestroy(&ts));
+    PetscFunctionReturn(0);
+  }
+
+  /* Axes and memories back to the start */
+  PetscErrorCode rewind() const
+  {
+    hhtdae::Runtime &R = *scene_->data().run;
+    double          *x;
+
+    PetscFunctionBegin;
+    last_.u.clear();
+    if (!R.axes) PetscFunctionReturn(0);
+    PetscCall(VecGetArray(R.axes, &x));
+    std::copy(axes_.begin(), axes_.end(), x);
+    PetscCall(VecRestoreArray(R.axes, &x));
+    PetscCall(hhtdae::UseAxes(R));
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode place(const double *u, const double *v, const double *a) const
+  {
+    PetscFunctionBegin; /* PETSc's arrays are not const, but nobody writes to these */
+    PetscCall(VecPlaceArray(x_[0], u));
+    PetscCall(VecPlaceArray(x_[1], v));
+    PetscCall(VecPlaceArray(x_[2], a));
+    PetscFunctionReturn(0);
+  }
+  PetscErrorCode take() const
+  {
+    PetscFunctionBegin;
+    for (int k = 0; k < 3; k++) PetscCall(VecResetArray(x_[k]));
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode evaluate(double t, const double *u, const double *v, const double *a, double *f) const
+  {
+    PetscFunctionBegin;
+    PetscCall(place(u, v, a));
+    PetscCall(VecPlaceArray(x_[3], f));
+    const PetscErrorCode failed = function_(ts_, t, x_[0], x_[1], x_[2], x_[3], functionContext_);
+    PetscCall(VecResetArray(x_[3]));
+    PetscCall(take());
+    PetscCall(failed);
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode evaluate(double t, const double *u, const double *v, const double *a, double sv, double sa,
+                          hhtex::Entries &J) const
+  {
+    const double *value;
+
+    PetscFunctionBegin;
+    PetscCall(place(u, v, a));
+    const PetscErrorCode failed = jacobian_(ts_, t, x_[0], x_[1], x_[2], sv, sa, J_, J_, jacobianContext_);
+    PetscCall(take());
+    PetscCall(failed);
+    PetscCall(MatSeqAIJGetArrayRead(J_, &value));
+    J.row.insert(J.row.end(), row_.begin(), row_.end());
+    J.col.insert(J.col.end(), col_.begin(), col_.end());
+    J.value.insert(J.value.end(), value, value + row_.size());
+    PetscCall(MatSeqAIJRestoreArrayRead(J_, &value));
+    PetscFunctionReturn(0);
+  }
+};
+
+} // namespace hhtbench
+
+#endif
