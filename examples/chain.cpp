@@ -7,6 +7,7 @@ static char help[] =
     "  -net <rows,columns>: instead, a net of point masses and rods on ball joints, hung along one side\n"
     "  -end <1>: end time, s\n";
 
+#include "chain_model.h"
 #include "problem.h"
 #include "scene_watch.h"
 
@@ -15,64 +16,6 @@ static char help[] =
 #include <cstring>
 
 using namespace hhtdae;
-
-/* A rod of 1 kg and 1 m, x along it */
-static Body AddRod(Scene &scene, const Vector3 &from, const Matrix3 &rotation)
-{
-  RigidBody rod;
-  rod.mass     = 1;
-  rod.inertia  = Vector3(1e-3, 1. / 12, 1. / 12).asDiagonal();
-  rod.rotation = rotation;
-  rod.position = from + rotation.col(0) / 2;
-  const Body b = scene.add("", rod);
-  scene.shape(
-      b, Shape::cylinder(0.03, 1, {0, 0, 0}, Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix()));
-  return b;
-}
-
-/* From the origin along x; returns the end of the last rod */
-static Marker AddChain(Scene &scene, PetscInt n, bool spherical)
-{
-  Marker last = scene.marker(scene.ground());
-  for (PetscInt k = 0; k < n; k++) {
-    const Body   b     = AddRod(scene, {(double)k, 0, 0}, Matrix3::Identity());
-    const Marker first = scene.marker(b, {-0.5, 0, 0});
-    if (spherical)
-      scene.add("", Spherical{first, last});
-    else
-      scene.add("", Revolute{first, last});
-    last = scene.marker(b, {0.5, 0, 0});
-  }
-  return last;
-}
-
-/* Knots in the xz plane, the first row held by the ground; rods along the rows and the columns */
-static Marker AddNet(Scene &scene, PetscInt rows, PetscInt columns)
-{
-  std::vector<Marker> knot(columns);
-  const Matrix3       along_z = Eigen::AngleAxisd(-PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix();
-  for (PetscInt r = 0; r <= rows; r++)
-    for (PetscInt c = 0; c < columns; c++) {
-      const Vector3 x((double)c, 0, (double)r);
-      const Marker  above = knot[c];
-      if (r == 0) {
-        knot[c] = scene.marker(scene.ground(), x);
-        continue;
-      }
-      PointMass p;
-      p.mass          = 0.5;
-      p.position      = x;
-      knot[c]         = scene.marker(scene.add("", p));
-      const Body down = AddRod(scene, x - Vector3::UnitZ(), along_z);
-      scene.add("", Spherical{scene.marker(down, {-0.5, 0, 0}), above});
-      scene.add("", Spherical{scene.marker(down, {0.5, 0, 0}), knot[c]});
-      if (c == 0) continue;
-      const Body across = AddRod(scene, x - Vector3::UnitX(), Matrix3::Identity());
-      scene.add("", Spherical{scene.marker(across, {-0.5, 0, 0}), knot[c - 1]});
-      scene.add("", Spherical{scene.marker(across, {0.5, 0, 0}), knot[c]});
-    }
-  return knot[columns - 1];
-}
 
 static PetscErrorCode Run(void)
 {
@@ -103,7 +46,7 @@ static PetscErrorCode Run(void)
 
   Scene scene(PETSC_COMM_WORLD, planar ? Space::Planar : Space::Spatial);
   scene.gravity({0, -9.81, 0});
-  const Marker   tip    = is_net ? AddNet(scene, net[0], net[1]) : AddChain(scene, n, spherical);
+  const Marker   tip    = is_net ? hhtex::AddNet(scene, net[0], net[1]) : hhtex::AddChain(scene, n, spherical);
   const PetscInt bodies = is_net ? net[0] * (3 * net[1] - 1) : n;
   for (int k = 0; k < (planar ? 2 : 3); k++)
     scene.channel(std::string("tip.") + "xyz"[k], Measure::displacement(tip, k), "m");

@@ -5,6 +5,7 @@ static char help[] =
     "  -planar: bodies of a planar scene, 3 coordinates each (revolute joints)\n"
     "  -end <2>: end time, s\n";
 
+#include "doublependulum_model.h"
 #include "problem.h"
 #include "problems/extrapolation.h"
 #include "scene_watch.h"
@@ -29,18 +30,6 @@ static void TwoAngles(long double, const long double *y, long double *f)
   f[3]                  = (m1 * q2 - c * q1) / det;
 }
 
-static Body AddRod(Scene &scene, const char *name, const Vector3 &from, const Matrix3 &rotation)
-{
-  RigidBody rod;
-  rod.mass     = 1;
-  rod.inertia  = Vector3(1e-3, 1. / 12, 1. / 12).asDiagonal();
-  rod.rotation = rotation; /* x along the rod */
-  rod.position = from + rotation.col(0) * 0.5;
-  const Body b = scene.add(name, rod);
-  scene.shape(b, Shape::box({0.5, 0.03, 0.03}));
-  return b;
-}
-
 static PetscErrorCode Run(void)
 {
   char      joint[16] = "revolute";
@@ -58,28 +47,8 @@ static PetscErrorCode Run(void)
   PetscCheck(!planar || !spherical, PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP,
              "-planar and -joint spherical exclude each other");
 
-  /* ---- the scene ---- */
-  Scene scene(PETSC_COMM_WORLD, planar ? Space::Planar : Space::Spatial);
-  scene.gravity({0, -g, 0});
-  Matrix3 across; /* x of the second rod along space z */
-  across << 0, 0, -1, 0, 1, 0, 1, 0, 0;
-  const Body   a   = AddRod(scene, "upper rod", {0, 0, 0}, Matrix3::Identity());
-  const Body   b   = AddRod(scene, "lower rod", {1, 0, 0}, spherical ? across : Matrix3(Matrix3::Identity()));
-  const Marker top = scene.marker(a, {-0.5, 0, 0}), elbow = scene.marker(a, {0.5, 0, 0}),
-               hand = scene.marker(b, {-0.5, 0, 0});
-  const Marker tip = scene.marker(b, {0.5, 0, 0}), origin = scene.marker(scene.ground());
-  if (spherical) {
-    scene.add("shoulder", Spherical{top, origin});
-    scene.add("elbow", Spherical{hand, elbow});
-  } else {
-    scene.add("shoulder", Revolute{top, origin});
-    scene.add("elbow", Revolute{hand, elbow});
-  }
-  scene.channel("tip.x", Measure::displacement(tip, 0), "m");
-  scene.channel("tip.y", Measure::displacement(tip, 1), "m");
-  scene.channel("kinetic", Measure::kineticEnergy(), "J");
-  scene.channel("potential", Measure::potentialEnergy(), "J");
-
+  hhtex::DoublePendulum model(spherical, planar);
+  Scene                &scene = model.scene;
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));
   PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));

@@ -5,6 +5,7 @@ static char help[] =
     "  -turns <0>: instead, a body with three different moments of inertia tumbles on the joint for so many\n"
     "              revolutions, through every attitude; prints changes of its angles' axes and drift of energy\n";
 
+#include "heavytop_model.h"
 #include "problem.h"
 #include "scene_watch.h"
 
@@ -24,34 +25,6 @@ static const double table[][9] = {{0.2, .60555056137707, .59895768179494, -.5239
                                    4.6053599853369, 305.2520963488, -100.1277955532, -316.3527961145},
                                   {2.0, -.15041682274585, -.72416559163698, -.67302226956031, .122233219492,
                                    -5.855624589205, -260.735211311, 613.612698983, 309.716631391}};
-
-/* mass, moments of inertia about the centre, its place and the angular velocity at the start in body axes, which are
- * those of space */
-static RigidBody Top(double mass, const Vector3 &J, const Vector3 &center, const Vector3 &spin)
-{
-  RigidBody b;
-  b.mass             = mass;
-  b.inertia          = J.asDiagonal();
-  b.center           = center;
-  b.velocity         = spin.cross(center);
-  b.angular_velocity = spin;
-  return b;
-}
-
-static void Hang(Scene &scene, const RigidBody &body)
-{
-  scene.gravity({0, 0, -9.81});
-  const Body   b     = scene.add("top", body);
-  const Marker pivot = scene.marker(b), center = scene.marker(b, body.center);
-  scene.shape(b, Shape::cylinder(0.3, 0.1, body.center));
-  const Element joint = scene.add("pivot", Spherical{pivot, scene.marker(scene.ground())});
-  for (int k = 0; k < 3; k++) scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k), "m");
-  for (int k = 0; k < 3; k++)
-    scene.channel(std::string("Omega.") + "xyz"[k], Measure::angularVelocity(pivot, k, {}, pivot), "rad/s");
-  for (int k = 0; k < 3; k++) scene.channel(std::string("F.") + "xyz"[k], Measure::jointForce(joint, k), "N");
-  scene.channel("kinetic", Measure::kineticEnergy(), "J");
-  scene.channel("potential", Measure::potentialEnergy(), "J");
-}
 
 static PetscErrorCode Solve(Scene &scene, PetscReal end, const hhtex::Watch::Look &look, double dt, TS *ts)
 {
@@ -73,9 +46,8 @@ static PetscErrorCode Spin(PetscReal end)
   double x = 0, omega = 0, force = 0, energy = 0, start = 0;
 
   PetscFunctionBeginUser;
-  Scene scene(PETSC_COMM_WORLD);
-  Hang(scene, Top(15, {0.234375, 0.46875, 0.234375}, {0, 1, 0}, {0, 150, -4.61538}));
-  const auto compare = [&](double t, const std::vector<double> &c) {
+  hhtex::FastTop model;
+  const auto     compare = [&](double t, const std::vector<double> &c) {
     if (t == 0) start = c[9] + c[10];
     hhtex::Widen(energy, c[9] + c[10], start);
     for (const double *row : table) {
@@ -89,7 +61,7 @@ static PetscErrorCode Spin(PetscReal end)
       hhtex::Widen(omega, c[5], row[5]);
     }
   };
-  PetscCall(Solve(scene, end, compare, 0.1, &ts));
+  PetscCall(Solve(model.scene, end, compare, 0.1, &ts));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: x=%.3e Omega=%.3e F=%.3e energy=%.3e\n", x, omega, force, energy));
   PetscCall(TSDestroy(&ts));
   PetscFunctionReturn(0);
@@ -100,13 +72,10 @@ static PetscErrorCode Tumble(PetscReal turns)
   TS               ts;
   TSHHT3Statistics s;
   double           angle = 0, last = 0, rate = 0, start = 0, drift = 0, largest = 0, turned = 0, low = 1, high = -1;
-  const Vector3    spin(0.4, 4, 0.4);
 
   PetscFunctionBeginUser;
-  Scene scene(PETSC_COMM_WORLD);
-  Hang(scene,
-       Top(1, {0.1, 0.2, 0.3}, {0.5, 0, 0}, spin)); /* about the middle one of its principal axes: it turns over */
-  const auto look = [&](double t, const std::vector<double> &c) {
+  hhtex::TumblingTop model;
+  const auto         look = [&](double t, const std::vector<double> &c) {
     const double w = Vector3(c[3], c[4], c[5]).norm();
     if (t == 0)
       start = c[9] + c[10];
@@ -119,7 +88,7 @@ static PetscErrorCode Tumble(PetscReal turns)
     turned = angle / (2 * PETSC_PI);
   };
   /* a revolution takes some 1.3 s */
-  PetscCall(Solve(scene, 1.35 * turns, look, 0.02, &ts));
+  PetscCall(Solve(model.scene, 1.35 * turns, look, 0.02, &ts));
   PetscCall(TSHHT3GetStatistics(ts, &s));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "tumbled: revolutions=%.1f attitude=%.3f..%.3f changes=%d rejected=%d steps=%d kinetic=%.3f\n",

@@ -7,6 +7,7 @@ static char help[] = "Quarter car: body and wheel on vertical guides, suspension
                      "  -end <2>: end time, s\n";
 
 #include "problem.h"
+#include "quartercar_model.h"
 #include "scene_references.h"
 #include "scene_watch.h"
 
@@ -43,40 +44,9 @@ static PetscErrorCode Run(void)
   else
     SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-road %s: must be bump, curb or sine", road);
 
-  /* ---- the scene starts in static equilibrium ---- */
-  const double radius = 0.3, hub = radius - p.sink(), deck = hub + 0.4, weight = p.body * 9.81;
-  Scene        scene(PETSC_COMM_WORLD);
-  scene.gravity({0, 0, -9.81});
-  RigidBody strip, wheel, body;
-  strip.mass     = 1;
-  wheel.mass     = p.wheel;
-  wheel.inertia  = Vector3(1, 2, 1).asDiagonal();
-  wheel.position = {0, 0, hub};
-  body.mass      = p.body;
-  body.inertia   = Vector3(50, 50, 50).asDiagonal();
-  body.position  = {0, 0, deck};
-  const Body R = scene.add("road", strip), W = scene.add("wheel", wheel), B = scene.add("body", body),
-             ground  = scene.ground();
-  const Marker datum = scene.marker(ground), surface = scene.marker(R), axle = scene.marker(W), mount = scene.marker(B);
-  scene.shape(R, Shape::box({1, 0.3, 0.01}, {0, 0, -0.01}));
-  scene.shape(B, Shape::box({0.6, 0.3, 0.15}));
-  scene.add("road's guide", Translational{surface, datum});
-  scene.add("wheel's guide", Translational{axle, datum});
-  scene.add("body's guide", Translational{mount, datum});
-  scene.add("road's motion", TranslationalMotion{surface, datum, p.road});
-  scene.add("suspension", SpringDamper{mount, axle, p.stiffness, p.damping, deck - hub, -weight});
-  ContactLaw law;
-  law.stiffness = p.tire;
-  law.damping   = p.tire_damping;
-  Matrix3 z_along_y; /* the wheel's axis */
-  z_along_y << 0, 1, 0, 0, 0, 1, 1, 0, 0;
-  const Marker  rim     = scene.marker(W, {0, 0, 0}, z_along_y);
-  const Element contact = torus ? scene.add("tire", TorusPlane{rim, surface, radius - 0.1, 0.1, law})
-                                : scene.add("tire", SpherePlane{rim, surface, radius, law});
-  scene.channel("body.z", Measure::displacement(mount, 2), "m");
-  scene.channel("wheel.z", Measure::displacement(axle, 2), "m");
-  scene.channel("tire", Measure::force(contact, 2), "N");
-
+  hhtex::QuarterCar model(p, torus);
+  Scene            &scene = model.scene;
+  const double      hub = model.hub, deck = model.deck, weight = p.body * 9.81;
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));
   PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));

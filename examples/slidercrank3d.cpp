@@ -7,18 +7,11 @@ static char help[] =
 #include "problem.h"
 #include "scene_references.h"
 #include "scene_watch.h"
+#include "slidercrank3d_model.h"
 
 #include <hhtdae/scene.h>
 
 using namespace hhtdae;
-
-/* axes with z along the first and x along the second of two directions across each other */
-static Matrix3 Axes(const Vector3 &z, const Vector3 &x)
-{
-  Matrix3 R;
-  R << x, z.cross(x), z;
-  return R;
-}
 
 static PetscErrorCode Run(void)
 {
@@ -29,46 +22,8 @@ static PetscErrorCode Run(void)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-speed", &speed, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
 
-  /* ---- bodies, at the start: crank up, rod from B to S ---- */
-  const Vector3 A(0, 0.1, 0.12), B(0, 0.1, 0.2), S(0.2, 0, 0), ex = Vector3::UnitX(), ez = Vector3::UnitZ();
-  const Vector3 along = (S - B) / 0.3, normal = along.cross(ex).normalized();
-  const Vector3 w(speed, 0, 0), wrod = Vector3(0.32, -0.16, 0.08) * speed, vB = w.cross(B - A), vS(0.04 * speed, 0, 0);
-  Scene         scene(PETSC_COMM_WORLD);
-  scene.gravity({0, 0, -9.81});
-
-  RigidBody crank, rod, slider;
-  crank.mass             = 0.12;
-  crank.inertia          = Vector3(1e-4, 1e-4, 1e-5).asDiagonal();
-  crank.position         = (A + B) / 2;
-  crank.velocity         = vB / 2;
-  crank.angular_velocity = w;
-  rod.mass               = 0.5;
-  rod.inertia            = Vector3(4e-4, 4e-3, 4e-3).asDiagonal(); /* x along the rod */
-  rod.position           = (B + S) / 2;
-  rod.rotation << along, normal, along.cross(normal);
-  rod.velocity         = (vB + vS) / 2;
-  rod.angular_velocity = wrod;
-  slider.mass          = 2;
-  slider.inertia       = Matrix3::Identity() * 1e-3;
-  slider.position      = S;
-  slider.velocity      = vS;
-  const Body c = scene.add("crank", crank), r = scene.add("rod", rod), s = scene.add("slider", slider),
-             ground = scene.ground();
-  scene.shape(c, Shape::box({0.01, 0.01, 0.04}));
-  scene.shape(r, Shape::box({0.15, 0.008, 0.008}));
-  scene.shape(s, Shape::box({0.03, 0.02, 0.02}));
-
-  /* ---- joints; markers where they are at the start ---- */
-  const Matrix3 z_along_x = Axes(ex, ez);
-  scene.add("crank pin", Revolute{scene.markerAt(c, A, z_along_x), scene.markerAt(ground, A, z_along_x)});
-  scene.add("ball", Spherical{scene.markerAt(r, B), scene.markerAt(c, B)});
-  scene.add("cross", Universal{scene.markerAt(r, S, Axes(normal, ex)), scene.markerAt(s, S, z_along_x)});
-  scene.add("guide", Translational{scene.markerAt(s, S, z_along_x), scene.marker(ground, {0, 0, 0}, z_along_x)});
-
-  scene.channel("slider.x", Measure::displacement(scene.marker(s), 0), "m");
-  scene.channel("kinetic", Measure::kineticEnergy(), "J");
-  scene.channel("potential", Measure::potentialEnergy(), "J");
-
+  hhtex::SpatialSliderCrank model(speed);
+  Scene                    &scene = model.scene;
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));
   PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
