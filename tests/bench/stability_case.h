@@ -1,0 +1,188 @@
+/*
+  A case of the table of stability: a model, what it is judged by, and the figure that it must not exceed. A case that
+  cannot succeed names the words that its PETSc error must contain instead; what the last accepted state is worth is
+  then judged too, where known.
+
+    cases.push_back({"springs", "k=1e9", "position against the rigid rod", 2e-3, [](Run &run) -> PetscErrorCode { ...
+  }});
+
+  The same cases are rows of the program `stability` and, where they are quick, tests in
+  tests/stability/test_extreme.cpp.
+*/
+#ifndef HHTDAE_BENCH_STABILITY_CASE_H
+#define HHTDAE_BENCH_STABILITY_CASE_H
+
+#include <hhtdae/hhtdae.h>
+
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace hhtstab
+{
+
+/* Plain data: it goes through a pipe from the process that runs the case */
+struct Outcome {
+  double           figure       = -1;    /* largest so far; NaN stays */
+  bool             finished     = false; /* came to its end time */
+  int              code         = 0;     /* PETSc's error; -1: the process crashed; -2: deadline */
+  double           t            = 0;     /* where it stopped */
+  double           seconds      = 0;     /* of CPU time, references included */
+  TSHHT3Statistics s            = {};
+  char             message[400] = "", note[240] = "";
+};
+
+class Run
+{
+public:
+  Outcome   &out;
+  TSHHT3Form form;
+
+  Run(Outcome &o, TSHHT3Form f) : out(o), form(f) {}
+
+  void judge(double figure)
+  {
+    if (!(std::fabs(figure) <= out.figure)) out.figure = std::isnan(out.figure) ? out.figure : std::fabs(figure);
+  }
+  void note(const char *format, ...)
+  {
+    va_list arguments;
+    va_start(arguments, format);
+    std::vsnprintf(out.note, sizeof out.note, format, arguments);
+    va_end(arguments);
+  }
+
+  /* Form, tolerance and options for a TS that has its end time */
+  PetscErrorCode prepare(TS ts, double tolerance) const
+  {
+    PetscFunctionBegin;
+    PetscCall(TSSetMaxSteps(ts, 100000000));
+    PetscCall(TSSetTolerances(ts, tolerance, nullptr, tolerance, nullptr));
+    PetscCall(TSHHT3SetForm(ts, form));
+    PetscCall(TSSetFromOptions(ts));
+    PetscFunctionReturn(0);
+  }
+  /* Steps of one length */
+  static PetscErrorCode fixSteps(TS ts, double h)
+  {
+    TSAdapt adapt;
+    PetscFunctionBegin;
+    PetscCall(TSGetAdapt(ts, &adapt));
+    PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
+    PetscCall(TSSetTimeStep(ts, h));
+    PetscFunctionReturn(0);
+  }
+  /* Keeps the counters whether or not the run succeeds. Numbers that are none in the final state spoil the figure. */
+  PetscErrorCode solve(TS ts, const std::function<PetscErrorCode()> &solver = {})
+  {
+    TSConvergedReason reason;
+    PetscReal         t, norm[2];
+    Vec               U, V;
+    PetscFunctionBegin;
+    const PetscErrorCode code = solver ? solver() : TSSolve(ts, nullptr);
+    PetscCall(TSHHT3GetStatistics(ts, &out.s));
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(TSGetConvergedReason(ts, &reason));
+    PetscCall(TS2GetSolution(ts, &U, &V));
+    PetscCall(VecNorm(U, NORM_2, &norm[0]));
+    PetscCall(VecNorm(V, NORM_2, &norm[1]));
+    out.t        = t;
+    out.finished = !code && reason == TS_CONVERGED_TIME;
+    if (!code && !out.finished && !out.note[0]) note("ended with %s", TSConvergedReasons[reason]);
+    if (!std::isfinite(norm[0] + norm[1])) judge(NAN);
+    PetscFunctionReturn(code);
+  }
+};
+
+struct Case {
+  std::string kind, name, measure;
+  double      accept; /* largest figure; the same in both forms unless paper() says otherwise */
+  std::function<PetscErrorCode(Run &)> run;
+  std::string                          message  = ""; /* words of the error that must end the run; "": it must finish */
+  double                               deadline = 20; /* seconds */
+  double accept_paper = -1;    /* the paper's form, of first order where M varies; negative: as accept */
+  bool   quick        = false; /* a test, too */
+
+  Case &mustFail(const std::string &words)
+  {
+    message = words;
+    return *this;
+  }
+  Case &paper(double figure)
+  {
+    accept_paper = figure;
+    return *this;
+  }
+  Case &within(double seconds)
+  {
+    deadline = seconds;
+    return *this;
+  }
+  Case &test()
+  {
+    quick = true;
+    return *this;
+  }
+  double acceptance(TSHHT3Form form) const
+  {
+    return form == TSHHT3_FORM_PAPER && accept_paper >= 0 ? accept_paper : accept;
+  }
+  bool passed(TSHHT3Form form, const Outcome &o) const
+  {
+    const bool judged = o.figure <= acceptance(form); /* false for NaN */
+    if (message.empty()) return o.finished && o.figure >= 0 && judged;
+    return o.code > 0 && std::strstr(o.message, message.c_str()) && judged;
+  }
+};
+
+using Cases = std::vector<Case>;
+
+/* Adds a case and returns it, to be qualified */
+inline Case &Add(Cases &cases, const std::string &kind, const std::string &name, const std::string &measure,
+                 double accept, std::function<PetscErrorCode(Run &)> run)
+{
+  Case c{kind, name, measure, accept, std::move(run)};
+  cases.push_back(std::move(c));
+  return cases.back();
+}
+
+/* The first message of an error is the result; nothing is printed */
+inline PetscErrorCode KeepMessage(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type,
+                                  const char *message, void *ctx)
+{
+  if (type == PETSC_ERROR_INITIAL && message)
+    std::snprintf(static_cast<Outcome *>(ctx)->message, sizeof(Outcome::message), "%s", message);
+  return code;
+}
+
+/* Lines that the library prints belong to the case, not to the terminal */
+inline PetscErrorCode Silent(FILE *, const char[], va_list) { return 0; }
+
+inline void RunCase(const Case &c, TSHHT3Form form, Outcome &out)
+{
+  Run           run(out, form);
+  auto          print = PetscVFPrintf;
+  const clock_t start = clock();
+  PetscVFPrintf       = Silent;
+  PetscPushErrorHandler(KeepMessage, &out);
+  out.code = (int)c.run(run);
+  PetscPopErrorHandler();
+  PetscVFPrintf = print;
+  out.seconds   = (double)(clock() - start) / CLOCKS_PER_SEC;
+}
+
+inline std::string Name(const char *format, double x)
+{
+  char s[64];
+  std::snprintf(s, sizeof s, format, x);
+  return s;
+}
+
+} // namespace hhtstab
+
+#endif

@@ -1,0 +1,140 @@
+/* Fast spin, attitudes where Euler angles are singular, bodies that tumble for long. */
+#ifndef HHTDAE_BENCH_STABILITY_ROTATION_H
+#define HHTDAE_BENCH_STABILITY_ROTATION_H
+
+#include "stability_models.h"
+
+namespace hhtstab
+{
+
+/* A rotor on a hinge, its axis along the space z axis, where Euler angles begin at their singularity */
+inline PetscErrorCode RotorCase(Run &run, double spin)
+{
+  using namespace hhtdae;
+  Scene     scene(PETSC_COMM_SELF);
+  RigidBody rotor;
+  PetscFunctionBegin;
+  rotor.inertia          = Vector3(1, 1.3, 2).asDiagonal();
+  rotor.angular_velocity = {0, 0, spin};
+  const Marker m = scene.marker(scene.add("rotor", rotor)), ground = scene.marker(scene.ground());
+  scene.add("bearing", Revolute{m, ground});
+  scene.channel("angle", Measure::angle(m, ground));
+  PetscCall(RunScene(run, scene, 1, 1e-6, 0.01,
+                     [&](double t, const std::vector<double> &c) { run.judge((c[0] - spin * t) / spin); }));
+  PetscFunctionReturn(0);
+}
+
+/* A free body, from an attitude: directions of its axes */
+inline PetscErrorCode FreeCase(Run &run, const hhtdae::Vector3 &J, const hhtdae::Vector3 &spin, double tilt, double end,
+                               double tolerance)
+{
+  using namespace hhtdae;
+  FreeBody  exact(J, spin);
+  Scene     scene(PETSC_COMM_SELF);
+  RigidBody body;
+  PetscFunctionBegin;
+  const Matrix3 R       = Eigen::AngleAxisd(tilt, Vector3::UnitX()).toRotationMatrix();
+  body.inertia          = J.asDiagonal();
+  body.rotation         = R;
+  body.angular_velocity = R * spin;
+  const Body b          = scene.add("body", body);
+  for (int k = 0; k < 3; k++)
+    for (int c = 0; c < 3; c++) scene.channel("", Measure::displacement(scene.marker(b, Vector3::Unit(k)), c));
+  PetscCall(RunScene(run, scene, end, tolerance, end / 200, [&](double t, const std::vector<double> &c) {
+    for (int k = 0; k < 3; k++) run.judge((Eigen::Map<const Vector3>(&c[3 * k]) - R * exact.axis(t, k)).norm());
+  }));
+  run.note("%d changes of axes", (int)run.out.s.changes);
+  PetscFunctionReturn(0);
+}
+
+/* A fast top in slow regular precession, its nutation far above what the steps resolve: part of the precession's way */
+inline PetscErrorCode PrecessionCase(Run &run, double spin)
+{
+  using namespace hhtdae;
+  const double l = 0.5, I3 = 0.02, I1 = 0.015 + l * l, theta = PETSC_PI / 3, end = 2;
+  const double a    = I1 * std::cos(theta),
+               rate = 2 * 9.81 * l / (I3 * spin + std::sqrt(I3 * spin * I3 * spin - 4 * a * 9.81 * l));
+  Scene     scene(PETSC_COMM_SELF);
+  RigidBody top;
+  PetscFunctionBegin;
+  top.inertia          = Vector3(0.015, 0.015, I3).asDiagonal();
+  top.rotation         = Eigen::AngleAxisd(theta, Vector3::UnitX()).toRotationMatrix();
+  const Vector3 axis   = top.rotation.col(2);
+  top.angular_velocity = Vector3(0, 0, rate) + (spin - rate * std::cos(theta)) * axis;
+  top.position         = l * axis;
+  top.velocity         = top.angular_velocity.cross(top.position);
+  const Body b         = scene.add("top", top);
+  scene.add("pivot", Spherical{scene.marker(b, {0, 0, -l}), scene.marker(scene.ground())});
+  scene.gravity({0, 0, -9.81});
+  for (int c = 0; c < 3; c++) scene.channel("", Measure::displacement(scene.marker(b), c));
+  PetscCall(RunScene(run, scene, end, 1e-6, end / 100, [&](double t, const std::vector<double> &c) {
+    const Vector3 exact = Eigen::AngleAxisd(rate * t, Vector3::UnitZ()) * Vector3(l * axis);
+    run.judge((Eigen::Map<const Vector3>(c.data()) - exact).norm() / (l * std::sin(theta) * rate * end));
+  }));
+  run.note("largest h omega %.1e; precession %.1e rad", run.out.s.h_max * spin, rate * end);
+  PetscFunctionReturn(0);
+}
+
+/* A body with three moments of inertia on a ball joint, turning over and over: energy */
+inline PetscErrorCode TumbleCase(Run &run, double turns)
+{
+  using namespace hhtdae;
+  const Vector3 spin(0.4, 4, 0.4);
+  Scene         scene(PETSC_COMM_SELF);
+  RigidBody     body;
+  EnergyDrift   energy;
+  PetscFunctionBegin;
+  body.inertia          = Vector3(0.1, 0.2, 0.3).asDiagonal();
+  body.center           = {0.5, 0, 0};
+  body.velocity         = spin.cross(body.center);
+  body.angular_velocity = spin;
+  scene.add("pivot", Spherical{scene.marker(scene.add("body", body)), scene.marker(scene.ground())});
+  scene.gravity({0, 0, -9.81});
+  EnergyChannels(scene);
+  PetscCall(RunScene(run, scene, 1.35 * turns, 1e-7, 0.05, [&](double, const std::vector<double> &c) {
+    energy(c);
+    run.judge(energy.relative());
+  }));
+  run.note("%d changes of axes", (int)run.out.s.changes);
+  PetscFunctionReturn(0);
+}
+
+inline void AddRotation(Cases &cases)
+{
+  using hhtdae::Vector3;
+  const char *axes = "axes, exact";
+  for (double w : {1e3, 1e5}) {
+    Add(cases, "spin", Name("rotor, %.0e rad/s", w), "angle, relative", 1e-6, [w](Run &r) {
+      return RotorCase(r, w);
+    }).test();
+    Add(cases, "spin", Name("precession, %.0e rad/s", w), "place over the way", 1e-2,
+        [w](Run &r) { return PrecessionCase(r, w); });
+  }
+  /* 100 rad at eps = 1e-7: the paper's form is of first order here */
+  Add(cases, "spin", "free, 1e5 rad/s, wobbling", axes, 2e-2,
+      [](Run &r) {
+        return FreeCase(r, {1, 1, 1.8}, {1e4, 0, 1e5}, 1, 1e-3, 1e-7);
+      })
+      .paper(0.5)
+      .test();
+  Add(cases, "spin", "free, 1e5 rad/s, three moments", axes, 2e-2, [](Run &r) {
+    return FreeCase(r, {1, 2, 3}, {1e3, 1e3, 1e5}, 1, 1e-3, 1e-7);
+  }).paper(0.5);
+  Add(cases, "gimbal", "middle axis, from theta=0", axes, 2e-2, [](Run &r) {
+    return FreeCase(r, {1, 2, 3}, {0.5, 5, 0.5}, 0, 10, 1e-7);
+  }).paper(0.5);
+  Add(cases, "gimbal", "through theta=0 exactly", axes, 2e-2, [](Run &r) {
+    return FreeCase(r, {1, 2, 3}, {5, 0, 0}, 1, 10, 1e-7);
+  }).paper(0.5);
+  Add(cases, "gimbal", "near theta=0: 1e-9 rad", axes, 2e-2, [](Run &r) {
+    return FreeCase(r, {1, 2, 3}, {0.5, 0.2, 5}, 1e-9, 10, 1e-7);
+  }).paper(0.5);
+  Add(cases, "gimbal", "tumbles for 200 turns", "energy over the kinetic", 5e-2,
+      [](Run &r) { return TumbleCase(r, 200); })
+      .paper(0.5)
+      .within(40);
+}
+
+} // namespace hhtstab
+
+#endif
