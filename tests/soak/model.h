@@ -1,0 +1,145 @@
+/* Model k of seed s: a scene put together at random from trees, loops, machines, contacts and flexible bodies, with what is observed. */
+#ifndef HHTDAE_SOAK_MODEL_H
+#define HHTDAE_SOAK_MODEL_H
+
+#include "model_loads.h"
+#include "model_machines.h"
+#include <cstring>
+
+namespace soak
+{
+
+enum class Observed { Position, Velocity, Reaction, Energy };
+
+struct Model {
+  std::shared_ptr<Scene>     scene;
+  bool                       planar = false, conservative = false;
+  int                        bodies = 0;
+  double                     end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
+  std::vector<Observed>      observed; /* what each channel of the scene is */
+  std::map<std::string, int> types;    /* elements by type, and features */
+};
+
+class Generator
+{
+public:
+  Generator(std::uint64_t seed, std::uint64_t number, bool small, const std::vector<ReducedPart> &parts) : r(seed, number), small_(small), parts_(parts) {}
+
+  Model make()
+  {
+    Model m;
+    m.planar = r.chance(0.25);
+    m.scene  = std::make_shared<Scene>(PETSC_COMM_SELF, m.planar ? Space::Planar : Space::Spatial);
+    Builder b(*m.scene, r, m.planar);
+    scales(b);
+    Loads    loads(b);
+    Machines machines(b, parts_);
+    populate(b, loads, machines);
+    decorate(b, loads);
+    if (b.speed > 0 || b.project) m.scene->start().assembly = Assembly::Project;
+    observe(b, machines, loads, m);
+    m.bodies   = b.bodies();
+    m.end      = b.period * r.uniform(0.3, 2) * (m.bodies > 60 ? 0.5 : 1);
+    m.length   = b.length;
+    m.mass     = b.mass;
+    m.period   = b.period;
+    m.stiffest = b.stiffest;
+    m.softest  = b.softest;
+    m.speed    = b.speed;
+    count(b, m);
+    return m;
+  }
+
+private:
+  Random                   r;
+  bool                     small_;
+  const std::vector<ReducedPart> &parts_;
+
+  void scales(Builder &b)
+  {
+    b.length       = r.logarithmic(0.2, 2);
+    b.mass         = r.logarithmic(1e-3, 1e3);
+    const double g = r.chance(0.15) ? 0 : r.chance(0.1) ? r.logarithmic(0.1, 100) : 9.81;
+    b.gravity      = -g * (r.chance(0.9) ? b.up : b.direction());
+    b.period       = g > 0 ? 2 * M_PI * std::sqrt(b.length / g) : r.logarithmic(0.1, 3);
+    b.speed        = r.chance(0.45) ? r.logarithmic(0.1, 5) : 0;
+    b.scene.gravity(b.gravity);
+  }
+
+  /* small ones are the most, a few have 100 to 200 bodies */
+  int size()
+  {
+    if (small_) return (int)r.logarithmic(1, 12);
+    if (r.chance(0.03)) return r.integer(100, 200);
+    return (int)(60 * std::pow(60., -r.uniform() * r.choose({1, 1}) - 0.0) / (r.chance(0.5) ? 1 : r.logarithmic(1, 30))) + 1;
+  }
+
+  void populate(Builder &b, Loads &loads, Machines &machines)
+  {
+    Trees     trees(b);
+    const int n = size();
+    if (!b.planar && !small_ && r.chance(0.1)) machines.flexible();
+    if (!b.planar && small_ && r.chance(0.05)) machines.flexible();
+    while (b.bodies() < n) {
+      const int rest = n - b.bodies();
+      switch (b.planar ? r.choose({6, 4, 0, 0, 2, 1.5, 3, 0.5, 1.2, 0}) : r.choose({7, 2, 3, 1, 2, 2.5, 3, 0.5, 1.2, 0.8})) {
+      case 0: trees.tree(rest > 40 ? r.integer(rest / 2, rest) : r.integer(1, rest)); break;
+      case 1: trees.planeLoop(); break;
+      case 2: trees.spaceLoop(); break;
+      case 3: trees.platform(); break;
+      case 4: machines.couple(); break;
+      case 5: machines.roll(); break;
+      case 6: machines.contact(); break;
+      case 7: machines.shaker([&] { return loads.motion(b.length * r.uniform(0.05, 0.3)); }); break;
+      case 8: loads.net(r.integer(1, std::min(rest, 20))); break;
+      default: machines.flexible();
+      }
+    }
+  }
+
+  void decorate(Builder &b, Loads &loads)
+  {
+    const int forces = (int)(r.uniform(0, 1) * (2 + 0.4 * b.bodies()));
+    for (int k = 0; k < forces; k++) loads.any();
+    if (r.chance(0.35))
+      for (int k = r.integer(1, 3); k > 0; k--) loads.drive();
+  }
+
+  void observe(Builder &b, Machines &machines, Loads &loads, Model &m)
+  {
+    Scene    &s    = *m.scene;
+    const int step = std::max(1, b.bodies() / 10), components = b.planar ? 2 : 3;
+    auto      look = [&](const Measure &what, Observed kind) {
+      s.channel("c" + std::to_string(m.observed.size()), what);
+      m.observed.push_back(kind);
+    };
+    for (int k = 1; k <= b.bodies(); k += step) {
+      const Marker at = b.at(k, b.on(k));
+      for (int c = 0; c < components; c++) look(Measure::displacement(at, c), Observed::Position);
+      for (int c = 0; c < components; c++) look(Measure::velocity(at, c), Observed::Velocity);
+    }
+    for (Body f : machines.modal) look(Measure::modal(f, 0), Observed::Position);
+    for (State x : loads.states) look(Measure::value(x), Observed::Position);
+    int seen = 0;
+    for (std::size_t k = 0; k < s.data().elements.size() && seen < 4; k += std::max<std::size_t>(1, s.data().elements.size() / 8))
+      if (s.data().elements[k].kind != ElementData::Force && std::strcmp(s.data().elements[k].type, "attachment")) {
+        for (int c = 0; c < components; c++) look(Measure::jointForce(Element{(PetscInt)k}, c, b.at(0, Vector3::Zero())), Observed::Reaction);
+        seen++;
+      }
+    look(Measure::kineticEnergy(), Observed::Energy);
+    look(Measure::potentialEnergy(), Observed::Energy);
+  }
+
+  void count(Builder &b, Model &m)
+  {
+    m.types = b.used;
+    for (const ElementData &e : m.scene->data().elements) m.types[e.type]++;
+    if (!m.scene->data().variables.empty()) m.types["variable"] += (int)m.scene->data().variables.size();
+    if (!m.scene->data().states.empty()) m.types["first-order state"] += (int)m.scene->data().states.size();
+    m.types[m.planar ? "planar scene" : "spatial scene"]++;
+  }
+};
+
+} // namespace soak
+
+#endif

@@ -1,0 +1,271 @@
+/*
+  What becomes of one model: the run with defaults (tolerance 1e-4), a run at a tenth of it, two references, and the verdict.
+
+  Error of a position: |x - x_ref| / max(1, largest |x_ref| of that channel so far), the weights of the method's own test.
+
+  A run at tolerance eps is right if at every sample time t
+
+    error(t) <= C eps N(t) (1 + G(t)),
+
+  N: its steps so far, each of which may leave an error of eps; G: how much the model itself makes grow of an error, as IDA shows it: the
+  difference of its runs at 10 eps_ref and eps_ref, over 10 eps_ref and its number of steps. It is asked for as long as the right-hand
+  side is below 0.1: later the tolerance does not determine the solution. Where that is so before the end, a third run, at eps / 100, has
+  to be right by the same formula. And where the first error is not small, the second has to be smaller.
+*/
+#ifndef HHTDAE_SOAK_MODEL_JUDGE_H
+#define HHTDAE_SOAK_MODEL_JUDGE_H
+
+#include "model_reference.h"
+
+namespace soak
+{
+
+enum Verdict { Right, Wrong, Failed, Unknown, Crashed, Hung, verdicts };
+constexpr const char *verdict_name[] = {"right", "wrong", "failed", "no reference", "crashed", "hung"};
+enum Stage { Building, Default, Finer, Referring, Judging, Done };
+constexpr const char *stage_name[] = {"building the scene", "the run with defaults", "the run at a smaller tolerance", "the reference", "the verdict", "done"};
+enum By { ByNobody, ByIDA, ByHHT };
+constexpr const char *by_name[] = {"none", "IDA", "hhtdae"};
+
+/* Plain data: it comes through a pipe */
+struct Outcome {
+  long   number = 0;
+  int    stage = Building, verdict = Unknown, by = ByNobody, bodies = 0, planar = 0, window = 0, finest_window = 0, legs = 0;
+  long   steps = 0, rejected = 0, newton = 0, jacobians = 0, factorizations = 0, changes = 0, fails = 0, reference_steps = 0, finer_steps = 0;
+  double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
+  double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1, doubt = -1, used = -1; /* used: largest part of what is allowed */
+  char   message[600] = "", types[2000] = "";
+};
+
+inline void SetText(char *to, std::size_t room, const std::string &s)
+{
+  std::strncpy(to, s.c_str(), room - 1);
+  to[room - 1] = 0;
+}
+
+class Judge
+{
+public:
+  Judge(std::uint64_t seed, long number, bool small, const std::vector<ReducedPart> &parts, bool options, Outcome *outcome)
+      : seed_(seed), small_(small), options_(options), parts_(parts), o_(*outcome)
+  {
+    o_.number = number;
+  }
+
+  void run()
+  {
+    const double start = CpuSeconds();
+    model_             = build();
+    describe();
+    Settings defaults;
+    defaults.options = options_;
+    o_.stage         = Default;
+    const Trajectory a = RunHHT(model_, defaults);
+    costs(a);
+    if (a.arrived()) judge(a);
+    else fail(Failed, a.failure);
+    o_.total = CpuSeconds() - start;
+    o_.stage = Done;
+  }
+
+private:
+  static constexpr double C = 10, undetermined = 0.1, reference_eps = 1e-7;
+  static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
+
+  std::uint64_t                   seed_;
+  bool                            small_, options_;
+  const std::vector<ReducedPart> &parts_;
+  Model                           model_;
+  Outcome                        &o_;
+  Trajectory                      looser_, reference_;
+
+  Model build() const { return Generator(seed_, (std::uint64_t)o_.number, small_, parts_).make(); }
+
+  void fail(Verdict v, const std::string &why)
+  {
+    o_.verdict = v;
+    SetText(o_.message, sizeof o_.message, why);
+  }
+
+  void describe()
+  {
+    o_.bodies   = model_.bodies;
+    o_.planar   = model_.planar;
+    o_.end      = model_.end;
+    o_.length   = model_.length;
+    o_.mass     = model_.mass;
+    o_.speed    = model_.speed;
+    o_.stiffest = model_.stiffest;
+    o_.softest  = model_.softest;
+    std::string all;
+    for (const auto &t : model_.types) all += t.first + "=" + std::to_string(t.second) + ";";
+    SetText(o_.types, sizeof o_.types, all);
+  }
+  void costs(const Trajectory &a)
+  {
+    o_.steps          = a.cost.steps;
+    o_.rejected       = a.cost.rejected;
+    o_.newton         = a.cost.newton;
+    o_.jacobians      = a.cost.jacobians;
+    o_.factorizations = a.cost.factorizations;
+    o_.changes        = a.cost.changes;
+    o_.fails          = a.cost.corrector_fails;
+    o_.cpu            = a.cpu;
+  }
+
+  /* ---- references ---- */
+
+  void refer()
+  {
+    o_.stage = Referring;
+#ifdef HHTDAE_HAVE_IDA
+    looser_ = RunIDA(build(), 10 * reference_eps, 5, &o_.legs);
+    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, 8, &o_.legs);
+    if (looser_.arrived() && reference_.arrived()) o_.by = ByIDA;
+    else SetText(o_.message, sizeof o_.message, looser_.arrived() ? reference_.failure : looser_.failure);
+#endif
+    if (o_.by == ByNobody) referToItself();
+    o_.reference_steps = reference_.steps;
+  }
+
+  /* Another method of the same family, at two small tolerances */
+  void referToItself()
+  {
+    Settings tight;
+    tight.radius  = 0.8;
+    tight.eps     = 10 * reference_eps;
+    tight.seconds = 10;
+    looser_       = RunHHT(build(), tight);
+    tight.eps     = reference_eps;
+    tight.seconds = 20;
+    if (looser_.arrived()) reference_ = RunHHT(build(), tight);
+    if (looser_.arrived() && reference_.arrived()) o_.by = ByHHT;
+  }
+
+  /* ---- differences ---- */
+
+  double weight(std::size_t channel, int k) const
+  {
+    double w = 1;
+    for (int l = 0; l <= k; l++) w = std::max(w, std::abs(reference_.x[(std::size_t)l][channel]));
+    return w;
+  }
+  /* of positions, at sample k */
+  double error(const Trajectory &a, int k) const
+  {
+    double worst = 0;
+    for (std::size_t c = 0; c < model_.observed.size(); c++)
+      if (model_.observed[c] == Observed::Position) {
+        const double d = std::abs(a.x[(std::size_t)k][c] - reference_.x[(std::size_t)k][c]) / weight(c, k);
+        if (!(d <= worst)) worst = d;
+      }
+    return worst;
+  }
+  double error(const Trajectory &a) const
+  {
+    double worst = 0;
+    for (int k = 0; k < samples; k++) worst = std::max(worst, error(a, k));
+    return worst;
+  }
+  /* of velocities or reactions, relative to the largest of all; the mean over time, as they may jump */
+  double meanError(const Trajectory &a, Observed kind) const
+  {
+    double largest = 0, sum = 0;
+    for (std::size_t c = 0; c < model_.observed.size(); c++)
+      for (int k = 0; k < samples; k++)
+        if (model_.observed[c] == kind) largest = std::max(largest, std::abs(reference_.x[(std::size_t)k][c]));
+    for (int k = 0; k < samples && largest > 0; k++) {
+      double worst = 0;
+      for (std::size_t c = 0; c < model_.observed.size(); c++)
+        if (model_.observed[c] == kind) worst = std::max(worst, std::abs(a.x[(std::size_t)k][c] - reference_.x[(std::size_t)k][c]));
+      sum += worst / largest / samples;
+    }
+    return largest > 0 ? sum : -1;
+  }
+
+  /* ---- verdict ---- */
+
+  double allowed(double eps, const Trajectory &a, int k) const
+  {
+    double doubt = 0;
+    for (int l = 0; l <= k; l++) doubt = std::max(doubt, error(looser_, l));
+    const double growth = doubt / (10 * reference_eps * (double)std::max(1l, looser_.steps * (k + 1) / samples));
+    return C * eps * (double)a.steps_at[(std::size_t)k] * (1 + growth);
+  }
+
+  /* Samples for which the tolerance determines the solution; of these, whether all are right */
+  int window(double eps, const Trajectory &a) const
+  {
+    int k = 0;
+    while (k < samples && allowed(eps, a, k) < undetermined) k++;
+    return k;
+  }
+  bool right(double eps, const Trajectory &a, const char *which)
+  {
+    const int n = window(eps, a);
+    for (int k = 0; k < n; k++) {
+      const double e = error(a, k), most = allowed(eps, a, k);
+      o_.used        = std::max(o_.used, e / most);
+      if (e <= most) continue;
+      fail(Wrong, hhtbench::Text("%s: error %.2e at t = %g, allowed %.2e", which, e, SampleTime(model_.end, k + 1), most));
+      return false;
+    }
+    return true;
+  }
+  double largest(const Trajectory &a, int n) const
+  {
+    double e = 0;
+    for (int k = 0; k < n; k++) e = std::max(e, error(a, k));
+    return e;
+  }
+
+  void judge(const Trajectory &a)
+  {
+    o_.stage = Finer;
+    Settings finer;
+    finer.eps          = 0.1 * default_eps;
+    const Trajectory b = RunHHT(build(), finer);
+    o_.finer_steps     = b.steps;
+    if (!b.arrived()) return fail(Failed, "at a tenth of the tolerance: " + b.failure);
+    refer();
+    if (o_.by == ByNobody) return;
+    o_.stage          = Judging;
+    o_.error          = error(a);
+    o_.finer          = error(b);
+    o_.velocity       = meanError(a, Observed::Velocity);
+    o_.finer_velocity = meanError(b, Observed::Velocity);
+    o_.reaction       = meanError(a, Observed::Reaction);
+    o_.finer_reaction = meanError(b, Observed::Reaction);
+    o_.doubt          = error(looser_);
+    o_.window         = window(default_eps, a);
+    o_.verdict        = Right;
+    if (!right(default_eps, a, "defaults") || !right(finer.eps, b, "a tenth of the tolerance")) return;
+    if (!falls(a, b)) return;
+    if (o_.window < samples) finest();
+  }
+
+  bool falls(const Trajectory &a, const Trajectory &b)
+  {
+    const double first = largest(a, o_.window), second = largest(b, o_.window);
+    if (first < 1e-3 || second < 0.7 * first) return true;
+    fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e", first, second));
+    return false;
+  }
+
+  void finest()
+  {
+    Settings s;
+    s.eps              = 0.01 * default_eps;
+    o_.stage           = Finer;
+    const Trajectory c = RunHHT(build(), s);
+    if (!c.arrived()) return fail(Failed, "at a hundredth of the tolerance: " + c.failure);
+    o_.stage         = Judging;
+    o_.finest        = error(c);
+    o_.finest_window = window(s.eps, c);
+    right(s.eps, c, "a hundredth of the tolerance");
+  }
+};
+
+} // namespace soak
+
+#endif

@@ -1,0 +1,188 @@
+/*
+  The reference of a model by SUNDIALS IDA, on the stabilized first-order form of index 2: variable-order BDF, another formulation, other
+  step and error control. Of the library it shares the scene's residual and Jacobian, and the consistent start.
+
+  A body whose Euler angles come near their singularity gets other axes here too: the run is cut at an output point before that, the state
+  is written in the new angles, and IDA starts again from there.
+*/
+#ifndef HHTDAE_SOAK_MODEL_REFERENCE_H
+#define HHTDAE_SOAK_MODEL_REFERENCE_H
+
+#include "model_run.h"
+
+#ifdef HHTDAE_HAVE_IDA
+#include "bench/scene_problem.h"
+#include "bench/workprecision_ida.h"
+
+namespace soak
+{
+
+/* The scene from some state on; not a number where angles come near their singularity, so that IDA stops there */
+struct Leg : hhtex::Problem {
+  const hhtbench::SceneProblem &p;
+  std::vector<double>           u0, v0, a0;
+  std::vector<PetscInt>         angles; /* first of the Euler angles of each body that has some */
+  mutable bool                  singular = false;
+
+  static constexpr double least = 0.2; /* sine of theta */
+
+  Leg(const hhtbench::SceneProblem &problem) : p(problem)
+  {
+    name = p.name;
+    n    = p.n;
+    t0   = p.t0;
+    t1   = p.t1;
+    role = p.role;
+    for (const LocalBody &b : runtime().bodies.body)
+      if (HasEulerAngles(b.kind)) angles.push_back(b.first + 3);
+  }
+  Runtime &runtime() const { return *p.scene().data().run; }
+
+  void initial(double *u, double *v) const override
+  {
+    std::copy(u0.begin(), u0.end(), u);
+    std::copy(v0.begin(), v0.end(), v);
+  }
+  bool reference(double t, double *u, double *v, double *a) const override
+  {
+    if (t != t0) return false;
+    initial(u, v);
+    std::copy(a0.begin(), a0.end(), a);
+    return true;
+  }
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    for (PetscInt e : angles)
+      if (!(std::abs(std::sin(u[e + 1])) > least)) {
+        singular = true;
+        std::fill_n(f, n, std::nan(""));
+        return;
+      }
+    p.residual(t, u, v, a, f);
+  }
+  void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, hhtex::Entries &J) const override
+  {
+    p.jacobian(t, u, v, a, sv, sa, J);
+  }
+
+  /* Other axes for all bodies, as their present motion chooses them, and the state (u0, v0, a0) in the new angles */
+  void reframe()
+  {
+    Bodies &B = runtime().bodies;
+    for (PetscInt b = 0; b < (PetscInt)B.body.size(); b++) {
+      const LocalBody k = B.body[b];
+      if (!HasEulerAngles(k.kind)) continue;
+      double   *eps = &u0[k.first + 3], *rate = &v0[k.first + 3], *acc = &a0[k.first + 3];
+      Matrix3   A;
+      EulerAxes e;
+      EulerFrame(eps, A, e);
+      const Vector3 x(rate[0], rate[1], rate[2]), w = AngularVelocity(e, x), alpha = AngularVelocity(e, Vector3(acc[0], acc[1], acc[2])) + Convective(e, x, w);
+      const Matrix3 C = ChooseAxes(A * k.C, w);
+      const Vector3 angle = EulerAngles(A * k.C * C.transpose());
+      EulerFrame(angle.data(), A, e);
+      const Vector3 y = EulerRates(e, w), z = EulerRates(e, alpha - Convective(e, y, w));
+      for (int i = 0; i < 3; i++) {
+        eps[i]  = angle(i);
+        rate[i] = y(i);
+        acc[i]  = z(i);
+      }
+      B.setAxes(b, C, runtime().scene.bodies[k.id].inertia);
+    }
+  }
+};
+
+inline wp::Case CaseOf(const Leg &leg)
+{
+  wp::Case c;
+  c.name = leg.name;
+  if (leg.p.hasMotions()) c.phiT = [](const wp::Problem &q, double t, const double *, double *f) { static_cast<const Leg &>(q).p.phiT(t, f); };
+  return c;
+}
+
+struct ReferenceRun {
+  Model                                   model;
+  std::unique_ptr<hhtbench::SceneProblem> problem;
+  Trajectory                              result;
+  int                                     legs = 0;
+};
+
+constexpr int fine = 16; /* output points of IDA per sample */
+
+/* One leg, until IDA stops; the state at the last output point it got to becomes the start of the next */
+inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, double eps, double seconds, std::string *failure)
+{
+  std::vector<double> times, values;
+  wp::IDASettings     settings;
+  PetscErrorCode      failed = 0;
+  PetscFunctionBegin;
+  for (int k = point + 1; k <= samples * fine; k++) times.push_back(k == samples * fine ? leg.t1 : leg.t1 * k / (samples * fine));
+  settings.form         = wp::FirstOrder::Form::Stabilized;
+  settings.testVelocity = true;
+  double at             = leg.t0;
+  std::vector<double> u, v, a;
+  settings.look = [&](double t, const double *U, const double *V, const double *A) {
+    at = t;
+    u.assign(U, U + leg.n);
+    v.assign(V, V + leg.n);
+    a.assign(A, A + leg.n);
+    point++;
+    if (!failed) failed = r.problem->channels(t, U, V, A, values);
+    if (point % fine == 0) r.result.x.push_back(values);
+  };
+  leg.singular = false;
+  const wp::Reference output(leg, times);
+  wp::IDASolver       ida(CaseOf(leg), leg, output, settings);
+  const wp::Run       run = ida.run(eps, wp::Limits{seconds});
+  *failure          = run.failure;
+  r.result.steps += run.count.steps;
+  r.legs++;
+  if (u.empty() && !run.failure.empty()) PetscFunctionReturn(failed);
+  leg.u0 = u;
+  leg.v0 = v;
+  leg.a0 = a;
+  leg.t0 = at;
+  PetscFunctionReturn(failed);
+}
+
+inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double seconds)
+{
+  std::string failure;
+  PetscFunctionBegin;
+  PetscCall(hhtbench::SceneProblem::make("model", [&](MPI_Comm) { return r.model.scene; }, r.model.end, &r.problem));
+  Leg leg(*r.problem);
+  leg.u0.resize(leg.n);
+  leg.v0.resize(leg.n);
+  leg.a0.resize(leg.n);
+  r.problem->initial(leg.u0.data(), leg.v0.data());
+  r.problem->reference(leg.t0, leg.u0.data(), leg.v0.data(), leg.a0.data());
+  const double start = CpuSeconds();
+  for (int point = 0, stuck = 0; point < samples * fine;) {
+    const int before = point;
+    PetscCall(RunLeg(r, leg, point, eps, seconds - (CpuSeconds() - start), &failure));
+    if (failure.empty()) break;
+    stuck = point == before ? stuck + 1 : 0;
+    if (!leg.singular || stuck > 1 || r.legs > 60 || CpuSeconds() - start > seconds) {
+      r.result.failure = "IDA: " + failure;
+      break;
+    }
+    leg.reframe();
+  }
+  r.result.cpu = CpuSeconds() - start;
+  PetscFunctionReturn(0);
+}
+
+inline Trajectory RunIDA(Model model, double eps, double seconds, int *legs)
+{
+  ReferenceRun r;
+  Quiet        quiet;
+  r.model = std::move(model);
+  if (SolveByIDA(r, eps, seconds)) r.result.failure = "IDA: " + quiet.message;
+  if (r.result.failure.empty() && (int)r.result.x.size() != samples) r.result.failure = "IDA ended early";
+  *legs = r.legs;
+  return r.result;
+}
+
+} // namespace soak
+
+#endif
+#endif

@@ -1,0 +1,127 @@
+/* One model run by one integrator: samples of its channels at common times, and what it cost. */
+#ifndef HHTDAE_SOAK_MODEL_RUN_H
+#define HHTDAE_SOAK_MODEL_RUN_H
+
+#include "bench/page.h"
+#include "model.h"
+#include <ctime>
+
+namespace soak
+{
+
+constexpr int samples = 24; /* after the start */
+
+struct Trajectory {
+  std::string                      failure; /* empty: arrived */
+  std::vector<std::vector<double>> x;       /* channels at the sample times, without the start */
+  std::vector<long>                steps_at; /* steps so far, at the sample times */
+  TSHHT3Statistics                 cost{};
+  double                           cpu   = 0;
+  long                             steps = 0;
+  bool                             arrived() const { return failure.empty() && (int)x.size() == samples; }
+};
+
+inline double SampleTime(double end, int k) { return k == samples ? end : end * k / samples; }
+
+inline double CpuSeconds()
+{
+  timespec t = {};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* The first message of an error, in place of PETSc's printed trace */
+class Quiet
+{
+public:
+  std::string message;
+  explicit Quiet(bool loud = false) : loud_(loud) { PetscPushErrorHandler(keep, this); }
+  ~Quiet() { PetscPopErrorHandler(); }
+  Quiet(const Quiet &) = delete;
+
+private:
+  bool                  loud_;
+  static PetscErrorCode keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code, PetscErrorType type, const char *message, void *ctx)
+  {
+    Quiet *q = static_cast<Quiet *>(ctx);
+    if (type == PETSC_ERROR_INITIAL && message && q->message.empty()) q->message = message;
+    return q->loud_ ? PetscTraceBackErrorHandler(comm, line, function, file, code, type, message, nullptr) : code;
+  }
+};
+
+/* ---- hhtdae ---- */
+
+struct Settings {
+  double eps     = 0; /* 0: as it comes */
+  bool   paper   = false;
+  double radius  = -1; /* negative: as it comes */
+  bool   options = false; /* from the command line */
+  double seconds = 1e9;
+};
+
+struct Watcher {
+  Scene      &scene;
+  double      end, deadline;
+  Trajectory &result;
+};
+
+inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
+{
+  Watcher            &w = *static_cast<Watcher *>(ctx);
+  std::vector<double> values;
+  PetscFunctionBegin;
+  if (step <= 0) PetscFunctionReturn(0);
+  while ((int)w.result.x.size() < samples && SampleTime(w.end, (int)w.result.x.size() + 1) <= t * (1 + 1e-12)) {
+    PetscCall(w.scene.sample(ts, std::fmin(t, SampleTime(w.end, (int)w.result.x.size() + 1)), values));
+    w.result.x.push_back(values);
+    w.result.steps_at.push_back((long)step);
+  }
+  if (step % 16 == 0 && CpuSeconds() > w.deadline) {
+    w.result.failure = hhtbench::Text("took longer than the limit, at t = %g of %g", t, w.end);
+    PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
+  }
+  PetscFunctionReturn(0);
+}
+
+inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *result)
+{
+  TS                ts;
+  TSConvergedReason reason;
+  PetscFunctionBegin;
+  PetscCall(m.scene->createTS(&ts));
+  PetscCall(TSSetMaxTime(ts, m.end));
+  PetscCall(TSSetMaxSteps(ts, 100000000));
+  if (s.eps > 0) PetscCall(TSSetTolerances(ts, s.eps, nullptr, s.eps, nullptr));
+  if (s.paper) PetscCall(TSHHT3SetForm(ts, TSHHT3_FORM_PAPER));
+  if (s.radius >= 0) PetscCall(TSHHT3SetRadius(ts, s.radius));
+  if (s.options) PetscCall(TSSetFromOptions(ts));
+  Watcher watcher{*m.scene, m.end, CpuSeconds() + s.seconds, *result};
+  PetscCall(TSMonitorSet(ts, WatchRun, &watcher, nullptr));
+  const double         start  = CpuSeconds();
+  const PetscErrorCode failed = m.scene->solve(ts);
+  result->cpu                 = CpuSeconds() - start;
+  PetscCall(TSHHT3GetStatistics(ts, &result->cost));
+  result->steps = (long)result->cost.steps;
+  PetscCall(failed);
+  PetscCall(TSGetConvergedReason(ts, &reason));
+  if (reason < 0) result->failure = TSConvergedReasons[reason];
+  for (const auto &x : result->x)
+    for (double v : x)
+      if (!std::isfinite(v)) result->failure = "a result is not a number";
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
+
+/* The scene is made anew for every run: a run leaves axes and memories behind */
+inline Trajectory RunHHT(const Model &m, const Settings &s)
+{
+  Trajectory result;
+  Quiet      quiet(s.options);
+  if (SolveBy(m, s, &result)) result.failure = quiet.message.empty() ? "error without a message" : quiet.message;
+  if (result.failure.empty() && (int)result.x.size() != samples) result.failure = "ended early";
+  return result;
+}
+
+} // namespace soak
+
+#endif
