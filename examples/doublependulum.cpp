@@ -47,8 +47,8 @@ static PetscErrorCode Run(void)
   PetscCheck(!planar || !spherical, PETSC_COMM_WORLD, PETSC_ERR_ARG_INCOMP,
              "-planar and -joint spherical exclude each other");
 
-  hhtex::DoublePendulum model(spherical, planar);
-  Scene                &scene = model.scene;
+  hhtex::DoublePendulumScene model(spherical, planar);
+  Scene                     &scene = model.scene;
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, end));
   PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));

@@ -7,10 +7,10 @@
 namespace hhtex
 {
 
-struct DoublePendulum {
+struct DoublePendulumScene {
   hhtdae::Scene scene;
 
-  explicit DoublePendulum(bool spherical, bool planar, MPI_Comm comm = PETSC_COMM_WORLD)
+  explicit DoublePendulumScene(bool spherical, bool planar, MPI_Comm comm = PETSC_COMM_WORLD)
       : scene(comm, planar ? hhtdae::Space::Planar : hhtdae::Space::Spatial)
   {
     using namespace hhtdae;

@@ -58,7 +58,7 @@ struct LeaningDisc {
     const Body   b        = scene.add("disc", disc);
     const Marker center   = scene.marker(b);
     scene.shape(b, Shape::cylinder(r, 0.02));
-    const Element roll = scene.add("rolling", RollingDisc{center, scene.marker(scene.ground()), r});
+    const Element roll = scene.add("rolling", hhtdae::RollingDisc{center, scene.marker(scene.ground()), r});
     for (int k = 0; k < 3; k++) scene.channel(std::string("x.") + "xyz"[k], Measure::displacement(center, k), "m");
     for (int k = 0; k < 3; k++) scene.channel(std::string("force.") + "nxy"[k], Measure::multiplier(roll, k), "N");
     scene.channel("kinetic", Measure::kineticEnergy(), "J");
