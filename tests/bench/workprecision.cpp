@@ -1,19 +1,23 @@
-static char help[] = "Error against run time of every example problem with a reference: both forms of hhtdae, PETSc's "
-                     "ALPHA2 and BDF, and\n"
-                     "SUNDIALS IDA (where it was found), in turn in one process. Error: largest weighted difference to "
-                     "the reference over\n"
-                     "the output points. Time: CPU time of the solve alone, median of the repeats.\n"
-                     "  -problems <a,b,...>: problems [all]\n"
+static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPHA2 and BDF, and SUNDIALS IDA (where it "
+                     "was found), in turn in\n"
+                     "one process, on problems written by hand and on scenes. Error: largest weighted difference to "
+                     "the reference over the\n"
+                     "output points. Time: CPU time of the solve alone, median of the repeats. Results: tables, CSV, "
+                     "pictures, report.html.\n"
+                     "  -problems <a,b,...>: problems [all]; \"written\" and \"scenes\" are all of one kind\n"
                      "  -solvers <a,b,...>: solvers [all]; the first one is what the others are compared with\n"
-                     "  -sweep: instead of other solvers, variations of hhtdae's own settings\n"
+                     "  -sweep <also>: variations of hhtdae's own settings: also, only (in full), no\n"
                      "  -eps_max <1e-2> -eps_min <1e-8>: range of tolerances, two per decade with -dense [one]\n"
-                     "  -repeats <5>: runs of which the median counts\n"
-                     "  -limit <5>: CPU seconds after which a run counts as failed\n"
+                     "  -repeats <5>: runs of which the median counts, fewer of long ones\n"
+                     "  -limit <1.5>: CPU seconds after which a run counts as failed\n"
                      "  -errors <q|v|lambda>: tables per problem for this error [q]\n"
-                     "  -out <dir>: where CSV and pictures go [the directory above the program's]\n"
+                     "  -out <dir>: where CSV, pictures and page go [the directory above the program's]\n"
                      "Further options, such as -ts_hhtdae_predictor_degree, go to every TS.\n";
 
-#include "workprecision_report.h"
+#include <hhtdae/scene.h>
+
+#include "workprecision_page.h"
+#include "workprecision_scenes.h"
 #if defined(HHTDAE_HAVE_IDA)
 #include "workprecision_ida.h"
 #endif
@@ -54,6 +58,24 @@ template <class T> static PetscErrorCode Select(const char *option, std::vector<
   PetscFunctionReturn(0);
 }
 
+/* Likewise, with names for all of one kind */
+static PetscErrorCode SelectCases(std::vector<Case> &list)
+{
+  char      name[16];
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-problems", name, sizeof(name), &given));
+  const std::string kind = given ? name : "";
+  if (kind != "written" && kind != "scenes") {
+    PetscCall(Select("-problems", list));
+    PetscFunctionReturn(0);
+  }
+  list.erase(std::remove_if(list.begin(), list.end(), [&](const Case &c) { return c.scene != (kind == "scenes"); }),
+             list.end());
+  PetscFunctionReturn(0);
+}
+
 struct Grid {
   std::vector<double> eps;
   PetscInt            repeats = 5;
@@ -62,7 +84,7 @@ struct Grid {
 
 static PetscErrorCode ReadGrid(Grid &grid)
 {
-  PetscReal from = 1e-2, to = 1e-8, limit = 5.;
+  PetscReal from = 1e-2, to = 1e-8, limit = 1.5;
   PetscBool dense = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -78,7 +100,23 @@ static PetscErrorCode ReadGrid(Grid &grid)
   PetscFunctionReturn(0);
 }
 
-/* All solvers at one tolerance, in turn, as often as asked; a failure is not repeated */
+/* A solver that has reached the limit is not tried at a tighter tolerance. */
+static const char *const gaveUp = "not tried: reached the limit at a looser tolerance";
+
+static bool HasGivenUp(const Curve &c)
+{
+  if (c.runs.empty()) return false;
+  const std::string &last = c.runs.back().failure;
+  return last == tooLong || last == gaveUp;
+}
+
+/* A failure is not repeated, and what takes long less often */
+static bool Enough(const Run &run, size_t repeats)
+{
+  return repeats > 0 && (!run.failure.empty() || run.time * (double)repeats > 0.15);
+}
+
+/* All solvers at one tolerance, in turn, as often as asked */
 static PetscErrorCode RunTolerance(const Case &c, const Problem &p, const Reference &ref, double eps, const Grid &grid,
                                    const std::vector<Solver> &solvers, std::vector<Curve> &curves)
 {
@@ -88,28 +126,55 @@ static PetscErrorCode RunTolerance(const Case &c, const Problem &p, const Refere
   PetscFunctionBegin;
   for (PetscInt repeat = 0; repeat < grid.repeats; repeat++)
     for (size_t s = 0; s < solvers.size(); s++) {
-      if (repeat && !runs[s].failure.empty()) continue;
+      if (HasGivenUp(curves[s])) {
+        runs[s].failure = gaveUp;
+        continue;
+      }
+      if (Enough(runs[s], times[s].size())) continue;
       PetscCall(solvers[s].run(c, p, ref, eps, grid.limits, &runs[s]));
       times[s].push_back(runs[s].time);
     }
   for (size_t s = 0; s < solvers.size(); s++) {
     std::sort(times[s].begin(), times[s].end());
-    runs[s].time = times[s][times[s].size() / 2];
+    if (!times[s].empty()) runs[s].time = times[s][times[s].size() / 2];
     curves[s].eps.push_back(eps);
     curves[s].runs.push_back(runs[s]);
   }
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode RunCase(const Case &c, const Grid &grid, const std::vector<Solver> &solvers,
+static PetscErrorCode RunCase(const Case &c, const Problem &p, const Grid &grid, const std::vector<Solver> &solvers,
                               std::vector<Curve> &curves)
 {
-  const std::unique_ptr<Problem> problem = c.make();
-  const Reference                ref(*problem);
+  const Reference ref(p);
 
   PetscFunctionBegin;
   curves.assign(solvers.size(), Curve());
-  for (double eps : grid.eps) PetscCall(RunTolerance(c, *problem, ref, eps, grid, solvers, curves));
+  for (double eps : grid.eps) PetscCall(RunTolerance(c, p, ref, eps, grid, solvers, curves));
+  PetscFunctionReturn(0);
+}
+
+/* Every problem with all solvers, then with the settings to sweep; one without a reference is left out, and said so */
+static PetscErrorCode RunAll(Results &r, Results &sweep, const Grid &grid, const Grid &coarse)
+{
+  PetscFunctionBegin;
+  for (Results *x : {&r, &sweep}) x->curve.resize(r.cases.size());
+  r.origin.resize(r.cases.size());
+  for (size_t i = 0; i < r.cases.size(); i++) {
+    const double             start = cpuSeconds();
+    std::unique_ptr<Problem> problem;
+    PetscCall(r.cases[i].make(&problem, &r.origin[i]));
+    const double found = cpuSeconds() - start;
+    if (r.origin[i].failure.empty()) {
+      if (!r.solvers.empty()) PetscCall(RunCase(r.cases[i], *problem, grid, r.solvers, r.curve[i]));
+      if (!sweep.solvers.empty()) PetscCall(RunCase(r.cases[i], *problem, coarse, sweep.solvers, sweep.curve[i]));
+    }
+    fprintf(stderr, "%s: %d unknowns, %.1f s%s%s%s\n", r.cases[i].name.c_str(), (int)problem->n, cpuSeconds() - start,
+            r.cases[i].scene ? Text(", reference %.1f s", found).c_str() : "",
+            r.origin[i].failure.empty() ? "" : ", left out: ", r.origin[i].failure.c_str());
+  }
+  sweep.cases  = r.cases;
+  sweep.origin = r.origin;
   PetscFunctionReturn(0);
 }
 
@@ -125,49 +190,94 @@ static PetscErrorCode OutputDirectory(const char *program, std::string &out)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode Report(const Results &r, const std::string &out, bool sweep)
+static void PrintTables(const Results &r, int kind, bool problems)
+{
+  for (int scene = 0; scene < 2; scene++) {
+    const Group       group = Scenes(r, scene);
+    const std::string what  = scene ? "Scenes" : "Hand-written problems";
+    if (group.empty()) continue;
+    for (size_t i : group)
+      if (problems) problemTable(r, i, kind).print();
+    byProblemTable(r, group, kind, what).print();
+    for (int k = 0; k < 3; k++) summaryTable(r, group, k, what).print();
+    if (scene) originTable(r).print();
+  }
+  failureTable(r).print();
+}
+
+static PetscErrorCode Report(const Results &r, const Results &sweep, PageSetting page)
 {
   char kindName[16] = "q";
-  int  kind;
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-errors", kindName, sizeof(kindName), nullptr));
-  kind = kindName[0] == 'v' ? 1 : kindName[0] == 'l' ? 2 : 0;
-  if (!sweep)
-    for (size_t i = 0; i < r.cases.size(); i++) printProblem(r, i, kind);
-  printByProblem(r, kind);
-  for (int k = 0; k < 3; k++) printSummary(r, k);
-  printFailures(r);
-  PetscCall(WriteCSV(r, out + (sweep ? "/sweep.csv" : "/workprecision.csv")));
-  if (!sweep) PetscCall(Plot(r, out));
+  const int kind = kindName[0] == 'v' ? 1 : kindName[0] == 'l' ? 2 : 0;
+  if (!sweep.solvers.empty()) {
+    PrintTables(sweep, kind, false);
+    PetscCall(WriteCSV(sweep, page.out + "/sweep.csv"));
+  }
+  if (r.solvers.empty()) PetscFunctionReturn(0);
+  PrintTables(r, kind, true);
+  PetscCall(WriteCSV(r, page.out + "/workprecision.csv"));
+  PetscCall(Plot(r, page.out, &page.pictures));
+  PetscCall(WritePage(r, sweep, page));
   PetscFunctionReturn(0);
+}
+
+/* What the sweep is to be; on its own it takes all tolerances */
+static PetscErrorCode ReadSweep(Results &r, Results &sweep, const Grid &grid, Grid &coarse)
+{
+  char      text[16] = "also";
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-sweep", text, sizeof(text), &given));
+  const std::string which = given && !text[0] ? "only" : text;
+  PetscCheck(which == "also" || which == "only" || which == "no", PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+             "-sweep %s: must be also, only or no", text);
+  r.solvers = allSolvers();
+  PetscCall(Select("-solvers", r.solvers));
+  if (which != "no") sweep.solvers = sweepSolvers();
+  coarse = grid;
+  if (which == "only") r.solvers.clear();
+  if (which != "also") PetscFunctionReturn(0);
+  coarse.repeats = PetscMin(grid.repeats, 3);
+  coarse.eps.clear();
+  for (double eps : grid.eps)
+    if (eps < 2e-3 && eps > 5e-7) coarse.eps.push_back(eps);
+  PetscFunctionReturn(0);
+}
+
+static std::string CommandLine(int argc, char **argv)
+{
+  std::string line = "bin/workprecision";
+  for (int k = 1; k < argc; k++) line += std::string(" ") + argv[k];
+  return line;
 }
 
 int main(int argc, char **argv)
 {
-  Results     r;
-  Grid        grid;
-  std::string out;
-  PetscBool   sweep = PETSC_FALSE;
+  Results     r, sweep;
+  Grid        grid, coarse;
+  PageSetting page;
 
   runSingleThreaded(argv);
+  page.command = CommandLine(argc, argv);
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, nullptr, help));
   PetscCall(TSHHT3Initialize());
-  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
   PetscCall(ReadGrid(grid));
-  PetscCall(OutputDirectory(argv[0], out));
-  r.cases   = allCases();
-  r.solvers = sweep ? sweepSolvers() : allSolvers();
-  PetscCall(Select("-problems", r.cases));
-  PetscCall(Select("-solvers", r.solvers));
-  r.curve.resize(r.cases.size());
-  for (size_t i = 0; i < r.cases.size(); i++) {
-    const double start = cpuSeconds();
-    PetscCall(RunCase(r.cases[i], grid, r.solvers, r.curve[i]));
-    fprintf(stderr, "%s: %.1f s\n", r.cases[i].name.c_str(), cpuSeconds() - start);
-  }
-  PetscCall(Report(r, out, sweep));
+  PetscCall(OutputDirectory(argv[0], page.out));
+  r.cases                        = allCases();
+  const std::vector<Case> scenes = allScenes();
+  r.cases.insert(r.cases.end(), scenes.begin(), scenes.end());
+  PetscCall(SelectCases(r.cases));
+  PetscCall(ReadSweep(r, sweep, grid, coarse));
+  PetscCall(RunAll(r, sweep, grid, coarse));
+  page.repeats = (int)grid.repeats;
+  page.limit   = grid.limits.seconds;
+  page.seconds = cpuSeconds();
+  PetscCall(Report(r, sweep, page));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -23,7 +23,13 @@ namespace wp
 
 template <class P, class... Args> Case makeCase(const char *name, Args... args)
 {
-  return {name, [=] { return std::unique_ptr<Problem>(new P(args...)); }};
+  Case c;
+  c.name = name;
+  c.make = [=](std::unique_ptr<Problem> *p, Origin *) {
+    p->reset(new P(args...));
+    return (PetscErrorCode)0;
+  };
+  return c;
 }
 
 inline std::vector<Case> allCases()

@@ -164,7 +164,7 @@ private:
       realtype  t;
       const int code = IDASolve(memory_, recorder_.next(), &t, y_, yp_, IDA_NORMAL);
       run.time       = cpuSeconds() - start;
-      if (counted_.late) throw Failure{"took longer than the limit"};
+      if (counted_.late) throw Failure{tooLong};
       if (code != IDA_TOO_MUCH_WORK) check(code, "IDASolve");
       if (code == IDA_TOO_MUCH_WORK) continue;
       system_.output(N_VGetArrayPointer(y_), u.data(), v.data());

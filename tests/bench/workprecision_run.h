@@ -35,6 +35,8 @@ struct Counters {
   long steps = 0, rejected = 0, newton = 0, residuals = 0, jacobians = 0, factorizations = 0;
 };
 
+constexpr const char *tooLong = "took longer than the limit";
+
 /* One run, or the median of several: failure is empty if the solver reached the end */
 struct Run {
   double   time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
@@ -159,12 +161,20 @@ struct Recorder {
   }
 };
 
+/* Where a problem's reference comes from */
+struct Origin {
+  std::string reference;                 /* empty: the problem's own, exact or tabulated */
+  std::string failure;                   /* why there is none to rely on */
+  double      trusted[3] = {0., 0., 0.}; /* errors below are not told from the reference's own: q, q', multipliers */
+  double      ida[3] = {}, hht[3] = {};  /* differences that say so */
+};
+
 /* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
    entry per unknown. A scene has a TS of its own, for PETSc's second-order integrators, wants to know of accepted
    steps, and may give results in other coordinates than those of the start. */
 struct Case {
   std::string                                                                    name;
-  std::function<std::unique_ptr<Problem>()>                                      make;
+  std::function<PetscErrorCode(std::unique_ptr<Problem> *, Origin *)>            make;
   std::function<void(const Problem &, double, const double *, double *)>         phiT     = nullptr;
   std::function<PetscErrorCode(const Problem &, TS *)>                           createTS = nullptr;
   std::function<void(const Problem &, const double *u, const double *v)>         accept   = nullptr;

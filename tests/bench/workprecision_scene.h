@@ -19,16 +19,23 @@ using hhtbench::SceneProblem;
 
 inline const SceneProblem &AsScene(const Problem &p) { return static_cast<const SceneProblem &>(p); }
 
-/* What the solvers need to know of a scene; make is the caller's */
-inline Case SceneCase(const SceneProblem &p)
+/* What the solvers need to know of any scene */
+inline Case SceneCallbacks()
 {
   Case c;
-  c.name     = p.name;
   c.scene    = true;
   c.createTS = [](const Problem &q, TS *ts) { return AsScene(q).createTS(ts); };
   c.accept   = [](const Problem &q, const double *u, const double *v) { AsScene(q).accept(u, v); };
   c.toStart  = [](const Problem &q, double *u, double *v, const double *near) { AsScene(q).toStart(u, v, near); };
-  if (p.hasMotions()) c.phiT = [](const Problem &q, double t, const double *, double *f) { AsScene(q).phiT(t, f); };
+  c.phiT     = [](const Problem &q, double t, const double *, double *f) { AsScene(q).phiT(t, f); };
+  return c;
+}
+
+/* The case of one that is there already */
+inline Case SceneCase(const SceneProblem &p)
+{
+  Case c = SceneCallbacks();
+  c.name = p.name;
   return c;
 }
 

@@ -368,7 +368,7 @@ inline PetscErrorCode RunTS(const Case &c, const Problem &problem, const Referen
   PetscCall(ReadTSCounters(r, *run));
   PetscCall(TSGetConvergedReason(r.ts, &reason));
   if (r.counted.late)
-    run->failure = "took longer than the limit";
+    run->failure = tooLong;
   else if (e)
     run->failure = "error in TSSolve()";
   else if (reason <= 0)
