@@ -320,9 +320,10 @@ PetscErrorCode CorrectorSetUp(TS ts)
   PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));
   PetscCheck(!snes->mf || snes->mf_operator, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "-snes_mf leaves no matrix, which the consistent start needs; use -snes_mf_operator, whose preconditioner is the assembled matrix");
-  if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
+  /* before SNESSetType(), which gives backtracking to a line search without a type: TSSetFromOptions() need not have been called */
   PetscCall(SNESGetLineSearch(snes, &ls));
   if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
+  if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
   PetscBool shell;
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
   if (shell) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));

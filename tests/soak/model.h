@@ -62,7 +62,7 @@ private:
     const double g = r.chance(0.15) ? 0 : r.chance(0.1) ? r.logarithmic(0.1, 100) : 9.81;
     b.gravity      = -g * (r.chance(0.9) ? b.up : b.direction());
     b.period       = g > 0 ? 2 * M_PI * std::sqrt(b.length / g) : r.logarithmic(0.1, 3);
-    b.speed        = r.chance(0.45) ? r.logarithmic(0.1, 5) : 0;
+    b.speed        = g == 0 || r.chance(0.45) ? r.logarithmic(0.1, 5) : 0;
     b.scene.gravity(b.gravity);
   }
 

@@ -169,6 +169,7 @@ private:
     d.rotation         = A;
     d.angular_velocity = A.col(2) * r.sign() * std::sqrt(g / radius) * r.uniform(1.2, 3);
     d.velocity         = d.angular_velocity.cross(center - touch);
+    b.project          = true; /* what else hangs on it has to move along */
     const int wheel    = b.enter({b.scene.add("", d), center, A, m, radius, false, false});
     b.scene.add("", RollingDisc{b.at(wheel, center, A), ground, radius});
     return 1;
