@@ -221,6 +221,25 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A factor that failed on a matrix with NaN keeps its error, and PETSc would not try another matrix with it: PCSetUp_LU() forgives
+   zero pivots alone */
+PetscErrorCode ForgiveFactor(KSP ksp)
+{
+  PC             pc;
+  Mat            F;
+  MatFactorError error;
+  PCFailedReason reason;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetFailedReason(pc, &reason));
+  if (reason != PC_FACTOR_OTHER) PetscFunctionReturn(PETSC_SUCCESS); /* so there is a factor */
+  PetscCall(PCFactorGetMatrix(pc, &F));
+  PetscCall(MatFactorGetError(F, &error));
+  if (error == MAT_FACTOR_OTHER) PetscCall(MatFactorClearError(F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Some packages report a singular matrix as an error, others as a failed preconditioner: both become a failed correction */
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P)
 {
@@ -230,7 +249,8 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P)
   PetscFunctionBegin;
   PetscCall(KSPSetOperators(ksp, J, P));
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = KSPSetUp(ksp);
+  ierr = ForgiveFactor(ksp);
+  if (!ierr) ierr = KSPSetUp(ksp);
   PetscCall(PetscPopErrorHandler());
   I.singular = (PetscBool)(ierr != 0);
   if (ierr) PetscCall(PetscInfo(ts, "the factorization failed with PETSc error %d\n", (int)ierr));
@@ -238,6 +258,16 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P)
 }
 
 } // namespace
+
+PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
+{
+  PetscReal norm;
+
+  PetscFunctionBegin;
+  PetscCall(MatNorm(P, NORM_FROBENIUS, &norm));
+  *numbers = (PetscBool)!PetscIsInfOrNanReal(norm);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F)
 {
@@ -362,7 +392,9 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscCall(SNESGetKSP(snes, &ksp));
   if (!I.linear_chosen || I.linear.cholesky) {
     PetscCall(LinearIsSymmetric(P, &symmetric));
-    if (!I.linear_chosen || !symmetric) PetscCall(LinearChoose(ksp, P, symmetric, &I.linear));
+    PetscBool numbers = PETSC_TRUE; /* NaN is not symmetric, but no reason to choose another solver */
+    if (I.linear_chosen && !symmetric) PetscCall(MatrixHasNumbers(P, &numbers));
+    if (!I.linear_chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, &I.linear));
     I.linear_chosen = PETSC_TRUE;
   }
   PetscCall(Factor(ts, ksp, J, P));

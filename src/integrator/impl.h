@@ -192,6 +192,7 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
 /* equations.cpp */
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
+PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode PrepareStage(TS ts);
 PetscErrorCode StageVectors(TS ts, Vec X);
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);

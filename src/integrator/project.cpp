@@ -215,7 +215,8 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscCall(VecRestoreArrayRead(I.ymax, &y));
   PetscCall(VecRestoreArrayRead(I.V0, &v));
   PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > ts->ptime ? ts->max_time - ts->ptime : 1;
+  /* not what is left of the run: differences over next to nothing are rounding */
+  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.progress_t0 ? ts->max_time - I.progress_t0 : 1;
   *T                   = rate > 0 ? PetscMin(1 / rate, span) : span;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -81,15 +81,19 @@ PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* There is no h to cut here: an application whose Jacobian is not a number is asked once more */
 PetscErrorCode MakeStartMatrix(TS ts)
 {
   Integrator &I = Get(ts);
   Mat         P; /* alone: a matrix-free operator has nothing to differentiate before SNESSolve() */
+  PetscBool   numbers = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
+  PetscCall(MatrixHasNumbers(P, &numbers));
+  if (!numbers) PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,9 +220,15 @@ PetscErrorCode ClearAlgebraicRates(Integrator &I, Vec V)
 
 } // namespace
 
+/* X may be what a failed correction has left: multipliers that are not numbers would be part of the matrix */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
 {
+  Integrator &I = Get(ts);
+  PetscReal   norm;
+
   PetscFunctionBegin;
+  PetscCall(VecNorm(I.X, NORM_2, &norm));
+  if (PetscIsInfOrNanReal(norm)) PetscCall(VecCopy(I.X0, I.X));
   PetscCall(EnterStart(ts, t, U, V));
   PetscCall(MakeStartMatrix(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -234,14 +244,17 @@ PetscErrorCode NameRedundant(TS ts)
   Mat                   P;
   char                  text[256] = "";
   size_t                used;
+  PetscBool             numbers;
 
   PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(MatrixHasNumbers(P, &numbers));
+  PetscCheck(numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g", (double)ts->ptime);
   PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
   for (size_t i = 0; i < I.role.size(); i++)
     if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) list.push_back(start + (PetscInt)i);
   if (I.constraints()) {
     PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)list.size(), list.data(), PETSC_COPY_VALUES, &multipliers));
-    PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
     PetscCall(LinearNameDependent(P, multipliers, 20, &n, rows));
     PetscCall(ISDestroy(&multipliers));
   }

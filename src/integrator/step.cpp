@@ -43,6 +43,30 @@ PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* f_n of (9a): everything but the inertia forces. A1 serves as work space. */
+PetscErrorCode HistoryForces(TS ts, PetscReal t)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(VecZeroEntries(I.A1));
+  PetscCall(EvaluateResidual(ts, t, I.U0, I.V0, I.A1, I.F0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An application that failed when f_n was evaluated would spoil every attempt from t_n: it is asked again */
+PetscErrorCode RenewHistoryForces(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscReal   norm;
+
+  PetscFunctionBegin;
+  if (!I.F0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(I.F0, NORM_2, &norm));
+  if (PetscIsInfOrNanReal(norm)) PetscCall(HistoryForces(ts, ts->ptime));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The accepted step becomes the history */
 PetscErrorCode Commit(TS ts)
 {
@@ -58,10 +82,7 @@ PetscErrorCode Commit(TS ts)
   I.have_misfit = PETSC_FALSE;
   I.bent        = Bend::None;
   I.repaired    = PETSC_FALSE;
-  if (I.F0) {
-    PetscCall(VecZeroEntries(I.A1)); /* f_n of (9a): everything but the inertia forces */
-    PetscCall(EvaluateResidual(ts, I.t1, I.U0, I.V0, I.A1, I.F0));
-  }
+  if (I.F0) PetscCall(HistoryForces(ts, I.t1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,6 +279,7 @@ PetscErrorCode Step(TS ts)
     }
     if (!ok || !accept) {
       accept = PETSC_FALSE;
+      PetscCall(RenewHistoryForces(ts));
       PetscCall(CheckRejections(ts, ++rejections));
     }
   }
