@@ -115,7 +115,9 @@ private:
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> A(width, rows.size());
     for (std::size_t i = 0; i < rows.size(); i++) {
       const RowBlock &e = blocks_[rows[i].block];
-      A.col(i) = e.J.row(rows[i].row).segment(e.column[std::find(e.body.begin(), e.body.end(), b) - e.body.begin()], width).transpose();
+      A.col(i)          = e.J.row(rows[i].row)
+                     .segment(e.column[std::find(e.body.begin(), e.body.end(), b) - e.body.begin()], width)
+                     .transpose();
     }
     if (std::abs(Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(A).matrixR()(rows.size() - 1, rows.size() - 1)) <
         clearly_independent)
@@ -147,7 +149,8 @@ std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, c
   Eigen::COLAMDOrdering<int>()(A, p);
   std::vector<std::size_t> place(first.size()), order;
   for (std::size_t e = 0; e < first.size(); e++) place[p.indices()(e)] = e;
-  std::stable_partition(place.begin(), place.end(), [&](std::size_t e) { return blocks[core[first[e]].block].store->everIndependent(); });
+  std::stable_partition(place.begin(), place.end(),
+                        [&](std::size_t e) { return blocks[core[first[e]].block].store->everIndependent(); });
   for (std::size_t e : place)
     for (bool length : {true, false})
       for (std::size_t k = first[e]; k < (e + 1 < first.size() ? first[e + 1] : core.size()); k++)
@@ -269,10 +272,11 @@ PetscErrorCode MoveAside(Runtime &R, const std::vector<RowBlock> &blocks, bool *
   std::mt19937                           random(1);
   std::uniform_real_distribution<double> uniform(-1, 1);
   NearestSystem                          system(R);
-  std::vector<double>                    from(6 * s.bodies.size()), d, rhs;
+  std::vector<double>                    from(6 * s.bodies.size(), 0), d, rhs;
   double                                 most = 0;
   PetscFunctionBegin;
-  for (std::size_t i = 0; i < from.size(); i++) from[i] = uniform(random) * (i % 6 < 3 ? size : 1);
+  for (std::size_t i = 0; i < s.bodies.size(); i++) /* none out of the plane of a planar scene */
+    for (int k : Directions(KindOf(s, s.bodies[i]))) from[6 * i + k] = uniform(random) * (k < 3 ? size : 1);
   for (const RowBlock &b : blocks) rhs.insert(rhs.end(), b.rows, 0.0);
   PetscCall(system.factor(blocks));
   PetscCall(system.solve(blocks, rhs, &from, d));
@@ -288,19 +292,68 @@ PetscErrorCode MoveAside(Runtime &R, const std::vector<RowBlock> &blocks, bool *
   PetscFunctionReturn(0);
 }
 
+void SetActive(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &rows, bool active)
+{
+  for (const RowRef &f : rows) {
+    const RowBlock     &b   = blocks[f.block];
+    const unsigned char now = b.store->active(b.instance), bit = (unsigned char)(1u << f.row);
+    b.store->setActive(b.instance, (unsigned char)(active ? now | bit : now & ~bit));
+  }
+}
+
+/* Largest misfit of rows where the bodies are, lengths in units of the scene's size */
+double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
+{
+  const double                size   = SceneSize(s);
+  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  double                      worst  = 0;
+  for (const RowRef &f : rows) {
+    const RowBlock &b = blocks[f.block];
+    const double    x = b.holonomic ? std::abs(b.value(f.row)) / (b.length ? size : 1) : 0;
+    if (!(x <= worst)) worst = x;
+  }
+  return worst;
+}
+
+/* To a neighbouring position that all constraints are met at, redundant ones to less than what a start may be off.
+   Found without the redundant ones, which near a position that is not consistent contradict the others; where that
+   leads away from them, with them */
+PetscErrorCode Neighbour(Runtime &R, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
+                         bool *moved, bool *ok)
+{
+  SceneData              &s      = R.scene;
+  const std::vector<Pose> before = Poses(s);
+  const double            enough = 1e-3 * s.start.tolerance;
+  PetscFunctionBegin;
+  *ok = false;
+  PetscCall(MoveAside(R, DescribeAll(s, s.start.time, Hold::None), moved));
+  if (!*moved) PetscFunctionReturn(0);
+  const std::vector<Pose> aside = Poses(s);
+  SetActive(blocks, redundant, false);
+  const PetscErrorCode failed = ProjectPositions(R, Hold::None, ok);
+  SetActive(blocks, redundant, true);
+  PetscCall(failed);
+  *ok = *ok && LargestMisfit(s, redundant) <= enough;
+  if (*ok) PetscFunctionReturn(0);
+  SetPoses(s, aside);
+  PetscCall(ProjectPositions(R, Hold::None, ok));
+  *ok = *ok && LargestMisfit(s, redundant) <= enough;
+  if (!*ok) SetPoses(s, before);
+  PetscFunctionReturn(0);
+}
+
 /* Takes the rows out of `found` that are independent next to the start */
-PetscErrorCode KeepSingular(Runtime &R, std::vector<RowRef> &found)
+PetscErrorCode KeepSingular(Runtime &R, const std::vector<RowBlock> &blocks, std::vector<RowRef> &found)
 {
   SceneData              &s       = R.scene;
   const std::vector<Pose> before  = Poses(s);
   const StartResult       started = s.started;
-  bool                    moved, ok = false;
+  bool                    moved = false, ok = false;
   PetscFunctionBegin;
-  PetscCall(MoveAside(R, DescribeAll(s, s.start.time, Hold::None), &moved));
-  if (moved) PetscCall(ProjectPositions(R, Hold::None, &ok));
+  PetscCall(Neighbour(R, blocks, found, &moved, &ok));
   if (ok) {
-    std::vector<RowBlock>     blocks = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
-    const std::vector<RowRef> next   = Find(s, blocks);
+    std::vector<RowBlock>     there = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
+    const std::vector<RowRef> next  = Find(s, there);
     if (next.size() < found.size()) {
       PetscCall(PetscPrintf(
           s.comm,
@@ -309,8 +362,16 @@ PetscErrorCode KeepSingular(Runtime &R, std::vector<RowRef> &found)
           found.size(), next.size()));
       found = next;
     }
-  } else
+  } else {
+    const RowBlock &b = blocks[found[0].block];
+    PetscCheck(
+        !moved || s.start.redundant != Redundant::Drop, s.comm, PETSC_ERR_ARG_WRONG,
+        "%zu of the constraints are redundant at the start, among them %s, but next to it no position meets them "
+        "all:\nwithout them the mechanism would move away from them, with them it is locked. Mend dimensions or "
+        "positions, leave out what locks it, or start elsewhere",
+        found.size(), RowName(s, b.element, b.first + found[0].row, b.name).c_str());
     PetscCall(PetscInfo(nullptr, "scene: no neighbouring position to test redundant constraints at\n"));
+  }
   SetPoses(s, before);
   s.started = started;
   PetscFunctionReturn(0);
@@ -357,7 +418,7 @@ PetscErrorCode DropRedundant(Runtime &R)
     for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);
   std::vector<RowRef> found = Find(s, blocks);
-  if (!found.empty()) PetscCall(KeepSingular(R, found));
+  if (!found.empty()) PetscCall(KeepSingular(R, blocks, found));
   s.started.redundant = (PetscInt)found.size();
   if (found.empty()) PetscFunctionReturn(0);
   PetscCall(Tell(s, blocks, found));

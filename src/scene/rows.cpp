@@ -108,6 +108,8 @@ std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes
       FindBodies(s, *p.store, p.index, hold, modes, b);
       b.J.setZero(b.rows, b.column.back());
       for (int k = 0; k < p.store->markers(); k++) AddColumns(s, b, d, k, p.store->marker(p.index, k), modes);
+      for (int r = 0; r < b.rows; r++)
+        if (!b.has(r)) b.J.row(r).setZero();
       Speeds(s, d, b);
       all.push_back(std::move(b));
     }
