@@ -1,0 +1,147 @@
+static char help[] =
+    "The all-terrain vehicle under hhtdae (both forms) and IDA as GSTIFF, against a reference at a much tighter "
+    "tolerance: CPU time,\n"
+    "counters, hot spots of the frame, a reaction, the engine's pitch rate, error against run time; one HTML page.\n"
+    "  -frame <frame.h5>: the reduced frame, by atv_frame\n"
+    "  -o <atv.html>: the page\n"
+    "  -end <2>: s;  -repeats <3>: of the timed runs;  -sweep <true>: error against run time too\n"
+    "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n";
+
+#include "atv_page.h"
+#include <petsctime.h>
+
+using namespace hhtbench;
+using Form = wp::FirstOrder::Form;
+
+static PetscErrorCode Done(const AtvRun &run)
+{
+  PetscFunctionBegin;
+  PetscCall(
+      PetscPrintf(PETSC_COMM_SELF,
+                  "%-34s eps %.0e, step at most %-7.3g %8.2f s CPU %7ld steps %7ld iterations %5ld factorizations %s\n",
+                  run.name.c_str(), run.eps, run.step_max, run.cpu, run.count.steps, run.count.newton,
+                  run.count.factorizations, run.failure.c_str()));
+  fflush(stdout); /* progress, through pipes too */
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Paper(TS ts) { return TSHHT3SetForm(ts, TSHHT3_FORM_PAPER); }
+
+static PetscErrorCode LittleDamping(TS ts) { return TSHHT3SetAlpha(ts, -0.05); }
+
+/* The three integrators of the comparison in turn, as often as asked; the median of the times */
+static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector<AtvRun> *all)
+{
+  std::vector<std::vector<double>> times;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < repeats; k++) {
+    all->assign(2, AtvRun());
+    PetscCall(runs.hht("hhtdae, second-order form", 1e-5, 5e-4, nullptr, &(*all)[0]));
+    PetscCall(runs.hht("hhtdae, paper's form", 1e-5, 5e-4, Paper, &(*all)[1]));
+#if defined(HHTDAE_HAVE_IDA)
+    all->emplace_back();
+    PetscCall(runs.ida("IDA, index 3 (as GSTIFF)", 1e-4, 5e-4, Form::Index3, &all->back()));
+#endif
+    times.resize(all->size());
+    for (size_t i = 0; i < all->size(); i++) {
+      times[i].push_back((*all)[i].cpu);
+      PetscCall(Done((*all)[i]));
+    }
+  }
+  for (size_t i = 0; i < all->size(); i++) {
+    std::sort(times[i].begin(), times[i].end());
+    (*all)[i].cpu = times[i][times[i].size() / 2];
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode RunSweep(const AtvRuns &runs, std::vector<AtvRun> *all)
+{
+  struct Method {
+    const char                            *name;
+    std::function<PetscErrorCode(TS)>      configure;
+    std::vector<std::pair<double, double>> grid; /* tolerance, largest step */
+  };
+  const Method methods[] = {
+      {"hhtdae", nullptr, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
+      {"hhtdae, paper's form", Paper, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
+      {"hhtdae, steps limited", nullptr, {{1e-5, 2e-3}, {1e-5, 1e-3}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}}};
+
+  PetscFunctionBegin;
+  for (const Method &m : methods)
+    for (const auto &[eps, step] : m.grid) {
+      all->emplace_back();
+      PetscCall(runs.hht(m.name, eps, step, m.configure, &all->back()));
+      PetscCall(Done(all->back()));
+    }
+#if defined(HHTDAE_HAVE_IDA)
+  struct Foreign {
+    const char                            *name;
+    Form                                   form;
+    std::vector<std::pair<double, double>> grid;
+  };
+  const Foreign foreign[] = {
+      {"IDA, index 3", Form::Index3, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}, {1e-6, 0}}},
+      {"IDA, index 3, steps limited", Form::Index3, {{1e-4, 5e-4}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}},
+      {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}}}};
+  for (const Foreign &m : foreign)
+    for (const auto &[eps, step] : m.grid) {
+      all->emplace_back();
+      PetscCall(runs.ida(m.name, eps, step, m.form, &all->back()));
+      PetscCall(Done(all->back()));
+    }
+#endif
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Run()
+{
+  char        frame[PETSC_MAX_PATH_LEN] = "frame.h5", out[PETSC_MAX_PATH_LEN] = "atv.html";
+  AtvRuns     runs;
+  AtvResults  results;
+  ReducedBody body;
+  PetscInt    repeats = 3;
+  PetscBool   sweep   = PETSC_TRUE;
+  PetscReal   end = 2, limit = 120;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-frame", frame, sizeof(frame), nullptr));
+  PetscCall(PetscOptionsGetString(nullptr, nullptr, "-o", out, sizeof(out), nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-limit", &limit, nullptr));
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-repeats", &repeats, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
+  PetscCheck(end > 0 && repeats > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end and -repeats must be positive");
+  PetscCall(body.load(PETSC_COMM_SELF, frame));
+  runs.model = std::make_shared<ModalBody>(body.modal);
+  runs.end   = end;
+  runs.limit = limit;
+  PetscCall(RunMain(runs, repeats, &results.main));
+  PetscCall(runs.hht("reference", 1e-8, 5e-5, LittleDamping, &results.reference));
+  PetscCall(Done(results.reference));
+  PetscCall(runs.hht("reference at twice the step", 1e-8, 1e-4, LittleDamping, &results.check));
+  PetscCall(Done(results.check));
+  if (sweep) PetscCall(RunSweep(runs, &results.sweep));
+
+  hhtex::Atv atv(PETSC_COMM_SELF, runs.model);
+  atv.watchFrame();
+  PetscCall(atv.scene.setUp());
+  const AtvStress stress(body, atv);
+  PetscCall(stress.spots(results.reference, 10, &results.spots));
+  results.found.resize(results.main.size());
+  for (size_t i = 0; i < results.main.size(); i++) PetscCall(stress.spots(results.main[i], 10, &results.found[i]));
+  PetscCall(AtvPage(results, atv, body, stress).write(out));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "page: %s\n", out));
+  PetscFunctionReturn(0);
+}
+
+int main(int argc, char **argv)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscInitialize(&argc, &argv, nullptr, help));
+  PetscCall(TSHHT3Initialize());
+  PetscCall(Run());
+  PetscCall(PetscFinalize());
+  return 0;
+}

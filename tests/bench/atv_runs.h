@@ -1,0 +1,234 @@
+/*
+  The all-terrain vehicle under several integrators: hhtdae, and SUNDIALS IDA on the index-3 first-order form in the
+  manner of Adams' GSTIFF (BDF of variable order, velocities and multipliers kept out of the error test) and on the
+  stabilized index-2 form. Every run gives the channels of the scene every 4 ms, and what it cost.
+*/
+#ifndef HHTDAE_BENCH_ATV_RUNS_H
+#define HHTDAE_BENCH_ATV_RUNS_H
+
+#include "atv_model.h"
+#include "scene_watch.h"
+#include "workprecision_scene.h"
+#include <hhtdae/flexible.h>
+
+namespace hhtbench
+{
+
+using namespace hhtdae;
+
+struct AtvRun {
+  std::string                      name, failure;
+  PetscReal                        eps = 0, step_max = 0; /* 0: no bound */
+  double                           cpu       = 0;         /* of the solve, s */
+  long                             equations = 0;
+  wp::Counters                     count;
+  std::vector<double>              time;
+  std::vector<std::vector<double>> x; /* channels at these times */
+};
+
+class AtvRuns
+{
+public:
+  std::shared_ptr<const ModalBody> model;
+  double                           end = 2, dt = 4e-3, limit = 120; /* s; of CPU time of a run */
+
+  using Configure = std::function<PetscErrorCode(TS)>;
+
+  /* Twice: once for the time of the solve alone, once for the channels. configure comes after the tolerances. */
+  PetscErrorCode hht(const std::string &name, double eps, double step_max, const Configure &configure,
+                     AtvRun *run) const
+  {
+    PetscFunctionBegin;
+    *run = started(name, eps, step_max);
+    PetscCall(hhtSolve(configure, false, run));
+    const double cpu = run->cpu;
+    PetscCall(hhtSolve(configure, true, run));
+    run->cpu = cpu;
+    PetscFunctionReturn(0);
+  }
+
+#if defined(HHTDAE_HAVE_IDA)
+  PetscErrorCode ida(const std::string &name, double eps, double step_max, wp::FirstOrder::Form form, AtvRun *run) const
+  {
+    std::unique_ptr<SceneProblem> p;
+    std::shared_ptr<hhtex::Atv>   atv;
+    wp::IDASettings               settings;
+    struct State {
+      double              t;
+      std::vector<double> u, v, a;
+    };
+    std::vector<State> states;
+
+    PetscFunctionBegin;
+    *run = started(name, eps, step_max);
+    PetscCall(SceneProblem::make(
+        name,
+        [&](MPI_Comm comm) {
+          atv = std::make_shared<hhtex::Atv>(comm, model);
+          atv->watchFrame();
+          return std::shared_ptr<Scene>(atv, &atv->scene);
+        },
+        end, &p));
+    const wp::Reference points(*p, times());
+    settings.form         = form;
+    settings.maxStep      = step_max;
+    settings.testVelocity = form == wp::FirstOrder::Form::Stabilized;
+    settings.looser       = form == wp::FirstOrder::Form::Stabilized ? 1e3 : 1e6;
+    settings.look         = [&](double t, const double *u, const double *v, const double *a) {
+      states.push_back({t, {u, u + p->n}, {v, v + p->n}, {a, a + p->n}});
+    };
+    const wp::Case case_ = wp::SceneCase(*p);
+    const wp::Run  r     = wp::IDASolver(case_, *p, points, settings).run(eps, wp::Limits{limit});
+    run->failure         = r.failure;
+    run->cpu             = r.time;
+    run->count           = r.count;
+    run->equations       = equations(*p, form);
+    std::vector<double> u(p->n), v(p->n), a(p->n), x;
+    if (p->reference(p->t0, u.data(), v.data(), a.data())) states.insert(states.begin(), State{p->t0, u, v, a});
+    for (const State &s : states) {
+      PetscCall(p->channels(s.t, s.u.data(), s.v.data(), s.a.data(), x));
+      run->time.push_back(s.t);
+      run->x.push_back(x);
+    }
+    PetscFunctionReturn(0);
+  }
+#endif
+
+  std::vector<double> times() const
+  {
+    std::vector<double> t;
+    for (int k = 1; k <= (int)std::lround(end / dt); k++) t.push_back(k * dt);
+    return t;
+  }
+
+private:
+  PetscErrorCode hhtSolve(const Configure &configure, bool watched, AtvRun *run) const
+  {
+    TS                ts;
+    TSAdapt           adapt;
+    TSHHT3Statistics  s;
+    TSConvergedReason reason;
+    Vec               U;
+    PetscInt          n;
+
+    PetscFunctionBegin;
+    hhtex::Atv atv(PETSC_COMM_SELF, model);
+    atv.watchFrame();
+    PetscCall(atv.scene.createTS(&ts));
+    PetscCall(TSSetMaxTime(ts, end));
+    PetscCall(TSSetMaxSteps(ts, 100000000));
+    PetscCall(TSSetTolerances(ts, run->eps, nullptr, run->eps, nullptr));
+    PetscCall(TSGetAdapt(ts, &adapt));
+    if (run->step_max > 0) PetscCall(TSAdaptSetStepLimits(adapt, PETSC_DEFAULT, run->step_max));
+    if (configure) PetscCall(configure(ts));
+    PetscCall(TSSetFromOptions(ts));
+    PetscCall(TSSetErrorIfStepFails(ts, PETSC_FALSE));
+    hhtex::Watch watch(atv.scene, dt, [run](double t, const std::vector<double> &x) {
+      run->time.push_back(t);
+      run->x.push_back(x);
+    });
+    if (watched) PetscCall(watch.attach(ts));
+    PetscCall(atv.scene.solve(ts));
+    PetscCall(TSGetConvergedReason(ts, &reason));
+    if (reason <= 0) run->failure = TSConvergedReasons[reason];
+    PetscCall(TSHHT3GetStatistics(ts, &s));
+    run->cpu   = s.cpu;
+    run->count = {s.steps, s.rejected, s.newton, s.residuals, s.jacobians, s.factorizations};
+    PetscCall(TSGetSolution(ts, &U));
+    PetscCall(VecGetSize(U, &n));
+    run->equations = n;
+    PetscCall(TSDestroy(&ts));
+    PetscFunctionReturn(0);
+  }
+
+  static AtvRun started(const std::string &name, double eps, double step_max)
+  {
+    AtvRun r;
+    r.name     = name;
+    r.eps      = eps;
+    r.step_max = step_max;
+    return r;
+  }
+
+  static long equations(const SceneProblem &p, wp::FirstOrder::Form form)
+  {
+    long n = p.n;
+    for (TSHHT3Role r : p.role)
+      n += r == TSHHT3_COORDINATE || (form == wp::FirstOrder::Form::Stabilized && r == TSHHT3_HOLONOMIC);
+    return n;
+  }
+};
+
+/* Largest difference of a channel from the reference, as a part of its largest value; NaN for a run that did not arrive
+ */
+inline double Difference(const AtvRun &run, const AtvRun &reference, PetscInt channel)
+{
+  double       most = 0, worst = 0;
+  const size_t c = (size_t)channel;
+  if (!run.failure.empty() || run.x.size() != reference.x.size()) return std::nan("");
+  for (size_t k = 0; k < reference.x.size(); k++) {
+    most = std::max(most, std::fabs(reference.x[k][c]));
+    hhtex::Widen(worst, run.x[k][c], reference.x[k][c]);
+  }
+  return worst / most;
+}
+
+/* ---- stress ---- */
+
+/* Largest von Mises stress of one node through a run */
+struct NodeStress {
+  double stress = 0, time = 0;
+};
+
+class AtvStress
+{
+public:
+  AtvStress(const ReducedBody &body, const hhtex::Atv &channels) : body_(body), atv_(channels) {}
+
+  PetscErrorCode spots(const AtvRun &run, PetscInt count, std::vector<HotSpot> *list) const
+  {
+    HotSpots hot(body_);
+    PetscFunctionBegin;
+    for (size_t k = 0; k < run.x.size(); k++) PetscCall(hot.add(run.time[k], atv_.modes(run.x[k])));
+    PetscCall(hot.highest(count, 0.05, list));
+    PetscFunctionReturn(0);
+  }
+
+  /* Largest of every node with stress modes, over every fifth time */
+  PetscErrorCode largest(const AtvRun &run, std::vector<double> *most) const
+  {
+    std::vector<double> mises;
+    PetscFunctionBegin;
+    most->assign(body_.stress.node.size(), 0);
+    for (size_t k = 0; k < run.x.size(); k += 5) {
+      PetscCall(VonMises(body_, atv_.modes(run.x[k]), &mises));
+      for (size_t i = 0; i < mises.size(); i++) (*most)[i] = std::max((*most)[i], mises[i]);
+    }
+    PetscFunctionReturn(0);
+  }
+
+  NodeStress at(const AtvRun &run, PetscInt label) const
+  {
+    NodeStress   most;
+    Eigen::Index row = -1;
+    for (size_t i = 0; i < body_.stress.node.size(); i++)
+      if (body_.label[(size_t)body_.stress.node[i]] == label) row = (Eigen::Index)(6 * i);
+    if (row < 0) return {std::nan(""), std::nan("")};
+    for (size_t k = 0; k < run.x.size(); k++) {
+      const Eigen::Matrix<double, 6, 1> s = body_.stress.values.middleRows<6>(row) * atv_.modes(run.x[k]);
+      const double                      mises =
+          std::sqrt(0.5 * (std::pow(s[0] - s[1], 2) + std::pow(s[1] - s[2], 2) + std::pow(s[2] - s[0], 2)) +
+                    3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+      if (mises > most.stress) most = {mises, run.time[k]};
+    }
+    return most;
+  }
+
+private:
+  const ReducedBody &body_;
+  const hhtex::Atv  &atv_;
+};
+
+} // namespace hhtbench
+
+#endif
