@@ -83,6 +83,14 @@ inline PetscErrorCode addGroup(hhtbench::Page &page, const Results &r, bool scen
   if (s.pictures)
     PetscCall(page.picture(s.out + "/" + overviewName(scene), what + ": CPU time against error of the positions"));
   for (int kind = 0; kind < 3; kind++) summaryTable(r, group, kind, what).addTo(page);
+  if (scene) {
+    page.text("The same with the time of the adapter's additional evaluations of the Jacobian taken off BDF's and "
+              "IDA's, as if a scene gave the "
+              "gradient of its constraints and the three parts of its Jacobian for nothing: the least that these codes "
+              "could take. The "
+              "rest is theirs: more unknowns per step, and the linear algebra of these.");
+    summaryTable(r, group, 0, what, Time::WithoutAdapter).addTo(page);
+  }
   byProblemTable(r, group, 0, what).addTo(page);
   PetscFunctionReturn(0);
 }

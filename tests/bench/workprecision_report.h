@@ -33,15 +33,19 @@ inline Group Scenes(const Results &r, bool scene)
   return g;
 }
 
+/* What of a run's time counts: all of it, or less what the adapter alone makes */
+enum class Time { All, WithoutAdapter };
+
 /* CPU time at which a curve reaches an error, log-log between the first two points that bracket it; NaN outside */
-inline double timeAtError(const Curve &c, int kind, double target)
+inline double timeAtError(const Curve &c, int kind, double target, Time what = Time::All)
 {
   const Run *before = nullptr;
+  auto       time = [&](const Run &r) { return what == Time::All ? r.time : std::max(r.time - r.extra, 0.1 * r.time); };
   for (const Run &r : c.runs) {
     if (!r.failure.empty() || !(r.error[kind] > 0.)) continue;
     if (before && before->error[kind] >= target && r.error[kind] < target) {
       const double x = std::log(target / before->error[kind]) / std::log(r.error[kind] / before->error[kind]);
-      return before->time * std::pow(r.time / before->time, x);
+      return time(*before) * std::pow(time(r) / time(*before), x);
     }
     before = &r;
   }
@@ -49,10 +53,10 @@ inline double timeAtError(const Curve &c, int kind, double target)
 }
 
 /* Of a solver to the first one's, where the reference is good enough to tell */
-inline double ratioAt(const Results &r, size_t i, size_t s, int kind, double level)
+inline double ratioAt(const Results &r, size_t i, size_t s, int kind, double level, Time what = Time::All)
 {
   if (level < r.origin[i].trusted[kind]) return std::nan("");
-  return timeAtError(r.curve[i][s], kind, level) / timeAtError(r.curve[i][0], kind, level);
+  return timeAtError(r.curve[i][s], kind, level, what) / timeAtError(r.curve[i][0], kind, level);
 }
 
 inline std::vector<double> levels(int kind)
@@ -79,8 +83,9 @@ struct Ratios {
 
 inline void writeRow(FILE *f, const Run &r)
 {
-  fprintf(f, ",%.6e,%.6e,%.6e,%.6e,%ld,%ld,%ld,%ld,%ld,%ld", r.error[0], r.error[1], r.error[2], r.time, r.count.steps,
-          r.count.rejected, r.count.newton, r.count.residuals, r.count.jacobians, r.count.factorizations);
+  fprintf(f, ",%.6e,%.6e,%.6e,%.6e,%.6e,%ld,%ld,%ld,%ld,%ld,%ld", r.error[0], r.error[1], r.error[2], r.time, r.extra,
+          r.count.steps, r.count.rejected, r.count.newton, r.count.residuals, r.count.jacobians,
+          r.count.factorizations);
 }
 
 inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
@@ -89,7 +94,7 @@ inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
   FILE *f = fopen(file.c_str(), "w");
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s: name a directory that exists with -out",
              file.c_str());
-  fprintf(f, "problem,solver,eps,error_q,error_v,error_lambda,time,steps,rejected,newton,residuals,jacobians,"
+  fprintf(f, "problem,solver,eps,error_q,error_v,error_lambda,time,adapter,steps,rejected,newton,residuals,jacobians,"
              "factorizations,failure\n");
   for (size_t i = 0; i < r.cases.size(); i++)
     for (size_t s = 0; s < r.solvers.size(); s++)

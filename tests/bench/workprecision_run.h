@@ -40,6 +40,7 @@ constexpr const char *tooLong = "took longer than the limit";
 /* One run, or the median of several: failure is empty if the solver reached the end */
 struct Run {
   double   time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
+  double   extra = 0.; /* of the time, what first-order forms spend in evaluations that only the adapter makes */
   Counters count;
   std::string failure;
 };

@@ -90,11 +90,13 @@ inline Table problemTable(const Results &r, size_t i, int kind)
 }
 
 /* Geometric means over the problems of a group, per error level and over everything */
-inline Table summaryTable(const Results &r, const Group &group, int kind, const std::string &what)
+inline Table summaryTable(const Results &r, const Group &group, int kind, const std::string &what,
+                          Time time = Time::All)
 {
   Table t;
-  t.caption = what + ": geometric mean of CPU time / that of " + r.solvers[0].name + " at equal " + errorName(kind);
-  t.head    = levelHead("", kind);
+  t.caption = what + ": geometric mean of CPU time / that of " + r.solvers[0].name + " at equal " + errorName(kind) +
+              (time == Time::All ? "" : ", without the adapter's own evaluations");
+  t.head = levelHead("", kind);
   t.head.insert(t.head.end(), {"mean", "worst", "best", "points", "failed"});
   for (size_t s = 0; s < r.solvers.size(); s++) {
     Ratios     all;
@@ -103,7 +105,7 @@ inline Table summaryTable(const Results &r, const Group &group, int kind, const 
     for (double level : levels(kind)) {
       Ratios at;
       for (size_t i : group) {
-        const double x = ratioAt(r, i, s, kind, level);
+        const double x = ratioAt(r, i, s, kind, level, time);
         at.add(x);
         all.add(x);
       }
