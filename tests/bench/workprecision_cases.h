@@ -134,7 +134,7 @@ inline void addForeign(std::vector<Solver> &list)
   ida.testVelocity = false;
   ida.form         = FirstOrder::Form::Index3;
   ida.looser       = 1e6;
-  list.push_back(makeIDA("ida3", "IDA, index 3", false, ida));
+  list.push_back(makeIDA("ida3", "IDA, index 3", true, ida));
 #endif
 }
 

@@ -95,6 +95,25 @@ inline PetscErrorCode addGroup(hhtbench::Page &page, const Results &r, bool scen
   PetscFunctionReturn(0);
 }
 
+/* Variations of the defaults, one at a time; rows that repeat a default show how far repetitions differ */
+inline void addSweep(hhtbench::Page &page, const Results &sweep)
+{
+  page.section("hhtdae's own settings");
+  page.text("Each setting by itself against the defaults, over fewer tolerances. Rows that repeat a default (c=0.001, "
+            "degree=-1, "
+            "reuse=1.4/0.25/1.2, alpha=-0.3) show how far repetitions differ: nothing below that is a difference. c: "
+            "when the corrector stops; "
+            "degree: of the predictor, -1 chosen on the fly; reuse: largest change of h that keeps the matrix / rate "
+            "of convergence that "
+            "asks for a new one / change of h that is not taken; alpha and radius: damping.");
+  for (int scene = 0; scene < 2; scene++) {
+    const Group group = Scenes(sweep, scene);
+    for (int kind = 0; kind < 3 && !group.empty(); kind++)
+      summaryTable(sweep, group, kind, scene ? "Scenes" : "Hand-written problems").addTo(page);
+  }
+  failureTable(sweep).addTo(page);
+}
+
 inline PetscErrorCode WritePage(const Results &r, const Results &sweep, const PageSetting &s)
 {
   hhtbench::Page page("Error against run time");
@@ -106,21 +125,7 @@ inline PetscErrorCode WritePage(const Results &r, const Results &sweep, const Pa
   PetscCall(addGroup(page, r, true, s));
   page.section("Failures");
   failureTable(r).addTo(page);
-  if (!sweep.solvers.empty()) {
-    page.section("hhtdae's own settings");
-    page.text(
-        "Each setting by itself against the defaults, over fewer tolerances; repetitions of one setting differ by some "
-        "3 %. "
-        "c: when the corrector stops; degree: of the predictor, -1 chosen on the fly; reuse: ratio of step sizes / "
-        "rate of convergence / "
-        "smallest change of h worth a new matrix; alpha and radius: damping, form second-order unless it says paper.");
-    for (int scene = 0; scene < 2; scene++) {
-      const Group group = Scenes(sweep, scene);
-      for (int kind = 0; kind < 2 && !group.empty(); kind++)
-        summaryTable(sweep, group, kind, scene ? "Scenes" : "Hand-written problems").addTo(page);
-    }
-    failureTable(sweep).addTo(page);
-  }
+  if (!sweep.solvers.empty()) addSweep(page, sweep);
   PetscCall(page.write(s.out + "/report.html"));
   printf("\nreport: %s/report.html\n", s.out.c_str());
   PetscFunctionReturn(0);
