@@ -21,6 +21,7 @@
 #include "scene/kernels/motion.h"
 #include "scene/output/channels.h"
 #include "scene/runtime.h"
+#include "scene_axes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,7 +80,7 @@ public:
     PetscCall(run(eps, path, &changes));
     if (!changes) PetscFunctionReturn(0);
     for (size_t b = 0; b < path.size(); b++)
-      if (!path[b].empty()) *nearest = std::min(*nearest, chooseAxes(path[b], &axes_[4 * b]));
+      if (!path[b].empty()) *nearest = std::min(*nearest, ChooseAxes(path[b], &axes_[4 * b]));
     PetscCall(findStart());
     PetscFunctionReturn(0);
   }
@@ -110,7 +111,7 @@ public:
       const hhtdae::LocalBody &k = B.body[b];
       if (!hhtdae::HasEulerAngles(k.kind)) continue;
       const hhtdae::Matrix3 C = axes(b);
-      if ((C - k.C).cwiseAbs().maxCoeff() > 1e-14) toAxes(k.C, C, u + k.first + 3, v + k.first + 3);
+      if ((C - k.C).cwiseAbs().maxCoeff() > 1e-14) ToAxes(k.C, C, u + k.first + 3, v + k.first + 3);
       for (PetscInt i = k.first + 3; i < k.first + 6; i++)
         if (std::isfinite(near[i])) u[i] += 2. * PETSC_PI * std::round((near[i] - u[i]) / (2. * PETSC_PI));
     }
@@ -227,46 +228,22 @@ private:
   mutable State                  last_;                                    /* evaluated */
   std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
 
-  /* of the third axis of space in body axes: where the axis theta is measured from must not come near it */
-  using Attitudes = std::vector<hhtdae::Vector3>;
-
   SceneProblem() = default;
 
   /* hhtdae from start to end; the attitudes of all bodies with Euler angles on the way */
   PetscErrorCode run(double eps, std::vector<Attitudes> &path, PetscInt *changes) const
   {
-    struct Watch {
-      hhtdae::Runtime        &R;
-      std::vector<Attitudes> &path;
-    } watch = {*scene_->data().run, path};
+    AttitudeWatch     watch = {*scene_->data().run, path};
     TSHHT3Statistics  s;
     TSConvergedReason reason;
     TS                ts;
 
     PetscFunctionBegin;
-    path.resize(watch.R.bodies.own);
+    path.assign(watch.R.bodies.own, {});
     PetscCall(createTS(&ts));
     PetscCall(TSSetTolerances(ts, eps, nullptr, eps, nullptr));
     PetscCall(TSSetErrorIfStepFails(ts, PETSC_FALSE));
-    PetscCall(TSMonitorSet(
-        ts,
-        [](TS, PetscInt, PetscReal, Vec U, void *ctx) {
-          Watch        &w = *static_cast<Watch *>(ctx);
-          const double *u;
-          PetscFunctionBegin;
-          PetscCall(VecGetArrayRead(U, &u));
-          for (PetscInt b = 0; b < w.R.bodies.own; b++) {
-            const hhtdae::LocalBody &k = w.R.bodies.body[b];
-            hhtdae::Matrix3          A;
-            hhtdae::EulerAxes        e;
-            if (!hhtdae::HasEulerAngles(k.kind)) continue;
-            hhtdae::EulerFrame(u + k.first + 3, A, e);
-            w.path[b].push_back((A * k.C).row(2).transpose());
-          }
-          PetscCall(VecRestoreArrayRead(U, &u));
-          PetscFunctionReturn(0);
-        },
-        &watch, nullptr));
+    PetscCall(TSMonitorSet(ts, WatchAttitudes, &watch, nullptr));
     PetscCall(TSSolve(ts, nullptr));
     PetscCall(TSGetConvergedReason(ts, &reason));
     PetscCheck(reason > 0, PETSC_COMM_SELF, PETSC_ERR_NOT_CONVERGED,
@@ -279,51 +256,11 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* The body-fixed direction that stays farthest from the third axis of space and its opposite, of many on a half
-     sphere, as z axis of the Euler angles' axes; these as a quaternion. Returns the smallest |sin theta|. */
-  static double chooseAxes(const Attitudes &path, double *quaternion)
-  {
-    hhtdae::Vector3 best  = hhtdae::Vector3::UnitZ();
-    double          worst = 2.;
-    const int       tried = 500;
-    for (int k = 0; k < tried; k++) {
-      const double          z = (k + .5) / tried, r = std::sqrt(1. - z * z), angle = 2.399963229728653 * k;
-      const hhtdae::Vector3 c(r * std::cos(angle), r * std::sin(angle), z);
-      double                near = 0.;
-      for (const hhtdae::Vector3 &up : path) near = std::max(near, std::abs(up.dot(c)));
-      if (near >= worst) continue;
-      worst = near;
-      best  = c;
-    }
-    const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(best, hhtdae::Vector3::UnitZ());
-    quaternion[0]              = q.w();
-    quaternion[1]              = q.x();
-    quaternion[2]              = q.y();
-    quaternion[3]              = q.z();
-    return std::sqrt(1. - worst * worst);
-  }
-
   /* of the start, as the scene loads them */
   hhtdae::Matrix3 axes(PetscInt b) const
   {
     const double *x = &axes_[4 * b];
     return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix();
-  }
-
-  /* The same attitude and angular velocity with other axes */
-  static void toAxes(const hhtdae::Matrix3 &from, const hhtdae::Matrix3 &to, double *eps, double *rate)
-  {
-    hhtdae::Matrix3   A;
-    hhtdae::EulerAxes e;
-    hhtdae::EulerFrame(eps, A, e);
-    const hhtdae::Vector3 w      = hhtdae::AngularVelocity(e, hhtdae::Vector3(rate[0], rate[1], rate[2]));
-    const hhtdae::Vector3 angles = hhtdae::EulerAngles(A * from * to.transpose());
-    hhtdae::EulerFrame(angles.data(), A, e);
-    const hhtdae::Vector3 rates = hhtdae::EulerRates(e, w);
-    for (int i = 0; i < 3; i++) {
-      eps[i]  = angles(i);
-      rate[i] = rates(i);
-    }
   }
 
   static PetscErrorCode copy(Vec x, std::vector<double> &to)

@@ -1,0 +1,86 @@
+/* Axes of the Euler angles of a scene's bodies: those that keep away from the singularity on a given way, and the
+ * change to others. */
+#ifndef HHTDAE_BENCH_SCENE_AXES_H
+#define HHTDAE_BENCH_SCENE_AXES_H
+
+#include "scene/runtime.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace hhtbench
+{
+
+/* Of one body on its way: the third axis of space in body axes, which the axis that theta is measured from must not
+ * come near */
+using Attitudes = std::vector<hhtdae::Vector3>;
+
+/* A monitor that collects them for all bodies with Euler angles */
+struct AttitudeWatch {
+  hhtdae::Runtime        &R;
+  std::vector<Attitudes> &path; /* of every body */
+};
+
+inline PetscErrorCode WatchAttitudes(TS, PetscInt, PetscReal, Vec U, void *ctx)
+{
+  AttitudeWatch &w = *static_cast<AttitudeWatch *>(ctx);
+  const double  *u;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt b = 0; b < w.R.bodies.own; b++) {
+    const hhtdae::LocalBody &k = w.R.bodies.body[b];
+    hhtdae::Matrix3          A;
+    hhtdae::EulerAxes        e;
+    if (!hhtdae::HasEulerAngles(k.kind)) continue;
+    hhtdae::EulerFrame(u + k.first + 3, A, e);
+    w.path[b].push_back((A * k.C).row(2).transpose());
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscFunctionReturn(0);
+}
+
+/* The body-fixed direction that stays farthest from the third axis of space and its opposite, of many on a half
+   sphere, as z axis of the Euler angles' axes; these as a quaternion. Returns the smallest |sin theta|. */
+inline double ChooseAxes(const Attitudes &path, double *quaternion)
+{
+  hhtdae::Vector3 best  = hhtdae::Vector3::UnitZ();
+  double          worst = 2.;
+  const int       tried = 500;
+  for (int k = 0; k < tried; k++) {
+    const double          z = (k + .5) / tried, r = std::sqrt(1. - z * z), angle = 2.399963229728653 * k;
+    const hhtdae::Vector3 c(r * std::cos(angle), r * std::sin(angle), z);
+    double                near = 0.;
+    for (const hhtdae::Vector3 &up : path) near = std::max(near, std::abs(up.dot(c)));
+    if (near >= worst) continue;
+    worst = near;
+    best  = c;
+  }
+  const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(best, hhtdae::Vector3::UnitZ());
+  quaternion[0]              = q.w();
+  quaternion[1]              = q.x();
+  quaternion[2]              = q.y();
+  quaternion[3]              = q.z();
+  return std::sqrt(1. - worst * worst);
+}
+
+/* The same attitude and angular velocity with other axes */
+inline void ToAxes(const hhtdae::Matrix3 &from, const hhtdae::Matrix3 &to, double *eps, double *rate)
+{
+  hhtdae::Matrix3   A;
+  hhtdae::EulerAxes e;
+  hhtdae::EulerFrame(eps, A, e);
+  const hhtdae::Vector3 w      = hhtdae::AngularVelocity(e, hhtdae::Vector3(rate[0], rate[1], rate[2]));
+  const hhtdae::Vector3 angles = hhtdae::EulerAngles(A * from * to.transpose());
+  hhtdae::EulerFrame(angles.data(), A, e);
+  const hhtdae::Vector3 rates = hhtdae::EulerRates(e, w);
+  for (int i = 0; i < 3; i++) {
+    eps[i]  = angles(i);
+    rate[i] = rates(i);
+  }
+}
+
+} // namespace hhtbench
+
+#endif
