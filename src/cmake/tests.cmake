@@ -56,6 +56,12 @@ if(parallel_found)
   endforeach()
 endif()
 
+# A slice of the random models of "make soak", small ones of another seed
+if(TARGET models)
+  add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -output none)
+  set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 900 LABELS soak)
+endif()
+
 # The integration tests start other programs, which a library with a sanitizer inside would need to be preloaded into.
 if(HHTDAE_SANITIZE)
   return()

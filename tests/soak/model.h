@@ -1,4 +1,5 @@
-/* Model k of seed s: a scene put together at random from trees, loops, machines, contacts and flexible bodies, with what is observed. */
+/* Model k of seed s: a scene put together at random from trees, loops, machines, contacts and flexible bodies, with
+ * what is observed. */
 #ifndef HHTDAE_SOAK_MODEL_H
 #define HHTDAE_SOAK_MODEL_H
 
@@ -23,7 +24,11 @@ struct Model {
 class Generator
 {
 public:
-  Generator(std::uint64_t seed, std::uint64_t number, bool small, const std::vector<ReducedPart> &parts) : r(seed, number), small_(small), parts_(parts) {}
+  Generator(std::uint64_t seed, std::uint64_t number, bool small, const std::vector<ReducedPart> &parts,
+            const Vector3 &push = Vector3::Zero())
+      : r(seed, number), small_(small), parts_(parts), push_(push)
+  {
+  }
 
   Model make()
   {
@@ -51,9 +56,10 @@ public:
   }
 
 private:
-  Random                   r;
-  bool                     small_;
+  Random                          r;
+  bool                            small_;
   const std::vector<ReducedPart> &parts_;
+  const Vector3 push_; /* a small change of gravity and places, in parts of them: the same model, disturbed */
 
   void scales(Builder &b)
   {
@@ -63,7 +69,10 @@ private:
     b.gravity      = -g * (r.chance(0.9) ? b.up : b.direction());
     b.period       = g > 0 ? 2 * M_PI * std::sqrt(b.length / g) : r.logarithmic(0.1, 3);
     b.speed        = g == 0 || r.chance(0.45) ? r.logarithmic(0.1, 5) : 0;
-    b.scene.gravity(b.gravity);
+    b.push         = push_;
+    Vector3 more   = b.weightPerMass() * push_;
+    if (b.planar) more(2) = 0;
+    b.scene.gravity(b.gravity + more);
   }
 
   /* small ones are the most, a few have 100 to 200 bodies */
@@ -71,7 +80,7 @@ private:
   {
     if (small_) return (int)r.logarithmic(1, 12);
     if (r.chance(0.03)) return r.integer(100, 200);
-    return (int)(60 * std::pow(60., -r.uniform() * r.choose({1, 1}) - 0.0) / (r.chance(0.5) ? 1 : r.logarithmic(1, 30))) + 1;
+    return (int)std::pow(61., std::pow(r.uniform(), 1.5));
   }
 
   void populate(Builder &b, Loads &loads, Machines &machines)
@@ -82,17 +91,37 @@ private:
     if (!b.planar && small_ && r.chance(0.05)) machines.flexible();
     while (b.bodies() < n) {
       const int rest = n - b.bodies();
-      switch (b.planar ? r.choose({6, 4, 0, 0, 2, 1.5, 3, 0.5, 1.2, 0}) : r.choose({7, 2, 3, 1, 2, 2.5, 3, 0.5, 1.2, 0.8})) {
-      case 0: trees.tree(rest > 40 ? r.integer(rest / 2, rest) : r.integer(1, rest)); break;
-      case 1: trees.planeLoop(); break;
-      case 2: trees.spaceLoop(); break;
-      case 3: trees.platform(); break;
-      case 4: machines.couple(); break;
-      case 5: machines.roll(); break;
-      case 6: machines.contact(); break;
-      case 7: machines.shaker([&] { return loads.motion(b.length * r.uniform(0.05, 0.3)); }); break;
-      case 8: loads.net(r.integer(1, std::min(rest, 20))); break;
-      default: machines.flexible();
+      switch (b.planar ? r.choose({6, 4, 0, 0, 2, 1.5, 3, 0.5, 1.2, 0})
+                       : r.choose({7, 2, 3, 1, 2, 2.5, 3, 0.5, 1.2, 0.8})) {
+      case 0:
+        trees.tree(rest > 40 ? r.integer(rest / 2, rest) : r.integer(1, rest));
+        break;
+      case 1:
+        trees.planeLoop();
+        break;
+      case 2:
+        trees.spaceLoop();
+        break;
+      case 3:
+        trees.platform();
+        break;
+      case 4:
+        machines.couple();
+        break;
+      case 5:
+        machines.roll();
+        break;
+      case 6:
+        machines.contact();
+        break;
+      case 7:
+        machines.shaker([&] { return loads.motion(b.length * r.uniform(0.05, 0.3)); });
+        break;
+      case 8:
+        loads.net(r.integer(1, std::min(rest, 20)));
+        break;
+      default:
+        machines.flexible();
       }
     }
   }
@@ -121,9 +150,11 @@ private:
     for (Body f : machines.modal) look(Measure::modal(f, 0), Observed::Position);
     for (State x : loads.states) look(Measure::value(x), Observed::Position);
     int seen = 0;
-    for (std::size_t k = 0; k < s.data().elements.size() && seen < 4; k += std::max<std::size_t>(1, s.data().elements.size() / 8))
+    for (std::size_t k = 0; k < s.data().elements.size() && seen < 4;
+         k += std::max<std::size_t>(1, s.data().elements.size() / 8))
       if (s.data().elements[k].kind != ElementData::Force && std::strcmp(s.data().elements[k].type, "attachment")) {
-        for (int c = 0; c < components; c++) look(Measure::jointForce(Element{(PetscInt)k}, c, b.at(0, Vector3::Zero())), Observed::Reaction);
+        for (int c = 0; c < components; c++)
+          look(Measure::jointForce(Element{(PetscInt)k}, c, b.at(0, Vector3::Zero())), Observed::Reaction);
         seen++;
       }
     look(Measure::kineticEnergy(), Observed::Energy);

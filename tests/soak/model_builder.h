@@ -1,6 +1,6 @@
 /*
-  What the generators of models share: the scene under construction, its bodies with pose and mass, joints that may be driven or rubbed,
-  scales of length, time and speed from which stiffness, damping and forces are drawn.
+  What the generators of models share: the scene under construction, its bodies with pose and mass, joints that may be
+  driven or rubbed, scales of length, time and speed from which stiffness, damping and forces are drawn.
 */
 #ifndef HHTDAE_SOAK_MODEL_BUILDER_H
 #define HHTDAE_SOAK_MODEL_BUILDER_H
@@ -45,19 +45,21 @@ struct Stiff {
 class Builder
 {
 public:
-  Scene              &scene;
-  Random             &random;
-  const bool          planar;
-  std::vector<Placed> placed;
-  std::vector<Held>   held;
-  std::map<std::string, int> used; /* what elements do not show by their type */
-  double  length = 1, mass = 1, period = 2; /* scales of the model */
-  double  speed  = 0;                       /* of bodies at the start, 0: at rest; times length per period */
-  bool    project = false;                  /* initial velocities have to be made consistent */
-  Vector3 up, gravity;
-  double  stiffest = 0, softest = 1e300;
+  Scene                     &scene;
+  Random                    &random;
+  const bool                 planar;
+  std::vector<Placed>        placed;
+  std::vector<Held>          held;
+  std::map<std::string, int> used;                             /* what elements do not show by their type */
+  double                     length = 1, mass = 1, period = 2; /* scales of the model */
+  double                     speed   = 0;     /* of bodies at the start, 0: at rest; times length per period */
+  bool                       project = false; /* initial velocities have to be made consistent */
+  Vector3                    up, gravity;
+  double                     stiffest = 0, softest = 1e300;
+  Vector3 push = Vector3::Zero(); /* a small disturbance of where bodies and points are, in lengths of the model */
 
-  Builder(Scene &s, Random &r, bool plane) : scene(s), random(r), planar(plane), up(plane ? Vector3(0, 1, 0) : Vector3(0, 0, 1))
+  Builder(Scene &s, Random &r, bool plane)
+      : scene(s), random(r), planar(plane), up(plane ? Vector3(0, 1, 0) : Vector3(0, 0, 1))
   {
     placed.push_back({s.ground(), Vector3::Zero(), Matrix3::Identity(), 0, 1, false, false});
   }
@@ -70,7 +72,10 @@ public:
     const Vector3 d = random.direction();
     return planar ? inPlane(d) : d;
   }
-  Vector3 inPlane(const Vector3 &d) { return std::hypot(d(0), d(1)) > 1e-3 ? Vector3(d(0), d(1), 0).normalized() : Vector3(1, 0, 0); }
+  Vector3 inPlane(const Vector3 &d)
+  {
+    return std::hypot(d(0), d(1)) > 1e-3 ? Vector3(d(0), d(1), 0).normalized() : Vector3(1, 0, 0);
+  }
   Matrix3 axes() { return planar ? turn(random.uniform(-M_PI, M_PI)) : random.rotation(); }
   Matrix3 turn(double angle) const { return Eigen::AngleAxisd(angle, Vector3::UnitZ()).toRotationMatrix(); }
   /* the third axis along z */
@@ -92,7 +97,10 @@ public:
     R << A.col(2), A.col(0), A.col(1);
     return R;
   }
-  Marker at(int b, const Vector3 &x, const Matrix3 &R = Matrix3::Identity()) { return scene.markerAt(placed[b].body, x, R); }
+  Marker at(int b, const Vector3 &x, const Matrix3 &R = Matrix3::Identity())
+  {
+    return scene.markerAt(placed[b].body, x, R);
+  }
   /* any point of body b */
   Vector3 on(int b)
   {
@@ -100,7 +108,15 @@ public:
     if (p.point || p.flexible) return p.at;
     Vector3 d = random.vector();
     if (planar) d(2) = 0;
-    return p.at + (b == 0 ? 2 : 0.5) * p.size * d;
+    return p.at + (b == 0 ? 2 : 0.5) * p.size * d + disturbance();
+  }
+
+  /* this way and that, so that it is no motion of the whole */
+  Vector3 disturbance()
+  {
+    Vector3 d = (pushed_++ % 2 ? -length : length) * push;
+    if (planar) d(2) = 0;
+    return d;
   }
 
   /* ---- bodies ---- */
@@ -110,7 +126,7 @@ public:
     const double size = length * random.logarithmic(0.5, 1.5), m = mass * random.logarithmic(0.3, 3);
     Vector3      edges(random.uniform(0.3, 1), random.uniform(0.15, 0.6), random.uniform(0.1, 0.5));
     edges *= size;
-    return addBody(x, R, m, size, inertiaOfBox(m, edges));
+    return addBody(x + disturbance(), R, m, size, inertiaOfBox(m, edges));
   }
   int addBody(const Vector3 &x, const Matrix3 &R, double m, double size, const Matrix3 &inertia)
   {
@@ -144,7 +160,8 @@ public:
   }
   static Matrix3 inertiaOfBox(double m, const Vector3 &e)
   {
-    return Vector3(e(1) * e(1) + e(2) * e(2), e(0) * e(0) + e(2) * e(2), e(0) * e(0) + e(1) * e(1)).asDiagonal() * (m / 12);
+    return Vector3(e(1) * e(1) + e(2) * e(2), e(0) * e(0) + e(2) * e(2), e(0) * e(0) + e(1) * e(1)).asDiagonal() *
+           (m / 12);
   }
   Vector3 startVelocity()
   {
@@ -161,14 +178,15 @@ public:
   }
 
   /* ---- scales ---- */
-  /* of a frequency from about that of the model to 1e4 times that; what is fast is damped, as a few periods of the model are run */
+  /* of a frequency from about that of the model to 1e4 times that; what is fast is damped, as a few periods of the
+   * model are run */
   Stiff stiff(double m)
   {
     Stiff        s;
     const double ratio = random.logarithmic(1.5, random.chance(0.3) ? 1e4 : 60);
     s.omega            = 2 * M_PI / period * ratio;
-    s.zeta             = ratio > 25 ? random.logarithmic(0.05, 1) : random.chance(0.3) ? 0 : random.logarithmic(0.003, 0.5);
-    s.k                = m * s.omega * s.omega;
+    s.zeta = ratio > 25 ? random.logarithmic(0.05, 1) : random.chance(0.3) ? 0 : random.logarithmic(0.003, 0.5);
+    s.k    = m * s.omega * s.omega;
     if (s.k > 1e8) {
       s.k     = 1e8;
       s.omega = std::sqrt(s.k / m);
@@ -180,8 +198,14 @@ public:
   }
   double inertia(int b) const { return 0.08 * placed[b].mass * placed[b].size * placed[b].size; }
   /* the lighter of two, of which one may be the ground */
-  double lighter(int a, int b) const { return a == 0 ? placed[b].mass : b == 0 ? placed[a].mass : std::min(placed[a].mass, placed[b].mass); }
-  double lighterInertia(int a, int b) const { return a == 0 ? inertia(b) : b == 0 ? inertia(a) : std::min(inertia(a), inertia(b)); }
+  double lighter(int a, int b) const
+  {
+    return a == 0 ? placed[b].mass : b == 0 ? placed[a].mass : std::min(placed[a].mass, placed[b].mass);
+  }
+  double lighterInertia(int a, int b) const
+  {
+    return a == 0 ? inertia(b) : b == 0 ? inertia(a) : std::min(inertia(a), inertia(b));
+  }
   double weightPerMass() const { return std::max(gravity.norm(), length / (period * period)); }
   double weight(int b) const { return placed[b].mass * weightPerMass(); }
   bool   state(double p = 0.15) /* carry a force as force states */
@@ -199,6 +223,9 @@ public:
     }
     return 0;
   }
+
+private:
+  int pushed_ = 0;
 };
 
 } // namespace soak

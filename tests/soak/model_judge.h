@@ -1,16 +1,21 @@
 /*
-  What becomes of one model: the run with defaults (tolerance 1e-4), a run at a tenth of it, two references, and the verdict.
+  What becomes of one model: the run with defaults (tolerance 1e-4), a run at a tenth of it, two references, and the
+  verdict.
 
-  Error of a position: |x - x_ref| / max(1, largest |x_ref| of that channel so far), the weights of the method's own test.
+  Error of a position: |x - x_ref| / max(1, largest |x_ref| of that channel so far), the weights of the method's own
+  test.
 
   A run at tolerance eps is right if at every sample time t
 
-    error(t) <= eps N(t) (4 + 2 G(t)),
+    error(t) <= eps N(t) (10 + 3 G(t)),
 
-  N: its steps so far, each of which may leave an error of eps; G: how much the model itself makes grow of an error, as IDA shows it: the
-  difference of its runs at tolerances 10 eps_ref and eps_ref, over 10 eps_ref. It is asked for as long as the right-hand side is below
-  0.2: later the tolerance does not determine the solution. Where that is so before the end, a third run, at eps / 100, has to be right
-  by the same formula. And where the first error is above 1e-3, that of the second run has to be smaller, or else that of the third.
+  N: its steps so far, each of which may leave an error of eps; G: how much the model itself makes grow of an error, as
+  IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over 10 eps_ref. It is asked for as
+  long as the right-hand side is below 0.3: later the tolerance does not determine the solution. Where that is so before
+  the end, a third run, at eps / 100, has to be right by the same formula. Where an error is larger, gravity, bodies and
+  points are moved by eps N / 2 in six directions: a model which that moves as far (a third as far at least) is one
+  whose solution eps does not determine from there on, near a separatrix. And where the first error is above 1e-3, that
+  of the second run has to be smaller, or else that of the third.
 */
 #ifndef HHTDAE_SOAK_MODEL_JUDGE_H
 #define HHTDAE_SOAK_MODEL_JUDGE_H
@@ -23,18 +28,22 @@ namespace soak
 enum Verdict { Right, Wrong, Failed, Unknown, Crashed, Hung, verdicts };
 constexpr const char *verdict_name[] = {"right", "wrong", "failed", "no reference", "crashed", "hung"};
 enum Stage { Building, Default, Finer, Referring, Judging, Done };
-constexpr const char *stage_name[] = {"building the scene", "the run with defaults", "the run at a smaller tolerance", "the reference", "the verdict", "done"};
+constexpr const char *stage_name[] = {"building the scene", "the run with defaults", "the run at a smaller tolerance",
+                                      "the reference",      "the verdict",           "done"};
 enum By { ByNobody, ByIDA, ByHHT };
 constexpr const char *by_name[] = {"none", "IDA", "hhtdae"};
 
 /* Plain data: it comes through a pipe */
 struct Outcome {
-  long   number = 0;
-  int    stage = Building, verdict = Unknown, by = ByNobody, bodies = 0, planar = 0, window = 0, finest_window = 0, legs = 0;
-  long   steps = 0, rejected = 0, newton = 0, jacobians = 0, factorizations = 0, changes = 0, fails = 0, reference_steps = 0, finer_steps = 0;
+  long number = 0;
+  int  stage = Building, verdict = Unknown, by = ByNobody, bodies = 0, planar = 0, window = 0, finest_window = 0,
+      legs = 0, disturbed = 0;
+  long steps = 0, rejected = 0, newton = 0, jacobians = 0, factorizations = 0, changes = 0, fails = 0,
+       reference_steps = 0, finer_steps = 0;
   double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
-  double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1, doubt = -1, used = -1; /* used: largest part of what is allowed */
-  char   message[600] = "", types[2000] = "";
+  double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
+         doubt = -1, used = -1; /* used: largest part of what is allowed */
+  char message[600] = "", types[2000] = "";
 };
 
 inline void SetText(char *to, std::size_t room, const std::string &s)
@@ -46,7 +55,8 @@ inline void SetText(char *to, std::size_t room, const std::string &s)
 class Judge
 {
 public:
-  Judge(std::uint64_t seed, long number, bool small, const std::vector<ReducedPart> &parts, bool options, Outcome *outcome)
+  Judge(std::uint64_t seed, long number, bool small, const std::vector<ReducedPart> &parts, bool options,
+        Outcome *outcome)
       : seed_(seed), small_(small), options_(options), parts_(parts), o_(*outcome)
   {
     o_.number = number;
@@ -58,29 +68,35 @@ public:
     model_             = build();
     describe();
     Settings defaults;
-    defaults.options = options_;
-    o_.stage         = Default;
+    defaults.options   = options_;
+    o_.stage           = Default;
     const Trajectory a = RunHHT(model_, defaults);
     costs(a);
-    if (a.arrived()) judge(a);
-    else fail(Failed, a.failure);
+    if (a.arrived())
+      judge(a);
+    else
+      fail(Failed, a.failure);
     o_.total = CpuSeconds() - start;
     o_.stage = Done;
   }
 
 private:
-  static constexpr double per_step = 4, per_growth = 2, undetermined = 0.2, reference_eps = 1e-7;
+  static constexpr double per_step = 10, per_growth = 3, undetermined = 0.3, reference_eps = 1e-7;
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
-  std::uint64_t                   seed_;
-  bool                            small_, options_;
-  const std::vector<ReducedPart> &parts_;
-  Model                           model_;
-  Outcome                        &o_;
-  Trajectory                      looser_, reference_;
-  double                          finest_ = 0; /* error at the smallest tolerance, where the default was judged */
+  std::uint64_t                             seed_;
+  bool                                      small_, options_;
+  const std::vector<ReducedPart>           &parts_;
+  Model                                     model_;
+  Outcome                                  &o_;
+  Trajectory                                looser_, reference_;
+  std::map<double, std::vector<Trajectory>> disturbed_; /* by how much */
+  double finest_ = 0; /* error at the smallest tolerance, where the default was judged */
 
-  Model build() const { return Generator(seed_, (std::uint64_t)o_.number, small_, parts_).make(); }
+  Model build(const Vector3 &push = Vector3::Zero()) const
+  {
+    return Generator(seed_, (std::uint64_t)o_.number, small_, parts_, push).make();
+  }
 
   void fail(Verdict v, const std::string &why)
   {
@@ -120,10 +136,12 @@ private:
   {
     o_.stage = Referring;
 #ifdef HHTDAE_HAVE_IDA
-    looser_ = RunIDA(build(), 10 * reference_eps, 5, &o_.legs);
-    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, 8, &o_.legs);
-    if (looser_.arrived() && reference_.arrived()) o_.by = ByIDA;
-    else SetText(o_.message, sizeof o_.message, looser_.arrived() ? reference_.failure : looser_.failure);
+    looser_ = RunIDA(build(), 10 * reference_eps, 4, &o_.legs);
+    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, 7, &o_.legs);
+    if (looser_.arrived() && reference_.arrived())
+      o_.by = ByIDA;
+    else
+      SetText(o_.message, sizeof o_.message, looser_.arrived() ? reference_.failure : looser_.failure);
 #endif
     if (o_.by == ByNobody) referToItself();
     o_.reference_steps = reference_.steps;
@@ -178,7 +196,8 @@ private:
     for (int k = 0; k < samples && largest > 0; k++) {
       double worst = 0;
       for (std::size_t c = 0; c < model_.observed.size(); c++)
-        if (model_.observed[c] == kind) worst = std::max(worst, std::abs(a.x[(std::size_t)k][c] - reference_.x[(std::size_t)k][c]));
+        if (model_.observed[c] == kind)
+          worst = std::max(worst, std::abs(a.x[(std::size_t)k][c] - reference_.x[(std::size_t)k][c]));
       sum += worst / largest / samples;
     }
     return largest > 0 ? sum : -1;
@@ -205,13 +224,44 @@ private:
     const int n = window(eps, a);
     for (int k = 0; k < n; k++) {
       const double e = error(a, k), most = allowed(eps, a, k);
-      o_.used        = std::max(o_.used, e / most);
+      o_.used = std::max(o_.used, e / most);
       if (e <= most) continue;
-      fail(Wrong, hhtbench::Text("%s: error %.2e at t = %g, allowed %.2e", which, e, SampleTime(model_.end, k + 1), most));
+      if (e <= 3 * disturbance(0.5 * eps * (double)a.steps, k)) {
+        o_.disturbed = 1;
+        return true;
+      }
+      fail(Wrong,
+           hhtbench::Text("%s: error %.2e at t = %g, allowed %.2e", which, e, SampleTime(model_.end, k + 1), most));
       return false;
     }
     return true;
   }
+  /* How far the reference moves until sample k if gravity, bodies and points are moved */
+  double disturbance(double by, int k)
+  {
+    std::vector<Trajectory> &all = disturbed_[by];
+    for (int d = 0; d < 6 && (int)all.size() < 6; d++) {
+      const Vector3 push = (d % 2 ? -by : by) * Vector3::Unit(d / 2);
+      all.push_back(referenceOf(push));
+    }
+    double most = 0;
+    for (const Trajectory &t : all)
+      for (int l = 0; l <= k && l < (int)t.x.size(); l++) most = std::max(most, error(t, l));
+    return most;
+  }
+  Trajectory referenceOf(const Vector3 &push)
+  {
+#ifdef HHTDAE_HAVE_IDA
+    int legs;
+    if (o_.by == ByIDA) return RunIDA(build(push), 10 * reference_eps, 4, &legs);
+#endif
+    Settings tight;
+    tight.radius  = 0.8;
+    tight.eps     = 10 * reference_eps;
+    tight.seconds = 4;
+    return RunHHT(build(push), tight);
+  }
+
   double largest(const Trajectory &a, int n) const
   {
     double e = 0;
@@ -242,11 +292,12 @@ private:
     o_.verdict        = Right;
     if (!right(default_eps, a, "defaults") || !right(finer.eps, b, "a tenth of the tolerance")) return;
     const double first = largest(a, o_.window), second = largest(b, o_.window);
-    const bool   falls = first < 1e-3 || second < 0.7 * first;
+    const bool   falls = o_.disturbed || first < 1e-3 || second < 0.7 * first;
     if (o_.window == samples && falls) return;
     finest();
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first))
-      fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e and %.2e", first, second, finest_));
+      fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e and %.2e", first, second,
+                                 finest_));
   }
 
   /* for a model that is looked at alone: errors over tolerances, of both kinds of damping */
@@ -255,14 +306,24 @@ private:
     for (double eps = default_eps; eps > 2e-9; eps *= 0.1)
       for (int other = 0; other < 2; other++) {
         Settings s;
-        s.eps     = eps;
-        s.radius  = other ? 0.8 : -1;
-        s.seconds = 60;
+        s.eps                 = eps;
+        s.radius              = other ? 0.8 : -1;
+        s.seconds             = 60;
         const char      *what = other ? "radius 0.8" : "alpha -0.3";
         const Trajectory t    = RunHHT(build(), s);
-        if (!t.arrived()) std::printf("eps %.0e, %s: %s\n", eps, what, t.failure.c_str());
-        else
-          std::printf("eps %.0e, %s: %6ld steps, error %.2e, half way %.2e, allowed %.2e\n", eps, what, t.steps, error(t), error(t, samples / 2), allowed(eps, t, samples - 1));
+        if (!t.arrived())
+          std::printf("eps %.0e, %s: %s\n", eps, what, t.failure.c_str());
+        else {
+          if (getenv("SOAK_TALK"))
+            for (int k = 0; k < samples; k++) {
+              std::printf("   t %.4f:", SampleTime(model_.end, k + 1));
+              for (std::size_t c = 0; c < std::min<std::size_t>(9, t.x[0].size()); c++)
+                std::printf(" %.6f (%.6f)", t.x[k][c], reference_.x[k][c]);
+              std::printf("\n");
+            }
+          std::printf("eps %.0e, %s: %6ld steps, error %.2e, half way %.2e, allowed %.2e\n", eps, what, t.steps,
+                      error(t), error(t, samples / 2), allowed(eps, t, samples - 1));
+        }
       }
   }
 

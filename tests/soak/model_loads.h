@@ -1,4 +1,5 @@
-/* Forces of every type between bodies of a model, friction in its joints, user's variables and states, motions of its joints. */
+/* Forces of every type between bodies of a model, friction in its joints, user's variables and states, motions of its
+ * joints. */
 #ifndef HHTDAE_SOAK_MODEL_LOADS_H
 #define HHTDAE_SOAK_MODEL_LOADS_H
 
@@ -17,18 +18,41 @@ public:
   void any()
   {
     switch (r.choose({4, 2, 2, 1.5, 2, 2, 2, 2, 1.5, 1.5, 1, 1})) {
-    case 0: spring(); return;
-    case 1: nonlinearSpring(); return;
-    case 2: torsion(); return;
-    case 3: nonlinearTorsion(); return;
-    case 4: bushing(); return;
-    case 5: beam(); return;
-    case 6: friction(); return;
-    case 7: actuator(); return;
-    case 8: wind(); return;
-    case 9: moment(); return;
-    case 10: alias(); return;
-    default: follower();
+    case 0:
+      spring();
+      return;
+    case 1:
+      nonlinearSpring();
+      return;
+    case 2:
+      torsion();
+      return;
+    case 3:
+      nonlinearTorsion();
+      return;
+    case 4:
+      bushing();
+      return;
+    case 5:
+      beam();
+      return;
+    case 6:
+      friction();
+      return;
+    case 7:
+      actuator();
+      return;
+    case 8:
+      wind();
+      return;
+    case 9:
+      moment();
+      return;
+    case 10:
+      alias();
+      return;
+    default:
+      follower();
     }
   }
 
@@ -38,10 +62,15 @@ public:
     const Vector3 start = 2 * b.length * b.direction();
     int           last  = 0;
     for (int k = 0; k < bodies; k++) {
-      const int child = b.addBody(start + b.length * (k + 1.) * (b.planar ? Vector3(1, 0, 0) : Vector3(1, 0.2, 0)) + 0.3 * b.length * b.direction());
+      const int child = b.addBody(start + b.length * (k + 1.) * (b.planar ? Vector3(1, 0, 0) : Vector3(1, 0.2, 0)) +
+                                  0.3 * b.length * b.direction());
       switch (r.choose({1, 1, 1})) {
-      case 0: beamBetween(last, child); break;
-      case 1: bushingBetween(last, child); break;
+      case 0:
+        beamBetween(last, child);
+        break;
+      case 1:
+        bushingBetween(last, child);
+        break;
       default:
         for (int n = 0; n < (b.planar ? 2 : 4); n++) springBetween(last, child);
       }
@@ -56,19 +85,27 @@ public:
   {
     std::vector<std::size_t> may;
     for (std::size_t k = 0; k < b.held.size(); k++)
-      if (b.held[k].free && (b.held[k].kind == Held::Revolute || b.held[k].kind == Held::Translational || b.held[k].kind == Held::Cylindrical)) may.push_back(k);
+      if (b.held[k].free && (b.held[k].kind == Held::Revolute || b.held[k].kind == Held::Translational ||
+                             b.held[k].kind == Held::Cylindrical))
+        may.push_back(k);
     if (may.empty()) return;
-    Held      &h    = b.held[may[(std::size_t)r.integer(0, (int)may.size() - 1)]];
-    const bool turn = h.kind == Held::Revolute || (h.kind == Held::Cylindrical && r.chance(0.5));
-    h.free          = false;
-    b.project       = true;
+    Held      &h         = b.held[may[(std::size_t)r.integer(0, (int)may.size() - 1)]];
+    const bool turn      = h.kind == Held::Revolute || (h.kind == Held::Cylindrical && r.chance(0.5));
+    h.free               = false;
+    b.project            = true;
     const double   reach = turn ? r.uniform(0.2, 1.5) : b.length * r.uniform(0.1, 0.5);
     const MotionOf of    = (MotionOf)r.choose({3, 1, 1});
-    b.used[of == MotionOf::Displacement ? "motion by displacement" : of == MotionOf::Velocity ? "motion by velocity" : "motion by acceleration"]++;
+    b.used[of == MotionOf::Displacement ? "motion by displacement"
+           : of == MotionOf::Velocity   ? "motion by velocity"
+                                        : "motion by acceleration"]++;
     const double rate = 2 * M_PI / b.period;
-    TimeFunction f    = of == MotionOf::Displacement ? motion(reach) : motion(reach * rate * (of == MotionOf::Acceleration ? 0.5 * rate : 1));
-    if (turn) b.scene.add("", RotationalMotion{h.i, h.j, f, of});
-    else b.scene.add("", TranslationalMotion{h.i, h.j, f, of, b.planar ? 0 : 2});
+    TimeFunction f    = of == MotionOf::Displacement
+                            ? motion(reach)
+                            : motion(reach * rate * (of == MotionOf::Acceleration ? 0.5 * rate : 1));
+    if (turn)
+      b.scene.add("", RotationalMotion{h.i, h.j, f, of});
+    else
+      b.scene.add("", TranslationalMotion{h.i, h.j, f, of, b.planar ? 0 : 2});
   }
 
   /* zero at t = 0, of every kind of function */
@@ -76,12 +113,17 @@ public:
   {
     const double T = b.period, w = 2 * M_PI / T * r.uniform(0.3, 2);
     switch (r.choose({3, 1, 2, 1, 1, 1})) {
-    case 0: return TimeFunction::harmonic(reach, w);
-    case 1: return TimeFunction::polynomial({0, reach / T, -0.3 * reach / (T * T)});
-    case 2: return TimeFunction::step(0.1 * T, 0, (0.1 + r.uniform(0.3, 1)) * T, reach);
-    case 3: return TimeFunction::spline({0, 0.4 * T, 0.9 * T, 1.7 * T, 3 * T}, {0, 0.5 * reach, -0.2 * reach, reach, 0});
+    case 0:
+      return TimeFunction::harmonic(reach, w);
+    case 1:
+      return TimeFunction::polynomial({0, reach / T, -0.3 * reach / (T * T)});
+    case 2:
+      return TimeFunction::step(0.1 * T, 0, (0.1 + r.uniform(0.3, 1)) * T, reach);
+    case 3:
+      return TimeFunction::spline({0, 0.4 * T, 0.9 * T, 1.7 * T, 3 * T}, {0, 0.5 * reach, -0.2 * reach, reach, 0});
     case 4:
-      return TimeFunction::formula([=](const TimeFunction::Number &t) -> TimeFunction::Number { return reach * sin(w * t) * sin(w * t); });
+      return TimeFunction::formula(
+          [=](const TimeFunction::Number &t) -> TimeFunction::Number { return reach * sin(w * t) * sin(w * t); });
     default:
       return TimeFunction::values([=](double t) -> TimeFunction::Value {
         return {reach * (1 - std::cos(w * t)), reach * w * std::sin(w * t), reach * w * w * std::cos(w * t)};
@@ -105,11 +147,15 @@ private:
     const Vector3 x = b.on(c);
     Vector3       y = b.on(a);
     if (a == 0) y = x + b.length * r.uniform(0.5, 2) * b.direction();
-    for (int k = 0; k < 10 && (x - y).norm() < b.length / 3; k++) y = b.placed[a].point || b.placed[a].flexible ? y : Vector3(b.on(a) + 0.5 * b.length * b.direction());
+    for (int k = 0; k < 10 && (x - y).norm() < b.length / 3; k++)
+      y = b.placed[a].point || b.placed[a].flexible ? y : Vector3(b.on(a) + 0.5 * b.length * b.direction());
     i = b.at(c, x);
     j = b.at(a, y);
   }
-  bool apart(Marker i, Marker j) { return (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm() > 0.1 * b.length; }
+  bool apart(Marker i, Marker j)
+  {
+    return (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm() > 0.1 * b.length;
+  }
 
   void springBetween(int a, int c)
   {
@@ -121,7 +167,11 @@ private:
     /* strained by what keeps forces near weights */
     const double strain = b.weight(c) / s.k * r.uniform(-0.5, 0.5);
     const bool   zero   = r.chance(0.1) && s.omega * b.period < 40;
-    b.scene.add("", SpringDamper{i, j, s.k, s.c, zero ? 0 : r.chance(0.5) ? -1 : std::max(0.2 * distance, distance + strain), 0, b.state()});
+    b.scene.add("", SpringDamper{i, j, s.k, s.c,
+                                 zero            ? 0
+                                 : r.chance(0.5) ? -1
+                                                 : std::max(0.2 * distance, distance + strain),
+                                 0, b.state()});
   }
   void spring()
   {
@@ -138,8 +188,13 @@ private:
     ends(a, c, i, j);
     if (!apart(i, j)) return;
     const Stiff  s = b.stiff(b.lighter(a, c));
-    const double l = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(), hard = 1 / (b.length * b.length), k = s.k, d = s.c;
-    b.scene.add("", NonlinearSpring{i, j, [=](const Real &x, const Real &v) -> Real { return k * (x - l) * (1. + hard * (x - l) * (x - l)) + d * v; }, b.state()});
+    const double l = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(), hard = 1 / (b.length * b.length),
+                 k = s.k, d = s.c;
+    b.scene.add("", NonlinearSpring{i, j,
+                                    [=](const Real &x, const Real &v) -> Real {
+                                      return k * (x - l) * (1. + hard * (x - l) * (x - l)) + d * v;
+                                    },
+                                    b.state()});
   }
 
   const Held *revolute()
@@ -154,7 +209,9 @@ private:
     const Held *h = revolute();
     if (!h) return;
     const Stiff s = b.stiff(0.08 * h->mass * h->size * h->size);
-    b.scene.add("", TorsionalSpringDamper{h->i, h->j, s.k, s.c, r.chance(0.5) ? 0 : r.uniform(-1, 1) * std::min(1., 10 / (s.omega * b.period)), 0, b.state()});
+    b.scene.add("", TorsionalSpringDamper{
+                        h->i, h->j, s.k, s.c,
+                        r.chance(0.5) ? 0 : r.uniform(-1, 1) * std::min(1., 10 / (s.omega * b.period)), 0, b.state()});
   }
   void nonlinearTorsion()
   {
@@ -162,7 +219,9 @@ private:
     if (!h) return;
     const Stiff  s = b.stiff(0.08 * h->mass * h->size * h->size);
     const double k = s.k, c = s.c;
-    b.scene.add("", NonlinearTorsionalSpring{h->i, h->j, [=](const Real &x, const Real &v) -> Real { return -k * sin(x) - c * v; }, b.state()});
+    b.scene.add("", NonlinearTorsionalSpring{h->i, h->j,
+                                             [=](const Real &x, const Real &v) -> Real { return -k * sin(x) - c * v; },
+                                             b.state()});
   }
 
   void bushingBetween(int a, int c)
@@ -194,7 +253,7 @@ private:
   void beamBetween(int a, int c)
   {
     if (b.placed[c].point || b.placed[a].point) return;
-    const Vector3 to = b.placed[c].at;
+    const Vector3 to   = b.placed[c].at;
     Vector3       from = b.placed[a].at;
     if (a == 0) from = to + b.length * r.uniform(0.7, 1.5) * b.direction();
     const double l = (to - from).norm();
@@ -240,13 +299,21 @@ private:
     pair(a, c);
     ends(a, c, i, j);
     if (!apart(i, j)) return;
-    const double l = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(), tau = b.period * r.logarithmic(0.01, 0.3), w = 2 * M_PI / b.period;
+    const double l   = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(),
+                 tau = b.period * r.logarithmic(0.01, 0.3), w = 2 * M_PI / b.period;
     const double gain = b.weight(c) / b.length * r.uniform(0.5, 2);
-    const State  x    = b.scene.state("", Expression{{Measure::distance(i, j), Measure::time(), Measure::value(State{(PetscInt)b.scene.data().states.size()})},
-                                                     [=](const Real *m) -> Real { return (l * (1. + 0.2 * sin(w * m[1])) - m[0] - m[2]) / tau; }},
-                                      0);
+    const State  x    = b.scene.state(
+            "",
+            Expression{
+            {Measure::distance(i, j), Measure::time(), Measure::value(State{(PetscInt)b.scene.data().states.size()})},
+            [=](const Real *m) -> Real { return (l * (1. + 0.2 * sin(w * m[1])) - m[0] - m[2]) / tau; }},
+            0);
     states.push_back(x);
-    b.scene.add("", UserScalarForce{i, j, Expression{{Measure::value(x), Measure::rate(i, j)}, [=](const Real *m) -> Real { return gain * m[0] - 0.05 * gain / w * m[1]; }}, false, b.state(0.4)});
+    b.scene.add("",
+                UserScalarForce{i, j,
+                                Expression{{Measure::value(x), Measure::rate(i, j)},
+                                           [=](const Real *m) -> Real { return gain * m[0] - 0.05 * gain / w * m[1]; }},
+                                false, b.state(0.4)});
   }
 
   /* quadratic drag, written with expressions; a force without reaction */
@@ -258,7 +325,8 @@ private:
     UserForce    f;
     f.i = i;
     for (int d = 0; d < 3; d++)
-      f.force.push_back(Expression{{Measure::velocity(i, 0), Measure::velocity(i, 1), Measure::velocity(i, 2)}, [=](const Real *m) -> Real {
+      f.force.push_back(Expression{{Measure::velocity(i, 0), Measure::velocity(i, 1), Measure::velocity(i, 2)},
+                                   [=](const Real *m) -> Real {
                                      const Real speed = sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + 1e-4 * v * v);
                                      return -k * speed * m[d];
                                    }});
@@ -270,28 +338,40 @@ private:
   {
     const Held *h = revolute();
     if (!h) return;
-    const double w = 2 * M_PI / b.period * r.uniform(0.5, 3), M = 0.1 * h->mass * h->size * b.weightPerMass() * r.uniform(-1, 1);
-    b.scene.add("", UserScalarForce{h->i, h->j, Expression{{Measure::time(), Measure::angle(h->i, h->j)}, [=](const Real *m) -> Real { return M * sin(w * m[0]) - 0.3 * std::abs(M) * sin(m[1]); }}, true, b.state(0.4)});
+    const double w = 2 * M_PI / b.period * r.uniform(0.5, 3),
+                 M = 0.1 * h->mass * h->size * b.weightPerMass() * r.uniform(-1, 1);
+    b.scene.add("", UserScalarForce{h->i, h->j,
+                                    Expression{{Measure::time(), Measure::angle(h->i, h->j)},
+                                               [=](const Real *m) -> Real {
+                                                 return M * sin(w * m[0]) - 0.3 * std::abs(M) * sin(m[1]);
+                                               }},
+                                    true, b.state(0.4)});
   }
 
   /* a variable that other expressions use; now and then of accelerations or reactions */
   void alias()
   {
-    const int      c = b.anyBody();
-    const Marker   i = b.at(c, b.placed[c].at);
-    const double   v = b.length / b.period, m0 = b.placed[c].mass;
-    const int      kind = r.choose({2, 1, lastJoint().id < 0 ? 0. : 1});
-    Expression     e;
-    if (kind == 0) e = Expression{{Measure::velocity(i, 0), Measure::velocity(i, 1)}, [=](const Real *m) -> Real { return v * tanh((m[0] + m[1]) / v); }};
-    else if (kind == 1) e = Expression{{Measure::acceleration(i, 0)}, [=](const Real *m) -> Real { return 0.05 * m[0]; }};
-    else e = Expression{{Measure::jointForce(lastJoint(), 0)}, [=](const Real *m) -> Real { return 0.02 / m0 * m[0]; }};
+    const int    c = b.anyBody();
+    const Marker i = b.at(c, b.placed[c].at);
+    const double v = b.length / b.period, m0 = b.placed[c].mass;
+    const int    kind = r.choose({2, 1, lastJoint().id < 0 ? 0. : 1});
+    Expression   e;
+    if (kind == 0)
+      e = Expression{{Measure::velocity(i, 0), Measure::velocity(i, 1)},
+                     [=](const Real *m) -> Real { return v * tanh((m[0] + m[1]) / v); }};
+    else if (kind == 1)
+      e = Expression{{Measure::acceleration(i, 0)}, [=](const Real *m) -> Real { return 0.05 * m[0]; }};
+    else
+      e = Expression{{Measure::jointForce(lastJoint(), 0)}, [=](const Real *m) -> Real { return 0.02 / m0 * m[0]; }};
     const Variable V = b.scene.variable("", e, 0);
     variables.push_back(V);
     b.used[kind == 0 ? "variable of velocities" : kind == 1 ? "variable of accelerations" : "variable of reactions"]++;
     const double k = kind == 0 ? 0.2 * m0 / b.period : 0.5 * m0;
     UserForce    f;
     f.i = i;
-    for (int d = 0; d < 3; d++) f.force.push_back(Expression{{Measure::value(V)}, [=](const Real *m) -> Real { return (d == 0 ? -k : 0.) * m[0]; }});
+    for (int d = 0; d < 3; d++)
+      f.force.push_back(
+          Expression{{Measure::value(V)}, [=](const Real *m) -> Real { return (d == 0 ? -k : 0.) * m[0]; }});
     b.scene.add("", f);
   }
   Element lastJoint()
@@ -310,8 +390,12 @@ private:
     if (b.placed[a].point || b.placed[a].flexible || b.placed[c].point) return;
     const double F = 0.3 * b.weight(c) * r.uniform(-1, 1), w = 2 * M_PI / b.period;
     UserForce    f{i, j, i, {}, {}, false};
-    for (int d = 0; d < 3; d++) f.force.push_back(Expression{{Measure::time()}, [=](const Real *m) -> Real { return (d == 0 ? F : 0.) * cos(w * m[0]); }});
-    for (int d = 0; d < 3; d++) f.moment.push_back(Expression{{Measure::time()}, [=](const Real *m) -> Real { return (d == 2 ? 0.05 * F : 0.) * sin(w * m[0]); }});
+    for (int d = 0; d < 3; d++)
+      f.force.push_back(
+          Expression{{Measure::time()}, [=](const Real *m) -> Real { return (d == 0 ? F : 0.) * cos(w * m[0]); }});
+    for (int d = 0; d < 3; d++)
+      f.moment.push_back(Expression{{Measure::time()},
+                                    [=](const Real *m) -> Real { return (d == 2 ? 0.05 * F : 0.) * sin(w * m[0]); }});
     f.state = b.state(0.3);
     b.scene.add("", f);
   }

@@ -10,32 +10,41 @@ namespace soak
 class Machines
 {
 public:
-  Machines(Builder &builder, const std::vector<ReducedPart> &parts) : b(builder), r(builder.random), trees_(builder), parts_(parts) {}
+  Machines(Builder &builder, const std::vector<ReducedPart> &parts)
+      : b(builder), r(builder.random), trees_(builder), parts_(parts)
+  {
+  }
 
   /* two or three bodies on one base, their motions coupled */
   int couple()
   {
-    const int              base = b.bodies() && r.chance(0.4) ? b.anyRigid() : 0;
-    const int              kind = r.choose({2, 2, 2});
-    std::vector<bool>      turns;
-    if (kind == 0) turns = {true, true};
-    else if (kind == 1) turns = {true, false};
+    const int         base = b.bodies() && r.chance(0.4) ? b.anyRigid() : 0;
+    const int         kind = r.choose({2, 2, 2});
+    std::vector<bool> turns;
+    if (kind == 0)
+      turns = {true, true};
+    else if (kind == 1)
+      turns = {true, false};
     else
       for (int k = r.integer(2, 3); k > 0; k--) turns.push_back(r.chance(0.6));
     std::vector<Coupler::Term> terms;
     for (bool t : turns) {
-      const std::size_t at = b.held.size();
-      const Vector3     x  = b.placed[base].at + b.length * r.uniform(1, 2) * b.direction();
+      const std::size_t at    = b.held.size();
+      const Vector3     x     = b.placed[base].at + b.length * r.uniform(1, 2) * b.direction();
       const int         child = b.addBody(x);
-      trees_.hold(t ? t && !b.planar && kind == 2 && r.chance(0.2) ? Held::Cylindrical : Held::Revolute : Held::Translational, base, child,
-                  x + 0.2 * b.length * b.direction(), b.axes(), false);
+      trees_.hold(t ? t && !b.planar && kind == 2 && r.chance(0.2) ? Held::Cylindrical : Held::Revolute
+                    : Held::Translational,
+                  base, child, x + 0.2 * b.length * b.direction(), b.axes(), false);
       terms.push_back({b.held[at].i, b.held[at].j, t, (t ? b.length : 1) * r.sign() * r.uniform(0.3, 2)});
       if (b.held[at].kind == Held::Cylindrical || r.chance(0.3)) spring(base, child);
     }
     const double ratio = r.sign() * r.logarithmic(0.2, 5);
-    if (kind == 0) b.scene.add("", Gear{terms[0].i, terms[0].j, terms[1].i, terms[1].j, ratio});
-    else if (kind == 1) b.scene.add("", RackAndPinion{terms[0].i, terms[0].j, terms[1].i, terms[1].j, 0.5 * b.length * ratio / 2});
-    else b.scene.add("", Coupler{terms});
+    if (kind == 0)
+      b.scene.add("", Gear{terms[0].i, terms[0].j, terms[1].i, terms[1].j, ratio});
+    else if (kind == 1)
+      b.scene.add("", RackAndPinion{terms[0].i, terms[0].j, terms[1].i, terms[1].j, 0.5 * b.length * ratio / 2});
+    else
+      b.scene.add("", Coupler{terms});
     return (int)turns.size();
   }
 
@@ -43,10 +52,11 @@ public:
   int roll()
   {
     const double  radius = b.length * r.uniform(0.2, 0.8);
-    const Matrix3 plane = level();
-    const Vector3 touch = b.planar ? Vector3(r.uniform(-2, 2) * b.length, 0, 0) : Vector3(plane * Vector3(r.uniform(-2, 2), r.uniform(-2, 2), 0) * b.length);
+    const Matrix3 plane  = level();
+    const Vector3 touch  = b.planar ? Vector3(r.uniform(-2, 2) * b.length, 0, 0)
+                                    : Vector3(plane * Vector3(r.uniform(-2, 2), r.uniform(-2, 2), 0) * b.length);
     const double  m = b.mass * r.logarithmic(0.3, 3), I = 0.4 * m * radius * radius;
-    b.project = b.project || b.speed > 0;
+    b.project           = b.project || b.speed > 0;
     const Marker ground = b.at(0, touch, plane);
     if (b.planar) {
       const int ball = b.addBody(touch + radius * b.up, b.axes(), m, radius, Matrix3::Identity() * I);
@@ -59,7 +69,8 @@ public:
       b.scene.add("", RollingSphere{b.at(ball, b.placed[ball].at), ground, radius});
       return 1 + (r.chance(0.4) ? load(ball) : 0);
     }
-    case 1: return disc(touch, plane, ground, m, radius);
+    case 1:
+      return disc(touch, plane, ground, m, radius);
     default: {
       const int sleigh = b.addBody(touch, plane);
       b.scene.add("", KnifeEdge{b.at(sleigh, touch + 0.3 * b.length * plane.col(0), plane), ground});
@@ -74,24 +85,33 @@ public:
     const double size = b.length * r.uniform(0.2, 0.6);
     const double m    = b.mass * r.logarithmic(0.3, 3);
     switch (b.planar ? r.choose({2, 2, 0, 2, 2}) : r.choose({2, 2, 2, 2, 2})) {
-    case 0: return spheres(m, size, false);
-    case 1: return ellipsoid(m, size);
-    case 2: return tire(m, size);
-    case 3: return spheres(m, size, true);
-    default: return onBox(m, size);
+    case 0:
+      return spheres(m, size, false);
+    case 1:
+      return ellipsoid(m, size);
+    case 2:
+      return tire(m, size);
+    case 3:
+      return spheres(m, size, true);
+    default:
+      return onBox(m, size);
     }
   }
 
   /* a table that is moved along two or three axes and does not turn */
   int shaker(const std::function<TimeFunction()> &motion)
   {
-    const Vector3 x = 2 * b.length * b.direction();
+    const Vector3 x     = 2 * b.length * b.direction();
     const int     table = b.addBody(x);
-    const Matrix3 R = b.axes();
+    const Matrix3 R     = b.axes();
     const Marker  i = b.at(table, x, R), j = b.at(0, x, R);
-    if (b.planar) b.scene.add("", RotationalMotion{i, j, TimeFunction(0)});
-    else b.scene.add("", Orientation{i, j});
-    for (int axis = 0; axis < (b.planar ? 2 : 3); axis++) b.scene.add("", TranslationalMotion{i, j, r.chance(0.4) ? TimeFunction(0) : motion(), MotionOf::Displacement, axis});
+    if (b.planar)
+      b.scene.add("", RotationalMotion{i, j, TimeFunction(0)});
+    else
+      b.scene.add("", Orientation{i, j});
+    for (int axis = 0; axis < (b.planar ? 2 : 3); axis++)
+      b.scene.add("",
+                  TranslationalMotion{i, j, r.chance(0.4) ? TimeFunction(0) : motion(), MotionOf::Displacement, axis});
     b.used["shaker"]++;
     b.project = true;
     return 1;
@@ -99,22 +119,23 @@ public:
 
   int flexible()
   {
-    const ReducedPart    part = parts_[(std::size_t)r.integer(0, (int)parts_.size() - 1)];
-    const int     base = b.bodies() && r.chance(0.4) ? b.anyRigid() : 0;
-    const Matrix3 R = r.rotation();
-    const Vector3 hub = b.placed[base].at + b.length * r.direction();
-    FlexibleBody  f;
-    f.model    = part;
-    f.rotation = R;
-    f.position = hub - R * part->attachments[0].position;
-    f.mass     = r.choose({3, 1}) ? ModalMass::Partial : ModalMass::Full;
-    f.damping  = {{100, r.logarithmic(0.005, 0.05)}, {1e9, r.logarithmic(0.02, 0.2)}};
-    f.velocity = b.startVelocity();
-    f.angular_velocity = b.startSpin();
+    const ReducedPart part = parts_[(std::size_t)r.integer(0, (int)parts_.size() - 1)];
+    const int         base = b.bodies() && r.chance(0.4) ? b.anyRigid() : 0;
+    const Matrix3     R    = r.rotation();
+    const Vector3     hub  = b.placed[base].at + b.length * r.direction();
+    FlexibleBody      f;
+    f.model               = part;
+    f.rotation            = R;
+    f.position            = hub - R * part->attachments[0].position;
+    f.mass                = r.choose({3, 1}) ? ModalMass::Partial : ModalMass::Full;
+    f.damping             = {{100, r.logarithmic(0.005, 0.05)}, {1e9, r.logarithmic(0.02, 0.2)}};
+    f.velocity            = b.startVelocity();
+    f.angular_velocity    = b.startSpin();
     const Body       body = b.scene.add("", f);
     std::vector<int> frame;
     for (const ModalAttachment &a : part->attachments) {
-      const Placed p{b.scene.attachment(body, a.name), f.position + R * a.position, R, part->mass / 3, 0.5, false, true};
+      const Placed p{
+          b.scene.attachment(body, a.name), f.position + R * a.position, R, part->mass / 3, 0.5, false, true};
       frame.push_back(b.enter(p));
     }
     b.used["flexible body"]++;
@@ -127,15 +148,16 @@ public:
   std::vector<Body> modal;
 
 private:
-  Builder                 &b;
-  Random                  &r;
-  Trees                    trees_;
+  Builder                        &b;
+  Random                         &r;
+  Trees                           trees_;
   const std::vector<ReducedPart> &parts_;
 
   void spring(int a, int c)
   {
     const Stiff s = b.stiff(b.lighter(a, c));
-    b.scene.add("", SpringDamper{b.at(c, b.on(c)), b.at(a, b.placed[c].at + 1.5 * b.length * b.direction()), s.k, s.c, -1, 0, b.state()});
+    b.scene.add("", SpringDamper{b.at(c, b.on(c)), b.at(a, b.placed[c].at + 1.5 * b.length * b.direction()), s.k, s.c,
+                                 -1, 0, b.state()});
   }
 
   /* axes of a plane whose normal points up; planar: a line along x */
@@ -150,7 +172,8 @@ private:
   {
     const Vector3 x     = b.placed[on].at + b.length * b.direction();
     const int     child = b.addBody(x);
-    trees_.hold(b.planar || r.chance(0.5) ? Held::Revolute : Held::Spherical, on, child, b.placed[on].at, b.axes(), true);
+    trees_.hold(b.planar || r.chance(0.5) ? Held::Revolute : Held::Spherical, on, child, b.placed[on].at, b.axes(),
+                true);
     return 1;
   }
 
@@ -158,9 +181,10 @@ private:
   int disc(const Vector3 &touch, const Matrix3 &plane, Marker ground, double m, double radius)
   {
     const double  lean = r.uniform(-0.2, 0.2), g = b.gravity.norm() + 0.1 * b.length / (b.period * b.period);
-    const Matrix3 R = plane * Eigen::AngleAxisd(lean, Vector3::UnitX()).toRotationMatrix();
-    const Vector3 axis = R.col(1), upward = (plane.col(2) - plane.col(2).dot(axis) * axis).normalized(), center = touch + radius * upward;
-    Matrix3       A;
+    const Matrix3 R    = plane * Eigen::AngleAxisd(lean, Vector3::UnitX()).toRotationMatrix();
+    const Vector3 axis = R.col(1), upward = (plane.col(2) - plane.col(2).dot(axis) * axis).normalized(),
+                  center = touch + radius * upward;
+    Matrix3 A;
     A << R.col(0), upward, R.col(0).cross(upward);
     RigidBody d;
     d.mass             = m;
@@ -179,7 +203,7 @@ private:
   {
     const double g = std::max(b.gravity.norm(), b.length / (b.period * b.period));
     ContactLaw   c;
-    c.exponent      = r.choose({2, 1, 1}) == 0 ? 1.5 : r.uniform(1, 2.2);
+    c.exponent = r.choose({2, 1, 1}) == 0 ? 1.5 : r.uniform(1, 2.2);
     if (r.chance(0.2)) c.exponent = 1;
     c.stiffness     = m * g / std::pow(size * r.logarithmic(1e-3, 2e-2), c.exponent);
     c.damping       = r.chance(0.7) ? r.uniform(0.05, 1) / std::sqrt(g * b.length) : 0;
@@ -202,12 +226,12 @@ private:
   {
     const Vector3 x = place();
     const Matrix3 R = plane(), I = Matrix3::Identity() * (0.4 * m * size * size);
-    const int     below = b.addBody(x, b.axes(), m, size, I);
+    const int     below  = b.addBody(x, b.axes(), m, size, I);
     const Marker  center = b.at(below, x);
     b.scene.add("", SpherePlane{center, b.at(0, x - (size + gap(size)) * normal(R), R), size, law(m, size), b.state()});
     if (!two) return 1;
     const double  other = size * r.uniform(0.5, 1);
-    const Vector3 off   = (normal(R) + 0.3 * b.direction()).normalized(), y = x + (size + other + gap(size)) * off;
+    const Vector3 off = (normal(R) + 0.3 * b.direction()).normalized(), y = x + (size + other + gap(size)) * off;
     const int     above = b.addBody(y, b.axes(), m, other, Matrix3::Identity() * (0.4 * m * other * other));
     b.scene.add("", SphereSphere{b.at(above, y), center, other, size, law(m, other), b.state()});
     return 2;
@@ -218,20 +242,23 @@ private:
     const Vector3 x = place();
     const Matrix3 R = plane(), A = b.axes();
     Vector3       s = size * Vector3(1, r.uniform(0.5, 1), r.uniform(0.5, 1)), e = 2 * s / std::sqrt(5. / 3);
-    const int     body = b.addBody(x, A, m, size, Builder::inertiaOfBox(m, e));
-    const Vector3 n = A.transpose() * normal(R);
+    const int     body  = b.addBody(x, A, m, size, Builder::inertiaOfBox(m, e));
+    const Vector3 n     = A.transpose() * normal(R);
     const double  reach = std::sqrt(s.cwiseProduct(n).squaredNorm());
-    b.scene.add("", EllipsoidPlane{b.at(body, x, A), b.at(0, x - (reach + gap(size)) * normal(R), R), s, law(m, size), b.state()});
+    b.scene.add("", EllipsoidPlane{b.at(body, x, A), b.at(0, x - (reach + gap(size)) * normal(R), R), s, law(m, size),
+                                   b.state()});
     return 1;
   }
 
   int tire(double m, double size)
   {
-    const Vector3 x = place();
-    const Matrix3 R = plane(), A = R * Eigen::AngleAxisd(M_PI / 2 + r.uniform(-0.3, 0.3), Vector3::UnitX()).toRotationMatrix();
-    const double  tube = size * r.uniform(0.1, 0.3);
-    const int     wheel = b.addBody(x, A, m, size, Vector3(0.3, 0.3, 0.5).asDiagonal() * (m * size * size));
-    b.scene.add("", TorusPlane{b.at(wheel, x, A), b.at(0, x - (size + tube + gap(size)) * R.col(2), R), size, tube, law(m, size), b.state()});
+    const Vector3 x    = place();
+    const Matrix3 R    = plane(),
+                  A    = R * Eigen::AngleAxisd(M_PI / 2 + r.uniform(-0.3, 0.3), Vector3::UnitX()).toRotationMatrix();
+    const double tube  = size * r.uniform(0.1, 0.3);
+    const int    wheel = b.addBody(x, A, m, size, Vector3(0.3, 0.3, 0.5).asDiagonal() * (m * size * size));
+    b.scene.add("", TorusPlane{b.at(wheel, x, A), b.at(0, x - (size + tube + gap(size)) * R.col(2), R), size, tube,
+                               law(m, size), b.state()});
     return 1;
   }
 
@@ -240,10 +267,11 @@ private:
   {
     const Vector3 x = place(), half = size * Vector3(r.uniform(1, 3), r.uniform(1, 3), r.uniform(1, 3));
     const Matrix3 R = plane();
-    const Vector3 y = x - (size + gap(size) + (b.planar ? half(1) : half(2))) * normal(R) + 0.3 * size * (b.planar ? R.col(0) : R.col(1));
-    const int     ball = b.addBody(x, b.axes(), m, size, Matrix3::Identity() * (0.4 * m * size * size));
-    const bool    hung = r.chance(0.5);
-    const int     box  = hung ? b.addBody(y, R, 3 * m, size, Builder::inertiaOfBox(3 * m, 2 * half)) : 0;
+    const Vector3 y = x - (size + gap(size) + (b.planar ? half(1) : half(2))) * normal(R) +
+                      0.3 * size * (b.planar ? R.col(0) : R.col(1));
+    const int  ball = b.addBody(x, b.axes(), m, size, Matrix3::Identity() * (0.4 * m * size * size));
+    const bool hung = r.chance(0.5);
+    const int  box  = hung ? b.addBody(y, R, 3 * m, size, Builder::inertiaOfBox(3 * m, 2 * half)) : 0;
     if (hung) {
       const Stiff  s = b.stiff(3 * m);
       const double I = m * half.squaredNorm();
@@ -264,15 +292,16 @@ private:
     if (r.chance(0.4)) {
       const Marker i = b.at(frame, x, R), j = b.at(base, x, R);
       b.scene.add("", Fixed{i, j});
-    } else trees_.hold(r.chance(0.6) ? Held::Revolute : Held::Spherical, base, frame, x, R, true);
+    } else
+      trees_.hold(r.chance(0.6) ? Held::Revolute : Held::Spherical, base, frame, x, R, true);
   }
   void tip(int frame, double m)
   {
     const double  before = b.mass;
-    const Vector3 x = b.placed[frame].at;
-    b.mass           = m * r.logarithmic(0.1, 1);
-    const int child  = b.addBody(x + 0.3 * b.length * r.direction());
-    b.mass           = before;
+    const Vector3 x      = b.placed[frame].at;
+    b.mass               = m * r.logarithmic(0.1, 1);
+    const int child      = b.addBody(x + 0.3 * b.length * r.direction());
+    b.mass               = before;
     trees_.hold(r.chance(0.6) ? Held::Revolute : Held::Spherical, frame, child, x, r.rotation(), true);
   }
 };

@@ -25,19 +25,21 @@ inline PetscErrorCode MakePart(const PartPlan &plan, const std::string &name, Re
   hhtdae::ReducedBody body;
   PetscFunctionBegin;
   hhtest::BoxBuilder builder(plan.box, &model);
-  const double      *size = plan.box.size;
-  const double       half = 1.01 * size[0] / plan.box.n[0];
-  reduction.attachments   = {hhtdae::Attachment(), hhtdae::Attachment()};
+  const double      *size       = plan.box.size;
+  const double       half       = 1.01 * size[0] / plan.box.n[0];
+  reduction.attachments         = {hhtdae::Attachment(), hhtdae::Attachment()};
   reduction.attachments[0].name = "left";
   reduction.attachments[1].name = "right";
   if (plan.middle) {
-    builder.addSet("middle", [&](const hhtdae::Vector3 &x) { return std::abs(x[0] - size[0] / 2) < half && x[2] > 0.99 * size[2]; });
+    builder.addSet("middle", [&](const hhtdae::Vector3 &x) {
+      return std::abs(x[0] - size[0] / 2) < half && x[2] > 0.99 * size[2];
+    });
     reduction.attachments.emplace_back();
     reduction.attachments.back().name = "middle";
     reduction.attachments.back().tie  = hhtdae::Tie::Average;
   }
-  reduction.modes      = plan.modes;
-  reduction.all_nodes  = false;
+  reduction.modes     = plan.modes;
+  reduction.all_nodes = false;
   PetscCall(hhtdae::Reduce(model, reduction, &body));
   body.modal.name = name;
   *part           = std::make_shared<hhtdae::ModalBody>(body.modal);
@@ -54,7 +56,8 @@ inline PetscErrorCode MakeParts(std::vector<ReducedPart> *parts)
                                        {{{8, 1, 1}, {0.5, 0.1, 0.08}, rubber}, true, 2}};
   PetscFunctionBegin;
   parts->resize(plans.size());
-  for (std::size_t k = 0; k < plans.size(); k++) PetscCall(MakePart(plans[k], "part " + std::to_string(k), &(*parts)[k]));
+  for (std::size_t k = 0; k < plans.size(); k++)
+    PetscCall(MakePart(plans[k], "part " + std::to_string(k), &(*parts)[k]));
   PetscFunctionReturn(0);
 }
 

@@ -1,6 +1,6 @@
 /*
-  Every model in a process of its own, several at a time: a crash or an endless loop is counted, and the others go on. Outcomes are
-  in memory that the processes share, written as they come about.
+  Every model in a process of its own, several at a time: a crash or an endless loop is counted, and the others go on.
+  Outcomes are in memory that the processes share, written as they come about.
 */
 #ifndef HHTDAE_SOAK_MODEL_POOL_H
 #define HHTDAE_SOAK_MODEL_POOL_H
@@ -26,8 +26,9 @@ public:
 
   explicit Pool(int count) : count_(count)
   {
-    void *memory = mmap(nullptr, sizeof(Outcome) * (std::size_t)count, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    outcome_     = memory == MAP_FAILED ? nullptr : static_cast<Outcome *>(memory);
+    void *memory =
+        mmap(nullptr, sizeof(Outcome) * (std::size_t)count, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    outcome_ = memory == MAP_FAILED ? nullptr : static_cast<Outcome *>(memory);
   }
   ~Pool()
   {
@@ -48,7 +49,8 @@ public:
         outcome_[next].number = first + next;
         std::fflush(nullptr);
         const pid_t child = fork();
-        PetscCheck(child >= 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "No process for model %ld could be started", first + next);
+        PetscCheck(child >= 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "No process for model %ld could be started",
+                   first + next);
         if (child == 0) child_(next, seconds, quiet, work);
         running[child] = next++;
       }
@@ -96,12 +98,16 @@ private:
   static void conclude(Outcome &o, int status)
   {
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && o.stage == Done) return;
-    const bool        killed = WIFSIGNALED(status), late = killed && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGALRM || WTERMSIG(status) == SIGKILL);
+    const bool killed = WIFSIGNALED(status),
+               late   = killed &&
+                      (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGALRM || WTERMSIG(status) == SIGKILL);
     const std::string before = o.message;
-    o.verdict                = late ? Hung : Crashed;
+    o.verdict                = !late ? Crashed : o.stage == Referring || o.stage == Judging ? Unknown : Hung;
     SetText(o.message, sizeof o.message,
-            std::string(late ? "not at an end in time" : killed ? std::string("signal ") + strsignal(WTERMSIG(status)) : "ended by itself") + ", in " + stage_name[o.stage] +
-                (before.empty() ? "" : ": " + before));
+            std::string(late     ? "not at an end in time"
+                        : killed ? std::string("signal ") + strsignal(WTERMSIG(status))
+                                 : "ended by itself") +
+                ", in " + stage_name[o.stage] + (before.empty() ? "" : ": " + before));
   }
 };
 

@@ -17,7 +17,11 @@ using hhtdae::Vector3;
 class Random
 {
 public:
-  Random(std::uint64_t seed, std::uint64_t number) : state_(seed * 0x9E3779B97F4A7C15ull + number * 0xD1B54A32D192ED03ull) { next(); }
+  Random(std::uint64_t seed, std::uint64_t number)
+      : state_(seed * 0x9E3779B97F4A7C15ull + number * 0xD1B54A32D192ED03ull)
+  {
+    next();
+  }
 
   double uniform(double a = 0, double b = 1) { return a + (b - a) * ((double)(next() >> 11) * 0x1p-53); }
   double logarithmic(double a, double b) { return a * std::pow(b / a, uniform()); }

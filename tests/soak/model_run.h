@@ -12,8 +12,8 @@ namespace soak
 constexpr int samples = 24; /* after the start */
 
 struct Trajectory {
-  std::string                      failure; /* empty: arrived */
-  std::vector<std::vector<double>> x;       /* channels at the sample times, without the start */
+  std::string                      failure;  /* empty: arrived */
+  std::vector<std::vector<double>> x;        /* channels at the sample times, without the start */
   std::vector<long>                steps_at; /* steps so far, at the sample times */
   TSHHT3Statistics                 cost{};
   double                           cpu   = 0;
@@ -41,7 +41,8 @@ public:
 
 private:
   bool                  loud_;
-  static PetscErrorCode keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code, PetscErrorType type, const char *message, void *ctx)
+  static PetscErrorCode keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                             PetscErrorType type, const char *message, void *ctx)
   {
     Quiet *q = static_cast<Quiet *>(ctx);
     if (type == PETSC_ERROR_INITIAL && message && q->message.empty()) q->message = message;
@@ -54,7 +55,7 @@ private:
 struct Settings {
   double eps     = 0; /* 0: as it comes */
   bool   paper   = false;
-  double radius  = -1; /* negative: as it comes */
+  double radius  = -1;    /* negative: as it comes */
   bool   options = false; /* from the command line */
   double seconds = 1e9;
 };

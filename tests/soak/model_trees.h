@@ -1,4 +1,5 @@
-/* Trees of bodies and closed loops: poses first, then joints with markers at one place on both bodies, so that loops close. */
+/* Trees of bodies and closed loops: poses first, then joints with markers at one place on both bodies, so that loops
+ * close. */
 #ifndef HHTDAE_SOAK_MODEL_TREES_H
 #define HHTDAE_SOAK_MODEL_TREES_H
 
@@ -37,19 +38,22 @@ public:
     }
   }
 
-  /* Joints about one normal: four-bars, five-bars, slider-cranks. In space, revolute joints all around say some things twice. */
+  /* Joints about one normal: four-bars, five-bars, slider-cranks. In space, revolute joints all around say some things
+   * twice. */
   int planeLoop()
   {
-    const int     n = r.choose({5, 2, 1}) + 3;
-    const Vector3 start = b.placed[0].at + 2 * b.length * b.direction();
-    const Matrix3 R = b.planar ? Matrix3(Matrix3::Identity()) : b.axesAlong(r.direction());
+    const int            n      = r.choose({5, 2, 1}) + 3;
+    const Vector3        start  = b.placed[0].at + 2 * b.length * b.direction();
+    const Matrix3        R      = b.planar ? Matrix3(Matrix3::Identity()) : b.axesAlong(r.direction());
     std::vector<Vector3> corner = {start};
     for (int k = 0; k < n; k++) { /* a convex polygon, far from flat */
       const double angle = M_PI * (0.15 + 0.9 * k / (n - 1.) + r.uniform(-0.1, 0.1));
-      corner.push_back(corner.back() + R * Vector3(std::cos(angle), std::sin(angle), 0) * b.length * r.uniform(0.6, 1.4));
+      corner.push_back(corner.back() +
+                       R * Vector3(std::cos(angle), std::sin(angle), 0) * b.length * r.uniform(0.6, 1.4));
     }
     std::vector<int> link = {0};
-    for (int k = 0; k < n; k++) link.push_back(b.addBody((corner[k] + corner[k + 1]) / 2, frameIn(R, corner[k + 1] - corner[k])));
+    for (int k = 0; k < n; k++)
+      link.push_back(b.addBody((corner[k] + corner[k + 1]) / 2, frameIn(R, corner[k + 1] - corner[k])));
     for (int k = 0; k < n; k++) hold(Held::Revolute, link[k], link[k + 1], corner[k], R, false);
     closePlane(link.back(), corner, R, r.choose({4, 3, b.planar ? 0. : 1}));
     b.used["plane loop"]++;
@@ -59,8 +63,8 @@ public:
   /* Joints with axes anywhere whose freedoms sum up to seven or more */
   int spaceLoop()
   {
-    const int         n = r.integer(2, 5);
-    std::vector<int>  link = {0};
+    const int            n      = r.integer(2, 5);
+    std::vector<int>     link   = {0};
     std::vector<Vector3> corner = {2 * b.length * r.direction()};
     for (int k = 0; k < n; k++) {
       corner.push_back(corner.back() + b.length * r.uniform(0.7, 1.3) * r.direction());
@@ -70,7 +74,7 @@ public:
     const int missing  = 7 - freedoms;
     for (int k = 0; k < n; k++) {
       const int rest = n - 1 - k, least = missing - (freedoms - 3) - 3 * rest; /* the others may be spherical */
-      const int f    = std::max(least, r.integer(1, 3));
+      const int f = std::max(least, r.integer(1, 3));
       loopJoint(f, link[k], link[k + 1], corner[k]);
       freedoms += f;
     }
@@ -93,7 +97,8 @@ public:
     return 1;
   }
 
-  /* Angular about z_j, or linear along the axis that joints leave free; adds what an element needs to be driven or rubbed */
+  /* Angular about z_j, or linear along the axis that joints leave free; adds what an element needs to be driven or
+   * rubbed */
   Element hold(Held::Kind kind, int parent, int child, const Vector3 &x, const Matrix3 &R, bool free)
   {
     const Marker i = b.at(child, x, R), j = b.at(parent, x, R);
@@ -136,13 +141,18 @@ private:
     const Vector3 x = between(parent, child);
     const Matrix3 R = b.axes();
     switch (r.choose({6, 3, 0.7, 1.5})) {
-    case 0: hold(Held::Revolute, parent, child, x, R, true); return;
+    case 0:
+      hold(Held::Revolute, parent, child, x, R, true);
+      return;
     case 1:
       hold(Held::Translational, parent, child, x, R, true);
       tether(parent, child, x + b.length * R.col(0));
       return;
-    case 2: add<Fixed>(parent, child, x, R); return;
-    default: rod(parent, child);
+    case 2:
+      add<Fixed>(parent, child, x, R);
+      return;
+    default:
+      rod(parent, child);
     }
   }
 
@@ -151,22 +161,53 @@ private:
     const Vector3 x = between(parent, child);
     const Matrix3 R = r.rotation(), across = R * Eigen::AngleAxisd(M_PI / 2, Vector3::UnitX()).toRotationMatrix();
     switch (r.choose({6, 3, 2.5, 2, 2, 1.5, 1, 1.2, 0.7, 1.5, 1.5, 0.6, 0.6, 0.6, 0.6, 0.6})) {
-    case 0: hold(Held::Revolute, parent, child, x, R, true); return;
-    case 1: hold(Held::Spherical, parent, child, x, R, true); return;
-    case 2: hold(Held::Translational, parent, child, x, R, true); break;
-    case 3: hold(Held::Cylindrical, parent, child, x, R, true); break;
-    case 4: add<Universal>(parent, child, x, R, across); return;
-    case 5: add<ConstantVelocity>(parent, child, x, R, bent(R)); return;
-    case 6: add<Planar>(parent, child, x, R); break;
-    case 7: add<Fixed>(parent, child, x, R); return;
-    case 8: screw(parent, child, x, R); return;
-    case 9: rod(parent, child); return;
-    case 10: curve(parent, child, x, R); return;
-    case 11: add<InLine>(parent, child, x, R); break;
-    case 12: add<InPlane>(parent, child, x, R); break;
-    case 13: add<ParallelAxes>(parent, child, x, R); break;
-    case 14: add<Perpendicular>(parent, child, x, R, across); break;
-    default: add<Orientation>(parent, child, x, R);
+    case 0:
+      hold(Held::Revolute, parent, child, x, R, true);
+      return;
+    case 1:
+      hold(Held::Spherical, parent, child, x, R, true);
+      return;
+    case 2:
+      hold(Held::Translational, parent, child, x, R, true);
+      break;
+    case 3:
+      hold(Held::Cylindrical, parent, child, x, R, true);
+      break;
+    case 4:
+      add<Universal>(parent, child, x, R, across);
+      return;
+    case 5:
+      add<ConstantVelocity>(parent, child, x, R, bent(R));
+      return;
+    case 6:
+      add<Planar>(parent, child, x, R);
+      break;
+    case 7:
+      add<Fixed>(parent, child, x, R);
+      return;
+    case 8:
+      screw(parent, child, x, R);
+      return;
+    case 9:
+      rod(parent, child);
+      return;
+    case 10:
+      curve(parent, child, x, R);
+      return;
+    case 11:
+      add<InLine>(parent, child, x, R);
+      break;
+    case 12:
+      add<InPlane>(parent, child, x, R);
+      break;
+    case 13:
+      add<ParallelAxes>(parent, child, x, R);
+      break;
+    case 14:
+      add<Perpendicular>(parent, child, x, R, across);
+      break;
+    default:
+      add<Orientation>(parent, child, x, R);
     }
     tether(parent, child, x);
   }
@@ -178,7 +219,10 @@ private:
     b.held.push_back({e, i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
     return e;
   }
-  template <class Joint> Element add(int parent, int child, const Vector3 &x, const Matrix3 &R) { return add<Joint>(parent, child, x, R, R); }
+  template <class Joint> Element add(int parent, int child, const Vector3 &x, const Matrix3 &R)
+  {
+    return add<Joint>(parent, child, x, R, R);
+  }
 
   Matrix3 bent(const Matrix3 &R)
   {
@@ -191,7 +235,8 @@ private:
   {
     const double pitch = r.sign() * b.length * r.logarithmic(0.05, 3);
     const Marker i = b.at(child, x, R), j = b.at(parent, x, R);
-    b.held.push_back({b.scene.add("", Screw{i, j, pitch}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
+    b.held.push_back(
+        {b.scene.add("", Screw{i, j, pitch}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
   }
 
   void rod(int parent, int child)
@@ -200,14 +245,15 @@ private:
     Vector3       y = b.placed[parent].at + 0.3 * (x - b.placed[parent].at);
     if ((x - y).norm() < 0.2 * b.length) y = x + b.length * b.direction();
     const Marker i = b.at(child, x), j = b.at(parent, y);
-    b.held.push_back({b.scene.add("", PointDistance{i, j}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
+    b.held.push_back(
+        {b.scene.add("", PointDistance{i, j}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
   }
 
   /* An arc or a ring through x, in the axes of a marker of the parent */
   void curve(int parent, int child, const Vector3 &x, const Matrix3 &R)
   {
     const double         radius = b.length * r.uniform(0.6, 2), rise = b.planar ? 0 : radius * r.uniform(0, 0.4);
-    const int            n = r.integer(8, 14);
+    const int            n      = r.integer(8, 14);
     const bool           closed = r.chance(0.5);
     std::vector<Vector3> points;
     for (int k = 0; k < n; k++) {
@@ -216,20 +262,26 @@ private:
     }
     const std::size_t middle = closed ? 0 : n / 2;
     const Marker      i = b.at(child, x), j = b.at(parent, x - R * points[middle], R);
-    b.held.push_back({b.scene.add("", PointOnCurve{i, j, points, closed}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
+    b.held.push_back({b.scene.add("", PointOnCurve{i, j, points, closed}), i, j, Held::Other, false,
+                      b.placed[child].mass, b.placed[child].size});
   }
 
   int bead(int parent, const Vector3 &x)
   {
     const int child = b.addPoint(x);
     switch (r.choose({1, 1, 1, 1})) {
-    case 0: curve(parent, child, x, r.rotation()); break;
-    case 1: rod(parent, child); break;
+    case 0:
+      curve(parent, child, x, r.rotation());
+      break;
+    case 1:
+      rod(parent, child);
+      break;
     case 2:
       add<InLine>(parent, child, x, r.rotation());
       tether(parent, child, x);
       break;
-    default: add<Spherical>(parent, child, x, Matrix3::Identity());
+    default:
+      add<Spherical>(parent, child, x, Matrix3::Identity());
     }
     return child;
   }
@@ -238,7 +290,7 @@ private:
   void tether(int parent, int child, const Vector3 &x)
   {
     if (r.chance(0.15)) return;
-    const Stiff s = b.stiff(b.placed[child].mass);
+    const Stiff s    = b.stiff(b.placed[child].mass);
     Vector3     from = b.on(child), to = x + b.length * (b.planar ? b.direction() : r.direction());
     if ((from - to).norm() < 0.3 * b.length) to += b.length * (b.planar ? Vector3(1, 0, 0) : Vector3(1, 1, 1));
     b.scene.add("", SpringDamper{b.at(child, from), b.at(parent, to), s.k, s.c, -1, 0, b.state()});
@@ -247,8 +299,10 @@ private:
   void closePlane(int last, const std::vector<Vector3> &corner, const Matrix3 &R, int kind)
   {
     const Vector3 x = corner.back();
-    if (kind == 0) hold(Held::Revolute, 0, last, x, R, false);
-    else if (kind == 1) slide(last, x, R);
+    if (kind == 0)
+      hold(Held::Revolute, 0, last, x, R, false);
+    else if (kind == 1)
+      slide(last, x, R);
     else { /* in space: without saying things twice */
       const Marker i = b.at(last, x, R), j = b.at(0, x, R);
       b.scene.add("", InLine{i, j});
@@ -257,8 +311,8 @@ private:
   /* the last link's end in a straight guide: by a slider, or, planar, by a curve that is almost straight */
   void slide(int last, const Vector3 &x, const Matrix3 &R)
   {
-    const double  angle = r.uniform(-0.6, 0.6);
-    const Vector3 along = R * Vector3(std::cos(angle), std::sin(angle), 0);
+    const double  angle  = r.uniform(-0.6, 0.6);
+    const Vector3 along  = R * Vector3(std::cos(angle), std::sin(angle), 0);
     const int     slider = b.addBody(x);
     hold(Held::Revolute, last, slider, x, R, false);
     hold(Held::Translational, 0, slider, x, b.planar ? b.axesFrom(along) : b.axesAlong(along), false);
@@ -267,11 +321,16 @@ private:
   void loopJoint(int freedoms, int parent, int child, const Vector3 &x)
   {
     const Matrix3 R = r.rotation(), across = R * Eigen::AngleAxisd(M_PI / 2, Vector3::UnitX()).toRotationMatrix();
-    if (freedoms >= 3) hold(Held::Spherical, parent, child, x, R, false);
-    else if (freedoms == 1) hold(Held::Revolute, parent, child, x, R, false);
-    else if (r.chance(0.6)) add<Universal>(parent, child, x, R, across);
-    else if (r.chance(0.5)) add<ConstantVelocity>(parent, child, x, R, bent(R));
-    else hold(Held::Cylindrical, parent, child, x, R, false);
+    if (freedoms >= 3)
+      hold(Held::Spherical, parent, child, x, R, false);
+    else if (freedoms == 1)
+      hold(Held::Revolute, parent, child, x, R, false);
+    else if (r.chance(0.6))
+      add<Universal>(parent, child, x, R, across);
+    else if (r.chance(0.5))
+      add<ConstantVelocity>(parent, child, x, R, bent(R));
+    else
+      hold(Held::Cylindrical, parent, child, x, R, false);
   }
 };
 

@@ -16,8 +16,8 @@ using namespace soak;
 static PetscErrorCode Run(bool *passed)
 {
   PetscInt                 seed = 1, first = 0, count = 2000, jobs = 2;
-  PetscReal                deadline = 120;
-  PetscBool                small    = PETSC_FALSE;
+  PetscReal                deadline                   = 120;
+  PetscBool                small                      = PETSC_FALSE;
   char                     output[PETSC_MAX_PATH_LEN] = "build/soak";
   std::vector<ReducedPart> parts;
 
@@ -29,7 +29,8 @@ static PetscErrorCode Run(bool *passed)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-deadline", &deadline, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-small", &small, nullptr));
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-output", output, sizeof output, nullptr));
-  PetscCheck(count > 0 && jobs > 0 && deadline > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-count, -jobs and -deadline must be positive");
+  PetscCheck(count > 0 && jobs > 0 && deadline > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "-count, -jobs and -deadline must be positive");
 #ifndef HHTDAE_HAVE_IDA
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "built without SUNDIALS IDA: every reference is hhtdae's own\n"));
 #endif
