@@ -7,43 +7,18 @@ static char help[] =
     "  -cases <a,b,...>: kinds or names of cases, or the beginnings of such\n"
     "  -form <both>: second_order, paper or both\n"
     "  -csv <stability.csv>, -page <stability.html>: the table as files\n"
+    "  -show: what the library prints in a case, too; with -info every decision\n"
     "  -list: the cases, without running them\n"
     "Options of the integrator hold for all cases, -ts_hhtdae_alpha -0.1 for example. The exit code tells whether a "
     "case missed its figure.\n";
 
 #include <hhtdae/scene.h>
 
-#include "stability_condition.h"
-#include "stability_constraints.h"
-#include "stability_events.h"
-#include "stability_faults.h"
+#include "stability_all.h"
 #include "stability_process.h"
-#include "stability_rotation.h"
-#include "stability_start.h"
-#include "stability_stiff.h"
 #include "stability_table.h"
 
 using namespace hhtstab;
-
-static Cases AllCases(const ConditionReport &report)
-{
-  Cases cases;
-  AddSprings(cases);
-  AddModes(cases);
-  AddMasses(cases);
-  AddRedundant(cases);
-  AddSingular(cases);
-  AddImpacts(cases);
-  AddJumps(cases);
-  AddStarts(cases);
-  AddSteps(cases);
-  AddRotation(cases);
-  AddFaults(cases);
-  AddRange(cases);
-  AddConditions(cases, report);
-  AddMillion(cases);
-  return cases;
-}
 
 static bool Chosen(const Case &c, const std::string &list)
 {

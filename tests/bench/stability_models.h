@@ -69,13 +69,14 @@ private:
 struct AgainstReference {
   const hhtex::Problem &problem;
   Array                 u, v, a;
-  double                q = 0, rate = 0, lambda = 0, scale = 0, next;
+  double                q = 0, rate = 0, lambda = 0, scale = 0, next, before = 0;
 
   explicit AgainstReference(const hhtex::Problem &p) : problem(p), u(p.n), v(p.n), a(p.n), next(p.t0) {}
   void operator()(double t, const double *x, const double *y)
   {
     if (t < next && t < problem.t1) return;
-    next = t + (problem.t1 - problem.t0) / 100;
+    next   = t + std::fmin((problem.t1 - problem.t0) / 100, 50 * (t - before));
+    before = t;
     if (!problem.reference(t, u.data(), v.data(), a.data())) return;
     for (PetscInt i = 0; i < problem.n; i++) {
       const bool multiplier = problem.role[i] == TSHHT3_HOLONOMIC || problem.role[i] == TSHHT3_NONHOLONOMIC;

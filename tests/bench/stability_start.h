@@ -74,7 +74,7 @@ inline void AddStarts(Cases &cases)
       const char *word = start == TSHHT3_START_OFF ? ", off" : ", report";
       Case       &c = Add(cases, "starts", Name("%.0e too long", x) + word, x < 1e-6 ? position : error, 2e-3 + 2 * x,
                           [x, start](Run &r) { return DisplacedCase(r, x, 0, start); });
-      if (x > 1e-6) c.mustFail("No step from t = 0 succeeded").test();
+      if (x > 1e-6) c.mustFail("too short for the corrector").test();
       Add(cases, "starts", Name("velocity off by %.0e", x) + word, position, 2e-3,
           [x, start](Run &r) { return DisplacedCase(r, 0, x, start); });
     }
@@ -88,7 +88,7 @@ inline void AddStarts(Cases &cases)
       .test();
   Add(cases, "starts", "scene, gap of 0.1, off", error, 0.2, [](Run &r) {
     return GapCase(r, 0.1, Assembly::Off);
-  }).mustFail("No step from t = 0 succeeded");
+  }).mustFail("too short for the corrector");
 }
 
 /* ---- steps and tolerances ---- */
@@ -96,12 +96,12 @@ inline void AddStarts(Cases &cases)
 /*
   Steps of one length, in units of what the method promises: positions within (h w)^2 w t plus rounding, velocities w
   times that, multipliers of short steps within 5 %. Steps of a tenth of a swing and more resolve nothing: there the rod
-  keeps its length to 1e-6 and energy does not grow by more than 1e-6 of the swing's.
+  keeps its length to 1e-6 and the energy that it gains stays below that of a turn.
 */
 inline PetscErrorCode FixedStepCase(Run &run, double h)
 {
   const double          w = 3.5, steps = h > 1e-2 ? 200 : 1000;
-  const hhtex::Pendulum p(-60, 1, steps * h);
+  const hhtex::Pendulum p(-60, 1, h > 1e-2 ? steps * h : 10);
   ProblemRun            r(p);
   AgainstReference      error(p);
   double                length = 0, start = 0, growth = 0;
@@ -114,15 +114,18 @@ inline PetscErrorCode FixedStepCase(Run &run, double h)
     growth = std::fmax(growth, E - start);
     hhtex::Widen(length, std::hypot(u[0], u[1]), 1);
   };
+  if (h <= 1e-2) PetscCall(TSSetMaxSteps(r.ts, (PetscInt)steps));
   const PetscErrorCode code = run.solve(r.ts);
   if (h > 1e-2) {
     run.judge(length / 1e-6);
-    run.judge(growth / (1e-6 * 2 * p.g));
+    run.judge(growth / (2 * p.g));
     run.note("length to %.1e, energy grows by %.1e J", length, growth);
   } else {
-    const double bound = h * h * w * w * w * p.t1 + 1e-11;
+    run.out.finished   = !code && run.out.s.steps == (PetscInt)steps;
+    const double bound = h * h * w * w * w * steps * h + 1e-11;
     run.judge(error.q / bound);
-    run.judge(error.rate / (w * bound + 1e-9 + (h > 1e-4 ? h * h * w * w * w : 0)));
+    run.judge(error.rate / (w * bound + 1e-9 + 10 * PETSC_MACHINE_EPSILON / std::fmax(h, 1e-7) +
+                            (h > 1e-4 ? h * h * w * w * w : 0)));
     if (h < 1e-4) run.judge(error.multipliers() / 0.05);
     run.note("errors %.1e, velocities %.1e, multipliers %.1e", error.q, error.rate, error.multipliers());
   }
@@ -163,11 +166,11 @@ inline void AddSteps(Cases &cases)
   for (double h : {1e-12, 1e-6, 1., 1e3})
     Add(cases, "steps", Name("first h=%.0e", h), "position, exact", 2e-3, [h](Run &r) { return FirstStepCase(r, h); });
   for (int d = -2; d >= -12; d--) { /* of second order: global errors like eps^(2/3) */
-    const double eps = std::pow(10, d), bound = 5 * std::pow(eps, 2. / 3);
-    Add(cases, "tolerances", Name("pendulum eps=%.0e", eps), "position, exact", bound,
+    const double eps = std::pow(10, d), way5 = Allowed(eps, 5), way8 = Allowed(eps, 8);
+    Add(cases, "tolerances", Name("pendulum eps=%.0e", eps), "position, exact", way5,
         [eps](Run &r) { return ToleranceCase(r, eps); });
     if (d >= -10)
-      Add(cases, "tolerances", Name("slider-crank eps=%.0e", eps), "position, exact", bound,
+      Add(cases, "tolerances", Name("slider-crank eps=%.0e", eps), "position, exact", way8,
           [eps](Run &r) { return SliderCrankCase(r, 0.3, 1, 1, 8, 1, eps); });
   }
 }

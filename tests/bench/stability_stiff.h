@@ -63,14 +63,13 @@ inline void AddSprings(Cases &cases)
 {
   for (int d = 3; d <= 14; d++) {
     const double k = std::pow(10, d);
-    Case        &c = Add(cases, "springs", Name("k=%.0e", k), d <= 6 ? "position, exact" : "position, rigid rod", 2e-3,
-                         [k](Run &r) { return SpringCase(r, k); });
+    Case        &c = Add(cases, "springs", Name("k=%.0e", k), d <= 6 ? "position, exact" : "position, rigid rod",
+                         Allowed(1e-6, 5), [k](Run &r) { return SpringCase(r, k); });
     if (d == 14) c.test();
   }
   for (double k : {1e6, 1e10, 1e14})
-    Add(cases, "springs", Name("bushing k=%.0e", k), "position, rigid joint", 2e-3, [k](Run &r) {
-      return BushingCase(r, k);
-    }).test();
+    Add(cases, "springs", Name("bushing k=%.0e", k), "position, rigid joint", Allowed(1e-6, 3.5),
+        [k](Run &r) { return BushingCase(r, k); });
 }
 
 /* ---- modes ---- */
@@ -105,7 +104,7 @@ inline PetscErrorCode ModeCase(Run &run, double h_omega)
 inline PetscErrorCode ModalCase(Run &run)
 {
   using namespace hhtdae;
-  const Vector3 J(1, 2, 3), spin(0.3, 5, 0.2);
+  const Vector3 J(1, 2, 3), spin(1, 0.5, 5);
   const int     modes = 5;
   FreeBody      exact(J, spin);
   auto          model = std::make_shared<ModalBody>();
@@ -149,7 +148,7 @@ inline void AddModes(Cases &cases)
                          [x](Run &r) { return ModeCase(r, x); });
     if (d == 6 || d == 0) c.test();
   }
-  Add(cases, "modes", "flexible body, 10 MHz", "attachment, rigid body", 1e-2, ModalCase).paper(5e-2);
+  Add(cases, "modes", "flexible body, 10 MHz", "attachment, rigid body", Allowed(1e-6, 25), ModalCase).paper(0.2);
 }
 
 /* ---- masses ---- */
@@ -174,11 +173,11 @@ struct TwoMasses {
     f[3] =
         (s * ((1 + r) * y[2] * y[2] + r * c * y[3] * y[3]) + g * (1 + r) * (c * std::sin(y[0]) - std::sin(y[1]))) / den;
   }
-  /* beyond 1e7 the light mass stays on the straight line between pivot and heavy one, to 1/ratio */
+  /* beyond 1e5 the light mass stays on the straight line between pivot and heavy one, to 1/ratio */
   void at(double t, double x[4]) const
   {
     long double a, b;
-    if (ratio > 1e7)
+    if (ratio > 1e5)
       a = b = hhtex::PendulumMotion(std::sqrt(9.81L / 2), start, 0, t).theta;
     else {
       const auto y = solution.at(t);
@@ -252,7 +251,8 @@ struct SliderCrankByHand {
 
   SliderCrankByHand(double crank, double rod_mass, double angle, double speed)
       : r(crank), rod(rod_mass), equal(crank == 1),
-        solution([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 0.01L, {angle, speed})
+        solution([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L,
+                 0.01L * (equal ? 1 : std::sqrt(1 - (long double)crank * crank)), {angle, speed})
   {
   }
   SliderCrankByHand(const SliderCrankByHand &) = delete;
@@ -327,13 +327,14 @@ inline PetscErrorCode SliderCrankCase(Run &run, double crank, double rod_mass, d
 inline void AddMasses(Cases &cases)
 {
   for (double x : {1e-10, 1e-6, 1e-3, 1e3, 1e6, 1e8, 1e10})
-    Add(cases, "masses", Name("two masses 1:%.0e", x), "position, exact", 2e-3, [x](Run &r) { return MassCase(r, x); });
+    Add(cases, "masses", Name("two masses 1:%.0e", x), "position, exact", Allowed(1e-6, 8),
+        [x](Run &r) { return MassCase(r, x); });
   for (double x : {1e5, 1e10})
     Add(cases, "masses", Name("heavy-light-heavy %.0e", x), "energy over the kinetic", 1e-2, [x](Run &r) {
       return HeavyLightHeavy(r, x);
     }).paper(5e-2);
   for (double m : {1e-3, 1e-6, 1e-9, 1e-12})
-    Add(cases, "masses", Name("slider-crank, rod %.0e kg", m), "position, exact", 2e-3, [m](Run &r) {
+    Add(cases, "masses", Name("slider-crank, rod %.0e kg", m), "position, exact", Allowed(1e-6, 16), [m](Run &r) {
       return SliderCrankCase(r, 0.3, m, 1, 8, 2, 1e-6);
     }).test();
 }
