@@ -80,7 +80,7 @@ public:
     const wp::Case case_ = wp::SceneCase(*p);
     const wp::Run  r     = wp::IDASolver(case_, *p, points, settings).run(eps, wp::Limits{limit});
     run->failure         = r.failure;
-    run->cpu             = r.time;
+    run->cpu             = r.time - r.extra;
     run->count           = r.count;
     run->equations       = equations(*p, form);
     std::vector<double> u(p->n), v(p->n), a(p->n), x;
