@@ -10,10 +10,12 @@ namespace hhtbench
 
 /* All that the page tells */
 struct AtvResults {
-  AtvRun               reference, check; /* check: the reference at twice its step */
-  std::vector<AtvRun>  main;  /* hhtdae in both forms, IDA as GSTIFF, each with the largest step of the paper */
-  std::vector<AtvRun>  sweep; /* over tolerances and largest steps, by name of the method */
-  std::vector<HotSpot> spots; /* of the reference */
+  AtvRun              reference, check; /* check: the reference at twice its step */
+  std::vector<AtvRun> main; /* hhtdae in both forms, IDA as GSTIFF, each with the largest step of the paper */
+  std::vector<double> step; /* at which conditions were measured */
+  std::vector<hhtstab::Conditions>  condition;
+  std::vector<AtvRun>               sweep; /* over tolerances and largest steps, by name of the method */
+  std::vector<HotSpot>              spots; /* of the reference */
   std::vector<std::vector<HotSpot>> found; /* of the main runs */
 };
 
@@ -35,6 +37,7 @@ public:
     PetscCall(channel("Vertical reaction in the ball joint of the rear suspension", "reaction [N]", atv_.reaction.id));
     PetscCall(channel("Pitch rate of the engine", "pitch rate [rad/s]", atv_.pitch_rate.id));
     if (!r_.sweep.empty()) PetscCall(precision());
+    conditions();
     PetscCall(page_.write(file));
     PetscFunctionReturn(0);
   }
@@ -254,6 +257,20 @@ private:
     page_.table({"error at most", "of", "hhtdae, fastest", "IDA, index 3, fastest", "ratio", "IDA, any form", "ratio"},
                 equalErrors(), "Fastest of these runs with no larger error, CPU s");
     PetscFunctionReturn(0);
+  }
+
+  void conditions()
+  {
+    std::vector<Page::Row> rows;
+    page_.section("Conditioning of the Newton matrix");
+    page_.text(
+        "Condition numbers (2-norm) in the three scalings that the paper weighs: (a) positions as unknowns, (b) "
+        "accelerations as unknowns, (c) "
+        "accelerations as unknowns and the position constraints over beta h^2, which is what hhtdae solves with.");
+    for (size_t k = 0; k < r_.step.size(); k++)
+      rows.push_back({Text("%.0e", r_.step[k]), Text("%.1e", r_.condition[k].a), Text("%.1e", r_.condition[k].b),
+                      Text("%.1e", r_.condition[k].c)});
+    page_.table({"h [s]", "(a)", "(b)", "(c)"}, rows);
   }
 
   std::vector<Page::Row> equalErrors() const

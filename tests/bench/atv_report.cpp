@@ -124,6 +124,12 @@ static PetscErrorCode Run()
   PetscCall(Done(results.check));
   if (sweep) PetscCall(RunSweep(runs, &results.sweep));
 
+  results.step = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  PetscCall(runs.conditions(results.step, &results.condition));
+  for (size_t k = 0; k < results.step.size(); k++)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "conditioning at h=%.0e: (a) %.1e, (b) %.1e, (c) %.1e\n", results.step[k],
+                          results.condition[k].a, results.condition[k].b, results.condition[k].c));
+
   hhtex::Atv atv(PETSC_COMM_SELF, runs.model);
   atv.watchFrame();
   PetscCall(atv.scene.setUp());

@@ -8,6 +8,7 @@
 
 #include "atv_model.h"
 #include "scene_watch.h"
+#include "stability_condition.h"
 #include "workprecision_scene.h"
 #include <hhtdae/flexible.h>
 
@@ -93,6 +94,24 @@ public:
     PetscFunctionReturn(0);
   }
 #endif
+
+  /* cond_2 of the Newton matrix in the paper's three scalings, after ten steps, as steps of length h would have it */
+  PetscErrorCode conditions(const std::vector<double> &h, std::vector<hhtstab::Conditions> *list) const
+  {
+    TS ts;
+
+    PetscFunctionBegin;
+    hhtex::Atv atv(PETSC_COMM_SELF, model);
+    PetscCall(atv.scene.createTS(&ts));
+    PetscCall(TSSetMaxTime(ts, end));
+    PetscCall(TSSetMaxSteps(ts, 10));
+    PetscCall(TSSetTolerances(ts, 1e-5, nullptr, 1e-5, nullptr));
+    PetscCall(atv.scene.solve(ts));
+    list->resize(h.size());
+    for (size_t k = 0; k < h.size(); k++) PetscCall(hhtstab::ScalingConditions(ts, h[k], &(*list)[k]));
+    PetscCall(TSDestroy(&ts));
+    PetscFunctionReturn(0);
+  }
 
   std::vector<double> times() const
   {
