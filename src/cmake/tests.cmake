@@ -25,6 +25,7 @@ function(hhtdae_test_program folder)
     hhtdae_program(${folder}_tests ${sources} ${common})
     target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
     target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
+    target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
     set(${folder}_found TRUE PARENT_SCOPE)
   endif()
 endfunction()
