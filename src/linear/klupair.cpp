@@ -4,11 +4,13 @@
   column -mat_klupair_row_scale <none,sum,max>      scaling of rows, none by default -mat_klupair_ordering
   <auto,amd,metis>     auto: METIS where AMD foresees much work and METIS less -mat_klupair_refactor <true> keep the
   pivots from one matrix to the next while they are good
+    -mat_klupair_panels <true>                        dense panels for that where they pay (klupair_panels.h)
 */
 #include "klupair.h"
 
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_data.h"
+#include "klupair_panels.h"
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
@@ -87,20 +89,53 @@ static double ReciprocalGrowth(const LinearRows &rows, KluPair *k)
   return k->common.rgrowth;
 }
 
+/* Panels are built when pivots are kept for the first time. Row scaling and the interface of kluparts want KLU's
+ * factors.
+ */
+static PetscErrorCode FindPanels(Mat F, const LinearRows &rows, KluPair *k)
+{
+  bool pays;
+
+  PetscFunctionBegin;
+  if (k->panels_looked || !k->panels_wanted || k->whole || k->common.scale > 0) PetscFunctionReturn(0);
+  k->panels_looked = true;
+  k->panels        = std::make_shared<KluPanels>();
+  PetscCall(KluPanelsBuild(rows, k, k->panels.get(), &pays));
+  const KluPanels &p = *k->panels;
+  PetscCall(PetscInfo(F, "%zu panels with %g entries, %g operations, estimated at %g s; KLU at %g s\n", p.panel.size(),
+                      p.entries, p.flops, p.seconds, p.scalar));
+  if (!pays) k->panels.reset();
+  PetscFunctionReturn(0);
+}
+
+/* The reciprocal growth with the old pivots, 0 if they cannot be used any more */
+static PetscErrorCode FactorWithOldPivots(const LinearRows &rows, KluPair *k, double *growth)
+{
+  PetscFunctionBegin;
+  *growth        = 0;
+  k->panels_used = k->panels != nullptr;
+  if (k->panels_used) {
+    PetscCall(KluPanelsFactor(rows, k->panels.get(), growth));
+    ++k->panels_made;
+  } else if (KLU(refactor)(Start(rows), Col(rows), Val(rows), k->symbolic, k->numeric, &k->common) &&
+             k->common.status == KLU_OK)
+    *growth = ReciprocalGrowth(rows, k);
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
 {
   KluPair *k = Data(F);
+  double   growth;
 
   PetscFunctionBegin;
   *good = false;
   if (!k->numeric || !k->refactor) PetscFunctionReturn(0);
-  if (KLU(refactor)(Start(rows), Col(rows), Val(rows), k->symbolic, k->numeric, &k->common) &&
-      k->common.status == KLU_OK) {
-    const double growth = ReciprocalGrowth(rows, k);
-    *good               = growth > 0 && growth * GROWTH >= k->growth;
-    PetscCall(
-        PetscInfo(F, "Old pivots %s: reciprocal growth %g, was %g\n", *good ? "kept" : "given up", growth, k->growth));
-  }
+  PetscCall(FindPanels(F, rows, k));
+  PetscCall(FactorWithOldPivots(rows, k, &growth));
+  *good = growth > 0 && growth * GROWTH >= k->growth;
+  PetscCall(
+      PetscInfo(F, "Old pivots %s: reciprocal growth %g, was %g\n", *good ? "kept" : "given up", growth, k->growth));
   if (*good)
     ++k->refactorizations;
   else
@@ -112,7 +147,9 @@ static PetscErrorCode FactorWithPivoting(const LinearRows &rows, KluPair *k)
 {
   PetscFunctionBegin;
   KLU(free_numeric)(&k->numeric, &k->common);
-  k->numeric = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
+  k->panels.reset();
+  k->panels_looked = k->panels_used = false;
+  k->numeric                        = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
   ++k->factorizations;
   if (!k->numeric) PetscFunctionReturn(0);
   KLU(sort)(k->symbolic, k->numeric, &k->common);
@@ -189,7 +226,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(KluPairRestoreRows(A, &rows));
   PetscCall(ReportError(F, A));
   F->assembled = PETSC_TRUE;
-  if (k->numeric) PetscCall(PetscLogFlops(k->common.flops));
+  if (k->numeric) PetscCall(PetscLogFlops(k->panels_used ? k->panels->flops : k->common.flops));
   PetscFunctionReturn(0);
 }
 
@@ -208,6 +245,12 @@ static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
   }
   PetscCall(VecCopy(b, x));
   PetscCall(VecGetArray(x, &array));
+  if (k->panels_used) {
+    PetscCall(KluPanelsSolve(k->panels.get(), !transposed, array));
+    PetscCall(VecRestoreArray(x, &array));
+    PetscCall(PetscLogFlops(2.0 * k->panels->entries));
+    PetscFunctionReturn(0);
+  }
   /* KLU holds the factors of the transpose */
   const KluInt n  = k->symbolic->n;
   const KluInt ok = transposed ? KLU(solve)(k->symbolic, k->numeric, n, 1, array, &k->common)
@@ -241,6 +284,8 @@ static PetscErrorCode ReadOptions(Mat F)
                               orderings[ordering], &ordering, NULL));
   PetscCall(PetscOptionsBool("-mat_klupair_refactor", "Keep pivots while they are good", "None", k->refactor,
                              &k->refactor, NULL));
+  PetscCall(PetscOptionsBool("-mat_klupair_panels", "Dense panels where they pay", "None", k->panels_wanted,
+                             &k->panels_wanted, NULL));
   PetscOptionsEnd();
   PetscCheck(k->common.tol >= 0 && k->common.tol <= 1, PetscObjectComm((PetscObject)F), PETSC_ERR_ARG_OUTOFRANGE,
              "-mat_klupair_pivot_tol %g is not between 0 and 1", k->common.tol);
@@ -316,6 +361,13 @@ static PetscErrorCode View(Mat F, PetscViewer viewer)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  %g entries in L and U, %g operations; %d pivots not as planned\n",
                                      (double)k->numeric->lnz + (double)k->numeric->unz, k->common.flops,
                                      (int)k->common.noffdiag));
+  if (k->panels)
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "  dense panels for these pivots: %zu, %g entries, %g operations; used %" PetscInt_FMT " times\n",
+        k->panels->panel.size(), k->panels->entries, k->panels->flops, k->panels_made));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  no dense panels%s\n",
+                                     k->panels_looked ? ": they would not pay" : " looked for"));
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  analyses: %" PetscInt_FMT ", factorizations with pivoting: %" PetscInt_FMT
                                    ", with old pivots: %" PetscInt_FMT ", of these given up: %" PetscInt_FMT "\n",

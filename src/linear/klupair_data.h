@@ -5,6 +5,7 @@
 #include "graph.h"
 #include "klupair_matching.h"
 #include <klu.h>
+#include <memory>
 
 #if defined(PETSC_USE_64BIT_INDICES)
 typedef SuiteSparse_long KluInt;
@@ -16,6 +17,8 @@ typedef int KluInt;
 #define AMD(name) amd_##name
 #endif
 static_assert(sizeof(KluInt) == sizeof(PetscInt), "KLU's integers have the size of PETSc's");
+
+struct KluPanels; /* klupair_panels.h */
 
 enum KluPairOrdering { KLUPAIR_AUTO, KLUPAIR_AMD, KLUPAIR_METIS };
 
@@ -39,12 +42,18 @@ struct KluPair {
   PetscBool       refactor = PETSC_TRUE;
 
   LinearPivots pivots;
-  LinearWork   work; /* foreseen for L of the symmetrized pattern */
+  LinearWork   work;                               /* foreseen for L of the symmetrized pattern */
   double       path_columns = 0, path_entries = 0; /* columns of L that the ends reach, and entries in them */
   const char  *ordering_used = "";
   double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
   double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
-  PetscInt     analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
+  /* Dense panels for the pivots of `numeric`; its own values are old while panels_used */
+  std::shared_ptr<KluPanels> panels;
+  PetscBool                  panels_wanted = PETSC_TRUE;
+  bool                       panels_looked = false, panels_used = false;
+  PetscInt                   panels_made = 0; /* factorizations by panels */
+
+  PetscInt analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
 };
 
 inline KluInt *KluIndices(const PetscInt *i) { return reinterpret_cast<KluInt *>(const_cast<PetscInt *>(i)); }

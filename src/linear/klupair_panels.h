@@ -1,0 +1,77 @@
+/*
+  The factors of "klupair" as dense panels, for matrices with dense parts: a block of modes, constraints that act on all
+  of them.
+
+  KLU goes through L and U entry by entry with an index each. Here KLU still plans and finds the pivots in its first
+  factorization; where much of the work lies in columns of the same structure, the following factorizations with these
+  pivots, and all solves, go by panels of such columns with dense algebra (BLAS).
+
+  M is the transpose of the PETSc matrix, as KLU sees it, and a place is one in the pivots' order. A panel is a range K
+  of places whose pivots have much the same structure by the elimination tree of M(P,Q) + its transpose, in postorder,
+  in one diagonal block (BTF) of KLU. The panels are the blocks of a block factorization, with the rows R and the
+  columns C after K that its pattern fills:
+
+      lower   rows K and R, columns K   on top the factors of M(K,K) with row exchanges inside, below it L(R,K)
+      upper   rows C, columns K         U(K,C)^T
+
+  Both are tall. R and C differ where a multiplier and a coordinate exchange their rows. A panel collects what all
+  panels before it contribute (left-looking): these stand side by side in one product of dense matrices.
+*/
+#ifndef HHTDAE_LINEAR_KLUPAIR_PANELS_H
+#define HHTDAE_LINEAR_KLUPAIR_PANELS_H
+
+#include "klupair_data.h"
+
+/* Places that a panel reaches, from KluPanels::reached[start] on, ascending */
+struct KluReach {
+  PetscInt start, count;
+};
+
+/* A panel before, of whose rows R those from row_first on count, and up to row_last they are places of the panel that
+   looks back; columns likewise */
+struct KluPanelSource {
+  PetscInt panel, row_first, row_last, col_first, col_last;
+};
+
+struct KluPanel {
+  PetscInt first, width; /* its places */
+  KluReach rows, cols;   /* R and C */
+  PetscInt source, sources;
+  size_t   lower, upper; /* where the values begin */
+};
+
+struct KluPanels {
+  PetscInt                    n = 0;
+  std::vector<PetscInt>       row, col; /* of M, at each place */
+  std::vector<KluPanel>       panel;    /* ascending places; diagonal blocks one after the other */
+  std::vector<PetscInt>       block;    /* the first panel of each diagonal block, and the end */
+  std::vector<PetscInt>       reached;
+  std::vector<KluPanelSource> source;
+  std::vector<PetscInt>       outer_start, outer; /* entries between diagonal blocks: by columns, their row places */
+  std::vector<PetscInt>       target;             /* where each entry of the matrix goes among the values */
+  std::vector<PetscInt>       exchange;           /* LAPACK's row exchanges in the diagonal block of each panel */
+  size_t                      outer_values = 0;   /* where the values between diagonal blocks begin */
+  std::vector<double>         value;
+
+  double entries = 0, flops = 0;  /* stored, zeros included, and operations with them */
+  double seconds = 0, scalar = 0; /* estimates for a factorization by panels, and by KLU */
+
+  /* scratch: rows of `lower` and `upper` of the panel at work, by place; panels side by side; vectors */
+  std::vector<PetscInt> row_of, col_of;
+  std::vector<double>   left, right, matrix_size, factor_size, x, y;
+};
+
+/* *pays tells whether the factors of `numeric` are worth panels; only then they are built. Their values come later. */
+PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *panels, bool *pays);
+
+/* row_of gets K and R, col_of K and C of this panel */
+void KluPanelsSetPlaces(const KluPanel &panel, KluPanels *panels);
+
+/* With the pivots that the panels were built for; *growth is the reciprocal growth, 0 where a pivot is zero or not
+ * finite */
+PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *panels, double *growth);
+
+/* M x = b, or with the transpose of M, in place */
+PetscErrorCode KluPanelsSolve(KluPanels *panels, bool transposed, double x[]);
+
+#endif

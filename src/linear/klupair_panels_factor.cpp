@@ -1,0 +1,313 @@
+/* Numbers for the panels of "klupair": what the panels before contribute, the factors of each, how much entries grow */
+#if defined(HHTDAE_HAVE_KLU)
+#include "klupair_panels.h"
+#include <algorithm>
+#include <petscblaslapack.h>
+
+/* Up to this width the loops written here are faster than calls of LAPACK */
+static const PetscInt NARROW = 8;
+
+/* Columns of panels before that are multiplied at a time */
+static const PetscInt SIDE_BY_SIDE = 256;
+
+/* Seconds per operation of dense products and of loops that add entry by entry, and per entry copied */
+static const double DENSE = 0.07e-9, SCATTERED = 0.4e-9, COPY = 0.7e-9;
+
+/* Largest allowed width + rows is that of a matrix with PETSc's indices for BLAS */
+typedef PetscBLASInt Int;
+
+/* ---- contributions ---- */
+
+/* The panel at work, and how many columns of others stand side by side in left and right */
+struct Work {
+  const KluPanel *q;
+  Int             width, left, right, columns; /* left: rows of `lower`; right: those of `upper` under K's own */
+};
+
+static PetscErrorCode Multiply(Work *w, KluPanels *p)
+{
+  const PetscScalar minus = -1, one = 1;
+  const Int         below = w->right - w->width;
+
+  PetscFunctionBegin;
+  if (!w->columns) PetscFunctionReturn(0);
+  PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &w->left, &w->width, &w->columns, &minus, p->left.data(), &w->left,
+                                      p->right.data(), &w->right, &one, p->value.data() + w->q->lower, &w->left));
+  if (below)
+    PetscCallBLAS("BLASgemm",
+                  BLASgemm_("N", "T", &below, &w->width, &w->columns, &minus, p->right.data() + w->width, &w->right,
+                            p->left.data(), &w->left, &one, p->value.data() + w->q->upper, &below));
+  w->columns = 0;
+  PetscFunctionReturn(0);
+}
+
+/* `count` rows of a matrix to the rows of another one with the given numbers, the rest of it zero */
+static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt columns, const PetscInt places[],
+                   const PetscInt row_of[], PetscInt rows, double to[])
+{
+  const PetscInt first = count ? row_of[places[0]] : 0;
+  if (count && row_of[places[count - 1]] == first + count - 1) { /* without gaps */
+    for (PetscInt c = 0; c < columns; ++c, to += rows, from += ld) {
+      std::fill(to, to + first, 0.0);
+      std::copy(from, from + count, to + first);
+      std::fill(to + first + count, to + rows, 0.0);
+    }
+    return;
+  }
+  std::fill(to, to + (size_t)columns * rows, 0.0);
+  for (PetscInt c = 0; c < columns; ++c, to += rows, from += ld)
+    for (PetscInt i = 0; i < count; ++i) to[row_of[places[i]]] = from[i];
+}
+
+/* Where the panel before lies in the values, and its parts that count: rows after those of K only together with columns
+   of K, and the other way round */
+struct Source {
+  const KluPanelSource *s;
+  PetscInt              width, ld_lower, ld_upper, rows, cols, inner_rows, inner_cols;
+  const double         *lower, *upper;
+  const PetscInt       *row, *col;
+};
+
+static Source Look(const KluPanels &p, const KluPanelSource &s)
+{
+  const KluPanel &q = p.panel[s.panel];
+  Source          v;
+  v.s          = &s;
+  v.width      = q.width;
+  v.ld_lower   = q.width + q.rows.count;
+  v.ld_upper   = q.cols.count;
+  v.inner_rows = s.row_last - s.row_first;
+  v.inner_cols = s.col_last - s.col_first;
+  v.rows       = v.inner_cols ? q.rows.count - s.row_first : v.inner_rows;
+  v.cols       = v.inner_rows ? q.cols.count - s.col_first : v.inner_cols;
+  v.lower      = p.value.data() + q.lower + q.width + s.row_first;
+  v.upper      = p.value.data() + q.upper + s.col_first;
+  v.row        = p.reached.data() + q.rows.start + s.row_first;
+  v.col        = p.reached.data() + q.cols.start + s.col_first;
+  return v;
+}
+
+/* to(row_of[row], of[col]) -= sum over the columns of a(row,:) b(col,:) */
+static void AddScattered(const double a[], PetscInt lda, PetscInt rows, const PetscInt row[], const PetscInt row_of[],
+                         const double b[], PetscInt ldb, PetscInt cols, const PetscInt col[], PetscInt first,
+                         PetscInt columns, PetscInt ld, double to[])
+{
+  for (PetscInt j = 0; j < cols; ++j) {
+    double *t = to + (size_t)(col[j] - first) * ld;
+    for (PetscInt c = 0; c < columns; ++c) {
+      const double  factor = b[j + (size_t)c * ldb];
+      const double *x      = a + (size_t)c * lda;
+      if (factor != 0)
+        for (PetscInt i = 0; i < rows; ++i) t[row_of[row[i]]] -= x[i] * factor;
+    }
+  }
+}
+
+static void Scatter(const Source &v, const Work &w, KluPanels *p)
+{
+  AddScattered(v.lower, v.ld_lower, v.rows, v.row, p->row_of.data(), v.upper, v.ld_upper, v.inner_cols, v.col,
+               w.q->first, v.width, w.left, p->value.data() + w.q->lower);
+  AddScattered(v.upper + v.inner_cols, v.ld_upper, v.cols - v.inner_cols, v.col + v.inner_cols, p->col_of.data(),
+               v.lower, v.ld_lower, v.inner_rows, v.row, w.q->first, v.width, w.right - w.width,
+               p->value.data() + w.q->upper - w.width);
+}
+
+static bool BetterScattered(const Source &v, const Work &w)
+{
+  const double columns = (double)v.width, sizes = (double)w.left + (double)w.right;
+  const double scattered =
+      SCATTERED * 2 * columns *
+      ((double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows);
+  return scattered < columns * sizes * (DENSE * 2 * (double)w.width + COPY);
+}
+
+static PetscErrorCode Collect(Work *w, KluPanels *p)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
+    const Source v = Look(*p, p->source[k]);
+    if (BetterScattered(v, *w)) {
+      Scatter(v, *w, p);
+      continue;
+    }
+    for (PetscInt done = 0, count; done < v.width; done += count) {
+      if (w->columns == SIDE_BY_SIDE) PetscCall(Multiply(w, p));
+      count = PetscMin(v.width - done, SIDE_BY_SIDE - (PetscInt)w->columns);
+      Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->left,
+             p->left.data() + (size_t)w->columns * w->left);
+      Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->right,
+             p->right.data() + (size_t)w->columns * w->right);
+      w->columns += (Int)count;
+    }
+  }
+  PetscCall(Multiply(w, p));
+  PetscFunctionReturn(0);
+}
+
+/* ---- factors of one panel ---- */
+
+/* Row exchanges as LAPACK's, from one; false at a zero pivot */
+static bool FactorNarrow(PetscInt n, double a[], PetscInt ld, PetscInt exchange[])
+{
+  for (PetscInt k = 0; k < n; ++k) {
+    double  *c = a + k * ld;
+    PetscInt r = k;
+    for (PetscInt i = k + 1; i < n; ++i)
+      if (PetscAbsReal(c[i]) > PetscAbsReal(c[r])) r = i;
+    exchange[k] = r;
+    if (c[r] == 0) return false;
+    if (r != k)
+      for (PetscInt j = 0; j < n; ++j) std::swap(a[k + j * ld], a[r + j * ld]);
+    for (PetscInt i = k + 1; i < n; ++i) c[i] /= c[k];
+    for (PetscInt j = k + 1; j < n; ++j)
+      for (PetscInt i = k + 1; i < n; ++i) a[i + j * ld] -= c[i] * a[k + j * ld];
+  }
+  return true;
+}
+
+/* Columns of a tall matrix: x_to -= sum of x_k f(k) */
+static void SubtractColumns(double x[], PetscInt ld, PetscInt rows, PetscInt to, PetscInt begin, PetscInt end,
+                            const double f[], PetscInt step)
+{
+  double *t = x + to * ld;
+  for (PetscInt k = begin; k < end; ++k) {
+    const double *s      = x + k * ld;
+    const double  factor = f[k * step];
+    for (PetscInt i = 0; i < rows; ++i) t[i] -= s[i] * factor;
+  }
+}
+
+/* X U^-1 and Y L^-T for the factors at a */
+static void DivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[], PetscInt rows, double y[],
+                         PetscInt cols)
+{
+  for (PetscInt c = 0; c < n; ++c) {
+    SubtractColumns(x, ld, rows, c, 0, c, a + c * ld, 1);
+    for (PetscInt i = 0; i < rows; ++i) x[c * ld + i] /= a[c + c * ld];
+    SubtractColumns(y, cols, cols, c, 0, c, a + c, ld);
+  }
+}
+
+static PetscErrorCode FactorWide(Int n, double a[], Int ld, PetscInt exchange[], bool *good)
+{
+  std::vector<Int> ipiv(n);
+  Int              info;
+
+  PetscFunctionBegin;
+  PetscCallBLAS("LAPACKgetrf", LAPACKgetrf_(&n, &n, a, &ld, ipiv.data(), &info));
+  *good = info == 0;
+  for (Int i = 0; i < n; ++i) exchange[i] = ipiv[i] - 1;
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode DivideWide(Int n, const double a[], Int ld, double x[], Int rows, double y[], Int cols)
+{
+  const PetscScalar one = 1;
+
+  PetscFunctionBegin;
+  if (rows) PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "U", "N", "N", &rows, &n, &one, a, &ld, x, &ld));
+  if (cols) PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "L", "T", "U", &cols, &n, &one, a, &ld, y, &cols));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
+{
+  const PetscInt n = w.width, rows = w.q->rows.count, cols = w.q->cols.count;
+  double        *a = p->value.data() + w.q->lower, *x = a + n, *y = p->value.data() + w.q->upper;
+  PetscInt      *swap = p->exchange.data() + w.q->first;
+
+  PetscFunctionBegin;
+  if (n <= NARROW)
+    *good = FactorNarrow(n, a, w.left, swap);
+  else
+    PetscCall(FactorWide(w.width, a, w.left, swap, good));
+  if (!*good) PetscFunctionReturn(0);
+  for (PetscInt k = 0; k < n; ++k)
+    if (swap[k] != k) std::swap_ranges(y + k * cols, y + (k + 1) * cols, y + swap[k] * cols);
+  if (n <= NARROW)
+    DivideNarrow(n, a, w.left, x, rows, y, cols);
+  else
+    PetscCall(DivideWide(w.width, a, w.left, x, (Int)rows, y, (Int)cols));
+  PetscFunctionReturn(0);
+}
+
+/* ---- growth ---- */
+
+static double Larger(double a, double b) { return a > b ? a : b; }
+
+/* The largest entries of U in its columns; false where a pivot is not finite */
+static bool MeasurePanel(const KluPanel &q, KluPanels *p)
+{
+  const double  *a = p->value.data() + q.lower, *y = p->value.data() + q.upper;
+  const PetscInt ld = q.width + q.rows.count, cols = q.cols.count;
+  double        *size = p->factor_size.data(), *largest = p->y.data();
+
+  std::fill_n(largest, cols, 0.0);
+  for (PetscInt k = 0; k < q.width; ++k, a += ld, y += cols) {
+    if (!(PetscAbsReal(a[k]) > 0) || !(PetscAbsReal(a[k]) < PETSC_INFINITY)) return false;
+    for (PetscInt i = 0; i <= k; ++i) size[q.first + k] = Larger(PetscAbsReal(a[i]), size[q.first + k]);
+    for (PetscInt i = 0; i < cols; ++i) largest[i] = Larger(PetscAbsReal(y[i]), largest[i]);
+  }
+  const PetscInt *place = p->reached.data() + q.cols.start;
+  for (PetscInt i = 0; i < cols; ++i) size[place[i]] = Larger(largest[i], size[place[i]]);
+  return true;
+}
+
+/* Rows of the PETSc matrix are columns for KLU */
+static void MeasureMatrix(const LinearRows &rows, KluPanels *p)
+{
+  for (PetscInt k = 0; k < p->n; ++k) {
+    double largest[2] = {0, 0};
+    for (PetscInt j = p->col[k], e = rows.start[j]; e < rows.start[j + 1]; ++e) {
+      const bool inside = (size_t)p->target[e] < p->outer_values;
+      largest[e & 1]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 1]);
+    }
+    p->matrix_size[k] = Larger(largest[0], largest[1]);
+  }
+}
+
+static double ReciprocalGrowth(const KluPanels &p)
+{
+  double smallest = 1;
+  for (PetscInt k = 0; k < p.n; ++k)
+    if (p.factor_size[k] > 0) smallest = PetscMin(smallest, p.matrix_size[k] / p.factor_size[k]);
+  return smallest;
+}
+
+/* ---- all together ---- */
+
+static void Assemble(const LinearRows &rows, KluPanels *p)
+{
+  std::fill(p->value.begin(), p->value.end(), 0.0);
+  for (PetscInt e = 0; e < rows.start[rows.n]; ++e) p->value[p->target[e]] = rows.val[e];
+}
+
+static Work Begin(const KluPanel &q, KluPanels *p)
+{
+  const Work w = {&q, (Int)q.width, (Int)(q.width + q.rows.count), (Int)(q.width + q.cols.count), 0};
+  KluPanelsSetPlaces(q, p);
+  const size_t left = (size_t)w.left * SIDE_BY_SIDE, right = (size_t)w.right * SIDE_BY_SIDE;
+  if (p->left.size() < left) p->left.resize(left);
+  if (p->right.size() < right) p->right.resize(right);
+  return w;
+}
+
+PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *growth)
+{
+  PetscFunctionBegin;
+  *growth = 0;
+  Assemble(rows, p);
+  std::fill(p->factor_size.begin(), p->factor_size.end(), 0.0);
+  for (const KluPanel &q : p->panel) {
+    bool good = false;
+    Work w = Begin(q, p);
+    PetscCall(Collect(&w, p));
+    PetscCall(FactorPanel(w, p, &good));
+    if (!good || !MeasurePanel(q, p)) PetscFunctionReturn(0);
+  }
+  MeasureMatrix(rows, p);
+  *growth = ReciprocalGrowth(*p);
+  PetscFunctionReturn(0);
+}
+
+#endif

@@ -1,0 +1,445 @@
+/* Structure of the panels of "klupair": from the patterns of KLU's factors to panels, what they cost, where entries go
+ */
+#if defined(HHTDAE_HAVE_KLU)
+#include "klupair_panels.h"
+#include <algorithm>
+
+typedef std::vector<PetscInt> Indices;
+
+/* Below so many operations in all, or per entry of L and U, KLU is as fast and nobody looks for panels */
+static const double LEAST_FLOPS = 2e5, LEAST_PER_ENTRY = 30;
+
+/*
+  Seconds per operation of KLU's scalar loops and of dense products, per entry stored in panels, per panel, and per
+  panel that a panel looks back to.
+*/
+static const double SCALAR_OPERATION = 0.36e-9, DENSE_OPERATION = 0.07e-9, PANEL_ENTRY = 1.5e-9, PANEL = 1e-6,
+                    SOURCE = 0.15e-6;
+
+/* Panels must promise this part of KLU's time */
+static const double GAIN = 0.7;
+
+/* ---- the patterns of L and U ---- */
+
+/* Off the diagonal, entries of column k of L and of row k of U together, as places */
+struct Pattern {
+  Indices start, index;
+};
+
+static PetscErrorCode Extract(KluPair *k, Pattern *pattern)
+{
+  const KluInt        n = k->symbolic->n;
+  std::vector<KluInt> Lp(n + 1), Li(k->numeric->lnz), Up(n + 1), Ui(k->numeric->unz);
+  std::vector<double> Lx(Li.size()), Ux(Ui.size()); /* without them KLU gives no indices */
+
+  PetscFunctionBegin;
+  const KluInt ok = KLU(extract)(k->numeric, k->symbolic, Lp.data(), Li.data(), Lx.data(), Up.data(), Ui.data(),
+                                 Ux.data(), NULL, NULL, NULL, NULL, NULL, NULL, NULL, &k->common);
+  PetscCheck(ok, PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU does not give the pattern of its factors, status %d",
+             (int)k->common.status);
+  Indices &start = pattern->start;
+  start.assign(n + 1, 0);
+  for (KluInt j = 0; j < n; ++j) {
+    start[j + 1] += Lp[j + 1] - Lp[j];
+    for (KluInt e = Up[j]; e < Up[j + 1]; ++e) ++start[Ui[e] + 1];
+  }
+  for (KluInt j = 0; j < n; ++j) start[j + 1] += start[j];
+  pattern->index.resize(start[n]);
+  Indices next(start.begin(), start.end() - 1);
+  for (KluInt j = 0; j < n; ++j) {
+    for (KluInt e = Lp[j]; e < Lp[j + 1]; ++e) pattern->index[next[j]++] = Li[e];
+    for (KluInt e = Up[j]; e < Up[j + 1]; ++e) pattern->index[next[Ui[e]]++] = j;
+  }
+  PetscFunctionReturn(0);
+}
+
+/* ---- the symmetric structure and its elimination tree ---- */
+
+struct Tree {
+  std::vector<Indices> structure; /* places after each place that its pivot reaches */
+  Indices              parent;    /* -1 at roots: the last place of a diagonal block, and other ends */
+};
+
+/* A pivot reaches what it meets itself and what those before hand over to it; structures are dropped when `limit`
+   entries are exceeded: panels would be much fuller than KLU's factors */
+static bool Eliminate(const Pattern &pattern, double limit, Tree *tree)
+{
+  const PetscInt n = (PetscInt)pattern.start.size() - 1;
+  Indices        met(n, -1), child(n, -1), next(n, -1);
+  double         entries = 0;
+
+  tree->structure.assign(n, Indices());
+  tree->parent.assign(n, -1);
+  for (PetscInt k = 0; k < n; ++k) {
+    Indices   &s    = tree->structure[k];
+    const auto meet = [&](PetscInt i) {
+      if (i > k && met[i] != k) s.push_back(i);
+      met[i] = k;
+    };
+    for (PetscInt e = pattern.start[k]; e < pattern.start[k + 1]; ++e) meet(pattern.index[e]);
+    for (PetscInt c = child[k]; c >= 0; c = next[c])
+      for (PetscInt i : tree->structure[c]) meet(i);
+    entries += 2 * (double)s.size();
+    if (entries > limit) return false;
+    if (s.empty()) continue;
+    const PetscInt parent = *std::min_element(s.begin(), s.end());
+    tree->parent[k]       = parent;
+    next[k]               = child[parent];
+    child[parent]         = k;
+  }
+  return true;
+}
+
+/* Old place of each new one: everything below a place directly before it. Roots stay in their order, and with them the
+   diagonal blocks. */
+static Indices Postorder(const Tree &tree)
+{
+  const PetscInt n = (PetscInt)tree.parent.size();
+  Indices        child(n, -1), next(n, -1), order, stack;
+  for (PetscInt k = n; k-- > 0;)
+    if (tree.parent[k] >= 0) {
+      next[k]               = child[tree.parent[k]];
+      child[tree.parent[k]] = k;
+    }
+  order.reserve(n);
+  for (PetscInt root = 0; root < n; ++root) {
+    if (tree.parent[root] >= 0) continue;
+    stack.assign(1, root);
+    while (!stack.empty()) {
+      const PetscInt v = stack.back(), c = child[v];
+      if (c >= 0) {
+        child[v] = next[c];
+        stack.push_back(c);
+      } else {
+        order.push_back(v);
+        stack.pop_back();
+      }
+    }
+  }
+  return order;
+}
+
+/* ---- panels ---- */
+
+/* Ranges of places; all of `block` begin one, too */
+struct Range {
+  PetscInt first, last, rows; /* with so many places after the last */
+  double   zeros;
+};
+
+/* Pivots in a row of which each reaches the next one and what that reaches */
+static std::vector<Range> Fundamental(const Indices &parent, const Indices &count)
+{
+  std::vector<Range> ranges;
+  const PetscInt     n = (PetscInt)parent.size();
+  for (PetscInt k = 0; k < n; ++k)
+    if (k && parent[k - 1] == k && count[k - 1] == count[k] + 1) {
+      ranges.back().last = k;
+      ranges.back().rows = count[k];
+    } else
+      ranges.push_back({k, k, count[k], 0});
+  return ranges;
+}
+
+/* A range taken together with the one that follows, if that is its parent: worth it where few zeros are stored or both
+   are narrow */
+static bool Joined(const Range &a, const Range &b, Range *both)
+{
+  const double wa = (double)(a.last - a.first + 1), wb = (double)(b.last - b.first + 1), w = wa + wb;
+  *both            = {a.first, b.last, b.rows, a.zeros + b.zeros + 2 * wa * (wb + (double)(b.rows - a.rows))};
+  const double all = w * (w + 2 * (double)b.rows), part = both->zeros / all;
+  return w <= 4 ? part < 0.6 : w <= 16 ? part < 0.25 : w <= 48 ? part < 0.1 : part < 0.05;
+}
+
+static std::vector<Range> Amalgamate(const std::vector<Range> &fine, const Indices &parent)
+{
+  std::vector<Range> ranges; /* from the last to the first */
+  for (size_t k = fine.size(); k-- > 0;) {
+    Range both;
+    if (!ranges.empty() && parent[fine[k].last] >= 0 && parent[fine[k].last] <= ranges.back().last &&
+        Joined(fine[k], ranges.back(), &both))
+      ranges.back() = both;
+    else
+      ranges.push_back(fine[k]);
+  }
+  std::reverse(ranges.begin(), ranges.end());
+  return ranges;
+}
+
+/* ---- rows and columns that each panel reaches ---- */
+
+/* Entries of the matrix, as places, inside of diagonal blocks or between them */
+struct Entry {
+  PetscInt number, row, col;
+};
+
+struct Entries {
+  std::vector<Entry> inner, outer;
+};
+
+static Entries Place(const LinearRows &rows, const Indices &block_of, const KluPanels &p)
+{
+  Entries e;
+  Indices row(p.n), col(p.n);
+  for (PetscInt k = 0; k < p.n; ++k) {
+    row[p.row[k]] = k;
+    col[p.col[k]] = k;
+  }
+  e.inner.reserve(rows.start[rows.n]);
+  for (PetscInt j = 0; j < rows.n; ++j)
+    for (PetscInt k = rows.start[j]; k < rows.start[j + 1]; ++k) {
+      const Entry entry = {k, row[rows.col[k]], col[j]};
+      (block_of[entry.row] == block_of[entry.col] ? e.inner : e.outer).push_back(entry);
+    }
+  return e;
+}
+
+/* What the panels before hand over to one panel, sorted, each once */
+struct Reach {
+  std::vector<Indices> rows, cols;
+};
+
+static Indices PanelOf(const KluPanels &p)
+{
+  Indices of(p.n);
+  for (size_t k = 0; k < p.panel.size(); ++k) std::fill_n(of.begin() + p.panel[k].first, p.panel[k].width, (PetscInt)k);
+  return of;
+}
+
+static void SortUnique(Indices *a)
+{
+  std::sort(a->begin(), a->end());
+  a->erase(std::unique(a->begin(), a->end()), a->end());
+}
+
+/* Appends what lies after the places of panel q */
+static void Append(const Indices &from, const KluPanel &q, Indices *to)
+{
+  to->insert(to->end(), std::lower_bound(from.begin(), from.end(), q.first + q.width), from.end());
+}
+
+/* Calls use(panel) for every panel that has some of these ascending places */
+template <typename Use> static void EachPanel(const Indices &places, const Indices &of, Use use)
+{
+  PetscInt last = -1;
+  for (PetscInt i : places) {
+    if (of[i] != last) use(of[i]);
+    last = of[i];
+  }
+}
+
+/* Places met again and again are sorted out early, before a panel's turn comes */
+static void Spread(const Indices &rows, const Indices &cols, const Indices &of, const KluPanels &p,
+                   std::vector<Indices> *to)
+{
+  EachPanel(cols, of, [&](PetscInt k) {
+    Indices &r = (*to)[k];
+    Append(rows, p.panel[k], &r);
+    if (r.size() > 4 * (size_t)p.n) SortUnique(&r);
+  });
+}
+
+static Reach FindReach(const Entries &e, const Indices &of, const KluPanels &p)
+{
+  Reach r;
+  r.rows.resize(p.panel.size());
+  r.cols.resize(p.panel.size());
+  for (const Entry &a : e.inner)
+    if (of[a.row] > of[a.col])
+      r.rows[of[a.col]].push_back(a.row);
+    else if (of[a.row] < of[a.col])
+      r.cols[of[a.row]].push_back(a.col);
+  for (size_t k = 0; k < p.panel.size(); ++k) {
+    SortUnique(&r.rows[k]);
+    SortUnique(&r.cols[k]);
+    Spread(r.rows[k], r.cols[k], of, p, &r.rows);
+    Spread(r.cols[k], r.rows[k], of, p, &r.cols);
+  }
+  return r;
+}
+
+static KluReach Store(const Indices &places, KluPanels *p)
+{
+  const KluReach r = {(PetscInt)p->reached.size(), (PetscInt)places.size()};
+  p->reached.insert(p->reached.end(), places.begin(), places.end());
+  return r;
+}
+
+static void SizePanels(const Reach &reach, KluPanels *p)
+{
+  size_t values = 0;
+  for (size_t k = 0; k < p->panel.size(); ++k) {
+    KluPanel &q    = p->panel[k];
+    q.rows         = Store(reach.rows[k], p);
+    q.cols         = Store(reach.cols[k], p);
+    q.lower        = values;
+    q.upper        = q.lower + (size_t)q.width * (size_t)(q.width + q.rows.count);
+    values         = q.upper + (size_t)q.width * (size_t)q.cols.count;
+    const double w = (double)q.width, l = (double)q.rows.count, u = (double)q.cols.count;
+    p->flops += 2.0 / 3 * w * w * w + w * w * (l + u) + 2 * w * l * u;
+  }
+  p->outer_values = values;
+  p->entries      = (double)values;
+}
+
+static PetscInt Find(const Indices &places, PetscInt place)
+{
+  return (PetscInt)(std::lower_bound(places.begin(), places.end(), place) - places.begin());
+}
+
+/* Which panels each one looks back to */
+static void FindSources(const Reach &reach, const Indices &of, KluPanels *p)
+{
+  std::vector<std::vector<KluPanelSource>> found(p->panel.size());
+  for (size_t k = 0; k < p->panel.size(); ++k) {
+    const Indices &r = reach.rows[k], &c = reach.cols[k];
+    const auto     add = [&](PetscInt to) {
+      const PetscInt first = p->panel[to].first, end = first + p->panel[to].width;
+      if (found[to].empty() || found[to].back().panel != (PetscInt)k)
+        found[to].push_back({(PetscInt)k, Find(r, first), Find(r, end), Find(c, first), Find(c, end)});
+    };
+    EachPanel(r, of, add);
+    EachPanel(c, of, add);
+  }
+  for (size_t k = 0; k < p->panel.size(); ++k) {
+    p->panel[k].source  = (PetscInt)p->source.size();
+    p->panel[k].sources = (PetscInt)found[k].size();
+    p->source.insert(p->source.end(), found[k].begin(), found[k].end());
+  }
+}
+
+/* ---- where the entries of the matrix go ---- */
+
+void KluPanelsSetPlaces(const KluPanel &q, KluPanels *p)
+{
+  for (PetscInt i = 0; i < q.width; ++i) p->row_of[q.first + i] = p->col_of[q.first + i] = i;
+  for (PetscInt i = 0; i < q.rows.count; ++i) p->row_of[p->reached[q.rows.start + i]] = q.width + i;
+  for (PetscInt i = 0; i < q.cols.count; ++i) p->col_of[p->reached[q.cols.start + i]] = q.width + i;
+}
+
+static size_t Position(const KluPanel &q, const KluPanels &p, const Entry &e)
+{
+  if (e.col < q.first + q.width)
+    return q.lower + (size_t)(e.col - q.first) * (size_t)(q.width + q.rows.count) + (size_t)p.row_of[e.row];
+  return q.upper + (size_t)(e.row - q.first) * (size_t)q.cols.count + (size_t)(p.col_of[e.col] - q.width);
+}
+
+/* Entries are dealt out to the panels that hold them first, so that places are set once for each panel */
+static void AimInner(const std::vector<Entry> &entries, const Indices &of, KluPanels *p)
+{
+  Indices            start(p->panel.size() + 1, 0);
+  std::vector<Entry> dealt(entries.size());
+  const auto         panel = [&of](const Entry &e) { return std::min(of[e.row], of[e.col]); };
+  for (const Entry &e : entries) ++start[panel(e) + 1];
+  for (size_t k = 0; k < p->panel.size(); ++k) start[k + 1] += start[k];
+  Indices next(start.begin(), start.end() - 1);
+  for (const Entry &e : entries) dealt[next[panel(e)]++] = e;
+  for (size_t k = 0; k < p->panel.size(); ++k) {
+    KluPanelsSetPlaces(p->panel[k], p);
+    for (PetscInt e = start[k]; e < start[k + 1]; ++e)
+      p->target[dealt[e].number] = (PetscInt)Position(p->panel[k], *p, dealt[e]);
+  }
+}
+
+static void AimOuter(const std::vector<Entry> &entries, KluPanels *p)
+{
+  p->outer_start.assign(p->n + 1, 0);
+  for (const Entry &e : entries) ++p->outer_start[e.col + 1];
+  for (PetscInt k = 0; k < p->n; ++k) p->outer_start[k + 1] += p->outer_start[k];
+  p->outer.resize(entries.size());
+  Indices next(p->outer_start.begin(), p->outer_start.end() - 1);
+  for (const Entry &e : entries) {
+    p->outer[next[e.col]] = e.row;
+    p->target[e.number]   = (PetscInt)p->outer_values + next[e.col]++;
+  }
+}
+
+/* ---- all together ---- */
+
+static void Estimate(double flops, KluPanels *p)
+{
+  p->scalar  = SCALAR_OPERATION * flops;
+  p->seconds = DENSE_OPERATION * p->flops + PANEL_ENTRY * p->entries + PANEL * (double)p->panel.size() +
+               SOURCE * (double)p->source.size();
+}
+
+static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
+{
+  Indices block(p->n);
+  p->row.resize(p->n);
+  p->col.resize(p->n);
+  block_of->resize(p->n);
+  for (KluInt b = 0; b < k.symbolic->nblocks; ++b)
+    std::fill(block.begin() + k.symbolic->R[b], block.begin() + k.symbolic->R[b + 1], (PetscInt)b);
+  for (PetscInt i = 0; i < p->n; ++i) {
+    p->row[i]      = k.numeric->Pnum[order[i]];
+    p->col[i]      = k.symbolic->Q[order[i]];
+    (*block_of)[i] = block[order[i]];
+  }
+}
+
+static void MakePanels(const std::vector<Range> &ranges, const Indices &block_of, KluPanels *p)
+{
+  for (size_t i = 0; i < ranges.size(); ++i) {
+    KluPanel q = KluPanel();
+    q.first    = ranges[i].first;
+    q.width    = ranges[i].last - ranges[i].first + 1;
+    p->panel.push_back(q);
+    if (!i || block_of[q.first] != block_of[q.first - 1]) p->block.push_back((PetscInt)i);
+  }
+  p->block.push_back((PetscInt)ranges.size());
+}
+
+static std::vector<Range> Ranges(const Tree &tree, const Indices &order)
+{
+  const PetscInt n = (PetscInt)order.size();
+  Indices        place(n), parent(n), count(n);
+  for (PetscInt i = 0; i < n; ++i) place[order[i]] = i;
+  for (PetscInt i = 0; i < n; ++i) {
+    parent[i] = tree.parent[order[i]] < 0 ? -1 : place[tree.parent[order[i]]];
+    count[i]  = (PetscInt)tree.structure[order[i]].size();
+  }
+  return Amalgamate(Fundamental(parent, count), parent);
+}
+
+static void Allocate(const LinearRows &rows, KluPanels *p)
+{
+  p->target.resize(rows.start[rows.n]);
+  for (auto *scratch : {&p->row_of, &p->col_of, &p->exchange}) scratch->resize(p->n);
+  for (auto *scratch : {&p->matrix_size, &p->factor_size, &p->x, &p->y}) scratch->resize(p->n);
+}
+
+PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, bool *pays)
+{
+  Pattern      pattern;
+  Tree         tree;
+  Indices      block_of;
+  const double entries = (double)k->numeric->lnz + (double)k->numeric->unz, flops = k->common.flops;
+
+  PetscFunctionBegin;
+  *p    = KluPanels();
+  *pays = flops > LEAST_FLOPS && flops > LEAST_PER_ENTRY * entries && entries < 0.1 * PETSC_MAX_INT;
+  if (!*pays) PetscFunctionReturn(0);
+  p->n = rows.n;
+  PetscCall(Extract(k, &pattern));
+  *pays = Eliminate(pattern, 3 * entries, &tree);
+  if (!*pays) PetscFunctionReturn(0);
+  const Indices order = Postorder(tree);
+  Order(*k, order, p, &block_of);
+  MakePanels(Ranges(tree, order), block_of, p);
+  const Indices of    = PanelOf(*p);
+  const Entries e     = Place(rows, block_of, *p);
+  const Reach   reach = FindReach(e, of, *p);
+  SizePanels(reach, p);
+  FindSources(reach, of, p);
+  Estimate(flops, p);
+  *pays = p->seconds < GAIN * p->scalar && p->entries < 0.5 * PETSC_MAX_INT;
+  if (!*pays) PetscFunctionReturn(0);
+  Allocate(rows, p);
+  AimInner(e.inner, of, p);
+  AimOuter(e.outer, p);
+  p->value.resize(p->outer_values + p->outer.size());
+  PetscFunctionReturn(0);
+}
+
+#endif
