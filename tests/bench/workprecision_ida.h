@@ -159,7 +159,7 @@ private:
   {
     std::vector<double> u(counted_.n), v(counted_.n), a(counted_.n);
     const double        start = cpuSeconds();
-    system_.extra             = 0.;
+    system_.extra             = 0;
     counted_.deadline         = start + limits.seconds;
     while (!recorder_.done()) {
       realtype  t;
@@ -180,7 +180,7 @@ private:
   void statistics(Run &run)
   {
     long steps = 0, errorFails = 0, newton = 0, setups = 0;
-    run.extra = system_.extra;
+    run.extra = system_.extraSeconds();
     IDAGetNumSteps(memory_, &steps);
     IDAGetNumErrTestFails(memory_, &errorFails);
     IDAGetNumNonlinSolvIters(memory_, &newton);

@@ -325,13 +325,13 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
 inline PetscErrorCode SolveTS(TSRun &r, Run &run)
 {
   PetscFunctionBegin;
-  if (r.system) r.system->extra = 0.;
+  if (r.system) r.system->extra = 0;
   r.counted.residuals = r.counted.jacobians = 0;
   const double start                        = cpuSeconds();
   r.counted.deadline                        = start + r.limits.seconds;
   const PetscErrorCode e                    = TSSolve(r.ts, r.U);
   run.time                                  = cpuSeconds() - start;
-  if (r.system) run.extra = r.system->extra;
+  if (r.system) run.extra = r.system->extraSeconds();
   PetscCall(e);
   PetscFunctionReturn(0);
 }
