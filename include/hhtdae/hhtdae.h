@@ -93,6 +93,10 @@ typedef PetscErrorCode (*TSHHT3ChangeMap)(TS ts, PetscReal t, Vec U, Vec V, Vec 
 typedef PetscErrorCode (*TSHHT3ChangeCommit)(TS ts, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetCoordinateChange(TS, TSHHT3ChangeTest, TSHHT3ChangeMap, TSHHT3ChangeCommit, void *);
 
+/* The longest step from a state (U, U', U'') that the application allows */
+typedef PetscErrorCode (*TSHHT3StepLimit)(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx);
+PETSC_EXTERN PetscErrorCode TSHHT3SetStepLimit(TS, TSHHT3StepLimit, void *);
+
 /* The results */
 PETSC_EXTERN PetscErrorCode TSHHT3GetAcceleration(TS, Vec *);
 PETSC_EXTERN PetscErrorCode TSHHT3Interpolate(TS, PetscReal, Vec, Vec, Vec);

@@ -70,6 +70,12 @@ struct Change {
   PetscInt           step   = 0;
 };
 
+/* limit.cpp */
+struct StepLimit {
+  TSHHT3StepLimit limit = nullptr;
+  void           *ctx   = nullptr;
+};
+
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
 enum class Bend { None, Rates, Velocities };
 
@@ -133,7 +139,8 @@ struct Integrator {
   PetscBool     singular = PETSC_FALSE;       /* the package could not factor the last matrix */
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
 
-  Change change;
+  Change    change;
+  StepLimit limit;
 
   /* bookkeeping */
   TSStepStatus     status = TS_STEP_INCOMPLETE;
@@ -238,6 +245,9 @@ PetscErrorCode StepAfterChange(TS ts);
 PetscErrorCode MatrixAfterChange(TS ts);
 PetscErrorCode CommitChange(TS ts);
 PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap map, TSHHT3ChangeCommit commit, void *ctx);
+/* limit.cpp */
+PetscErrorCode ApplyStepLimit(TS ts);
+PetscErrorCode SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx);
 /* step.cpp */
 PetscErrorCode NoteState(TS ts);
 PetscErrorCode Step(TS ts);

@@ -161,6 +161,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscBool   stage;
 
   PetscFunctionBegin;
+  PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
   if (!*tiny && I.constraints() && ts->time_step < shrink * I.h_last) PetscCall(Repair(ts));
   if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));

@@ -5,6 +5,7 @@
 #include "bodies.h"
 #include "pattern.h"
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 namespace hhtdae
@@ -46,6 +47,10 @@ public:
   virtual void accept(Bodies &) {}
   /* potential energy of the instances that belong to this rank; bodies have moved */
   virtual double energy(const Evaluation &) const { return 0; }
+  /* bodies that are apart and could be through each other after a step: whether there are such, and in what time at the present
+     velocities and accelerations; bodies have moved */
+  virtual bool   fliesThrough() const { return false; }
+  virtual double untilThrough(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
   /* energy and momentum of own coordinates that are not those of bodies */
   virtual void addTo(Balance &, const Evaluation &) const {}
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */

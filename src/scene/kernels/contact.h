@@ -11,6 +11,9 @@
 #include "contact_law.h"
 #include "contact_shapes.h"
 #include "scene/kernel.h"
+#include <algorithm>
+#include <limits>
+#include <utility>
 
 namespace hhtdae
 {
@@ -75,6 +78,20 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     Touch<T> t;
     Shape::template touch<T>(d.shape, f, t);
     place<T>(f, t.p, F, on);
+  }
+
+  /* Until a body is as deep in a ball or box as a step may end, or, being deep, a little deeper: on the other side
+     there is no force, so that the end of a step may lie there as well. Their distance along a straight flight is
+     convex: it never shrinks faster than now. */
+  template <class S = Shape, class = decltype(S::through(std::declval<const typename S::Data &>()))>
+  static double untilThrough(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration)
+  {
+    Touch<double> t;
+    Shape::template touch<double>(d.shape, f, t);
+    const double most = Shape::through(d.shape), way = std::max(most - t.depth, 0.25 * most),
+                 closing = -t.n.dot(slip<double>(f, w, t.p));
+    const double speed   = closing + std::sqrt(closing * closing + 2 * acceleration * way);
+    return speed > 0 ? 2 * way / speed : std::numeric_limits<double>::infinity();
   }
 
   /* of the elastic part of the force */

@@ -9,6 +9,7 @@
 #define HHTDAE_SCENE_KERNELS_CONTACT_SHAPES_H
 
 #include "scene/frames.h"
+#include <algorithm>
 #include <cmath>
 
 namespace hhtdae
@@ -109,6 +110,7 @@ struct SphereSphereShape {
   struct Data {
     double radius_i, radius_j;
   };
+  static double through(const Data &d) { return 0.5 * std::min(d.radius_i, d.radius_j); }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;
@@ -133,6 +135,7 @@ struct SphereBoxShape {
   struct Data {
     double radius, half[3];
   };
+  static double through(const Data &d) { return 0.5 * std::min({d.radius, d.half[0], d.half[1], d.half[2]}); }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;

@@ -1,0 +1,71 @@
+/* The longest step that the application allows: what the estimate cannot see, because nothing of it shows at the ends
+ * of the step. */
+#include "impl.h"
+
+namespace hht3
+{
+
+/* Before an attempt from t_n; steps of fixed length and the search for an event are left alone */
+PetscErrorCode ApplyStepLimit(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscReal   h = PETSC_MAX_REAL;
+
+  PetscFunctionBegin;
+  if (!I.limit.limit || I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall((*I.limit.limit)(ts, ts->ptime, I.U0, I.V0, I.A0, &h, I.limit.ctx));
+  PetscCheck(h > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "The function of TSHHT3SetStepLimit() allows a step of %g at t = %g, must be positive", (double)h,
+             (double)ts->ptime);
+  h = PetscMax(h, PetscMin(ts->adapt->dt_min, ts->time_step));
+  if (h < ts->time_step) {
+    PetscCall(PetscInfo(ts, "the application allows a step of %g in place of %g\n", (double)h, (double)ts->time_step));
+    ts->time_step = h;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx)
+{
+  PetscFunctionBegin;
+  Get(ts).limit = {limit, ctx};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@C
+  TSHHT3SetStepLimit - Gives a function that says how long the next step may be
+
+  Logically Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+. limit - the function, or `NULL` for none
+- ctx   - its context
+
+  Calling sequence of limit:
+$ PetscErrorCode limit(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
++ ts    - the `TS` context
+. t     - the time of the state
+. U     - the solution, read-only
+. V     - its first time derivative, read-only
+. A     - its second time derivative, read-only
+. h     - in: as long as one likes; out: the longest step, the same on all ranks
+- ctx   - the context
+
+  Level: advanced
+
+  Note:
+  The error estimate looks at both ends of a step. Where something may begin and end between them, as when a body flies
+through another one, only the application knows. It is asked before every attempt of a step of variable length.
+
+.seealso: `TSHHT3`, `TSHHT3SetCoordinateChange()`
+@*/
+PetscErrorCode TSHHT3SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscTryMethod(ts, "TSHHT3SetStepLimit_C", (TS, TSHHT3StepLimit, void *), (ts, limit, ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,54 @@
+/*
+  Bodies that fly towards each other: a step must not be so long that one is through the other at its end. In free
+  flight the error estimate finds nothing to object to, whatever the length of the step.
+*/
+#include "runtime.h"
+#include <limits>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
+{
+  Runtime            &R = *static_cast<Runtime *>(ctx);
+  const double       *u, *v, *a, *local[3];
+  std::vector<double> acceleration;
+  double              least = *h;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(VecGetArrayRead(A, &a));
+  /* the exchange carries accelerations only where elements read them */
+  if (R.size > 1 && !R.uses_acceleration) {
+    PetscCall(LocalState(R, a, a, a, local));
+    acceleration.assign(local[0], local[0] + R.u.size());
+  }
+  PetscCall(LocalState(R, u, v, a, local));
+  if (!acceleration.empty()) local[2] = acceleration.data();
+  R.bodies.move(local[0], local[1]);
+  const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
+  for (const auto &b : R.batches) least = std::min(least, b->untilThrough(e));
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscCall(VecRestoreArrayRead(A, &a));
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE, MPI_MIN, R.scene.comm));
+  *h = least;
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode AttachApproach(Runtime &R, TS ts)
+{
+  int any = 0;
+  PetscFunctionBegin;
+  for (const auto &b : R.batches) any |= b->fliesThrough();
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
+  if (any) PetscCall(TSHHT3SetStepLimit(ts, Limit, &R));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
