@@ -7,15 +7,15 @@
 
   A run at tolerance eps is right if at every sample time t
 
-    error(t) <= eps N(t) (10 + 3 G(t)),
+    error(t) <= eps (N(t) + 50) (10 + 3 G(t)),
 
-  N: its steps so far, each of which may leave an error of eps; G: how much the model itself makes grow of an error, as
-  IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over 10 eps_ref. It is asked for as
-  long as the right-hand side is below 0.3: later the tolerance does not determine the solution. Where that is so before
-  the end, a third run, at eps / 100, has to be right by the same formula. Where an error is larger, gravity, bodies and
-  points are moved by eps N / 2 in six directions: a model which that moves as far (a third as far at least) is one
-  whose solution eps does not determine from there on, near a separatrix. And where the first error is above 1e-3, that
-  of the second run has to be smaller, or else that of the third.
+  N: its steps so far, each of which may leave an error of eps, and 50 for the start and impacts; G: how much the model
+  itself makes grow of an error, as IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
+  10 eps_ref. It is asked for as long as the right-hand side is below 0.3: later the tolerance does not determine the
+  solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
+  error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
+  (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
+  first error is above 1e-3, that of the second run has to be smaller, or else that of the third.
 */
 #ifndef HHTDAE_SOAK_MODEL_JUDGE_H
 #define HHTDAE_SOAK_MODEL_JUDGE_H
@@ -209,7 +209,7 @@ private:
   {
     double doubt = 0;
     for (int l = 0; l <= k; l++) doubt = std::max(doubt, error(looser_, l));
-    return eps * (double)a.steps_at[(std::size_t)k] * (per_step + per_growth * doubt / (10 * reference_eps));
+    return eps * (double)(a.steps_at[(std::size_t)k] + 50) * (per_step + per_growth * doubt / (10 * reference_eps));
   }
 
   /* Samples for which the tolerance determines the solution; of these, whether all are right */

@@ -386,8 +386,8 @@ private:
   {
     int a, c;
     pair(a, c);
-    const Marker i = b.at(c, b.placed[c].at, b.placed[c].axes), j = b.at(a, b.placed[c].at);
     if (b.placed[a].point || b.placed[a].flexible || b.placed[c].point) return;
+    const Marker i = b.at(c, b.placed[c].at, b.placed[c].axes), j = b.at(a, b.placed[c].at);
     const double F = 0.3 * b.weight(c) * r.uniform(-1, 1), w = 2 * M_PI / b.period;
     UserForce    f{i, j, i, {}, {}, false};
     for (int d = 0; d < 3; d++)
