@@ -47,10 +47,10 @@ public:
   virtual void accept(Bodies &) {}
   /* potential energy of the instances that belong to this rank; bodies have moved */
   virtual double energy(const Evaluation &) const { return 0; }
-  /* bodies that are apart and could be through each other after a step: whether there are such, and in what time at the present
-     velocities and accelerations; bodies have moved */
-  virtual bool   fliesThrough() const { return false; }
-  virtual double untilThrough(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
+  /* What the ends of a step do not show: bodies that could be through each other, angles that could turn by more than half a turn.
+     Whether there are such, and how long a step may be at the present velocities and accelerations; bodies have moved */
+  virtual bool   limitsSteps() const { return false; }
+  virtual double longestStep(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
   /* energy and momentum of own coordinates that are not those of bodies */
   virtual void addTo(Balance &, const Evaluation &) const {}
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
@@ -90,6 +90,48 @@ inline void AddLever(const Bodies &B, PetscInt b, const Vector3 &s, const Vector
   if (k != BodyKind::Rigid) return;
   const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
   H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
+}
+
+/* ---- how long a step the instances of a kernel allow ---- */
+
+/* A kernel that has a limit says so by
+     static double longestStep(const Data &, const Frame<double> *f, const Twist<double> *w, double acceleration, double angular);
+   the last two are magnitudes of the relative acceleration and angular acceleration of the markers, about */
+template <class K, class = void> struct HasLongestStep : std::false_type {
+};
+template <class K>
+struct HasLongestStep<K, std::void_t<decltype(K::longestStep(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr,
+                                                               (const Twist<double> *)nullptr, 0., 0.))>> : std::true_type {
+};
+
+/* of one instance */
+template <class K, class Instance> double LongestStep(const Instance &e, const Evaluation &ev)
+{
+  const Bodies &B = ev.bodies;
+  Frame<double> f[K::markers];
+  Twist<double> w[K::markers];
+  double        acceleration = 0, angular = 0;
+  for (int k = 0; k < K::markers; k++) {
+    const PetscInt   b = B.marker[e.marker[k]].body;
+    const LocalBody &l = B.body[b];
+    f[k]               = B.frame<true>(e.marker[k]);
+    w[k]               = B.twist(e.marker[k], f[k]);
+    Vector3 a          = Vector3::Zero();
+    for (int c = 0; l.kind != BodyKind::Ground && c < (PlanarScene(l.kind) ? 2 : 3); c++) a(c) = ev.a[l.first + c];
+    acceleration += a.norm() + w[k].w.squaredNorm() * (f[k].x - B.now[b].r).norm();
+    angular += B.angularAcceleration(b, ev.v, ev.a).norm();
+  }
+  return K::longestStep(e.data, f, w, acceleration, angular);
+}
+
+template <class K, class Instances> double LongestSteps(const Instances &all, const Evaluation &ev)
+{
+  double least = std::numeric_limits<double>::infinity();
+  if constexpr (HasLongestStep<K>::value)
+    for (const auto &e : all) least = std::min(least, LongestStep<K>(e, ev));
+  (void)all;
+  (void)ev;
+  return least;
 }
 
 /* ---- what the instances of a kernel remember of accepted steps ---- */

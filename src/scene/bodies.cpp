@@ -44,6 +44,15 @@ void Bodies::move(const double *u, const double *v)
   }
 }
 
+Vector3 Bodies::angularAcceleration(PetscInt b, const double *v, const double *a) const
+{
+  const LocalBody &k = body[b];
+  if (k.kind == BodyKind::Planar) return {0, 0, a[k.first + 2]};
+  if (!HasEulerAngles(k.kind)) return Vector3::Zero();
+  const double *acc = a + k.first + 3, *rate = v + k.first + 3;
+  return AngularVelocity(now[b].euler, Vector3(acc[0], acc[1], acc[2])) + Convective(now[b].euler, Vector3(rate[0], rate[1], rate[2]), now[b].w);
+}
+
 /* ---- flexible bodies ---- */
 
 ModalMotion Bodies::modalMotion(PetscInt i, const double *u, const double *v, const double *a) const

@@ -99,6 +99,7 @@ public:
     if constexpr (with_axes) f.R.noalias() = b.A * k.R;
     return f;
   }
+  Vector3 angularAcceleration(PetscInt b, const double *v, const double *a) const; /* of all rates and accelerations */
   Twist<double> twist(PetscInt m, const Frame<double> &f) const
   {
     const BodyMotion &b = now[marker[m].body];

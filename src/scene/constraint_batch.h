@@ -92,6 +92,8 @@ public:
     for (Instance &e : all) Remember<K>(e, B);
   }
 
+  bool     limitsSteps() const override { return HasLongestStep<K>::value && !all.empty(); }
+  double   longestStep(const Evaluation &ev) const override { return LongestSteps<K>(all, ev); }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   void     copyMemory(double *x, bool in) override
   {

@@ -89,6 +89,18 @@ void ExpressionBatch::accept(Bodies &B)
   for (Row &r : all_) r.f.arguments.accept(B);
 }
 
+bool ExpressionBatch::limitsSteps() const
+{
+  return std::any_of(all_.begin(), all_.end(), [](const Row &r) { return r.f.arguments.limitsSteps(); });
+}
+
+double ExpressionBatch::longestStep(const Evaluation &e) const
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const Row &r : all_) least = std::min(least, r.f.arguments.longestStep(e));
+  return least;
+}
+
 PetscInt ExpressionBatch::memory() const
 {
   PetscInt n = 0;

@@ -51,6 +51,8 @@ public:
   void     residual(Evaluation &e) override;
   void     jacobian(Evaluation &e) override;
   void     accept(Bodies &B) override;
+  bool     limitsSteps() const override;
+  double   longestStep(const Evaluation &e) const override;
   PetscInt memory() const override;
   void     copyMemory(double *x, bool in) override;
 

@@ -25,15 +25,6 @@ template <class K>
 struct HasEnergy<K, std::void_t<decltype(K::energy(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr))>> : std::true_type {
 };
 
-/* A contact that one body may fly through says in what time:  static double untilThrough(const Data &, const Frame<double> *f,
-   const Twist<double> *w, double acceleration);  the last one is the relative acceleration of the markers, about */
-template <class K, class = void> struct HasUntilThrough : std::false_type {
-};
-template <class K>
-struct HasUntilThrough<K, std::void_t<decltype(K::untilThrough(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr,
-                                                               (const Twist<double> *)nullptr, 0.))>> : std::true_type {
-};
-
 /* What both ways share: blocks between the coordinates of the markers' bodies */
 template <class K> class ForceBatchBase : public Batch
 {
@@ -62,29 +53,8 @@ public:
     (void)ev;
     return sum;
   }
-  bool   fliesThrough() const override { return HasUntilThrough<K>::value && !all.empty(); }
-  double untilThrough(const Evaluation &ev) const override
-  {
-    double least = std::numeric_limits<double>::infinity();
-    if constexpr (HasUntilThrough<K>::value)
-      for (const Instance &e : all) {
-        Frame<double> f[2];
-        Twist<double> w[2];
-        Vector3       a[2];
-        double        turning = 0;
-        for (int k = 0; k < 2; k++) {
-          const LocalBody &b = bodyOf(ev.bodies, e, k);
-          f[k]               = ev.bodies.template frame<true>(e.marker[k]);
-          w[k]               = ev.bodies.twist(e.marker[k], f[k]);
-          a[k].setZero();
-          for (int c = 0; b.kind != BodyKind::Ground && c < (PlanarScene(b.kind) ? 2 : 3); c++) a[k](c) = ev.a[b.first + c];
-          turning += w[k].w.squaredNorm() * (f[k].x - ev.bodies.now[ev.bodies.marker[e.marker[k]].body].r).norm();
-        }
-        least = std::min(least, K::untilThrough(e.data, f, w, (a[0] - a[1]).norm() + turning));
-      }
-    (void)ev;
-    return least;
-  }
+  bool   limitsSteps() const override { return HasLongestStep<K>::value && !all.empty(); }
+  double longestStep(const Evaluation &ev) const override { return LongestSteps<K>(all, ev); }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   void     copyMemory(double *x, bool in) override
   {

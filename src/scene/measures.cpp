@@ -361,6 +361,13 @@ void LocalMeasure::accept(const Bodies &B)
   for (auto &p : probes) p->accept(B);
 }
 
+double LocalMeasure::longestStep(const Evaluation &e) const
+{
+  if (kind != Measure::Angle) return std::numeric_limits<double>::infinity();
+  const MarkerMotion<double> a = Motion(e, i, true), b = Motion(e, j, true);
+  return LongestTurn(AngleRate<double>(a.f, b.f, a.w, b.w), (a.alpha - b.alpha).norm());
+}
+
 PetscInt LocalMeasure::memory() const
 {
   PetscInt n = kind == Measure::Angle;
@@ -459,6 +466,18 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
 void MeasureSet::accept(const Bodies &B)
 {
   for (LocalMeasure &m : all_) m.accept(B);
+}
+
+bool MeasureSet::limitsSteps() const
+{
+  return std::any_of(all_.begin(), all_.end(), [](const LocalMeasure &m) { return m.kind == Measure::Angle; });
+}
+
+double MeasureSet::longestStep(const Evaluation &e) const
+{
+  double least = std::numeric_limits<double>::infinity();
+  for (const LocalMeasure &m : all_) least = std::min(least, m.longestStep(e));
+  return least;
 }
 
 PetscInt MeasureSet::memory() const

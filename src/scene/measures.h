@@ -23,6 +23,7 @@ struct LocalMeasure {
   std::vector<std::unique_ptr<Probe>> probes;
 
   void     accept(const Bodies &B);
+  double   longestStep(const Evaluation &e) const; /* for angles */
   PetscInt memory() const;
   void     copyMemory(double *x, bool in);
 };
@@ -75,6 +76,8 @@ public:
   void addGradient(int k, const Evaluation &e, double factor, double *row) const;
 
   void     accept(const Bodies &B);
+  bool     limitsSteps() const;
+  double   longestStep(const Evaluation &e) const;
   PetscInt memory() const;
   void     copyMemory(double *x, bool in);
 

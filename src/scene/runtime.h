@@ -82,8 +82,8 @@ PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
-/* approach.cpp: no step goes through a contact */
-PetscErrorCode AttachApproach(Runtime &R, TS ts);
+/* step_limit.cpp: no step goes through a contact, or loses a turn of an angle */
+PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */
 PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);

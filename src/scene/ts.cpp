@@ -72,7 +72,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) PetscCall(TSHHT3SetIS(*ts, (TSHHT3Role)r, R.roles[r]));
   PetscCall(AttachReframing(R, *ts));
-  PetscCall(AttachApproach(R, *ts));
+  PetscCall(AttachStepLimit(R, *ts));
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&F));

@@ -81,6 +81,16 @@ public:
   {
     for (LocalFunction &f : functions) f.arguments.accept(B);
   }
+  bool limitsSteps() const override
+  {
+    return std::any_of(functions.begin(), functions.end(), [](const LocalFunction &f) { return f.arguments.limitsSteps(); });
+  }
+  double longestStep(const Evaluation &ev) const override
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (const LocalFunction &f : functions) least = std::min(least, f.arguments.longestStep(ev));
+    return least;
+  }
   PetscInt memory() const override
   {
     PetscInt n = 0;

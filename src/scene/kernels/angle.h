@@ -15,6 +15,7 @@
 
 #include "scene/kernel.h"
 #include <cmath>
+#include <limits>
 
 namespace hhtdae
 {
@@ -48,6 +49,14 @@ template <class T> Vec3<T> AngleGradient(const Frame<T> &i, const Frame<T> &j)
   const T       h = i.R.col(0).dot(j.R.col(2)), k = T(1) / (T(1) - h * h);
   const Vec3<T> n = j.R.col(2) - i.R.col(0) * h;
   return n * k;
+}
+
+/* In what time an angle of this rate and acceleration turns by two radians: between accepted steps less than half a turn can be
+   told, and both may grow */
+inline double LongestTurn(double rate, double acceleration)
+{
+  const double fast = std::fabs(rate) + std::sqrt(rate * rate + 4 * std::fabs(acceleration));
+  return fast > 0 ? 4 / fast : std::numeric_limits<double>::infinity(); /* also where the rate is not defined */
 }
 
 /* the exact time derivative of the angle */

@@ -84,7 +84,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
      there is no force, so that the end of a step may lie there as well. Their distance along a straight flight is
      convex: it never shrinks faster than now. */
   template <class S = Shape, class = decltype(S::through(std::declval<const typename S::Data &>()))>
-  static double untilThrough(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration)
+  static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
     Touch<double> t;
     Shape::template touch<double>(d.shape, f, t);

@@ -81,6 +81,13 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   {
     for (int k = 0; k < R; k++) d.memory[k] = UnwoundAngle<double>(f[2 * k], f[2 * k + 1], d.memory[k]);
   }
+  static double longestStep(const Data &, const Frame<double> *f, const Twist<double> *w, double, double angular)
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < R; k++)
+      least = std::min(least, LongestTurn(AngleRate<double>(f[2 * k], f[2 * k + 1], w[2 * k], w[2 * k + 1]), angular));
+    return least;
+  }
   /* the pose at the start as reference */
   static void begin(Data &d, const Frame<double> *f)
   {
@@ -125,6 +132,10 @@ struct ScrewRow : Constraint<ScrewRow, 2, 1> {
     AddAngleCurvature(f[0], f[1], lambda[0] * d.pitch / kTurn, H);
   }
   static void accept(Data &d, const Frame<double> *f) { d.memory[0] = UnwoundAngle<double>(f[0], f[1], d.memory[0]); }
+  static double longestStep(const Data &, const Frame<double> *f, const Twist<double> *w, double, double angular)
+  {
+    return LongestTurn(AngleRate<double>(f[0], f[1], w[0], w[1]), angular);
+  }
   static void begin(Data &d, const Frame<double> *f)
   {
     d.memory[0] = PrincipalAngle<double>(f[0], f[1]);

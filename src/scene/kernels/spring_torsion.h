@@ -30,6 +30,12 @@ template <class K> struct TurnForce : Force<K, 2, 1> {
     p.memory[0] = UnwoundAngle<double>(f[0], f[1], p.memory[0]);
   }
 
+  template <class Data>
+  static double longestStep(const Data &, const Frame<double> *f, const Twist<double> *w, double, double angular)
+  {
+    return LongestTurn(AngleRate<double>(f[0], f[1], w[0], w[1]), angular);
+  }
+
   /* of M from its value and derivatives in angle and rate: d(M g) = dM g + M dg, d angle = g . (d theta_i - d theta_j),
      d rate = w . dg + g . dw */
   static void spread(double M, double by_angle, double by_rate, const Frame<double> *f, const Twist<double> *w,

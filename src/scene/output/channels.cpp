@@ -28,6 +28,16 @@ public:
   {
     for (LocalMeasure &m : work_->own) m.accept(B);
   }
+  bool limitsSteps() const override
+  {
+    return std::any_of(work_->own.begin(), work_->own.end(), [](const LocalMeasure &m) { return m.kind == Measure::Angle; });
+  }
+  double longestStep(const Evaluation &e) const override
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (const LocalMeasure &m : work_->own) least = std::min(least, m.longestStep(e));
+    return least;
+  }
   PetscInt memory() const override
   {
     PetscInt n = 0;

@@ -1,6 +1,7 @@
 /*
-  Bodies that fly towards each other: a step must not be so long that one is through the other at its end. In free
-  flight the error estimate finds nothing to object to, whatever the length of the step.
+  What a step must not skip. Bodies that fly towards each other: none may be through the other at its end. Angles over full turns: it
+  must not turn them so far that the turns cannot be told. In free flight the error estimate finds nothing to object to, whatever the
+  length of the step.
 */
 #include "runtime.h"
 #include <limits>
@@ -30,7 +31,7 @@ PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *c
   if (!acceleration.empty()) local[2] = acceleration.data();
   R.bodies.move(local[0], local[1]);
   const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
-  for (const auto &b : R.batches) least = std::min(least, b->untilThrough(e));
+  for (const auto &b : R.batches) least = std::min(least, b->longestStep(e));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
   PetscCall(VecRestoreArrayRead(A, &a));
@@ -41,11 +42,11 @@ PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *c
 
 } // namespace
 
-PetscErrorCode AttachApproach(Runtime &R, TS ts)
+PetscErrorCode AttachStepLimit(Runtime &R, TS ts)
 {
   int any = 0;
   PetscFunctionBegin;
-  for (const auto &b : R.batches) any |= b->fliesThrough();
+  for (const auto &b : R.batches) any |= b->limitsSteps();
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
   if (any) PetscCall(TSHHT3SetStepLimit(ts, Limit, &R));
   PetscFunctionReturn(0);
