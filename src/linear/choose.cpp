@@ -32,9 +32,26 @@
 
   KLU is the package "klupair", which keeps its pivots from one matrix to the next; the table was made with PETSc's
   "klu", which does not. It takes half the time of the table on chains and two thirds to three quarters up to some 20
-  operations per entry; from 60 on the two are equal, so that MUMPS begins at the same place.
+  operations per entry. Above that it goes by dense panels once its pivots are kept (klupair_panels.h). Factorizations
+  after the first one, each with three solves, and the first one, in ms of processor time:
+
+      family, size              n     work   klupair    first   MUMPS LU   MUMPS LDL^T
+      10 bodies, 120 modes   1250  6.9e+06       1.6       12         14           7.8
+      1 body, 320 modes       325  1.2e+07       1.2       11        8.5           6.7
+      plate, 16 x 16 bricks  1836  1.4e+07       2.3       18         15           8.3
+      plate, 24 x 24 bricks  3900  5.1e+07       8.4       69         32            22
+      block, 8^3 bricks      2430  1.5e+08        10       77         32            23
+      block, 12^3 bricks     7098  1.9e+09        82     1560        300           210
+
+  A run needs dozens of factorizations. MUMPS begins where a few of them do not make up for the first one, and for those
+  that follow when pivots are given up. PETSc's "klu" has no panels.
 */
-static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6, LARGE_PER_ENTRY = 40;
+#if defined(HHTDAE_HAVE_KLU)
+static const double LARGE_SYMMETRIC = 6e7, LARGE_UNSYMMETRIC = 1e8;
+#else
+static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6;
+#endif
+static const double LARGE_PER_ENTRY = 40;
 
 /*
   Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.

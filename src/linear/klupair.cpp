@@ -98,6 +98,7 @@ static PetscErrorCode FindPanels(Mat F, const LinearRows &rows, KluPair *k)
 
   PetscFunctionBegin;
   if (k->panels_looked || !k->panels_wanted || k->whole || k->common.scale > 0) PetscFunctionReturn(0);
+  if (k->rejected > k->refactorizations) PetscFunctionReturn(0); /* pivots are not kept for long */
   k->panels_looked = true;
   k->panels        = std::make_shared<KluPanels>();
   PetscCall(KluPanelsBuild(rows, k, k->panels.get(), &pays));
@@ -334,8 +335,9 @@ static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
   info->nz_used = foreseen;
   if (k->numeric)
     info->nz_used = (double)k->numeric->lnz + (double)k->numeric->unz + (double)k->numeric->nzoff - (double)F->rmap->n;
-  info->nz_allocated      = info->nz_used;
-  info->memory            = (double)k->common.memusage;
+  info->nz_allocated = info->nz_used;
+  info->memory       = (double)k->common.memusage;
+  if (k->panels) info->memory += sizeof(double) * k->panels->entries;
   info->fill_ratio_given  = foreseen / matrix;
   info->fill_ratio_needed = info->nz_used / matrix;
   PetscFunctionReturn(0);

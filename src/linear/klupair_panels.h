@@ -58,7 +58,7 @@ struct KluPanels {
 
   /* scratch: rows of `lower` and `upper` of the panel at work, by place; panels side by side; vectors */
   std::vector<PetscInt> row_of, col_of;
-  std::vector<double>   left, right, matrix_size, factor_size, x, y;
+  std::vector<double>   left, right, product, matrix_size, factor_size, x, y;
 };
 
 /* *pays tells whether the factors of `numeric` are worth panels; only then they are built. Their values come later. */

@@ -10,8 +10,11 @@ static const PetscInt NARROW = 8;
 /* Columns of panels before that are multiplied at a time */
 static const PetscInt SIDE_BY_SIDE = 256;
 
-/* Seconds per operation of dense products and of loops that add entry by entry, and per entry copied */
-static const double DENSE = 0.07e-9, SCATTERED = 0.4e-9, COPY = 0.7e-9;
+/* Seconds: per operation of dense products, per entry copied, per entry added somewhere, per call of BLAS */
+static const double OPERATION = 0.04e-9, COPY = 0.6e-9, ADD = 0.8e-9, CALL = 0.2e-6;
+
+/* Products with fewer operations are made by loops */
+static const double FEW = 1000;
 
 /* Largest allowed width + rows is that of a matrix with PETSc's indices for BLAS */
 typedef PetscBLASInt Int;
@@ -87,38 +90,65 @@ static Source Look(const KluPanels &p, const KluPanelSource &s)
   return v;
 }
 
-/* to(row_of[row], of[col]) -= sum over the columns of a(row,:) b(col,:) */
-static void AddScattered(const double a[], PetscInt lda, PetscInt rows, const PetscInt row[], const PetscInt row_of[],
-                         const double b[], PetscInt ldb, PetscInt cols, const PetscInt col[], PetscInt first,
-                         PetscInt columns, PetscInt ld, double to[])
+/* Columns of a narrow panel that reach a part of the panel at work: to(row_of[row], col) -= (a b^T)(row, col) */
+struct Product {
+  const double   *a, *b;
+  PetscInt        lda, ldb, rows, cols, width;
+  const PetscInt *row, *col, *row_of;
+};
+
+static void SubtractLoop(const Product &m, PetscInt first, PetscInt ld, double to[])
 {
-  for (PetscInt j = 0; j < cols; ++j) {
-    double *t = to + (size_t)(col[j] - first) * ld;
-    for (PetscInt c = 0; c < columns; ++c) {
-      const double  factor = b[j + (size_t)c * ldb];
-      const double *x      = a + (size_t)c * lda;
-      if (factor != 0)
-        for (PetscInt i = 0; i < rows; ++i) t[row_of[row[i]]] -= x[i] * factor;
+  for (PetscInt j = 0; j < m.cols; ++j) {
+    double *t = to + (size_t)(m.col[j] - first) * ld;
+    for (PetscInt c = 0; c < m.width; ++c) {
+      const double  factor = m.b[j + (size_t)c * m.ldb];
+      const double *x      = m.a + (size_t)c * m.lda;
+      for (PetscInt i = 0; i < m.rows; ++i) t[m.row_of[m.row[i]]] -= x[i] * factor;
     }
   }
 }
 
-static void Scatter(const Source &v, const Work &w, KluPanels *p)
+static PetscErrorCode Subtract(const Product &m, PetscInt first, PetscInt ld, double to[], std::vector<double> *scratch)
 {
-  AddScattered(v.lower, v.ld_lower, v.rows, v.row, p->row_of.data(), v.upper, v.ld_upper, v.inner_cols, v.col,
-               w.q->first, v.width, w.left, p->value.data() + w.q->lower);
-  AddScattered(v.upper + v.inner_cols, v.ld_upper, v.cols - v.inner_cols, v.col + v.inner_cols, p->col_of.data(),
-               v.lower, v.ld_lower, v.inner_rows, v.row, w.q->first, v.width, w.right - w.width,
-               p->value.data() + w.q->upper - w.width);
+  const Int         rows = (Int)m.rows, cols = (Int)m.cols, width = (Int)m.width, lda = (Int)m.lda, ldb = (Int)m.ldb;
+  const PetscScalar zero = 0, one = 1;
+  const size_t      size = (size_t)rows * (size_t)cols;
+
+  PetscFunctionBegin;
+  if (!size) PetscFunctionReturn(0);
+  if (2 * (double)size * (double)width < FEW) {
+    SubtractLoop(m, first, ld, to);
+    PetscFunctionReturn(0);
+  }
+  if (scratch->size() < size) scratch->resize(size);
+  const double *x = scratch->data();
+  PetscCallBLAS("BLASgemm",
+                BLASgemm_("N", "T", &rows, &cols, &width, &one, m.a, &lda, m.b, &ldb, &zero, scratch->data(), &rows));
+  for (PetscInt j = 0; j < m.cols; ++j, x += rows) {
+    double *t = to + (size_t)(m.col[j] - first) * ld;
+    for (PetscInt i = 0; i < m.rows; ++i) t[m.row_of[m.row[i]]] -= x[i];
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode Scatter(const Source &v, const Work &w, KluPanels *p)
+{
+  const Product to_lower = {v.lower,      v.upper, v.ld_lower, v.ld_upper, v.rows,
+                            v.inner_cols, v.width, v.row,      v.col,      p->row_of.data()};
+  const Product to_upper = {v.upper + v.inner_cols, v.lower, v.ld_upper,           v.ld_lower, v.cols - v.inner_cols,
+                            v.inner_rows,           v.width, v.col + v.inner_cols, v.row,      p->col_of.data()};
+  PetscFunctionBegin;
+  PetscCall(Subtract(to_lower, w.q->first, w.left, p->value.data() + w.q->lower, &p->product));
+  PetscCall(Subtract(to_upper, w.q->first, w.right - w.width, p->value.data() + w.q->upper - w.width, &p->product));
+  PetscFunctionReturn(0);
 }
 
 static bool BetterScattered(const Source &v, const Work &w)
 {
   const double columns = (double)v.width, sizes = (double)w.left + (double)w.right;
-  const double scattered =
-      SCATTERED * 2 * columns *
-      ((double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows);
-  return scattered < columns * sizes * (DENSE * 2 * (double)w.width + COPY);
+  const double reached = (double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows;
+  return reached * (OPERATION * 2 * columns + ADD) + CALL < columns * sizes * (OPERATION * 2 * (double)w.width + COPY);
 }
 
 static PetscErrorCode Collect(Work *w, KluPanels *p)
@@ -127,7 +157,7 @@ static PetscErrorCode Collect(Work *w, KluPanels *p)
   for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
     const Source v = Look(*p, p->source[k]);
     if (BetterScattered(v, *w)) {
-      Scatter(v, *w, p);
+      PetscCall(Scatter(v, *w, p));
       continue;
     }
     for (PetscInt done = 0, count; done < v.width; done += count) {
@@ -300,7 +330,7 @@ PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *gro
   std::fill(p->factor_size.begin(), p->factor_size.end(), 0.0);
   for (const KluPanel &q : p->panel) {
     bool good = false;
-    Work w = Begin(q, p);
+    Work w    = Begin(q, p);
     PetscCall(Collect(&w, p));
     PetscCall(FactorPanel(w, p, &good));
     if (!good || !MeasurePanel(q, p)) PetscFunctionReturn(0);

@@ -7,14 +7,28 @@
 typedef std::vector<PetscInt> Indices;
 
 /* Below so many operations in all, or per entry of L and U, KLU is as fast and nobody looks for panels */
-static const double LEAST_FLOPS = 2e5, LEAST_PER_ENTRY = 30;
+static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
 
 /*
-  Seconds per operation of KLU's scalar loops and of dense products, per entry stored in panels, per panel, and per
-  panel that a panel looks back to.
+  Seconds of KLU per operation and per entry of L and U; of the panels per operation, per entry stored, per panel and
+  per panel that one looks back to. Milliseconds of processor time with the matrices of tests/bench/linear_matrices.h,
+  for a factorization with old pivots and one solve (Debian 12, KLU 1.3.8, OpenBLAS, one core):
+
+      family, size               n   nz(L+U)  operations  per nz      KLU   solve    panels   solve
+      chain in space, 1000   11000   1.8e+05     1.3e+06       7     1.20    0.18      1.79    0.27   not used
+      rings of eight, 1000   11375   2.5e+05     2.6e+06      10     2.28    0.23      2.65    0.30   not used
+      10 modes, 30 bodies      450   9.6e+03     1.0e+05      11    0.071   0.010     0.077   0.011   not used
+      20 modes, 30 bodies      750   2.4e+04     4.1e+05      18     0.22   0.020      0.17   0.021
+      10 bodies, 40 modes      450   2.3e+04     7.1e+05      31     0.31   0.018      0.16   0.013
+      10 bodies, 120 modes    1250   1.6e+05     1.4e+07      84     4.99    0.13      1.43   0.050
+      1 body, 80 modes          85   7.3e+03     4.1e+05      56     0.15   0.006     0.048   0.003
+      1 body, 320 modes        325   1.1e+05     2.3e+07     215     7.33   0.085      1.16   0.022
+      plate, 12 x 12 bricks   1092   1.4e+05     1.0e+07      74     3.64    0.11      0.89   0.049
+      block, 4^3 bricks        450   5.2e+04     3.8e+06      74     1.32   0.040      0.43   0.020
+      block, 8^3 bricks       2430   7.6e+05     1.6e+08     203       56     1.0       8.2    0.63
 */
-static const double SCALAR_OPERATION = 0.36e-9, DENSE_OPERATION = 0.07e-9, PANEL_ENTRY = 1.5e-9, PANEL = 1e-6,
-                    SOURCE = 0.15e-6;
+static const double KLU_OPERATION = 0.32e-9, KLU_ENTRY = 4e-9;
+static const double OPERATION = 0.045e-9, ENTRY = 3.5e-9, PANEL = 0.5e-6, SOURCE = 0.15e-6;
 
 /* Panels must promise this part of KLU's time */
 static const double GAIN = 0.7;
@@ -356,11 +370,11 @@ static void AimOuter(const std::vector<Entry> &entries, KluPanels *p)
 
 /* ---- all together ---- */
 
-static void Estimate(double flops, KluPanels *p)
+static void Estimate(double entries, double flops, KluPanels *p)
 {
-  p->scalar  = SCALAR_OPERATION * flops;
-  p->seconds = DENSE_OPERATION * p->flops + PANEL_ENTRY * p->entries + PANEL * (double)p->panel.size() +
-               SOURCE * (double)p->source.size();
+  p->scalar = KLU_OPERATION * flops + KLU_ENTRY * entries;
+  p->seconds =
+      OPERATION * p->flops + ENTRY * p->entries + PANEL * (double)p->panel.size() + SOURCE * (double)p->source.size();
 }
 
 static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
@@ -432,7 +446,7 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
   const Reach   reach = FindReach(e, of, *p);
   SizePanels(reach, p);
   FindSources(reach, of, p);
-  Estimate(flops, p);
+  Estimate(entries, flops, p);
   *pays = p->seconds < GAIN * p->scalar && p->entries < 0.5 * PETSC_MAX_INT;
   if (!*pays) PetscFunctionReturn(0);
   Allocate(rows, p);
