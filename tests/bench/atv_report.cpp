@@ -8,6 +8,7 @@ static char help[] =
     "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n";
 
 #include "atv_page.h"
+#include <hhtdae/flexible.h>
 #include <petsctime.h>
 
 using namespace hhtbench;
