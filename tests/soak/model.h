@@ -78,7 +78,7 @@ private:
   /* small ones are the most, a few have 100 to 200 bodies */
   int size()
   {
-    if (small_) return (int)r.logarithmic(1, 12);
+    if (small_) return (int)r.logarithmic(1, 8);
     if (r.chance(0.03)) return r.integer(100, 200);
     return (int)std::pow(61., std::pow(r.uniform(), 1.5));
   }

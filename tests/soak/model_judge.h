@@ -132,12 +132,14 @@ private:
 
   /* ---- references ---- */
 
+  double patience(double seconds) const { return small_ ? 0.12 * seconds : seconds; }
+
   void refer()
   {
     o_.stage = Referring;
 #ifdef HHTDAE_HAVE_IDA
-    looser_ = RunIDA(build(), 10 * reference_eps, 4, &o_.legs);
-    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, 7, &o_.legs);
+    looser_ = RunIDA(build(), 10 * reference_eps, patience(4), &o_.legs);
+    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, patience(7), &o_.legs);
     if (looser_.arrived() && reference_.arrived())
       o_.by = ByIDA;
     else
@@ -153,10 +155,10 @@ private:
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = 10 * reference_eps;
-    tight.seconds = 10;
+    tight.seconds = patience(10);
     looser_       = RunHHT(build(), tight);
     tight.eps     = reference_eps;
-    tight.seconds = 20;
+    tight.seconds = patience(20);
     if (looser_.arrived()) reference_ = RunHHT(build(), tight);
     if (looser_.arrived() && reference_.arrived()) o_.by = ByHHT;
   }
@@ -253,12 +255,12 @@ private:
   {
 #ifdef HHTDAE_HAVE_IDA
     int legs;
-    if (o_.by == ByIDA) return RunIDA(build(push), 10 * reference_eps, 4, &legs);
+    if (o_.by == ByIDA) return RunIDA(build(push), 10 * reference_eps, patience(4), &legs);
 #endif
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = 10 * reference_eps;
-    tight.seconds = 4;
+    tight.seconds = patience(4);
     return RunHHT(build(push), tight);
   }
 
@@ -314,13 +316,6 @@ private:
         if (!t.arrived())
           std::printf("eps %.0e, %s: %s\n", eps, what, t.failure.c_str());
         else {
-          if (getenv("SOAK_TALK"))
-            for (int k = 0; k < samples; k++) {
-              std::printf("   t %.4f:", SampleTime(model_.end, k + 1));
-              for (std::size_t c = 0; c < std::min<std::size_t>(9, t.x[0].size()); c++)
-                std::printf(" %.6f (%.6f)", t.x[k][c], reference_.x[k][c]);
-              std::printf("\n");
-            }
           std::printf("eps %.0e, %s: %6ld steps, error %.2e, half way %.2e, allowed %.2e\n", eps, what, t.steps,
                       error(t), error(t, samples / 2), allowed(eps, t, samples - 1));
         }

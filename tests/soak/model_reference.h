@@ -185,10 +185,7 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double seconds)
     PetscCall(RunLeg(r, leg, point, way, eps, seconds - (CpuSeconds() - start), &failure));
     if (failure.empty()) break;
     const bool late = r.legs > 100 || CpuSeconds() - start > seconds;
-    if (getenv("SOAK_TALK"))
-      std::fprintf(stderr, "  IDA at %g: point %d of %d, way %d, %s%s\n", eps, point, samples * fine, way,
-                   failure.c_str(), leg.singular ? ", singular" : "");
-    stuck = point == before ? stuck + 1 : 0;
+    stuck           = point == before ? stuck + 1 : 0;
     if (leg.singular && stuck < 2)
       leg.reframe();
     else

@@ -3,6 +3,7 @@
 #include "scene/kernels/curve.h"
 #include "scene/kernels/primitives.h"
 #include "scene/kernels/rolling.h"
+#include <limits>
 
 using namespace hhtdae;
 
@@ -308,6 +309,15 @@ TEST(Curve, ClosestPoint)
       EXPECT_NEAR(curve.closest(p, s + random(-.2, .2)), s, 1e-12);
     }
   }
+}
+
+/* A diverged iteration asks for the point closest to nowhere */
+TEST(Curve, ClosestPointToNowhereEnds)
+{
+  const Curve  curve(OpenPoints(), false, false);
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(curve.closest(Vec3<double>(NAN, 0, 0), .3), .3);
+  EXPECT_EQ(curve.closest(Vec3<double>(0, infinity, 0), .3), .3);
 }
 
 /* On the curve the force of the two multipliers is along the normals, and its rows vanish. */

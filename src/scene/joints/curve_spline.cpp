@@ -215,6 +215,7 @@ double Curve::closest(const Vec3<double> &p, double s) const
 {
   Vec3<double> c, c1, c2;
   const double size = longest_ + path_.length() + p.norm();
+  if (!std::isfinite(size)) return s; /* a diverged iteration: no comparison would ever end the search */
   path_(s, c, c1, c2);
   for (int k = 0; k < 100; k++) {
     const double distance = (p - c).squaredNorm(), speed = c1.squaredNorm(), bend = speed - (p - c).dot(c2);
