@@ -10,7 +10,8 @@ set(test_environment OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_
                      OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_btl_base_warn_component_unused=0)
 # A single process needs no daemon of Open MPI, and nobody needs hwloc's search for graphics cards: start-up is several
 # times faster without the two.
-list(APPEND test_environment OMPI_MCA_ess_singleton_isolated=1 HWLOC_COMPONENTS=-gl,-opencl)
+# Such processes share a directory for Open MPI's session, which the first one to end removes: nothing may be kept there.
+list(APPEND test_environment OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_sharedfp=individual HWLOC_COMPONENTS=-gl,-opencl)
 if(HHTDAE_SANITIZE)
   # Open MPI is compiled without frame pointers; its leaks can be told from ours by whole stacks only.
   list(APPEND test_environment UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=fast_unwind_on_malloc=0)
