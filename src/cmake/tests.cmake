@@ -8,14 +8,16 @@ endif()
 set(test_environment OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1
                      OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                      OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_btl_base_warn_component_unused=0)
-# A single process needs no daemon of Open MPI, and nobody needs hwloc's search for graphics cards: start-up is several
-# times faster without the two.
-# Such processes share a directory for Open MPI's session, which the first one to end removes: nothing may be kept there.
-list(APPEND test_environment OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_sharedfp=individual HWLOC_COMPONENTS=-gl,-opencl)
 if(HHTDAE_SANITIZE)
   # Open MPI is compiled without frame pointers; its leaks can be told from ours by whole stacks only.
   list(APPEND test_environment UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=fast_unwind_on_malloc=0)
 endif()
+
+# A single process needs no daemon of Open MPI, and nobody needs hwloc's search for graphics cards: start-up is several
+# times faster without the two. All such processes would share one session directory, which the first one to end removes.
+set(serial_environment ${test_environment} OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_orte_create_session_dirs=0
+                       OMPI_MCA_sharedfp=individual HWLOC_COMPONENTS=-gl,-opencl)
+list(APPEND test_environment HWLOC_COMPONENTS=-gl,-opencl)
 
 # hhtdae_test_program(folder): <folder>_tests from tests/<folder>/*.cpp; sets <folder>_found
 function(hhtdae_test_program folder)
@@ -43,7 +45,7 @@ foreach(folder unit verification stability)
                          PROPERTIES TIMEOUT ${${folder}_timeout} LABELS ${folder})
     # gtest_discover_tests takes lists among the properties apart, so the environment is set when ctest reads the tests.
     file(WRITE ${PROJECT_BINARY_DIR}/${folder}_environment.cmake
-         "set_tests_properties(\${${folder}_list} PROPERTIES ENVIRONMENT \"${test_environment}\")\n")
+         "set_tests_properties(\${${folder}_list} PROPERTIES ENVIRONMENT \"${serial_environment}\")\n")
     set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${PROJECT_BINARY_DIR}/${folder}_environment.cmake)
   endif()
 endforeach()
@@ -61,7 +63,7 @@ endif()
 # A slice of the random models of "make soak", small ones of another seed
 if(TARGET models)
   add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -output none)
-  set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 900 LABELS soak)
+  set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS soak)
 endif()
 
 # The integration tests start other programs, which a library with a sanitizer inside would need to be preloaded into.
