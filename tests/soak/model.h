@@ -43,14 +43,15 @@ public:
     decorate(b, loads);
     if (b.speed > 0 || b.project) m.scene->start().assembly = Assembly::Project;
     observe(b, machines, loads, m);
-    m.bodies   = b.bodies();
-    m.end      = b.period * r.uniform(0.3, 2) * (m.bodies > 60 ? 0.5 : 1);
-    m.length   = b.length;
-    m.mass     = b.mass;
-    m.period   = b.period;
-    m.stiffest = b.stiffest;
-    m.softest  = b.softest;
-    m.speed    = b.speed;
+    m.bodies       = b.bodies();
+    m.end          = b.period * r.uniform(0.3, 2) * (m.bodies > 60 ? 0.5 : 1);
+    m.length       = b.length;
+    m.mass         = b.mass;
+    m.period       = b.period;
+    m.stiffest     = b.stiffest;
+    m.softest      = b.softest;
+    m.speed        = b.speed;
+    m.conservative = !b.lossy && !dissipates(*m.scene);
     count(b, m);
     return m;
   }
@@ -79,7 +80,7 @@ private:
   int size()
   {
     if (small_) return (int)r.logarithmic(1, 8);
-    if (r.chance(0.03)) return r.integer(100, 200);
+    if (r.chance(0.025)) return r.integer(100, 200);
     return (int)std::pow(61., std::pow(r.uniform(), 1.5));
   }
 
@@ -159,6 +160,16 @@ private:
       }
     look(Measure::kineticEnergy(), Observed::Energy);
     look(Measure::potentialEnergy(), Observed::Energy);
+  }
+
+  /* by elements that take or give energy as such; springs with damping are known to the builder */
+  static bool dissipates(const Scene &s)
+  {
+    static const char *const takes[] = {"motion", "friction", "user", "beam", "contact", "nonlinear", "attachment"};
+    for (const ElementData &e : s.data().elements)
+      for (const char *word : takes)
+        if (std::strstr(e.type, word)) return true;
+    return false;
   }
 
   void count(Builder &b, Model &m)

@@ -53,6 +53,7 @@ public:
   std::map<std::string, int> used;                             /* what elements do not show by their type */
   double                     length = 1, mass = 1, period = 2; /* scales of the model */
   double                     speed   = 0;     /* of bodies at the start, 0: at rest; times length per period */
+  bool                       lossy   = false; /* energy is not kept */
   bool                       project = false; /* initial velocities have to be made consistent */
   Vector3                    up, gravity;
   double                     stiffest = 0, softest = 1e300;
@@ -192,6 +193,7 @@ public:
       s.omega = std::sqrt(s.k / m);
     }
     s.c      = 2 * s.zeta * m * s.omega;
+    lossy    = lossy || s.zeta > 0;
     stiffest = std::max(stiffest, s.k);
     softest  = std::min(softest, s.k);
     return s;

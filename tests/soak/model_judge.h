@@ -11,11 +11,13 @@
 
   N: its steps so far, each of which may leave an error of eps, and 50 for the start and impacts; G: how much the model
   itself makes grow of an error, as IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
-  10 eps_ref. It is asked for as long as the right-hand side is below 0.3: later the tolerance does not determine the
+  10 eps_ref. It is asked for as long as the right-hand side is below 1: later the tolerance does not determine the
   solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
   error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
   (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
   first error is above 1e-3, that of the second run has to be smaller, or else that of the third.
+
+  Besides, constraints have to hold to eps, and the reference has to keep the energy of a model that has no losses.
 */
 #ifndef HHTDAE_SOAK_MODEL_JUDGE_H
 #define HHTDAE_SOAK_MODEL_JUDGE_H
@@ -37,12 +39,12 @@ constexpr const char *by_name[] = {"none", "IDA", "hhtdae"};
 struct Outcome {
   long number = 0;
   int  stage = Building, verdict = Unknown, by = ByNobody, bodies = 0, planar = 0, window = 0, finest_window = 0,
-      legs = 0, disturbed = 0;
+      legs = 0, disturbed = 0, conservative = 0;
   long steps = 0, rejected = 0, newton = 0, jacobians = 0, factorizations = 0, changes = 0, fails = 0,
        reference_steps = 0, finer_steps = 0;
   double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
   double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
-         doubt = -1, used = -1; /* used: largest part of what is allowed */
+         doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of what is allowed */
   char message[600] = "", types[2000] = "";
 };
 
@@ -81,7 +83,7 @@ public:
   }
 
 private:
-  static constexpr double per_step = 10, per_growth = 3, undetermined = 0.3, reference_eps = 1e-7;
+  static constexpr double per_step = 10, per_growth = 3, undetermined = 1, reference_eps = 1e-7;
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
   std::uint64_t                             seed_;
@@ -128,6 +130,8 @@ private:
     o_.changes        = a.cost.changes;
     o_.fails          = a.cost.corrector_fails;
     o_.cpu            = a.cpu;
+    o_.misfit         = a.misfit;
+    o_.slip           = a.slip < 0 ? -1 : a.slip * model_.period / ((1 + model_.speed) * model_.length);
   }
 
   /* ---- references ---- */
@@ -138,8 +142,8 @@ private:
   {
     o_.stage = Referring;
 #ifdef HHTDAE_HAVE_IDA
-    looser_ = RunIDA(build(), 10 * reference_eps, patience(4), &o_.legs);
-    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, patience(7), &o_.legs);
+    looser_ = RunIDA(build(), 10 * reference_eps, patience(3), &o_.legs);
+    if (looser_.arrived()) reference_ = RunIDA(build(), reference_eps, patience(5), &o_.legs);
     if (looser_.arrived() && reference_.arrived())
       o_.by = ByIDA;
     else
@@ -155,12 +159,29 @@ private:
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = 10 * reference_eps;
-    tight.seconds = patience(10);
+    tight.seconds = patience(5);
     looser_       = RunHHT(build(), tight);
     tight.eps     = reference_eps;
-    tight.seconds = patience(20);
+    tight.seconds = patience(10);
     if (looser_.arrived()) reference_ = RunHHT(build(), tight);
     if (looser_.arrived() && reference_.arrived()) o_.by = ByHHT;
+  }
+
+  /* An invariant of the reference, where the model has one: energy, relative to what goes to and fro; it has to be kept
+     to a thousandth */
+  bool keepsEnergy()
+  {
+    const std::size_t kinetic = model_.observed.size() - 2, potential = kinetic + 1;
+    double            least = 1e300, most = -1e300, moved = 0;
+    o_.conservative = model_.conservative;
+    if (!model_.conservative) return true;
+    for (const auto &x : reference_.x) {
+      least = std::min(least, x[kinetic] + x[potential]);
+      most  = std::max(most, x[kinetic] + x[potential]);
+      moved = std::max(moved, x[kinetic]);
+    }
+    o_.energy = moved > 0 ? (most - least) / moved : 0;
+    return o_.energy < 1e-3;
   }
 
   /* ---- differences ---- */
@@ -195,14 +216,16 @@ private:
     for (std::size_t c = 0; c < model_.observed.size(); c++)
       for (int k = 0; k < samples; k++)
         if (model_.observed[c] == kind) largest = std::max(largest, std::abs(reference_.x[(std::size_t)k][c]));
-    for (int k = 0; k < samples && largest > 0; k++) {
+    const double rate  = 1 / model_.period;
+    const double least = 1e-3 * model_.length * rate * (kind == Observed::Velocity ? 1 : model_.mass * rate);
+    for (int k = 0; k < samples && largest > least; k++) {
       double worst = 0;
       for (std::size_t c = 0; c < model_.observed.size(); c++)
         if (model_.observed[c] == kind)
           worst = std::max(worst, std::abs(a.x[(std::size_t)k][c] - reference_.x[(std::size_t)k][c]));
       sum += worst / largest / samples;
     }
-    return largest > 0 ? sum : -1;
+    return largest > least ? sum : -1;
   }
 
   /* ---- verdict ---- */
@@ -281,6 +304,11 @@ private:
     if (!b.arrived()) return fail(Failed, "at a tenth of the tolerance: " + b.failure);
     refer();
     if (o_.by == ByNobody) return;
+    if (!keepsEnergy()) {
+      o_.verdict = Unknown;
+      return SetText(o_.message, sizeof o_.message,
+                     hhtbench::Text("the energy of the reference drifts by %.1e", o_.energy));
+    }
     if (options_) converge();
     o_.stage          = Judging;
     o_.error          = error(a);
@@ -292,6 +320,8 @@ private:
     o_.doubt          = error(looser_);
     o_.window         = window(default_eps, a);
     o_.verdict        = Right;
+    if (!(a.misfit <= default_eps * std::max(1., model_.length)))
+      return fail(Wrong, hhtbench::Text("constraints are off by %.2e", a.misfit));
     if (!right(default_eps, a, "defaults") || !right(finer.eps, b, "a tenth of the tolerance")) return;
     const double first = largest(a, o_.window), second = largest(b, o_.window);
     const bool   falls = o_.disturbed || first < 1e-3 || second < 0.7 * first;

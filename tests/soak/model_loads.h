@@ -241,6 +241,7 @@ private:
     }
     if (r.chance(0.2)) f.force = 0.1 * b.weight(c) * b.direction();
     f.state = b.state();
+    b.lossy = b.lossy || !f.force.isZero(0);
     b.scene.add("", f);
   }
   void bushing()

@@ -16,7 +16,8 @@ struct Trajectory {
   std::vector<std::vector<double>> x;        /* channels at the sample times, without the start */
   std::vector<long>                steps_at; /* steps so far, at the sample times */
   TSHHT3Statistics                 cost{};
-  double                           cpu   = 0;
+  double                           cpu    = 0;
+  double                           misfit = 0, slip = -1; /* at ends of steps, see Misfit() */
   long                             steps = 0;
   bool                             arrived() const { return failure.empty() && (int)x.size() == samples; }
 };
@@ -66,10 +67,47 @@ struct Watcher {
   Trajectory &result;
 };
 
+/* How far the state is off the constraints: of positions, in lengths and sines; of velocities, as they are, and times
+   the step, as every step solves them anew */
+inline PetscErrorCode Misfit(TS ts, PetscReal t, Trajectory *result)
+{
+  Vec                U, V, A, F;
+  const PetscScalar *f;
+  PetscReal          before;
+  PetscFunctionBegin;
+  PetscCall(TSGetPrevTime(ts, &before));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecDuplicate(U, &A));
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(VecZeroEntries(A));
+  PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
+  PetscCall(VecGetArrayRead(F, &f));
+  for (TSHHT3Role role : {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC}) {
+    IS              is;
+    const PetscInt *row;
+    PetscInt        n;
+    const bool      position = role == TSHHT3_HOLONOMIC;
+    PetscCall(TSHHT3GetIS(ts, role, &is));
+    PetscCall(ISGetLocalSize(is, &n));
+    PetscCall(ISGetIndices(is, &row));
+    for (PetscInt k = 0; k < n; k++) {
+      const double off = std::abs(PetscRealPart(f[row[k]]));
+      result->misfit   = std::max(result->misfit, position ? off : off * (t - before));
+      if (!position) result->slip = std::max(result->slip, off);
+    }
+    PetscCall(ISRestoreIndices(is, &row));
+  }
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(VecDestroy(&A));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(0);
+}
+
 inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
 {
   Watcher            &w = *static_cast<Watcher *>(ctx);
   std::vector<double> values;
+  const std::size_t   before = w.result.x.size();
   PetscFunctionBegin;
   if (step <= 0) PetscFunctionReturn(0);
   while ((int)w.result.x.size() < samples && SampleTime(w.end, (int)w.result.x.size() + 1) <= t * (1 + 1e-12)) {
@@ -77,6 +115,7 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx
     w.result.x.push_back(values);
     w.result.steps_at.push_back((long)step);
   }
+  if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
   if (step % 16 == 0 && CpuSeconds() > w.deadline) {
     w.result.failure = hhtbench::Text("took longer than the limit, at t = %g of %g", t, w.end);
     PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
