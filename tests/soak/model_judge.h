@@ -180,7 +180,9 @@ private:
       most  = std::max(most, x[kinetic] + x[potential]);
       moved = std::max(moved, x[kinetic]);
     }
-    o_.energy = moved > 0 ? (most - least) / moved : 0;
+    /* what never moves has no energy to lose: a hundredth of what the scales of the model would move */
+    const double v = 0.01 * model_.length / model_.period;
+    o_.energy      = (most - least) / std::max(moved, model_.mass * v * v);
     return o_.energy < 1e-3;
   }
 
