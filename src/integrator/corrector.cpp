@@ -20,6 +20,9 @@
     renew      before a correction otherwise; within a correction when it is slow, a few times
     retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
     fail       with a matrix of this very correction: TSAdapt cuts h
+  Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) reuse costs a
+  correction each time, and one that passes by chance after its first iteration may be far off: after a retry the next step
+  gets a new matrix, after the second retry the next two, then four, ... until a reused matrix holds.
   A step size that would grow by less than `hold` is kept, so that the factorization lives on (estimate.cpp).
 
   All of it goes through SNESSetLagJacobian(): -2 is "once, now", -1 is "not again". A user's -snes_lag_jacobian, line search
@@ -43,6 +46,9 @@ constexpr PetscReal fixed = 0.02;
 
 /* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
 constexpr PetscInt max_renewals = 3;
+
+/* Steps without reuse after old matrices have failed, at most */
+constexpr PetscInt max_renew_steps = 32;
 
 const char *RoleName(const Integrator &I, PetscInt local)
 {
@@ -95,18 +101,26 @@ PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
 }
 
 /* Corrections that no longer fall may be rounding, at a level that only the problem knows (q'' of a short step as it enters
-   forces and states). They are if they have fallen a thousandfold before, or, with a matrix just made, tenfold and to a
-   hundredth of the tolerance, or never exceeded that. */
-bool IsRounding(const Corrector &c)
+   forces and states): with a matrix just made, if they have fallen a thousandfold, or tenfold and to a hundredth of the
+   tolerance, or never exceeded that. A stiff direction that the iteration does not follow looks the same, but not at a smaller
+   h, where rounding stays or grows. (Taken for rounding at first sight, it filled the motion on a bushing of 1e14 N/m with
+   energy that no error test saw.) */
+bool IsRounding(Corrector &c, PetscReal h)
 {
-  if (c.rate < 0.5) return false; /* still converging */
-  return (c.e <= 1e-3 * c.e_max && c.e <= 0.1) || (c.fresh && c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01));
+  if (!c.fresh || c.rate < 0.5) return false; /* still converging */
+  if (!(c.e <= 1e-3 * c.e_max && c.e <= 0.1) && !(c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01))) return false;
+  const bool stays = c.suspect_h > 0 && h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect_e;
+  c.suspect_h      = h;
+  c.suspect_e      = c.e;
+  return stays;
 }
 
-void Diverge(Integrator &I, const char *why)
+void Diverge(TS ts, const char *why)
 {
-  Corrector &c = I.corrector;
-  if (I.mode == Mode::Step && IsRounding(c)) {
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+  if (I.mode == Mode::Step && IsRounding(c, I.h)) {
+    (void)PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h);
     c.reason  = SNES_CONVERGED_SNORM_RELATIVE;
     c.xi_max  = 0; /* a new matrix would not help */
     c.learned = 2 * c.e;
@@ -149,7 +163,7 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   c.e_max = PetscMax(c.e_max, e);
   if (PetscIsInfOrNanReal(e)) {
     c.e_max = PETSC_INFINITY;
-    Diverge(I, "produced a correction that is not a number");
+    Diverge(ts, "produced a correction that is not a number");
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (e <= Floor(I)) {
@@ -159,7 +173,7 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
     const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
     if (known || e <= 0.1 * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-    else if (left <= 0) Diverge(I, "needs too many iterations");
+    else if (left <= 0) Diverge(ts, "needs too many iterations");
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   const PetscReal xi = e / old_e;
@@ -169,13 +183,13 @@ PetscErrorCode Judge(TS ts, PetscReal e)
     c.reason = SNES_CONVERGED_SNORM_RELATIVE;
   } else if (I.mode == Mode::Start && xi > 0.3) {
     if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
-    else if (left <= 0 || xi > 2) Diverge(I, "finds no consistent accelerations");
+    else if (left <= 0 || xi > 2) Diverge(ts, "finds no consistent accelerations");
     else PetscCall(FreshMatrixNextIteration(ts));
   } else if (xi >= 1) {
-    Diverge(I, "diverges");
+    Diverge(ts, "diverges");
   } else if (left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
     if (c.renewals < max_renewals && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
-    else Diverge(I, "converges too slowly");
+    else Diverge(ts, "converges too slowly");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -371,6 +385,17 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the end of a correction says about the reuse of matrices in the next steps */
+static void LearnReuse(Corrector &c, bool converged, bool retried)
+{
+  const bool reused = converged && !c.fresh;
+  if (converged) c.suspect_h = 0;
+  if (retried) c.renew_steps = c.renew_left = PetscClipInterval(2 * c.renew_steps, 1, max_renew_steps);
+  else if (reused) c.renew_steps = c.renew_left = 0;
+  else if (c.renew_left > 0) c.renew_left--;
+  c.want_matrix = (PetscBool)(!converged || c.xi_max >= c.slow_rate || c.renew_left > 0);
+}
+
 /* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
 PetscErrorCode Correct(TS ts, PetscBool *converged)
 {
@@ -390,7 +415,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
     PetscCall(Predict(ts, I.X));
     PetscCall(Iterate(ts, converged));
   }
-  c.want_matrix = (PetscBool)(!*converged || c.xi_max >= c.slow_rate || retry);
+  LearnReuse(c, *converged, retry);
   if (!*converged) {
     /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what steps since the last
        failure have shown to work */

@@ -34,8 +34,11 @@ struct Corrector {
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
   PetscReal h_matrix    = 0;           /* h it was made with */
+  PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
+  PetscInt  renew_left  = 0;           /* of these, still to come */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
+  PetscReal suspect_e = 0, suspect_h = 0; /* corrections that may be rounding, and h of that failure; 0 after a success */
   PetscReal learned = 0, h_floor = 0;  /* level at which corrections of steps of about h_floor were seen to be rounding */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
