@@ -102,34 +102,64 @@ PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
 
 /* Corrections that no longer fall may be rounding, at a level that only the problem knows (q'' of a short step as it enters
    forces and states): with a matrix just made, if they have fallen a thousandfold, or tenfold and to a hundredth of the
-   tolerance, or never exceeded that. A stiff direction that the iteration does not follow looks the same, but not at a smaller
-   h, where rounding stays or grows. (Taken for rounding at first sight, it filled the motion on a bushing of 1e14 N/m with
-   energy that no error test saw.) */
-bool IsRounding(Corrector &c, PetscReal h)
+   tolerance, or never exceeded that. */
+bool LooksLikeRounding(const Corrector &c)
 {
   if (!c.fresh || c.rate < 0.5) return false; /* still converging */
-  if (!(c.e <= 1e-3 * c.e_max && c.e <= 0.1) && !(c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01))) return false;
-  const bool stays = c.suspect_h > 0 && h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect_e;
-  c.suspect_h      = h;
-  c.suspect_e      = c.e;
-  return stays;
+  return (c.e <= 1e-3 * c.e_max && c.e <= 0.1) || (c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01));
 }
 
-void Diverge(TS ts, const char *why)
+PetscErrorCode AcceptRounding(TS ts)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
-  if (I.mode == Mode::Step && IsRounding(c, I.h)) {
-    (void)PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h);
-    c.reason  = SNES_CONVERGED_SNORM_RELATIVE;
-    c.xi_max  = 0; /* a new matrix would not help */
-    c.learned = 2 * c.e;
-    c.h_floor = I.h;
-    return;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
+  c.reason  = SNES_CONVERGED_SNORM_RELATIVE;
+  c.xi_max  = 0; /* a new matrix would not help */
+  c.learned = 2 * c.e;
+  c.h_floor = I.h;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A stiff direction that the iteration does not follow looks the same. (Taken for rounding at first sight, it filled the motion
+  on a bushing of 1e14 N/m with energy that no error test saw.) But rounding stays where the iteration would converge: at a
+  smaller h, or, where h is not ours to cut, with a matrix made at the iterate itself.
+*/
+PetscErrorCode SuspectRounding(TS ts, PetscBool *settled)
+{
+  Integrator &I     = Get(ts);
+  Corrector  &c     = I.corrector;
+  const bool  stays = c.suspect_h > 0 && I.h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect;
+
+  PetscFunctionBegin;
+  *settled = PETSC_TRUE;
+  if (stays || (I.fixed_h && (c.user_lag || c.it >= c.max_it))) {
+    PetscCall(AcceptRounding(ts));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  c.reason     = SNES_DIVERGED_DTOL;
-  (void)PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
-                      why, (double)I.t1, (double)I.h, c.it, (double)c.e);
+  c.suspect   = c.e;
+  c.suspect_h = I.h;
+  *settled    = I.fixed_h;
+  if (I.fixed_h) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Diverge(TS ts, const char *why)
+{
+  Integrator &I       = Get(ts);
+  Corrector  &c       = I.corrector;
+  PetscBool   settled = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (I.mode == Mode::Step && LooksLikeRounding(c)) PetscCall(SuspectRounding(ts, &settled));
+  if (settled) PetscFunctionReturn(PETSC_SUCCESS);
+  c.reason = SNES_DIVERGED_DTOL;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
+                          why, (double)I.t1, (double)I.h, c.it, (double)c.e));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rounding of q, or what an earlier step of about this length has learned; rounding may grow with 1/h */
@@ -163,17 +193,24 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   c.e_max = PetscMax(c.e_max, e);
   if (PetscIsInfOrNanReal(e)) {
     c.e_max = PETSC_INFINITY;
-    Diverge(ts, "produced a correction that is not a number");
+    PetscCall(Diverge(ts, "produced a correction that is not a number"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (e <= Floor(I)) {
     c.reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (I.fixed_h && c.suspect > 0 && c.base == c.it - 1) { /* the matrix of a suspicion */
+    if (e > 0.1 * c.suspect && e < 10 * c.suspect) {
+      PetscCall(AcceptRounding(ts));
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    c.suspect = 0;
+  }
   if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
     const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
     if (known || e <= 0.1 * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-    else if (left <= 0) Diverge(ts, "needs too many iterations");
+    else if (left <= 0) PetscCall(Diverge(ts, "needs too many iterations"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   const PetscReal xi = e / old_e;
@@ -183,13 +220,13 @@ PetscErrorCode Judge(TS ts, PetscReal e)
     c.reason = SNES_CONVERGED_SNORM_RELATIVE;
   } else if (I.mode == Mode::Start && xi > 0.3) {
     if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
-    else if (left <= 0 || xi > 2) Diverge(ts, "finds no consistent accelerations");
+    else if (left <= 0 || xi > 2) PetscCall(Diverge(ts, "finds no consistent accelerations"));
     else PetscCall(FreshMatrixNextIteration(ts));
   } else if (xi >= 1) {
-    Diverge(ts, "diverges");
+    PetscCall(Diverge(ts, "diverges"));
   } else if (left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
     if (c.renewals < max_renewals && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
-    else Diverge(ts, "converges too slowly");
+    else PetscCall(Diverge(ts, "converges too slowly"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -369,6 +406,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscFunctionBegin;
   c.it = c.base = c.renewals = 0;
   c.e = c.e_max = c.xi_max = 0;
+  if (I.fixed_h) c.suspect = 0;
   c.reason       = SNES_CONVERGED_ITERATING;
   c.fresh        = PETSC_FALSE;
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));

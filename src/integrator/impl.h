@@ -38,7 +38,7 @@ struct Corrector {
   PetscInt  renew_left  = 0;           /* of these, still to come */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
-  PetscReal suspect_e = 0, suspect_h = 0; /* corrections that may be rounding, and h of that failure; 0 after a success */
+  PetscReal suspect = 0, suspect_h = 0; /* a correction that may have been rounding, and its h; 0 after a success */
   PetscReal learned = 0, h_floor = 0;  /* level at which corrections of steps of about h_floor were seen to be rounding */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
