@@ -86,11 +86,11 @@ enum class Tie {
 };
 
 struct Attachment {
-  std::string name, set;           /* set of nodes; its name is the attachment's if empty */
+  std::string name, set = {};      /* set of nodes; its name is the attachment's if empty */
   Tie         tie = Tie::Rigid;
   bool        at_given = false;    /* else at the centroid of the nodes */
   Vector3     position = Vector3::Zero();
-  std::vector<double> weights;     /* of an average: one for each node of the set in the order of their global numbers; empty: equal */
+  std::vector<double> weights = {}; /* of an average: one for each node of the set in the order of their global numbers; empty: equal */
 };
 
 enum class Method {

@@ -116,27 +116,27 @@ struct ContactLaw {
 struct SpherePlane {
   Marker     i, j;
   double     radius = 1;
-  ContactLaw law;
-  bool       state = false;
+  ContactLaw law    = {};
+  bool       state  = false;
 };
 /* ellipsoid about i in its axes, plane as above */
 struct EllipsoidPlane {
   Marker     i, j;
   Vector3    semiaxes = Vector3::Ones();
-  ContactLaw law;
-  bool       state = false;
+  ContactLaw law      = {};
+  bool       state    = false;
 };
 /* tire: torus about z_i, plane as above */
 struct TorusPlane {
   Marker     i, j;
   double     radius = 1, tube = 0.1;
-  ContactLaw law;
+  ContactLaw law   = {};
   bool       state = false;
 };
 struct SphereSphere {
   Marker     i, j;
   double     radius_i = 1, radius_j = 1;
-  ContactLaw law;
+  ContactLaw law   = {};
   bool       state = false;
 };
 /* sphere about i, box about j in its axes */
@@ -144,7 +144,7 @@ struct SphereBox {
   Marker     i, j;
   double     radius = 1;
   Vector3    half   = Vector3::Ones(); /* half of its edges */
-  ContactLaw law;
+  ContactLaw law   = {};
   bool       state = false;
 };
 

@@ -158,7 +158,7 @@ static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied
 {
   PetscInt            start;
   std::vector<double> weight;
-  double              sum;
+  double              sum = 0;
   Vector3             centroid;
   Matrix3             J;
 

@@ -23,17 +23,19 @@ struct BodyScales {
       frame; /* the same as translation of the centre of mass and rotation, one motion a column */
 };
 
-/* Sizes, symmetry, finite entries; M = m_ij times identity(3) with positive diagonal; nodes without stiffness */
+/* diagnose_matrices.cpp: sizes, symmetry, finite entries; M = m_ij times identity(3) with positive diagonal; nodes without stiffness */
 PetscErrorCode CheckMatrices(const FeModel &model);
-/* One part, rigid attachments taken as links */
+/* diagnose_parts.cpp: one part, rigid attachments taken as links */
 PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tied);
+
+/* diagnose_scales.cpp */
 PetscErrorCode ComputeScales(const FeModel &model, BodyScales *scales);
 /* K r = 0 for rigid motions r: no supports, no springs to ground */
 PetscErrorCode CheckUnsupported(const FeModel &model, const BodyScales &scales);
 /* What may be wrong with the units; empty: nothing strikes */
 std::string SuspectUnits(const FeModel &model, const BodyScales &scales);
 
-/* Labels of the nodes that move most in u (own dofs), "17, 18 and 19"; on all ranks */
+/* diagnose_nodes.cpp: labels of the nodes that move most in u (own dofs), "17, 18 and 19"; on all ranks */
 PetscErrorCode MostMoved(const FeModel &model, const Eigen::VectorXd &u, std::string *labels);
 /* Raises the error of a mechanism which moves as u */
 PetscErrorCode MechanismError(const FeModel &model, const Eigen::VectorXd &u, const char where[]);

@@ -231,6 +231,30 @@ PetscErrorCode Factor(KSP ksp, Mat A, PetscBool *singular, PetscInt *negative)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode SolveBlock(KSP ksp, const MatrixXd &F, MatrixXd *X)
+{
+  Mat                b, x;
+  MPI_Comm           comm = PetscObjectComm((PetscObject)ksp);
+  KSPConvergedReason reason;
+
+  PetscFunctionBegin;
+  X->setZero(F.rows(), F.cols());
+  PetscCall(MatCreateDense(comm, F.rows(), PETSC_DECIDE, PETSC_DETERMINE, F.cols(), const_cast<double *>(F.data()), &b));
+  PetscCall(MatCreateDense(comm, F.rows(), PETSC_DECIDE, PETSC_DETERMINE, F.cols(), X->data(), &x));
+  for (Mat A : {b, x}) {
+    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(KSPMatSolve(ksp, b, x));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCheck(reason >= 0, comm, PETSC_ERR_CONV_FAILED,
+             "Reduce(): the solver of -" REDUCE_PREFIX "ksp_type did not converge (%s) for constraint modes or residuals",
+             KSPConvergedReasons[reason]);
+  PetscCall(MatDestroy(&b));
+  PetscCall(MatDestroy(&x));
+  PetscFunctionReturn(0);
+}
+
 /* K - lambda M, a new matrix */
 static PetscErrorCode Shifted(const Pencil &pencil, double lambda, Mat *S)
 {
@@ -393,6 +417,20 @@ static void Merge(const NormalModes &more, NormalModes *modes)
   modes->x.swap(all.x);
 }
 
+/* EPSDestroy() resets the solver which it has; ours is to keep its factors */
+static PetscErrorCode ReleaseSolver(EPS eps)
+{
+  ST  st;
+  KSP none;
+
+  PetscFunctionBegin;
+  PetscCall(EPSGetST(eps, &st));
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)eps), &none));
+  PetscCall(STSetKSP(st, none));
+  PetscCall(KSPDestroy(&none));
+  PetscFunctionReturn(0);
+}
+
 /* One run of the eigensolver for the `count` lowest besides those in modes, which are added to it in ascending order */
 static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, PetscInt count, bool slices, KSP *ksp,
                              NormalModes *modes)
@@ -415,8 +453,8 @@ static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, Pe
   PetscCall(Collect(eps, pencil.K, &more));
   modes->how +=
       (modes->how.empty() ? "" : " + ") + std::to_string(iterations) + (slices ? " restarts in slices" : " restarts");
+  if (!slices) PetscCall(ReleaseSolver(eps));
   PetscCall(EPSDestroy(&eps));
-  PetscCall(KSPDestroy(ksp));
   Merge(more, modes);
   PetscFunctionReturn(0);
 }
@@ -455,7 +493,38 @@ constexpr int      most_searches = 6;
 constexpr PetscInt beyond =
     2; /* modes that are looked for above those wanted, to see whether frequencies are equal there */
 
-PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *ksp, NormalModes *modes)
+/* Slices have solvers of their own, which are gone after them */
+static PetscErrorCode FactorAgain(const Pencil &pencil, double shift, KSP *ksp)
+{
+  Mat       S = pencil.K;
+  PetscBool singular;
+  PetscInt  negative;
+
+  PetscFunctionBegin;
+  if (shift != 0)
+    PetscCall(Shifted(pencil, shift, &S));
+  else
+    PetscCall(PetscObjectReference((PetscObject)S));
+  PetscCall(CreateSolver(PetscObjectComm((PetscObject)pencil.K), ksp));
+  PetscCall(Factor(*ksp, S, &singular, &negative));
+  PetscCall(MatDestroy(&S));
+  PetscCheck(!singular, PetscObjectComm((PetscObject)pencil.K), PETSC_ERR_MAT_LU_ZRPVT,
+             "Reduce(): the stiffness is singular to the solver, though it had normal modes");
+  PetscFunctionReturn(0);
+}
+
+/* The lowest `count` of modes are used while the factorization is there, then it goes */
+static PetscErrorCode Use(const WhileFactored &use, PetscInt count, KSP *ksp, NormalModes *modes)
+{
+  PetscFunctionBegin;
+  modes->wanted = std::min(count, (PetscInt)modes->lambda.size());
+  PetscCall(use(*ksp, modes));
+  PetscCall(KSPDestroy(ksp));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, const WhileFactored &use, KSP *ksp,
+                         NormalModes *modes)
 {
   MPI_Comm       comm = PetscObjectComm((PetscObject)pencil.K);
   const PetscInt most = pencil.modes - (PetscInt)pencil.rigid.cols(), count = std::min(wanted.count, most);
@@ -466,15 +535,18 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *k
   PetscCall(MatGetLocalSize(pencil.K, &rows, nullptr));
   modes->lambda.resize(0);
   modes->x.resize(rows, 0);
-  if (count <= 0) PetscFunctionReturn(KSPDestroy(ksp));
+  if (count <= 0) PetscFunctionReturn(Use(use, 0, ksp, modes));
   const bool slices = wanted.below > 0 && count >= from;
   if (slices) PetscCall(KSPDestroy(ksp)); /* it has its own, and counts by inertia itself */
   const PetscInt ask = slices ? count : std::min(count + beyond, most);
   PetscCall(RunEps(pencil, wanted, ask, slices, ksp, modes));
+  if (slices) PetscCall(FactorAgain(pencil, wanted.shift, ksp));
+  PetscCall(Use(use, count, ksp, modes));
   for (int search = 0; !slices; search++) {
     PetscCall(CountMissing(pencil, *modes, &missing));
     if (missing <= 0 || search == most_searches) break;
     PetscCall(RunEps(pencil, wanted, std::min(missing, most - (PetscInt)modes->lambda.size()), slices, ksp, modes));
+    PetscCall(Use(use, count, ksp, modes));
   }
   PetscCheck(missing <= 0, comm, PETSC_ERR_CONV_FAILED,
              "Reduce(): the eigensolver misses %" PetscInt_FMT
@@ -485,7 +557,6 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *k
              "Reduce(): only %d of %" PetscInt_FMT " normal modes converged; raise -" REDUCE_PREFIX
              "eps_max_it or -" REDUCE_PREFIX "eps_ncv",
              (int)modes->lambda.size(), count);
-  modes->wanted = count;
   PetscFunctionReturn(0);
 }
 

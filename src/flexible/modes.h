@@ -7,6 +7,7 @@
 #define HHTDAE_FLEXIBLE_MODES_H
 
 #include <Eigen/Core>
+#include <functional>
 #include <petscksp.h>
 #include <string>
 
@@ -66,6 +67,8 @@ PetscErrorCode CreateSolver(MPI_Comm comm, KSP *ksp);
 /* Factors A; *singular where the factorization met null pivots or failed. *negative: pivots, -1 if the solver does not
  * tell */
 PetscErrorCode Factor(KSP ksp, Mat A, PetscBool *singular, PetscInt *negative);
+/* A X = F for a block of right-hand sides */
+PetscErrorCode SolveBlock(KSP ksp, const MatrixXd &F, MatrixXd *X);
 /* Modes below lambda without the rigid ones by an inertia count; -1: not known */
 PetscErrorCode CountBelow(const Pencil &pencil, double lambda, PetscInt *count);
 
@@ -87,8 +90,13 @@ struct WantedModes {
 #define EPS_BLOCK_KRYLOV "blockkrylovschur"
 PetscErrorCode RegisterBlockKrylov();
 
+/* What needs the factorization of K - shift M once modes are found. Called again, with more modes, if some were missing;
+   may lower modes->wanted. The solver is null only if nothing was searched and none was given. */
+using WhileFactored = std::function<PetscErrorCode(KSP ksp, NormalModes *modes)>;
+
 /* Consumes *ksp (may be null): if it holds a factorization of K and the shift is 0, that one is used */
-PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, KSP *ksp, NormalModes *modes);
+PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, const WhileFactored &use, KSP *ksp,
+                         NormalModes *modes);
 
 } // namespace hhtdae
 

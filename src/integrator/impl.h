@@ -190,7 +190,7 @@ extern Events events;
 
 /* hht3.cpp */
 PetscErrorCode UpdateParameters(TS ts);
-/* api.cpp */
+/* setters.cpp */
 PetscErrorCode ComposeSetters(TS ts, bool attach);
 /* roles.cpp */
 PetscErrorCode SetUpRoles(TS ts);

@@ -146,9 +146,10 @@ static PetscErrorCode Scatter(const Source &v, const Work &w, KluPanels *p)
 
 static bool BetterScattered(const Source &v, const Work &w)
 {
-  const double columns = (double)v.width, sizes = (double)w.left + (double)w.right;
+  const double columns = (double)v.width, copied = (double)w.left + (double)w.right, all = copied - (double)w.width;
   const double reached = (double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows;
-  return reached * (OPERATION * 2 * columns + ADD) + CALL < columns * sizes * (OPERATION * 2 * (double)w.width + COPY);
+  return reached * (OPERATION * 2 * columns + ADD) + CALL <
+         columns * (all * OPERATION * 2 * (double)w.width + copied * COPY);
 }
 
 static PetscErrorCode Collect(Work *w, KluPanels *p)

@@ -34,12 +34,10 @@ namespace
 
 constexpr int rows_of_attachment = 6;
 
-/* Frame of the point that follows the modes */
-Frame<double> Deformed(const ModalAttachment &a, const Vector3 &r, const Matrix3 &A, const Vector3 &s, const Eigen::Ref<const Eigen::VectorXd> &eta,
-                       SmallTurn *turn)
+/* Frame of the point that follows the modes, which move it by x and turn it by phi in body axes */
+Frame<double> Deformed(const Vector3 &r, const Matrix3 &A, const Vector3 &s, const Vector3 &x, const SmallTurn &turn)
 {
-  *turn = SmallTurn(a.rotation * eta);
-  return {r + A * (s + a.translation * eta), A * turn->rotation()};
+  return {r + A * (s + x), A * turn.rotation()};
 }
 
 /* Rows x_i - x_e, then the axes' products */
@@ -50,6 +48,21 @@ void Value(const Frame<double> &e, const Frame<double> &i, double *phi)
   Orient::value<double>(Empty(), f, 0, phi + 3);
 }
 
+/* All attachments of one flexible body: products with their modes are made for all of them at once */
+struct Carrier {
+  PetscInt        body = -1, count = 0;
+  Eigen::MatrixXd shapes;       /* padded modes x 6 count: translations of all attachments, then rotations, transposed */
+  Eigen::VectorXd motion, load; /* of all points, in the same order: from the modes, and on the modes */
+
+  auto   translation(PetscInt k) { return shapes.middleCols<3>(3 * k); }
+  auto   rotation(PetscInt k) { return shapes.middleCols<3>(3 * (count + k)); }
+  auto   rotations() { return shapes.rightCols(3 * count); }
+  auto   x(PetscInt k) { return motion.segment<3>(3 * k); }
+  auto   phi(PetscInt k) { return motion.segment<3>(3 * (count + k)); }
+  auto   force(PetscInt k) { return load.segment<3>(3 * k); }
+  auto   moment(PetscInt k) { return load.segment<3>(3 * (count + k)); }
+};
+
 class AttachBatch : public Batch
 {
 public:
@@ -58,9 +71,34 @@ public:
     const ModalAttachment *attachment;
     Vector3                s; /* undeformed, from the frame's origin */
     PetscInt               lambda, group;
+    PetscInt               carrier, place; /* which one of it */
   };
   std::vector<Instance> all;
+  std::vector<Carrier>  carriers;
   Bodies               *bodies = nullptr;
+
+  void finish()
+  {
+    std::vector<PetscInt> of(bodies->body.size(), -1);
+    for (Instance &e : all) {
+      if (e.body < 0) return; /* while others' bodies are collected */
+      if (of[e.body] < 0) {
+        of[e.body] = (PetscInt)carriers.size();
+        carriers.emplace_back();
+        carriers.back().body = e.body;
+      }
+      e.carrier = of[e.body];
+      e.place   = carriers[e.carrier].count++;
+    }
+    for (Carrier &c : carriers) size(c);
+    for (const Instance &e : all) {
+      Carrier  &c = carriers[e.carrier];
+      const int m = bodies->modes(e.body);
+      c.translation(e.place).topRows(m) = e.attachment->translation.transpose();
+      c.rotation(e.place).topRows(m)    = e.attachment->rotation.transpose();
+      if (c.body < bodies->own) bodies->modal[bodies->body[c.body].modal].outer.left = c.rotations();
+    }
+  }
 
   void pattern(Pattern &p) override
   {
@@ -70,34 +108,51 @@ public:
         request_.push_back(p.need(e.group, g));
         request_.push_back(p.need(g, e.group));
       }
-      for (PetscInt g : {b + 1, b + 2, i + 1})
-        for (PetscInt h : {b + 1, b + 2, i + 1}) request_.push_back(p.need(g, h));
+      request_.push_back(p.need(b + 1, b + 1));
+      request_.push_back(p.need(b + 1, i + 1));
+      request_.push_back(p.need(i + 1, b + 1));
+      request_.push_back(p.need(i + 1, i + 1));
+      request_.push_back(p.need(i + 1, b + 2));
+      request_.push_back(p.need(b + 2, i + 1));
     }
   }
 
   void residual(Evaluation &ev) override
   {
+    move(ev);
     for (const Instance &e : all) {
-      State  s(ev, e);
+      State  s(ev, e, carriers[e.carrier]);
       double phi[rows_of_attachment];
       Value(s.e, s.i, phi);
       for (int r = 0; r < rows_of_attachment; r++) ev.row(e.lambda + r, phi[r]);
-      load(ev.bodies, e, s);
+      load(ev.bodies, e, s, carriers[e.carrier]);
     }
+    loadModes(ev.bodies);
   }
 
   void jacobian(Evaluation &ev) override
   {
     const Slot *slot = slot_.data();
+    move(ev);
+    for (const Carrier &c : carriers)
+      if (ModalPart &p = ev.bodies.modal[ev.bodies.body[c.body].modal]; c.body < ev.bodies.own) p.outer.right.resize(c.shapes.rows(), 3 * c.count);
     for (const Instance &e : all) {
-      State s(ev, e);
-      load(ev.bodies, e, s);
-      gradientBlocks(ev, e, s, slot);
-      curvatureBlocks(ev, e, s, slot);
+      Carrier &c = carriers[e.carrier];
+      State    s(ev, e, c);
+      load(ev.bodies, e, s, c);
+      gradientBlocks(ev, e, s, c, slot);
+      curvatureBlocks(ev, e, s, c, slot);
     }
+    turn(ev.bodies);
   }
 
 private:
+  using Wide = Eigen::Matrix<double, rows_of_attachment, Eigen::Dynamic>;
+  using Tall = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+  Wide              wide_; /* scratch */
+  Tall              tall_;
+  std::vector<Tall> turned_; /* of each carrier: by the points' motions, the moment on the body */
+
   struct State {
     Frame<double>    e, i;
     SmallTurn        turn;
@@ -105,11 +160,10 @@ private:
     const double    *lambda;
     Vector3          f, m;   /* J^T lambda on the point of the flexible body */
 
-    State(const Evaluation &ev, const Instance &a) : turn(Vector3::Zero()), lambda(ev.u + a.lambda)
+    State(const Evaluation &ev, const Instance &a, Carrier &on) : turn(on.phi(a.place)), lambda(ev.u + a.lambda)
     {
       const BodyMotion &b = ev.bodies.now[a.body], &c = ev.bodies.now[a.frame];
-      const int         n = ev.bodies.modes(a.body);
-      e = Deformed(*a.attachment, b.r, b.A, a.s, Eigen::Map<const Eigen::VectorXd>(ev.u + ev.bodies.body[a.body].first + 6, n), &turn);
+      e = Deformed(b.r, b.A, a.s, on.x(a.place), turn);
       i = {c.r, c.A};
       const Frame<double> frames[2] = {e, i};
       Orient::gradient(Empty(), frames, 0, J);
@@ -118,17 +172,44 @@ private:
     }
   };
 
-  static void load(Bodies &B, const Instance &e, const State &s)
+  void size(Carrier &c)
   {
-    BodyMotion             &b = B.now[e.body], &i = B.now[e.frame];
-    const ModalAttachment  &a = *e.attachment;
-    const Vector3           n = b.A.transpose() * s.m;
+    c.shapes.setZero(ModalProducts::padded(bodies->modes(c.body)), 6 * c.count);
+    c.motion.setZero(6 * c.count);
+    c.load.setZero(6 * c.count);
+    turned_.emplace_back(6 * c.count, 3);
+  }
+
+  void move(const Evaluation &ev)
+  {
+    for (Carrier &c : carriers) {
+      const int m = ev.bodies.modes(c.body);
+      c.motion.noalias() = c.shapes.topRows(m).transpose() * Eigen::Map<const Eigen::VectorXd>(ev.u + ev.bodies.body[c.body].first + 6, m);
+    }
+  }
+
+  static void load(Bodies &B, const Instance &e, const State &s, Carrier &c)
+  {
+    BodyMotion &b = B.now[e.body], &i = B.now[e.frame];
     b.f -= s.f;
     b.m -= s.m + (s.e.x - b.r).cross(s.f);
-    B.modal[B.body[e.body].modal].load.noalias() -=
-        a.translation.transpose() * (b.A.transpose() * s.f) + a.rotation.transpose() * (s.turn.J().transpose() * n);
+    c.force(e.place)  = b.A.transpose() * s.f;
+    c.moment(e.place) = s.turn.J().transpose() * (b.A.transpose() * s.m);
     i.f += s.f;
     i.m += s.m; /* the axes' rows turn both alike */
+  }
+
+  void loadModes(Bodies &B)
+  {
+    for (Carrier &c : carriers) B.modal[B.body[c.body].modal].load.noalias() -= c.shapes.topRows(B.modes(c.body)) * c.load;
+  }
+
+  void turn(Bodies &B)
+  {
+    for (std::size_t k = 0; k < carriers.size(); k++) {
+      Carrier &c = carriers[k];
+      if (c.body < B.own) B.modal[B.body[c.body].modal].turned.noalias() = c.shapes.topRows(B.modes(c.body)) * turned_[k];
+    }
   }
 
   template <class Block> static void add(Evaluation &ev, const Slot *&slot, const Block &D, int size)
@@ -138,49 +219,54 @@ private:
   }
 
   /* rows of Phi, columns of lambda */
-  static void gradientBlocks(Evaluation &ev, const Instance &e, const State &s, const Slot *&slot)
+  void gradientBlocks(Evaluation &ev, const Instance &e, const State &s, Carrier &on, const Slot *&slot)
   {
-    using Wide = Eigen::Matrix<double, rows_of_attachment, Eigen::Dynamic>;
     const BodyMotion &b = ev.bodies.now[e.body], &i = ev.bodies.now[e.frame];
     const Matrix3     Jl = b.A * s.turn.J();
-    const auto        rows = [](const auto &top, const auto &bottom) {
-      Wide D(rows_of_attachment, top.cols());
+    const auto        rows = [](const Matrix3 &top, const Matrix3 &bottom) {
+      Matrix<rows_of_attachment, 3> D;
       D << top, bottom;
       return D;
     };
     const Matrix3 O = s.J.middleCols<3>(3), G = b.euler.G(), zero = Matrix3::Zero(), one = Matrix3::Identity();
+    const int     m = ev.bodies.modes(e.body);
     add(ev, slot, rows(-one, zero), 3);
     add(ev, slot, rows(Cross<double>(s.e.x - b.r) * G, O * G), 3);
-    const Eigen::Matrix<double, 3, Eigen::Dynamic> x = -b.A * e.attachment->translation, turn = (O * Jl) * e.attachment->rotation;
-    add(ev, slot, rows(x, turn), (int)x.cols());
+    wide_.resize(rows_of_attachment, m);
+    tall_                      = on.translation(e.place).topRows(m).lazyProduct(Matrix3(-b.A.transpose()));
+    wide_.topRows<3>()         = tall_.transpose();
+    tall_                      = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((O * Jl).transpose()));
+    wide_.bottomRows<3>()      = tall_.transpose();
+    add(ev, slot, wide_, m);
     add(ev, slot, rows(one, zero), 3);
     add(ev, slot, rows(zero, s.J.rightCols<3>() * i.euler.G()), 3);
   }
 
-  /* d(Phi_q^T lambda)/dq, but for what the bodies themselves add */
-  static void curvatureBlocks(Evaluation &ev, const Instance &e, const State &s, const Slot *&slot)
+  /* d(Phi_q^T lambda)/dq, but for what the bodies themselves add. Blocks of modes and of modes with the body's angles are made for
+     all attachments together, in turn() and by the body. They are symmetric: as a function of the coordinates it is a gradient. */
+  void curvatureBlocks(Evaluation &ev, const Instance &e, const State &s, Carrier &on, const Slot *&slot)
   {
-    using Wide = Eigen::Matrix<double, 3, Eigen::Dynamic>;
-    const BodyMotion      &b = ev.bodies.now[e.body], &i = ev.bodies.now[e.frame];
-    const ModalAttachment &a = *e.attachment;
-    const Frame<double>    frames[2] = {s.e, s.i};
-    Matrix<12, 12>         H;
+    const BodyMotion   &b = ev.bodies.now[e.body], &i = ev.bodies.now[e.frame];
+    const Frame<double> frames[2] = {s.e, s.i};
+    Matrix<12, 12>      H;
     Orient::curvature(Empty(), frames, 0, s.lambda + 3, H);
     const Matrix3 Hee = H.block<3, 3>(3, 3), Hei = H.block<3, 3>(3, 9), Hie = H.block<3, 3>(9, 3), Hii = H.block<3, 3>(9, 9);
-    const Matrix3 G = b.euler.G(), Gi = i.euler.G(), F = Cross<double>(s.f), S = Cross<double>(s.e.x - b.r);
-    const Wide    Wx = b.A * a.translation, Wt = (b.A * s.turn.J()) * a.rotation;
-    const Vector3 n  = b.A.transpose() * s.m;
-    const int     m  = (int)Wx.cols();
+    const Matrix3 G = b.euler.G(), Gi = i.euler.G(), F = Cross<double>(s.f), S = Cross<double>(s.e.x - b.r), Jl = b.A * s.turn.J();
+    const Vector3 n = b.A.transpose() * s.m;
+    const int     m = ev.bodies.modes(e.body);
     ev.sink.add(*slot++, Matrix3(G.transpose() * (Hee + F * S) * G), 3, 3);
-    ev.sink.add(*slot++, Wide(G.transpose() * (Hee * Wt - F * Wx)), 3, m);
     ev.sink.add(*slot++, Matrix3(G.transpose() * Hei * Gi), 3, 3);
-    ev.sink.add(*slot++, Wide(G.transpose() * ((Hee + Cross<double>(s.m)).transpose() * Wt - F * Wx)).transpose(), m, 3);
-    const Matrix3 Q = s.turn.J().transpose() * (b.A.transpose() * Hee * b.A) * s.turn.J() + s.turn.momentGradient(n);
-    ev.sink.add(*slot++, Eigen::MatrixXd(a.rotation.transpose() * (Q * a.rotation)), m, m);
-    ev.sink.add(*slot++, Wide((Hei * Gi).transpose() * Wt).transpose(), m, 3);
     ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hie * G), 3, 3);
-    ev.sink.add(*slot++, Wide(Gi.transpose() * Hie * Wt), 3, m);
     ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hii * Gi), 3, 3);
+    tall_ = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((Gi.transpose() * Hie * Jl).transpose()));
+    ev.sink.add(*slot++, tall_.transpose(), 3, m);
+    ev.sink.add(*slot++, tall_, m, 3);
+    if (e.body >= ev.bodies.own) return;
+    auto &turned = turned_[e.carrier];
+    turned.middleRows<3>(3 * e.place).noalias()              = -(F * b.A).transpose();
+    turned.middleRows<3>(3 * (on.count + e.place)).noalias() = (Hee * Jl).transpose();
+    const Matrix3 Q = s.turn.J().transpose() * (b.A.transpose() * Hee * b.A) * s.turn.J() + s.turn.momentGradient(n);
+    ev.bodies.modal[ev.bodies.body[e.body].modal].outer.right.middleCols<3>(3 * e.place) = on.rotation(e.place).lazyProduct(Matrix3(Q.transpose()));
   }
 };
 
@@ -212,13 +298,14 @@ void AttachStore::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &ba
     i.s          = m.s;
     i.lambda     = l.local(start[e]);
     i.group      = l.group(start[e], unknowns(e));
-    i.body = i.frame = -1;
+    i.body = i.frame = i.carrier = i.place = -1;
     if (!l.bodies->marker.empty()) { /* not while others' bodies are collected */
       i.body  = l.bodies->marker[on[0]].body;
       i.frame = l.bodies->marker[on[1]].body;
     }
     batch->all.push_back(i);
   }
+  batch->finish();
   if (!batch->all.empty()) batches.push_back(std::move(batch));
 }
 
@@ -227,9 +314,9 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
   const MarkerData      &m = s.markers[all[e].marker[0]];
   const BodyData        &b = s.bodies[m.body], &c = s.bodies[s.markers[all[e].marker[1]].body];
   const ModalAttachment &a = b.flexible->model->attachments[c.attachment];
-  SmallTurn              turn(Vector3::Zero());
-  Eigen::VectorXd        eta = Eigen::Map<const Eigen::VectorXd>(b.flexible->deformation.data(), b.flexible->deformation.size());
-  const Frame<double>    f[2] = {Deformed(a, b.r, b.A, m.s, eta, &turn), {c.r, c.A}};
+  const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), (Eigen::Index)b.flexible->deformation.size());
+  const SmallTurn        turn(a.rotation * eta);
+  const Frame<double>    f[2] = {Deformed(b.r, b.A, m.s, a.translation * eta, turn), {c.r, c.A}};
   Matrix<3, 12>          J;
   rows.name   = "attachment";
   rows.length = true;

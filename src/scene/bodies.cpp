@@ -113,25 +113,27 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   ModalPart        &p = modal[k.modal];
   ModalGradient    &D = p.gradient;
   const int         m = modes(i);
-  Vector3           f, n;
-  const ModalMotion q = modalMotion(i, u, v, a);
-  p.dynamics->force(q, f, n, p.block.col(0).head(m));
-  p.dynamics->gradient(q, sv, sa, D);
+  const int         padded = 6 + p.dynamics->padded();
+  auto             &B = p.block;
+  B.setZero(padded, padded);
+  p.dynamics->gradient(modalMotion(i, u, v, a), sv, sa, p.outer, D, &B.coeffRef(0, 0) + 6 * (std::ptrdiff_t)padded + 6, padded);
   const AngularGradient g = ByAngles(b, Vector3(v[k.first + 3], v[k.first + 4], v[k.first + 5]),
                                      Vector3(a[k.first + 3], a[k.first + 4], a[k.first + 5]), sv, sa);
-  const auto by_angles = [&](const auto &X) { return X.template middleCols<3>(3) * g.G + X.template middleCols<3>(6) * g.w + X.template rightCols<3>() * g.alpha; };
-  Eigen::MatrixXd &B = p.block;
-  Matrix<6, 6>     R;
+  const auto by_angles = [&](const auto &X) {
+    return X.template middleCols<3>(3).lazyProduct(g.G) + X.template middleCols<3>(6).lazyProduct(g.w) + X.template rightCols<3>().lazyProduct(g.alpha);
+  };
+  Matrix<6, 6> R;
   R.leftCols<3>()    = sa * D.rigid.leftCols<3>();
   R.rightCols<3>()   = by_angles(D.rigid);
   R.bottomRows<3>()  = Matrix<3, 6>(g.G.transpose() * R.bottomRows<3>());
-  R.bottomRightCorner<3, 3>() += MomentGradient(b.euler, n - b.m);
-  B.topLeftCorner<6, 6>()         = R;
-  B.topRightCorner(3, m)          = D.rigid_modal.topRows<3>();
-  B.block(3, 6, 3, m).noalias()   = g.G.transpose() * D.rigid_modal.bottomRows<3>();
-  B.block(6, 0, m, 3)             = sa * D.modal_rigid.leftCols<3>();
-  B.block(6, 3, m, 3)             = by_angles(D.modal_rigid);
-  B.bottomRightCorner(m, m)       = D.modal;
+  R.bottomRightCorner<3, 3>() += MomentGradient(b.euler, D.n - b.m);
+  B.topLeftCorner<6, 6>() = R;
+  if (p.turned.rows()) D.rigid_modal.rightCols<3>() += p.turned;
+  B.block(0, 6, 3, m)     = D.rigid_modal.leftCols<3>().transpose();
+  B.block(3, 6, 3, m)     = D.rigid_modal.rightCols<3>().lazyProduct(g.G).transpose();
+  B.block(6, 0, m, 3)     = sa * D.modal_rigid.leftCols<3>();
+  B.block(6, 3, m, 3)     = by_angles(D.modal_rigid);
+  if (p.turned.rows()) B.block(6, 3, m, 3) += p.turned.lazyProduct(g.G);
 }
 
 void Bodies::setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J)

@@ -65,12 +65,16 @@ struct LocalMarker {
   Matrix3  R; /* axes, in body axes */
 };
 
-/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix */
+/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix. What all attachments together
+   add to the matrix is in `outer`, modes by modes, and `turned`, the derivative of the moment on the body by the modes, transposed. */
 struct ModalPart {
-  std::unique_ptr<ModalDynamics> dynamics;
-  Eigen::VectorXd                load;
-  ModalGradient                  gradient;
-  Eigen::MatrixXd                block; /* coordinates x coordinates */
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  std::unique_ptr<ModalDynamics>           dynamics;
+  Eigen::VectorXd                          load;
+  ModalGradient                            gradient;
+  RowMajor                                 block; /* coordinates x coordinates, and behind them the padding of the modes */
+  ModalOuter                               outer;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> turned;
 };
 
 class Bodies

@@ -168,7 +168,7 @@ private:
       const LocalBody &b = bodyOf(ev.bodies, e, k);
       if (!Groups(b.kind)) continue;
       Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
-      int              n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
+      const int        n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
       if constexpr (K::holonomic) {
         S = T;
       } else {
@@ -177,17 +177,17 @@ private:
         ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, J.template middleCols<6>(6 * k), S);
       }
       if (rows < R)
-        for (int r = 0; r < rows; r++) {
-          T.row(r) = Matrix<1, 6>(T.row(active[r]));
-          S.row(r) = Matrix<1, 6>(S.row(active[r]));
-        }
+        for (int c = 0; c < n; c++)
+          for (int r = 0; r < rows; r++) {
+            T(r, c) = T(active[r], c);
+            S(r, c) = S(active[r], c);
+          }
       for (int g = 0; g < Groups(b.kind); g++) {
         if (!uses(b.kind, g, k)) continue;
         const int size = GroupSize(b.kind, g), at = GroupOffset(b.kind, g);
         ev.sink.add(*slot++, S.middleCols(at, size), rows, size);
         ev.sink.add(*slot++, T.middleCols(at, size).transpose(), size, rows);
       }
-      (void)n;
     }
     for (int i = 0; i < Z; i++) {
       Matrix<R, 1> column;

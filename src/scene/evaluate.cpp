@@ -57,7 +57,7 @@ void ModalBlocks(Runtime &R, PetscInt b, const Evaluation &e, const Slot *&slot)
 {
   const int size[3] = {3, 3, R.bodies.modes(b)}, at[3] = {0, 3, 6};
   R.bodies.modalJacobian(b, e.u, e.v, e.a, e.sv, e.sa);
-  const Eigen::MatrixXd &B = R.bodies.modal[R.bodies.body[b].modal].block;
+  const auto &B = R.bodies.modal[R.bodies.body[b].modal].block;
   for (int g = 0; g < 3; g++)
     for (int h = 0; h < 3; h++) e.sink.add(*slot++, B.block(at[g], at[h], size[g], size[h]), size[g], size[h]);
 }

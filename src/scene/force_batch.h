@@ -286,15 +286,17 @@ private:
   {
     constexpr int n = 6 * M, moving = K::damped ? n : 0, N = n + moving + Z;
     using T         = Dual<N>;
-    Frame<T> s[M];
-    Twist<T> u[M];
-    T        c[C], zs[Z > 0 ? Z : 1];
+    Frame<T>                               s[M];
+    T                                      c[C];
+    Arguments<Twist<T>, K::damped ? M : 0> u;
+    Arguments<T, Z>                        zs;
     for (int k = 0; k < M; k++) {
       s[k] = Seed<N>(f[k], 6 * k);
       if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
     }
-    for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
-    K::template components<T>(e.data, s, u, T(ev.t), zs, c);
+    if constexpr (Z > 0)
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+    K::template components<T>(e.data, s, u.data(), T(ev.t), zs.data(), c);
     ev.sink.add(*slot++, Matrix<C, C>(Matrix<C, C>::Identity()), C, C);
     for (int i = 0; i < Z; i++) {
       Matrix<C, 1> column;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <unsupported/Eigen/AutoDiff>
 
 namespace hhtdae
@@ -48,6 +49,14 @@ template <class T> T Taylor(double f, double f1, double f2, const T &t)
   return T(f) + d * T(f1) + d * d * T(0.5 * f2);
 }
 inline double Taylor(double f, double, double, double) { return f; }
+
+/* Eigen's own atan2 of duals takes memory for their derivatives, in each call */
+inline double Atan2(double y, double x) { return std::atan2(y, x); }
+template <class D> Eigen::AutoDiffScalar<D> Atan2(const Eigen::AutoDiffScalar<D> &y, const Eigen::AutoDiffScalar<D> &x)
+{
+  const typename D::Scalar r2 = y.value() * y.value() + x.value() * x.value();
+  return {Atan2(y.value(), x.value()), D((y.derivatives() * x.value() - y.value() * x.derivatives()) / r2)};
+}
 
 /*
   Frames of M markers as duals: directions 6k..6k+2 move marker k, 6k+3..6k+5 turn it about the space axes through its own origin,

@@ -55,6 +55,16 @@ constexpr unsigned Rotation(int k) { return 2u << (2 * k); }
 constexpr unsigned Everything(int markers) { return (1u << (2 * markers)) - 1; }
 constexpr bool     Depends(unsigned mask, int a) { return (mask >> a) & 1u; }
 
+/* n arguments of a kernel; none: a null pointer, so that nothing undefined is handed on */
+template <class T, int n> struct Arguments {
+  T        value[n];
+  const T *data() const { return value; }
+  T       &operator[](int i) { return value[i]; }
+};
+template <class T> struct Arguments<T, 0> {
+  const T *data() const { return nullptr; }
+};
+
 template <int N, int M> void SeedAll(const Frame<double> *f, Frame<Dual<N>> *s)
 {
   for (int k = 0; k < M; k++) s[k] = Seed<N>(f[k], 6 * k);
@@ -135,15 +145,17 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
   {
     constexpr int Z = K::inputs;
     using T         = Dual<2 * N + Z>;
-    Frame<T> s[M];
-    Twist<T> u[M];
-    T        psi[R], zs[Z > 0 ? Z : 1];
+    Frame<T>        s[M];
+    Twist<T>        u[M];
+    T               psi[R];
+    Arguments<T, Z> zs;
     for (int k = 0; k < M; k++) {
       s[k] = Seed<2 * N + Z>(f[k], 6 * k);
       u[k] = Seed<2 * N + Z>(w[k], N + 6 * k);
     }
-    for (int i = 0; i < Z; i++) zs[i] = T(z[i], 2 * N + Z, 2 * N + i);
-    evaluate<T>(d, s, u, T(t), zs, psi);
+    if constexpr (Z > 0)
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], 2 * N + Z, 2 * N + i);
+    evaluate<T>(d, s, u, T(t), zs.data(), psi);
     for (int r = 0; r < R; r++) {
       P.row(r) = psi[r].derivatives().template head<N>().transpose();
       J.row(r) = psi[r].derivatives().template segment<N>(N).transpose();
@@ -163,9 +175,10 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
                         Hessian &H)
   {
     using T = Dual2<N>;
-    Frame<T> s[M];
-    Twist<T> u[M];
-    T        psi[R], zs[K::inputs > 0 ? K::inputs : 1];
+    Frame<T>                s[M];
+    Twist<T>                u[M];
+    T                       psi[R];
+    Arguments<T, K::inputs> zs;
     for (int k = 0; k < M; k++) {
       const Frame<Dual<N>> inner = Seed<N>(f[k], 6 * k);
       u[k]                       = Constant<T>(w[k]);
@@ -176,8 +189,9 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
         u[k].w(i).derivatives()(6 * k + 3 + i) = Dual<N>(1);
       }
     }
-    for (int i = 0; i < K::inputs; i++) zs[i] = T(Dual<N>(z[i]));
-    evaluate<T>(d, s, u, T(Dual<N>(t)), zs, psi);
+    if constexpr (K::inputs > 0)
+      for (int i = 0; i < K::inputs; i++) zs[i] = T(Dual<N>(z[i]));
+    evaluate<T>(d, s, u, T(Dual<N>(t)), zs.data(), psi);
     H.setZero();
     for (int r = 0; r < R; r++)
       for (int a = 0; a < N; a++) H.row(a) += lambda[r] * psi[r].derivatives()(a).derivatives().transpose();
@@ -227,16 +241,18 @@ template <class K, int M, int C> struct Force {
   {
     constexpr int n = 6 * M, moving = K::damped ? n : 0, N = n + moving + Z;
     using T         = Dual<N>;
-    Frame<T>  s[M];
-    Twist<T>  u[M];
-    T         c[C], zs[Z > 0 ? Z : 1];
-    Wrench<T> load[M];
+    Frame<T>                               s[M];
+    T                                      c[C];
+    Wrench<T>                              load[M];
+    Arguments<Twist<T>, K::damped ? M : 0> u;
+    Arguments<T, Z>                        zs;
     for (int k = 0; k < M; k++) {
       s[k] = Seed<N>(f[k], 6 * k);
       if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
     }
-    for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
-    K::template components<T>(d, s, u, T(t), zs, c);
+    if constexpr (Z > 0)
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+    K::template components<T>(d, s, u.data(), T(t), zs.data(), c);
     K::template apply<T>(d, s, c, load);
     J.twists.setZero();
     for (int k = 0; k < M; k++)

@@ -152,9 +152,11 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
     const int m = (int)b.flexible->model->modes();
     k.modal = (PetscInt)R.bodies.modal.size();
     R.pattern.addGroup(global + 6, k.first + 6, m, own);
-    ModalPart p{std::make_unique<ModalDynamics>(b.flexible->model, b.flexible->mass, ModalDamping(*b.flexible)), Eigen::VectorXd::Zero(m), {}, {}};
+    R.bodies.modal.emplace_back();
+    ModalPart &p = R.bodies.modal.back();
+    p.dynamics   = std::make_unique<ModalDynamics>(b.flexible->model, b.flexible->mass, ModalDamping(*b.flexible));
+    p.load       = Eigen::VectorXd::Zero(m);
     if (own) p.block.resize(6 + m, std::max(6 + m, 1));
-    R.bodies.modal.push_back(std::move(p));
   }
   return k;
 }

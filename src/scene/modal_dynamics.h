@@ -14,6 +14,7 @@
 #define HHTDAE_SCENE_MODAL_DYNAMICS_H
 
 #include "hhtdae/modal.h"
+#include "modal_products.h"
 #include <memory>
 
 namespace hhtdae
@@ -26,13 +27,18 @@ struct ModalMotion {
   Eigen::Map<const Eigen::VectorXd> eta, rate, acceleration;
 };
 
-/* Derivatives of (f, n) and h in space axes by a0, a turn of the body, w and alpha; and by the modal coordinates,
-   d/deta + sv d/deta' + sa d/deta'' */
+/* (f, n) and its derivatives and those of h in space axes by a0, a turn of the body, w and alpha; and of (f, n) by the modal
+   coordinates, d/deta + sv d/deta' + sa d/deta'' */
 struct ModalGradient {
-  Eigen::Matrix<double, 6, 12>             rigid;
+  Vector3                                   f, n;
+  Eigen::Matrix<double, 6, 12>              rigid;
   Eigen::Matrix<double, Eigen::Dynamic, 12> modal_rigid;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> rigid_modal;
-  Eigen::MatrixXd                          modal;
+  Eigen::Matrix<double, Eigen::Dynamic, 6>  rigid_modal; /* transposed */
+};
+
+/* A symmetric matrix modes x modes as the product left right^T, with ModalDynamics::padded() rows each */
+struct ModalOuter {
+  Eigen::MatrixXd left, right;
 };
 
 struct ModalEnergy {
@@ -48,25 +54,34 @@ public:
   ModalDynamics(std::shared_ptr<const ModalBody> body, ModalMass mass, const Eigen::VectorXd &damping);
 
   int              modes() const { return m_; }
+  int              padded() const { return ModalProducts::padded(m_); }
   const ModalBody &body() const { return *body_; }
 
   void        force(const ModalMotion &q, Vector3 &f, Vector3 &n, Eigen::Ref<Eigen::VectorXd> h);
-  void        gradient(const ModalMotion &q, double sv, double sa, ModalGradient &G);
+  /* modal: dh by the modal coordinates in the same sense, row by row at the distance ld; it has padded() rows and columns, and is
+     zero at first. What is given as `more` adds to it. */
+  void        gradient(const ModalMotion &q, double sv, double sa, const ModalOuter &more, ModalGradient &G, double *modal, int ld);
   ModalEnergy energy(const ModalMotion &q, const Vector3 &v); /* v: of the frame's origin; accelerations are not used */
 
 private:
+  using Columns  = ModalProducts::Columns;
+  using Vectors3 = Eigen::Matrix<double, Eigen::Dynamic, 3>;
   std::shared_ptr<const ModalBody> body_;
   int                              m_;
   bool                             linear_, quadratic_; /* invariants of first and second order in the modes are used */
   Eigen::VectorXd                  damping_, stiffness_;
-  Eigen::Matrix<double, Eigen::Dynamic, 9> b_, n_rate_, n_acc_; /* column 3 c + d: b_cd; N_cd eta'; N_cd eta'' */
-  Matrix3                          I2_, V_, W_;                 /* int y y^T, int y s^T, int y u''^T */
-  Vector3                          c_, p_, pa_;                 /* int y, int s, int u'' */
+  ModalProducts                    products_;
+  Vectors3                         first_;              /* int phi */
+  Columns                          moment_, b_, rate_;  /* column 3 c + d: int phi_c X_d; b_cd; N_cd eta' */
+  Vectors3                         skew_rate_, skew_acc_; /* (N_cd - N_dc)/2 by eta' and eta'' for xy, yz, zx */
+  Eigen::MatrixXd                  x_, y_;              /* padded: eta, eta', eta''; products with each, side by side */
+  Matrix3                          I2_, V_, W_;         /* int y y^T, int y s^T, int y u''^T */
+  Vector3                          c_, p_, pa_;         /* int y, int s, int u'' */
 
-  void integrals(const ModalMotion &q);
-  void products(const Eigen::Ref<const Eigen::VectorXd> &x, Eigen::Matrix<double, Eigen::Dynamic, 9> &out) const; /* adds N_cd x */
-  /* sum_cd L_cd N_cd */
-  void addQuadratic(const Matrix3 &L, double factor, Eigen::MatrixXd &out) const;
+  enum class For { Force, Gradient, Energy };
+  void integrals(const ModalMotion &q, For what);
+  void products(const ModalMotion &q, For what);
+  void addProducts(int vector, Columns &to) const; /* N_cd x */
 };
 
 } // namespace hhtdae

@@ -74,7 +74,7 @@ struct Sink {
     if (s.base < 0) return;
     double *p = (s.off ? off : diagonal) + s.base;
     if (s.diagonal) {
-      for (int r = 0; r < rows; r++, p += s.stride) *p += B(r, r);
+      for (int r = 0; r < rows && r < columns; r++, p += s.stride) *p += B(r, r);
     } else if (columns == 3) {
       for (int r = 0; r < rows; r++, p += s.stride)
         for (int c = 0; c < 3; c++) p[c] += B(r, c);

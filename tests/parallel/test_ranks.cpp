@@ -19,7 +19,21 @@ End run(MPI_Comm comm, const Problem &p, const std::string &options, bool setRol
   return {r.u(), r.v(), r.a(), r.statistics(), r.t()};
 }
 
-void compare(const Problem &p, const std::string &options, bool setRoles = false, double multipliers = 1e-8)
+/* Rounding of q enters Phi, and through (9b) lambda and q'' divided by beta h^2: with the accelerations for scale this is as far
+   as the algebraic unknowns of an index-3 method agree in double precision, whatever computes them */
+double algebraicFloor(const Problem &p, const End &e)
+{
+  const double h = (p.t1 - p.t0) / e.s.steps;
+  double       q = 0., a = 0.;
+  for (PetscInt i = 0; i < p.n; i++)
+    if (p.role[i] == TSHHT3_COORDINATE) {
+      q = std::max(q, std::abs(e.u[i]));
+      a = std::max(a, std::abs(e.a[i]));
+    }
+  return 100. * PETSC_MACHINE_EPSILON * q / (.25 * h * h * a);
+}
+
+void compare(const Problem &p, const std::string &options, bool setRoles = false)
 {
   int size, rank;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
@@ -36,14 +50,14 @@ void compare(const Problem &p, const std::string &options, bool setRoles = false
   const double dq = relativeDifference(q[0], q[1]), dv = relativeDifference(v[0], v[1]),
                dl = relativeDifference(l[0], l[1]);
   if (rank == 0)
-    MEASURED("%-12s %d ranks, %s: differ by %.1e in q, %.1e in q', %.1e in algebraic unknowns; %d steps and %d",
-             p.name.c_str(), size, setRoles ? "roles set" : "roles detected", dq, dv, dl, (int)all.s.steps,
-             (int)self.s.steps);
+    MEASURED("%-12s %d ranks, %s: differ by %.1e in q, %.1e in q', %.1e in algebraic unknowns (rounding: %.1e); %d steps and %d",
+             p.name.c_str(), size, setRoles ? "roles set" : "roles detected", dq, dv, dl, algebraicFloor(p, self),
+             (int)all.s.steps, (int)self.s.steps);
   EXPECT_EQ(all.t, p.t1);
   EXPECT_EQ(all.s.steps, self.s.steps);
   EXPECT_LT(dq, 1e-10);
   EXPECT_LT(dv, 1e-10);
-  EXPECT_LT(dl, multipliers);
+  EXPECT_LT(dl, 1e-10 + algebraicFloor(p, self));
 }
 
 /* Steps of one length, so that no decision hangs on a rounding error, and corrections to rounding */
@@ -92,7 +106,7 @@ TEST(Ranks, Oscillators)
 TEST(Ranks, Chain)
 {
   const Chain p(30, 0., .3);
-  compare(p, steps(p, 100), false, 1e-7);
+  compare(p, steps(p, 100));
 }
 
 TEST(Ranks, NonholonomicConstraints)

@@ -14,7 +14,7 @@ namespace
 {
 
 template <class K> struct UserItem {
-  PetscInt                element;
+  PetscInt                element = -1;
   PetscInt                marker[K::markers];
   std::vector<Expression> expressions;
   bool                    carried;

@@ -31,9 +31,8 @@ template <class T> T Unwind(const T &theta, double near)
 /* in (-pi, pi] */
 template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
 {
-  using std::atan2;
   const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
-  return atan2(s, c);
+  return Atan2(s, c);
 }
 
 /* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn

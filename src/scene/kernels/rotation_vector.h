@@ -72,7 +72,6 @@ template <class T> Quaternion<T> HalfTurn(const Quaternion<T> &q)
 
 template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
 {
-  using std::atan2;
   using std::sqrt;
   const T v2 = q.v.dot(q.v);
   T       factor;
@@ -81,7 +80,7 @@ template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
     factor    = (T(1) - y * (T(1. / 3) - y * (T(1. / 5) - y * (T(1. / 7) - y * T(1. / 9))))) * T(2) / q.w;
   } else {
     const T v = sqrt(v2);
-    factor    = T(2) * atan2(v, q.w) / v;
+    factor    = T(2) * Atan2(v, q.w) / v;
   }
   return q.v * factor;
 }
