@@ -1,0 +1,185 @@
+/* Whether K and M can be those of solid elements: sizes, symmetry, the form of M, diagonals. */
+#include "diagnose_nodes.h"
+#include "modes.h"
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace hhtdae
+{
+
+/* Entries of M that have to vanish or to be equal, relative to its largest */
+constexpr double form_tolerance = 1e-8;
+
+static PetscErrorCode CheckLayout(const FeModel &model, Mat A, const char name[])
+{
+  PetscInt  begin, end, rows, cols;
+  PetscBool aij;
+
+  PetscFunctionBegin;
+  PetscCheck(A, model.comm, PETSC_ERR_ARG_WRONGSTATE, "The FE model has no matrix %s: read a mesh or matrices first",
+             name);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  PetscCheck(aij, model.comm, PETSC_ERR_ARG_WRONG, "The matrix %s of the FE model has to be AIJ (with both triangles)",
+             name);
+  PetscCall(MatGetSize(A, &rows, &cols));
+  PetscCheck(rows == 3 * model.nodes && cols == rows, model.comm, PETSC_ERR_ARG_SIZ,
+             "The matrix %s has %" PetscInt_FMT " rows and %" PetscInt_FMT " columns, but there are %" PetscInt_FMT
+             " nodes of three unknowns",
+             name, rows, cols, model.nodes);
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  int wrong = begin != 3 * model.first || end != 3 * (model.first + model.own) ||
+              (PetscInt)model.coordinates.size() != 3 * model.own;
+  for (double x : model.coordinates) wrong = wrong || !std::isfinite(x);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_MAX, model.comm));
+  PetscCheck(!wrong, model.comm, PETSC_ERR_ARG_SIZ,
+             "The rows of %s are not those of the ranks' own nodes, or there are not three finite coordinates for each "
+             "own node",
+             name);
+  PetscFunctionReturn(0);
+}
+
+static double Pattern(PetscInt row, double k) { return std::sin(k * (double)row + 0.3 * k); }
+
+/* y^T A x = x^T A y for two fixed vectors; Inf and NaN among the entries are found on the way */
+static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char name[])
+{
+  MatrixXd  X(3 * model.own, 2), AX;
+  double    s[3] = {0, 0, 0};
+  PetscReal norm;
+
+  PetscFunctionBegin;
+  PetscCall(MatNorm(A, NORM_FROBENIUS, &norm)); /* of the others, NaN may go unseen */
+  PetscCheck(std::isfinite(norm), model.comm, PETSC_ERR_FP,
+             "The matrix %s of the FE model has entries that are not numbers", name);
+  PetscCheck(norm > 0, model.comm, PETSC_ERR_ARG_WRONG, "The matrix %s of the FE model is zero", name);
+  for (PetscInt i = 0; i < 3 * model.own; i++)
+    X.row(i) << Pattern(3 * model.first + i, 1.1), Pattern(3 * model.first + i, 2.3);
+  PetscCall(Multiply(A, X, &AX));
+  if (X.rows()) {
+    s[0] = X.col(0).dot(AX.col(1));
+    s[1] = X.col(1).dot(AX.col(0));
+    s[2] = X.squaredNorm();
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, s, 3, MPI_DOUBLE, MPI_SUM, model.comm));
+  PetscCheck(std::abs(s[0] - s[1]) <= 1e-10 * norm * std::sqrt(s[2]), model.comm, PETSC_ERR_ARG_WRONG,
+             "The matrix %s of the FE model is not symmetric; both triangles have to be given", name);
+  PetscFunctionReturn(0);
+}
+
+/* The three rows of a node in M: m_ij by column node, and whether the blocks are m_ij times identity(3) */
+static PetscErrorCode MassRow(Mat M, PetscInt node, double tiny, std::map<PetscInt, double> *mass, bool *right)
+{
+  std::map<PetscInt, Vector3> row;
+  PetscInt                    n;
+  const PetscInt             *cols;
+  const PetscScalar          *v;
+
+  PetscFunctionBegin;
+  *right = true;
+  for (int r = 0; r < 3; r++) {
+    PetscCall(MatGetRow(M, 3 * node + r, &n, &cols, &v));
+    for (PetscInt k = 0; k < n; k++) {
+      if (cols[k] % 3 == r)
+        row.emplace(cols[k] / 3, Vector3::Zero()).first->second[r] = v[k];
+      else if (std::abs(v[k]) > tiny)
+        *right = false;
+    }
+    PetscCall(MatRestoreRow(M, 3 * node + r, &n, &cols, &v));
+  }
+  mass->clear();
+  for (const auto &m : row) {
+    if (m.second.maxCoeff() - m.second.minCoeff() > tiny) *right = false;
+    (*mass)[m.first] = m.second[0];
+  }
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CheckMass(const FeModel &model)
+{
+  std::vector<PetscInt>      wrong_form, not_positive;
+  std::map<PetscInt, double> row;
+  double                     largest;
+  bool                       right;
+  PetscInt                   count;
+  std::string                labels;
+
+  PetscFunctionBegin;
+  PetscCall(LargestEntry(model.comm, model.M, &largest));
+  for (PetscInt i = 0; i < model.own; i++) {
+    PetscCall(MassRow(model.M, model.first + i, form_tolerance * largest, &row, &right));
+    if (!right) wrong_form.push_back(i);
+    const auto diagonal = row.find(model.first + i);
+    if (diagonal == row.end() || !(diagonal->second > 0)) not_positive.push_back(i);
+  }
+  PetscCall(NameNodes(model, not_positive, &count, &labels));
+  PetscCheck(
+      !count, model.comm, PETSC_ERR_ARG_WRONG,
+      "%" PetscInt_FMT
+      " node(s) of the FE model have no mass or a negative one on the diagonal of M: %s; give all materials a density",
+      count, labels.c_str());
+  PetscCall(NameNodes(model, wrong_form, &count, &labels));
+  PetscCheck(!count, model.comm, PETSC_ERR_ARG_WRONG,
+             "M has to be m_ij times the 3 x 3 identity for all pairs of nodes, which translations of solid elements "
+             "give. It is not at %" PetscInt_FMT
+             " node(s): %s; are the unknowns in the order x, y, z of node after node, without rotations?",
+             count, labels.c_str());
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode CheckStiffness(const FeModel &model)
+{
+  std::vector<PetscInt> loose, negative;
+  double                largest;
+  PetscInt              count, n;
+  const PetscInt       *cols;
+  const PetscScalar    *v;
+  std::string           labels;
+
+  PetscFunctionBegin;
+  PetscCall(LargestEntry(model.comm, model.K, &largest));
+  for (PetscInt i = 0; i < model.own; i++) {
+    double most = 0, least = largest;
+    for (int r = 0; r < 3; r++) {
+      const PetscInt row      = 3 * (model.first + i) + r;
+      double         diagonal = 0;
+      PetscCall(MatGetRow(model.K, row, &n, &cols, &v));
+      for (PetscInt k = 0; k < n; k++) {
+        most = std::max(most, std::abs(v[k]));
+        if (cols[k] == row) diagonal = v[k];
+      }
+      PetscCall(MatRestoreRow(model.K, row, &n, &cols, &v));
+      least = std::min(least, diagonal);
+    }
+    if (most <= no_coupling * largest)
+      loose.push_back(i);
+    else if (least < 0)
+      negative.push_back(i);
+  }
+  PetscCall(NameNodes(model, loose, &count, &labels));
+  PetscCheck(!count, model.comm, PETSC_ERR_ARG_WRONG,
+             "%" PetscInt_FMT " node(s) of the FE model have no stiffness: %s; no element holds them: remove them",
+             count, labels.c_str());
+  PetscCall(NameNodes(model, negative, &count, &labels));
+  PetscCheck(!count, model.comm, PETSC_ERR_ARG_WRONG,
+             "%" PetscInt_FMT
+             " node(s) of the FE model have a negative stiffness on the diagonal of K: %s; are elements inside out?",
+             count, labels.c_str());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckMatrices(const FeModel &model)
+{
+  PetscFunctionBegin;
+  PetscCheck(model.nodes > 0, model.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "The FE model has no nodes: read a mesh or matrices first");
+  PetscCall(CheckLayout(model, model.K, "K"));
+  PetscCall(CheckLayout(model, model.M, "M"));
+  PetscCall(CheckSymmetric(model, model.K, "K"));
+  PetscCall(CheckSymmetric(model, model.M, "M"));
+  PetscCall(CheckMass(model));
+  PetscCall(CheckStiffness(model));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
