@@ -1,0 +1,208 @@
+/*
+  Loops over the packed invariants.
+
+  A panel is four columns of the lower triangle, from the four by four block on the diagonal down; of that block one half
+  is stored, so that it needs no special treatment where every entry is used at its place and at the mirrored one. Panels
+  of all matrices with the same columns stand one behind the other: the symmetric ones, then the skew ones.
+
+  Eigen and the compiler use the instructions that they are told to, which are those of the oldest processor where a
+  library is made for many. These loops are compiled twice; the processor at hand decides.
+*/
+#include "modal_products.h"
+
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#if defined(__x86_64__) && defined(__GNUC__)
+#define TWO_VERSIONS 1
+#define NEWER __attribute__((target("avx2,fma")))
+#endif
+
+namespace hhtdae
+{
+
+namespace
+{
+
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+
+struct Packed {
+  int           n, symmetric, skew;
+  const double *value;
+};
+
+ALWAYS_INLINE Four       &At(double *p) { return *reinterpret_cast<Four *>(p); }
+ALWAYS_INLINE const Four &At(const double *p) { return *reinterpret_cast<const Four *>(p); }
+
+/* ---- products with vectors ---- */
+
+/* A panel of so many rows and its mirror image: y += A x below, y += sign A^T x above; x and y begin at its columns */
+ALWAYS_INLINE void Mirrored(int rows, const double *a, const double *x, double *y, double sign)
+{
+  const Four x0 = {x[0], x[0], x[0], x[0]}, x1 = {x[1], x[1], x[1], x[1]}, x2 = {x[2], x[2], x[2], x[2]}, x3 = {x[3], x[3], x[3], x[3]};
+  Four       s0 = {0, 0, 0, 0}, s1 = s0, s2 = s0, s3 = s0;
+  for (int i = 0; i < rows; i += 4) {
+    const Four a0 = At(a + i), a1 = At(a + rows + i), a2 = At(a + 2 * rows + i), a3 = At(a + 3 * rows + i), xi = At(x + i);
+    At(y + i) += (a0 * x0 + a1 * x1) + (a2 * x2 + a3 * x3);
+    s0 += a0 * xi;
+    s1 += a1 * xi;
+    s2 += a2 * xi;
+    s3 += a3 * xi;
+  }
+  y[0] += sign * ((s0[0] + s0[1]) + (s0[2] + s0[3]));
+  y[1] += sign * ((s1[0] + s1[1]) + (s1[2] + s1[3]));
+  y[2] += sign * ((s2[0] + s2[1]) + (s2[2] + s2[3]));
+  y[3] += sign * ((s3[0] + s3[1]) + (s3[2] + s3[3]));
+}
+
+ALWAYS_INLINE void ApplyPanels(const Packed &p, const ModalProducts::Task *task, int count, int zz)
+{
+  const double *a = p.value;
+  for (int first = 0; first < p.n; first += 4) {
+    const int rows = p.n - first;
+    for (int k = 0; k < p.symmetric; k++, a += 4 * rows) {
+      const int to = (k < 2 ? k : k + zz) * p.n + first;
+      for (int t = 0; t < count; t++)
+        if (task[t].symmetric) Mirrored(rows, a, task[t].x + first, task[t].symmetric + to, 1);
+    }
+    for (int k = 0; k < p.skew; k++, a += 4 * rows)
+      for (int t = 0; t < count; t++) Mirrored(rows, a, task[t].x + first, task[t].skew + k * p.n + first, -1);
+  }
+}
+
+/* ---- sums ---- */
+
+struct Sum {
+  double        symmetric[6], skew[3]; /* factors */
+  const double *left, *right;
+  int           rank;
+  double       *out;
+  long          ld;
+};
+
+/* `blocks` times four rows of a panel from row i on, both halves */
+template <int blocks> ALWAYS_INLINE void CombineRows(const Packed &p, const Sum &sum, const double *a, int first, int i)
+{
+  const int    rows = p.n - first;
+  const double part = i ? 1 : 0.5;
+  Four         s[blocks][4], k[blocks][4];
+  for (int b = 0; b < blocks; b++)
+    for (int c = 0; c < 4; c++) s[b][c] = k[b][c] = Four{0, 0, 0, 0};
+  for (int r = 0; r < sum.rank; r++) {
+    const double *x = sum.left + (long)r * p.n + first + i, *y = sum.right + (long)r * p.n + first;
+    for (int b = 0; b < blocks; b++)
+      for (int c = 0; c < 4; c++) s[b][c] += At(x + 4 * b) * y[c];
+  }
+  for (int b = 0; b < blocks && !i; b++)
+    for (int c = 0; c < 4; c++) s[b][c] *= part;
+  for (int m = 0; m < p.symmetric; m++, a += 4 * rows)
+    for (int b = 0; b < blocks; b++)
+      for (int c = 0; c < 4; c++) s[b][c] += sum.symmetric[m] * At(a + c * rows + i + 4 * b);
+  for (int m = 0; m < p.skew; m++, a += 4 * rows)
+    for (int b = 0; b < blocks; b++)
+      for (int c = 0; c < 4; c++) k[b][c] += sum.skew[m] * At(a + c * rows + i + 4 * b);
+  for (int b = 0; b < blocks; b++) {
+    const int row = first + i + 4 * b;
+    Four      t[4];
+    for (int c = 0; c < 4; c++) t[c] = s[b][c] + k[b][c];
+    for (int r = 0; r < 4; r++) At(sum.out + (row + r) * sum.ld + first) += Four{t[0][r], t[1][r], t[2][r], t[3][r]};
+    for (int c = 0; c < 4; c++) At(sum.out + (first + c) * sum.ld + row) += s[b][c] - k[b][c];
+  }
+}
+
+ALWAYS_INLINE void CombinePanels(const Packed &p, const Sum &sum)
+{
+  const double *a = p.value;
+  for (int first = 0; first < p.n; first += 4) {
+    const int rows = p.n - first;
+    int       i    = 4;
+    CombineRows<1>(p, sum, a, first, 0);
+    for (; i + 8 <= rows; i += 8) CombineRows<2>(p, sum, a, first, i);
+    if (i < rows) CombineRows<1>(p, sum, a, first, i);
+    a += 4l * rows * (p.symmetric + p.skew);
+  }
+}
+
+/* ---- versions ---- */
+
+void ApplyPlain(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
+void CombinePlain(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+
+#if defined(TWO_VERSIONS)
+NEWER void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
+NEWER void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+
+bool Newer()
+{
+  static const bool newer = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  return newer;
+}
+#else
+bool Newer() { return false; }
+void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
+void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+#endif
+
+/* Panels of a square matrix, of which half the block on the diagonal is taken */
+double *Store(const Eigen::MatrixXd &M, int n, int first, double *to)
+{
+  const int m = (int)M.rows();
+  for (int c = first; c < first + 4; c++)
+    for (int r = first; r < n; r++) *to++ = r >= m || c >= m ? 0 : r < first + 4 ? 0.5 * M(r, c) : M(r, c);
+  return to;
+}
+
+} // namespace
+
+ModalProducts::ModalProducts(int modes, const std::array<Eigen::MatrixXd, 6> *quadratic) : padded_(padded(modes))
+{
+  if (quadratic) pack(*quadratic);
+}
+
+void ModalProducts::pack(const std::array<Eigen::MatrixXd, 6> &N)
+{
+  const Eigen::Index           m = N[0].rows();
+  std::vector<Eigen::MatrixXd> part;
+  identity_ = m && (N[0] + N[1] + N[2] - Eigen::MatrixXd::Identity(m, m)).cwiseAbs().maxCoeff() < 1e-10;
+  for (int p = 0; p < 6; p++)
+    if (p != 2 || !identity_) part.push_back(0.5 * (N[p] + N[p].transpose()));
+  symmetric_ = (int)part.size();
+  for (int p = 3; p < 6; p++) part.push_back(0.5 * (N[p] - N[p].transpose()));
+  skew_ = 3;
+  std::size_t size = 0;
+  for (int first = 0; first < padded_; first += 4) size += 4 * (std::size_t)(padded_ - first);
+  value_.resize(size * part.size());
+  double *to = value_.data();
+  for (int first = 0; first < padded_; first += 4)
+    for (const Eigen::MatrixXd &M : part) to = Store(M, padded_, first, to);
+}
+
+void ModalProducts::apply(const Task *task, int count) const
+{
+  (Newer() ? ApplyNewer : ApplyPlain)({padded_, symmetric_, skew_, value_.data()}, task, count, identity_ ? 1 : 0);
+  if (!identity_) return;
+  for (int t = 0; t < count; t++)
+    if (double *s = task[t].symmetric)
+      for (int i = 0; i < padded_; i++) s[2 * padded_ + i] += task[t].x[i] - s[i] - s[padded_ + i];
+}
+
+void ModalProducts::combine(const Eigen::Matrix3d &L, const double *left, const double *right, int rank, double *out, int ld) const
+{
+  Sum       sum  = {{}, {}, left, right, rank, out, ld};
+  double   *s    = sum.symmetric;
+  const int pair = symmetric_ - 3; /* where xy begins */
+  if (!symmetric_ && !rank) return;
+  if (symmetric_) {
+    const double zz = identity_ ? L(2, 2) : 0;
+    s[0] = L(0, 0) - zz;
+    s[1] = L(1, 1) - zz;
+    if (!identity_) s[2] = L(2, 2);
+    for (int c = 0; c < 3; c++) {
+      const int d   = (c + 1) % 3;
+      s[pair + c]   = L(c, d) + L(d, c);
+      sum.skew[c]   = L(c, d) - L(d, c);
+    }
+    for (int i = 0; i < padded_; i++) out[i * (long)ld + i] += zz;
+  }
+  (Newer() ? CombineNewer : CombinePlain)({padded_, symmetric_, skew_, value_.data()}, sum);
+}
+
+} // namespace hhtdae
