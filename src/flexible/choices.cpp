@@ -1,0 +1,68 @@
+/* What is left to choose of modes, chosen so that it does not depend on the ranks: the combinations of modes of equal
+   frequencies, and signs. */
+#include "craig_bampton.h"
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace hhtdae
+{
+
+/* ---- equal frequencies ---- */
+
+/* Falls off from a point beside the body, so that symmetries of the body are none of it */
+static double Weight(const Vector3 &X, const BodyScales &scales, int c)
+{
+  static const double direction[3] = {1, 0.37, 0.11};
+  return direction[c] / (1 + 2 * ((X - scales.center) / scales.length - Vector3(0.9, 0.5, 0.2)).squaredNorm());
+}
+
+/* Orthogonal in the weight: what is left to choose is the sign */
+PetscErrorCode TurnEqual(const FeModel &model, const BodyScales &scales, PetscInt from, PetscInt to, MatrixXd *X,
+                         MatrixXd *Y)
+{
+  const PetscInt n = to - from;
+  MatrixXd       G = MatrixXd::Zero(n, n);
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < 3 * model.own; i++) {
+    const VectorXd row = X->block(i, from, 1, n).transpose();
+    G += Weight(NodePosition(model, i / 3), scales, i % 3) * row * row.transpose();
+  }
+  PetscCall(SumOverRanks(model.comm, &G));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> turn(0.5 * (G + G.transpose()));
+  X->middleCols(from, n) = (X->middleCols(from, n) * turn.eigenvectors()).eval();
+  Y->middleCols(from, n) = (Y->middleCols(from, n) * turn.eigenvectors()).eval();
+  PetscFunctionReturn(0);
+}
+
+/* ---- signs ---- */
+
+PetscErrorCode FixSigns(const FeModel &model, MatrixXd *X, MatrixXd *Y)
+{
+  const PetscInt        n = (PetscInt)X->cols();
+  std::vector<double>   most(n, 0.), value(n, 0.);
+  std::vector<PetscInt> first(n, PETSC_MAX_INT);
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n && X->rows(); k++) most[k] = X->col(k).cwiseAbs().maxCoeff();
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most.data(), (PetscMPIInt)n, MPI_DOUBLE, MPI_MAX, model.comm));
+  for (PetscInt k = 0; k < n; k++)
+    for (PetscInt i = 0; i < X->rows(); i++)
+      if (std::abs((*X)(i, k)) > (1 - 1e-4) * most[k])
+        first[k] = std::min(first[k], 3 * NodeLabel(model, i / 3) + i % 3);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, first.data(), (PetscMPIInt)n, MPIU_INT, MPI_MIN, model.comm));
+  for (PetscInt k = 0; k < n; k++)
+    for (PetscInt i = 0; i < X->rows(); i++)
+      if (std::abs((*X)(i, k)) > (1 - 1e-4) * most[k] && first[k] == 3 * NodeLabel(model, i / 3) + i % 3)
+        value[k] = (*X)(i, k);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value.data(), (PetscMPIInt)n, MPI_DOUBLE, MPI_SUM, model.comm));
+  for (PetscInt k = 0; k < n; k++)
+    if (value[k] < 0) {
+      X->col(k) *= -1;
+      Y->col(k) *= -1;
+    }
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
