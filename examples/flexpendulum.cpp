@@ -14,6 +14,7 @@ static char help[] =
     "  -plot <file.png>: deflection of the middle and force in the pin, by gnuplot\n"
     "  -scene_animation <prefix>: pictures for ParaView\n";
 
+#include "flexpendulum_model.h"
 #include "problem.h"
 #include "scene_watch.h"
 
@@ -21,20 +22,18 @@ static char help[] =
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <slepcsys.h>
 #include <unistd.h>
 
 using namespace hhtdae;
+using hhtex::Arm;
 
-struct Pendulum {
-  double                size = 0.02, thickness = 0.005, length = 1, width = 0.05;
-  double                tip = 0.2, speed = 0, end = 1;
+struct Pendulum : hhtex::HangingArm {
+  double                end     = 1;
   PetscInt              samples = 500, spots = 5;
-  std::string           body, out, mesh, field, plot;
+  std::string           body, out, field, plot;
   bool                  full  = false;
   std::vector<PetscInt> modes = {4};
-  Material              material{7e10, 0.33, 2700};
 };
 
 /* What is looked at, at equal distances in time */
@@ -54,53 +53,7 @@ struct History {
   }
 };
 
-/* ---- the mesh ---- */
-
-static PetscErrorCode MakeMesh(const Pendulum &p, std::string *file)
-{
-  PetscMPIInt rank;
-  int         failed = 0, number = (int)getpid();
-  char        folder[PETSC_MAX_PATH_LEN];
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscGetTmp(PETSC_COMM_WORLD, folder, sizeof folder));
-  PetscCallMPI(MPI_Bcast(&number, 1, MPI_INT, 0, PETSC_COMM_WORLD)); /* one name on all ranks */
-  const std::string stem = std::string(folder) + "/flexpendulum" + std::to_string(number);
-  *file                  = p.mesh.empty() ? stem + ".msh" : p.mesh;
-  if (rank == 0) {
-    std::ofstream geo(stem + ".geo");
-    geo << "SetFactory(\"OpenCASCADE\");\n"
-        << "L = " << p.length << "; w = " << p.width << "; h = " << p.thickness << "; e = 1e-6;\n"
-        << "Box(1) = {0, -w/2, -h/2, L, w, h};\n"
-        << "Cylinder(2) = {L/2, 0, -h, 0, 0, 2*h, w/4};\n"
-        << "BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };\n"
-        << "Physical Volume(\"arm\") = {3};\n"
-        << "Physical Surface(\"hub\") = Surface In BoundingBox{-e, -w, -h, e, w, h};\n"
-        << "Physical Surface(\"tip\") = Surface In BoundingBox{L-e, -w, -h, L+e, w, h};\n"
-        << "Physical Surface(\"middle\") = Surface In BoundingBox{L/2-w/4-e, -w/4-e, -h, L/2+w/4+e, w/4+e, h};\n"
-        << "Mesh.MeshSizeMax = " << p.size << "; Mesh.MeshSizeFromCurvature = 16;\n"
-        << "Mesh.ElementOrder = 2; Mesh.HighOrderOptimize = 1;\n";
-    geo.close();
-    failed = std::system(("gmsh -v 1 -3 -format msh41 -o '" + *file + "' " + stem + ".geo").c_str()) != 0;
-    std::remove((stem + ".geo").c_str());
-  }
-  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, PETSC_COMM_WORLD));
-  PetscCheck(!failed, PETSC_COMM_WORLD, PETSC_ERR_LIB,
-             "the program gmsh failed or is not installed; give a body with -body");
-  PetscFunctionReturn(0);
-}
-
 /* ---- the reduced body, through its file ---- */
-
-static std::vector<Attachment> Attachments()
-{
-  std::vector<Attachment> a(3);
-  a[0].name = "hub";
-  a[1].name = "middle";
-  a[1].tie  = Tie::Average;
-  a[2].name = "tip";
-  return a;
-}
 
 static PetscErrorCode MakeBody(const Pendulum &p, const FeModel &model, PetscInt modes, ReducedBody *body)
 {
@@ -110,7 +63,7 @@ static PetscErrorCode MakeBody(const Pendulum &p, const FeModel &model, PetscInt
   PetscMPIInt rank;
   char        folder[PETSC_MAX_PATH_LEN];
   PetscFunctionBeginUser;
-  reduction.attachments = Attachments();
+  reduction.attachments = hhtex::ArmAttachments();
   reduction.modes       = modes;
   reduction.progress    = true;
   PetscCall(Reduce(model, reduction, &made));
@@ -127,46 +80,6 @@ static PetscErrorCode MakeBody(const Pendulum &p, const FeModel &model, PetscInt
 }
 
 /* ---- the scene ---- */
-
-/* The arm of one kind or another: bodies that are held at hub, middle and tip, horizontal at the start */
-struct Arm {
-  Body hub, middle, tip, modal;
-};
-
-static Matrix3 AboutY() /* axes of markers: z along the pin */
-{
-  Matrix3 R;
-  R << Vector3::UnitX(), -Vector3::UnitZ(), Vector3::UnitY();
-  return R;
-}
-
-/* Everything but the arm; the channels in the order of the enumeration above */
-static void Hang(const Pendulum &p, const ModalBody &shape, const Arm &arm, Scene &scene)
-{
-  const auto    at  = [&](const char *name) { return shape.attachments[shape.attachment(name)].position; };
-  const Vector3 hub = at("hub"), tip = at("tip"), w(0, -p.speed, 0);
-  RigidBody     block;
-  const double  half     = 0.02;
-  block.mass             = p.tip;
-  block.inertia          = Matrix3::Identity() * (p.tip * 2 * half * half / 3);
-  block.position         = tip;
-  block.velocity         = w.cross(tip - hub);
-  block.angular_velocity = w;
-  const Body load        = scene.add("block", block);
-  scene.gravity({0, 0, -9.81});
-  const Marker pin = scene.markerAt(arm.hub, hub, AboutY()), end = scene.markerAt(arm.tip, tip),
-               middle = scene.markerAt(arm.middle, at("middle"));
-  const Element hold  = scene.add("pin", Revolute{pin, scene.markerAt(scene.ground(), hub, AboutY())});
-  scene.add("weld", Fixed{end, scene.markerAt(load, tip)});
-  scene.shape(load, Shape::box(Vector3::Constant(half)));
-  scene.line({pin, middle, end});
-  for (int c : {0, 2}) scene.channel(c ? "tip.z" : "tip.x", Measure::displacement(end, c), "m");
-  for (int c : {0, 2}) scene.channel(c ? "middle.z" : "middle.x", Measure::displacement(middle, c), "m");
-  for (int c : {0, 2})
-    scene.channel(c ? "pin.z" : "pin.x", Measure::jointForce(hold, c, scene.marker(scene.ground())), "N");
-  scene.channel("kinetic", Measure::kineticEnergy(), "J");
-  scene.channel("potential", Measure::potentialEnergy(), "J");
-}
 
 static PetscErrorCode Swing(const Pendulum &p, Scene &scene, HotSpots *hot, History *h)
 {
@@ -196,18 +109,10 @@ static PetscErrorCode Swing(const Pendulum &p, Scene &scene, HotSpots *hot, Hist
 
 static PetscErrorCode SwingModal(const Pendulum &p, const ReducedBody &body, HotSpots *hot, History *h)
 {
-  Scene        scene(PETSC_COMM_WORLD);
-  FlexibleBody b;
-  Arm          arm;
+  Scene scene(PETSC_COMM_WORLD);
   PetscFunctionBeginUser;
-  b.model            = std::make_shared<ModalBody>(body.modal);
-  b.angular_velocity = Vector3(0, -p.speed, 0);
-  b.velocity = b.angular_velocity.cross(b.model->center - b.model->attachments[b.model->attachment("hub")].position);
-  arm.modal  = scene.add("arm", b);
-  arm.hub    = scene.attachment(arm.modal, "hub");
-  arm.middle = scene.attachment(arm.modal, "middle");
-  arm.tip    = scene.attachment(arm.modal, "tip");
-  Hang(p, body.modal, arm, scene);
+  const Arm arm = hhtex::AddModalArm(p, body.modal, scene);
+  hhtex::Hang(p, body.modal, arm, scene);
   for (PetscInt k = 0; k < body.modal.modes(); k++)
     scene.channel("eta" + std::to_string(k + 1), Measure::modal(arm.modal, (int)k));
   PetscCall(Swing(p, scene, hot, h));
@@ -227,7 +132,7 @@ static PetscErrorCode SwingRigid(const Pendulum &p, const ModalBody &body, Histo
   b.angular_velocity = Vector3(0, -p.speed, 0);
   b.velocity         = b.angular_velocity.cross(body.center - body.attachments[body.attachment("hub")].position);
   arm.hub = arm.middle = arm.tip = scene.add("arm", b);
-  Hang(p, body, arm, scene);
+  hhtex::Hang(p, body, arm, scene);
   PetscCall(Swing(p, scene, nullptr, h));
   PetscFunctionReturn(0);
 }
@@ -240,14 +145,14 @@ static PetscErrorCode SwingFull(const Pendulum &p, const FeModel &model, const M
   Arm        arm;
   PetscFunctionBeginUser;
   h->name            = "full";
-  b.attachments      = Attachments();
+  b.attachments      = hhtex::ArmAttachments();
   b.angular_velocity = Vector3(0, -p.speed, 0);
   b.velocity         = b.angular_velocity.cross(-shape.attachments[shape.attachment("hub")].position);
   PetscCall(fe.add(scene, "arm", model, b));
   arm.hub    = fe.attachment("hub");
   arm.middle = fe.attachment("middle");
   arm.tip    = fe.attachment("tip");
-  Hang(p, shape, arm, scene);
+  hhtex::Hang(p, shape, arm, scene);
   PetscCall(Swing(p, scene, nullptr, h));
   PetscFunctionReturn(0);
 }
@@ -444,7 +349,7 @@ static PetscErrorCode Run(void)
     std::string mesh;
     PetscMPIInt rank;
     PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-    PetscCall(MakeMesh(p, &mesh));
+    PetscCall(hhtex::MakeArmMesh(p, &mesh));
     PetscCall(model.readMesh(mesh, {{"", p.material}}));
     if (p.mesh.empty() && rank == 0) std::remove(mesh.c_str());
   } else {

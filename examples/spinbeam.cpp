@@ -16,37 +16,16 @@ static char help[] =
     "  -modes <10>: normal modes of a modal body;  -parts <4>: modal bodies in the chain\n"
     "  -plot <file.png>: deflection over time, by gnuplot\n";
 
-#include "beam_bodies.h"
 #include "problem.h"
 #include "scene_watch.h"
+#include "spinbeam_model.h"
+
+#include <hhtdae/flexible.h>
 
 #include <cstdlib>
 #include <slepcsys.h>
 
 using namespace hhtdae;
-
-/* EA = 2.8e7, EI = 1.4e4, mass 1.2 per length: a square section. G A_s is 1.17e7 where the source has 1e7, which moves
-   the tip by 1e-5 of its deflection; so there is no lateral contraction, which a clamped end would hinder. */
-static hhtex::SolidBeam Arm()
-{
-  hhtex::SolidBeam b;
-  b.length = 10;
-  b.depth = b.width  = std::sqrt(12 * 1.4e4 / 2.8e7);
-  b.material.young   = 2.8e7 / b.area();
-  b.material.density = 1.2 / b.area();
-  b.n[0]             = 20;
-  return b;
-}
-
-static const double spin = 6, ramp = 15;
-
-static TimeFunction::Value Turn(double t)
-{
-  const double w = 2 * PETSC_PI / ramp;
-  if (t > ramp) return {spin * (t - ramp / 2), spin, 0};
-  return {spin / ramp * (t * t / 2 + (std::cos(w * t) - 1) / (w * w)), spin / ramp * (t - std::sin(w * t) / w),
-          spin / ramp * (1 - std::cos(w * t))};
-}
 
 /* Deflection across of a linear beam with the centrifugal force's stiffening, 8 modes, 5 digits */
 struct Point {
@@ -59,7 +38,7 @@ static const Point reference[] = {{2, -.10238},    {4, -.34239}, {5, -.46878}, {
 /* Steady extension of a bar in rotation */
 static double ExactExtension(const hhtex::SolidBeam &b)
 {
-  const double aL = spin * b.length * std::sqrt(b.material.density / b.material.young);
+  const double aL = hhtex::spin_speed * b.length * std::sqrt(b.material.density / b.material.young);
   return b.length * (std::tan(aL) / aL - 1);
 }
 
@@ -84,7 +63,7 @@ struct Curve {
 };
 
 struct Settings {
-  hhtex::SolidBeam arm    = Arm();
+  hhtex::SolidBeam arm    = hhtex::SpinningArm();
   PetscInt         pieces = 40, modes = 10, parts = 4;
   PetscReal        end = 20;
 };
@@ -120,13 +99,7 @@ static PetscErrorCode Run(const std::string &kind, const Settings &s, const FeMo
   PetscFunctionBeginUser;
   curve->name = kind;
   PetscCall(AddBody(kind, s, model, scene, &fe, &ends));
-  const Body   hub  = scene.add("hub", RigidBody{});
-  const Marker axis = scene.marker(hub), ground = scene.marker(scene.ground());
-  scene.add("bearing", Revolute{axis, ground});
-  scene.add("drive", RotationalMotion{axis, ground, TimeFunction::values(Turn)});
-  scene.add("clamp", Fixed{scene.marker(ends.root), axis});
-  const Marker tip = scene.marker(ends.tip);
-  for (int k = 0; k < 2; k++) scene.channel(std::string(1, "xy"[k]), Measure::displacement(tip, k, axis, axis), "m");
+  hhtex::SpinUp(scene, ends);
 
   PetscCall(scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, s.end));
@@ -186,7 +159,7 @@ static PetscErrorCode Extension(const Settings &s, const std::vector<Curve> &cur
     double sum = 0;
     int    n   = 0;
     for (const Sample &p : c.samples)
-      if (p.t > PetscMax(ramp + 1, s.end - 3)) sum += p.along, n++;
+      if (p.t > PetscMax(hhtex::spin_ramp + 1, s.end - 3)) sum += p.along, n++;
     if (n > 0)
       PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s: steady extension %.4e m, exact bar %.4e: %+.3f %%\n", c.name.c_str(),
                             sum / n, exact, 100 * (sum / n / exact - 1)));

@@ -14,6 +14,7 @@ static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPH
                      "  -out <dir>: where CSV, pictures and page go [the directory above the program's]\n"
                      "Further options, such as -ts_hhtdae_predictor_degree, go to every TS.\n";
 
+#include <hhtdae/flexible.h>
 #include <hhtdae/scene.h>
 
 #include "workprecision_page.h"
@@ -24,6 +25,7 @@ static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPH
 
 #include <cstdlib>
 #include <set>
+#include <slepcsys.h>
 #include <unistd.h>
 
 using namespace wp;
@@ -275,7 +277,7 @@ int main(int argc, char **argv)
   runSingleThreaded(argv);
   page.command = CommandLine(argc, argv);
   PetscFunctionBeginUser;
-  PetscCall(PetscInitialize(&argc, &argv, nullptr, help));
+  PetscCall(SlepcInitialize(&argc, &argv, nullptr, help));
   PetscCall(TSHHT3Initialize());
   PetscCall(ReadGrid(grid));
   PetscCall(OutputDirectory(argv[0], page.out));
@@ -289,6 +291,6 @@ int main(int argc, char **argv)
   page.limit   = grid.limits.seconds;
   page.seconds = cpuSeconds();
   PetscCall(Report(r, sweep, page));
-  PetscCall(PetscFinalize());
+  PetscCall(SlepcFinalize());
   return 0;
 }

@@ -6,11 +6,13 @@
 #include "chain_model.h"
 #include "doublependulum_model.h"
 #include "flexcrank_model.h"
+#include "flexpendulum_model.h"
 #include "flyball_model.h"
 #include "heavytop_model.h"
 #include "quartercar_model.h"
 #include "rollingball_model.h"
 #include "slidercrank3d_model.h"
+#include "spinbeam_model.h"
 #include "workprecision_scene.h"
 
 namespace wp
@@ -44,6 +46,56 @@ inline SceneProblem::Build QuarterCarOver(double rise)
     p.road     = hhtdae::TimeFunction::step(0.2, 0, 0.2 + rise, 0.05);
     auto model = std::make_shared<hhtex::QuarterCar>(p, true, comm);
     return std::shared_ptr<Scene>(model, &model->scene);
+  };
+}
+
+/* The plate with a hole, meshed and reduced once */
+inline const hhtdae::ModalBody &ReducedArm()
+{
+  static hhtdae::ReducedBody body;
+  static const bool          made = [] {
+    const hhtex::HangingArm arm;
+    hhtdae::FeModel         model(PETSC_COMM_SELF);
+    hhtdae::Reduction       reduction;
+    std::string             mesh;
+    PetscCallAbort(PETSC_COMM_SELF, hhtex::MakeArmMesh(arm, &mesh));
+    PetscCallAbort(PETSC_COMM_SELF, model.readMesh(mesh, {{"", arm.material}}));
+    std::remove(mesh.c_str());
+    reduction.attachments = hhtex::ArmAttachments();
+    reduction.modes       = 4;
+    PetscCallAbort(PETSC_COMM_SELF, hhtdae::Reduce(model, reduction, &body));
+    return true;
+  }();
+  (void)made;
+  return body.modal;
+}
+
+inline SceneProblem::Build FlexPendulum()
+{
+  return [](MPI_Comm comm) {
+    auto                    scene = std::make_shared<Scene>(comm);
+    const hhtex::HangingArm arm;
+    hhtex::Hang(arm, ReducedArm(), hhtex::AddModalArm(arm, ReducedArm(), *scene), *scene);
+    return scene;
+  };
+}
+
+/* As modal bodies one after the other, or as two-node beams */
+inline SceneProblem::Build SpinBeam(int parts, int beams)
+{
+  return [=](MPI_Comm comm) {
+    auto             scene = std::make_shared<Scene>(comm);
+    hhtex::SolidBeam arm   = hhtex::SpinningArm();
+    hhtex::BeamEnds  ends;
+    if (parts > 0) {
+      hhtdae::FeModel model(PETSC_COMM_SELF);
+      arm.length /= parts;
+      arm.n[0] /= parts;
+      PetscCallAbort(PETSC_COMM_SELF, hhtex::ReadSolidBeam(arm, &model));
+      PetscCallAbort(PETSC_COMM_SELF, hhtex::AddModalBeam(*scene, model, arm.length, parts, 4, &ends));
+    } else hhtex::AddBeamElements(*scene, arm, beams, &ends);
+    hhtex::SpinUp(*scene, ends);
+    return scene;
   };
 }
 
@@ -99,6 +151,9 @@ inline std::vector<Case> allScenes()
       makeScene("scene:rollingball", 1., Modelled<RollingBall>(20. * degree)),
       makeScene("scene:rollingdisc", 1., Modelled<LeaningDisc>(20. * degree, 2.)),
       makeScene("scene:flexcrank", 0.02, Modelled<FlexCrank>(hhtdae::ModalMass::Full)),
+      makeScene("scene:flexpendulum", 0.5, FlexPendulum()),
+      makeScene("scene:spinbeam", 3., SpinBeam(2, 0)),
+      makeScene("scene:spinbeams", 3., SpinBeam(0, 8)),
   };
 }
 
