@@ -21,35 +21,55 @@ typedef PetscBLASInt Int;
 
 /* ---- contributions ---- */
 
+/* Rows of `lower` or of K and `upper` that others reach: before `last`, not before `first` */
+struct Reached {
+  Int first, last;
+  Int count() const { return last - first; }
+  void add(PetscInt begin, PetscInt end)
+  {
+    first = PetscMin(first, (Int)begin);
+    last  = PetscMax(last, (Int)end);
+  }
+};
+
 /* The panel at work, and how many columns of others stand side by side in left and right */
 struct Work {
   const KluPanel *q;
   Int             width, left, right, columns; /* left: rows of `lower`; right: those of `upper` under K's own */
+  Reached         rows, cols;                  /* what stands side by side, of these */
 };
 
 static PetscErrorCode Multiply(Work *w, KluPanels *p)
 {
   const PetscScalar minus = -1, one = 1;
-  const Int         below = w->right - w->width;
+  const Int         rows = w->rows.count(), cols = w->cols.count(), below = w->right - w->width;
+  const Int         inner_rows = PetscMin(w->rows.last, w->width) - w->rows.first;
+  const Int         inner_cols = PetscMin(w->cols.last, w->width) - w->cols.first;
+  const Int         skip = PetscMax(inner_cols, 0), outer_cols = cols - skip;
+  const double     *left = p->left.data(), *right = p->right.data();
 
   PetscFunctionBegin;
   if (!w->columns) PetscFunctionReturn(0);
-  PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &w->left, &w->width, &w->columns, &minus, p->left.data(), &w->left,
-                                      p->right.data(), &w->right, &one, p->value.data() + w->q->lower, &w->left));
-  if (below)
-    PetscCallBLAS("BLASgemm",
-                  BLASgemm_("N", "T", &below, &w->width, &w->columns, &minus, p->right.data() + w->width, &w->right,
-                            p->left.data(), &w->left, &one, p->value.data() + w->q->upper, &below));
+  if (inner_cols > 0) {
+    double *to = p->value.data() + w->q->lower + w->rows.first + (size_t)w->cols.first * (size_t)w->left;
+    PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &rows, &inner_cols, &w->columns, &minus, left, &rows, right, &cols,
+                                        &one, to, &w->left));
+  }
+  if (inner_rows > 0 && outer_cols > 0) {
+    double *to = p->value.data() + w->q->upper + (w->cols.first + skip - w->width) + (size_t)w->rows.first * (size_t)below;
+    PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &outer_cols, &inner_rows, &w->columns, &minus, right + skip, &cols,
+                                        left, &rows, &one, to, &below));
+  }
   w->columns = 0;
   PetscFunctionReturn(0);
 }
 
-/* `count` rows of a matrix to the rows of another one with the given numbers, the rest of it zero */
+/* `count` rows of a matrix to the rows of another one with the given numbers, less the first it has; the rest of it is zero */
 static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt columns, const PetscInt places[],
-                   const PetscInt row_of[], PetscInt rows, double to[])
+                   const PetscInt row_of[], const Reached &reached, double to[])
 {
-  const PetscInt first = count ? row_of[places[0]] : 0;
-  if (count && row_of[places[count - 1]] == first + count - 1) { /* without gaps */
+  const PetscInt rows = reached.count(), first = count ? row_of[places[0]] - reached.first : 0;
+  if (count && row_of[places[count - 1]] - reached.first == first + count - 1) { /* without gaps */
     for (PetscInt c = 0; c < columns; ++c, to += rows, from += ld) {
       std::fill(to, to + first, 0.0);
       std::copy(from, from + count, to + first);
@@ -59,7 +79,7 @@ static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt co
   }
   std::fill(to, to + (size_t)columns * rows, 0.0);
   for (PetscInt c = 0; c < columns; ++c, to += rows, from += ld)
-    for (PetscInt i = 0; i < count; ++i) to[row_of[places[i]]] = from[i];
+    for (PetscInt i = 0; i < count; ++i) to[row_of[places[i]] - reached.first] = from[i];
 }
 
 /* Where the panel before lies in the values, and its parts that count: rows after those of K only together with columns
@@ -152,11 +172,26 @@ static bool BetterScattered(const Source &v, const Work &w)
          columns * (all * OPERATION * 2 * (double)w.width + copied * COPY);
 }
 
+/* What the sources that are not scattered reach of this panel; places ascend, and so do their numbers in it */
+static void FindReached(Work *w, const KluPanels &p)
+{
+  w->rows = {w->left, 0};
+  w->cols = {w->right, 0};
+  for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
+    const Source v = Look(p, p.source[k]);
+    if (!v.rows || !v.cols || BetterScattered(v, *w)) continue;
+    w->rows.add(p.row_of[v.row[0]], p.row_of[v.row[v.rows - 1]] + 1);
+    w->cols.add(p.col_of[v.col[0]], p.col_of[v.col[v.cols - 1]] + 1);
+  }
+}
+
 static PetscErrorCode Collect(Work *w, KluPanels *p)
 {
   PetscFunctionBegin;
+  FindReached(w, *p);
   for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
     const Source v = Look(*p, p->source[k]);
+    if (!v.rows || !v.cols) continue;
     if (BetterScattered(v, *w)) {
       PetscCall(Scatter(v, *w, p));
       continue;
@@ -164,10 +199,10 @@ static PetscErrorCode Collect(Work *w, KluPanels *p)
     for (PetscInt done = 0, count; done < v.width; done += count) {
       if (w->columns == SIDE_BY_SIDE) PetscCall(Multiply(w, p));
       count = PetscMin(v.width - done, SIDE_BY_SIDE - (PetscInt)w->columns);
-      Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->left,
-             p->left.data() + (size_t)w->columns * w->left);
-      Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->right,
-             p->right.data() + (size_t)w->columns * w->right);
+      Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->rows,
+             p->left.data() + (size_t)w->columns * w->rows.count());
+      Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->cols,
+             p->right.data() + (size_t)w->columns * w->cols.count());
       w->columns += (Int)count;
     }
   }
@@ -284,19 +319,6 @@ static bool MeasurePanel(const KluPanel &q, KluPanels *p)
   return true;
 }
 
-/* Rows of the PETSc matrix are columns for KLU */
-static void MeasureMatrix(const LinearRows &rows, KluPanels *p)
-{
-  for (PetscInt k = 0; k < p->n; ++k) {
-    double largest[2] = {0, 0};
-    for (PetscInt j = p->col[k], e = rows.start[j]; e < rows.start[j + 1]; ++e) {
-      const bool inside = (size_t)p->target[e] < p->outer_values;
-      largest[e & 1]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 1]);
-    }
-    p->matrix_size[k] = Larger(largest[0], largest[1]);
-  }
-}
-
 static double ReciprocalGrowth(const KluPanels &p)
 {
   double smallest = 1;
@@ -307,15 +329,28 @@ static double ReciprocalGrowth(const KluPanels &p)
 
 /* ---- all together ---- */
 
-static void Assemble(const LinearRows &rows, KluPanels *p)
+/* The entries go to their places, and the largest of each column is noted, of those inside of diagonal blocks. Rows of the
+   PETSc matrix are columns for KLU. */
+template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels *p)
 {
+  double         *value  = p->value.data();
+  const PetscInt *target = p->target.data();
   std::fill(p->value.begin(), p->value.end(), 0.0);
-  for (PetscInt e = 0; e < rows.start[rows.n]; ++e) p->value[p->target[e]] = rows.val[e];
+  for (PetscInt k = 0; k < p->n; ++k) {
+    double         largest[4] = {0, 0, 0, 0}; /* one would wait for itself */
+    const PetscInt j = p->col[k], end = rows.start[j + 1];
+    for (PetscInt e = rows.start[j]; e < end; ++e) {
+      const bool inside = !has_outer || (size_t)target[e] < p->outer_values;
+      value[target[e]]  = rows.val[e];
+      largest[e & 3]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 3]);
+    }
+    p->matrix_size[k] = Larger(Larger(largest[0], largest[1]), Larger(largest[2], largest[3]));
+  }
 }
 
 static Work Begin(const KluPanel &q, KluPanels *p)
 {
-  const Work w = {&q, (Int)q.width, (Int)(q.width + q.rows.count), (Int)(q.width + q.cols.count), 0};
+  const Work w = {&q, (Int)q.width, (Int)(q.width + q.rows.count), (Int)(q.width + q.cols.count), 0, {0, 0}, {0, 0}};
   KluPanelsSetPlaces(q, p);
   const size_t left = (size_t)w.left * SIDE_BY_SIDE, right = (size_t)w.right * SIDE_BY_SIDE;
   if (p->left.size() < left) p->left.resize(left);
@@ -327,7 +362,10 @@ PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *gro
 {
   PetscFunctionBegin;
   *growth = 0;
-  Assemble(rows, p);
+  if (p->outer.empty())
+    Assemble<false>(rows, p);
+  else
+    Assemble<true>(rows, p);
   std::fill(p->factor_size.begin(), p->factor_size.end(), 0.0);
   for (const KluPanel &q : p->panel) {
     bool good = false;
@@ -336,7 +374,6 @@ PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *gro
     PetscCall(FactorPanel(w, p, &good));
     if (!good || !MeasurePanel(q, p)) PetscFunctionReturn(0);
   }
-  MeasureMatrix(rows, p);
   *growth = ReciprocalGrowth(*p);
   PetscFunctionReturn(0);
 }

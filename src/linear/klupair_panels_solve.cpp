@@ -58,7 +58,7 @@ struct Panel {
   PetscInt        width, ld, rows, cols;
   const double   *lower, *upper;
   const PetscInt *row, *col, *exchange;
-  double         *x, *y; /* its own part of the vector; scratch for its own part and what it reaches */
+  double         *x, *y; /* its own part of the vector; scratch for what it reaches */
 };
 
 static Panel Look(const KluPanel &q, KluPanels *p)
@@ -76,6 +76,9 @@ static Panel Look(const KluPanel &q, KluPanels *p)
           p->y.data()};
 }
 
+/* Places without gaps: vectors are used where they are */
+static bool Together(const PetscInt place[], PetscInt count) { return count && place[count - 1] - place[0] == count - 1; }
+
 static void Gather(const double x[], const PetscInt place[], PetscInt count, double y[])
 {
   for (PetscInt i = 0; i < count; ++i) y[i] = x[place[i]];
@@ -92,16 +95,20 @@ static PetscErrorCode LowerForward(const Panel &q, double x[])
   PetscFunctionBegin;
   for (PetscInt k = 0; k < q.width; ++k)
     if (q.exchange[k] != k) std::swap(q.x[k], q.x[q.exchange[k]]);
-  std::copy(q.x, q.x + q.width, q.y);
-  std::fill(q.y + q.width, q.y + q.ld, 0.0);
   for (PetscInt first = 0, last; first < q.width; first = last) {
     last = PetscMin(first + CHUNK, q.width);
     for (PetscInt j = first; j < last; ++j)
-      for (PetscInt i = j + 1; i < last; ++i) q.y[i] -= q.lower[i + j * q.ld] * q.y[j];
-    PetscCall(Subtract(q.ld - last, last - first, q.lower + last + first * q.ld, q.ld, q.y + first, q.y + last));
+      for (PetscInt i = j + 1; i < last; ++i) q.x[i] -= q.lower[i + j * q.ld] * q.x[j];
+    PetscCall(Subtract(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + first, q.x + last));
   }
-  std::copy(q.y, q.y + q.width, q.x);
-  Scatter(q.y + q.width, q.row, q.rows, x);
+  const double *below = q.lower + q.width;
+  if (Together(q.row, q.rows)) {
+    PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, x + q.row[0]));
+    PetscFunctionReturn(0);
+  }
+  std::fill(q.y, q.y + q.rows, 0.0);
+  PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, q.y));
+  Scatter(q.y, q.row, q.rows, x);
   PetscFunctionReturn(0);
 }
 
@@ -109,18 +116,18 @@ static PetscErrorCode LowerForward(const Panel &q, double x[])
 static PetscErrorCode LowerBackward(const Panel &q, const double x[])
 {
   PetscFunctionBegin;
-  std::copy(q.x, q.x + q.width, q.y);
-  Gather(x, q.row, q.rows, q.y + q.width);
+  const double *known = Together(q.row, q.rows) ? x + q.row[0] : q.y;
+  if (known == q.y) Gather(x, q.row, q.rows, q.y);
+  PetscCall(SubtractTransposed(q.rows, q.width, q.lower + q.width, q.ld, known, q.x));
   for (PetscInt last = q.width, first; last > 0; last = first) {
     first = (last - 1) / CHUNK * CHUNK;
-    PetscCall(
-        SubtractTransposed(q.ld - last, last - first, q.lower + last + first * q.ld, q.ld, q.y + last, q.y + first));
+    PetscCall(SubtractTransposed(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + last,
+                                 q.x + first));
     for (PetscInt j = last; j-- > first;)
-      for (PetscInt i = j + 1; i < last; ++i) q.y[j] -= q.lower[i + j * q.ld] * q.y[i];
+      for (PetscInt i = j + 1; i < last; ++i) q.x[j] -= q.lower[i + j * q.ld] * q.x[i];
   }
   for (PetscInt k = q.width; k-- > 0;)
-    if (q.exchange[k] != k) std::swap(q.y[k], q.y[q.exchange[k]]);
-  std::copy(q.y, q.y + q.width, q.x);
+    if (q.exchange[k] != k) std::swap(q.x[k], q.x[q.exchange[k]]);
   PetscFunctionReturn(0);
 }
 
@@ -136,6 +143,10 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
       q.x[j] /= q.lower[j + j * q.ld];
     }
   }
+  if (Together(q.col, q.cols)) {
+    PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, x + q.col[0]));
+    PetscFunctionReturn(0);
+  }
   std::fill(q.y, q.y + q.cols, 0.0);
   PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, q.y));
   Scatter(q.y, q.col, q.cols, x);
@@ -146,8 +157,9 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
 static PetscErrorCode UpperBackward(const Panel &q, const double x[])
 {
   PetscFunctionBegin;
-  Gather(x, q.col, q.cols, q.y);
-  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, q.y, q.x));
+  const double *known = Together(q.col, q.cols) ? x + q.col[0] : q.y;
+  if (known == q.y) Gather(x, q.col, q.cols, q.y);
+  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, known, q.x));
   for (PetscInt last = q.width, first; last > 0; last = first) {
     first = (last - 1) / CHUNK * CHUNK;
     for (PetscInt j = last; j-- > first;) {
