@@ -4,7 +4,7 @@
 
     attributes of /
       format         text "hhtdae reduced body"
-      version        int64, 1; a reader refuses a newer one
+      version        int64, 2; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|
       program        text: what wrote the file
       source, method, units, name   text: provenance; name is the body's
       fe_nodes       int64: nodes of the finite-element model
@@ -20,7 +20,8 @@
       quadratic      float64 {6, n, n}      xx yy zz xy yz zx; absent if not known
     /modes           absent if not known
       frequency      float64 {n}            cycles per unit of time
-      residual       float64 {n}
+      residual       float64 {n}            in the norm of the stiffness, ReducedMode of hhtdae/flexible.h; negative:
+                                            not known (version 1: another norm, read as not known)
     /attachments
       name           uint8 {characters}     each name ends with a zero
       position       float64 {a, 3}
@@ -68,7 +69,7 @@ namespace bodyfile
 {
 
 constexpr const char *format_name    = "hhtdae reduced body";
-constexpr int64_t     format_version = 1;
+constexpr int64_t     format_version = 2;
 constexpr const char *program_name   = "hhtdae 0.1.0";
 constexpr hsize_t     block_entries  = 1 << 22; /* of one part that is sent to be written */
 

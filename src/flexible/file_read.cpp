@@ -262,7 +262,8 @@ void GetModes(Reader *in, hsize_t n, ReducedBody *b)
   const auto frequency = in->get<double>("/modes/frequency", {n}), residual = in->get<double>("/modes/residual", {n});
   if (!in->error.empty()) return;
   if (!Finite(frequency) || !Finite(residual)) return in->fail("a mode's frequency or residual is not finite");
-  for (hsize_t k = 0; k < n; k++) b->mode.push_back({frequency[k], residual[k]});
+  const bool known = in->head.version >= 2; /* before, residuals were those of forces, which say another thing */
+  for (hsize_t k = 0; k < n; k++) b->mode.push_back({frequency[k], known ? residual[k] : -1.});
 }
 
 void GetNodes(Reader *in, PetscMPIInt rank, PetscMPIInt size, hsize_t n, hsize_t *N, ReducedBody *b)

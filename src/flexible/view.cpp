@@ -72,14 +72,20 @@ PetscErrorCode ViewModes(PetscViewer viewer, const ReducedBody &body)
 {
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  modes: %" PetscInt_FMT "\n", body.modal.modes()));
-  if (body.modal.modes()) PetscCall(PetscViewerASCIIPrintf(viewer, "    mode        frequency    residual\n"));
+  if (body.modal.modes()) {
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "    residual eta in the norm of the full model's stiffness: omega^2 is within eta of one of its "
+                "eigenvalues, relative to\n    it; for an isolated mode the frequency is about eta^2/2 too high\n"));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "    mode        frequency    residual    too high\n"));
+  }
   for (PetscInt k = 0; k < body.modal.modes(); k++) {
     const double turns = body.modal.omega[k] / (2 * PETSC_PI);
-    if (body.mode.empty())
-      PetscCall(PetscViewerASCIIPrintf(viewer, "    %4" PetscInt_FMT " %16.9g           -\n", k, turns));
+    const double eta   = body.mode.empty() ? -1. : body.mode[(std::size_t)k].residual;
+    if (eta < 0)
+      PetscCall(PetscViewerASCIIPrintf(viewer, "    %4" PetscInt_FMT " %16.9g           -           -\n", k, turns));
     else
-      PetscCall(PetscViewerASCIIPrintf(viewer, "    %4" PetscInt_FMT " %16.9g %11.2e\n", k,
-                                       body.mode[(std::size_t)k].frequency, body.mode[(std::size_t)k].residual));
+      PetscCall(PetscViewerASCIIPrintf(viewer, "    %4" PetscInt_FMT " %16.9g %11.2e %11.2e\n", k,
+                                       body.mode[(std::size_t)k].frequency, eta, eta * eta / 2));
   }
   PetscFunctionReturn(0);
 }
