@@ -27,7 +27,7 @@ using hhtdae::Material;
 using hhtdae::Vector3;
 using Materials = std::map<std::string, Material>;
 
-struct Box {
+struct MeshBox {
   ElementType                             type = ElementType::Brick8;
   int                                     nx = 2, ny = 2, nz = 2;
   double                                  lx = 1, ly = 1, lz = 1;
@@ -62,7 +62,7 @@ template <class Shape> void addCell(const std::vector<Lattice> &corners, bool ot
   cells.push_back(cell);
 }
 
-template <class Shape> std::vector<BoxCell> cellsOf(const Box &box)
+template <class Shape> std::vector<BoxCell> cellsOf(const MeshBox &box)
 {
   std::vector<BoxCell> cells;
   for (int k = 0; k < box.nz; k++)
@@ -117,7 +117,7 @@ template <class Shape> std::vector<std::vector<Lattice>> facesAt(const std::vect
 class MeshWriter
 {
 public:
-  explicit MeshWriter(const Box &box) : box_(box)
+  explicit MeshWriter(const MeshBox &box) : box_(box)
   {
     hhtdae::fe::WithShape(box.type, [&](auto shape) {
       using Shape = decltype(shape);
@@ -136,7 +136,7 @@ public:
   std::string text(bool four) const { return header(four) + nodes(four) + elements(four); }
 
 private:
-  Box                               box_;
+  MeshBox                               box_;
   std::vector<BoxCell>              cells_;
   std::vector<std::vector<Lattice>> left_, right_;
   std::map<long, Lattice>           used_;
@@ -255,7 +255,7 @@ inline PetscErrorCode readText(FeModel &model, const std::string &text,
   return model.readMesh(file.name, materials);
 }
 
-inline PetscErrorCode readBox(FeModel &model, const Box &box, const Materials &materials = {{"", softSteel()}},
+inline PetscErrorCode readBox(FeModel &model, const MeshBox &box, const Materials &materials = {{"", softSteel()}},
                               bool four = true)
 {
   return readText(model, MeshWriter(box).text(four), materials);

@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(Types, FeMeshParallel, testing::ValuesIn(types));
 
 TEST_P(FeMeshParallel, SameAsOnOneRank)
 {
-  Box box{GetParam(), 6, 3, 3, 2, 1, 1, true, bent};
+  MeshBox box{GetParam(), 6, 3, 3, 2, 1, 1, true, bent};
   for (bool four : {true, false}) {
     FeModel all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
     must(readBox(all, box, two, four));
@@ -149,7 +149,7 @@ TEST_P(FeMeshParallel, SameAsOnOneRank)
 /* A user's choice of partitioner holds */
 TEST(FeMeshParallelOptions, OtherPartitioner)
 {
-  Box     box{ElementType::Tetrahedron10, 6, 3, 3, 2, 1, 1, true, bent};
+  MeshBox     box{ElementType::Tetrahedron10, 6, 3, 3, 2, 1, 1, true, bent};
   FeModel all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
   {
     Options options("-petscpartitioner_type simple");
@@ -206,7 +206,7 @@ TEST(FeMeshParallelOptions, MetisCutsFewFaces)
 TEST(FeMeshParallelOptions, OneElement)
 {
   for (ElementType type : types) {
-    Box box{type, 1, 1, 1};
+    MeshBox box{type, 1, 1, 1};
     if (!box.bricks()) box.nx = 1;
     FeModel all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
     must(readBox(all, box));
@@ -217,7 +217,7 @@ TEST(FeMeshParallelOptions, OneElement)
 
 TEST(FeMeshParallelErrors, ComeToAllRanks)
 {
-  const std::string text = MeshWriter(Box{ElementType::Tetrahedron4, 3, 3, 3}).text(true);
+  const std::string text = MeshWriter(MeshBox{ElementType::Tetrahedron4, 3, 3, 3}).text(true);
   const auto refused     = [&](std::string t, const std::string &from, const std::string &to, const std::string &says) {
     const size_t at = t.rfind(from);
     ASSERT_NE(at, std::string::npos);

@@ -83,7 +83,7 @@ bool gmshIsThere() { return std::system("gmsh --version > /dev/null 2>&1") == 0;
 
 TEST_P(FeMesh, MassMomentsAndRigidMotions)
 {
-  Box box{GetParam(), 3, 2, 2, 1.5, .8, .6, false, [](const Vector3 &x) { return Vector3(x + Vector3(.1, .2, .3)); }};
+  MeshBox box{GetParam(), 3, 2, 2, 1.5, .8, .6, false, [](const Vector3 &x) { return Vector3(x + Vector3(.1, .2, .3)); }};
   FeModel model(PETSC_COMM_SELF);
   must(readBox(model, box));
   const double mass = softSteel().density * 1.5 * .8 * .6;
@@ -107,7 +107,7 @@ TEST_P(FeMesh, MassMomentsAndRigidMotions)
 
 TEST_P(FeMesh, MatricesAreAsAgreed)
 {
-  Box     box{GetParam(), 3, 2, 2};
+  MeshBox     box{GetParam(), 3, 2, 2};
   FeModel model(PETSC_COMM_SELF);
   must(readBox(model, box));
   const PetscInt brick20 = 36 + 3 * 9 + 2 * 4 * 3 + 2 * 4 * 3; /* corners and edges along x, y, z */
@@ -148,7 +148,7 @@ TEST_P(FeMesh, MatricesAreAsAgreed)
 
 TEST_P(FeMesh, SetsAndLabels)
 {
-  const Box  box{GetParam(), 3, 2, 2, 1.5};
+  const MeshBox  box{GetParam(), 3, 2, 2, 1.5};
   MeshWriter writer(box);
   for (bool four : {true, false}) {
     FeModel model(PETSC_COMM_SELF);
@@ -174,7 +174,7 @@ TEST_P(FeMesh, SetsAndLabels)
 /* Nodes on the surface follow a linear field; those inside, in a mesh of no regularity, find it */
 TEST_P(FeMesh, PatchTest)
 {
-  const Box box{GetParam(), 3, 3, 3, 1, 1, 1, false, bent};
+  const MeshBox box{GetParam(), 3, 3, 3, 1, 1, 1, false, bent};
   FeModel   model(PETSC_COMM_SELF);
   must(readBox(model, box));
   const auto linear = [](const Vector3 &x) {
@@ -208,7 +208,7 @@ TEST_P(FeMesh, PatchTest)
 
 TEST_P(FeMesh, BothVersionsOfTheFormat)
 {
-  const Box       box{GetParam(), 3, 2, 2, 1, 1, 1, true, bent};
+  const MeshBox       box{GetParam(), 3, 2, 2, 1, 1, 1, true, bent};
   FeModel         a(PETSC_COMM_SELF), b(PETSC_COMM_SELF);
   const Materials materials = {{"solid", softSteel()}, {"other", {5, .2, 3}}};
   must(readBox(a, box, materials, true));
@@ -275,7 +275,7 @@ TEST(FeMeshFiles, MixedElements)
 
 TEST_P(FeMesh, ConstantStressIsRecovered)
 {
-  const Box box{GetParam(), 3, 3, 2, 1, 1, 1, false, bent};
+  const MeshBox box{GetParam(), 3, 3, 2, 1, 1, 1, false, bent};
   FeModel   model(PETSC_COMM_SELF);
   must(readBox(model, box));
   Matrix3d D, E;
@@ -296,7 +296,7 @@ TEST_P(FeMesh, ConstantStressIsRecovered)
 /* Pure bending: elements of degree two have the exact stress at every node */
 TEST_P(FeMesh, BendingStressIsRecovered)
 {
-  const Box    box{GetParam(), 4, 4, 4};
+  const MeshBox    box{GetParam(), 4, 4, 4};
   FeModel      model(PETSC_COMM_SELF);
   const double nu = softSteel().poisson;
   must(readBox(model, box));
@@ -325,7 +325,7 @@ TEST(FeMeshStress, StifferSideOfABoundary)
 {
   for (bool stiff_first : {true, false}) {
     const Material soft{2, .3, 1}, stiff{50, .1, 1};
-    Box            box{ElementType::Tetrahedron10, 4, 2, 2};
+    MeshBox            box{ElementType::Tetrahedron10, 4, 2, 2};
     box.two = true;
     FeModel model(PETSC_COMM_SELF);
     must(readBox(model, box, {{"solid", stiff_first ? stiff : soft}, {"other", stiff_first ? soft : stiff}}));
@@ -346,7 +346,7 @@ TEST(FeMeshStress, StifferSideOfABoundary)
 TEST(FeMeshStress, Errors)
 {
   FeModel model(PETSC_COMM_SELF);
-  must(readBox(model, Box()));
+  must(readBox(model, MeshBox()));
   ReducedBody body = bodyOf(model, [](Vector3 x) { return x; });
   {
     ErrorTrap   trap;
@@ -387,7 +387,7 @@ TEST(FeMeshErrors, Files)
 TEST(FeMeshErrors, CutOff)
 {
   for (bool four : {true, false}) {
-    const std::string text = MeshWriter(Box()).text(four);
+    const std::string text = MeshWriter(MeshBox()).text(four);
     for (size_t length = 0; length + 13 < text.size(); length += 97) {
       FeModel   model(PETSC_COMM_SELF);
       ErrorTrap trap;
@@ -399,7 +399,7 @@ TEST(FeMeshErrors, CutOff)
 
 TEST(FeMeshErrors, Elements)
 {
-  const std::string text = MeshWriter(Box{ElementType::Tetrahedron4, 1, 1, 1}).text(true);
+  const std::string text = MeshWriter(MeshBox{ElementType::Tetrahedron4, 1, 1, 1}).text(true);
   /* six tetrahedra, of which the first has the nodes 1 3 9 27 and the number 6 */
   EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 3 1 9 27")),
               "element 6 (tetrahedron with 4 nodes) is turned inside out");
@@ -423,7 +423,7 @@ TEST(FeMeshErrors, Elements)
 
 TEST(FeMeshErrors, Materials)
 {
-  const std::string text = MeshWriter(Box{ElementType::Brick8, 2, 1, 1, 1, 1, 1, true}).text(true);
+  const std::string text = MeshWriter(MeshBox{ElementType::Brick8, 2, 1, 1, 1, 1, 1, true}).text(true);
   const Material    m    = softSteel();
   EXPECT_SAYS(refusal(text, {}), "no material");
   EXPECT_SAYS(refusal(text, {{"stone", m}, {"", m}}), "no such physical volume; there are: \"solid\", \"other\"");

@@ -73,7 +73,7 @@ struct SlepcHere { /* SLEPc starts after PETSc, which runs already */
 /* Errors of frequencies on meshes of growing fineness, and the rate of the last two */
 struct Study {
   const char                               *name;
-  std::function<Box(ElementType, int)>      box;
+  std::function<MeshBox(ElementType, int)>      box;
   Material                                  material;
   std::function<bool(const Vector3 &, int)> held;
   double                                    omega;
@@ -105,7 +105,7 @@ Study bar()
   const Material m{2, 0, 3};
   return {
       "bar",
-      [](ElementType t, int n) { return Box{t, 2 * n, n, n, 2, .5, .5, false, [](const Vector3 &x) { return x; }}; }, m,
+      [](ElementType t, int n) { return MeshBox{t, 2 * n, n, n, 2, .5, .5, false, [](const Vector3 &x) { return x; }}; }, m,
       [](const Vector3 &x, int d) { return d > 0 && std::abs(x[d]) < 1e-9; }, /* stands on two planes */
       PETSC_PI / 2 * std::sqrt(m.young / m.density)};
 }
@@ -117,7 +117,7 @@ Study tube()
                                            const double a = PETSC_PI / 2 * (1 - x[1]), r = 1 + x[2];
                                            return Vector3(x[0], r * std::cos(a), r * std::sin(a));
   };
-  return {"tube", [=](ElementType t, int n) { return Box{t, 2 * n, 2 * n, n, 4, 1, 1, false, bend}; }, m,
+  return {"tube", [=](ElementType t, int n) { return MeshBox{t, 2 * n, 2 * n, n, 4, 1, 1, false, bend}; }, m,
           [](const Vector3 &x, int d) { return d == 0 && (std::abs(x[1]) < 1e-9 || std::abs(x[2]) < 1e-9); },
           PETSC_PI / 4 * std::sqrt(m.young / (2.6 * m.density))};
 }
@@ -148,7 +148,7 @@ Study plate()
   const double   a = 2, b = 1.5, h = .1;
   return {"plate",
           [=](ElementType t, int n) {
-            return Box{t, 4 * n, 3 * n, std::max(1, n / 2), a, b, 2 * h, false, [](const Vector3 &x) { return x; }};
+            return MeshBox{t, 4 * n, 3 * n, std::max(1, n / 2), a, b, 2 * h, false, [](const Vector3 &x) { return x; }};
           },
           m,
           [=](const Vector3 &x, int d) {
