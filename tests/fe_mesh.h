@@ -213,12 +213,12 @@ private:
 };
 
 /* A file of the first rank's, seen by all, which goes when the object does */
-class TemporaryFile
+class MeshFile
 {
 public:
   std::string name;
 
-  TemporaryFile(MPI_Comm comm, const std::string &text, const std::string &end = ".msh") : comm_(comm)
+  MeshFile(MPI_Comm comm, const std::string &text, const std::string &end = ".msh") : comm_(comm)
   {
     int pid = (int)getpid(), rank;
     MPI_Comm_rank(comm, &rank);
@@ -230,12 +230,12 @@ public:
     if (mine_) std::ofstream(name, std::ios::binary) << text;
     MPI_Barrier(comm);
   }
-  ~TemporaryFile()
+  ~MeshFile()
   {
     MPI_Barrier(comm_);
     if (mine_) std::remove(name.c_str());
   }
-  TemporaryFile(const TemporaryFile &) = delete;
+  MeshFile(const MeshFile &) = delete;
 
 private:
   MPI_Comm comm_;
@@ -251,7 +251,7 @@ inline const Material &softSteel()
 inline PetscErrorCode readText(FeModel &model, const std::string &text,
                                const Materials &materials = {{"", softSteel()}})
 {
-  TemporaryFile file(model.comm, text);
+  MeshFile file(model.comm, text);
   return model.readMesh(file.name, materials);
 }
 

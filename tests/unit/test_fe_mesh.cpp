@@ -228,11 +228,11 @@ TEST(FeMeshFiles, BinaryIsTheSameAsText)
   const std::string geometry =
       "SetFactory(\"OpenCASCADE\");\nCylinder(1) = {0, 0, 0, 0, 0, 2, 0.5};\nPhysical Volume(\"rod\") = {1};\n"
       "Physical Surface(\"end\") = {2};\nMesh.MeshSizeMax = 0.4;\n";
-  TemporaryFile geo(PETSC_COMM_SELF, geometry, ".geo");
+  MeshFile geo(PETSC_COMM_SELF, geometry, ".geo");
   PetscReal     norm[4];
   int           k = 0;
   for (const char *format : {"msh41", "msh22", "msh41 -bin", "msh22 -bin"}) {
-    TemporaryFile     mesh(PETSC_COMM_SELF, "");
+    MeshFile     mesh(PETSC_COMM_SELF, "");
     const std::string command =
         "gmsh -v 0 -3 -order 2 -format " + std::string(format) + " -o " + mesh.name + " " + geo.name;
     ASSERT_EQ(std::system(command.c_str()), 0);
