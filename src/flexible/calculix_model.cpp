@@ -1,0 +1,129 @@
+/* Nodes, sets and elements of a deck of CalculiX in the order that the model has them, and the rows of its matrices. */
+#include "flexible/calculix.h"
+#include "flexible/node_order.h"
+#include <algorithm>
+#include <fstream>
+
+namespace hhtdae
+{
+namespace calculix
+{
+
+namespace
+{
+
+/* Rows of the stored matrices: node and direction, in the order of the file */
+std::string ReadUnknowns(const std::string &file, std::vector<std::pair<Label, int>> *unknown)
+{
+  std::ifstream in(file);
+  std::string   line;
+  if (!in)
+    return "cannot read " + file +
+           ": there is no such file, or no right to read it (ccx writes it with *FREQUENCY, SOLVER=MATRIXSTORAGE)";
+  while (std::getline(in, line)) {
+    const std::string text = Trim(line);
+    const std::size_t dot  = text.find('.');
+    if (text.empty()) continue;
+    if (dot == std::string::npos || !IsLabel(text.substr(0, dot)) || !IsLabel(text.substr(dot + 1)))
+      return file + ": \"" + text + "\" is not \"node.direction\"";
+    const Label direction = std::stoll(text.substr(dot + 1));
+    if (direction < 1 || direction > 3)
+      return file + ": \"" + text + "\" is not a translation: solid elements alone can be read";
+    unknown->push_back({std::stoll(text.substr(0, dot)), (int)direction});
+  }
+  return unknown->empty() ? file + " has no unknowns" : "";
+}
+
+constexpr const char *no_supports = " Supports and constraints (*BOUNDARY, *EQUATION, *MPC, *RIGID BODY, *TIE) have to "
+                                    "be left out of the deck whose matrices are "
+                                    "stored; attachments take their place";
+
+/* Places of nodes in the model, in the order of their labels, and rows of the unknowns; says what does not fit */
+std::string Number(const Deck &deck, const std::vector<std::pair<Label, int>> &unknown, ReadModel *read,
+                   std::unordered_map<Label, PetscInt> *place, std::vector<PetscInt> *row)
+{
+  std::map<Label, int> directions;
+  for (const auto &u : unknown) {
+    int &have = directions[u.first];
+    if (have & (1 << u.second))
+      return "node " + std::to_string(u.first) + " has direction " + std::to_string(u.second) + " twice";
+    have |= 1 << u.second;
+    if (!deck.node.count(u.first))
+      return "node " + std::to_string(u.first) +
+             " is not in the deck: CalculiX makes nodes of its own for beams, shells and plane elements, which are not "
+             "read";
+  }
+  for (const auto &d : directions) {
+    for (int c = 1; c <= 3; c++)
+      if (!(d.second & (1 << c)))
+        return "node " + std::to_string(d.first) + " has no unknown in direction " + std::to_string(c) + "." +
+               no_supports;
+    const Vector3 &x = deck.node.at(d.first);
+    place->emplace(d.first, (PetscInt)read->label.size());
+    read->label.push_back((PetscInt)d.first);
+    read->coordinates.insert(read->coordinates.end(), x.data(), x.data() + 3);
+  }
+  for (Label l : deck.used)
+    if (!place->count(l)) return "node " + std::to_string(l) + " of an element has no unknowns." + no_supports;
+  for (const auto &u : unknown) row->push_back(3 * place->at(u.first) + u.second - 1);
+  return "";
+}
+
+/* Sets of nodes, and sets of elements as sets of their nodes where no set of nodes has the name */
+void CollectSets(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
+{
+  const auto add = [&](const std::string &name, Label l) {
+    const auto found = place.find(l);
+    if (found != place.end()) read->sets[name].push_back(found->second);
+  };
+  for (const auto &set : deck.nsets) {
+    read->sets[set.second.name];
+    for (Label l : set.second.member) add(set.second.name, l);
+  }
+  for (const auto &set : deck.elsets) {
+    if (deck.nsets.count(set.first)) continue;
+    read->sets[set.second.name];
+    for (Label l : set.second.member) {
+      const auto e = deck.element.find(l);
+      if (e == deck.element.end()) continue;
+      for (Label n : e->second.node) add(set.second.name, n);
+    }
+  }
+}
+
+/* In the order of their labels */
+void CollectElements(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
+{
+  std::vector<Label> labels;
+  for (const auto &e : deck.element)
+    if (e.second.element.material >= 0) labels.push_back(e.first);
+  std::sort(labels.begin(), labels.end());
+  for (Label l : labels) {
+    const DeckElement &from = deck.element.at(l);
+    FeElement          e    = from.element;
+    for (int k = 0; k < FeNodes(e.type); k++) e.node[GmshPlace(e.type, k)] = place.at(from.node[(std::size_t)k]);
+    read->elements.push_back(e);
+  }
+  read->materials = deck.materials;
+}
+
+} // namespace
+
+std::string ReadJob(const std::string &stem, ReadModel *read, std::vector<PetscInt> *row, PetscInt64 *left_out)
+{
+  Deck                                deck;
+  std::vector<std::pair<Label, int>>  unknown;
+  std::unordered_map<Label, PetscInt> place;
+  deck.read(stem + ".inp");
+  if (!deck.error.empty()) return deck.error;
+  std::string error = ReadUnknowns(stem + ".dof", &unknown);
+  if (error.empty() && (error = Number(deck, unknown, read, &place, row)).size()) error = stem + ".dof: " + error;
+  if (!error.empty()) return error;
+  CollectSets(deck, place, read);
+  CollectElements(deck, place, read);
+  *left_out = (PetscInt64)deck.left_out;
+  return "";
+}
+
+} // namespace calculix
+} // namespace hhtdae
