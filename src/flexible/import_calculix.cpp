@@ -17,6 +17,7 @@
 #include "flexible/calculix.h"
 #include "flexible/exchange.h"
 #include <exception>
+#include <fstream>
 
 namespace hhtdae
 {
@@ -34,13 +35,23 @@ std::string ReadSafely(const std::string &stem, ReadModel *read, std::vector<Pet
   }
 }
 
+/* A file that was cut within its last line has a number there with fewer digits, or a smaller exponent. */
+std::string CheckEnd(const std::string &file)
+{
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(-1, std::ios::end);
+  return in.get() == '\n' ? "" : file + " ends within a line (truncated?): ccx ends each line";
+}
+
 /* Both matrices have all rows; a file that ends early has not */
 PetscErrorCode ReadMatrix(const FeModel &model, const std::string &file, const std::vector<PetscInt> &row, Mat *A)
 {
   MatrixFile  head;
   MatrixShape shape;
   Triplets    triplets;
+  PetscMPIInt rank;
   PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   shape.rows = 3 * model.nodes;
   shape.row  = row.empty() ? nullptr : &row;
   PetscCall(OpenMatrix(model.comm, file, &head));
@@ -51,6 +62,7 @@ PetscErrorCode ReadMatrix(const FeModel &model, const std::string &file, const s
              "%s ends with row %" PetscInt_FMT " of %" PetscInt_FMT
              " (truncated, or of another run than the .dof file)",
              file.c_str(), triplets.largest + 1, shape.rows);
+  PetscCall(Agree(model.comm, rank ? "" : CheckEnd(file), PETSC_ERR_FILE_UNEXPECTED));
   PetscCall(Assemble(model, file, &triplets, A));
   PetscFunctionReturn(0);
 }

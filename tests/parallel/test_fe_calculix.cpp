@@ -370,6 +370,7 @@ TEST(CalculixRanks, ErrorsOnAllRanks)
   const std::size_t middle = mas.find('\n', mas.size() / 2) + 1;
   EXPECT_SAYS(damaged(".mas", mas.substr(0, middle) + "1000 1000 1\n" + mas.substr(middle), mas), "is not among 1 ..");
   EXPECT_SAYS(damaged(".mas", mas.substr(0, middle), mas), "truncated");
+  EXPECT_SAYS(damaged(".mas", mas.substr(0, mas.size() - 3), mas), "box.mas ends within a line");
   EXPECT_SAYS(damaged(".mas", "", mas), "box.mas: it is empty");
   EXPECT_SAYS(refused(job.stem + "none"), "there is no such file");
   /* all is good again */
