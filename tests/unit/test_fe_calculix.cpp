@@ -152,7 +152,7 @@ TEST_P(Calculix, FrequenciesAsPrintedAndAsFromTheMesh)
   if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
   const Sort sort = GetParam();
   Folder     folder;
-  Box        box;
+  MeshBox        box;
   box.type = sort.type;
   box.nx = 3, box.ny = 2, box.nz = 1;
   box.lx = 1.1, box.ly = 0.5, box.lz = 0.2;
