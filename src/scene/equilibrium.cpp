@@ -1,18 +1,20 @@
 /*
   Static equilibrium: Q(q, 0) - Phi_q^T lambda = 0, Phi = 0 with all velocities, accelerations and rates of states zero.
 
-  Implicit Euler steps from rest, one Newton correction each, with velocities set to zero after every step:
+  Implicit Euler steps from rest, one Newton correction each if it is good enough, with velocities set to zero after
+  every step:
 
     (M/h^2 + C/h + K) dq + Phi_q^T dlambda = -F,   Phi_q dq = -Phi
 
   which is the scene's Jacobian with sigma_v = 1/h and sigma_a = 1/h^2. Small steps slide downhill however far from
   equilibrium, large ones are Newton's method; h grows as the unbalanced forces fall and shrinks where a step would go
-  too far.
+  too far or has gone uphill.
 */
 #include "extension.h"
 #include "start.h"
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace hhtdae
 {
@@ -24,6 +26,10 @@ constexpr int    most_iterations = 2000;
 constexpr double balanced       = 1e-10; /* of forces, times the largest of the scene; of constraints, times its size */
 constexpr double largest_turn   = 0.25;  /* in one step: radians, parts of the scene's size */
 constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and from its first value */
+constexpr double downhill_growth = 2, hollow = 0.999; /* of h in a hollow: where forces fall to this part in a step */
+constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
+constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
+constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
 
 /* The largest force that nothing balances, and on which body; moments as forces at the scene's size */
 struct Unbalanced {
@@ -32,9 +38,16 @@ struct Unbalanced {
   PetscInt body = -1;
 };
 
+/* What became of a step: how far it went, and the work over it of the forces that were left before and after it */
+struct Attempt {
+  bool   good        = false;
+  int    corrections = 0; /* after the first */
+  double reach = INFINITY, work[2] = {0, 0};
+};
+
 struct Equilibrium {
   Runtime &R;
-  Vec      U = nullptr, V = nullptr, zero = nullptr, F = nullptr, d = nullptr, next = nullptr;
+  Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, start = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;
   double   size, scale = 0; /* of lengths, of forces */
@@ -44,7 +57,7 @@ struct Equilibrium {
   {
     PetscCallAbort(PETSC_COMM_SELF, KSPDestroy(&ksp));
     PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
-    for (Vec *x : {&U, &V, &zero, &F, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
+    for (Vec *x : {&U, &V, &A, &zero, &F, &start, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
   }
 };
 
@@ -115,7 +128,7 @@ PetscErrorCode Create(Equilibrium &E)
   PetscCall(VecCreate(R.scene.comm, &E.U));
   PetscCall(VecSetSizes(E.U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(E.U, VECSTANDARD));
-  for (Vec *x : {&E.V, &E.zero, &E.F, &E.d, &E.next}) PetscCall(VecDuplicate(E.U, x));
+  for (Vec *x : {&E.V, &E.A, &E.zero, &E.F, &E.start, &E.d, &E.next}) PetscCall(VecDuplicate(E.U, x));
   PetscCall(InitialState(R, E.U, E.V));
   PetscCall(VecSet(E.V, 0));
   PetscCall(VecSet(E.zero, 0));
@@ -159,78 +172,6 @@ PetscErrorCode Reach(const Equilibrium &E, Vec d, double *reach)
   PetscFunctionReturn(0);
 }
 
-/* The deformation of flexible bodies, from their owners to every rank */
-PetscErrorCode WriteBackModes(Runtime &R, const PetscScalar *u)
-{
-  SceneData &s = R.scene;
-  PetscFunctionBegin;
-  for (std::size_t b = 0; b < s.bodies.size(); b++) {
-    if (!s.bodies[b].flexible) continue;
-    auto              f     = std::make_shared<FlexibleData>(*s.bodies[b].flexible);
-    const PetscMPIInt owner = R.number.owner.empty() ? 0 : R.number.owner[b];
-    if (owner == R.rank) {
-      const PetscScalar *eta = u + R.number.body[b] - R.start + 6;
-      std::copy(eta, eta + f->deformation.size(), f->deformation.begin());
-    }
-    PetscCallMPI(MPI_Bcast(f->deformation.data(), (PetscMPIInt)f->deformation.size(), MPI_DOUBLE, owner, s.comm));
-    std::fill(f->deformation_rate.begin(), f->deformation_rate.end(), 0.0);
-    s.bodies[b].flexible = f;
-  }
-  PetscFunctionReturn(0);
-}
-
-/* Poses out of U into the description of every rank, at rest; initial values of variables and states too */
-PetscErrorCode WriteBack(Equilibrium &E)
-{
-  Runtime                 &R     = E.R;
-  SceneData               &s     = R.scene;
-  const int                width = 13; /* body, position, attitude */
-  const PetscScalar       *u, *v;
-  const double            *local[3];
-  std::vector<double>      mine, all;
-  std::vector<PetscMPIInt> count(R.size), from(R.size + 1, 0);
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(E.U, &u));
-  PetscCall(VecGetArrayRead(E.zero, &v));
-  PetscCall(LocalState(R, u, v, v, local));
-  R.bodies.move(local[0], local[1]);
-  for (PetscInt b = 0; b < R.bodies.own; b++) {
-    const BodyMotion &m = R.bodies.now[b];
-    mine.push_back((double)R.bodies.body[b].id);
-    mine.insert(mine.end(), m.r.data(), m.r.data() + 3);
-    const BodyKind kind  = R.bodies.body[b].kind;
-    const bool     turns = HasEulerAngles(kind) || kind == BodyKind::Planar;
-    const Matrix3  A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
-    mine.insert(mine.end(), A.data(), A.data() + 9);
-  }
-  std::vector<double> scalars(s.variables.size() + s.states.size(), 0), sum(scalars.size());
-  for (std::size_t i = 0; i < s.variables.size(); i++)
-    if (R.number.variable_owner[i] == R.rank) scalars[i] = u[R.number.variable[i] - R.start];
-  for (std::size_t i = 0; i < s.states.size(); i++)
-    if (R.number.state_owner[i] == R.rank) scalars[s.variables.size() + i] = u[R.number.state[i] - R.start];
-  PetscCall(WriteBackModes(R, u));
-  for (auto &x : s.extensions) x->rest(u + x->start[R.rank] - R.start);
-  PetscCall(VecRestoreArrayRead(E.zero, &v));
-  PetscCall(VecRestoreArrayRead(E.U, &u));
-  const PetscMPIInt n = (PetscMPIInt)mine.size();
-  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count.data(), 1, MPI_INT, s.comm));
-  for (PetscMPIInt r = 0; r < R.size; r++) from[r + 1] = from[r] + count[r];
-  all.resize(from[R.size]);
-  PetscCallMPI(MPI_Allgatherv(mine.data(), n, MPI_DOUBLE, all.data(), count.data(), from.data(), MPI_DOUBLE, s.comm));
-  for (std::size_t k = 0; k < all.size(); k += width) {
-    BodyData &b = s.bodies[(std::size_t)all[k]];
-    b.r         = Eigen::Map<const Vector3>(&all[k + 1]);
-    b.A         = Eigen::Map<const Matrix3>(&all[k + 4]);
-    b.v.setZero();
-    b.w.setZero();
-  }
-  if (!sum.empty())
-    PetscCallMPI(MPI_Allreduce(scalars.data(), sum.data(), (PetscMPIInt)sum.size(), MPI_DOUBLE, MPI_SUM, s.comm));
-  for (std::size_t i = 0; i < s.variables.size(); i++) s.variables[i].initial = sum[i];
-  for (std::size_t i = 0; i < s.states.size(); i++) s.states[i].initial = sum[s.variables.size() + i];
-  PetscFunctionReturn(0);
-}
-
 /* New axes for all bodies once one of them nears the singularity; multipliers and force states stay */
 PetscErrorCode RenewAxes(Equilibrium &E)
 {
@@ -247,7 +188,7 @@ PetscErrorCode RenewAxes(Equilibrium &E)
   PetscCall(VecRestoreArrayRead(E.U, &u));
   PetscCallMPI(MPI_Allreduce(&mine, &any, 1, MPIU_BOOL, MPI_LOR, R.scene.comm));
   if (!any) PetscFunctionReturn(0);
-  PetscCall(WriteBack(E));
+  PetscCall(WriteRest(R, E.U));
   PetscCall(InitialState(R, E.next, E.V));
   PetscCall(VecSet(E.V, 0));
   PetscCall(VecGetArrayRead(E.next, &u));
@@ -282,60 +223,145 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   PetscFunctionReturn(0);
 }
 
-/* One step; false if it would go too far or cannot be computed */
-PetscErrorCode Step(Equilibrium &E, double h, bool *good, Unbalanced &after)
+/* Work of the forces in F over d, on bodies and on what other libraries add: constraints and definitions have none */
+PetscErrorCode Work(const Equilibrium &E, Vec F, Vec d, double *work)
 {
-  const double       t = E.R.scene.start.time;
-  KSPConvergedReason reason;
-  double             reach;
+  const Runtime     &R = E.R;
+  const PetscScalar *f, *x;
+  double             mine = 0;
   PetscFunctionBegin;
-  *good = false;
-  PetscCall(Residual(E.R, t, E.U, E.zero, E.zero, E.F));
-  PetscCall(Jacobian(E.R, t, E.U, E.zero, E.zero, 1 / h, 1 / (h * h), E.J));
+  PetscCall(VecGetArrayRead(F, &f));
+  PetscCall(VecGetArrayRead(d, &x));
+  const auto add = [&](PetscInt first, PetscInt n) { mine += std::inner_product(f + first, f + first + n, x + first, 0.0); };
+  for (PetscInt b = 0; b < R.bodies.own; b++) add(R.bodies.body[b].first, R.bodies.coordinates(b));
+  for (const auto &e : R.scene.extensions) add(e->start[R.rank] - R.start, e->coordinates());
+  PetscCall(VecRestoreArrayRead(d, &x));
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCallMPI(MPI_Allreduce(&mine, work, 1, MPI_DOUBLE, MPI_SUM, R.scene.comm));
+  PetscFunctionReturn(0);
+}
+
+/* d = J^-1 F, next less d; the reach of d is infinite if there is none */
+PetscErrorCode Newton(Equilibrium &E, double *reach)
+{
+  KSPConvergedReason reason;
+  PetscFunctionBegin;
+  E.R.scene.started.equilibrium_iterations++;
+  *reach = INFINITY;
   PetscCall(KSPSolve(E.ksp, E.F, E.d));
   PetscCall(KSPGetConvergedReason(E.ksp, &reason));
   if (reason < 0) PetscFunctionReturn(0);
-  PetscCall(Reach(E, E.d, &reach));
-  if (!(reach <= 1)) PetscFunctionReturn(0);
-  PetscCall(VecWAXPY(E.next, -1, E.d, E.U));
-  PetscCall(Residual(E.R, t, E.next, E.zero, E.zero, E.F));
-  PetscCall(MeasureForces(E, E.F, after));
-  if (!std::isfinite(after.force + after.misfit + after.other)) PetscFunctionReturn(0);
-  PetscCall(VecCopy(E.next, E.U));
-  after.step = reach * largest_turn;
-  *good      = true;
+  PetscCall(Reach(E, E.d, reach));
+  if (*reach <= 1) PetscCall(VecAXPY(E.next, -1, E.d));
   PetscFunctionReturn(0);
+}
+
+/* F: what is left of the equations of the step from U to next */
+PetscErrorCode StepResidual(Equilibrium &E, double h, Unbalanced &left)
+{
+  PetscFunctionBegin;
+  PetscCall(VecWAXPY(E.V, -1, E.U, E.next));
+  PetscCall(VecScale(E.V, 1 / h));
+  PetscCall(VecCopy(E.V, E.A));
+  PetscCall(VecScale(E.A, 1 / h));
+  PetscCall(Residual(E.R, E.R.scene.start.time, E.next, E.V, E.A, E.F));
+  PetscCall(MeasureForces(E, E.F, left));
+  PetscFunctionReturn(0);
+}
+
+/*
+  More corrections where the first has raised the unbalanced forces. It moves thin parts along straight lines, which
+  stretches them: forces that say nothing of how far equilibrium is and would only make h fall.
+*/
+PetscErrorCode Correct(Equilibrium &E, double h, double before, Attempt &a, Unbalanced &after)
+{
+  const double t    = E.R.scene.start.time;
+  double       last = a.reach;
+  Unbalanced   left;
+  PetscFunctionBegin;
+  for (a.corrections = 0;; a.corrections++) {
+    PetscCall(Residual(E.R, t, E.next, E.zero, E.zero, E.F));
+    PetscCall(MeasureForces(E, E.F, after));
+    if (!std::isfinite(after.force + after.misfit + after.other)) PetscFunctionReturn(0);
+    if (after.force <= before || a.reach * largest_turn <= at_rest || last <= corrected * a.reach) break;
+    PetscCall(StepResidual(E, h, left));
+    if (left.force <= solved * before) break;
+    if (a.corrections == most_corrections) PetscFunctionReturn(0);
+    PetscCall(Jacobian(E.R, t, E.next, E.V, E.A, 1 / h, 1 / (h * h), E.J));
+    PetscCall(Newton(E, &last));
+    if (!(last <= a.reach)) PetscFunctionReturn(0);
+  }
+  a.good = true;
+  PetscFunctionReturn(0);
+}
+
+/* One step from forces before; not good if it would go too far or cannot be computed */
+PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalanced &after)
+{
+  const double t = E.R.scene.start.time;
+  PetscFunctionBegin;
+  a = Attempt();
+  PetscCall(Residual(E.R, t, E.U, E.zero, E.zero, E.F));
+  PetscCall(VecCopy(E.F, E.start));
+  PetscCall(Jacobian(E.R, t, E.U, E.zero, E.zero, 1 / h, 1 / (h * h), E.J));
+  PetscCall(VecCopy(E.U, E.next));
+  PetscCall(Newton(E, &a.reach));
+  if (!(a.reach <= 1)) PetscFunctionReturn(0);
+  PetscCall(Correct(E, h, before, a, after));
+  if (!a.good) PetscFunctionReturn(0);
+  PetscCall(VecWAXPY(E.d, -1, E.next, E.U));
+  PetscCall(Reach(E, E.d, &a.reach));
+  PetscCall(Residual(E.R, t, E.next, E.zero, E.zero, E.F));
+  PetscCall(Work(E, E.start, E.d, &a.work[0]));
+  PetscCall(Work(E, E.F, E.d, &a.work[1]));
+  PetscCall(VecCopy(E.next, E.U));
+  after.step = a.reach * largest_turn;
+  PetscFunctionReturn(0);
+}
+
+/*
+  Of h: as the forces fall. Where they fall along the step as in a hollow, h need not wait for that, as long as the next
+  step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
+  against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding.
+*/
+double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbalanced &after)
+{
+  const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
+  if (after.step <= at_rest) return after.force <= rounding * E.scale ? largest_growth : falling;
+  if (a.work[0] <= 0) return 0.25;
+  const bool in_hollow = a.work[1] > 0 && a.work[1] < hollow * a.work[0];
+  return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);
 }
 
 /* Stiff springs leave rounding that is no small part of the weights: there it is the step that has to vanish. */
 bool Balanced(const Equilibrium &E, const Unbalanced &at, double h)
 {
   if (!(at.misfit <= balanced * E.size && at.other <= 1e-8 * std::max(1.0, E.scale))) return false;
-  return at.force <= balanced * E.scale || (at.force <= 1e-5 * E.scale && at.step <= 1e-12 && h >= 1e3);
+  return at.force <= balanced * E.scale || (at.force <= rounding * E.scale && at.step <= 1e-12 && h >= 1e3);
 }
 
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
   SceneData &s = E.R.scene;
-  double     h = 0, first;
-  bool       good;
+  double     h = 0, first, before;
+  Attempt    a;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
-  first    = h;
-  at.force = E.scale;
-  *found   = false;
-  for (int it = 0; it < most_iterations && !*found && h > 1e-12 * first; it++) {
-    const double before = at.force;
-    PetscCall(Step(E, h, &good, at));
-    s.started.equilibrium_iterations++;
-    if (!good) {
+  first  = h;
+  before = at.force = E.scale;
+  *found = false;
+  while (s.started.equilibrium_iterations < most_iterations && !*found && h > 1e-12 * first) {
+    PetscCall(Step(E, h, before, a, at));
+    PetscCall(PetscInfo(nullptr, "scene: equilibrium %d: h = %g%s, unbalanced %g of %g, constraints %g, step %g with %d corrections more\n",
+                        (int)s.started.equilibrium_iterations, h, a.good ? "" : " refused", at.force, E.scale, at.misfit, a.reach * largest_turn,
+                        a.corrections));
+    if (!a.good) {
       h /= 4;
       continue;
     }
-    PetscCall(PetscInfo(nullptr, "scene: equilibrium %d: h = %g, unbalanced %g of %g, constraints %g\n", it, h,
-                        at.force, E.scale, at.misfit));
     *found = Balanced(E, at, h / first);
-    h = std::min(longest * first, h * std::min(largest_growth, std::max(0.5, before / std::max(at.force, 1e-300))));
+    h      = std::min(longest * first, h * Growth(E, a, before, at));
+    before = at.force;
     PetscCall(RenewAxes(E));
   }
   PetscFunctionReturn(0);
@@ -359,12 +385,12 @@ PetscErrorCode FindEquilibrium(Runtime &R)
     s.variables = variables;
     s.states    = states;
     SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
-            "no static equilibrium found in %d steps: a force of %g (moments over the scene's size) is left on %s, "
+            "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
             "constraints are violated by %g.\n"
             "Start nearer to it, or hold what is free to move for ever",
             (int)s.started.equilibrium_iterations, at.force, s.bodyName(at.body).c_str(), at.misfit);
   }
-  PetscCall(WriteBack(E));
+  PetscCall(WriteRest(R, E.U));
   PetscCall(ReportMoves(s, before, "equilibrium"));
   PetscFunctionReturn(0);
 }

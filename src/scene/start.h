@@ -90,6 +90,9 @@ PetscErrorCode DropRedundant(Runtime &R);
 /* ---- equilibrium.cpp: after Layout() ---- */
 PetscErrorCode FindEquilibrium(Runtime &R);
 
+/* ---- rest.cpp: poses, deformations, variables and states of U become the initial ones, at rest ---- */
+PetscErrorCode WriteRest(Runtime &R, Vec U);
+
 } // namespace hhtdae
 
 #endif

@@ -1,0 +1,133 @@
+/* Static equilibrium of thin parts: large rotations in few corrections, and not at a state that is not stable. */
+#include "box_model.h"
+#include "hhtdae/flexible.h"
+#include "scene/scene_data.h"
+#include "support.h"
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+/* A force that goes by nothing, in space axes */
+void load(Scene &s, Marker tip, Vector3 force)
+{
+  UserForce f;
+  f.i = tip;
+  for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = force(k)](const Real *t) -> Real { return 0. * t[0] + x; }));
+  s.add("load", f);
+}
+
+/* One metre along x, held at the left, of a square section */
+struct Plank {
+  FeModel    model{PETSC_COMM_WORLD};
+  FullFeBody fe;
+  Scene      scene{PETSC_COMM_WORLD};
+  Body       tip;
+
+  Plank(int n, double depth, double young, Vector3 force)
+  {
+    FullBody b;
+    BoxBuilder({{n, 1, 1}, {1, depth, depth}, {young, 0, 2700}}, &model);
+    b.law = FeLaw::Large;
+    b.attachments.resize(2);
+    b.attachments[0].name = "left";
+    b.attachments[1].name = "right";
+    b.attachments[1].tie  = Tie::Average;
+    must(fe.add(scene, "plank", model, b));
+    const Marker left = scene.marker(fe.attachment("left"));
+    const auto   at   = scene.data().frame(left);
+    tip               = fe.attachment("right");
+    scene.add("clamp", Fixed{left, scene.marker(scene.ground(), at.x, at.R)});
+    load(scene, scene.marker(tip), force);
+    scene.start().equilibrium = true;
+    must(scene.setUp());
+  }
+  Vector3 axis() const { return scene.data().bodies[tip.id].A.col(0); }
+  int     corrections() const { return (int)scene.data().started.equilibrium_iterations; }
+};
+
+} // namespace
+
+/* Bending far softer than stretching: every correction along a straight line leaves forces far above the load */
+TEST(Equilibrium, AThinPlankBentFar)
+{
+  for (double depth : {0.02, 0.005}) {
+    const double young = 2.1e11, EI = young * std::pow(depth, 4) / 12;
+    const int    n     = 6;
+    /* bricks of 2^3 points are stiffer in bending: shear by 1 + (l/h)^2 G/E */
+    const double stiffer = 1 + 0.5 / std::pow(n * depth, 2);
+    const Plank  p(n, depth, young, {0, 3 * stiffer * EI, 0});
+    const double turn = std::atan2(p.axis()(1), p.axis()(0));
+    MEASURED("plank %g m deep: turned by %.2f in %d corrections", depth, turn, p.corrections());
+    /* the elastica under P L^2/EI = 3: 0.9860 */
+    EXPECT_NEAR(turn, 0.986, 0.05);
+    EXPECT_LE(p.corrections(), 40);
+  }
+}
+
+/* Pushed along its axis and a little aside: above the critical load there is a balance next to straight, not a stable one */
+TEST(Equilibrium, AColumnBuckles)
+{
+  const double depth = 0.1, young = 1e7, EI = young * std::pow(depth, 4) / 12;
+  const int    n       = 10;
+  const double stiffer = 1 + 0.5 / std::pow(n * depth, 2), critical = stiffer * EI * PETSC_PI * PETSC_PI / 4;
+  for (double part : {0.7, 1.5})
+    for (double aside : {1e-3, 1e-2, 5e-2}) {
+      const Plank  p(n, depth, young, {-part * critical, aside * critical, 0});
+      const double turn = std::atan2(p.axis()(1), p.axis()(0));
+      MEASURED("column under %g of its critical load, %g aside: turned by %.3f in %d corrections", part, aside, turn, p.corrections());
+      if (part < 1) {
+        EXPECT_NEAR(turn, 0, 0.3);
+      } else {
+        EXPECT_GT(std::abs(turn), 1);
+      }
+      EXPECT_LE(p.corrections(), 200);
+    }
+}
+
+/* Rigid pieces with beams between them, bent as the elastica of P L^2/EI = 3: 0.6033 across, 0.2544 along */
+TEST(Equilibrium, AChainOfBeamsBentFar)
+{
+  const double depth = 0.02, young = 2.1e11, area = depth * depth, I = std::pow(depth, 4) / 12;
+  const int    n     = 20;
+  Scene        s(PETSC_COMM_WORLD);
+  Body         last;
+  for (int k = 0; k <= n; k++) {
+    RigidBody node;
+    node.mass       = 7850 * area / n;
+    node.inertia    = (7850. / n * Vector3(2 * I, I, I)).asDiagonal();
+    node.position   = {1. * k / n, 0, 0};
+    const Body here = s.add("node " + std::to_string(k), node);
+    if (k == 0) {
+      s.add("clamp", Fixed{s.marker(here), s.marker(s.ground())});
+    } else {
+      Beam piece;
+      piece.i       = s.marker(here);
+      piece.j       = s.marker(last);
+      piece.length  = 1. / n;
+      piece.E       = young;
+      piece.G       = young / 2;
+      piece.area    = area;
+      piece.Iyy     = piece.Izz = I;
+      piece.J       = 0.141 * area * area;
+      piece.shear_y = piece.shear_z = 5. / 6 * area;
+      s.add("piece " + std::to_string(k), piece);
+    }
+    last = here;
+  }
+  RigidBody pan; /* without it the search is an easy one */
+  pan.mass     = 7850 * area;
+  pan.inertia  = pan.mass * area * Matrix3::Identity();
+  pan.position = {1, 0, 0};
+  s.add("hook", Fixed{s.marker(s.add("pan", pan)), s.marker(last)});
+  load(s, s.marker(last), {0, 3 * young * I, 0});
+  s.start().equilibrium = true;
+  must(s.setUp());
+  const Vector3 r = s.data().bodies[last.id].r;
+  MEASURED("chain of beams: tip at %.4f, %.4f in %d corrections", r(0), r(1), (int)s.data().started.equilibrium_iterations);
+  EXPECT_NEAR(r(1), 0.6033, 2e-3);
+  EXPECT_NEAR(r(0), 1 - 0.2544, 2e-3);
+  EXPECT_LE((int)s.data().started.equilibrium_iterations, 40);
+}
