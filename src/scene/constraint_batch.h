@@ -167,11 +167,10 @@ private:
     for (int k = 0; k < M; k++) {
       const LocalBody &b = bodyOf(ev.bodies, e, k);
       if (!Groups(b.kind)) continue;
-      Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
+      Matrix<R, 6>     T, own; /* columns of lambda are T^T, rows of Phi are S */
+      Matrix<R, 6>    &S = K::holonomic ? T : own;
       const int        n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
-      if constexpr (K::holonomic) {
-        S = T;
-      } else {
+      if constexpr (!K::holonomic) {
         S.leftCols(n).setZero();
         ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k) + ev.sv * J.template middleCols<6>(6 * k)), S);
         ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, J.template middleCols<6>(6 * k), S);
@@ -180,7 +179,7 @@ private:
         for (int c = 0; c < n; c++)
           for (int r = 0; r < rows; r++) {
             T(r, c) = T(active[r], c);
-            S(r, c) = S(active[r], c);
+            if (!K::holonomic) S(r, c) = S(active[r], c);
           }
       for (int g = 0; g < Groups(b.kind); g++) {
         if (!uses(b.kind, g, k)) continue;
