@@ -41,7 +41,7 @@ def mesh(path, n=(6, 1, 1), size=(1.0, 0.1, 0.05)):
 
 def table(text):
     """Frequencies of a table of modes"""
-    rows = re.findall(r"^ +(\d+) +([0-9.e+]+) +(\S+)$", text, re.M)
+    rows = re.findall(r"^ +(\d+) +([0-9.e+]+) +(\S+) +(\S+)$", text, re.M)
     check(rows and [int(r[0]) for r in rows] == list(range(len(rows))), "no table of modes in\n" + text)
     return [float(r[1]) for r in rows]
 
