@@ -187,21 +187,32 @@ PetscErrorCode RenewMatrix(TS ts)
 
 } // namespace
 
+/* The viewer goes whatever happens: a run may live on without its checkpoint */
+static PetscErrorCode WritePart(TS ts, const char part[])
+{
+  PetscViewer    viewer = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = PetscViewerBinaryOpen(PetscObjectComm((PetscObject)ts), part, FILE_MODE_WRITE, &viewer);
+  if (!ierr) ierr = PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE);
+  if (!ierr) ierr = Write(ts, viewer);
+  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CheckpointSave(TS ts, const char file[])
 {
   Integrator       &I = Get(ts);
   const std::string part = std::string(file) + ".part";
-  PetscViewer       viewer;
   PetscMPIInt       rank;
   MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
   int               failed = 0;
 
   PetscFunctionBegin;
   PetscCheck(I.have_step, comm, PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
-  PetscCall(PetscViewerBinaryOpen(comm, part.c_str(), FILE_MODE_WRITE, &viewer));
-  PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
-  PetscCall(Write(ts, viewer));
-  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(WritePart(ts, part.c_str()));
   /* a run that dies while writing keeps the checkpoint before */
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (rank == 0) failed = !Seal(part.c_str(), file);
@@ -215,8 +226,9 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
 /* Before the set-up it is only noted, and read at its end */
 PetscErrorCode CheckpointLoad(TS ts, const char file[])
 {
-  Integrator &I = Get(ts);
-  PetscViewer viewer;
+  Integrator    &I = Get(ts);
+  PetscViewer    viewer;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!I.U0) {
@@ -226,8 +238,9 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscCall(CheckSeal(PetscObjectComm((PetscObject)ts), file));
   PetscCall(PetscViewerBinaryOpen(PetscObjectComm((PetscObject)ts), file, FILE_MODE_READ, &viewer));
   PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
-  PetscCall(Read(ts, viewer, file));
-  PetscCall(PetscViewerDestroy(&viewer));
+  ierr = Read(ts, viewer, file);
+  PetscCall(PetscViewerDestroy(&viewer)); /* of a file that is refused, too */
+  PetscCall(ierr);
   PetscCall(RenewMatrix(ts));
   ts->steprestart = PETSC_FALSE;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
