@@ -105,7 +105,7 @@ PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
    tolerance, or never exceeded that. */
 bool LooksLikeRounding(const Corrector &c)
 {
-  if (!c.fresh || c.rate < 0.5) return false; /* still converging */
+  if (c.rate < 0.5 || (!c.fresh && !c.user_lag)) return false; /* still converging, or a new matrix may */
   return (c.e <= 1e-3 * c.e_max && c.e <= 0.1) || (c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01));
 }
 
@@ -132,7 +132,7 @@ PetscErrorCode SuspectRounding(TS ts, PetscBool *settled)
 {
   Integrator &I     = Get(ts);
   Corrector  &c     = I.corrector;
-  const bool  stays = c.suspect_h > 0 && I.h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect;
+  const bool  stays = c.suspect > 0 && c.suspect_h > 0 && I.h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect;
 
   PetscFunctionBegin;
   *settled = PETSC_TRUE;
