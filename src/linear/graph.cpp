@@ -41,17 +41,43 @@ template void LinearGraphFromEntries<PetscInt>(PetscInt, size_t, const PetscInt[
                                                LinearGraph *);
 #endif
 
+/* Rows of the transpose, ascending */
+static void Transposed(PetscInt n, const PetscInt ia[], const PetscInt ja[], std::vector<PetscInt> *start,
+                       std::vector<PetscInt> *row)
+{
+  start->assign(n + 1, 0);
+  row->resize(ia[n]);
+  for (PetscInt k = 0; k < ia[n]; ++k) ++(*start)[ja[k] + 1];
+  for (PetscInt i = 0; i < n; ++i) (*start)[i + 1] += (*start)[i];
+  std::vector<PetscInt> next(start->begin(), start->end() - 1);
+  for (PetscInt i = 0; i < n; ++i)
+    for (PetscInt k = ia[i]; k < ia[i + 1]; ++k) (*row)[next[ja[k]]++] = i;
+}
+
+/* Rows of SEQAIJ are sorted: they and those of the transpose are merged, and nothing is sorted */
 PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
 {
-  PetscInt        n;
-  const PetscInt *ia, *ja;
+  PetscInt              n;
+  const PetscInt       *ia, *ja;
+  std::vector<PetscInt> start, row;
 
   PetscFunctionBegin;
   PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
   if (!*done) PetscFunctionReturn(0);
-  std::vector<PetscInt> row(ia[n]);
-  for (PetscInt i = 0; i < n; ++i) std::fill(row.begin() + ia[i], row.begin() + ia[i + 1], i);
-  LinearGraphFromEntries<PetscInt>(n, row.size(), row.data(), ja, 0, graph);
+  Transposed(n, ia, ja, &start, &row);
+  graph->n = n;
+  graph->xadj.assign(n + 1, 0);
+  graph->adj.resize(2 * (size_t)ia[n]);
+  PetscInt *to = graph->adj.data();
+  for (PetscInt i = 0; i < n; ++i) {
+    const PetscInt *const below = row.data() + start[i], *const end = row.data() + start[i + 1];
+    if (std::equal(ja + ia[i], ja + ia[i + 1], below, end))
+      to = std::remove_copy(below, end, to, i);
+    else
+      to = std::remove(to, std::set_union(ja + ia[i], ja + ia[i + 1], below, end, to), i);
+    graph->xadj[i + 1] = (PetscInt)(to - graph->adj.data());
+  }
+  graph->adj.resize(graph->xadj[n]);
   PetscCall(MatRestoreRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
   *done = PETSC_TRUE;
   PetscFunctionReturn(0);

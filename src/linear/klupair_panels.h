@@ -40,6 +40,11 @@ struct KluPanel {
   size_t   lower, upper; /* where the values begin */
 };
 
+/* Entries of the matrix, from that number on, whose places follow one another */
+struct KluRun {
+  PetscInt entry, count;
+};
+
 struct KluPanels {
   PetscInt                    n = 0;
   std::vector<PetscInt>       row, col; /* of M, at each place */
@@ -50,6 +55,9 @@ struct KluPanels {
   std::vector<PetscInt>       outer_start, outer; /* entries between diagonal blocks: by columns, their row places */
   std::vector<PetscInt>       target;             /* where each entry of the matrix goes among the values */
   std::vector<PetscInt>       exchange;           /* LAPACK's row exchanges in the diagonal block of each panel */
+  std::vector<PetscInt>       run_start; /* of each place: which runs its column has; other entries go one by one */
+  std::vector<KluRun>         run;
+  std::vector<char>           contributes; /* of each place: neither its part of `lower` below K nor that of `upper` is zero */
   size_t                      outer_values = 0;   /* where the values between diagonal blocks begin */
   std::vector<double>         value;
 
@@ -70,6 +78,14 @@ void KluPanelsSetPlaces(const KluPanel &panel, KluPanels *panels);
 /* With the pivots that the panels were built for; *growth is the reciprocal growth, 0 where a pivot is zero or not
  * finite */
 PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *panels, double *growth);
+
+/* LU of a narrow block, n <= KLU_PANELS_NARROW, in place; exchange[k]: the row that came to k. False at a zero pivot. */
+#define KLU_PANELS_NARROW 16
+bool KluPanelsFactorNarrow(PetscInt n, double a[], PetscInt ld, PetscInt exchange[]);
+
+/* X U^-1 and Y L^-T for these factors; X has the leading dimension ld, too */
+void KluPanelsDivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[], PetscInt rows, double y[],
+                           PetscInt cols);
 
 /* M x = b, or with the transpose of M, in place */
 PetscErrorCode KluPanelsSolve(KluPanels *panels, bool transposed, double x[]);

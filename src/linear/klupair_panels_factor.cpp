@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* Up to this width the loops written here are faster than calls of LAPACK */
-static const PetscInt NARROW = 8;
-
 /* Columns of panels before that are multiplied at a time */
 static const PetscInt SIDE_BY_SIDE = 256;
 
@@ -196,9 +193,12 @@ static PetscErrorCode Collect(Work *w, KluPanels *p)
       PetscCall(Scatter(v, *w, p));
       continue;
     }
+    const char *contributes = p->contributes.data() + p->panel[p->source[k].panel].first;
     for (PetscInt done = 0, count; done < v.width; done += count) {
       if (w->columns == SIDE_BY_SIDE) PetscCall(Multiply(w, p));
-      count = PetscMin(v.width - done, SIDE_BY_SIDE - (PetscInt)w->columns);
+      const PetscInt room = PetscMin(v.width - done, SIDE_BY_SIDE - (PetscInt)w->columns);
+      count               = (PetscInt)(std::find(contributes + done, contributes + done + room, !contributes[done]) - contributes) - done;
+      if (!contributes[done]) continue;
       Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->rows,
              p->left.data() + (size_t)w->columns * w->rows.count());
       Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->cols,
@@ -211,48 +211,6 @@ static PetscErrorCode Collect(Work *w, KluPanels *p)
 }
 
 /* ---- factors of one panel ---- */
-
-/* Row exchanges as LAPACK's, from one; false at a zero pivot */
-static bool FactorNarrow(PetscInt n, double a[], PetscInt ld, PetscInt exchange[])
-{
-  for (PetscInt k = 0; k < n; ++k) {
-    double  *c = a + k * ld;
-    PetscInt r = k;
-    for (PetscInt i = k + 1; i < n; ++i)
-      if (PetscAbsReal(c[i]) > PetscAbsReal(c[r])) r = i;
-    exchange[k] = r;
-    if (c[r] == 0) return false;
-    if (r != k)
-      for (PetscInt j = 0; j < n; ++j) std::swap(a[k + j * ld], a[r + j * ld]);
-    for (PetscInt i = k + 1; i < n; ++i) c[i] /= c[k];
-    for (PetscInt j = k + 1; j < n; ++j)
-      for (PetscInt i = k + 1; i < n; ++i) a[i + j * ld] -= c[i] * a[k + j * ld];
-  }
-  return true;
-}
-
-/* Columns of a tall matrix: x_to -= sum of x_k f(k) */
-static void SubtractColumns(double x[], PetscInt ld, PetscInt rows, PetscInt to, PetscInt begin, PetscInt end,
-                            const double f[], PetscInt step)
-{
-  double *t = x + to * ld;
-  for (PetscInt k = begin; k < end; ++k) {
-    const double *s      = x + k * ld;
-    const double  factor = f[k * step];
-    for (PetscInt i = 0; i < rows; ++i) t[i] -= s[i] * factor;
-  }
-}
-
-/* X U^-1 and Y L^-T for the factors at a */
-static void DivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[], PetscInt rows, double y[],
-                         PetscInt cols)
-{
-  for (PetscInt c = 0; c < n; ++c) {
-    SubtractColumns(x, ld, rows, c, 0, c, a + c * ld, 1);
-    for (PetscInt i = 0; i < rows; ++i) x[c * ld + i] /= a[c + c * ld];
-    SubtractColumns(y, cols, cols, c, 0, c, a + c, ld);
-  }
-}
 
 static PetscErrorCode FactorWide(Int n, double a[], Int ld, PetscInt exchange[], bool *good)
 {
@@ -283,17 +241,21 @@ static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
   PetscInt      *swap = p->exchange.data() + w.q->first;
 
   PetscFunctionBegin;
-  if (n <= NARROW)
-    *good = FactorNarrow(n, a, w.left, swap);
+  if (n <= KLU_PANELS_NARROW)
+    *good = KluPanelsFactorNarrow(n, a, w.left, swap);
   else
     PetscCall(FactorWide(w.width, a, w.left, swap, good));
   if (!*good) PetscFunctionReturn(0);
   for (PetscInt k = 0; k < n; ++k)
     if (swap[k] != k) std::swap_ranges(y + k * cols, y + (k + 1) * cols, y + swap[k] * cols);
-  if (n <= NARROW)
-    DivideNarrow(n, a, w.left, x, rows, y, cols);
+  if (n <= KLU_PANELS_NARROW)
+    KluPanelsDivideNarrow(n, a, w.left, x, rows, y, cols);
   else
     PetscCall(DivideWide(w.width, a, w.left, x, (Int)rows, y, (Int)cols));
+  const auto zero = [](double e) { return e == 0; };
+  for (PetscInt k = 0; k < n; ++k)
+    p->contributes[w.q->first + k] = !std::all_of(x + k * w.left, x + k * w.left + rows, zero) &&
+                                     !std::all_of(y + k * cols, y + (k + 1) * cols, zero);
   PetscFunctionReturn(0);
 }
 
@@ -329,6 +291,24 @@ static double ReciprocalGrowth(const KluPanels &p)
 
 /* ---- all together ---- */
 
+static void CopyRun(const double *PETSC_RESTRICT from, PetscInt count, double *PETSC_RESTRICT to, double largest[4])
+{
+  double   l0 = largest[0], l1 = largest[1];
+  PetscInt i = 0;
+  for (; i + 2 <= count; i += 2) {
+    to[i]     = from[i];
+    to[i + 1] = from[i + 1];
+    l0        = Larger(PetscAbsReal(from[i]), l0);
+    l1        = Larger(PetscAbsReal(from[i + 1]), l1);
+  }
+  if (i < count) {
+    to[i] = from[i];
+    l0    = Larger(PetscAbsReal(from[i]), l0);
+  }
+  largest[0] = l0;
+  largest[1] = l1;
+}
+
 /* The entries go to their places, and the largest of each column is noted, of those inside of diagonal blocks. Rows of the
    PETSc matrix are columns for KLU. */
 template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels *p)
@@ -337,13 +317,22 @@ template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels
   const PetscInt *target = p->target.data();
   std::fill(p->value.begin(), p->value.end(), 0.0);
   for (PetscInt k = 0; k < p->n; ++k) {
-    double         largest[4] = {0, 0, 0, 0}; /* one would wait for itself */
-    const PetscInt j = p->col[k], end = rows.start[j + 1];
-    for (PetscInt e = rows.start[j]; e < end; ++e) {
-      const bool inside = !has_outer || (size_t)target[e] < p->outer_values;
-      value[target[e]]  = rows.val[e];
-      largest[e & 3]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 3]);
+    double     largest[4] = {0, 0, 0, 0}; /* one would wait for itself */
+    const auto one_by_one = [&](PetscInt e, PetscInt end) {
+      for (; e < end; ++e) {
+        const bool inside = !has_outer || (size_t)target[e] < p->outer_values;
+        value[target[e]]  = rows.val[e];
+        largest[e & 3]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 3]);
+      }
+    };
+    PetscInt e = rows.start[p->col[k]];
+    for (PetscInt r = p->run_start[k]; r < p->run_start[k + 1]; ++r) {
+      const KluRun &run = p->run[r];
+      one_by_one(e, run.entry);
+      CopyRun(rows.val + run.entry, run.count, value + target[run.entry], largest);
+      e = run.entry + run.count;
     }
+    one_by_one(e, rows.start[p->col[k] + 1]);
     p->matrix_size[k] = Larger(Larger(largest[0], largest[1]), Larger(largest[2], largest[3]));
   }
 }

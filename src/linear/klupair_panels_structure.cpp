@@ -3,6 +3,7 @@
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_panels.h"
 #include <algorithm>
+#include <tuple>
 
 typedef std::vector<PetscInt> Indices;
 
@@ -32,6 +33,13 @@ static const double OPERATION = 0.045e-9, ENTRY = 3.5e-9, PANEL = 0.5e-6, SOURCE
 
 /* Panels must promise this part of KLU's time */
 static const double GAIN = 0.7;
+
+/* At the end of a diagonal block, a panel so wide that several others contribute to takes in none of them: their product
+   with all the others' columns is faster than their part in the factors of a wider panel */
+static const PetscInt WIDE = 64;
+
+/* Entries that go to places one after the other are copied together from so many on */
+static const PetscInt RUN = 8;
 
 /* ---- the patterns of L and U ---- */
 
@@ -139,19 +147,23 @@ static Indices Postorder(const Tree &tree)
 struct Range {
   PetscInt first, last, rows; /* with so many places after the last */
   double   zeros;
+  bool     junction; /* several places have the first one for their parent */
 };
 
-/* Pivots in a row of which each reaches the next one and what that reaches */
+/* Pivots in a row of which each reaches the next one and what that reaches, and nothing else reaches the next one first */
 static std::vector<Range> Fundamental(const Indices &parent, const Indices &count)
 {
   std::vector<Range> ranges;
   const PetscInt     n = (PetscInt)parent.size();
+  Indices            children(n, 0);
   for (PetscInt k = 0; k < n; ++k)
-    if (k && parent[k - 1] == k && count[k - 1] == count[k] + 1) {
+    if (parent[k] >= 0) ++children[parent[k]];
+  for (PetscInt k = 0; k < n; ++k)
+    if (k && children[k] == 1 && parent[k - 1] == k && count[k - 1] == count[k] + 1) {
       ranges.back().last = k;
       ranges.back().rows = count[k];
     } else
-      ranges.push_back({k, k, count[k], 0});
+      ranges.push_back({k, k, count[k], 0, children[k] > 1});
   return ranges;
 }
 
@@ -160,7 +172,8 @@ static std::vector<Range> Fundamental(const Indices &parent, const Indices &coun
 static bool Joined(const Range &a, const Range &b, Range *both)
 {
   const double wa = (double)(a.last - a.first + 1), wb = (double)(b.last - b.first + 1), w = wa + wb;
-  *both            = {a.first, b.last, b.rows, a.zeros + b.zeros + 2 * wa * (wb + (double)(b.rows - a.rows))};
+  *both            = {a.first, b.last, b.rows, a.zeros + b.zeros + 2 * wa * (wb + (double)(b.rows - a.rows)), a.junction};
+  if (b.junction && b.rows == 0 && wb >= (double)WIDE) return false;
   const double all = w * (w + 2 * (double)b.rows), part = both->zeros / all;
   return w <= 4 ? part < 0.6 : w <= 16 ? part < 0.25 : w <= 48 ? part < 0.1 : part < 0.05;
 }
@@ -178,6 +191,33 @@ static std::vector<Range> Amalgamate(const std::vector<Range> &fine, const Indic
   }
   std::reverse(ranges.begin(), ranges.end());
   return ranges;
+}
+
+static Indices PanelOf(const KluPanels &p)
+{
+  Indices of(p.n);
+  for (size_t k = 0; k < p.panel.size(); ++k) std::fill_n(of.begin() + p.panel[k].first, p.panel[k].width, (PetscInt)k);
+  return of;
+}
+
+/* Within a panel, pivots whose columns have the fewest entries outside of it go first: what a later pivot leaves there
+   does not fill them, and columns that stay zero need no products. Otherwise by number, so that entries lie together. */
+static void SortPlaces(const LinearRows &rows, const Indices &of, KluPanels *p)
+{
+  typedef std::pair<PetscInt, std::pair<PetscInt, PetscInt>> Pivot; /* entries outside, column, row */
+  Indices                                                   panel_of_row(p->n);
+  std::vector<Pivot>                                        pivots;
+  for (PetscInt k = 0; k < p->n; ++k) panel_of_row[p->row[k]] = of[k];
+  for (const KluPanel &q : p->panel) {
+    pivots.clear();
+    for (PetscInt k = q.first; k < q.first + q.width; ++k) {
+      const PetscInt *first = rows.col + rows.start[p->col[k]], *last = rows.col + rows.start[p->col[k] + 1];
+      const auto      outside = std::count_if(first, last, [&](PetscInt i) { return panel_of_row[i] != of[k]; });
+      pivots.push_back({(PetscInt)outside, {p->col[k], p->row[k]}});
+    }
+    std::sort(pivots.begin(), pivots.end());
+    for (PetscInt k = 0; k < q.width; ++k) std::tie(p->col[q.first + k], p->row[q.first + k]) = pivots[k].second;
+  }
 }
 
 /* ---- rows and columns that each panel reaches ---- */
@@ -212,13 +252,6 @@ static Entries Place(const LinearRows &rows, const Indices &block_of, const KluP
 struct Reach {
   std::vector<Indices> rows, cols;
 };
-
-static Indices PanelOf(const KluPanels &p)
-{
-  Indices of(p.n);
-  for (size_t k = 0; k < p.panel.size(); ++k) std::fill_n(of.begin() + p.panel[k].first, p.panel[k].width, (PetscInt)k);
-  return of;
-}
 
 static void SortUnique(Indices *a)
 {
@@ -368,6 +401,21 @@ static void AimOuter(const std::vector<Entry> &entries, KluPanels *p)
   }
 }
 
+/* Entries of a column that go to places one after the other, all inside of diagonal blocks */
+static void FindRuns(const LinearRows &rows, KluPanels *p)
+{
+  const auto inside = [p](PetscInt e) { return (size_t)p->target[e] < p->outer_values; };
+  p->run_start.assign(1, 0);
+  for (PetscInt k = 0; k < p->n; ++k) {
+    const PetscInt end = rows.start[p->col[k] + 1];
+    for (PetscInt e = rows.start[p->col[k]], last; e < end; e = last) {
+      for (last = e + 1; last < end && inside(last) && p->target[last] == p->target[last - 1] + 1;) ++last;
+      if (last - e >= RUN && inside(e)) p->run.push_back({e, last - e});
+    }
+    p->run_start.push_back((PetscInt)p->run.size());
+  }
+}
+
 /* ---- all together ---- */
 
 static void Estimate(double entries, double flops, KluPanels *p)
@@ -421,6 +469,7 @@ static void Allocate(const LinearRows &rows, KluPanels *p)
   p->target.resize(rows.start[rows.n]);
   for (auto *scratch : {&p->row_of, &p->col_of, &p->exchange}) scratch->resize(p->n);
   for (auto *scratch : {&p->matrix_size, &p->factor_size, &p->x, &p->y}) scratch->resize(p->n);
+  p->contributes.resize(p->n);
 }
 
 PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, bool *pays)
@@ -442,6 +491,7 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
   Order(*k, order, p, &block_of);
   MakePanels(Ranges(tree, order), block_of, p);
   const Indices of    = PanelOf(*p);
+  SortPlaces(rows, of, p);
   const Entries e     = Place(rows, block_of, *p);
   const Reach   reach = FindReach(e, of, *p);
   SizePanels(reach, p);
@@ -452,6 +502,7 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
   Allocate(rows, p);
   AimInner(e.inner, of, p);
   AimOuter(e.outer, p);
+  FindRuns(rows, p);
   p->value.resize(p->outer_values + p->outer.size());
   PetscFunctionReturn(0);
 }
