@@ -231,17 +231,14 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CountCorrection(TS ts, Vec X, Vec Y)
+PetscErrorCode CountCorrection(TS ts, PetscReal e)
 {
   Integrator &I = Get(ts);
-  PetscReal   e;
 
   PetscFunctionBegin;
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
-  if (I.mode == Mode::Start) PetscCall(RelativeNorm(X, Y, &e));
-  else PetscCall(CorrectionNorm(ts, Y, &e));
   PetscCall(Judge(ts, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -254,7 +251,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   Integrator &I  = Get(ts);
   SNES        snes;
   Vec         X, F, Y;
-  PetscReal   xnorm, fnorm, ynorm;
+  PetscReal   xnorm, fnorm, ynorm, e;
   PetscInt    monitors;
 
   PetscFunctionBegin;
@@ -262,8 +259,11 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   PetscCall(SNESLineSearchGetVecs(ls, &X, &F, &Y, NULL, NULL));
   PetscCall(SNESLineSearchGetNorms(ls, &xnorm, &fnorm, &ynorm));
   PetscCall(SNESLineSearchSetReason(ls, SNES_LINESEARCH_SUCCEEDED));
-  PetscCall(VecAXPY(X, -1, Y));
-  PetscCall(CountCorrection(ts, X, Y));
+  if (I.mode == Mode::Start) {
+    PetscCall(VecAXPY(X, -1, Y));
+    PetscCall(RelativeNorm(X, Y, &e));
+  } else PetscCall(SubtractCorrection(ts, X, Y, &e));
+  PetscCall(CountCorrection(ts, e));
   monitors = snes->numbermonitors;
   if (!I.corrector.reason || monitors) {
     PetscCall(SNESComputeFunction(snes, X, F));
@@ -279,6 +279,7 @@ PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, Pet
   TS          ts = (TS)ctx;
   Integrator &I  = Get(ts);
   Vec         X, Y;
+  PetscReal   e;
 
   PetscFunctionBegin;
   *reason = SNES_CONVERGED_ITERATING;
@@ -286,7 +287,9 @@ PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, Pet
   if (I.corrector.it < it) {
     PetscCall(SNESGetSolution(snes, &X));
     PetscCall(SNESGetSolutionUpdate(snes, &Y));
-    PetscCall(CountCorrection(ts, X, Y));
+    if (I.mode == Mode::Start) PetscCall(RelativeNorm(X, Y, &e));
+    else PetscCall(CorrectionNorm(ts, Y, &e));
+    PetscCall(CountCorrection(ts, e));
   }
   *reason = I.corrector.reason;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -17,6 +17,7 @@
   by X in D_c. Nothing is divided by h: for h -> 0 it tends to [M Phi_q^T; Phi_q 0].
 */
 #include "impl.h"
+#include "sweeps.h"
 
 namespace hht3
 {
@@ -53,45 +54,106 @@ void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScal
 }
 
 struct Ends { /* of the step, read-only */
-  const PetscScalar *u0, *v0, *a0, *x0, *dv = nullptr, *bend = nullptr;
+  const PetscScalar *u0, *v0, *a0, *x0;
 };
 
 /* The parts of U1, V1, A1 that do not depend on X, from (2) and from the average that the form asks for. a_n and w_n were made
    by a step of length h_last; their lag behind the true values is stretched to the present h, without which a change of h
    costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true value, so that nothing
-   changes. */
-void StepBase(const Integrator &I, PetscInt n, const Ends &e, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+   changes. v0 is q'_n as the step takes it, see VelocitiesAtBegin(). */
+template <bool all>
+struct BaseOfCoordinates {
+  Parameters         p;
+  PetscReal          h, r, cn, c0;
+  Ends               e;
+  const PetscScalar *moves;
+  PetscScalar       *u, *v, *a;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    const Four zero = {0, 0, 0, 0}, a0 = at.get(e.a0), an = a0 + r * (at.get(e.x0) - a0), v0 = at.get(e.v0);
+    Four       u1 = at.get(e.u0) + h * (v0 + h * ((PetscReal)0.5 - p.beta) * an), v1 = v0 + h * (1 - p.gamma) * an, a1 = cn * an - c0 * a0;
+    if (!all) {
+      const auto moving = at.get(moves) != 0;
+      u1                = moving ? u1 : zero;
+      v1                = moving ? v1 : zero;
+      a1                = moving ? a1 : zero;
+    }
+    at.put(u, u1);
+    at.put(v, v1);
+    at.put(a, a1);
+  }
+};
+
+void BaseOfStates(const Integrator &I, const Ends &e, PetscScalar *const b[])
 {
   const Parameters &p = I.p;
   const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1;
-  const bool        paper = I.form == TSHHT3_FORM_PAPER;
-  const PetscReal   bent = I.p.bend() * h * h;
-  const PetscReal   cn = paper ? 0 : p.am / (1 - p.af), c0 = paper ? 0 : p.af / (1 - p.af);
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role role = RoleOf(I, i);
-    if (role == TSHHT3_COORDINATE) {
-      const PetscScalar an = e.a0[i] + r * (e.x0[i] - e.a0[i]);
-      PetscScalar       v0 = e.dv ? e.v0[i] - I.misfit * e.dv[i] : e.v0[i];
-      if (e.bend) v0 -= bent * e.bend[i];
-      u[i]                 = NewmarkPosition(p, h, e.u0[i], v0, an, 0);
-      v[i]                 = NewmarkVelocity(p, h, v0, an, 0);
-      a[i]                 = cn * an - c0 * e.a0[i];
-    } else if (role == TSHHT3_STATE) {
-      const PetscScalar wn = e.v0[i] + r * (e.x0[i] - e.v0[i]);
-      u[i]                 = e.u0[i] + h * (1 - p.gamma_s) * wn;
-      v[i]                 = (p.am_s * wn - p.af_s * e.v0[i]) / (1 - p.af_s);
-      a[i]                 = 0;
-    } else u[i] = v[i] = a[i] = 0;
+  for (PetscInt i : I.states) {
+    const PetscScalar wn = e.v0[i] + r * (e.x0[i] - e.v0[i]);
+    b[0][i]              = e.u0[i] + h * (1 - p.gamma_s) * wn;
+    b[1][i]              = (p.am_s * wn - p.af_s * e.v0[i]) / (1 - p.af_s);
   }
 }
 
-/* y = base + slope x, entry by entry or with one slope for all */
-void Line(PetscInt n, const PetscScalar *PETSC_RESTRICT base, const PetscScalar *PETSC_RESTRICT slope, PetscReal one, const PetscScalar *PETSC_RESTRICT x, PetscScalar *PETSC_RESTRICT y)
+/* q'_n less its misfit and what a change of coordinates has bent, misfit.cpp */
+PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 {
-  if (slope)
-    for (PetscInt i = 0; i < n; i++) y[i] = base[i] + slope[i] * x[i];
-  else
-    for (PetscInt i = 0; i < n; i++) y[i] = base[i] + one * x[i];
+  PetscFunctionBegin;
+  if (I.misfit != 0) PetscCall(VecWAXPY(v, -I.misfit, I.dV, I.V0));
+  else PetscCall(VecCopy(I.V0, v));
+  if (I.bent == Bend::Velocities) PetscCall(VecAXPY(v, -I.p.bend() * I.h * I.h, I.bend));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U1, V1, A1 = base + X times their derivatives by X; of what is no coordinate U1 is X itself */
+template <bool all>
+struct Stage {
+  PetscReal          kq, kv, ka;
+  const PetscScalar *x, *moves, *base[3];
+  PetscScalar       *to[3];
+
+  template <class At>
+  HHT3_INLINE void set(const At &at, const Four &given) const
+  {
+    const Four c = all ? given : given * at.get(moves);
+    Four       u = at.get(base[0]) + kq * c;
+    if (!all) u += given - c;
+    at.put(to[0], u);
+    at.put(to[1], at.get(base[1]) + kv * c);
+    at.put(to[2], at.get(base[2]) + ka * c);
+  }
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const { set(at, at.get(x)); }
+};
+
+/* The same after X = X - d, and the squares of d by the weights */
+template <bool all>
+struct CorrectedStage {
+  Stage<all>         stage;
+  const PetscScalar *d, *w;
+  PetscScalar       *x;
+  Four               sum = {0, 0, 0, 0};
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at)
+  {
+    const Four correction = at.get(d), weighted = correction * at.get(w), now = at.get(x) - correction;
+    sum += weighted * weighted;
+    at.put(x, now);
+    stage.set(at, now);
+  }
+};
+
+void StageOfStates(const Integrator &I, const PetscScalar *x, const PetscScalar *const base[], PetscScalar *const to[])
+{
+  const Parameters &p = I.p;
+  const PetscReal   ks = ScaleState(p, I.h), cs = (1 - p.am_s) / (1 - p.af_s);
+  for (PetscInt i : I.states) {
+    to[0][i] = base[0][i] + ks * x[i];
+    to[1][i] = base[1][i] + cs * x[i];
+  }
 }
 
 /* (9a): what the average takes from t_n. f_n is evaluated once per step, at the end of the last one */
@@ -158,30 +220,87 @@ PetscErrorCode AccelerationConstraintRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D_r, D_c = dU/dX and, in a step, dU'/dX and dU''/dX. Kept while h and the mode stay. */
-PetscErrorCode FillScalings(Integrator &I)
+/* One value for coordinates, one for all others */
+struct TwoRoles {
+  const PetscScalar *moves;
+  PetscReal          coordinate, other;
+  PetscScalar       *d;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    const Four zero = {0, 0, 0, 0};
+    at.put(d, at.get(moves) != 0 ? zero + coordinate : zero + other);
+  }
+};
+
+/* d[i] = value of the role of i */
+PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
 {
-  const Scales      s     = CurrentScales(I);
-  const Parameters &p     = I.p;
-  const PetscReal   cv    = ScaleVelocity(p, I.h), cs = (1 - p.am_s) / (1 - p.af_s), ca = p.ca();
-  Vec               to[4] = {I.row, I.col, I.slope[0], I.slope[1]};
-  PetscScalar      *x[4];
-  PetscInt          n;
+  const PetscInt n = (PetscInt)I.role.size();
+  PetscScalar   *x;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayWrite(d, &x));
+  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, TwoRoles{I.moves.data(), value[TSHHT3_COORDINATE], value[TSHHT3_HOLONOMIC], x});
+  else
+    for (PetscInt i = 0; i < n; i++) x[i] = value[I.role[i]];
+  PetscCall(VecRestoreArrayWrite(d, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* D_r; kept while h and the mode stay */
+PetscErrorCode FillRows(Integrator &I)
+{
+  const Scales s = CurrentScales(I);
+  PetscReal    value[TSHHT3_NUM_ROLES];
 
   PetscFunctionBegin;
   if (I.scaled_h == I.h && I.scaled_mode == I.mode) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetLocalSize(I.row, &n));
-  for (int k = 0; k < 4; k++) PetscCall(VecGetArrayWrite(to[k], &x[k]));
-  for (PetscInt i = 0; i < n; i++) {
-    const unsigned char role = I.role[i];
-    x[0][i] = role == TSHHT3_HOLONOMIC ? s.holonomic : role == TSHHT3_NONHOLONOMIC ? s.velocity : 1;
-    x[1][i] = role == TSHHT3_COORDINATE ? s.coordinate : role == TSHHT3_STATE ? s.state : 1;
-    x[2][i] = role == TSHHT3_COORDINATE ? cv : role == TSHHT3_STATE ? cs : 0;
-    x[3][i] = role == TSHHT3_COORDINATE ? ca : 0;
-  }
-  for (int k = 0; k < 4; k++) PetscCall(VecRestoreArrayWrite(to[k], &x[k]));
+  for (PetscReal &v : value) v = 1;
+  value[TSHHT3_HOLONOMIC]    = s.holonomic;
+  value[TSHHT3_NONHOLONOMIC] = s.velocity;
+  PetscCall(FillByRole(I, value, I.row));
   I.scaled_h    = I.h;
   I.scaled_mode = I.mode;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* D_c = dU/dX */
+PetscErrorCode FillColumns(Integrator &I)
+{
+  const Scales s = CurrentScales(I);
+  PetscReal    value[TSHHT3_NUM_ROLES];
+
+  PetscFunctionBegin;
+  for (PetscReal &v : value) v = 1;
+  value[TSHHT3_COORDINATE] = s.coordinate;
+  value[TSHHT3_STATE]      = s.state;
+  PetscCall(FillByRole(I, value, I.col));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (9b) and its velocity-level sibling: F times D_r */
+struct ScaledRows {
+  const PetscScalar *row;
+  PetscScalar       *f;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const { at.put(f, at.get(f) * at.get(row)); }
+};
+
+PetscErrorCode ScaleResidual(const Integrator &I, Vec F)
+{
+  ScaledRows s;
+  PetscInt   n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(I.row, &s.row));
+  PetscCall(VecGetArray(F, &s.f));
+  Sweep(n, s);
+  PetscCall(VecRestoreArray(F, &s.f));
+  PetscCall(VecRestoreArrayRead(I.row, &s.row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,7 +313,11 @@ PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
   if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
-  else PetscCall(MatDiagonalScale(A, I.row, I.col));
+  else {
+    PetscCall(FillRows(I));
+    PetscCall(FillColumns(I));
+    PetscCall(MatDiagonalScale(A, I.row, I.col));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -286,56 +409,141 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U1, V1, A1 = base + X times the derivatives by X */
-PetscErrorCode StageVectors(TS ts, Vec X)
-{
-  Integrator        &I        = Get(ts);
-  const PetscReal    one[3]   = {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca()};
-  Vec                slope[3] = {I.col, I.slope[0], I.slope[1]}, to[3] = {I.U1, I.V1, I.A1};
-  const PetscScalar *x, *base, *s = nullptr;
-  PetscScalar       *y[3];
+/* The arrays of a stage but X */
+struct StageArrays {
+  const PetscScalar *base[3];
+  PetscScalar       *to[3];
   PetscInt           n;
+};
+
+static PetscErrorCode GetStage(const Integrator &I, StageArrays *s)
+{
+  Vec to[3] = {I.U1, I.V1, I.A1};
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetLocalSize(I.U1, &s->n));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(I.base[k], &s->base[k]));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(to[k], &s->to[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RestoreStage(const Integrator &I, StageArrays *s)
+{
+  Vec to[3] = {I.U1, I.V1, I.A1};
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &s->to[k]));
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(I.base[k], &s->base[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+template <bool all>
+static Stage<all> MakeStage(const Integrator &I, const StageArrays &s, const PetscScalar *x)
+{
+  return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, I.moves.data(), {s.base[0], s.base[1], s.base[2]}, {s.to[0], s.to[1], s.to[2]}};
+}
+
+/* Remembers that U1, V1, A1 belong to X */
+static PetscErrorCode NoteStage(Integrator &I, Vec X)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)X, &I.stage_id));
+  PetscCall(PetscObjectStateGet((PetscObject)X, &I.stage_state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode HasStage(const Integrator &I, Vec X, bool *has)
+{
+  PetscObjectId    id;
+  PetscObjectState state;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)X, &id));
+  PetscCall(PetscObjectStateGet((PetscObject)X, &state));
+  *has = I.mode == Mode::Step && id == I.stage_id && state == I.stage_state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U1, V1, A1 from X; to be called after PrepareStage() */
+PetscErrorCode StageVectors(TS ts, Vec X)
+{
+  Integrator        &I = Get(ts);
+  StageArrays        s;
+  const PetscScalar *x;
+  bool               has;
+
+  PetscFunctionBegin;
+  PetscCall(HasStage(I, X, &has));
+  if (has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArrayRead(X, &x));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(to[k], &y[k]));
-  if (I.mode == Mode::Start) StartStage(I, n, x, y[0], y[1], y[2]);
-  else
-    for (int k = 0; k < 3; k++) {
-      PetscCall(VecGetArrayRead(I.base[k], &base));
-      if (!I.coordinatesAlone()) PetscCall(VecGetArrayRead(slope[k], &s));
-      Line(n, base, s, one[k], x, y[k]);
-      if (!I.coordinatesAlone()) PetscCall(VecRestoreArrayRead(slope[k], &s));
-      PetscCall(VecRestoreArrayRead(I.base[k], &base));
-    }
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &y[k]));
+  PetscCall(GetStage(I, &s));
+  if (I.mode == Mode::Start) StartStage(I, s.n, x, s.to[0], s.to[1], s.to[2]);
+  else {
+    if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
+    else Sweep(s.n, MakeStage<false>(I, s, x));
+    StageOfStates(I, x, s.base, s.to);
+    PetscCall(NoteStage(I, X));
+  }
+  PetscCall(RestoreStage(I, &s));
   PetscCall(VecRestoreArrayRead(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X = X - dX, the norm of dX by which the corrector judges it, and U1, V1, A1 that belong to the new X, in one sweep */
+PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
+{
+  Integrator        &I = Get(ts);
+  StageArrays        s;
+  const PetscScalar *d, *w;
+  PetscScalar       *x;
+  Four               sum;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(X, &x));
+  PetscCall(VecGetArrayRead(dX, &d));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  PetscCall(GetStage(I, &s));
+  if (I.moves.empty()) sum = Sweep(s.n, CorrectedStage<true>{MakeStage<true>(I, s, x), d, w, x}).sum;
+  else sum = Sweep(s.n, CorrectedStage<false>{MakeStage<false>(I, s, x), d, w, x}).sum;
+  StageOfStates(I, x, s.base, s.to);
+  PetscCall(RestoreStage(I, &s));
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArrayRead(dX, &d));
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(NoteStage(I, X));
+  PetscCall(ReduceCorrection(ts, dX, Total(sum), e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual */
 PetscErrorCode PrepareStage(TS ts)
 {
-  Integrator  &I = Get(ts);
-  Ends         e;
-  PetscScalar *b[3];
-  PetscInt     n;
+  Integrator     &I = Get(ts);
+  const bool      paper = I.form == TSHHT3_FORM_PAPER, changed = I.misfit != 0 || I.bent == Bend::Velocities;
+  const PetscReal cn = paper ? 0 : I.p.am / (1 - I.p.af), c0 = paper ? 0 : I.p.af / (1 - I.p.af);
+  Ends            e;
+  PetscScalar    *b[3];
+  PetscInt        n;
 
   PetscFunctionBegin;
-  if (!I.coordinatesAlone()) PetscCall(FillScalings(I));
+  I.stage_id = 0;
+  if (I.constraints()) PetscCall(FillRows(I));
+  if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
   PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));
   PetscCall(VecGetArrayRead(I.V0, &e.v0));
   PetscCall(VecGetArrayRead(I.A0, &e.a0));
   PetscCall(VecGetArrayRead(I.X0, &e.x0));
-  if (I.misfit != 0) PetscCall(VecGetArrayRead(I.dV, &e.dv));
-  if (I.bent == Bend::Velocities) PetscCall(VecGetArrayRead(I.bend, &e.bend));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(I.base[k], &b[k]));
-  StepBase(I, n, e, b[0], b[1], b[2]);
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayWrite(I.base[k], &b[k]));
-  if (I.bent == Bend::Velocities) PetscCall(VecRestoreArrayRead(I.bend, &e.bend));
-  if (I.misfit != 0) PetscCall(VecRestoreArrayRead(I.dV, &e.dv));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &b[k]));
+  const auto sweep = [&](auto base) {
+    base = {I.p, I.h, I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), b[0], b[1], b[2]};
+    if (changed) base.e.v0 = b[1];
+    Sweep(n, base);
+  };
+  if (I.moves.empty()) sweep(BaseOfCoordinates<true>());
+  else sweep(BaseOfCoordinates<false>());
+  BaseOfStates(I, e, b);
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(I.base[k], &b[k]));
   PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
   PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
   PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
@@ -358,7 +566,7 @@ PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
     if (I.definitions_use_acceleration) PetscCall(TrueAccelerationRows(ts, X, F));
     PetscCall(AddOldForces(I, F));
   }
-  if (I.constraints()) PetscCall(VecPointwiseMult(F, F, I.row)); /* (9b) and its velocity-level sibling */
+  if (I.constraints()) PetscCall(ScaleResidual(I, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,7 +586,6 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
     if (I.mode == Mode::Step && I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
-    if (!I.coordinatesAlone()) PetscCall(FillScalings(I));
     PetscCall(ScaleMatrix(I, P));
     if (J != P) PetscCall(ScaleMatrix(I, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));

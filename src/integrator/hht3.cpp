@@ -51,7 +51,6 @@ PetscErrorCode AllocateForRoles(TS ts)
   if (!I.coordinatesAlone() && !I.row) {
     PetscCall(VecDuplicate(ts->vec_sol, &I.row));
     PetscCall(VecDuplicate(ts->vec_sol, &I.col));
-    for (Vec &v : I.slope) PetscCall(VecDuplicate(ts->vec_sol, &v));
     PetscCall(VecDuplicate(ts->vec_sol, &I.work));
   }
   if (I.form == TSHHT3_FORM_PAPER && I.alpha != 0 && !I.F0) PetscCall(VecDuplicate(ts->vec_sol, &I.F0));
@@ -160,13 +159,15 @@ PetscErrorCode Reset(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.slope[0], &I.slope[1], &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
   if (!I.is_set)
     for (IS &is : I.is) PetscCall(ISDestroy(&is));
   I.role.clear();
+  I.moves.clear();
+  I.states.clear();
   I.corrector.have_matrix = PETSC_FALSE;
   I.corrector.want_matrix = PETSC_TRUE;
   I.have_step             = PETSC_FALSE;

@@ -96,16 +96,19 @@ struct Integrator {
   IS                         is[TSHHT3_NUM_ROLES] = {};
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
+  std::vector<PetscScalar>   moves;  /* 1 for coordinates, 0 for others: for sweeps without branches */
+  std::vector<PetscInt>      states; /* local unknowns that are first-order states */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
   PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
   /* the same answer on every rank, also on one without unknowns, whose list of roles is empty too */
-  bool coordinatesAlone() const
+  bool coordinatesAnd(TSHHT3Role other) const
   {
     for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
-      if (r != TSHHT3_COORDINATE && count[r]) return false;
+      if (r != TSHHT3_COORDINATE && r != other && count[r]) return false;
     return true;
   }
+  bool coordinatesAlone() const { return coordinatesAnd(TSHHT3_COORDINATE); }
 
   /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
@@ -120,7 +123,9 @@ struct Integrator {
   PetscReal h_last = 0;
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
-  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see StepBase() */
+  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see BaseOfCoordinates */
+  PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
+  PetscObjectState stage_state = 0;
   PetscReal t0 = 0, t1 = 0, h = 0;
   Mode      mode = Mode::Step;
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
@@ -132,8 +137,7 @@ struct Integrator {
 
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
-  Vec           slope[2] = {};                /* dU'/dX, dU''/dX; col is dU/dX */
-  PetscReal     scaled_h = 0;                 /* for which they stand */
+  PetscReal     scaled_h = 0;                 /* for which row stands */
   Mode          scaled_mode = Mode::Step;
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
@@ -205,6 +209,7 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode PrepareStage(TS ts);
 PetscErrorCode StageVectors(TS ts, Vec X);
+PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 /* corrector.cpp */
@@ -216,6 +221,7 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 PetscErrorCode FreshMatrixNextIteration(TS ts);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);
+PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
 PetscErrorCode NoteError(TS ts);
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);

@@ -9,6 +9,7 @@
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
 #include "impl.h"
+#include "sweeps.h"
 
 namespace hht3
 {
@@ -20,38 +21,85 @@ constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less th
 
 /* New differences from the old ones and the new values x, in place; misses of the degrees 0..have, squared. Weights of
    unknowns that do not count are zero. The number of differences is a template's, for a loop without inner branches. */
-template <int have>
-void SweepFixed(PetscInt n, bool grow, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
-{
-  PetscReal    inverse[have + 1], sum[have + 1] = {};
-  PetscScalar *d[have + 1], *const next = grow ? D[have + 1] : nullptr;
-  for (int k = 0; k <= have; k++) {
-    inverse[k] = 1 / span[k];
-    d[k]       = D[k];
-  }
-  for (PetscInt i = 0; i < n; i++) {
-    PetscScalar fresh = x[i];
+template <int have, bool grow>
+struct Renewal {
+  const PetscScalar *x, *w;
+  PetscScalar       *D[have + 2];
+  PetscReal          inverse[have + 1]; /* of the times that the differences span */
+  Four               sum[have + 1] = {};
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at)
+  {
+    const Four weight = at.get(w);
+    Four       fresh  = at.get(x);
     for (int k = 0; k <= have; k++) {
-      const PetscScalar old = d[k][i];
-      d[k][i]               = fresh;
-      fresh                 = (fresh - old) * inverse[k];
-      sum[k] += PetscSqr(PetscRealPart(fresh * w[i]));
+      const Four old = at.get(D[k]);
+      at.put(D[k], fresh);
+      fresh            = (fresh - old) * inverse[k];
+      const Four missed = fresh * weight;
+      sum[k] += missed * missed;
     }
-    if (next) next[i] = fresh;
+    if (grow) at.put(D[have + 1], fresh);
   }
-  for (int k = 0; k <= have; k++) miss[k] = sum[k];
+};
+
+template <int have, bool grow>
+void Renew(PetscInt n, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+{
+  Renewal<have, grow> r;
+  r.x = x;
+  r.w = w;
+  for (int k = 0; k <= have; k++) r.inverse[k] = 1 / span[k];
+  for (int k = 0; k <= (grow ? have + 1 : have); k++) r.D[k] = D[k];
+  r = Sweep(n, r);
+  for (int k = 0; k <= have; k++) miss[k] = Total(r.sum[k]);
 }
 
-void Sweep(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
+void RenewDifferences(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
 {
   static_assert(max_degree == 3, "one case for each number of differences");
   const bool grow = have < keep;
   switch (have) {
-  case 0: SweepFixed<0>(n, grow, span, x, D, w, miss); break;
-  case 1: SweepFixed<1>(n, grow, span, x, D, w, miss); break;
-  case 2: SweepFixed<2>(n, grow, span, x, D, w, miss); break;
-  default: SweepFixed<3>(n, false, span, x, D, w, miss); break;
+  case 0: (grow ? Renew<0, true> : Renew<0, false>)(n, span, x, D, w, miss); break;
+  case 1: (grow ? Renew<1, true> : Renew<1, false>)(n, span, x, D, w, miss); break;
+  case 2: (grow ? Renew<2, true> : Renew<2, false>)(n, span, x, D, w, miss); break;
+  default: Renew<3, false>(n, span, x, D, w, miss); break;
   }
+}
+
+/* x = D_0 + factor_1 D_1 + ... */
+template <int degree>
+struct Extrapolation {
+  const PetscScalar *D[degree + 1];
+  PetscReal          factor[degree + 1];
+  PetscScalar       *x;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    Four sum = at.get(D[0]);
+    for (int k = 1; k <= degree; k++) sum += factor[k] * at.get(D[k]);
+    at.put(x, sum);
+  }
+};
+
+template <int degree>
+PetscErrorCode Extrapolate(const Predictor &p, PetscReal t, Vec X)
+{
+  Extrapolation<degree> e;
+  PetscInt              n;
+
+  PetscFunctionBegin;
+  e.factor[0] = 1;
+  for (int k = 1; k <= degree; k++) e.factor[k] = e.factor[k - 1] * (t - p.t[k - 1]);
+  PetscCall(VecGetLocalSize(X, &n));
+  for (int k = 0; k <= degree; k++) PetscCall(VecGetArrayRead(p.D[k], &e.D[k]));
+  PetscCall(VecGetArrayWrite(X, &e.x));
+  Sweep(n, e);
+  PetscCall(VecRestoreArrayWrite(X, &e.x));
+  for (int k = 0; k <= degree; k++) PetscCall(VecRestoreArrayRead(p.D[k], &e.D[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The new values: a, lambda, V, F as they are, of states s' */
@@ -59,36 +107,30 @@ PetscErrorCode TrueValues(const Integrator &I, Vec x)
 {
   const PetscScalar *v;
   PetscScalar       *a;
-  PetscInt           n;
 
   PetscFunctionBegin;
   PetscCall(VecCopy(I.X, x));
-  PetscCall(VecGetLocalSize(x, &n));
   PetscCall(VecGetArrayRead(I.V1, &v));
   PetscCall(VecGetArray(x, &a));
-  for (PetscInt i = 0; i < n; i++)
-    if (I.role[i] == TSHHT3_STATE) a[i] = v[i];
+  for (PetscInt i : I.states) a[i] = v[i];
   PetscCall(VecRestoreArray(x, &a));
   PetscCall(VecRestoreArrayRead(I.V1, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predicted s' at t1 to the algorithmic w that gives it: the average of StepStage() in equations.cpp, solved for w */
+/* Predicted s' at t1 to the algorithmic w that gives it: the average of StageOfStates() in equations.cpp, solved for w */
 PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
 {
   const Parameters  &p = I.p;
   const PetscReal    r = I.h_last > 0 ? I.h / I.h_last : 1;
   const PetscScalar *v0, *x0;
   PetscScalar       *x;
-  PetscInt           n;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(X, &n));
   PetscCall(VecGetArrayRead(I.V0, &v0));
   PetscCall(VecGetArrayRead(I.X0, &x0));
   PetscCall(VecGetArray(X, &x));
-  for (PetscInt i = 0; i < n; i++)
-    if (I.role[i] == TSHHT3_STATE) x[i] = ((1 - p.af_s) * x[i] + p.af_s * v0[i] - p.am_s * (v0[i] + r * (x0[i] - v0[i]))) / (1 - p.am_s);
+  for (PetscInt i : I.states) x[i] = ((1 - p.af_s) * x[i] + p.af_s * v0[i] - p.am_s * (v0[i] + r * (x0[i] - v0[i]))) / (1 - p.am_s);
   PetscCall(VecRestoreArray(X, &x));
   PetscCall(VecRestoreArrayRead(I.X0, &x0));
   PetscCall(VecRestoreArrayRead(I.V0, &v0));
@@ -113,14 +155,15 @@ PetscErrorCode Predict(TS ts, Vec X)
 {
   Integrator  &I = Get(ts);
   Predictor   &p = I.predictor;
-  PetscReal    factor = 1;
-  PetscScalar  coef[max_degree];
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
-  PetscCall(VecCopy(p.D[0], X));
-  for (PetscInt k = 0; k < p.degree; k++) coef[k] = factor *= I.t1 - p.t[k];
-  if (p.degree) PetscCall(VecMAXPY(X, p.degree, coef, &p.D[1]));
+  switch (p.degree) {
+  case 0: PetscCall(VecCopy(p.D[0], X)); break;
+  case 1: PetscCall(Extrapolate<1>(p, I.t1, X)); break;
+  case 2: PetscCall(Extrapolate<2>(p, I.t1, X)); break;
+  default: PetscCall(Extrapolate<3>(p, I.t1, X)); break;
+  }
   if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -149,7 +192,7 @@ PetscErrorCode PredictorUpdate(TS ts)
   PetscCall(VecGetArrayRead(now, &x));
   PetscCall(VecGetArrayRead(I.weight, &w));
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecGetArray(p.D[k], &D[k]));
-  Sweep(n, have, keep, span, x, D, w, miss);
+  RenewDifferences(n, have, keep, span, x, D, w, miss);
   for (PetscInt k = 0; k <= keep; k++) PetscCall(VecRestoreArray(p.D[k], &D[k]));
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArrayRead(now, &x));

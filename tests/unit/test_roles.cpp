@@ -102,6 +102,8 @@ TEST(Roles, AnODECarriesNoRoleMachinery)
   must(run.solve());
   const hht3::Integrator &I = hht3::Get(run.ts);
   EXPECT_TRUE(I.role.empty());
+  EXPECT_TRUE(I.moves.empty());
+  EXPECT_TRUE(I.states.empty());
   EXPECT_EQ(I.row, nullptr);
   EXPECT_EQ(I.col, nullptr);
   EXPECT_EQ(I.gamma, nullptr);
