@@ -18,6 +18,9 @@
  */
 static const double GROWTH = 100;
 
+/* Pivots as planned are good enough where no entry grows more than so (the reciprocal) */
+static const double PLANNED_GROWTH = 0.01;
+
 static KluPair *Data(Mat F) { return static_cast<KluPair *>(F->data); }
 
 /* ---- rows of the matrix ---- */
@@ -48,6 +51,8 @@ static PetscErrorCode Analyse(Mat A, const LinearRows &rows, KluPair *k)
 {
   PetscFunctionBegin;
   PetscCall(KluPairAnalyse(A, rows, k));
+  k->panels.reset();
+  k->panels_looked = k->panels_used = k->plan_tried = false;
   k->start.assign(rows.start, rows.start + rows.n + 1);
   k->col.assign(rows.col, rows.col + rows.start[rows.n]);
   PetscCall(PetscObjectGetId((PetscObject)A, &k->matrix));
@@ -89,22 +94,29 @@ static double ReciprocalGrowth(const LinearRows &rows, KluPair *k)
   return k->common.rgrowth;
 }
 
-/* Panels are built when pivots are kept for the first time. Row scaling and the interface of kluparts want KLU's
- * factors.
- */
+/* Row scaling and the interface of kluparts want KLU's factors */
+static bool PanelsAllowed(const KluPair *k) { return k->panels_wanted && !k->whole && !(k->common.scale > 0); }
+
+static PetscErrorCode ReportPanels(Mat F, const KluPanels &p)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(F, "%zu panels with %g entries, %g operations, estimated at %g s; KLU at %g s\n", p.panel.size(),
+                      p.entries, p.flops, p.seconds, p.scalar));
+  PetscFunctionReturn(0);
+}
+
+/* Panels for KLU's pivots are built when these are kept for the first time */
 static PetscErrorCode FindPanels(Mat F, const LinearRows &rows, KluPair *k)
 {
   bool pays;
 
   PetscFunctionBegin;
-  if (k->panels_looked || !k->panels_wanted || k->whole || k->common.scale > 0) PetscFunctionReturn(0);
+  if (k->panels_looked || !PanelsAllowed(k)) PetscFunctionReturn(0);
   if (k->rejected > k->refactorizations) PetscFunctionReturn(0); /* pivots are not kept for long */
   k->panels_looked = true;
   k->panels        = std::make_shared<KluPanels>();
   PetscCall(KluPanelsBuild(rows, k, k->panels.get(), &pays));
-  const KluPanels &p = *k->panels;
-  PetscCall(PetscInfo(F, "%zu panels with %g entries, %g operations, estimated at %g s; KLU at %g s\n", p.panel.size(),
-                      p.entries, p.flops, p.seconds, p.scalar));
+  PetscCall(ReportPanels(F, *k->panels));
   if (!pays) k->panels.reset();
   PetscFunctionReturn(0);
 }
@@ -131,7 +143,7 @@ static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
 
   PetscFunctionBegin;
   *good = false;
-  if (!k->numeric || !k->refactor) PetscFunctionReturn(0);
+  if (!k->factored() || !k->refactor) PetscFunctionReturn(0);
   PetscCall(FindPanels(F, rows, k));
   PetscCall(FactorWithOldPivots(rows, k, &growth));
   *good = growth > 0 && growth * GROWTH >= k->growth;
@@ -141,6 +153,30 @@ static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
     ++k->refactorizations;
   else
     ++k->rejected;
+  PetscFunctionReturn(0);
+}
+
+/* The first factorization after an analysis, by panels where they pay at once */
+static PetscErrorCode FactorAsPlanned(Mat F, const LinearRows &rows, bool *good)
+{
+  KluPair *k = Data(F);
+
+  PetscFunctionBegin;
+  *good = false;
+  if (k->factored() || k->plan_tried || !k->refactor || !PanelsAllowed(k)) PetscFunctionReturn(0);
+  k->plan_tried     = true;
+  const auto panels = std::make_shared<KluPanels>();
+  KluPanelsPlan(rows, *k, panels.get(), good);
+  if (!*good) PetscFunctionReturn(0);
+  PetscCall(ReportPanels(F, *panels));
+  PetscCall(KluPanelsFactor(rows, panels.get(), &k->growth));
+  *good = k->growth >= PLANNED_GROWTH;
+  PetscCall(PetscInfo(F, "Pivots as planned %s: reciprocal growth %g\n", *good ? "taken" : "not good enough", k->growth));
+  if (!*good) PetscFunctionReturn(0);
+  k->panels        = panels;
+  k->panels_looked = k->panels_used = true;
+  ++k->panels_made;
+  ++k->factorizations;
   PetscFunctionReturn(0);
 }
 
@@ -184,7 +220,7 @@ static PetscErrorCode ReportError(Mat F, Mat A)
   KluPair *k = Data(F);
 
   PetscFunctionBegin;
-  if (k->numeric && k->growth > 0) PetscFunctionReturn(0);
+  if (k->factored() && k->growth > 0) PetscFunctionReturn(0);
   KLU(free_numeric)(&k->numeric, &k->common);
   if (k->common.status < 0) {
     PetscCheck(!A->erroriffailure, PETSC_COMM_SELF, PETSC_ERR_LIB,
@@ -220,6 +256,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(SamePattern(A, rows, k, &same));
   if (!same) PetscCall(Analyse(A, rows, k));
   PetscCall(Refactor(F, rows, &good));
+  if (!good) PetscCall(FactorAsPlanned(F, rows, &good));
   if (!good) {
     PetscCall(FactorWithPivoting(rows, k));
     PetscCall(PlanAnew(F, A, rows));
@@ -227,7 +264,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(KluPairRestoreRows(A, &rows));
   PetscCall(ReportError(F, A));
   F->assembled = PETSC_TRUE;
-  if (k->numeric) PetscCall(PetscLogFlops(k->panels_used ? k->panels->flops : k->common.flops));
+  if (k->factored()) PetscCall(PetscLogFlops(k->panels_used ? k->panels->flops : k->common.flops));
   PetscFunctionReturn(0);
 }
 
@@ -239,7 +276,7 @@ static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
   PetscScalar *array;
 
   PetscFunctionBegin;
-  if (F->factorerrortype || !k->numeric) {
+  if (F->factorerrortype || !k->factored()) {
     PetscCall(PetscInfo(F, "Solve with a factor that failed: the result is Inf\n"));
     PetscCall(VecSet(x, PETSC_INFINITY));
     PetscFunctionReturn(0);

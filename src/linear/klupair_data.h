@@ -47,11 +47,13 @@ struct KluPair {
   const char  *ordering_used = "";
   double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
   double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
-  /* Dense panels for the pivots of `numeric`; its own values are old while panels_used */
+  /* Dense panels for the pivots of `numeric`, whose own values are old while panels_used, or without it for those planned */
   std::shared_ptr<KluPanels> panels;
   PetscBool                  panels_wanted = PETSC_TRUE;
-  bool                       panels_looked = false, panels_used = false;
+  bool                       panels_looked = false, panels_used = false, plan_tried = false;
   PetscInt                   panels_made = 0; /* factorizations by panels */
+
+  bool factored() const { return numeric || panels_used; }
 
   PetscInt analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
 };

@@ -2,9 +2,10 @@
   The factors of "klupair" as dense panels, for matrices with dense parts: a block of modes, constraints that act on all
   of them.
 
-  KLU goes through L and U entry by entry with an index each. Here KLU still plans and finds the pivots in its first
-  factorization; where much of the work lies in columns of the same structure, the following factorizations with these
-  pivots, and all solves, go by panels of such columns with dense algebra (BLAS).
+  KLU goes through L and U entry by entry with an index each. Where much of the work lies in columns of the same structure,
+  factorizations and solves go by panels of such columns with dense algebra (BLAS). Pivots are those planned for KLU, with
+  row exchanges inside of panels; where entries grow with them, or where this promises little, KLU finds the pivots in its
+  first factorization, and the following ones go by panels with these.
 
   M is the transpose of the PETSc matrix, as KLU sees it, and a place is one in the pivots' order. A panel is a range K
   of places whose pivots have much the same structure by the elimination tree of M(P,Q) + its transpose, in postorder,
@@ -57,7 +58,6 @@ struct KluPanels {
   std::vector<PetscInt>       exchange;           /* LAPACK's row exchanges in the diagonal block of each panel */
   std::vector<PetscInt>       run_start; /* of each place: which runs its column has; other entries go one by one */
   std::vector<KluRun>         run;
-  std::vector<char>           contributes; /* of each place: neither its part of `lower` below K nor that of `upper` is zero */
   size_t                      outer_values = 0;   /* where the values between diagonal blocks begin */
   std::vector<double>         value;
 
@@ -71,6 +71,9 @@ struct KluPanels {
 
 /* *pays tells whether the factors of `numeric` are worth panels; only then they are built. Their values come later. */
 PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *panels, bool *pays);
+
+/* The same for the pivots as planned, before KLU has factored anything */
+void KluPanelsPlan(const LinearRows &rows, const KluPair &k, KluPanels *panels, bool *pays);
 
 /* row_of gets K and R, col_of K and C of this panel */
 void KluPanelsSetPlaces(const KluPanel &panel, KluPanels *panels);

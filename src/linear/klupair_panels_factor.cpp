@@ -182,6 +182,21 @@ static void FindReached(Work *w, const KluPanels &p)
   }
 }
 
+/* Columns from the first one on that do, or do not, contribute: the part that counts is zero neither in `lower` nor in
+   `upper` */
+static PetscInt Alike(const Source &v, PetscInt first, PetscInt end, bool *live)
+{
+  const auto zero        = [](double e) { return e == 0; };
+  const auto contributes = [&](PetscInt c) {
+    const double *x = v.lower + (size_t)c * v.ld_lower, *y = v.upper + (size_t)c * v.ld_upper;
+    return !std::all_of(x, x + v.rows, zero) && !std::all_of(y, y + v.cols, zero);
+  };
+  PetscInt last = first + 1;
+  *live         = contributes(first);
+  while (last < end && contributes(last) == *live) ++last;
+  return last - first;
+}
+
 static PetscErrorCode Collect(Work *w, KluPanels *p)
 {
   PetscFunctionBegin;
@@ -193,12 +208,11 @@ static PetscErrorCode Collect(Work *w, KluPanels *p)
       PetscCall(Scatter(v, *w, p));
       continue;
     }
-    const char *contributes = p->contributes.data() + p->panel[p->source[k].panel].first;
     for (PetscInt done = 0, count; done < v.width; done += count) {
+      bool live;
       if (w->columns == SIDE_BY_SIDE) PetscCall(Multiply(w, p));
-      const PetscInt room = PetscMin(v.width - done, SIDE_BY_SIDE - (PetscInt)w->columns);
-      count               = (PetscInt)(std::find(contributes + done, contributes + done + room, !contributes[done]) - contributes) - done;
-      if (!contributes[done]) continue;
+      count = Alike(v, done, PetscMin(v.width, done + SIDE_BY_SIDE - (PetscInt)w->columns), &live);
+      if (!live) continue;
       Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->rows,
              p->left.data() + (size_t)w->columns * w->rows.count());
       Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->cols,
@@ -252,10 +266,6 @@ static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
     KluPanelsDivideNarrow(n, a, w.left, x, rows, y, cols);
   else
     PetscCall(DivideWide(w.width, a, w.left, x, (Int)rows, y, (Int)cols));
-  const auto zero = [](double e) { return e == 0; };
-  for (PetscInt k = 0; k < n; ++k)
-    p->contributes[w.q->first + k] = !std::all_of(x + k * w.left, x + k * w.left + rows, zero) &&
-                                     !std::all_of(y + k * cols, y + (k + 1) * cols, zero);
   PetscFunctionReturn(0);
 }
 

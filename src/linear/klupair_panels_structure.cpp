@@ -31,8 +31,9 @@ static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
 static const double KLU_OPERATION = 0.32e-9, KLU_ENTRY = 4e-9;
 static const double OPERATION = 0.045e-9, ENTRY = 3.5e-9, PANEL = 0.5e-6, SOURCE = 0.15e-6;
 
-/* Panels must promise this part of KLU's time */
-static const double GAIN = 0.7;
+/* Panels must promise this part of KLU's time. Before KLU has factored anything, so many seconds per entry that it takes
+   to build them count, too. */
+static const double GAIN = 0.7, BUILD = 20e-9;
 
 /* At the end of a diagonal block, a panel so wide that several others contribute to takes in none of them: their product
    with all the others' columns is faster than their part in the factors of a wider panel */
@@ -73,6 +74,33 @@ static PetscErrorCode Extract(KluPair *k, Pattern *pattern)
     for (KluInt e = Up[j]; e < Up[j + 1]; ++e) pattern->index[next[Ui[e]]++] = j;
   }
   PetscFunctionReturn(0);
+}
+
+/* Instead of them, where KLU has factored nothing yet: what M(P,Q) has off the diagonal, in diagonal blocks */
+static Pattern Planned(const LinearRows &rows, const KluPair &k)
+{
+  Indices row(rows.n), col(rows.n), block(rows.n), low, high;
+  Pattern pattern;
+  for (KluInt b = 0; b < k.symbolic->nblocks; ++b)
+    std::fill(block.begin() + k.symbolic->R[b], block.begin() + k.symbolic->R[b + 1], (PetscInt)b);
+  for (PetscInt i = 0; i < rows.n; ++i) {
+    row[k.symbolic->P[i]] = i;
+    col[k.symbolic->Q[i]] = i;
+  }
+  pattern.start.assign(rows.n + 1, 0);
+  for (PetscInt j = 0; j < rows.n; ++j)
+    for (PetscInt e = rows.start[j]; e < rows.start[j + 1]; ++e) {
+      const PetscInt a = row[rows.col[e]], b = col[j];
+      if (a == b || block[a] != block[b]) continue;
+      low.push_back(std::min(a, b));
+      high.push_back(std::max(a, b));
+      ++pattern.start[low.back() + 1];
+    }
+  for (PetscInt i = 0; i < rows.n; ++i) pattern.start[i + 1] += pattern.start[i];
+  pattern.index.resize(low.size());
+  Indices next(pattern.start.begin(), pattern.start.end() - 1);
+  for (size_t e = 0; e < low.size(); ++e) pattern.index[next[low[e]]++] = high[e];
+  return pattern;
 }
 
 /* ---- the symmetric structure and its elimination tree ---- */
@@ -427,14 +455,15 @@ static void Estimate(double entries, double flops, KluPanels *p)
 
 static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
 {
-  Indices block(p->n);
+  Indices       block(p->n);
+  const KluInt *row = k.numeric ? k.numeric->Pnum : k.symbolic->P;
   p->row.resize(p->n);
   p->col.resize(p->n);
   block_of->resize(p->n);
   for (KluInt b = 0; b < k.symbolic->nblocks; ++b)
     std::fill(block.begin() + k.symbolic->R[b], block.begin() + k.symbolic->R[b + 1], (PetscInt)b);
   for (PetscInt i = 0; i < p->n; ++i) {
-    p->row[i]      = k.numeric->Pnum[order[i]];
+    p->row[i]      = row[order[i]];
     p->col[i]      = k.symbolic->Q[order[i]];
     (*block_of)[i] = block[order[i]];
   }
@@ -469,28 +498,27 @@ static void Allocate(const LinearRows &rows, KluPanels *p)
   p->target.resize(rows.start[rows.n]);
   for (auto *scratch : {&p->row_of, &p->col_of, &p->exchange}) scratch->resize(p->n);
   for (auto *scratch : {&p->matrix_size, &p->factor_size, &p->x, &p->y}) scratch->resize(p->n);
-  p->contributes.resize(p->n);
 }
 
-PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, bool *pays)
+static bool WorthALook(double entries, double flops)
 {
-  Pattern      pattern;
-  Tree         tree;
-  Indices      block_of;
-  const double entries = (double)k->numeric->lnz + (double)k->numeric->unz, flops = k->common.flops;
+  return flops > LEAST_FLOPS && flops > LEAST_PER_ENTRY * entries && entries < 0.1 * PETSC_MAX_INT;
+}
 
-  PetscFunctionBegin;
-  *p    = KluPanels();
-  *pays = flops > LEAST_FLOPS && flops > LEAST_PER_ENTRY * entries && entries < 0.1 * PETSC_MAX_INT;
-  if (!*pays) PetscFunctionReturn(0);
-  p->n = rows.n;
-  PetscCall(Extract(k, &pattern));
+/* For factors of KLU with so many entries and operations */
+static void Build(const LinearRows &rows, const KluPair &k, const Pattern &pattern, double entries, double flops,
+                  KluPanels *p, bool *pays)
+{
+  Tree    tree;
+  Indices block_of;
+
+  p->n  = rows.n;
   *pays = Eliminate(pattern, 3 * entries, &tree);
-  if (!*pays) PetscFunctionReturn(0);
+  if (!*pays) return;
   const Indices order = Postorder(tree);
-  Order(*k, order, p, &block_of);
+  Order(k, order, p, &block_of);
   MakePanels(Ranges(tree, order), block_of, p);
-  const Indices of    = PanelOf(*p);
+  const Indices of = PanelOf(*p);
   SortPlaces(rows, of, p);
   const Entries e     = Place(rows, block_of, *p);
   const Reach   reach = FindReach(e, of, *p);
@@ -498,13 +526,36 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
   FindSources(reach, of, p);
   Estimate(entries, flops, p);
   *pays = p->seconds < GAIN * p->scalar && p->entries < 0.5 * PETSC_MAX_INT;
-  if (!*pays) PetscFunctionReturn(0);
+  if (!k.numeric && p->seconds + BUILD * p->entries > p->scalar) *pays = false;
+  if (!*pays) return;
   Allocate(rows, p);
   AimInner(e.inner, of, p);
   AimOuter(e.outer, p);
   FindRuns(rows, p);
   p->value.resize(p->outer_values + p->outer.size());
+}
+
+PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, bool *pays)
+{
+  Pattern      pattern;
+  const double entries = (double)k->numeric->lnz + (double)k->numeric->unz, flops = k->common.flops;
+
+  PetscFunctionBegin;
+  *p    = KluPanels();
+  *pays = WorthALook(entries, flops);
+  if (!*pays) PetscFunctionReturn(0);
+  PetscCall(Extract(k, &pattern));
+  Build(rows, *k, pattern, entries, flops, p, pays);
   PetscFunctionReturn(0);
+}
+
+void KluPanelsPlan(const LinearRows &rows, const KluPair &k, KluPanels *p, bool *pays)
+{
+  const double entries = 2 * k.work.factor, flops = 2 * k.work.flops;
+
+  *p    = KluPanels();
+  *pays = WorthALook(entries, flops) && KLU_OPERATION * flops > BUILD * entries;
+  if (*pays) Build(rows, k, Planned(rows, k), entries, flops, p, pays);
 }
 
 #endif
