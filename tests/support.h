@@ -155,7 +155,7 @@ public:
   std::function<void(Simulation &, PetscInt step, double t)> watch;
 
   Simulation(const Problem &p, const std::string &options, MPI_Comm comm = PETSC_COMM_SELF, bool setRoles = false)
-      : problem(p), options_(options)
+      : Simulation(p, options, Empty())
   {
     must(ProblemCreateTS(comm, p, &ts, &U, &V, setRoles));
     if (!setRoles) must(TSSetType(ts, TSHHT3));
@@ -216,6 +216,11 @@ public:
 
 private:
   std::string options_;
+
+  /* An object constructed by this one is destroyed even if the other constructor then throws */
+  struct Empty {
+  };
+  Simulation(const Problem &p, const std::string &options, Empty) : problem(p), options_(options) {}
 
   static PetscErrorCode monitor(TS, PetscInt step, PetscReal t, Vec, void *ctx)
   {

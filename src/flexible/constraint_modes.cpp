@@ -12,7 +12,7 @@ namespace hhtdae
 /* Inverse iteration on K + tau M: it turns to what K does not resist */
 static PetscErrorCode NullVector(const FeModel &model, const Interior &in, const BodyScales &scales, VectorXd *u)
 {
-  KSP          ksp;
+  ScopedSolver solver;
   Mat          S;
   Vec          x, y;
   PetscBool    singular;
@@ -22,8 +22,9 @@ static PetscErrorCode NullVector(const FeModel &model, const Interior &in, const
   PetscFunctionBegin;
   PetscCall(MatDuplicate(in.pencil.K, MAT_COPY_VALUES, &S));
   PetscCall(MatAXPY(S, std::max(1e-6 * scales.soft, 1e-12 * scales.stiff), in.pencil.M, DIFFERENT_NONZERO_PATTERN));
-  PetscCall(CreateSolver(model.comm, &ksp));
-  PetscCall(Factor(ksp, S, &singular, &negative));
+  PetscCall(CreateSolver(model.comm, &solver.ksp));
+  PetscCall(Factor(solver.ksp, S, &singular, &negative));
+  PetscCall(MatDestroy(&S));
   PetscCheck(!singular, model.comm, PETSC_ERR_MAT_LU_ZRPVT,
              "The attachments of the FE model depend on each other: averages over the same few nodes, or over fewer "
              "nodes than they hold motions");
@@ -33,7 +34,7 @@ static PetscErrorCode NullVector(const FeModel &model, const Interior &in, const
   PetscCall(VecRestoreArray(x, &v));
   for (int k = 0; k < 6; k++) {
     PetscCall(MatMult(in.pencil.M, x, y));
-    PetscCall(KSPSolve(ksp, y, x));
+    PetscCall(KSPSolve(solver.ksp, y, x));
     PetscCall(VecNormalize(x, nullptr));
   }
   u->setZero(3 * model.own);
@@ -42,8 +43,6 @@ static PetscErrorCode NullVector(const FeModel &model, const Interior &in, const
   PetscCall(VecRestoreArray(x, &v));
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&y));
-  PetscCall(MatDestroy(&S));
-  PetscCall(KSPDestroy(&ksp));
   PetscFunctionReturn(0);
 }
 

@@ -62,16 +62,16 @@ static PetscErrorCode FactorPhase(const FeModel &model, const Interior &in, cons
 PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                                  const BodyScales &scales, ReductionSpace *space)
 {
-  Interior    in;
-  WantedModes wanted;
-  NormalModes normal;
-  KSP         ksp;
+  Interior     in;
+  WantedModes  wanted;
+  NormalModes  normal;
+  ScopedSolver solver;
 
   PetscFunctionBegin;
   PetscCall(CreateInterior(model, tied, scales, &in));
   if (reduction.method == Method::CraigBampton) PetscCall(Want(in.pencil, reduction, model.comm, &wanted));
-  PetscCall(FactorPhase(model, in, reduction, scales, &ksp));
-  PetscCall(StartSpace(model, tied, in, reduction, ksp, space));
+  PetscCall(FactorPhase(model, in, reduction, scales, &solver.ksp));
+  PetscCall(StartSpace(model, tied, in, reduction, solver.ksp, space));
   const PetscInt constraints = (PetscInt)space->x.cols();
 
   const auto use = [&](KSP factored, NormalModes *modes) {
@@ -90,7 +90,7 @@ PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &
     space->motion.conservativeResize(Eigen::NoChange, constraints);
     PetscFunctionReturn(0);
   };
-  PetscCall(FindNormalModes(model, in.pencil, reduction, wanted, use, &ksp, &normal));
+  PetscCall(FindNormalModes(model, in.pencil, reduction, wanted, use, &solver.ksp, &normal));
   PetscCall(AddNormalModes(model, in, scales, normal, space));
   PetscFunctionReturn(0);
 }

@@ -137,10 +137,10 @@ static PetscErrorCode FillSpace(const FeModel &model, const std::vector<Tied> &t
 PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                              const BodyScales &scales, ReductionSpace *space)
 {
-  FreePencil  f;
-  KSP         ksp = nullptr;
-  WantedModes wanted;
-  NormalModes normal;
+  FreePencil   f;
+  ScopedSolver solver;
+  WantedModes  wanted;
+  NormalModes  normal;
 
   PetscFunctionBegin;
   PetscCall(CreateFreePencil(model, tied, scales, &f));
@@ -163,7 +163,7 @@ PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied
     space->x.resize(0, 0); /* the factorization that comes next needs the room */
     PetscFunctionReturn(0);
   };
-  PetscCall(FindNormalModes(model, f.pencil, reduction, wanted, use, &ksp, &normal));
+  PetscCall(FindNormalModes(model, f.pencil, reduction, wanted, use, &solver.ksp, &normal));
   PetscCall(FillSpace(model, tied, scales, f, normal, space));
   PetscFunctionReturn(0);
 }

@@ -247,11 +247,11 @@ PetscErrorCode SolveBlock(KSP ksp, const MatrixXd &F, MatrixXd *X)
   }
   PetscCall(KSPMatSolve(ksp, b, x));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(MatDestroy(&b));
+  PetscCall(MatDestroy(&x));
   PetscCheck(reason >= 0, comm, PETSC_ERR_CONV_FAILED,
              "Reduce(): the solver of -" REDUCE_PREFIX "ksp_type did not converge (%s) for constraint modes or residuals",
              KSPConvergedReasons[reason]);
-  PetscCall(MatDestroy(&b));
-  PetscCall(MatDestroy(&x));
   PetscFunctionReturn(0);
 }
 
@@ -446,15 +446,16 @@ static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, Pe
   PetscCall(EPSGetConvergedReason(eps, &reason));
   PetscCall(EPSGetConverged(eps, &converged));
   PetscCall(EPSGetIterationNumber(eps, &iterations));
-  PetscCheck(reason > 0 || converged >= count, PetscObjectComm((PetscObject)eps), PETSC_ERR_CONV_FAILED,
+  const bool good = reason > 0 || converged >= count;
+  if (good) PetscCall(Collect(eps, pencil.K, &more));
+  if (!slices) PetscCall(ReleaseSolver(eps));
+  PetscCall(EPSDestroy(&eps));
+  PetscCheck(good, PetscObjectComm((PetscObject)pencil.K), PETSC_ERR_CONV_FAILED,
              "Reduce(): %" PetscInt_FMT " of %" PetscInt_FMT " normal modes converged in %" PetscInt_FMT
              " restarts; raise -" REDUCE_PREFIX "eps_max_it or -" REDUCE_PREFIX "eps_ncv, or ask for fewer modes",
              converged, count, iterations);
-  PetscCall(Collect(eps, pencil.K, &more));
   modes->how +=
       (modes->how.empty() ? "" : " + ") + std::to_string(iterations) + (slices ? " restarts in slices" : " restarts");
-  if (!slices) PetscCall(ReleaseSolver(eps));
-  PetscCall(EPSDestroy(&eps));
   Merge(more, modes);
   PetscFunctionReturn(0);
 }

@@ -62,6 +62,15 @@ struct Pencil {
   MatrixXd rigid;                      /* own rows; no columns: none */
 };
 
+/* A solver that goes with its scope, which an error may end too */
+struct ScopedSolver {
+  KSP ksp = nullptr;
+
+  ScopedSolver() = default;
+  ~ScopedSolver() { PetscCallAbort(PETSC_COMM_SELF, KSPDestroy(&ksp)); }
+  ScopedSolver(const ScopedSolver &) = delete;
+};
+
 /* A solver with the defaults of the reduction (L D L^T by MUMPS), -reduce_... on top */
 PetscErrorCode CreateSolver(MPI_Comm comm, KSP *ksp);
 /* Factors A; *singular where the factorization met null pivots or failed. *negative: pivots, -1 if the solver does not

@@ -250,7 +250,7 @@ TEST(ReducedFile, NothingToWriteThatCannotBeRead)
   }
   {
     HandMade m(PETSC_COMM_SELF);
-    m.body.modal.moment[1].resize(3, 2);
+    m.body.modal.moment[1].conservativeResize(3, 2);
     EXPECT_SAYS(SaveRefused(m.body), "second moments of 2 modes among 4");
   }
   {

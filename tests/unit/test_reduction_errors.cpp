@@ -2,6 +2,7 @@
 #include "box_model.h"
 #include "flexible/diagnose.h"
 #include "reduction_cases.h"
+#include <petsc/private/petscimpl.h>
 
 using namespace hhtest;
 using namespace hhtdae;
@@ -9,13 +10,28 @@ using namespace hhtdae;
 namespace
 {
 
-/* The message of the error which the reduction has to end with */
+/* How many objects of PETSc there are on a communicator */
+PetscInt objects(MPI_Comm comm)
+{
+  MPI_Comm          inner;
+  PetscMPIInt       tag, found;
+  PetscCommCounter *counter;
+  must(PetscCommDuplicate(comm, &inner, &tag));
+  MPI_Comm_get_attr(inner, Petsc_Counter_keyval, &counter, &found);
+  const PetscInt count = counter->refcount - 1;
+  must(PetscCommDestroy(&inner));
+  return count;
+}
+
+/* The message of the error which the reduction has to end with; it leaves no solver or matrix behind */
 std::string failure(const FeModel &model, const Reduction &reduction)
 {
-  ErrorTrap   trap;
-  ReducedBody body;
-  const bool  failed = Reduce(model, reduction, &body) != 0;
+  ErrorTrap      trap;
+  ReducedBody    body;
+  const PetscInt before = objects(model.comm);
+  const bool     failed = Reduce(model, reduction, &body) != 0;
   EXPECT_TRUE(failed);
+  EXPECT_EQ(objects(model.comm), before) << trap.message;
   if (failed) std::printf("[ MESSAGE  ] %s\n", trap.message.c_str());
   return failed ? trap.message : "";
 }
