@@ -66,7 +66,7 @@ struct BaseOfCoordinates {
   Parameters         p;
   PetscReal          h, r, cn, c0;
   Ends               e;
-  const PetscScalar *moves;
+  const float       *moves;
   PetscScalar       *u, *v, *a;
 
   template <class At>
@@ -111,7 +111,8 @@ PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 template <bool all>
 struct Stage {
   PetscReal          kq, kv, ka;
-  const PetscScalar *x, *moves, *base[3];
+  const PetscScalar *x, *base[3];
+  const float       *moves;
   PetscScalar       *to[3];
 
   template <class At>
@@ -220,20 +221,6 @@ PetscErrorCode AccelerationConstraintRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One value for coordinates, one for all others */
-struct TwoRoles {
-  const PetscScalar *moves;
-  PetscReal          coordinate, other;
-  PetscScalar       *d;
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const
-  {
-    const Four zero = {0, 0, 0, 0};
-    at.put(d, at.get(moves) != 0 ? zero + coordinate : zero + other);
-  }
-};
-
 /* d[i] = value of the role of i */
 PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
 {
@@ -242,9 +229,7 @@ PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayWrite(d, &x));
-  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, TwoRoles{I.moves.data(), value[TSHHT3_COORDINATE], value[TSHHT3_HOLONOMIC], x});
-  else
-    for (PetscInt i = 0; i < n; i++) x[i] = value[I.role[i]];
+  for (PetscInt i = 0; i < n; i++) x[i] = value[I.role[i]];
   PetscCall(VecRestoreArrayWrite(d, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -280,7 +265,8 @@ PetscErrorCode FillColumns(Integrator &I)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (9b) and its velocity-level sibling: F times D_r */
+/* (9b) and its velocity-level sibling: F times D_r, which has one value in the rows of all constraints where there is nothing but
+   coordinates and holonomic ones */
 struct ScaledRows {
   const PetscScalar *row;
   PetscScalar       *f;
@@ -289,18 +275,36 @@ struct ScaledRows {
   HHT3_INLINE void operator()(const At &at) const { at.put(f, at.get(f) * at.get(row)); }
 };
 
-PetscErrorCode ScaleResidual(const Integrator &I, Vec F)
+struct ScaledConstraints {
+  const float *moves;
+  PetscReal    factor;
+  PetscScalar *f;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    const Four x = at.get(f);
+    at.put(f, at.get(moves) != 0 ? x : factor * x);
+  }
+};
+
+PetscErrorCode ScaleResidual(Integrator &I, Vec F)
 {
-  ScaledRows s;
-  PetscInt   n;
+  const PetscScalar *row;
+  PetscScalar       *f;
+  PetscInt           n;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(I.row, &s.row));
-  PetscCall(VecGetArray(F, &s.f));
-  Sweep(n, s);
-  PetscCall(VecRestoreArray(F, &s.f));
-  PetscCall(VecRestoreArrayRead(I.row, &s.row));
+  PetscCall(VecGetArray(F, &f));
+  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, ScaledConstraints{I.moves.data(), CurrentScales(I).holonomic, f});
+  else {
+    PetscCall(FillRows(I));
+    PetscCall(VecGetArrayRead(I.row, &row));
+    Sweep(n, ScaledRows{row, f});
+    PetscCall(VecRestoreArrayRead(I.row, &row));
+  }
+  PetscCall(VecRestoreArray(F, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -440,7 +444,7 @@ static PetscErrorCode RestoreStage(const Integrator &I, StageArrays *s)
 template <bool all>
 static Stage<all> MakeStage(const Integrator &I, const StageArrays &s, const PetscScalar *x)
 {
-  return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, I.moves.data(), {s.base[0], s.base[1], s.base[2]}, {s.to[0], s.to[1], s.to[2]}};
+  return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, {s.base[0], s.base[1], s.base[2]}, I.moves.data(), {s.to[0], s.to[1], s.to[2]}};
 }
 
 /* Remembers that U1, V1, A1 belong to X */
@@ -527,7 +531,6 @@ PetscErrorCode PrepareStage(TS ts)
 
   PetscFunctionBegin;
   I.stage_id = 0;
-  if (I.constraints()) PetscCall(FillRows(I));
   if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
   PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));

@@ -75,7 +75,8 @@ struct Squares {
 template <bool largest>
 struct Jumps {
   PetscReal          r;
-  const PetscScalar *x, *x0, *a0, *w, *moves; /* moves: if there are states, whose weights are not meant */
+  const PetscScalar *x, *x0, *a0, *w;
+  const float       *moves; /* if there are states, whose weights are not meant */
   Four               result = {0, 0, 0, 0};
 
   template <class At>

@@ -96,7 +96,7 @@ struct Integrator {
   IS                         is[TSHHT3_NUM_ROLES] = {};
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
-  std::vector<PetscScalar>   moves;  /* 1 for coordinates, 0 for others: for sweeps without branches */
+  std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for sweeps without branches */
   std::vector<PetscInt>      states; /* local unknowns that are first-order states */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */

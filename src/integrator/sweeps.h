@@ -23,17 +23,21 @@ namespace hht3
 
 typedef PetscScalar Four __attribute__((vector_size(4 * sizeof(PetscScalar)), aligned(sizeof(PetscScalar)), may_alias));
 
+typedef float Four32 __attribute__((vector_size(4 * sizeof(float)), aligned(sizeof(float)), may_alias));
+
 /* Entries i..i+3 of arrays */
 struct FourAt {
   PetscInt                i;
   HHT3_INLINE const Four &get(const PetscScalar *p) const { return *reinterpret_cast<const Four *>(p + i); }
+  HHT3_INLINE Four        get(const float *p) const { return __builtin_convertvector(*reinterpret_cast<const Four32 *>(p + i), Four); }
   HHT3_INLINE void        put(PetscScalar *p, const Four &v) const { *reinterpret_cast<Four *>(p + i) = v; }
 };
 
 /* The last entries, fewer than four: zeros stand for those that are missing */
 struct FewAt {
   PetscInt         i, count;
-  HHT3_INLINE Four get(const PetscScalar *p) const
+  template <class Number>
+  HHT3_INLINE Four get(const Number *p) const
   {
     Four v = {0, 0, 0, 0};
     for (int k = 0; k < count; k++) v[k] = p[i + k];
