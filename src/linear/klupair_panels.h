@@ -58,6 +58,7 @@ struct KluPanels {
   std::vector<PetscInt>       exchange;           /* LAPACK's row exchanges in the diagonal block of each panel */
   std::vector<PetscInt>       run_start; /* of each place: which runs its column has; other entries go one by one */
   std::vector<KluRun>         run;
+  std::vector<char>           zero_lower, zero_upper; /* of each place: its part of `lower` below K, that of `upper` is zero */
   size_t                      outer_values = 0;   /* where the values between diagonal blocks begin */
   std::vector<double>         value;
 
@@ -89,6 +90,12 @@ bool KluPanelsFactorNarrow(PetscInt n, double a[], PetscInt ld, PetscInt exchang
 /* X U^-1 and Y L^-T for these factors; X has the leading dimension ld, too */
 void KluPanelsDivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[], PetscInt rows, double y[],
                            PetscInt cols);
+
+/* y -= A x and y -= A^T x with a narrow A, whose columns may be known to be zero; `zero` may be null */
+void KluPanelsSubtractNarrow(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const char zero[],
+                             const double x[], double y[]);
+void KluPanelsSubtractTransposedNarrow(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const char zero[],
+                                       const double x[], double y[]);
 
 /* M x = b, or with the transpose of M, in place */
 PetscErrorCode KluPanelsSolve(KluPanels *panels, bool transposed, double x[]);

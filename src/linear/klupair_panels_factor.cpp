@@ -266,6 +266,11 @@ static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
     KluPanelsDivideNarrow(n, a, w.left, x, rows, y, cols);
   else
     PetscCall(DivideWide(w.width, a, w.left, x, (Int)rows, y, (Int)cols));
+  const auto zero = [](double e) { return e == 0; };
+  for (PetscInt k = 0; k < n; ++k) {
+    p->zero_lower[w.q->first + k] = std::all_of(x + k * w.left, x + k * w.left + rows, zero);
+    p->zero_upper[w.q->first + k] = std::all_of(y + k * cols, y + (k + 1) * cols, zero);
+  }
   PetscFunctionReturn(0);
 }
 

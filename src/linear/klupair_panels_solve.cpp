@@ -10,19 +10,23 @@
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* Columns solved entry by entry at a time; products with fewer entries than SMALL are made here and not by BLAS */
-static const PetscInt CHUNK = 16, SMALL = 200;
+/* Columns solved entry by entry at a time; products with fewer entries than SMALL are made here */
+static const PetscInt CHUNK = KLU_PANELS_NARROW, SMALL = 20;
 
 /* ---- dense matrices times vectors ---- */
 
-/* y -= A x */
+/* y -= A x; columns of A may be known to be zero */
 static PetscErrorCode Subtract(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const double x[],
-                               double y[])
+                               double y[], const char zero[] = NULL)
 {
   const PetscScalar  minus = -1, one = 1;
   const PetscBLASInt m = (PetscBLASInt)rows, n = (PetscBLASInt)cols, lda = (PetscBLASInt)ld, step = 1;
 
   PetscFunctionBegin;
+  if (rows * cols > SMALL && cols <= KLU_PANELS_NARROW) {
+    KluPanelsSubtractNarrow(rows, cols, a, ld, zero, x, y);
+    PetscFunctionReturn(0);
+  }
   if (rows * cols > SMALL) {
     PetscCallBLAS("BLASgemv", BLASgemv_("N", &m, &n, &minus, a, &lda, x, &step, &one, y, &step));
     PetscFunctionReturn(0);
@@ -34,12 +38,16 @@ static PetscErrorCode Subtract(PetscInt rows, PetscInt cols, const double a[], P
 
 /* y -= A^T x */
 static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const double x[],
-                                         double y[])
+                                         double y[], const char zero[] = NULL)
 {
   const PetscScalar  minus = -1, one = 1;
   const PetscBLASInt m = (PetscBLASInt)rows, n = (PetscBLASInt)cols, lda = (PetscBLASInt)ld, step = 1;
 
   PetscFunctionBegin;
+  if (rows * cols > SMALL && cols <= KLU_PANELS_NARROW) {
+    KluPanelsSubtractTransposedNarrow(rows, cols, a, ld, zero, x, y);
+    PetscFunctionReturn(0);
+  }
   if (rows * cols > SMALL) {
     PetscCallBLAS("BLASgemv", BLASgemv_("T", &m, &n, &minus, a, &lda, x, &step, &one, y, &step));
     PetscFunctionReturn(0);
@@ -58,6 +66,7 @@ struct Panel {
   PetscInt        width, ld, rows, cols;
   const double   *lower, *upper;
   const PetscInt *row, *col, *exchange;
+  const char     *zero_lower, *zero_upper;
   double         *x, *y; /* its own part of the vector; scratch for what it reaches */
 };
 
@@ -72,6 +81,8 @@ static Panel Look(const KluPanel &q, KluPanels *p)
           p->reached.data() + q.rows.start,
           p->reached.data() + q.cols.start,
           p->exchange.data() + q.first,
+          p->zero_lower.data() + q.first,
+          p->zero_upper.data() + q.first,
           p->x.data() + q.first,
           p->y.data()};
 }
@@ -103,11 +114,11 @@ static PetscErrorCode LowerForward(const Panel &q, double x[])
   }
   const double *below = q.lower + q.width;
   if (Together(q.row, q.rows)) {
-    PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, x + q.row[0]));
+    PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, x + q.row[0], q.zero_lower));
     PetscFunctionReturn(0);
   }
   std::fill(q.y, q.y + q.rows, 0.0);
-  PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, q.y));
+  PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, q.y, q.zero_lower));
   Scatter(q.y, q.row, q.rows, x);
   PetscFunctionReturn(0);
 }
@@ -118,7 +129,7 @@ static PetscErrorCode LowerBackward(const Panel &q, const double x[])
   PetscFunctionBegin;
   const double *known = Together(q.row, q.rows) ? x + q.row[0] : q.y;
   if (known == q.y) Gather(x, q.row, q.rows, q.y);
-  PetscCall(SubtractTransposed(q.rows, q.width, q.lower + q.width, q.ld, known, q.x));
+  PetscCall(SubtractTransposed(q.rows, q.width, q.lower + q.width, q.ld, known, q.x, q.zero_lower));
   for (PetscInt last = q.width, first; last > 0; last = first) {
     first = (last - 1) / CHUNK * CHUNK;
     PetscCall(SubtractTransposed(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + last,
@@ -144,11 +155,11 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
     }
   }
   if (Together(q.col, q.cols)) {
-    PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, x + q.col[0]));
+    PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, x + q.col[0], q.zero_upper));
     PetscFunctionReturn(0);
   }
   std::fill(q.y, q.y + q.cols, 0.0);
-  PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, q.y));
+  PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, q.y, q.zero_upper));
   Scatter(q.y, q.col, q.cols, x);
   PetscFunctionReturn(0);
 }
@@ -159,7 +170,7 @@ static PetscErrorCode UpperBackward(const Panel &q, const double x[])
   PetscFunctionBegin;
   const double *known = Together(q.col, q.cols) ? x + q.col[0] : q.y;
   if (known == q.y) Gather(x, q.col, q.cols, q.y);
-  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, known, q.x));
+  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, known, q.x, q.zero_upper));
   for (PetscInt last = q.width, first; last > 0; last = first) {
     first = (last - 1) / CHUNK * CHUNK;
     for (PetscInt j = last; j-- > first;) {

@@ -498,6 +498,7 @@ static void Allocate(const LinearRows &rows, KluPanels *p)
   p->target.resize(rows.start[rows.n]);
   for (auto *scratch : {&p->row_of, &p->col_of, &p->exchange}) scratch->resize(p->n);
   for (auto *scratch : {&p->matrix_size, &p->factor_size, &p->x, &p->y}) scratch->resize(p->n);
+  for (auto *zero : {&p->zero_lower, &p->zero_upper}) zero->resize(p->n);
 }
 
 static bool WorthALook(double entries, double flops)
