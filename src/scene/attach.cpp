@@ -53,6 +53,7 @@ struct Carrier {
   PetscInt        body = -1, count = 0;
   Eigen::MatrixXd shapes;       /* padded modes x 6 count: translations of all attachments, then rotations, transposed */
   Eigen::VectorXd motion, load; /* of all points, in the same order: from the modes, and on the modes */
+  Eigen::VectorXd modes;        /* padded scratch */
 
   auto   translation(PetscInt k) { return shapes.middleCols<3>(3 * k); }
   auto   rotation(PetscInt k) { return shapes.middleCols<3>(3 * (count + k)); }
@@ -147,7 +148,7 @@ public:
   }
 
 private:
-  using Wide = Eigen::Matrix<double, rows_of_attachment, Eigen::Dynamic>;
+  using Wide = Eigen::Matrix<double, rows_of_attachment, Eigen::Dynamic, Eigen::RowMajor>;
   using Tall = Eigen::Matrix<double, Eigen::Dynamic, 3>;
   Wide              wide_; /* scratch */
   Tall              tall_;
@@ -175,6 +176,7 @@ private:
   void size(Carrier &c)
   {
     c.shapes.setZero(ModalProducts::padded(bodies->modes(c.body)), 6 * c.count);
+    c.modes.setZero(c.shapes.rows());
     c.motion.setZero(6 * c.count);
     c.load.setZero(6 * c.count);
     turned_.emplace_back(6 * c.count, 3);
@@ -183,8 +185,10 @@ private:
   void move(const Evaluation &ev)
   {
     for (Carrier &c : carriers) {
-      const int m = ev.bodies.modes(c.body);
-      c.motion.noalias() = c.shapes.topRows(m).transpose() * Eigen::Map<const Eigen::VectorXd>(ev.u + ev.bodies.body[c.body].first + 6, m);
+      const int m     = ev.bodies.modes(c.body);
+      c.modes.head(m) = Eigen::Map<const Eigen::VectorXd>(ev.u + ev.bodies.body[c.body].first + 6, m);
+      c.modes.tail(c.modes.size() - m).setZero();
+      ModalProducts::transposedTimes((int)c.shapes.rows(), (int)c.shapes.cols(), c.shapes.data(), c.modes.data(), c.motion.data());
     }
   }
 
@@ -201,7 +205,10 @@ private:
 
   void loadModes(Bodies &B)
   {
-    for (Carrier &c : carriers) B.modal[B.body[c.body].modal].load.noalias() -= c.shapes.topRows(B.modes(c.body)) * c.load;
+    for (Carrier &c : carriers) {
+      ModalProducts::times((int)c.shapes.rows(), (int)c.shapes.cols(), c.shapes.data(), c.load.data(), c.modes.data());
+      B.modal[B.body[c.body].modal].load -= c.modes.head(B.modes(c.body));
+    }
   }
 
   void turn(Bodies &B)
@@ -216,6 +223,14 @@ private:
   {
     ev.sink.add(*slot++, D, (int)D.rows(), size);
     ev.sink.add(*slot++, D.transpose(), size, (int)D.rows());
+  }
+
+  /* rows of wide_ from `first` on: D times the shapes */
+  template <class Shapes> void byModes(const Shapes &x, const Matrix3 &D, int first)
+  {
+    const auto m = wide_.cols();
+    for (int r = 0; r < 3; r++)
+      wide_.row(first + r) = (D(r, 0) * x.col(0).head(m) + D(r, 1) * x.col(1).head(m) + D(r, 2) * x.col(2).head(m)).transpose();
   }
 
   /* rows of Phi, columns of lambda */
@@ -233,10 +248,8 @@ private:
     add(ev, slot, rows(-one, zero), 3);
     add(ev, slot, rows(Cross<double>(s.e.x - b.r) * G, O * G), 3);
     wide_.resize(rows_of_attachment, m);
-    tall_                      = on.translation(e.place).topRows(m).lazyProduct(Matrix3(-b.A.transpose()));
-    wide_.topRows<3>()         = tall_.transpose();
-    tall_                      = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((O * Jl).transpose()));
-    wide_.bottomRows<3>()      = tall_.transpose();
+    byModes(on.translation(e.place), -b.A, 0);
+    byModes(on.rotation(e.place), O * Jl, 3);
     add(ev, slot, wide_, m);
     add(ev, slot, rows(one, zero), 3);
     add(ev, slot, rows(zero, s.J.rightCols<3>() * i.euler.G()), 3);
@@ -258,9 +271,12 @@ private:
     ev.sink.add(*slot++, Matrix3(G.transpose() * Hei * Gi), 3, 3);
     ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hie * G), 3, 3);
     ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hii * Gi), 3, 3);
-    tall_ = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((Gi.transpose() * Hie * Jl).transpose()));
-    ev.sink.add(*slot++, tall_.transpose(), 3, m);
-    ev.sink.add(*slot++, tall_, m, 3);
+    if (s.lambda[3] != 0 || s.lambda[4] != 0 || s.lambda[5] != 0) { /* springs at the point itself leave no moment */
+      tall_ = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((Gi.transpose() * Hie * Jl).transpose()));
+      ev.sink.add(slot[0], tall_.transpose(), 3, m);
+      ev.sink.add(slot[1], tall_, m, 3);
+    }
+    slot += 2;
     if (e.body >= ev.bodies.own) return;
     auto &turned = turned_[e.carrier];
     turned.middleRows<3>(3 * e.place).noalias()              = -(F * b.A).transpose();

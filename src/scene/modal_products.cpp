@@ -9,6 +9,7 @@
   library is made for many. These loops are compiled twice; the processor at hand decides.
 */
 #include "modal_products.h"
+#include <algorithm>
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -74,6 +75,7 @@ struct Sum {
   double        symmetric[6], skew[3]; /* factors */
   const double *left, *right;
   int           rank;
+  const int    *column; /* of left and right, `rank` of them */
   double       *out;
   long          ld;
 };
@@ -87,7 +89,7 @@ template <int blocks> ALWAYS_INLINE void CombineRows(const Packed &p, const Sum 
   for (int b = 0; b < blocks; b++)
     for (int c = 0; c < 4; c++) s[b][c] = k[b][c] = Four{0, 0, 0, 0};
   for (int r = 0; r < sum.rank; r++) {
-    const double *x = sum.left + (long)r * p.n + first + i, *y = sum.right + (long)r * p.n + first;
+    const double *x = sum.left + (long)sum.column[r] * p.n + first + i, *y = sum.right + (long)sum.column[r] * p.n + first;
     for (int b = 0; b < blocks; b++)
       for (int c = 0; c < 4; c++) s[b][c] += At(x + 4 * b) * y[c];
   }
@@ -121,14 +123,52 @@ ALWAYS_INLINE void CombinePanels(const Packed &p, const Sum &sum)
   }
 }
 
+/* ---- products with a matrix that is not packed ---- */
+
+template <int columns> ALWAYS_INLINE void Dots(int rows, const double *A, const double *x, double *y)
+{
+  Four s[columns];
+  for (int c = 0; c < columns; c++) s[c] = Four{0, 0, 0, 0};
+  for (int i = 0; i < rows; i += 4)
+    for (int c = 0; c < columns; c++) s[c] += At(A + (long)c * rows + i) * At(x + i);
+  for (int c = 0; c < columns; c++) y[c] = (s[c][0] + s[c][1]) + (s[c][2] + s[c][3]);
+}
+
+ALWAYS_INLINE void AllDots(int rows, int columns, const double *A, const double *x, double *y)
+{
+  int c = 0;
+  for (; c + 6 <= columns; c += 6) Dots<6>(rows, A + (long)c * rows, x, y + c);
+  for (; c < columns; c++) Dots<1>(rows, A + (long)c * rows, x, y + c);
+}
+
+template <int columns> ALWAYS_INLINE void AddColumns(int rows, const double *A, const double *x, double *y)
+{
+  for (int i = 0; i < rows; i += 4) {
+    Four t = At(y + i);
+    for (int c = 0; c < columns; c++) t += At(A + (long)c * rows + i) * x[c];
+    At(y + i) = t;
+  }
+}
+
+ALWAYS_INLINE void AddAll(int rows, int columns, const double *A, const double *x, double *y)
+{
+  int c = 0;
+  for (; c + 6 <= columns; c += 6) AddColumns<6>(rows, A + (long)c * rows, x + c, y);
+  for (; c < columns; c++) AddColumns<1>(rows, A + (long)c * rows, x + c, y);
+}
+
 /* ---- versions ---- */
 
 void ApplyPlain(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 void CombinePlain(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+void DotsPlain(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+void AddPlain(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 
 #if defined(TWO_VERSIONS)
 NEWER void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 NEWER void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+NEWER void DotsNewer(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+NEWER void AddNewer(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 
 bool Newer()
 {
@@ -139,6 +179,8 @@ bool Newer()
 bool Newer() { return false; }
 void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
+void DotsNewer(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+void AddNewer(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 #endif
 
 /* Panels of a square matrix, of which half the block on the diagonal is taken */
@@ -186,10 +228,13 @@ void ModalProducts::apply(const Task *task, int count) const
 
 void ModalProducts::combine(const Eigen::Matrix3d &L, const double *left, const double *right, int rank, double *out, int ld) const
 {
-  Sum       sum  = {{}, {}, left, right, rank, out, ld};
+  std::vector<int> used;
+  for (int r = 0; r < rank; r++)
+    if (!std::all_of(right + (long)r * padded_, right + (long)(r + 1) * padded_, [](double x) { return x == 0; })) used.push_back(r);
+  Sum       sum  = {{}, {}, left, right, (int)used.size(), used.data(), out, ld};
   double   *s    = sum.symmetric;
   const int pair = symmetric_ - 3; /* where xy begins */
-  if (!symmetric_ && !rank) return;
+  if (!symmetric_ && used.empty()) return;
   if (symmetric_) {
     const double zz = identity_ ? L(2, 2) : 0;
     s[0] = L(0, 0) - zz;
@@ -203,6 +248,17 @@ void ModalProducts::combine(const Eigen::Matrix3d &L, const double *left, const 
     for (int i = 0; i < padded_; i++) out[i * (long)ld + i] += zz;
   }
   (Newer() ? CombineNewer : CombinePlain)({padded_, symmetric_, skew_, value_.data()}, sum);
+}
+
+void ModalProducts::transposedTimes(int rows, int columns, const double *A, const double *x, double *y)
+{
+  (Newer() ? DotsNewer : DotsPlain)(rows, columns, A, x, y);
+}
+
+void ModalProducts::times(int rows, int columns, const double *A, const double *x, double *y)
+{
+  std::fill(y, y + rows, 0.0);
+  (Newer() ? AddNewer : AddPlain)(rows, columns, A, x, y);
 }
 
 } // namespace hhtdae

@@ -38,8 +38,13 @@ public:
   void apply(const Task *task, int count) const;
 
   /* Adds sum_cd L_cd N_cd + left right^T to `out`, row by row at the distance ld. The product of the last two (leading
-     dimension padded(), `rank` columns) must be symmetric; half of it is computed. */
+     dimension padded(), `rank` columns) must be symmetric; half of it is computed, and where columns of `right` are zero,
+     nothing. */
   void combine(const Eigen::Matrix3d &L, const double *left, const double *right, int rank, double *out, int ld) const;
+
+  /* y = A^T x and y = A x with `rows` a multiple of four and as many columns as wanted */
+  static void transposedTimes(int rows, int columns, const double *A, const double *x, double *y);
+  static void times(int rows, int columns, const double *A, const double *x, double *y);
 
 private:
   int                 padded_, symmetric_ = 0, skew_ = 0;
