@@ -118,9 +118,13 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   Integrator  &I = Get(ts);
   MatColoring  mc;
   ISColoring   colors;
-  Differences *d = new Differences;
+  PetscBool    triangle = PETSC_FALSE;
 
   PetscFunctionBegin;
+  if (*P) PetscCall(LinearStoresTriangle(*P, &triangle));
+  PetscCheck(!triangle, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+             "A Jacobian from differences of the residual comes by columns, the matrix holds one triangle: use type %s, or give an I2Jacobian", MATAIJ);
+  Differences *d = new Differences;
   I.differences                = d;
   const TSHHT3Statistics saved = I.stat;
   d->ts                        = ts;

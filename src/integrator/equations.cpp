@@ -311,16 +311,18 @@ PetscErrorCode ScaleResidual(Integrator &I, Vec F)
 /* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already */
 PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
 {
-  PetscBool mffd;
+  PetscBool mffd, triangle;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
   if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LinearStoresTriangle(A, &triangle));
   if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
   else {
     PetscCall(FillRows(I));
     PetscCall(FillColumns(I));
-    PetscCall(MatDiagonalScale(A, I.row, I.col));
+    if (triangle) PetscCall(ScaleTriangle(I, A));
+    else PetscCall(MatDiagonalScale(A, I.row, I.col));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

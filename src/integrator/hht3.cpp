@@ -246,6 +246,7 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   Integrator &I = Get(ts);
   SNES        snes;
   KSP         ksp;
+  Mat         J, P;
   PetscBool   dt;
 
   PetscFunctionBegin;
@@ -260,6 +261,8 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   /* defaults go in before SNESSetFromOptions(), which TSSetFromOptions() calls next, so that options override them */
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; of one triangle there is no LU */
   PetscCall(LinearDefaults(ksp, &I.linear));
   SNESLineSearch ls;
   PetscCall(SNESGetLineSearch(snes, &ls));

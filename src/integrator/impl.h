@@ -199,6 +199,9 @@ PetscErrorCode ComposeSetters(TS ts, bool attach);
 /* roles.cpp */
 PetscErrorCode SetUpRoles(TS ts);
 PetscErrorCode ViewRoles(TS ts, PetscViewer viewer);
+/* triangle.cpp: matrices of which one triangle is stored */
+PetscErrorCode CheckTriangle(TS ts);
+PetscErrorCode ScaleTriangle(Integrator &I, Mat A);
 /* differences.cpp: a Jacobian from differences of the residual, for applications that have none */
 PetscErrorCode DifferencesCreate(TS ts, Mat *P);
 PetscErrorCode DifferencesDestroy(TS ts);

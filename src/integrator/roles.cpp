@@ -10,6 +10,7 @@
   moved off it, since at rest or in a symmetric position entries may vanish that are there otherwise.
 */
 #include "impl.h"
+#include <algorithm>
 
 namespace hht3
 {
@@ -21,11 +22,12 @@ constexpr PetscReal big = 1e20; /* shift of the probes */
 
 struct Probe {
   std::vector<unsigned char> col_a, col_v, row_a, row_v, row_u, self; /* per local unknown or row */
+  PetscBool                  triangle = PETSC_FALSE; /* the matrix is MATSBAIJ: an entry (i, j) stands for (j, i) too */
   explicit Probe(PetscInt n) : col_a(n), col_v(n), row_a(n), row_v(n), row_u(n), self(n) {}
 };
 
-/* Values of the local rows, one after another, and for each its global column */
-PetscErrorCode LocalValues(Mat P, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
+/* Values of the local rows, one after another, and for each its global column; of one triangle from the diagonal on */
+PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
 {
   PetscInt           start, end, nc;
   const PetscInt    *c;
@@ -36,13 +38,16 @@ PetscErrorCode LocalValues(Mat P, std::vector<PetscScalar> &val, std::vector<Pet
   col.clear();
   offset.assign(1, 0);
   PetscCall(MatGetOwnershipRange(P, &start, &end));
+  PetscCall(MatGetRowUpperTriangular(P)); /* nothing but with MATSBAIJ, whose blocks on the diagonal are whole */
   for (PetscInt i = start; i < end; i++) {
     PetscCall(MatGetRow(P, i, &nc, &c, &v));
-    col.insert(col.end(), c, c + nc);
-    val.insert(val.end(), v, v + nc);
+    const PetscInt from = triangle ? (PetscInt)(std::lower_bound(c, c + nc, i) - c) : 0;
+    col.insert(col.end(), c + from, c + nc);
+    val.insert(val.end(), v + from, v + nc);
     offset.push_back((PetscInt)val.size());
     PetscCall(MatRestoreRow(P, i, &nc, &c, &v));
   }
+  PetscCall(MatRestoreRowUpperTriangular(P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,6 +58,22 @@ bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
   return d > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)) && d > least;
 }
 
+/* Flags of the local unknowns that a vector marks with positive entries; the vector is destroyed */
+PetscErrorCode TakeMarks(Vec *mark, std::vector<unsigned char> &flag)
+{
+  const PetscScalar *m;
+
+  PetscFunctionBegin;
+  PetscCall(VecAssemblyBegin(*mark));
+  PetscCall(VecAssemblyEnd(*mark));
+  PetscCall(VecGetArrayRead(*mark, &m));
+  for (size_t i = 0; i < flag.size(); i++)
+    if (PetscRealPart(m[i]) > 0) flag[i] = 1;
+  PetscCall(VecRestoreArrayRead(*mark, &m));
+  PetscCall(VecDestroy(mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Marks rows and columns where the derivative that goes with one shift is not zero */
 PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceleration, Probe &probe)
 {
@@ -61,16 +82,17 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   std::vector<unsigned char> &row_flag = acceleration ? probe.row_a : probe.row_v, &col_flag = acceleration ? probe.col_a : probe.col_v;
   const PetscReal             t = ts->ptime;
   Vec                         mark;
-  const PetscScalar          *m;
+  PetscInt                    start;
 
   PetscFunctionBegin;
   PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : big, acceleration ? big : 0, J, P));
-  PetscCall(LocalValues(P, one, col, offset));
+  PetscCall(LocalValues(P, probe.triangle, one, col, offset));
   PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : 2 * big, acceleration ? 2 * big : 0, J, P));
-  PetscCall(LocalValues(P, two, col2, offset2));
+  PetscCall(LocalValues(P, probe.triangle, two, col2, offset2));
   PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
   PetscCall(VecDuplicate(U, &mark));
   PetscCall(VecZeroEntries(mark));
+  PetscCall(VecGetOwnershipRange(U, &start, NULL));
   for (size_t i = 0; i < row_flag.size(); i++) {
     PetscReal least = 0;
     if (Get(ts).differences)
@@ -79,15 +101,11 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
       if (!Doubles(one[k], two[k], least)) continue;
       row_flag[i] = 1;
       PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
+      if (probe.triangle) PetscCall(VecSetValue(mark, start + (PetscInt)i, 1, ADD_VALUES));
     }
   }
-  PetscCall(VecAssemblyBegin(mark));
-  PetscCall(VecAssemblyEnd(mark));
-  PetscCall(VecGetArrayRead(mark, &m));
-  for (size_t i = 0; i < col_flag.size(); i++)
-    if (PetscRealPart(m[i]) > 0) col_flag[i] = 1;
-  PetscCall(VecRestoreArrayRead(mark, &m));
-  PetscCall(VecDestroy(&mark));
+  PetscCall(TakeMarks(&mark, col_flag));
+  if (probe.triangle) row_flag = col_flag;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,19 +114,24 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
   std::vector<PetscScalar> val;
   std::vector<PetscInt>    col, offset;
   PetscInt                 start;
+  Vec                      mark;
 
   PetscFunctionBegin;
   PetscCall(ProbeShift(ts, J, P, U, V, A, true, probe));
   PetscCall(ProbeShift(ts, J, P, U, V, A, false, probe));
   PetscCall(EvaluateJacobian(ts, ts->ptime, U, V, A, 0, 0, J, P));
-  PetscCall(LocalValues(P, val, col, offset));
+  PetscCall(LocalValues(P, probe.triangle, val, col, offset));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
+  PetscCall(VecDuplicate(U, &mark));
+  PetscCall(VecZeroEntries(mark));
   for (size_t i = 0; i < probe.row_u.size(); i++)
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
       if (val[k] == (PetscScalar)0) continue;
       probe.row_u[i] = 1;
+      if (probe.triangle) PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
       if (col[k] == start + (PetscInt)i) probe.self[i] = 1;
     }
+  PetscCall(TakeMarks(&mark, probe.row_u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -133,6 +156,28 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One triangle does not show whether the rows of multipliers depend on q': the residual does, with U and A as they are */
+PetscErrorCode ProbeRates(TS ts, Vec U, Vec V, Vec A, Probe &probe)
+{
+  Vec                F[2];
+  const PetscScalar *f[2];
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 2; k++) {
+    PetscCall(VecDuplicate(U, &F[k]));
+    PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F[k]));
+    PetscCall(VecGetArrayRead(F[k], &f[k]));
+    if (!k) PetscCall(Shake(V, 1e-3, 4));
+  }
+  for (size_t i = 0; i < probe.row_v.size(); i++)
+    if (f[0][i] != f[1][i]) probe.row_v[i] = 1;
+  for (int k = 0; k < 2; k++) {
+    PetscCall(VecRestoreArrayRead(F[k], &f[k]));
+    PetscCall(VecDestroy(&F[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode RunProbes(TS ts, Probe &probe)
 {
   Integrator            &I = Get(ts);
@@ -141,6 +186,7 @@ PetscErrorCode RunProbes(TS ts, Probe &probe)
 
   PetscFunctionBegin;
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(LinearStoresTriangle(P, &probe.triangle));
   PetscCall(VecCopy(ts->vec_sol, I.U1));
   PetscCall(VecCopy(ts->vec_dot, I.V1));
   PetscCall(VecZeroEntries(I.A1));
@@ -149,6 +195,7 @@ PetscErrorCode RunProbes(TS ts, Probe &probe)
   PetscCall(Shake(I.V1, 1e-3, 2));
   PetscCall(Shake(I.A1, 1e-3, 3));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
+  if (probe.triangle) PetscCall(ProbeRates(ts, I.U1, I.V1, I.A1, probe));
   I.stat = saved; /* the probes are not part of the run */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -243,6 +290,7 @@ PetscErrorCode SetUpRoles(TS ts)
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) I.count[r] = global[r];
   I.definitions_use_acceleration = (PetscBool)(global[TSHHT3_NUM_ROLES] > 0);
   if (!I.is_set) PetscCall(MakeSets(ts));
+  PetscCall(CheckTriangle(ts));
   PetscCall(VecGetSize(ts->vec_sol, &n));
   if (I.count[TSHHT3_COORDINATE] == n) I.role = std::vector<unsigned char>(); /* an ODE: no roles to look up */
   I.moves.resize(I.role.size());

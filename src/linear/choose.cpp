@@ -145,6 +145,8 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PC        pc;
   KSPType   ksp_type;
   PCType    pc_type;
+  PetscBool operators, triangle = PETSC_FALSE;
+  Mat       P;
   PetscBool pc_by_program, pc_by_option, package_by_program = PETSC_FALSE, package_by_option;
 
   PetscFunctionBegin;
@@ -160,8 +162,11 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
   choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
   choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
-  if (!pc_type) {
-    PetscCall(PCSetType(pc, PCLU));
+  if (!pc_type) { /* options that name a package have PETSc look for its factorization of this matrix at once */
+    PetscCall(KSPGetOperatorsSet(ksp, NULL, &operators));
+    if (operators) PetscCall(KSPGetOperators(ksp, NULL, &P));
+    if (operators) PetscCall(LinearStoresTriangle(P, &triangle));
+    PetscCall(PCSetType(pc, triangle ? PCCHOLESKY : PCLU));
     PetscCall(SetMark(pc));
   }
   PetscFunctionReturn(0);
@@ -207,13 +212,19 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
 static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
 {
   PetscMPIInt     processes;
-  PetscBool       seqaij, bounded, done;
+  PetscBool       seqaij, triangle, bounded, done;
   IS              row, col;
   const PetscInt *order;
   LinearGraph     graph;
 
   PetscFunctionBegin;
   *size = Size();
+  PetscCall(LinearStoresTriangle(P, &triangle));
+  if (triangle) { /* of large packages MUMPS reads it, of small ones none */
+    size->large = PETSC_TRUE;
+    PetscCall(PetscStrncpy(size->text, "the matrix holds one triangle", sizeof size->text));
+    PetscFunctionReturn(0);
+  }
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &processes));
   PetscCall(PetscObjectTypeCompare((PetscObject)P, MATSEQAIJ, &seqaij));
   if (processes > 1) {
@@ -321,12 +332,41 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
   PetscFunctionReturn(0);
 }
 
+/* Of one triangle only PETSc's own LDL^T is left, which does not pivot: multipliers are beyond it */
+static PetscErrorCode ChoosePetscCholesky(KSP ksp, Mat P, PC pc, LinearChoice *choice)
+{
+  Vec       d;
+  PetscReal least;
+  PetscBool available;
+  MatType   type;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetFactorAvailable(P, MATSOLVERPETSC, MAT_FACTOR_CHOLESKY, &available));
+  PetscCall(MatCreateVecs(P, &d, NULL));
+  PetscCall(MatGetDiagonal(P, d));
+  PetscCall(VecAbs(d));
+  PetscCall(VecMin(d, NULL, &least));
+  PetscCall(VecDestroy(&d));
+  PetscCall(MatGetType(P, &type));
+  PetscCheck(available && least > 0, PetscObjectComm((PetscObject)P), PETSC_ERR_SUP,
+             "No installed package factors this matrix of type %s; MUMPS would. Use a matrix of type %s", type, MATAIJ);
+  PetscCall(SetFactorization(ksp, pc, PCCHOLESKY, MATSOLVERPETSC));
+  choice->cholesky = PETSC_TRUE;
+  PetscCall(PetscStrncpy(choice->text, "LDL^T with petsc, without pivoting: MUMPS is not installed", sizeof choice->text));
+  PetscFunctionReturn(0);
+}
+
 /* Only PETSc's own LU is left: it does not pivot, so zeros are moved off the diagonal by a permutation */
 static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
 {
-  PetscBool available, by_option;
+  PetscBool available, by_option, triangle;
 
   PetscFunctionBegin;
+  PetscCall(LinearStoresTriangle(P, &triangle));
+  if (triangle) {
+    PetscCall(ChoosePetscCholesky(ksp, P, pc, choice));
+    PetscFunctionReturn(0);
+  }
   PetscCall(MatGetFactorAvailable(P, MATSOLVERPETSC, MAT_FACTOR_LU, &available));
   if (available) {
     PetscCall(SetPackage(pc, MATSOLVERPETSC));
@@ -405,6 +445,22 @@ static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   PetscFunctionReturn(0);
 }
 
+/* An LU that the user has asked for */
+static PetscErrorCode RefuseTriangle(PC pc, Mat P)
+{
+  PetscBool triangle, lu;
+  MatType   type;
+
+  PetscFunctionBegin;
+  PetscCall(LinearStoresTriangle(P, &triangle));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCLU, &lu));
+  PetscCall(MatGetType(P, &type));
+  PetscCheck(!triangle || !lu, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_INCOMP,
+             "LU needs both triangles of the matrix, whose type %s holds one: use -pc_type cholesky, or a matrix of type %s",
+             type, MATAIJ);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice)
 {
   PC pc;
@@ -417,6 +473,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
     PetscCall(FollowPackage(ksp, P, symmetric, pc, choice));
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
+  PetscCall(RefuseTriangle(pc, P));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);
 }

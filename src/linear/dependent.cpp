@@ -213,17 +213,21 @@ PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt
   Dependence t = {};
   PetscInt   count;
   PetscReal  residual;
+  PetscBool  triangle;
 
   PetscFunctionBegin;
   *n = 0;
   PetscCall(ISGetSize(multipliers, &count));
   if (!count) PetscFunctionReturn(0);
-  t.P           = P;
+  PetscCall(LinearStoresTriangle(P, &triangle)); /* whole rows are read here */
+  if (triangle) PetscCall(MatConvert(P, MATAIJ, MAT_INITIAL_MATRIX, &t.P));
+  else t.P = P;
   t.multipliers = multipliers;
   PetscCall(Create(&t));
   PetscCall(Iterate(&t, &residual));
   PetscCall(PetscInfo(P, "Null vector of the constraints: residual %g\n", (double)residual));
   if (residual <= NULL_RESIDUAL) PetscCall(Collect(&t, max, n, rows));
   PetscCall(Destroy(&t));
+  if (triangle) PetscCall(MatDestroy(&t.P));
   PetscFunctionReturn(0);
 }

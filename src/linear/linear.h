@@ -25,6 +25,9 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
    The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);
 
+/* Whether A holds one triangle of a symmetric matrix, MATSBAIJ: its rows are upper parts of rows, and KLU cannot read it */
+PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle);
+
 /* Whether |y^T A x - x^T A y| is rounding for two fixed pseudo-random vectors: two products, no transpose */
 PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric);
 

@@ -72,6 +72,7 @@ static PetscErrorCode CopyPattern(Mat A, MumpsND *m)
   m->row.clear();
   m->col.clear();
   PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  PetscCall(MatGetRowUpperTriangular(A)); /* what MATSBAIJ has; nothing with other types */
   for (PetscInt i = begin; i < end; ++i) {
     PetscCall(MatGetRow(A, i, &count, &cols, NULL));
     for (PetscInt k = 0; k < count; ++k)
@@ -81,6 +82,7 @@ static PetscErrorCode CopyPattern(Mat A, MumpsND *m)
       }
     PetscCall(MatRestoreRow(A, i, &count, &cols, NULL));
   }
+  PetscCall(MatRestoreRowUpperTriangular(A));
   m->val.resize(m->row.size());
   m->id.n       = (MUMPS_INT)A->rmap->N;
   m->id.nnz_loc = (MUMPS_INT8)m->row.size();
@@ -99,6 +101,7 @@ static PetscErrorCode CopyValues(Mat A, MumpsND *m)
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  PetscCall(MatGetRowUpperTriangular(A));
   for (PetscInt i = begin; i < end; ++i) {
     PetscCall(MatGetRow(A, i, &count, &cols, &vals));
     for (PetscInt k = 0; k < count; ++k)
@@ -110,6 +113,7 @@ static PetscErrorCode CopyValues(Mat A, MumpsND *m)
       }
     PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
   }
+  PetscCall(MatRestoreRowUpperTriangular(A));
   PetscFunctionReturn(0);
 }
 
@@ -364,6 +368,8 @@ PetscErrorCode LinearRegisterMumpsND(void)
     PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATSEQAIJ, type, MatGetFactor_MumpsND));
     PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATMPIAIJ, type, MatGetFactor_MumpsND));
   }
+  for (MatType type : {MATSEQSBAIJ, MATMPISBAIJ})
+    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, type, MAT_FACTOR_CHOLESKY, MatGetFactor_MumpsND));
   PetscFunctionReturn(0);
 }
 

@@ -1,5 +1,6 @@
 /*
-  MUMPS with an ordering of ours, as the factorization package "mumpsnd" for MATSEQAIJ and MATMPIAIJ, LU and LDL^T.
+  MUMPS with an ordering of ours, as the factorization package "mumpsnd" for MATSEQAIJ and MATMPIAIJ, LU and LDL^T,
+  and for MATSEQSBAIJ and MATMPISBAIJ, LDL^T.
 
   PETSc's own interface hands MUMPS an ordering for LU on one process only, and there it passes the list of unknowns in
   the order of elimination where PERM_IN wants each unknown's position in it (seen in 3.18.5); MUMPS as Debian builds it

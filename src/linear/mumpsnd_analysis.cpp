@@ -3,40 +3,70 @@
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
 
 #include "graph.h"
+#include "linear.h"
 #include "mumpsnd_data.h"
 #include <cstring>
 #include <unordered_set>
 
 static_assert(sizeof(MUMPS_INT) == sizeof(int), "MUMPS with 64-bit integers throughout is not supported");
 
+/* Entries that a row without a value on its diagonal could be eliminated with */
+struct Candidate {
+  PetscInt  col;
+  PetscReal size;
+};
+
+/* of[row - begin], empty where the diagonal has a value. Of one triangle columns count as rows, but not other ranks' ones. */
+static PetscErrorCode FindCandidates(Mat A, std::vector<std::vector<Candidate>> *of)
+{
+  PetscInt           begin, end, count;
+  const PetscInt    *cols;
+  const PetscScalar *vals;
+  PetscBool          triangle;
+
+  PetscFunctionBegin;
+  PetscCall(LinearStoresTriangle(A, &triangle));
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  std::vector<char> lacks(end - begin, 1);
+  of->assign(end - begin, {});
+  PetscCall(MatGetRowUpperTriangular(A));
+  for (int pass = 0; pass < 2; ++pass)
+    for (PetscInt i = begin; i < end; ++i) {
+      PetscCall(MatGetRow(A, i, &count, &cols, &vals));
+      for (PetscInt k = 0; k < count; ++k) {
+        const PetscInt  j    = cols[k];
+        const PetscReal size = PetscAbsScalar(vals[k]);
+        if (pass == 0) {
+          if (j == i && size > 0) lacks[i - begin] = 0;
+          continue;
+        }
+        if (j == i || !(size > 0) || (triangle && j < i)) continue;
+        if (lacks[i - begin]) (*of)[i - begin].push_back({j, size});
+        if (triangle && j < end && lacks[j - begin]) (*of)[j - begin].push_back({i, size});
+      }
+      PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
+    }
+  PetscCall(MatRestoreRowUpperTriangular(A));
+  PetscFunctionReturn(0);
+}
+
 /* For every owned row without a value on the diagonal: the column of its largest entry that no other such row took */
 static PetscErrorCode FindPartners(Mat A, std::vector<int> *partner)
 {
-  PetscInt                     begin, end, count;
-  const PetscInt              *cols;
-  const PetscScalar           *vals;
-  std::unordered_set<PetscInt> taken;
+  std::vector<std::vector<Candidate>> candidates;
+  std::unordered_set<PetscInt>        taken;
 
   PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  partner->assign(end - begin, -1);
-  for (PetscInt i = begin; i < end; ++i) {
-    PetscReal diagonal = 0, largest = 0;
-    PetscInt  best = -1;
-    PetscCall(MatGetRow(A, i, &count, &cols, &vals));
-    for (PetscInt k = 0; k < count; ++k) {
-      const PetscReal size = PetscAbsScalar(vals[k]);
-      if (cols[k] == i)
-        diagonal = size;
-      else if (size > largest && !taken.count(cols[k])) {
-        largest = size;
-        best    = cols[k];
+  PetscCall(FindCandidates(A, &candidates));
+  partner->assign(candidates.size(), -1);
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    PetscReal largest = 0;
+    for (const Candidate &c : candidates[i])
+      if (c.size > largest && !taken.count(c.col)) {
+        largest       = c.size;
+        (*partner)[i] = (int)c.col;
       }
-    }
-    PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
-    if (diagonal > 0 || best < 0) continue;
-    (*partner)[i - begin] = (int)best;
-    taken.insert(best);
+    if (largest > 0) taken.insert((*partner)[i]);
   }
   PetscFunctionReturn(0);
 }

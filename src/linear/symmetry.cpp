@@ -17,6 +17,14 @@ static PetscErrorCode Scaling(Mat A, Vec d)
   PetscFunctionReturn(0);
 }
 
+/* MATSBAIJ: the upper triangle alone is stored, by block rows */
+PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)A, triangle, MATSEQSBAIJ, MATMPISBAIJ, ""));
+  PetscFunctionReturn(0);
+}
+
 /*
   With entries of order one at most, y^T A x is a sum of nz terms of random sign: rounding leaves about eps sqrt(nz) in
   the difference. A hundred times that is still far below what one wrong entry of relative size 1e-10 contributes.
@@ -28,6 +36,8 @@ PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric)
   MatInfo     info;
 
   PetscFunctionBegin;
+  PetscCall(LinearStoresTriangle(A, symmetric));
+  if (*symmetric) PetscFunctionReturn(0);
   PetscCall(MatCreateVecs(A, &x, &w));
   PetscCall(VecDuplicate(x, &y));
   PetscCall(VecDuplicate(x, &d));
