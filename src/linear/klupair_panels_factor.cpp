@@ -306,22 +306,50 @@ static double ReciprocalGrowth(const KluPanels &p)
 
 /* ---- all together ---- */
 
-static void CopyRun(const double *PETSC_RESTRICT from, PetscInt count, double *PETSC_RESTRICT to, double largest[4])
+/* The largest absolute values of two halves of what was looked at: one would wait for itself */
+struct Largest {
+  double even = 0, odd = 0;
+  void   see(double a, double b)
+  {
+    even = Larger(PetscAbsReal(a), even);
+    odd  = Larger(PetscAbsReal(b), odd);
+  }
+};
+
+static void CopyRun(const double *PETSC_RESTRICT from, PetscInt count, double *PETSC_RESTRICT to, Largest *largest)
 {
-  double   l0 = largest[0], l1 = largest[1];
+  Largest  l = *largest;
   PetscInt i = 0;
   for (; i + 2 <= count; i += 2) {
     to[i]     = from[i];
     to[i + 1] = from[i + 1];
-    l0        = Larger(PetscAbsReal(from[i]), l0);
-    l1        = Larger(PetscAbsReal(from[i + 1]), l1);
+    l.see(from[i], from[i + 1]);
   }
   if (i < count) {
     to[i] = from[i];
-    l0    = Larger(PetscAbsReal(from[i]), l0);
+    l.see(from[i], 0);
   }
-  largest[0] = l0;
-  largest[1] = l1;
+  *largest = l;
+}
+
+/* Entries from the number `outer` on are between diagonal blocks and do not count */
+template <bool has_outer>
+static void CopyEach(const double *PETSC_RESTRICT from, PetscInt count, const PetscInt *PETSC_RESTRICT target, size_t outer,
+                     double *PETSC_RESTRICT value, Largest *largest)
+{
+  const auto inner = [&](PetscInt e) { return !has_outer || (size_t)target[e] < outer ? from[e] : 0; };
+  Largest    l     = *largest;
+  PetscInt   e     = 0;
+  for (; e + 2 <= count; e += 2) {
+    value[target[e]]     = from[e];
+    value[target[e + 1]] = from[e + 1];
+    l.see(inner(e), inner(e + 1));
+  }
+  if (e < count) {
+    value[target[e]] = from[e];
+    l.see(inner(e), 0);
+  }
+  *largest = l;
 }
 
 /* The entries go to their places, and the largest of each column is noted, of those inside of diagonal blocks. Rows of the
@@ -332,23 +360,17 @@ template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels
   const PetscInt *target = p->target.data();
   std::fill(p->value.begin(), p->value.end(), 0.0);
   for (PetscInt k = 0; k < p->n; ++k) {
-    double     largest[4] = {0, 0, 0, 0}; /* one would wait for itself */
-    const auto one_by_one = [&](PetscInt e, PetscInt end) {
-      for (; e < end; ++e) {
-        const bool inside = !has_outer || (size_t)target[e] < p->outer_values;
-        value[target[e]]  = rows.val[e];
-        largest[e & 3]    = Larger(inside ? PetscAbsReal(rows.val[e]) : 0.0, largest[e & 3]);
-      }
-    };
-    PetscInt e = rows.start[p->col[k]];
+    Largest    largest;
+    PetscInt   e         = rows.start[p->col[k]];
+    const auto each_upto = [&](PetscInt end) { CopyEach<has_outer>(rows.val + e, end - e, target + e, p->outer_values, value, &largest); };
     for (PetscInt r = p->run_start[k]; r < p->run_start[k + 1]; ++r) {
       const KluRun &run = p->run[r];
-      one_by_one(e, run.entry);
-      CopyRun(rows.val + run.entry, run.count, value + target[run.entry], largest);
+      each_upto(run.entry);
+      CopyRun(rows.val + run.entry, run.count, value + target[run.entry], &largest);
       e = run.entry + run.count;
     }
-    one_by_one(e, rows.start[p->col[k] + 1]);
-    p->matrix_size[k] = Larger(Larger(largest[0], largest[1]), Larger(largest[2], largest[3]));
+    each_upto(rows.start[p->col[k] + 1]);
+    p->matrix_size[k] = Larger(largest.even, largest.odd);
   }
 }
 
