@@ -68,11 +68,15 @@ ALWAYS_INLINE void TakeAll(const Sum &s)
 /* Of up to four columns, what each makes of x */
 template <int columns> ALWAYS_INLINE void Dots(PetscInt rows, const double *const column[], const double x[], double dot[])
 {
-  Four     sum[columns] = {};
+  Four     sum[columns] = {}, next[columns] = {}; /* one would wait for itself */
   PetscInt i            = 0;
-  for (; i + 4 <= rows; i += 4)
-    for (int c = 0; c < columns; ++c) sum[c] += *reinterpret_cast<const Four *>(column[c] + i) * *reinterpret_cast<const Four *>(x + i);
+  for (; i + 8 <= rows; i += 8)
+    for (int c = 0; c < columns; ++c) {
+      sum[c] += *reinterpret_cast<const Four *>(column[c] + i) * *reinterpret_cast<const Four *>(x + i);
+      next[c] += *reinterpret_cast<const Four *>(column[c] + i + 4) * *reinterpret_cast<const Four *>(x + i + 4);
+    }
   for (int c = 0; c < columns; ++c) {
+    sum[c] += next[c];
     dot[c] = (sum[c][0] + sum[c][1]) + (sum[c][2] + sum[c][3]);
     for (PetscInt k = i; k < rows; ++k) dot[c] += column[c][k] * x[k];
   }

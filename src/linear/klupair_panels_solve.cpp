@@ -11,7 +11,7 @@
 #include <petscblaslapack.h>
 
 /* Columns solved entry by entry at a time; products with fewer entries than SMALL are made here */
-static const PetscInt CHUNK = KLU_PANELS_NARROW, SMALL = 20;
+static const PetscInt CHUNK = KLU_PANELS_NARROW, SMALL = 200;
 
 /* ---- dense matrices times vectors ---- */
 
@@ -23,7 +23,7 @@ static PetscErrorCode Subtract(PetscInt rows, PetscInt cols, const double a[], P
   const PetscBLASInt m = (PetscBLASInt)rows, n = (PetscBLASInt)cols, lda = (PetscBLASInt)ld, step = 1;
 
   PetscFunctionBegin;
-  if (rows * cols > SMALL && cols <= KLU_PANELS_NARROW) {
+  if (zero && cols <= KLU_PANELS_NARROW) {
     KluPanelsSubtractNarrow(rows, cols, a, ld, zero, x, y);
     PetscFunctionReturn(0);
   }
@@ -44,7 +44,7 @@ static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const dou
   const PetscBLASInt m = (PetscBLASInt)rows, n = (PetscBLASInt)cols, lda = (PetscBLASInt)ld, step = 1;
 
   PetscFunctionBegin;
-  if (rows * cols > SMALL && cols <= KLU_PANELS_NARROW) {
+  if (zero && cols <= KLU_PANELS_NARROW) {
     KluPanelsSubtractTransposedNarrow(rows, cols, a, ld, zero, x, y);
     PetscFunctionReturn(0);
   }
@@ -58,18 +58,6 @@ static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const dou
     y[j] -= sum;
   }
   PetscFunctionReturn(0);
-}
-
-/* Of a few entries: two sums, since each would wait for itself */
-static double Dot(PetscInt n, const double a[], const double x[])
-{
-  double   even = 0, odd = 0;
-  PetscInt i = 0;
-  for (; i + 2 <= n; i += 2) {
-    even += a[i] * x[i];
-    odd += a[i + 1] * x[i + 1];
-  }
-  return i < n ? even + odd + a[i] * x[i] : even + odd;
 }
 
 /* ---- one panel ---- */
@@ -146,7 +134,8 @@ static PetscErrorCode LowerBackward(const Panel &q, const double x[])
     first = (last - 1) / CHUNK * CHUNK;
     PetscCall(SubtractTransposed(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + last,
                                  q.x + first));
-    for (PetscInt j = last; j-- > first;) q.x[j] -= Dot(last - j - 1, q.lower + j + 1 + j * q.ld, q.x + j + 1);
+    for (PetscInt j = last; j-- > first;)
+      for (PetscInt i = j + 1; i < last; ++i) q.x[j] -= q.lower[i + j * q.ld] * q.x[i];
   }
   for (PetscInt k = q.width; k-- > 0;)
     if (q.exchange[k] != k) std::swap(q.x[k], q.x[q.exchange[k]]);
@@ -160,8 +149,10 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
   for (PetscInt first = 0, last; first < q.width; first = last) {
     last = PetscMin(first + CHUNK, q.width);
     PetscCall(SubtractTransposed(first, last - first, q.lower + first * q.ld, q.ld, q.x, q.x + first));
-    for (PetscInt j = first; j < last; ++j)
-      q.x[j] = (q.x[j] - Dot(j - first, q.lower + first + j * q.ld, q.x + first)) / q.lower[j + j * q.ld];
+    for (PetscInt j = first; j < last; ++j) {
+      for (PetscInt i = first; i < j; ++i) q.x[j] -= q.lower[i + j * q.ld] * q.x[i];
+      q.x[j] /= q.lower[j + j * q.ld];
+    }
   }
   if (Together(q.col, q.cols)) {
     PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, x + q.col[0], q.zero_upper));
