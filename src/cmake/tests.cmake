@@ -37,6 +37,12 @@ include(GoogleTest)
 set(unit_timeout 120)
 set(verification_timeout 300)
 set(stability_timeout 600)
+set(parallel_timeout 600)
+if(HHTDAE_SANITIZE)
+  foreach(folder unit verification stability parallel)
+    math(EXPR ${folder}_timeout "5 * ${${folder}_timeout}")
+  endforeach()
+endif()
 foreach(folder unit verification stability)
   hhtdae_test_program(${folder})
   if(${folder}_found)
@@ -55,8 +61,8 @@ if(parallel_found)
   foreach(ranks 1 2 3)
     add_test(NAME parallel.${ranks} COMMAND ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks}
                                             $<TARGET_FILE:parallel_tests>)
-    set_tests_properties(parallel.${ranks} PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 600 LABELS parallel
-                                                      PROCESSORS ${ranks})
+    set_tests_properties(parallel.${ranks} PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT ${parallel_timeout}
+                                                      LABELS parallel PROCESSORS ${ranks})
   endforeach()
 endif()
 
