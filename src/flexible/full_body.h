@@ -46,6 +46,7 @@ public:
   PetscInt multipliers() const override { return own_multipliers; }
   void     initial(double *x, double *y) const override;
   void     rest(const double *x) override;
+  bool     symmetric() const override { return true; } /* as K and M of the model are */
   void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override;
 
   PetscMPIInt ownerOf(PetscInt node) const;

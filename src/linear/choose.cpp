@@ -220,7 +220,7 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscFunctionBegin;
   *size = Size();
   PetscCall(LinearStoresTriangle(P, &triangle));
-  if (triangle) { /* of large packages MUMPS reads it, of small ones none */
+  if (triangle) { /* MUMPS reads it, KLU and the like do not: a chain of 50 unknowns takes 0.28 ms in place of 0.007 ms (above) */
     size->large = PETSC_TRUE;
     PetscCall(PetscStrncpy(size->text, "the matrix holds one triangle", sizeof size->text));
     PetscFunctionReturn(0);

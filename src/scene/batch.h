@@ -40,7 +40,7 @@ class Batch
 public:
   virtual ~Batch() = default;
   virtual void pattern(Pattern &p) = 0;       /* asks for blocks */
-  virtual void resolve(const Pattern &p);     /* their slots */
+  virtual void resolve(const Pattern &p, bool again = false); /* their slots; again: they will be asked for once more */
   virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
   virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
   /* after an accepted step; bodies have moved there */
@@ -62,10 +62,11 @@ protected:
   std::vector<Slot>     slot_;
 };
 
-inline void Batch::resolve(const Pattern &p)
+inline void Batch::resolve(const Pattern &p, bool again)
 {
   slot_.resize(request_.size());
   for (std::size_t i = 0; i < request_.size(); i++) slot_[i] = p.slot(request_[i]);
+  if (again) return;
   std::vector<PetscInt>().swap(request_);
 }
 

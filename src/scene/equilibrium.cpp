@@ -106,13 +106,15 @@ PetscErrorCode MeasureForces(Equilibrium &E, Vec F, Unbalanced &out)
   PetscFunctionReturn(0);
 }
 
-/* As the integrator would: KLU where it is there, which it is on one rank alone */
-PetscErrorCode ChoosePackage(Mat J, PC pc)
+/* As the integrator would: KLU where it is there, which it is on one rank alone; of one triangle MUMPS, which reads it */
+PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
 {
   PetscFunctionBegin;
-  for (const char *package : {"klupair", MATSOLVERKLU, MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST}) {
-    PetscBool is;
-    PetscCall(MatGetFactorAvailable(J, package, MAT_FACTOR_LU, &is));
+  for (const char *package : {"klupair", MATSOLVERKLU, "mumpsnd", MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST}) {
+    PetscBool is, ours;
+    PetscCall(PetscStrcmp(package, "mumpsnd", &ours));
+    if (ours && !triangle) continue;
+    PetscCall(MatGetFactorAvailable(J, package, triangle ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &is));
     if (!is) continue;
     PetscCall(PCFactorSetMatSolverType(pc, package));
     break;
@@ -138,8 +140,8 @@ PetscErrorCode Create(Equilibrium &E)
   PetscCall(KSPSetType(E.ksp, KSPPREONLY));
   PetscCall(KSPSetOperators(E.ksp, E.J, E.J));
   PetscCall(KSPGetPC(E.ksp, &pc));
-  PetscCall(PCSetType(pc, PCLU));
-  PetscCall(ChoosePackage(E.J, pc));
+  PetscCall(PCSetType(pc, R.triangle ? PCCHOLESKY : PCLU));
+  PetscCall(ChoosePackage(E.J, pc, R.triangle));
   PetscCall(KSPSetFromOptions(E.ksp));
   PetscFunctionReturn(0);
 }

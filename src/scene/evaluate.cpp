@@ -80,12 +80,22 @@ void BodyBlocks(Runtime &R, const Evaluation &e)
   }
 }
 
+void AddAll(Runtime &R, Evaluation &e)
+{
+  for (auto &b : R.batches) b->jacobian(e);
+  BodyBlocks(R, e);
+}
+
 /* The arrays of SEQAIJ and MPIAIJ are filled in place; another type gets the rows of an AIJ copy. */
 PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
 {
   Mat       diagonal = aij, off = nullptr;
   PetscInt  n;
   PetscFunctionBegin;
+  if (R.triangle) {
+    PetscCall(FillTriangle(R, e, aij, [&] { AddAll(R, e); }));
+    PetscFunctionReturn(0);
+  }
   if (R.size > 1) PetscCall(MatMPIAIJGetSeqAIJ(aij, &diagonal, &off, nullptr));
   MatInfo info;
   PetscCall(MatSeqAIJGetArrayWrite(diagonal, &e.sink.diagonal));
@@ -97,8 +107,7 @@ PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
     PetscCall(MatGetInfo(off, MAT_LOCAL, &info));
     std::fill(e.sink.off, e.sink.off + (PetscInt)info.nz_used, 0.0);
   }
-  for (auto &b : R.batches) b->jacobian(e);
-  BodyBlocks(R, e);
+  AddAll(R, e);
   PetscCall(MatSeqAIJRestoreArrayWrite(diagonal, &e.sink.diagonal));
   if (off) PetscCall(MatSeqAIJRestoreArrayWrite(off, &e.sink.off));
   PetscCall(MatAssemblyBegin(aij, MAT_FINAL_ASSEMBLY));
@@ -111,7 +120,7 @@ PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J)
 {
   const double *u, *v, *a, *local[3];
-  PetscBool     seq, mpi;
+  PetscBool     ours;
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
@@ -119,9 +128,9 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
   PetscCall(LocalState(R, u, v, a, local));
   R.bodies.move(local[0], local[1]);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, nullptr, sv, sa};
-  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSEQAIJ, &seq));
-  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMPIAIJ, &mpi));
-  if (seq || mpi) {
+  if (R.triangle) PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQSBAIJ, MATMPISBAIJ, ""));
+  else PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQAIJ, MATMPIAIJ, ""));
+  if (ours) {
     PetscCall(Fill(R, e, J));
   } else {
     MatType type;

@@ -19,6 +19,7 @@ public:
   virtual void     initial(double *u, double *v) const = 0; /* own coordinates */
   virtual void     rest(const double *u) = 0; /* these become the initial coordinates, at rest */
   virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  virtual bool     symmetric() const { return false; } /* forces have a potential, damping is a constant symmetric matrix */
   PetscInt         unknowns() const { return coordinates() + multipliers(); }
 
   std::vector<PetscInt> start; /* global number of the first unknown on every rank; numbering.cpp */

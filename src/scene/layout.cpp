@@ -226,26 +226,23 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
+/* The bodies' blocks are asked for before all others */
 PetscErrorCode MakePattern(Runtime &R)
 {
-  std::vector<PetscInt> request;
+  PetscInt bodies = 0;
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
     if (k.kind == BodyKind::Flexible) {
       for (int g = 0; g < 3; g++)
-        for (int h = 0; h < 3; h++) request.push_back(R.pattern.need(k.group + g, k.group + h));
+        for (int h = 0; h < 3; h++) bodies = 1 + R.pattern.need(k.group + g, k.group + h);
       continue;
     }
-    for (int g = 0; g < Groups(k.kind); g++) request.push_back(R.pattern.need(k.group + g, k.group + g, g == 0));
+    for (int g = 0; g < Groups(k.kind); g++) bodies = 1 + R.pattern.need(k.group + g, k.group + g, g == 0);
   }
   for (auto &b : R.batches) b->pattern(R.pattern);
-  R.pattern.build(R.start, R.n);
-  R.body_slot.clear();
-  for (PetscInt r : request) R.body_slot.push_back(R.pattern.slot(r));
-  for (auto &b : R.batches) b->resolve(R.pattern);
-  PetscCall(R.pattern.createMat(R.scene.comm, R.n, &R.J));
-  R.pattern.release();
+  R.body_slot.resize(bodies);
+  PetscCall(ResolvePattern(R, false, R.wants_triangle));
   PetscFunctionReturn(0);
 }
 

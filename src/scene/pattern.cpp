@@ -4,23 +4,27 @@
 namespace hhtdae
 {
 
-/* Columns of each row group, sorted, then offsets of every block */
-void Pattern::build(PetscInt start, PetscInt n)
+/* Columns of each row group, sorted, then offsets of every block; of one triangle from the diagonal on */
+void Pattern::build(PetscInt start, PetscInt n, bool triangle)
 {
   struct Column {
     PetscInt group;
     bool     diagonal;
     PetscInt at; /* first entry in the row, of its part of the matrix */
   };
+  triangle_ = triangle;
   const std::size_t     groups = group.size();
   std::vector<PetscInt> first(groups + 1, 0);
+  const auto            stored = [&](const Request &r) {
+    return r.row >= 0 && group[r.row].own && (!triangle || group[r.column].global >= group[r.row].global);
+  };
   for (const Request &r : request_)
-    if (r.row >= 0 && group[r.row].own) first[r.row + 1]++;
+    if (stored(r)) first[r.row + 1]++;
   for (std::size_t g = 0; g < groups; g++) first[g + 1] += first[g];
   std::vector<Column>   columns(first.back());
   std::vector<PetscInt> fill(first.begin(), first.end() - 1), last(groups);
   for (const Request &r : request_)
-    if (r.row >= 0 && group[r.row].own) columns[fill[r.row]++] = {r.column, r.diagonal, 0};
+    if (stored(r)) columns[fill[r.row]++] = {r.column, r.diagonal, 0};
 
   /* unique columns by global number; own ones before others'; diagonal if all who asked want no more */
   const auto before = [&](const Column &a, const Column &b) {
@@ -29,6 +33,7 @@ void Pattern::build(PetscInt start, PetscInt n)
   };
   const auto width = [&](const Column &c) { return c.diagonal ? 1 : group[c.group].size; };
   std::vector<PetscInt> width_own(groups, 0), width_other(groups, 0);
+  std::vector<char>     shrinks(groups, 0); /* one triangle, and a whole block on the diagonal */
   di.assign(n + 1, 0);
   oi.assign(n + 1, 0);
   for (std::size_t g = 0; g < groups; g++) {
@@ -43,8 +48,9 @@ void Pattern::build(PetscInt start, PetscInt n)
       columns[k].at = sum;
       sum += width(columns[k]);
     }
+    shrinks[g] = triangle && last[g] > first[g] && columns[first[g]].group == (PetscInt)g && !columns[first[g]].diagonal;
     for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
-      di[group[g].local + r + 1] = width_own[g];
+      di[group[g].local + r + 1] = width_own[g] - (shrinks[g] ? r : 0);
       oi[group[g].local + r + 1] = width_other[g];
     }
   }
@@ -59,8 +65,9 @@ void Pattern::build(PetscInt start, PetscInt n)
     for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
       PetscInt d = di[group[g].local + r], o = oi[group[g].local + r];
       for (PetscInt k = first[g]; k < last[g]; k++) {
-        const Group &c = group[columns[k].group];
-        for (PetscInt e = columns[k].diagonal ? r : 0; e < (columns[k].diagonal ? r + 1 : c.size); e++) {
+        const Group   &c    = group[columns[k].group];
+        const bool     half = shrinks[g] && k == first[g];
+        for (PetscInt e = columns[k].diagonal || half ? r : 0; e < (columns[k].diagonal ? r + 1 : c.size); e++) {
           if (c.own) dj[d++] = c.global + e - start;
           else oj[o++] = c.global + e;
         }
@@ -71,9 +78,12 @@ void Pattern::build(PetscInt start, PetscInt n)
   for (std::size_t q = 0; q < request_.size(); q++) {
     const PetscInt g = request_[q].row, c = request_[q].column;
     Slot          &s = slot_[q];
-    if (g < 0 || !group[g].own) continue;
-    s.off    = !group[c].own;
-    s.stride = s.off ? width_other[g] : width_own[g];
+    s = Slot();
+    if (!stored(request_[q])) continue;
+    s.off     = !group[c].own;
+    s.shrinks = shrinks[g] && !s.off;
+    s.upper   = s.shrinks && c == g;
+    s.stride  = s.off ? width_other[g] : width_own[g] - (s.shrinks ? 1 : 0);
     const auto found = std::lower_bound(columns.begin() + first[g], columns.begin() + last[g], Column{c, false, 0}, before);
     s.diagonal       = found->diagonal;
     s.base           = (s.off ? oi : di)[group[g].local] + found->at;
@@ -94,9 +104,10 @@ PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(MatCreate(comm, A));
   PetscCall(MatSetSizes(*A, n, n, PETSC_DETERMINE, PETSC_DETERMINE));
-  PetscCall(MatSetType(*A, MATAIJ));
+  PetscCall(MatSetType(*A, triangle_ ? MATSBAIJ : MATAIJ));
   if (size == 1) {
-    PetscCall(MatSeqAIJSetPreallocationCSR(*A, di.data(), dj.data(), nullptr));
+    if (triangle_) PetscCall(MatSeqSBAIJSetPreallocationCSR(*A, 1, di.data(), dj.data(), nullptr));
+    else PetscCall(MatSeqAIJSetPreallocationCSR(*A, di.data(), dj.data(), nullptr));
   } else {
     /* one list of global columns per row, sorted */
     PetscInt start;
@@ -113,7 +124,8 @@ PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const
       std::sort(j.begin() + begin, j.end());
       i[r + 1] = (PetscInt)j.size();
     }
-    PetscCall(MatMPIAIJSetPreallocationCSR(*A, i.data(), j.data(), nullptr));
+    if (triangle_) PetscCall(MatMPISBAIJSetPreallocationCSR(*A, 1, i.data(), j.data(), nullptr));
+    else PetscCall(MatMPIAIJSetPreallocationCSR(*A, i.data(), j.data(), nullptr));
   }
   PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
   PetscFunctionReturn(0);

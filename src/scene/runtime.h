@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_RUNTIME_H
 
 #include "scene_data.h"
+#include <functional>
 #include <petscsf.h>
 #include <petscts.h>
 
@@ -44,6 +45,11 @@ struct Runtime {
   std::vector<double>    u, v, a; /* local unknowns, where there are others */
 
   Mat  J = nullptr;      /* of the first TS; others get a duplicate */
+  /* one triangle of it: asked for, and so stored; off-diagonal values of own rows, which PETSc takes row by row there */
+  bool                  wants_triangle = false, triangle = false;
+  std::string           full_because; /* why the whole matrix is stored */
+  std::vector<PetscInt> off_start, off_column;
+  std::vector<double>   off_value;
   bool given = false;
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* quaternions of the axes of own rigid bodies, and memories: what a checkpoint has to keep */
@@ -91,6 +97,11 @@ PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
 PetscErrorCode AttachOutput(Runtime &R, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
+/* triangle.cpp: one triangle of the matrix, MATSBAIJ, where nothing breaks its symmetry */
+PetscErrorCode WantTriangle(Runtime &R);  /* before Layout() */
+PetscErrorCode StoreTriangle(Runtime &R); /* after it */
+PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again);
+PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::function<void()> &add);
 /* check.cpp: everything that is wrong with the description, as one error */
 PetscErrorCode CheckDescription(SceneData &s);
 

@@ -162,7 +162,9 @@ PetscErrorCode Scene::setUp()
   PetscCall(Assemble(R));
   PetscCall(DropRedundant(R));
   PetscCall(Number(R));
+  PetscCall(WantTriangle(R));
   PetscCall(Layout(R));
+  PetscCall(StoreTriangle(R));
   if (s.start.equilibrium) PetscCall(FindEquilibrium(R));
   if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
   s.run = std::move(run); /* not before everything is done: after an error setUp() starts anew */

@@ -63,6 +63,7 @@ PetscErrorCode Scene::view(PetscViewer viewer) const
                                    (int)R.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
   if (R.turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R.reframed));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  matrix: %s\n", R.triangle ? "one triangle" : ("all of it, " + R.full_because).c_str()));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);
 }
