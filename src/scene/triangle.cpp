@@ -11,6 +11,7 @@
       -size 30,8,8 -steps 4, one rank                          456 | 450 MB     7.5 | 7.5 s
       the same, two ranks                                      615 | 584 MB    14.5 | 14.1 s
       -size 40,12,12 -steps 2, 80898 unknowns               1577 | 1501 MB   30.2 | 31.3 s
+      the same, two ranks                                    1880 | 1753 MB   47.1 | 46.2 s
       -size 30,8,8 -steps 2 -held free -ksp_type cg
         -pc_type icc -ksp_rtol 1e-6                            241 | 241 MB     2.4 | 2.1 s
 
