@@ -1,11 +1,12 @@
-/* Structure of the panels of "klupair": from the patterns of KLU's factors to panels, what they cost, where entries go
- */
+/* Structure of the panels of "klupair": from the elimination tree to panels, what they cost, where entries go */
 #if defined(HHTDAE_HAVE_KLU)
-#include "klupair_panels.h"
+#include "klupair_panels_tree.h"
 #include <algorithm>
 #include <tuple>
 
 typedef std::vector<PetscInt> Indices;
+typedef KluPattern            Pattern;
+typedef KluTree               Tree;
 
 /* Below so many operations in all, or per entry of L and U, KLU is as fast and nobody looks for panels */
 static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
@@ -41,133 +42,6 @@ static const PetscInt WIDE = 64;
 
 /* Entries that go to places one after the other are copied together from so many on */
 static const PetscInt RUN = 8;
-
-/* ---- the patterns of L and U ---- */
-
-/* Off the diagonal, entries of column k of L and of row k of U together, as places */
-struct Pattern {
-  Indices start, index;
-};
-
-static PetscErrorCode Extract(KluPair *k, Pattern *pattern)
-{
-  const KluInt        n = k->symbolic->n;
-  std::vector<KluInt> Lp(n + 1), Li(k->numeric->lnz), Up(n + 1), Ui(k->numeric->unz);
-  std::vector<double> Lx(Li.size()), Ux(Ui.size()); /* without them KLU gives no indices */
-
-  PetscFunctionBegin;
-  const KluInt ok = KLU(extract)(k->numeric, k->symbolic, Lp.data(), Li.data(), Lx.data(), Up.data(), Ui.data(),
-                                 Ux.data(), NULL, NULL, NULL, NULL, NULL, NULL, NULL, &k->common);
-  PetscCheck(ok, PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU does not give the pattern of its factors, status %d",
-             (int)k->common.status);
-  Indices &start = pattern->start;
-  start.assign(n + 1, 0);
-  for (KluInt j = 0; j < n; ++j) {
-    start[j + 1] += Lp[j + 1] - Lp[j];
-    for (KluInt e = Up[j]; e < Up[j + 1]; ++e) ++start[Ui[e] + 1];
-  }
-  for (KluInt j = 0; j < n; ++j) start[j + 1] += start[j];
-  pattern->index.resize(start[n]);
-  Indices next(start.begin(), start.end() - 1);
-  for (KluInt j = 0; j < n; ++j) {
-    for (KluInt e = Lp[j]; e < Lp[j + 1]; ++e) pattern->index[next[j]++] = Li[e];
-    for (KluInt e = Up[j]; e < Up[j + 1]; ++e) pattern->index[next[Ui[e]]++] = j;
-  }
-  PetscFunctionReturn(0);
-}
-
-/* Instead of them, where KLU has factored nothing yet: what M(P,Q) has off the diagonal, in diagonal blocks */
-static Pattern Planned(const LinearRows &rows, const KluPair &k)
-{
-  Indices row(rows.n), col(rows.n), block(rows.n), low, high;
-  Pattern pattern;
-  for (KluInt b = 0; b < k.symbolic->nblocks; ++b)
-    std::fill(block.begin() + k.symbolic->R[b], block.begin() + k.symbolic->R[b + 1], (PetscInt)b);
-  for (PetscInt i = 0; i < rows.n; ++i) {
-    row[k.symbolic->P[i]] = i;
-    col[k.symbolic->Q[i]] = i;
-  }
-  pattern.start.assign(rows.n + 1, 0);
-  for (PetscInt j = 0; j < rows.n; ++j)
-    for (PetscInt e = rows.start[j]; e < rows.start[j + 1]; ++e) {
-      const PetscInt a = row[rows.col[e]], b = col[j];
-      if (a == b || block[a] != block[b]) continue;
-      low.push_back(std::min(a, b));
-      high.push_back(std::max(a, b));
-      ++pattern.start[low.back() + 1];
-    }
-  for (PetscInt i = 0; i < rows.n; ++i) pattern.start[i + 1] += pattern.start[i];
-  pattern.index.resize(low.size());
-  Indices next(pattern.start.begin(), pattern.start.end() - 1);
-  for (size_t e = 0; e < low.size(); ++e) pattern.index[next[low[e]]++] = high[e];
-  return pattern;
-}
-
-/* ---- the symmetric structure and its elimination tree ---- */
-
-struct Tree {
-  std::vector<Indices> structure; /* places after each place that its pivot reaches */
-  Indices              parent;    /* -1 at roots: the last place of a diagonal block, and other ends */
-};
-
-/* A pivot reaches what it meets itself and what those before hand over to it; structures are dropped when `limit`
-   entries are exceeded: panels would be much fuller than KLU's factors */
-static bool Eliminate(const Pattern &pattern, double limit, Tree *tree)
-{
-  const PetscInt n = (PetscInt)pattern.start.size() - 1;
-  Indices        met(n, -1), child(n, -1), next(n, -1);
-  double         entries = 0;
-
-  tree->structure.assign(n, Indices());
-  tree->parent.assign(n, -1);
-  for (PetscInt k = 0; k < n; ++k) {
-    Indices   &s    = tree->structure[k];
-    const auto meet = [&](PetscInt i) {
-      if (i > k && met[i] != k) s.push_back(i);
-      met[i] = k;
-    };
-    for (PetscInt e = pattern.start[k]; e < pattern.start[k + 1]; ++e) meet(pattern.index[e]);
-    for (PetscInt c = child[k]; c >= 0; c = next[c])
-      for (PetscInt i : tree->structure[c]) meet(i);
-    entries += 2 * (double)s.size();
-    if (entries > limit) return false;
-    if (s.empty()) continue;
-    const PetscInt parent = *std::min_element(s.begin(), s.end());
-    tree->parent[k]       = parent;
-    next[k]               = child[parent];
-    child[parent]         = k;
-  }
-  return true;
-}
-
-/* Old place of each new one: everything below a place directly before it. Roots stay in their order, and with them the
-   diagonal blocks. */
-static Indices Postorder(const Tree &tree)
-{
-  const PetscInt n = (PetscInt)tree.parent.size();
-  Indices        child(n, -1), next(n, -1), order, stack;
-  for (PetscInt k = n; k-- > 0;)
-    if (tree.parent[k] >= 0) {
-      next[k]               = child[tree.parent[k]];
-      child[tree.parent[k]] = k;
-    }
-  order.reserve(n);
-  for (PetscInt root = 0; root < n; ++root) {
-    if (tree.parent[root] >= 0) continue;
-    stack.assign(1, root);
-    while (!stack.empty()) {
-      const PetscInt v = stack.back(), c = child[v];
-      if (c >= 0) {
-        child[v] = next[c];
-        stack.push_back(c);
-      } else {
-        order.push_back(v);
-        stack.pop_back();
-      }
-    }
-  }
-  return order;
-}
 
 /* ---- panels ---- */
 
@@ -514,9 +388,9 @@ static void Build(const LinearRows &rows, const KluPair &k, const Pattern &patte
   Indices block_of;
 
   p->n  = rows.n;
-  *pays = Eliminate(pattern, 3 * entries, &tree);
+  *pays = KluTreeEliminate(pattern, 3 * entries, &tree);
   if (!*pays) return;
-  const Indices order = Postorder(tree);
+  const Indices order = KluTreePostorder(tree);
   Order(k, order, p, &block_of);
   MakePanels(Ranges(tree, order), block_of, p);
   const Indices of = PanelOf(*p);
@@ -545,7 +419,7 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
   *p    = KluPanels();
   *pays = WorthALook(entries, flops);
   if (!*pays) PetscFunctionReturn(0);
-  PetscCall(Extract(k, &pattern));
+  PetscCall(KluPatternExtract(k, &pattern));
   Build(rows, *k, pattern, entries, flops, p, pays);
   PetscFunctionReturn(0);
 }
@@ -556,7 +430,7 @@ void KluPanelsPlan(const LinearRows &rows, const KluPair &k, KluPanels *p, bool 
 
   *p    = KluPanels();
   *pays = WorthALook(entries, flops) && KLU_OPERATION * flops > BUILD * entries;
-  if (*pays) Build(rows, k, Planned(rows, k), entries, flops, p, pays);
+  if (*pays) Build(rows, k, KluPatternPlanned(rows, k), entries, flops, p, pays);
 }
 
 #endif
