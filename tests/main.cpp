@@ -49,7 +49,7 @@ int RunAllRanks()
    not libraries: a communicator that the project forgets has to be seen. */
 extern "C" const char *__lsan_default_suppressions()
 {
-  return "leak:ompi_mpi_init\nleak:ompi_mpi_finalize\nleak:hwloc_topology_load\n"
+  return "leak:ompi_mpi_init\nleak:ompi_mpi_finalize\nleak:hwloc_topology_load\nleak:event_base_loop\n"
          "leak:H5FL_reg_malloc\nleak:H5FL_blk_malloc\nleak:PetscOptionsBegin_Private\n";
 }
 #endif

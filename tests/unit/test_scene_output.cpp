@@ -255,7 +255,7 @@ template <class T> std::vector<T> Data(const std::string &text, const std::strin
   std::memcpy(&bytes, raw.data(), 8);
   if (raw.size() != 8 + bytes) throw std::runtime_error(name + " has another size than its header says");
   std::vector<T> values(bytes / sizeof(T));
-  std::memcpy(values.data(), raw.data() + 8, bytes);
+  if (bytes) std::memcpy(values.data(), raw.data() + 8, bytes);
   return values;
 }
 
