@@ -206,13 +206,14 @@ PetscErrorCode ScaleTriangle(Integrator &I, Mat A);
 PetscErrorCode DifferencesCreate(TS ts, Mat *P);
 PetscErrorCode DifferencesDestroy(TS ts);
 PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat P);
+/* stage.cpp */
+PetscErrorCode PrepareStage(TS ts);
+PetscErrorCode StageVectors(TS ts, Vec X);
+PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 /* equations.cpp */
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
-PetscErrorCode PrepareStage(TS ts);
-PetscErrorCode StageVectors(TS ts, Vec X);
-PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 /* corrector.cpp */
@@ -231,6 +232,7 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);
+PetscErrorCode PredictedStates(const Integrator &I, Vec X);
 PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);

@@ -1,0 +1,290 @@
+/*
+  U1, V1, A1: the state at t_{n+1} that belongs to the unknowns X, by (2) and by the average that the form asks for.
+
+  What does not depend on X, the base, is made once per step. The base, the first X and its stage come in one sweep part by part, a
+  correction with its norm and the new stage in another: the vectors of a large system do not fit into the nearest caches, and
+  to fetch them is most of the work.
+*/
+#include "extrapolation.h"
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* U1, V1, A1 in the start: q, q', s are given; a, s', lambda, V, F are the unknowns */
+void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+{
+  for (PetscInt i = 0; i < n; i++) {
+    switch (RoleOf(I, i)) {
+    case TSHHT3_COORDINATE: a[i] = x[i]; break;
+    case TSHHT3_STATE: v[i] = x[i]; break;
+    default: u[i] = x[i]; break;
+    }
+  }
+}
+
+struct Ends { /* of the step, read-only */
+  const PetscScalar *u0, *v0, *a0, *x0, *begin; /* begin: q'_n as the step takes it, v0 or what VelocitiesAtBegin() has left in the base */
+};
+
+/* The parts of U1, V1, A1 that do not depend on X, from (2) and from the average that the form asks for. a_n and w_n were made
+   by a step of length h_last; their lag behind the true values is stretched to the present h, without which a change of h
+   costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true value, so that nothing
+   changes. */
+template <bool all>
+struct BaseOfCoordinates {
+  Parameters         p;
+  PetscReal          h, r, cn, c0;
+  Ends               e;
+  const float       *moves;
+  PetscScalar       *u, *v, *a;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    const Four zero = {0, 0, 0, 0}, a0 = at.get(e.a0), an = a0 + r * (at.get(e.x0) - a0), v0 = at.get(e.begin);
+    Four       u1 = at.get(e.u0) + h * (v0 + h * ((PetscReal)0.5 - p.beta) * an), v1 = v0 + h * (1 - p.gamma) * an, a1 = cn * an - c0 * a0;
+    if (!all) {
+      const auto moving = at.get(moves) != 0;
+      u1                = moving ? u1 : zero;
+      v1                = moving ? v1 : zero;
+      a1                = moving ? a1 : zero;
+    }
+    at.put(u, u1);
+    at.put(v, v1);
+    at.put(a, a1);
+  }
+};
+
+void BaseOfStates(const Integrator &I, const Ends &e, PetscScalar *const b[])
+{
+  const Parameters &p = I.p;
+  const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1;
+  for (PetscInt i : I.states) {
+    const PetscScalar wn = e.v0[i] + r * (e.x0[i] - e.v0[i]);
+    b[0][i]              = e.u0[i] + h * (1 - p.gamma_s) * wn;
+    b[1][i]              = (p.am_s * wn - p.af_s * e.v0[i]) / (1 - p.af_s);
+  }
+}
+
+/* q'_n less its misfit and what a change of coordinates has bent, misfit.cpp */
+PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
+{
+  PetscFunctionBegin;
+  if (I.misfit != 0) PetscCall(VecWAXPY(v, -I.misfit, I.dV, I.V0));
+  else PetscCall(VecCopy(I.V0, v));
+  if (I.bent == Bend::Velocities) PetscCall(VecAXPY(v, -I.p.bend() * I.h * I.h, I.bend));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U1, V1, A1 = base + X times their derivatives by X; of what is no coordinate U1 is X itself */
+template <bool all>
+struct Stage {
+  PetscReal          kq, kv, ka;
+  const PetscScalar *x, *base[3];
+  const float       *moves;
+  PetscScalar       *to[3];
+
+  template <class At>
+  HHT3_INLINE void set(const At &at, const Four &given) const
+  {
+    const Four c = all ? given : given * at.get(moves);
+    Four       u = at.get(base[0]) + kq * c;
+    if (!all) u += given - c;
+    at.put(to[0], u);
+    at.put(to[1], at.get(base[1]) + kv * c);
+    at.put(to[2], at.get(base[2]) + ka * c);
+  }
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const { set(at, at.get(x)); }
+};
+
+/* The same after X = X - d, and the squares of d by the weights */
+template <bool all>
+struct CorrectedStage {
+  Stage<all>         stage;
+  const PetscScalar *d, *w;
+  PetscScalar       *x;
+  Four               sum = {0, 0, 0, 0};
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at)
+  {
+    const Four correction = at.get(d), weighted = correction * at.get(w), now = at.get(x) - correction;
+    sum += weighted * weighted;
+    at.put(x, now);
+    stage.set(at, now);
+  }
+};
+
+void StageOfStates(const Integrator &I, const PetscScalar *x, PetscScalar *const base[], PetscScalar *const to[])
+{
+  const Parameters &p = I.p;
+  const PetscReal   ks = ScaleState(p, I.h), cs = (1 - p.am_s) / (1 - p.af_s);
+  for (PetscInt i : I.states) {
+    to[0][i] = base[0][i] + ks * x[i];
+    to[1][i] = base[1][i] + cs * x[i];
+  }
+}
+
+/* The arrays of a stage but X */
+struct StageArrays {
+  PetscScalar       *base[3];
+  PetscScalar       *to[3];
+  PetscInt           n;
+};
+
+PetscErrorCode GetStage(const Integrator &I, StageArrays *s)
+{
+  Vec to[3] = {I.U1, I.V1, I.A1};
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(I.U1, &s->n));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &s->base[k]));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(to[k], &s->to[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RestoreStage(const Integrator &I, StageArrays *s)
+{
+  Vec to[3] = {I.U1, I.V1, I.A1};
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &s->to[k]));
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(I.base[k], &s->base[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+template <bool all>
+Stage<all> MakeStage(const Integrator &I, const StageArrays &s, const PetscScalar *x)
+{
+  return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, {s.base[0], s.base[1], s.base[2]}, I.moves.data(), {s.to[0], s.to[1], s.to[2]}};
+}
+
+/* Remembers that U1, V1, A1 belong to X */
+PetscErrorCode NoteStage(Integrator &I, Vec X)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)X, &I.stage_id));
+  PetscCall(PetscObjectStateGet((PetscObject)X, &I.stage_state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HasStage(const Integrator &I, Vec X, bool *has)
+{
+  PetscObjectId    id;
+  PetscObjectState state;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)X, &id));
+  PetscCall(PetscObjectStateGet((PetscObject)X, &state));
+  *has = I.mode == Mode::Step && id == I.stage_id && state == I.stage_state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U1, V1, A1 from X; to be called after PrepareStage() */
+PetscErrorCode StageVectors(TS ts, Vec X)
+{
+  Integrator        &I = Get(ts);
+  StageArrays        s;
+  const PetscScalar *x;
+  bool               has;
+
+  PetscFunctionBegin;
+  PetscCall(HasStage(I, X, &has));
+  if (has) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(GetStage(I, &s));
+  if (I.mode == Mode::Start) StartStage(I, s.n, x, s.to[0], s.to[1], s.to[2]);
+  else {
+    if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
+    else Sweep(s.n, MakeStage<false>(I, s, x));
+    StageOfStates(I, x, s.base, s.to);
+    PetscCall(NoteStage(I, X));
+  }
+  PetscCall(RestoreStage(I, &s));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X = X - dX, the norm of dX by which the corrector judges it, and U1, V1, A1 that belong to the new X, in one sweep */
+PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
+{
+  Integrator        &I = Get(ts);
+  StageArrays        s;
+  const PetscScalar *d, *w;
+  PetscScalar       *x;
+  Four               sum;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(X, &x));
+  PetscCall(VecGetArrayRead(dX, &d));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  PetscCall(GetStage(I, &s));
+  if (I.moves.empty()) sum = Sweep(s.n, CorrectedStage<true>{MakeStage<true>(I, s, x), d, w, x}).sum;
+  else sum = Sweep(s.n, CorrectedStage<false>{MakeStage<false>(I, s, x), d, w, x}).sum;
+  StageOfStates(I, x, s.base, s.to);
+  PetscCall(RestoreStage(I, &s));
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArrayRead(dX, &d));
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(NoteStage(I, X));
+  PetscCall(ReduceCorrection(ts, dX, Total(sum), e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+template <bool all>
+static PetscErrorCode BeginStage(Integrator &I, Ends e)
+{
+  const bool         paper = I.form == TSHHT3_FORM_PAPER;
+  const PetscReal    cn = paper ? 0 : I.p.am / (1 - I.p.af), c0 = paper ? 0 : I.p.af / (1 - I.p.af);
+  const PetscScalar *x;
+  StageArrays        s;
+
+  PetscFunctionBegin;
+  PetscCall(GetStage(I, &s));
+  if (!e.begin) e.begin = s.base[1];
+  const BaseOfCoordinates<all> base = {I.p, I.h, I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), s.base[0], s.base[1], s.base[2]};
+  PetscCall(Extrapolate(I.predictor, I.t1, I.X, [&](const auto &prediction) { SweepTogether(s.n, base, prediction, MakeStage<all>(I, s, prediction.x)); }));
+  BaseOfStates(I, e, s.base);
+  PetscCall(PredictedStates(I, I.X));
+  PetscCall(VecGetArrayRead(I.X, &x));
+  StageOfStates(I, x, s.base, s.to);
+  PetscCall(VecRestoreArrayRead(I.X, &x));
+  PetscCall(RestoreStage(I, &s));
+  PetscCall(NoteStage(I, I.X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The base, the predicted X and its U1, V1, A1. To be called when h, t_n's state or the misfit of its velocities have changed,
+   before the first residual. */
+PetscErrorCode PrepareStage(TS ts)
+{
+  Integrator &I = Get(ts);
+  const bool  changed = I.misfit != 0 || I.bent == Bend::Velocities;
+  Ends        e;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
+  if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
+  PetscCall(VecGetArrayRead(I.U0, &e.u0));
+  PetscCall(VecGetArrayRead(I.V0, &e.v0));
+  PetscCall(VecGetArrayRead(I.A0, &e.a0));
+  PetscCall(VecGetArrayRead(I.X0, &e.x0));
+  e.begin = changed ? nullptr : e.v0;
+  if (I.moves.empty()) PetscCall(BeginStage<true>(I, e));
+  else PetscCall(BeginStage<false>(I, e));
+  PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
+  PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
+  PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
+  PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
+  PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
