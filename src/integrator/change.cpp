@@ -115,6 +115,8 @@ PetscErrorCode StepAfterChange(TS ts)
   I.t1     = ts->ptime + I.h;
   I.misfit = 0;
   PetscCall(PrepareStage(ts));
+  PetscCall(Predict(ts, I.X));
+  PetscCall(StageVectors(ts, I.X));
   const TSStepStatus status = I.status;
   I.status                  = TS_STEP_PENDING;
   PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
@@ -139,6 +141,7 @@ PetscErrorCode MatrixAfterChange(TS ts)
   I.change.stale = PETSC_FALSE;
   I.misfit       = 0;
   PetscCall(PrepareStage(ts));
+  PetscCall(Predict(ts, I.X));
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL)); /* alone, as in the start */
   PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));

@@ -232,7 +232,6 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);
-PetscErrorCode PredictedStates(const Integrator &I, Vec X);
 PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);

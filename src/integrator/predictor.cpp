@@ -8,7 +8,8 @@
   with the new difference, so that one sweep over the differences both updates them and tells which degree would have
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
-#include "extrapolation.h"
+#include "impl.h"
+#include "sweeps.h"
 
 namespace hht3
 {
@@ -67,6 +68,40 @@ void RenewDifferences(PetscInt n, PetscInt have, PetscInt keep, const PetscReal 
   }
 }
 
+/* x = D_0 + factor_1 D_1 + ... */
+template <int degree>
+struct Extrapolation {
+  const PetscScalar *D[degree + 1];
+  PetscReal          factor[degree + 1];
+  PetscScalar       *x;
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    Four sum = at.get(D[0]);
+    for (int k = 1; k <= degree; k++) sum += factor[k] * at.get(D[k]);
+    at.put(x, sum);
+  }
+};
+
+template <int degree>
+PetscErrorCode Extrapolate(const Predictor &p, PetscReal t, Vec X)
+{
+  Extrapolation<degree> e;
+  PetscInt              n;
+
+  PetscFunctionBegin;
+  e.factor[0] = 1;
+  for (int k = 1; k <= degree; k++) e.factor[k] = e.factor[k - 1] * (t - p.t[k - 1]);
+  PetscCall(VecGetLocalSize(X, &n));
+  for (int k = 0; k <= degree; k++) PetscCall(VecGetArrayRead(p.D[k], &e.D[k]));
+  PetscCall(VecGetArrayWrite(X, &e.x));
+  Sweep(n, e);
+  PetscCall(VecRestoreArrayWrite(X, &e.x));
+  for (int k = 0; k <= degree; k++) PetscCall(VecRestoreArrayRead(p.D[k], &e.D[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The new values: a, lambda, V, F as they are, of states s' */
 PetscErrorCode TrueValues(const Integrator &I, Vec x)
 {
@@ -80,6 +115,25 @@ PetscErrorCode TrueValues(const Integrator &I, Vec x)
   for (PetscInt i : I.states) a[i] = v[i];
   PetscCall(VecRestoreArray(x, &a));
   PetscCall(VecRestoreArrayRead(I.V1, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Predicted s' at t1 to the algorithmic w that gives it: the average of StageOfStates() in stage.cpp, solved for w */
+PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
+{
+  const Parameters  &p = I.p;
+  const PetscReal    r = I.h_last > 0 ? I.h / I.h_last : 1;
+  const PetscScalar *v0, *x0;
+  PetscScalar       *x;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(I.V0, &v0));
+  PetscCall(VecGetArrayRead(I.X0, &x0));
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt i : I.states) x[i] = ((1 - p.af_s) * x[i] + p.af_s * v0[i] - p.am_s * (v0[i] + r * (x0[i] - v0[i]))) / (1 - p.am_s);
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(VecRestoreArrayRead(I.X0, &x0));
+  PetscCall(VecRestoreArrayRead(I.V0, &v0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,36 +151,21 @@ PetscErrorCode PredictorReset(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predicted s' at t1 to the algorithmic w that gives it: the average of StageOfStates() in stage.cpp, solved for w */
-PetscErrorCode PredictedStates(const Integrator &I, Vec X)
-{
-  const Parameters  &p = I.p;
-  const PetscReal    r = I.h_last > 0 ? I.h / I.h_last : 1;
-  const PetscScalar *v0, *x0;
-  PetscScalar       *x;
-
-  PetscFunctionBegin;
-  if (!I.count[TSHHT3_STATE]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  PetscCall(VecGetArrayRead(I.X0, &x0));
-  PetscCall(VecGetArray(X, &x));
-  for (PetscInt i : I.states) x[i] = ((1 - p.af_s) * x[i] + p.af_s * v0[i] - p.am_s * (v0[i] + r * (x0[i] - v0[i]))) / (1 - p.am_s);
-  PetscCall(VecRestoreArray(X, &x));
-  PetscCall(VecRestoreArrayRead(I.X0, &x0));
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* X alone, for a correction from the same base; see PrepareStage() */
 PetscErrorCode Predict(TS ts, Vec X)
 {
-  Integrator &I = Get(ts);
-  PetscInt    n;
+  Integrator  &I = Get(ts);
+  Predictor   &p = I.predictor;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(X, &n));
-  PetscCall(Extrapolate(I.predictor, I.t1, X, [&](const auto &e) { Sweep(n, e); }));
-  PetscCall(PredictedStates(I, X));
+  PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
+  switch (p.degree) {
+  case 0: PetscCall(VecCopy(p.D[0], X)); break;
+  case 1: PetscCall(Extrapolate<1>(p, I.t1, X)); break;
+  case 2: PetscCall(Extrapolate<2>(p, I.t1, X)); break;
+  default: PetscCall(Extrapolate<3>(p, I.t1, X)); break;
+  }
+  if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
+  PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

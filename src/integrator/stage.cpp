@@ -1,12 +1,11 @@
 /*
   U1, V1, A1: the state at t_{n+1} that belongs to the unknowns X, by (2) and by the average that the form asks for.
 
-  What does not depend on X, the base, is made once per step. The base, the first X and its stage come in one sweep part by part, a
-  correction with its norm and the new stage in another: the vectors of a large system do not fit into the nearest caches, and
-  to fetch them is most of the work.
+  What does not depend on X, the base, is made once per step. A correction, its norm and the new stage come in one sweep: the
+  vectors of a large system do not fit into the nearest caches, and to fetch them is most of the work.
 */
-#include "extrapolation.h"
 #include "impl.h"
+#include "sweeps.h"
 
 namespace hht3
 {
@@ -238,52 +237,38 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-template <bool all>
-static PetscErrorCode BeginStage(Integrator &I, Ends e)
-{
-  const bool         paper = I.form == TSHHT3_FORM_PAPER;
-  const PetscReal    cn = paper ? 0 : I.p.am / (1 - I.p.af), c0 = paper ? 0 : I.p.af / (1 - I.p.af);
-  const PetscScalar *x;
-  StageArrays        s;
-
-  PetscFunctionBegin;
-  PetscCall(GetStage(I, &s));
-  if (!e.begin) e.begin = s.base[1];
-  const BaseOfCoordinates<all> base = {I.p, I.h, I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), s.base[0], s.base[1], s.base[2]};
-  PetscCall(Extrapolate(I.predictor, I.t1, I.X, [&](const auto &prediction) { SweepTogether(s.n, base, prediction, MakeStage<all>(I, s, prediction.x)); }));
-  BaseOfStates(I, e, s.base);
-  PetscCall(PredictedStates(I, I.X));
-  PetscCall(VecGetArrayRead(I.X, &x));
-  StageOfStates(I, x, s.base, s.to);
-  PetscCall(VecRestoreArrayRead(I.X, &x));
-  PetscCall(RestoreStage(I, &s));
-  PetscCall(NoteStage(I, I.X));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The base, the predicted X and its U1, V1, A1. To be called when h, t_n's state or the misfit of its velocities have changed,
-   before the first residual. */
+/* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual */
 PetscErrorCode PrepareStage(TS ts)
 {
-  Integrator &I = Get(ts);
-  const bool  changed = I.misfit != 0 || I.bent == Bend::Velocities;
-  Ends        e;
+  Integrator     &I = Get(ts);
+  const bool      paper = I.form == TSHHT3_FORM_PAPER, changed = I.misfit != 0 || I.bent == Bend::Velocities;
+  const PetscReal cn = paper ? 0 : I.p.am / (1 - I.p.af), c0 = paper ? 0 : I.p.af / (1 - I.p.af);
+  Ends            e;
+  PetscScalar    *b[3];
+  PetscInt        n;
 
   PetscFunctionBegin;
-  PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
+  I.stage_id = 0;
   if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
+  PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));
   PetscCall(VecGetArrayRead(I.V0, &e.v0));
   PetscCall(VecGetArrayRead(I.A0, &e.a0));
   PetscCall(VecGetArrayRead(I.X0, &e.x0));
-  e.begin = changed ? nullptr : e.v0;
-  if (I.moves.empty()) PetscCall(BeginStage<true>(I, e));
-  else PetscCall(BeginStage<false>(I, e));
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &b[k]));
+  e.begin = changed ? b[1] : e.v0;
+  const auto sweep = [&](auto base) {
+    base = {I.p, I.h, I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), b[0], b[1], b[2]};
+    Sweep(n, base);
+  };
+  if (I.moves.empty()) sweep(BaseOfCoordinates<true>());
+  else sweep(BaseOfCoordinates<false>());
+  BaseOfStates(I, e, b);
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(I.base[k], &b[k]));
   PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
   PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
   PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
   PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
-  PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -174,6 +174,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
     if (I.change.stale) PetscCall(MatrixAfterChange(ts));
     PetscCall(AdaptVelocities(ts));
     PetscCall(PrepareStage(ts));
+    PetscCall(Predict(ts, I.X));
     PetscCall(Correct(ts, ok));
   }
   PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));

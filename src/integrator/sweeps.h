@@ -50,53 +50,38 @@ struct FewAt {
 };
 
 template <class Body>
-HHT3_INLINE void SweepEntries(PetscInt from, PetscInt to, Body &body)
+HHT3_INLINE void SweepAll(PetscInt n, Body &body)
 {
-  PetscInt i = from;
-  for (; i + 4 <= to; i += 4) body(FourAt{i});
-  if (i < to) body(FewAt{i, to - i});
+  PetscInt i = 0;
+  for (; i + 4 <= n; i += 4) body(FourAt{i});
+  if (i < n) body(FewAt{i, n - i});
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
 template <class Body>
-__attribute__((target("avx2"))) Body SweepNewer(PetscInt from, PetscInt to, Body body)
+__attribute__((target("avx2"))) Body SweepNewer(PetscInt n, Body body)
 {
-  SweepEntries(from, to, body);
+  SweepAll(n, body);
   return body;
 }
 bool NewerProcessor();
 #endif
 
 template <class Body>
-Body SweepPlain(PetscInt from, PetscInt to, Body body)
+Body SweepPlain(PetscInt n, Body body)
 {
-  SweepEntries(from, to, body);
+  SweepAll(n, body);
   return body;
-}
-
-template <class Body>
-Body SweepPart(PetscInt from, PetscInt to, const Body &body)
-{
-#if defined(__x86_64__) && defined(__GNUC__)
-  if (NewerProcessor()) return SweepNewer(from, to, body);
-#endif
-  return SweepPlain(from, to, body);
 }
 
 /* body for all entries of arrays of length n; returns it with what it has gathered */
 template <class Body>
 Body Sweep(PetscInt n, const Body &body)
 {
-  return SweepPart(0, n, body);
-}
-
-/* Bodies that gather nothing, of which one reads what those before it have written at the same entries: part by part, so that
-   it is still in the nearest cache */
-template <class... Body>
-void SweepTogether(PetscInt n, const Body &...body)
-{
-  constexpr PetscInt part = 256;
-  for (PetscInt from = 0; from < n; from += part) (SweepPart(from, PetscMin(n, from + part), body), ...);
+#if defined(__x86_64__) && defined(__GNUC__)
+  if (NewerProcessor()) return SweepNewer(n, body);
+#endif
+  return SweepPlain(n, body);
 }
 
 HHT3_INLINE PetscReal Total(const Four &sum) { return (sum[0] + sum[1]) + (sum[2] + sum[3]); }

@@ -65,25 +65,12 @@ TEST(Sweeps, BothVersionsGiveTheSameDigits)
   for (PetscInt n : {5, 64, 1003}) {
     const auto x = random(n, 3);
     auto       y = random(n, 4), z = y;
-    const auto plain = SweepPlain(0, n, Probe{1 / 3., x.data(), y.data()}), newer = SweepNewer(0, n, Probe{1 / 3., x.data(), z.data()});
+    const auto plain = SweepPlain(n, Probe{1 / 3., x.data(), y.data()}), newer = SweepNewer(n, Probe{1 / 3., x.data(), z.data()});
     EXPECT_EQ(y, z);
     EXPECT_EQ(Total(plain.sum), Total(newer.sum));
   }
 }
 #endif
-
-TEST(Sweeps, TogetherAsOneAfterAnother)
-{
-  for (PetscInt n : {0, 3, 256, 257, 1003}) {
-    const auto x = random(n, 5);
-    auto       y = random(n, 6), z = random(n, 7), v = y, w = z;
-    SweepTogether(n, Probe{2, x.data(), y.data()}, Probe{3, y.data(), z.data()});
-    Sweep(n, Probe{2, x.data(), v.data()});
-    Sweep(n, Probe{3, v.data(), w.data()});
-    EXPECT_EQ(y, v) << n;
-    EXPECT_EQ(z, w) << n;
-  }
-}
 
 /* What the corrector sees of a multiplier is 0 times its correction: it must not hide what is not a number */
 TEST(Sweeps, NoNumberStaysNoNumber)
