@@ -58,7 +58,7 @@ public:
       gather(ev, e, f, w, lambda, z);
       if constexpr (K::holonomic) {
         K::value(e.data, f, ev.t, phi);
-        K::gradient(e.data, f, ev.t, J);
+        if constexpr (!K::translates) K::gradient(e.data, f, ev.t, J);
       } else {
         value(e, f, w, ev.t, z, phi);
         gradient(e, f, w, ev.t, z, J, P, nullptr);
@@ -153,7 +153,14 @@ private:
   static void react(Bodies &B, const Instance &e, const Frame<double> *f, const double *lambda, const typename K::Gradient &J)
   {
     const Eigen::Map<const Matrix<R, 1>> l(lambda);
-    const Matrix<6 * M, 1>               on = -J.transpose() * l;
+    if constexpr (K::translates) { /* no need to multiply by ones and zeros */
+      Vector3 force = Vector3::Zero();
+      force.template head<R>() = l;
+      B.load(e.marker[0], f[0], force, Vector3::Zero());
+      B.load(e.marker[1], f[1], -force, Vector3::Zero());
+      return;
+    }
+    const Matrix<6 * M, 1> on = -J.transpose() * l;
     for (int k = 0; k < M; k++) B.load(e.marker[k], f[k], on.template segment<3>(6 * k), on.template segment<3>(6 * k + 3));
   }
 
