@@ -71,16 +71,6 @@ inline Parameters RadiusParameters(PetscReal rho)
   return p;
 }
 
-/* (2a) and (2b): position and velocity from the accelerations at both ends */
-inline PetscReal NewmarkPosition(const Parameters &p, PetscReal h, PetscReal q, PetscReal v, PetscReal a0, PetscReal a1)
-{
-  return q + h * (v + h * (((PetscReal)0.5 - p.beta) * a0 + p.beta * a1));
-}
-inline PetscReal NewmarkVelocity(const Parameters &p, PetscReal h, PetscReal v, PetscReal a0, PetscReal a1)
-{
-  return v + h * ((1 - p.gamma) * a0 + p.gamma * a1);
-}
-
 /* Shifts of TSI2Jacobian, and the scalings that make it the matrix (10): rows of holonomic constraints times 1/(beta h^2),
    velocity-level rows times 1/(gamma h), columns of q times beta h^2, of states times gamma_s h */
 inline PetscReal ShiftV(const Parameters &p, PetscReal h) { return p.gamma / (p.beta * h); }
@@ -88,6 +78,19 @@ inline PetscReal ShiftA(const Parameters &p, PetscReal h) { return p.ca() / (p.b
 inline PetscReal ScalePosition(const Parameters &p, PetscReal h) { return p.beta * h * h; }
 inline PetscReal ScaleVelocity(const Parameters &p, PetscReal h) { return p.gamma * h; }
 inline PetscReal ScaleState(const Parameters &p, PetscReal h) { return p.gamma_s * h; }
+
+/* (2a) and (2b): position and velocity from the accelerations at both ends. What a_n is multiplied with, and the whole; a_{n+1} goes
+   with ScalePosition() and ScaleVelocity(). The sweeps of stage.cpp take these factors. */
+inline PetscReal OldPosition(const Parameters &p, PetscReal h) { return h * h * ((PetscReal)0.5 - p.beta); }
+inline PetscReal OldVelocity(const Parameters &p, PetscReal h) { return h * (1 - p.gamma); }
+inline PetscReal NewmarkPosition(const Parameters &p, PetscReal h, PetscReal q, PetscReal v, PetscReal a0, PetscReal a1)
+{
+  return q + (h * v + OldPosition(p, h) * a0 + ScalePosition(p, h) * a1);
+}
+inline PetscReal NewmarkVelocity(const Parameters &p, PetscReal h, PetscReal v, PetscReal a0, PetscReal a1)
+{
+  return v + (OldVelocity(p, h) * a0 + ScaleVelocity(p, h) * a1);
+}
 
 /* How much less the multipliers' oscillation is damped than at alpha = -0.05 (or its spectral radius), 1 down to 0. Phi = 0
    leaves normal accelerations with the double eigenvalue -rho: what one step leaves in q or q' grows by 1/(1-rho) before it

@@ -35,8 +35,7 @@ struct Ends { /* of the step, read-only */
    changes. */
 template <bool all>
 struct BaseOfCoordinates {
-  Parameters         p;
-  PetscReal          h, r, cn, c0;
+  PetscReal          h, kq, kv, r, cn, c0; /* kq, kv: of a_n in (2a), (2b) */
   Ends               e;
   const float       *moves;
   PetscScalar       *u, *v, *a;
@@ -45,7 +44,7 @@ struct BaseOfCoordinates {
   HHT3_INLINE void operator()(const At &at) const
   {
     const Four zero = {0, 0, 0, 0}, a0 = at.get(e.a0), an = a0 + r * (at.get(e.x0) - a0), v0 = at.get(e.begin);
-    Four       u1 = at.get(e.u0) + h * (v0 + h * ((PetscReal)0.5 - p.beta) * an), v1 = v0 + h * (1 - p.gamma) * an, a1 = cn * an - c0 * a0;
+    Four       u1 = at.get(e.u0) + (h * v0 + kq * an), v1 = v0 + kv * an, a1 = cn * an - c0 * a0;
     if (!all) {
       const auto moving = at.get(moves) != 0;
       u1                = moving ? u1 : zero;
@@ -258,7 +257,7 @@ PetscErrorCode PrepareStage(TS ts)
   for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &b[k]));
   e.begin = changed ? b[1] : e.v0;
   const auto sweep = [&](auto base) {
-    base = {I.p, I.h, I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), b[0], b[1], b[2]};
+    base = {I.h, OldPosition(I.p, I.h), OldVelocity(I.p, I.h), I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), b[0], b[1], b[2]};
     Sweep(n, base);
   };
   if (I.moves.empty()) sweep(BaseOfCoordinates<true>());

@@ -76,7 +76,7 @@ template <class K, int M, int R> struct ConstraintBase {
   static constexpr int      memory = 0, inputs = 0;
   static constexpr unsigned depends = Everything(M);
   static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
-  static constexpr bool     translates = false;    /* row r moves with component r of the markers' positions and no other */
+  static constexpr bool     translates = false;    /* row r is component r of the second marker's position less that of the first, and nothing else */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;
   using Hessian                            = Matrix<size, size>;

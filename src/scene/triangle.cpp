@@ -47,33 +47,20 @@ std::string Breaks(const SceneData &s)
   return "";
 }
 
-/* Values of size 1/2 to 1 and of either sign that depend on the number alone (the mixing step of splitmix64) */
-double PseudoRandom(uint64_t i, uint64_t stream)
+/* x += amount * random numbers in [-1, 1], the same in every run */
+PetscErrorCode Shake(Vec x, double amount, PetscRandom random)
 {
-  uint64_t z = i + (stream << 48) + 0x9e3779b97f4a7c15u;
-  z          = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z          = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  const double size = 0.5 + 0.5 * (double)(z >> 12) / (double)(1ull << 52);
-  return z & 1 ? size : -size;
-}
-
-/* x += amount * pseudo-random numbers */
-PetscErrorCode Shake(Vec x, double amount, uint64_t stream)
-{
-  double  *a;
-  PetscInt n, start;
+  Vec y;
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(x, &n));
-  PetscCall(VecGetOwnershipRange(x, &start, nullptr));
-  PetscCall(VecGetArray(x, &a));
-  for (PetscInt i = 0; i < n; i++) a[i] += amount * PseudoRandom((uint64_t)(start + i), stream);
-  PetscCall(VecRestoreArray(x, &a));
+  PetscCall(VecDuplicate(x, &y));
+  PetscCall(VecSetRandom(y, random));
+  PetscCall(VecAXPY(x, amount, y));
+  PetscCall(VecDestroy(&y));
   PetscFunctionReturn(0);
 }
 
 /* |y^T J x - x^T J y| beside the rounding in it, rows and columns scaled by their largest entries */
-PetscErrorCode Asymmetry(Mat J, double *relative)
+PetscErrorCode Asymmetry(Mat J, PetscRandom random, double *relative)
 {
   Vec     x, y, w, d;
   double  a, b, *s;
@@ -88,10 +75,8 @@ PetscErrorCode Asymmetry(Mat J, double *relative)
   PetscCall(VecGetArray(d, &s));
   for (PetscInt i = 0; i < n; i++) s[i] = s[i] != 0 ? 1 / std::sqrt(std::abs(s[i])) : 1;
   PetscCall(VecRestoreArray(d, &s));
-  uint64_t stream = 11;
   for (Vec v : {x, y}) {
-    PetscCall(VecZeroEntries(v));
-    PetscCall(Shake(v, 1, stream++));
+    PetscCall(VecSetRandom(v, random));
     PetscCall(VecPointwiseMult(v, v, d));
   }
   PetscCall(MatMult(J, x, w));
@@ -107,8 +92,11 @@ PetscErrorCode Asymmetry(Mat J, double *relative)
 /* On the whole matrix: everything off the initial state by a little, with multipliers and velocities */
 PetscErrorCode TryWhole(Runtime &R, double *asymmetry)
 {
-  Vec U, V, A;
+  Vec         U, V, A;
+  PetscRandom random;
   PetscFunctionBegin;
+  PetscCall(PetscRandomCreate(R.scene.comm, &random));
+  PetscCall(PetscRandomSetInterval(random, -1, 1));
   PetscCall(VecCreate(R.scene.comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));
@@ -116,12 +104,13 @@ PetscErrorCode TryWhole(Runtime &R, double *asymmetry)
   PetscCall(VecDuplicate(U, &A));
   PetscCall(InitialState(R, U, V));
   PetscCall(VecZeroEntries(A));
-  PetscCall(Shake(U, 1e-6, 1));
-  PetscCall(Shake(V, 1, 2));
-  PetscCall(Shake(A, 1, 3));
+  PetscCall(Shake(U, 1e-6, random));
+  PetscCall(Shake(V, 1, random));
+  PetscCall(Shake(A, 1, random));
   PetscCall(Jacobian(R, R.scene.start.time, U, V, A, 1e2, 1e4, R.J));
-  PetscCall(Asymmetry(R.J, asymmetry));
+  PetscCall(Asymmetry(R.J, random, asymmetry));
   for (Vec *v : {&U, &V, &A}) PetscCall(VecDestroy(v));
+  PetscCall(PetscRandomDestroy(&random));
   PetscFunctionReturn(0);
 }
 
@@ -169,7 +158,7 @@ PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again)
 
 PetscErrorCode StoreTriangle(Runtime &R)
 {
-  double asymmetry;
+  double asymmetry = 0;
   PetscFunctionBegin;
   if (!R.wants_triangle) PetscFunctionReturn(0);
   PetscCall(TryWhole(R, &asymmetry));
