@@ -129,7 +129,7 @@ PetscErrorCode SetUp(TS ts)
   PetscFunctionBegin;
   if (I.wall0 <= 0) {
     ReadClocks(&I.wall0, &I.cpu0);
-    I.progress_t0 = ts->ptime;
+    I.progress_t0 = I.t_begin = ts->ptime;
   }
   PetscCall(PetscCitationsRegister(citation, &cited));
   PetscCall(CheckProblem(ts));
@@ -360,7 +360,6 @@ PetscErrorCode Create(TS ts)
 {
   PetscFunctionBegin;
   ts->data                = new Integrator();
-  for (Vec &d : Get(ts).predictor.D) d = nullptr;
   Get(ts).p               = HHTParameters(Get(ts).alpha, false);
   ts->ops->setup          = SetUp;
   ts->ops->reset          = Reset;

@@ -19,8 +19,13 @@ enum class Mode {
   Start /* accelerations and multipliers from given q, q': h -> 0, constraints differentiated as in (6b), (6c) */
 };
 
+/*
+  What a run is at any time is kept in plain structs, ...State: checkpoint.cpp writes them as they are, so that a field added to one of
+  them is saved and restored without another line. What the user has set is kept apart, ...Options: it belongs to the run that resumes.
+*/
+
 /* The stopping test and the reuse ladder, section 5 of the paper */
-struct Corrector {
+struct CorrectorOptions {
   PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
   PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
   PetscInt  max_it    = 10;
@@ -28,7 +33,9 @@ struct Corrector {
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
   PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
   PetscBool user_lag  = PETSC_FALSE; /* -snes_lag_jacobian: the user rules */
+};
 
+struct CorrectorState {
   PetscBool have_matrix = PETSC_FALSE; /* the SNES matrix is (10) of some earlier step */
   PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
@@ -51,26 +58,37 @@ struct Corrector {
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
 
-/* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
-   time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
-struct Predictor {
+struct Corrector : CorrectorOptions, CorrectorState {};
+
+struct PredictorOptions {
   PetscInt  degree_max = max_degree; /* what the user allows */
   PetscBool fixed      = PETSC_FALSE;
-  PetscInt  degree     = 0; /* in use */
-  PetscInt  available  = 0; /* differences that exist */
-  PetscReal t[max_degree + 2]; /* t_n, t_{n-1}, ... */
-  Vec       D[max_degree + 1]; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
+};
+
+struct PredictorState {
+  PetscInt  degree    = 0; /* in use */
+  PetscInt  available = 0; /* differences that exist */
+  PetscReal t[max_degree + 2] = {}; /* t_n, t_{n-1}, ... */
+};
+
+/* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
+   time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
+struct Predictor : PredictorOptions, PredictorState {
+  Vec D[max_degree + 1] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
+};
+
+struct ChangeState {
+  PetscBool stale = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
+  PetscReal t     = 0;           /* of the last change */
+  PetscInt  step  = 0;
 };
 
 /* New coordinates in the course of a run, change.cpp */
-struct Change {
+struct Change : ChangeState {
   TSHHT3ChangeTest   test   = nullptr;
   TSHHT3ChangeMap    map    = nullptr;
   TSHHT3ChangeCommit commit = nullptr;
   void              *ctx    = nullptr;
-  PetscBool          stale  = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
-  PetscReal          t      = 0;           /* of the last change */
-  PetscInt           step   = 0;
 };
 
 /* limit.cpp */
@@ -82,7 +100,31 @@ struct StepLimit {
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
 enum class Bend { None, Rates, Velocities };
 
-struct Integrator {
+/* Of the step and of the bookkeeping about steps */
+struct StepState {
+  PetscReal        t0 = 0, t1 = 0, h = 0; /* of the last accepted step, or of the attempt */
+  PetscReal        h_last      = 0;       /* length of the step that led to t_n */
+  PetscReal        t_begin     = 0;       /* of the run */
+  Mode             mode        = Mode::Step;
+  TSStepStatus     status      = TS_STEP_INCOMPLETE;
+  PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
+  PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
+  PetscBool        have_misfit = PETSC_FALSE; /* dV belongs to t_n */
+  Bend             bent        = Bend::None;
+  PetscBool        repaired    = PETSC_FALSE; /* U0, V0 have been changed by Repair() */
+  PetscInt         norm_size   = 0;           /* entries that enter the error test, global */
+  PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
+  PetscReal        h_regular   = 0;   /* running maximum of steps that went through the corrector, forgetting a tenth in each */
+  PetscReal        h_proven    = 0;   /* largest step accepted since the last failed correction */
+  PetscReal        h_limit     = 0;   /* what h may grow to after a failed correction; 0: no limit */
+  PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
+  PetscBool        auto_h      = PETSC_FALSE;
+  PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
+  PetscBool        singular    = PETSC_FALSE; /* the package could not factor the last matrix */
+  TSHHT3Statistics stat        = {};
+};
+
+struct Integrator : StepState {
   /* the method */
   TSHHT3Form  form   = TSHHT3_FORM_SECOND_ORDER;
   PetscReal   alpha  = -0.3;
@@ -112,28 +154,20 @@ struct Integrator {
 
   /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
-  Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp; q_n' counts as V0 - misfit dV */
-  PetscReal misfit = 0;
-  PetscBool have_misfit = PETSC_FALSE; /* dV belongs to t_n */
+  Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp */
   Vec       bend = nullptr; /* change of that misfit over k h^2 by a change of coordinates at t_n */
-  Bend      bent = Bend::None;
   Vec       accepted[2] = {}; /* U, U' as accepted, when Repair() has changed U0, V0 since */
-  PetscBool repaired = PETSC_FALSE;
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
-  PetscReal h_last = 0;
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
   Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see BaseOfCoordinates */
   PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
   PetscObjectState stage_state = 0;
-  PetscReal t0 = 0, t1 = 0, h = 0;
-  Mode      mode = Mode::Step;
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
 
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;
-  PetscInt  norm_size = 0; /* entries that enter, global */
 
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
@@ -143,30 +177,19 @@ struct Integrator {
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   LinearChoice  linear;
   PetscBool     linear_chosen = PETSC_FALSE;
-  PetscBool     singular = PETSC_FALSE;       /* the package could not factor the last matrix */
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
 
   Change    change;
   StepLimit limit;
 
-  /* bookkeeping */
-  TSStepStatus     status = TS_STEP_INCOMPLETE;
-  PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
-  PetscBool        have_step = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
+  /* bookkeeping: vec_sol and vec_dot as the integrator left them */
   PetscObjectState sol_state = 0, dot_state = 0;
   PetscObjectId    sol_id = 0;
-  PetscReal        h_regular = 0; /* running maximum of steps that went through the corrector, forgetting a tenth in each */
-  PetscInt         tiny_row = 0;  /* tiny steps in a row to which failures have led */
-  PetscReal        h_proven = 0;  /* largest step accepted since the last failed correction */
-  PetscReal        h_limit = 0;   /* what h may grow to after a failed correction; 0: no limit */
-  PetscBool        auto_h = PETSC_FALSE;
-  PetscBool        fixed_h = PETSC_FALSE; /* TSADAPTNONE */
   char             failure[512] = "";
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
   PetscInt         checkpoint_every = 0;
   Vec              checkpoint_vec = nullptr; /* the application's, saved and restored with the state */
-  TSHHT3Statistics stat = {};
   PetscReal        wall0 = 0, cpu0 = 0;
   PetscReal        progress_t0 = 0;
   PetscReal        progress_last = 0;

@@ -216,7 +216,7 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscCall(VecRestoreArrayRead(I.V0, &v));
   PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   /* not what is left of the run: differences over next to nothing are rounding */
-  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.progress_t0 ? ts->max_time - I.progress_t0 : 1;
+  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin ? ts->max_time - I.t_begin : 1;
   *T                   = rate > 0 ? PetscMin(1 / rate, span) : span;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
