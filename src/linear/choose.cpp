@@ -174,11 +174,16 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 
 /* ---- the work ---- */
 
+namespace
+{
+
 struct Size {
   LinearWork work;
   PetscBool  large, parts;
   char       text[160];
 };
+
+} // namespace
 
 static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
 {

@@ -25,6 +25,9 @@ static const PetscReal TAKES_PART = 1e-6;
 
 static const PetscInt ITERATIONS = 12;
 
+namespace
+{
+
 /* Vectors over all rows; s, lambda and the mask vanish on rows that are no multipliers */
 struct Dependence {
   Mat P, regularized;
@@ -36,6 +39,8 @@ struct Dependence {
   Vec work;
   KSP ksp;
 };
+
+} // namespace
 
 /* Where a coordinate has no diagonal entry, the mean of |k| stands in */
 static PetscErrorCode FillD(Dependence *t)

@@ -16,10 +16,15 @@ static const double TOO_MUCH_FILL = 1.5;
 /* Bound on KLU's search for diagonal blocks, in multiples of the entries of the matrix */
 static const double BLOCK_SEARCH = 10;
 
+namespace
+{
+
 /* The cycles of the permutation of pivots: single unknowns, pairs, rarely more */
 struct Groups {
   std::vector<PetscInt> of, start, member;
 };
+
+} // namespace
 
 static Groups FindGroups(const std::vector<PetscInt> &pivot)
 {
@@ -121,16 +126,21 @@ static std::vector<PetscInt> OrderTowards(const LinearGraph &c, const Groups &g,
   return order;
 }
 
+namespace
+{
+
 /* An order and what it costs: the factorization and, for the outside, two sweeps over the columns of L that the ends
  * reach */
-struct Candidate {
+struct WeighedOrder {
   const char           *name;
   std::vector<PetscInt> order;
   LinearWork            work;
   double                columns = 0, entries = 0, total = PETSC_MAX_REAL;
 };
 
-static void FollowPaths(const LinearTree &tree, const std::vector<PetscInt> &ends, Candidate *c)
+} // namespace
+
+static void FollowPaths(const LinearTree &tree, const std::vector<PetscInt> &ends, WeighedOrder *c)
 {
   std::vector<bool> met(tree.parent.size(), false);
   for (PetscInt i : ends)
@@ -141,12 +151,12 @@ static void FollowPaths(const LinearTree &tree, const std::vector<PetscInt> &end
     }
 }
 
-static Candidate Weigh(const char *name, const LinearGraph &graph, const Groups &g, const std::vector<PetscInt> &groups,
-                       const KluPair &k)
+static WeighedOrder Weigh(const char *name, const LinearGraph &graph, const Groups &g,
+                          const std::vector<PetscInt> &groups, const KluPair &k)
 {
-  Candidate  c;
-  LinearTree tree;
-  PetscBool  bounded;
+  WeighedOrder c;
+  LinearTree   tree;
+  PetscBool    bounded;
   c.name  = name;
   c.order = Expand(g, groups);
   LinearCountWork(graph, c.order.data(), COUNT_LIMIT, &c.work, &bounded, k.ends.empty() ? NULL : &tree);
@@ -161,9 +171,9 @@ static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *
 {
   const LinearGraph     c = Compress(graph, g);
   std::vector<PetscInt> groups;
-  Candidate             best;
+  WeighedOrder          best;
   const auto            try_this = [&](const char *name, const std::vector<PetscInt> &by_groups) {
-    Candidate other = Weigh(name, graph, g, by_groups, *k);
+    WeighedOrder other = Weigh(name, graph, g, by_groups, *k);
     if (other.total < best.total) std::swap(best, other);
   };
 

@@ -18,6 +18,9 @@ typedef PetscBLASInt Int;
 
 /* ---- contributions ---- */
 
+namespace
+{
+
 /* Rows of `lower` or of K and `upper` that others reach: before `last`, not before `first` */
 struct Reached {
   Int first, last;
@@ -35,6 +38,8 @@ struct Work {
   Int             width, left, right, columns; /* left: rows of `lower`; right: those of `upper` under K's own */
   Reached         rows, cols;                  /* what stands side by side, of these */
 };
+
+} // namespace
 
 static PetscErrorCode Multiply(Work *w, KluPanels *p)
 {
@@ -79,6 +84,9 @@ static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt co
     for (PetscInt i = 0; i < count; ++i) to[row_of[places[i]] - reached.first] = from[i];
 }
 
+namespace
+{
+
 /* Where the panel before lies in the values, and its parts that count: rows after those of K only together with columns
    of K, and the other way round */
 struct Source {
@@ -87,6 +95,8 @@ struct Source {
   const double         *lower, *upper;
   const PetscInt       *row, *col;
 };
+
+} // namespace
 
 static Source Look(const KluPanels &p, const KluPanelSource &s)
 {
@@ -107,12 +117,17 @@ static Source Look(const KluPanels &p, const KluPanelSource &s)
   return v;
 }
 
+namespace
+{
+
 /* Columns of a narrow panel that reach a part of the panel at work: to(row_of[row], col) -= (a b^T)(row, col) */
 struct Product {
   const double   *a, *b;
   PetscInt        lda, ldb, rows, cols, width;
   const PetscInt *row, *col, *row_of;
 };
+
+} // namespace
 
 static void SubtractLoop(const Product &m, PetscInt first, PetscInt ld, double to[])
 {
@@ -306,6 +321,9 @@ static double ReciprocalGrowth(const KluPanels &p)
 
 /* ---- all together ---- */
 
+namespace
+{
+
 /* The largest absolute values of two halves of what was looked at: one would wait for itself */
 struct Largest {
   double even = 0, odd = 0;
@@ -315,6 +333,8 @@ struct Largest {
     odd  = Larger(PetscAbsReal(b), odd);
   }
 };
+
+} // namespace
 
 static void CopyRun(const double *PETSC_RESTRICT from, PetscInt count, double *PETSC_RESTRICT to, Largest *largest)
 {

@@ -22,6 +22,9 @@ typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 
 /* ---- products of long columns ---- */
 
+namespace
+{
+
 /* Columns and their factors, in so many rows: to = (to - sum of them) scale */
 struct Sum {
   PetscInt      rows, count;
@@ -29,6 +32,8 @@ struct Sum {
   const double *column[KLU_PANELS_NARROW];
   double        factor[KLU_PANELS_NARROW];
 };
+
+} // namespace
 
 template <int columns> ALWAYS_INLINE void TakeSome(const Sum &s, PetscInt first, double scale)
 {

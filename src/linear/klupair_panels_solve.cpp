@@ -62,6 +62,9 @@ static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const dou
 
 /* ---- one panel ---- */
 
+namespace
+{
+
 struct Panel {
   PetscInt        width, ld, rows, cols;
   const double   *lower, *upper;
@@ -69,6 +72,8 @@ struct Panel {
   const char     *zero_lower, *zero_upper;
   double         *x, *y; /* its own part of the vector; scratch for what it reaches */
 };
+
+} // namespace
 
 static Panel Look(const KluPanel &q, KluPanels *p)
 {

@@ -45,12 +45,17 @@ static const PetscInt RUN = 8;
 
 /* ---- panels ---- */
 
+namespace
+{
+
 /* Ranges of places; all of `block` begin one, too */
 struct Range {
   PetscInt first, last, rows; /* with so many places after the last */
   double   zeros;
   bool     junction; /* several places have the first one for their parent */
 };
+
+} // namespace
 
 /* Pivots in a row of which each reaches the next one and what that reaches, and nothing else reaches the next one first */
 static std::vector<Range> Fundamental(const Indices &parent, const Indices &count)
@@ -124,6 +129,9 @@ static void SortPlaces(const LinearRows &rows, const Indices &of, KluPanels *p)
 
 /* ---- rows and columns that each panel reaches ---- */
 
+namespace
+{
+
 /* Entries of the matrix, as places, inside of diagonal blocks or between them */
 struct Entry {
   PetscInt number, row, col;
@@ -132,6 +140,8 @@ struct Entry {
 struct Entries {
   std::vector<Entry> inner, outer;
 };
+
+} // namespace
 
 static Entries Place(const LinearRows &rows, const Indices &block_of, const KluPanels &p)
 {
@@ -150,10 +160,15 @@ static Entries Place(const LinearRows &rows, const Indices &block_of, const KluP
   return e;
 }
 
+namespace
+{
+
 /* What the panels before hand over to one panel, sorted, each once */
 struct Reach {
   std::vector<Indices> rows, cols;
 };
+
+} // namespace
 
 static void SortUnique(Indices *a)
 {

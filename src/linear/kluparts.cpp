@@ -157,10 +157,15 @@ PetscErrorCode LinearPartsCount(Mat A, double max_couplings, PetscInt max_interf
 
 /* ---- factorization ---- */
 
+namespace
+{
+
 /* How it went on the ranks: the worst error other than a zero pivot, the first row with a zero pivot, wishes */
 struct Outcome {
   PetscInt error, singular, check, anew;
 };
+
+} // namespace
 
 static PetscErrorCode FactorInner(KluParts *p, Outcome *all)
 {

@@ -43,6 +43,9 @@ static std::vector<PetscReal> ColumnSizes(const PartsSplit &s, const std::vector
   return size;
 }
 
+namespace
+{
+
 /* What every row leaves, and what it sums up; b is 0 in the interface */
 struct Sums {
   std::vector<PetscScalar> left;
@@ -63,6 +66,8 @@ struct Sums {
     return r;
   }
 };
+
+} // namespace
 
 PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual)
 {

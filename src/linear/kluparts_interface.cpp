@@ -6,6 +6,9 @@
 
 typedef std::vector<PetscInt> Indices;
 
+namespace
+{
+
 /* Unknowns coupled across ranks, by their global rows, and the couplings between them; alike on all ranks */
 struct Couplings {
   Indices           row;
@@ -13,6 +16,8 @@ struct Couplings {
   std::vector<bool> multiplier; /* no value on the diagonal */
   Indices           weight;     /* rows that the interface gets with it, about */
 };
+
+} // namespace
 
 PetscErrorCode PartsCountCouplings(Mat A, double *couplings)
 {
@@ -95,6 +100,9 @@ static PetscErrorCode GatherCouplings(Mat A, Couplings *c)
   PetscFunctionReturn(0);
 }
 
+namespace
+{
+
 /* Rows of the rank's diagonal block, and which of them have a value on the diagonal */
 struct Local {
   Mat               diagonal;
@@ -104,6 +112,8 @@ struct Local {
 
   bool owns(PetscInt row) const { return row >= begin && row < end; }
 };
+
+} // namespace
 
 static PetscErrorCode GetLocal(Mat A, Local *l)
 {

@@ -14,6 +14,9 @@
 /* A pivot of the Schur complement below this, where the terms of every row and column sum up to one, is none */
 static const PetscReal NO_PIVOT = 1e-13;
 
+namespace
+{
+
 /* One column of L without its diagonal, or of U without its diagonal, as KLU stores it */
 struct Column {
   const KluInt *index;
@@ -35,6 +38,8 @@ struct Factor {
     return {reinterpret_cast<const KluInt *>(at), at + units, length[k]};
   }
 };
+
+} // namespace
 
 static Factor Lower(const KluPair &k)
 {

@@ -6,12 +6,17 @@
 
 typedef std::vector<PetscInt> Indices;
 
+namespace
+{
+
 /* The two blocks of a rank's rows, while they are looked at */
 struct Blocks {
   Mat             diagonal, off;
   LinearRows      d, o;
   const PetscInt *garray;
 };
+
+} // namespace
 
 static PetscErrorCode GetBlocks(Mat A, Blocks *b)
 {

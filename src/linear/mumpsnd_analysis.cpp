@@ -10,14 +10,19 @@
 
 static_assert(sizeof(MUMPS_INT) == sizeof(int), "MUMPS with 64-bit integers throughout is not supported");
 
+namespace
+{
+
 /* Entries that a row without a value on its diagonal could be eliminated with */
-struct Candidate {
+struct EliminationPartner {
   PetscInt  col;
   PetscReal size;
 };
 
+} // namespace
+
 /* of[row - begin], empty where the diagonal has a value. Of one triangle columns count as rows, but not other ranks' ones. */
-static PetscErrorCode FindCandidates(Mat A, std::vector<std::vector<Candidate>> *of)
+static PetscErrorCode FindEliminationPartners(Mat A, std::vector<std::vector<EliminationPartner>> *of)
 {
   PetscInt           begin, end, count;
   const PetscInt    *cols;
@@ -53,15 +58,15 @@ static PetscErrorCode FindCandidates(Mat A, std::vector<std::vector<Candidate>> 
 /* For every owned row without a value on the diagonal: the column of its largest entry that no other such row took */
 static PetscErrorCode FindPartners(Mat A, std::vector<int> *partner)
 {
-  std::vector<std::vector<Candidate>> candidates;
+  std::vector<std::vector<EliminationPartner>> candidates;
   std::unordered_set<PetscInt>        taken;
 
   PetscFunctionBegin;
-  PetscCall(FindCandidates(A, &candidates));
+  PetscCall(FindEliminationPartners(A, &candidates));
   partner->assign(candidates.size(), -1);
   for (size_t i = 0; i < candidates.size(); ++i) {
     PetscReal largest = 0;
-    for (const Candidate &c : candidates[i])
+    for (const EliminationPartner &c : candidates[i])
       if (c.size > largest && !taken.count(c.col)) {
         largest       = c.size;
         (*partner)[i] = (int)c.col;
