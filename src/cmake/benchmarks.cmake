@@ -20,7 +20,7 @@ add_custom_target(bench)
 file(GLOB bench_sources CONFIGURE_DEPENDS tests/bench/*.cpp tests/soak/*.cpp)
 foreach(source IN LISTS bench_sources)
   cmake_path(GET source STEM name)
-  hhtdae_program(${name} ${source})
+  hhtdae_program(${name} OPEN ${source})
   add_dependencies(bench ${name})
   # The benchmarks reach into src/ to time and compare single parts of the integrator.
   target_include_directories(${name} PRIVATE src tests)

@@ -23,14 +23,27 @@ endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(PETSC REQUIRED IMPORTED_TARGET PETSc>=3.18)
 pkg_get_variable(PETSC_PCFILEDIR PETSc pcfiledir)
-# SLEPc, for flexible bodies: optional
-pkg_search_module(SLEPC QUIET IMPORTED_TARGET SLEPc slepc)
-if(SLEPC_FOUND)
-  pkg_get_variable(SLEPC_PCFILEDIR ${SLEPC_MODULE_NAME} pcfiledir)
-endif()
 find_package(MPI REQUIRED COMPONENTS C CXX)
 string(REGEX MATCH "^[0-9]+\\.[0-9]+" PETSC_MINOR_VERSION "${PETSC_VERSION}")
 message(STATUS "PETSc ${PETSC_VERSION} from ${PETSC_PCFILEDIR}")
+
+# PETSC_HAS_<package>: what PETSc was built with, and so may be used by us, too
+find_file(petscconf petscconf.h HINTS ${PETSC_INCLUDE_DIRS} REQUIRED NO_CACHE)
+foreach(package HDF5 MUMPS)
+  file(STRINGS ${petscconf} PETSC_HAS_${package} REGEX "^#define PETSC_HAVE_${package} +1")
+endforeach()
+
+# SLEPc, for flexible bodies: optional. It has to be one for this PETSc; that of the system is for the system's.
+pkg_search_module(SLEPC QUIET IMPORTED_TARGET SLEPc slepc)
+if(SLEPC_FOUND)
+  pkg_get_variable(SLEPC_PCFILEDIR ${SLEPC_MODULE_NAME} pcfiledir)
+  string(REGEX MATCH "^[0-9]+\\.[0-9]+" SLEPC_MINOR_VERSION "${SLEPC_VERSION}")
+  if(NOT SLEPC_MINOR_VERSION STREQUAL PETSC_MINOR_VERSION
+     OR (SLEPC_PCFILEDIR MATCHES "^/usr/(lib|share)" AND NOT PETSC_PCFILEDIR MATCHES "^/usr/(lib|share)"))
+    message(STATUS "SLEPc ${SLEPC_VERSION} from ${SLEPC_PCFILEDIR} is not for this PETSc: it is left out")
+    set(SLEPC_FOUND FALSE)
+  endif()
+endif()
 
 set(CMAKE_REQUIRED_LIBRARIES PkgConfig::PETSC MPI::MPI_C)
 include(CheckCSourceCompiles)

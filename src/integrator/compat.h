@@ -46,6 +46,9 @@ typedef PetscErrorCode (*HHT3ColoringFunction)(void);
 typedef MatFDColoringFn *HHT3ColoringFunction;
 #endif
 
+/* An error unless the PETSc that runs is one that this library was built for; version.cpp */
+PetscErrorCode HHT3CheckPetscVersion(void);
+
 /* The next point that TSAdaptChoose() aims at with TS_EXACTFINALTIME_MATCHSTEP: of a time span, or the final time */
 static inline PetscReal HHT3NextStop(TS ts)
 {

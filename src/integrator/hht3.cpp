@@ -401,6 +401,7 @@ PetscErrorCode TSHHT3Initialize(void)
 
   PetscFunctionBegin;
   if (registered) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HHT3CheckPetscVersion());
   registered = PETSC_TRUE;
   PetscCall(TSRegister(TSHHT3, hht3::Create));
   PetscCall(LinearRegister());

@@ -18,10 +18,10 @@ def check(condition, message):
         sys.exit("FAILED: " + message)
 
 
-def run(command, fails=False, cwd=None, **environment):
+def run(command, fails=False, cwd=None, seconds=300, **environment):
     """Standard output of a program; fails=True asks for a failure, and returns standard error instead."""
     command = [str(word) for word in command]
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, cwd=cwd,
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=seconds, cwd=cwd,
                           env={**os.environ, **environment})
     if (done.returncode != 0) != fails:
         print(done.stdout[-4000:])
