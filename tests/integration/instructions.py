@@ -1,0 +1,49 @@
+"""Programs compiled for newer instructions or with a sanitizer use an installed library that was compiled without.
+
+Numbers with derivatives, vectors and matrices of Eigen go in and out of the library; with -mavx or a sanitizer Eigen by itself would
+align them in another way and free them by other means.
+usage: instructions.py build-tree cmake configuration directory-of-PETSc.pc [directory-of-SLEPc.pc]
+"""
+
+import os
+import re
+import sys
+import tempfile
+
+from common import check, run
+
+build, cmake, configuration = sys.argv[1:4]
+packages = sys.argv[4:]
+here = os.path.join(os.path.dirname(os.path.abspath(__file__)), "outside")
+
+with open("/proc/cpuinfo") as file:
+    processor = set(file.read().split())
+flavours = {"-fsanitize=address -O1": {"ASAN_OPTIONS": "detect_leaks=0"}, "-march=native -O1": {}}
+if {"avx2", "fma"} <= processor:
+    flavours["-mavx2 -mfma -O1"] = {}
+
+with tempfile.TemporaryDirectory(prefix="instructions-", dir=build) as work:
+    prefix = os.path.join(work, "prefix")
+    run([cmake, "--install", build, "--prefix", prefix, "--config", configuration])
+    libraries = next(folder for folder, _, files in os.walk(prefix) if "libhhtdae.so" in files)
+    paths = os.pathsep.join([os.path.join(libraries, "pkgconfig"), *packages, os.environ.get("PKG_CONFIG_PATH", "")])
+    programs = {"numbers": "hhtscene"}
+    if os.path.exists(os.path.join(libraries, "libhhtflexible.so")):
+        programs["flexible"] = "hhtflexible"
+
+    def works(program, flavour, **environment):
+        error = float(re.search(r"error (\S+)", run([program], **environment)).group(1))
+        print("%s: error %g" % (flavour, error))
+        check(error < 1e-4, "%s: off by %g" % (flavour, error))
+
+    for name, library in programs.items():
+        flags = run(["pkg-config", "--cflags", "--libs", library], PKG_CONFIG_PATH=paths).split()
+        for flavour, environment in flavours.items():
+            program = os.path.join(work, name)
+            run([os.environ.get("CXX", "c++"), "-std=c++17", *flavour.split(), os.path.join(here, name, "outside_%s.cpp" % name), "-o", program, *flags])
+            works(program, name + " " + flavour, LD_LIBRARY_PATH=libraries, **environment)
+
+    tree = os.path.join(work, "with-cmake")
+    run([cmake, "-S", os.path.join(here, "numbers"), "-B", tree, "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_FLAGS=-march=native -O1"])
+    run([cmake, "--build", tree])
+    works(os.path.join(tree, "outside_numbers"), "with CMake, -march=native")
