@@ -50,7 +50,9 @@ PetscErrorCode AdaptorFree(Adaptor *ad)
 #if PETSC_VERSION_LT(3, 23, 0)
 PetscErrorCode AdaptorDestroy(void *ctx) { return AdaptorFree(static_cast<Adaptor *>(ctx)); }
 #else
+/* The address of the context, a void ** until 3.24 and a void * after that: PETSc's prototype takes the one that fits. */
 PetscErrorCode AdaptorDestroy(void **ctx) { return AdaptorFree(static_cast<Adaptor *>(*ctx)); }
+[[maybe_unused]] PetscErrorCode AdaptorDestroy(void *ctx) { return AdaptorDestroy(static_cast<void **>(ctx)); }
 #endif
 
 PetscErrorCode AttachAdaptor(TS ts, Adaptor *ad)

@@ -416,6 +416,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   if (!package)
     PetscCall(FirstAvailable(P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, cholesky ? PETSC_TRUE : size.large,
                              &package));
+  if (!package && !cholesky) PetscCall(IfAvailable(P, LINEAR_KLUPARTS, MAT_FACTOR_LU, &package)); /* without MUMPS */
   if (!package && !choice->user_pc) {
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);
