@@ -61,11 +61,13 @@ private:
     m.name       = "row of bricks";
     m.mass       = 7.5;
     m.center     = Vector3(2.5, 0.5, 0.25);
-    m.moments    = Numbers(3, 3, 1);
+    m.moments    = Numbers(3, 3, 1) * Numbers(3, 3, 1).transpose();
     m.omega      = Eigen::VectorXd::LinSpaced(n, 100, 900);
     m.first      = Numbers(3, n, 2);
     for (int c = 0; c < 3; c++) m.moment[(std::size_t)c] = Numbers(3, n, 3 + c);
     for (int p = 0; p < 6; p++) m.quadratic[(std::size_t)p] = Numbers(n, n, 6 + p);
+    for (std::size_t p = 0; p < 2; p++) m.quadratic[p] = (m.quadratic[p] + m.quadratic[p].transpose()).eval();
+    m.quadratic[2] = Eigen::MatrixXd::Identity(n, n) - m.quadratic[0] - m.quadratic[1];
     for (const char *name : {"hub", "tip of the row"}) {
       ModalAttachment a;
       a.name        = name;

@@ -231,7 +231,7 @@ PetscErrorCode AddElements(FeModel *model, const ElementNodes &nodes, const std:
         x.col(i) = Eigen::Map<const Eigen::Vector3d>(&X[3 * nodes.place(e.node[i])]);
       return AddElement<Shape>(*model, e, x, as_stiffness, &least);
     }));
-    if (!(least > fe::degenerate)) problem = DegenerateElement(e, k < tags.size() ? tags[k] : (PetscInt)k, least);
+    if (!(least > fe::degenerate)) problem = "mesh " + model->source + ": " + DegenerateElement(e, k < tags.size() ? tags[k] : (PetscInt)k, least);
   }
   PetscCall(Agree(model->comm, problem, PETSC_ERR_ARG_WRONG));
   PetscFunctionReturn(0);

@@ -1,8 +1,9 @@
 /* Reads an input deck of CalculiX: keywords with their parameters, lines of data, at the end materials by sections. */
 #include "flexible/calculix.h"
+#include "flexible/read_text.h"
 #include <algorithm>
-#include <cmath>
 #include <fstream>
+#include <sys/stat.h>
 
 namespace hhtdae
 {
@@ -29,16 +30,6 @@ std::vector<std::string> Split(const std::string &line)
   const std::string last = Trim(line.substr(from));
   if (!last.empty()) part.push_back(last);
   return part;
-}
-
-bool IsNumber(const std::string &text, double *value)
-{
-  std::string plain = text;
-  for (char &c : plain)
-    if (c == 'D' || c == 'd') c = 'e';
-  char *end;
-  *value = std::strtod(plain.c_str(), &end);
-  return !plain.empty() && !*end && std::isfinite(*value);
 }
 
 bool SolidKind(const std::string &name, Kind *kind)
@@ -70,9 +61,11 @@ bool IsLabel(const std::string &text)
 
 void Deck::read(const std::string &file)
 {
+  deck_ = file;
   readFile(file, "", 0);
   endElement();
-  assignMaterials();
+  checkMaterials();
+  if (error.empty()) assignMaterials();
 }
 
 void Deck::fail(const std::string &file, long number, const std::string &why)
@@ -80,16 +73,38 @@ void Deck::fail(const std::string &file, long number, const std::string &why)
   if (error.empty()) error = file + ", line " + std::to_string(number) + ": " + why;
 }
 
+void Deck::fail(const std::string &why)
+{
+  if (error.empty()) error = deck_ + ": " + why;
+}
+
+/* Files that include others several times each multiply, level by level. */
+constexpr int most_times = 16, most_deep = 20;
+
+std::string Deck::whyNot(const std::string &file, int depth)
+{
+  struct stat       about;
+  const std::string why = WhyUnreadable(file);
+  if (!why.empty()) return why;
+  if (depth > most_deep)
+    return "files are included in one another more than " + std::to_string(most_deep) +
+           " deep (one includes itself?)";
+  if (stat(file.c_str(), &about)) return "there is no such file";
+  bytes += (PetscInt64)about.st_size;
+  if (++times_[{about.st_dev, about.st_ino}] > most_times)
+    return "it is included more than " + std::to_string(most_times) + " times (it includes itself?)";
+  return "";
+}
+
 void Deck::readFile(const std::string &file, const std::string &from, int depth)
 {
-  std::ifstream in(file);
-  std::string   line, more;
+  std::ifstream in;
+  std::string   line, more, why = whyNot(file, depth);
   long          number = 0;
-  if (!in || depth > 20) {
-    if (error.empty())
-      error = (from.empty() ? "" : from + ": ") + "cannot read the deck " + file +
-              (in ? ": files are included in one another more than 20 deep (one includes itself?)"
-                  : ": there is no such file, or no right to read it");
+  if (why.empty()) in.open(file);
+  if (why.empty() && !in) why = "it cannot be opened";
+  if (!why.empty()) {
+    if (error.empty()) error = (from.empty() ? "" : from + ": ") + "cannot read the deck " + file + ": " + why;
     return;
   }
   while (error.empty() && std::getline(in, line)) {
@@ -99,11 +114,12 @@ void Deck::readFile(const std::string &file, const std::string &from, int depth)
       data(file, number, Split(line));
       continue;
     }
-    while (Trim(line).back() == ',' && std::getline(in, more)) {
+    line = Trim(line);
+    while (line.back() == ',' && std::getline(in, more)) {
       number++;
-      line = Trim(line) + more;
+      line += Trim(more);
     }
-    keyword(file, number, Trim(line));
+    keyword(file, number, line);
     if (keyword_ == "INCLUDE") include(file, number, depth);
   }
   if (error.empty() && in.bad()) error = "reading " + file + " failed";
@@ -116,7 +132,7 @@ void Deck::include(const std::string &file, long number, int depth)
                     folder = file.find('/') == std::string::npos ? "" : file.substr(0, file.rfind('/') + 1);
   const std::string beside = !name.empty() && name[0] == '/' ? name : folder + name;
   keyword_.clear();
-  readFile(std::ifstream(beside) ? beside : name, file + ", line " + std::to_string(number), depth + 1);
+  readFile(WhyUnreadable(beside) == "there is no such file" ? name : beside, file + ", line " + std::to_string(number), depth + 1);
 }
 
 void Deck::keyword(const std::string &file, long number, const std::string &line)
@@ -181,11 +197,11 @@ void Deck::nodeLine(const std::string &file, long number, const std::vector<std:
   Vector3 x    = Vector3::Zero();
   bool    good = !part.empty() && IsLabel(part[0]) && std::stoll(part[0]) <= (Label)PETSC_MAX_INT;
   for (std::size_t k = 1; k < part.size() && k < 4; k++)
-    good = good && (part[k].empty() || IsNumber(part[k], &x[(Eigen::Index)k - 1]));
+    good = good && (part[k].empty() || ParseReal(part[k], &x[(Eigen::Index)k - 1]));
   if (!good) return fail(file, number, "is not \"node, x, y, z\"");
   const Label label = std::stoll(part[0]);
   node[label]       = x;
-  if (!into_nset_.empty()) nsets[into_nset_].member.push_back(label);
+  if (!into_nset_.empty()) nsets[into_nset_].add(label);
 }
 
 void Deck::elementLine(const std::string &file, long number, const std::vector<std::string> &part)
@@ -206,12 +222,13 @@ void Deck::endElement()
 {
   if (pending_.empty()) return;
   const Label label = pending_[0];
-  if (keyword_ == "ELEMENT" && known_type_ && (int)pending_.size() != kind_.nodes + 1 && error.empty())
-    error = "element " + std::to_string(label) + " of type " + type_ + " has " + std::to_string(pending_.size() - 1) +
-            " nodes in place of " + std::to_string(kind_.nodes);
+  if (keyword_ == "ELEMENT" && known_type_ && (int)pending_.size() != kind_.nodes + 1)
+    fail("element " + std::to_string(label) + " of type " + type_ + " has " + std::to_string(pending_.size() - 1) +
+         " nodes in place of " + std::to_string(kind_.nodes));
   used.insert(pending_.begin() + 1, pending_.end());
-  if (!into_elset_.empty()) elsets[into_elset_].member.push_back(label);
+  if (!into_elset_.empty()) elsets[into_elset_].add(label);
   if (known_type_) {
+    if (element.count(label)) fail("element " + std::to_string(label) + " is there twice");
     DeckElement &e = element[label];
     e.node.assign(pending_.begin() + 1, pending_.end());
     e.element = FeElement{kind_.type, kind_.kept ? -1 : -2, {}};
@@ -219,29 +236,40 @@ void Deck::endElement()
   pending_.clear();
 }
 
+/* "first, last, step" */
+bool Deck::rangeLine(const std::vector<std::string> &part, DeckSet *set)
+{
+  Label number[3] = {0, 0, 1};
+  if (part.size() < 2 || part.size() > 3) return false;
+  for (std::size_t k = 0; k < part.size(); k++) {
+    if (!IsLabel(part[k])) return false;
+    number[k] = std::stoll(part[k]);
+  }
+  if (number[2] < 1 || number[1] > (Label)PETSC_MAX_INT || number[0] > number[1]) return false;
+  set->member.push_back({number[0], number[1], number[2]});
+  return true;
+}
+
 void Deck::setLine(const std::string &file, long number, const std::vector<std::string> &part,
                    std::map<std::string, DeckSet> *sets, const std::string &into)
 {
   if (into.empty()) return fail(file, number, "belongs to a set without a name");
-  std::vector<Label> *member = &(*sets)[into].member;
+  DeckSet *set = &(*sets)[into];
   if (generate_) {
-    const bool good = part.size() >= 2 && part.size() <= 3 && IsLabel(part[0]) && IsLabel(part[1]) &&
-                      (part.size() == 2 || IsLabel(part[2]));
-    const Label first = good ? std::stoll(part[0]) : 0, last = good ? std::stoll(part[1]) : 0,
-                step = good && part.size() == 3 ? std::stoll(part[2]) : 1;
-    if (!good || step < 1 || last > (Label)PETSC_MAX_INT) return fail(file, number, "is not \"first, last, step\"");
-    for (Label l = first; l <= last; l += step) member->push_back(l);
+    if (!rangeLine(part, set)) fail(file, number, "is not \"first, last, step\"");
     return;
   }
   for (const std::string &p : part) {
     if (p.empty()) continue;
     if (IsLabel(p))
-      member->push_back(std::stoll(p));
+      set->add(std::stoll(p));
     else if (!sets->count(Upper(p)) || Upper(p) == into)
       return fail(file, number, "names the set " + p + ", which is not there");
     else {
-      const std::vector<Label> other = (*sets)[Upper(p)].member;
-      member->insert(member->end(), other.begin(), other.end());
+      const std::vector<DeckRange> &other = (*sets)[Upper(p)].member;
+      ranges_ += other.size();
+      if (!Budget(bytes).spend(ranges_)) return fail(file, number, "makes sets of sets with more members than a deck of this length can mean");
+      set->member.insert(set->member.end(), other.begin(), other.end());
     }
   }
 }
@@ -252,7 +280,7 @@ void Deck::materialLine(const std::string &file, long number, const std::vector<
   std::vector<double> value;
   for (const std::string &p : part) {
     double v = 0;
-    if (!p.empty() && !IsNumber(p, &v)) return fail(file, number, "has \"" + p + "\" in place of a number");
+    if (!p.empty() && !ParseReal(p, &v)) return fail(file, number, "has \"" + p + "\" in place of a number");
     value.push_back(v);
   }
   if (keyword_ == "DENSITY" && !value.empty()) m.material.density = value[0];
@@ -265,9 +293,26 @@ void Deck::materialLine(const std::string &file, long number, const std::vector<
   }
 }
 
+void Deck::checkMaterials()
+{
+  for (const auto &m : material_data_) {
+    const Material &material = m.second.material;
+    const bool      elastic  = m.second.isotropic && !m.second.elastic.empty();
+    std::string     why;
+    if (elastic && !(material.young > 0)) why = "a modulus of elasticity that is not positive";
+    if (elastic && !(material.poisson > -1 && material.poisson < .5)) why = "a Poisson's ratio that is not between -1 and 0.5";
+    if (material.density < 0) why = "a negative density";
+    if (!why.empty()) fail("material " + m.first + " has " + why);
+  }
+}
+
 void Deck::assignMaterials()
 {
   std::map<std::string, PetscInt> number;
+  std::vector<Label>              labels, members;
+  Budget                          budget(bytes);
+  for (const auto &e : element) labels.push_back(e.first);
+  std::sort(labels.begin(), labels.end());
   for (const auto &section : sections_) {
     const auto data = material_data_.find(section.second);
     const auto set  = elsets.find(section.first);
@@ -276,12 +321,34 @@ void Deck::assignMaterials()
       continue;
     const auto place = number.emplace(section.second, (PetscInt)materials.size());
     if (place.second) materials.push_back(data->second.material);
-    for (Label l : set->second.member) {
-      const auto e = element.find(l);
-      if (e != element.end() && e->second.element.material == -1) e->second.element.material = place.first->second;
+    if (!Expand(set->second, labels, &budget, &members))
+      return fail("sets of elements that *SOLID SECTION names have more members than a deck of this length can mean");
+    for (Label l : members) {
+      FeElement &e = element.at(l).element;
+      if (e.material == -1) e.material = place.first->second;
     }
   }
   for (const auto &e : element) left_out += e.second.element.material < 0;
+}
+
+bool Expand(const DeckSet &set, const std::vector<Label> &labels, Budget *budget, std::vector<Label> *found)
+{
+  found->clear();
+  for (const DeckRange &r : set.member) {
+    const auto from = std::lower_bound(labels.begin(), labels.end(), r.first),
+               to   = std::upper_bound(from, labels.end(), r.last);
+    const auto candidates = (std::size_t)((r.last - r.first) / r.step) + 1, there = (std::size_t)(to - from);
+    if (!budget->spend(std::min(candidates, there) + 1)) return false;
+    if (there <= candidates) {
+      for (auto l = from; l != to; ++l)
+        if ((*l - r.first) % r.step == 0) found->push_back(*l);
+    } else
+      for (Label l = r.first; l <= r.last; l += r.step)
+        if (std::binary_search(from, to, l)) found->push_back(l);
+  }
+  std::sort(found->begin(), found->end());
+  found->erase(std::unique(found->begin(), found->end()), found->end());
+  return true;
 }
 
 } // namespace calculix

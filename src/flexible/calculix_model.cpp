@@ -1,6 +1,7 @@
 /* Nodes, sets and elements of a deck of CalculiX in the order that the model has them, and the rows of its matrices. */
 #include "flexible/calculix.h"
 #include "flexible/node_order.h"
+#include "flexible/read_text.h"
 #include <algorithm>
 #include <fstream>
 
@@ -15,20 +16,19 @@ namespace
 /* Rows of the stored matrices: node and direction, in the order of the file */
 std::string ReadUnknowns(const std::string &file, std::vector<std::pair<Label, int>> *unknown)
 {
+  std::string   line, why = WhyUnreadable(file);
   std::ifstream in(file);
-  std::string   line;
-  if (!in)
-    return "cannot read " + file +
-           ": there is no such file, or no right to read it (ccx writes it with *FREQUENCY, SOLVER=MATRIXSTORAGE)";
+  if (!why.empty())
+    return "cannot read " + file + ": " + why + " (ccx writes it with *FREQUENCY, SOLVER=MATRIXSTORAGE)";
   while (std::getline(in, line)) {
     const std::string text = Trim(line);
     const std::size_t dot  = text.find('.');
     if (text.empty()) continue;
     if (dot == std::string::npos || !IsLabel(text.substr(0, dot)) || !IsLabel(text.substr(dot + 1)))
-      return file + ": \"" + text + "\" is not \"node.direction\"";
+      return file + ": " + Quoted(text) + " is not \"node.direction\"";
     const Label direction = std::stoll(text.substr(dot + 1));
     if (direction < 1 || direction > 3)
-      return file + ": \"" + text + "\" is not a translation: solid elements alone can be read";
+      return file + ": " + Quoted(text) + " is not a translation: solid elements alone can be read";
     unknown->push_back({std::stoll(text.substr(0, dot)), (int)direction});
   }
   return unknown->empty() ? file + " has no unknowns" : "";
@@ -69,37 +69,47 @@ std::string Number(const Deck &deck, const std::vector<std::pair<Label, int>> &u
   return "";
 }
 
-/* Sets of nodes, and sets of elements as sets of their nodes where no set of nodes has the name */
-void CollectSets(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
+template <class Map> std::vector<Label> SortedLabels(const Map &map)
 {
-  const auto add = [&](const std::string &name, Label l) {
-    const auto found = place.find(l);
-    if (found != place.end()) read->sets[name].push_back(found->second);
-  };
+  std::vector<Label> labels;
+  for (const auto &entry : map) labels.push_back(entry.first);
+  std::sort(labels.begin(), labels.end());
+  return labels;
+}
+
+/* Sets of nodes, and sets of elements as sets of their nodes where no set of nodes has the name; says what is wrong */
+std::string CollectSets(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
+{
+  const std::vector<Label> nodes = SortedLabels(place), elements = SortedLabels(deck.element);
+  const char *const        too_many = "the deck's sets have more members than a deck of this length can mean";
+  Budget                   budget(deck.bytes);
+  std::vector<Label>       members;
   for (const auto &set : deck.nsets) {
-    read->sets[set.second.name];
-    for (Label l : set.second.member) add(set.second.name, l);
+    if (!Expand(set.second, nodes, &budget, &members)) return too_many;
+    std::vector<PetscInt> &to = read->sets[set.second.name];
+    for (Label l : members) to.push_back(place.at(l));
   }
   for (const auto &set : deck.elsets) {
     if (deck.nsets.count(set.first)) continue;
-    read->sets[set.second.name];
-    for (Label l : set.second.member) {
-      const auto e = deck.element.find(l);
-      if (e == deck.element.end()) continue;
-      for (Label n : e->second.node) add(set.second.name, n);
-    }
+    if (!Expand(set.second, elements, &budget, &members)) return too_many;
+    std::vector<PetscInt> &to = read->sets[set.second.name];
+    for (Label l : members)
+      for (Label n : deck.element.at(l).node) {
+        const auto found = place.find(n);
+        if (found != place.end()) to.push_back(found->second);
+      }
+    std::sort(to.begin(), to.end());
+    to.erase(std::unique(to.begin(), to.end()), to.end());
   }
+  return "";
 }
 
 /* In the order of their labels */
 void CollectElements(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
 {
-  std::vector<Label> labels;
-  for (const auto &e : deck.element)
-    if (e.second.element.material >= 0) labels.push_back(e.first);
-  std::sort(labels.begin(), labels.end());
-  for (Label l : labels) {
+  for (Label l : SortedLabels(deck.element)) {
     const DeckElement &from = deck.element.at(l);
+    if (from.element.material < 0) continue;
     FeElement          e    = from.element;
     for (int k = 0; k < FeNodes(e.type); k++) e.node[GmshPlace(e.type, k)] = place.at(from.node[(std::size_t)k]);
     read->elements.push_back(e);
@@ -119,7 +129,8 @@ std::string ReadJob(const std::string &stem, ReadModel *read, std::vector<PetscI
   std::string error = ReadUnknowns(stem + ".dof", &unknown);
   if (error.empty() && (error = Number(deck, unknown, read, &place, row)).size()) error = stem + ".dof: " + error;
   if (!error.empty()) return error;
-  CollectSets(deck, place, read);
+  error = CollectSets(deck, place, read);
+  if (!error.empty()) return stem + ".inp: " + error;
   CollectElements(deck, place, read);
   *left_out = (PetscInt64)deck.left_out;
   return "";

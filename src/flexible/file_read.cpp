@@ -3,6 +3,7 @@
 
 #if defined(HHTDAE_HDF5)
 #include "flexible/file.h"
+#include "flexible/modal_check.h"
 #include <algorithm>
 #include <cstdio>
 #include <sys/stat.h>
@@ -75,7 +76,9 @@ public:
     H5Sget_simple_extent_dims(space, d.data(), nullptr);
     for (hsize_t e : d)
       if (e > (hsize_t)PETSC_MAX_INT) return fail(path + " is larger than this build of PETSc can count"), none;
-    /* no memory is asked for entries that the file does not have */
+    /* No memory is asked for entries that the file does not have. One dimension of none leaves the others free. */
+    for (hsize_t e : d)
+      if (e > size_) return fail(path + " has " + Text(d) + " entries, which the file does not hold"), none;
     if (Product(d) && (H5Dget_storage_size(set) != Product(d) * sizeof(T) || Product(d) > size_))
       return fail(path + " has " + Text(d) + " entries, which the file does not hold"), none;
     return d;
@@ -168,7 +171,9 @@ private:
     for (const char *path : every_dataset)
       if (has(path)) sum += DatasetShare(path, stored(path));
     if (sum != checksum) fail("the file is damaged: its checksum does not agree");
-    if (head.fe_nodes < 0 || !std::isfinite(head.elastic_scale)) fail("attributes of the file are not possible");
+    if (head.fe_nodes < 0 || head.fe_nodes > (int64_t)PETSC_MAX_INT || !std::isfinite(head.elastic_scale) ||
+        head.elastic_scale < 0)
+      fail("attributes of the file are not possible (fe_nodes, elastic_scale)");
   }
 
   uint64_t stored(const std::string &path)
@@ -253,7 +258,9 @@ void GetModal(Reader *in, ModalBody *m)
     m->quadratic[p] =
         Eigen::Map<const Eigen::MatrixXd>(quadratic.data() + p * n * n, (Eigen::Index)n, (Eigen::Index)n).transpose();
   const std::string bad = NotFinite(*m);
-  if (!bad.empty()) in->fail("numbers that are not finite: " + bad);
+  if (!bad.empty()) return in->fail("numbers that are not finite: " + bad);
+  const std::string impossible = Impossible(*m);
+  if (!impossible.empty()) in->fail("it has " + impossible);
 }
 
 void GetModes(Reader *in, hsize_t n, ReducedBody *b)
@@ -262,6 +269,8 @@ void GetModes(Reader *in, hsize_t n, ReducedBody *b)
   const auto frequency = in->get<double>("/modes/frequency", {n}), residual = in->get<double>("/modes/residual", {n});
   if (!in->error.empty()) return;
   if (!Finite(frequency) || !Finite(residual)) return in->fail("a mode's frequency or residual is not finite");
+  for (double f : frequency)
+    if (f < 0) return in->fail("a mode's frequency is negative");
   const bool known = in->head.version >= 2; /* before, residuals were those of forces, which say another thing */
   for (hsize_t k = 0; k < n; k++) b->mode.push_back({frequency[k], known ? residual[k] : -1.});
 }
@@ -280,6 +289,8 @@ void GetNodes(Reader *in, PetscMPIInt rank, PetscMPIInt size, hsize_t n, hsize_t
   b->coordinates.resize(3 * own);
   in->part("/nodes/coordinates", {*N, 3}, {1, own, first, *N, 3}, b->coordinates.data());
   in->part("/nodes/label", {*N}, {1, own, first, *N, 1}, label.data());
+  for (int64_t l : label)
+    if (l < 0 || l > (int64_t)PETSC_MAX_INT) return in->fail("/nodes/label has an impossible number, " + std::to_string(l));
   b->label.assign(label.begin(), label.end());
   if (in->has("/nodes/shape")) {
     const Dims shape = in->dims<double>("/nodes/shape");
@@ -320,6 +331,8 @@ PetscErrorCode GetElements(Reader *in, MPI_Comm comm, PetscMPIInt rank, PetscMPI
   const int64_t *next = node.data();
   for (hsize_t e = 0; e < own; e++) {
     FeElement element{(ElementType)type[e], (PetscInt)material[e], {}};
+    if (material[e] < 0 || material[e] > (int64_t)PETSC_MAX_INT)
+      in->fail("/elements/material has an impossible number, " + std::to_string(material[e]));
     for (int k = 0; k < FeNodes(element.type); k++, next++) {
       if (*next < 0 || *next >= (int64_t)N)
         in->fail("/elements/node has a node that is not there, " + std::to_string(*next));

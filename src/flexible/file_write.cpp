@@ -3,6 +3,7 @@
 
 #if defined(HHTDAE_HDF5)
 #include "flexible/file.h"
+#include "flexible/modal_check.h"
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -270,11 +271,15 @@ PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
   const std::string sizes = Inconsistent(b.modal), numbers = NotFinite(b.modal);
   wrong(!sizes.empty(), sizes);
   wrong(!numbers.empty(), "numbers that are not finite: " + numbers);
+  const std::string impossible = sizes.empty() && numbers.empty() ? Impossible(b.modal) : "";
+  wrong(!impossible.empty(), "it has " + impossible);
   wrong(!b.mode.empty() && (Eigen::Index)b.mode.size() != n,
         std::to_string(b.mode.size()) + " frequencies and residuals for " + std::to_string(n) + " modes");
   for (const ReducedMode &m : b.mode)
-    wrong(!std::isfinite(m.frequency) || !std::isfinite(m.residual), "a mode's frequency or residual is not finite");
-  wrong(!std::isfinite(b.elastic_scale), "elastic_scale is not finite");
+    wrong(!std::isfinite(m.frequency) || !std::isfinite(m.residual) || m.frequency < 0,
+          "a mode's frequency or residual is not finite, or the frequency negative");
+  wrong(!std::isfinite(b.elastic_scale) || b.elastic_scale < 0, "elastic_scale is negative or not finite");
+  for (PetscInt l : b.label) wrong(l < 0, "a node has a negative label");
   wrong(b.own < 0 || (b.own && b.first != kept->first),
         "its first node is " + std::to_string(b.first) + ", the ranks before have " + std::to_string(kept->first));
   const std::size_t own = (std::size_t)std::max<PetscInt>(0, b.own);
@@ -294,6 +299,7 @@ PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
           "its nodes with stress are not ascending places among its own nodes");
   for (const FeElement &e : b.elements) {
     wrong((unsigned)e.type > 3, "an element of unknown type");
+    wrong(e.material < 0, "an element without a material");
     for (int k = 0; (unsigned)e.type <= 3 && k < FeNodes(e.type); k++)
       wrong(e.node[k] < 0 || e.node[k] >= kept->nodes, "an element's node that is not there");
   }

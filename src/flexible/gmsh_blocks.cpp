@@ -14,12 +14,6 @@ namespace hhtdae
 namespace gmsh
 {
 
-static Size Checked(PetscInt count)
-{
-  if (count < 0) Fail("it announces %lld entries", (long long)count);
-  return (Size)count;
-}
-
 /* ---- lines ---- */
 
 PetscErrorCode GmshFile::indexLines()
@@ -98,14 +92,14 @@ const char *GmshFile::walkNodes(const char *p)
   bytes.skip(3, 8);
   for (PetscInt b = 0; b < count; b++) {
     Block block;
-    block.dim            = bytes.get<int>();
-    block.entity         = bytes.get<int>();
+    block.dim            = bytes.small();
+    block.entity         = bytes.small();
     const int parametric = bytes.get<int>();
     if (block.dim < 0 || block.dim > 3) Fail("$Nodes is damaged");
     block.extra = parametric ? block.dim : 0;
     block.count = bytes.integer8();
     block.place = bytes.at() - file_.begin;
-    bytes.skip(block.count, 8 + 8 * (3 + block.extra));
+    bytes.skip(block.count, 8 + 8 * (3 + (Size)block.extra));
     nodes_.push_back(block);
   }
   return bytes.at();
@@ -119,9 +113,9 @@ const char *GmshFile::walkElements(const char *p)
     bytes.skip(3, 8);
     for (PetscInt b = 0; b < count; b++) {
       Block block;
-      block.dim    = bytes.get<int>();
-      block.entity = bytes.get<int>();
-      block.type   = bytes.get<int>();
+      block.dim    = bytes.small();
+      block.entity = bytes.small();
+      block.type   = bytes.small();
       block.count  = bytes.integer8();
       block.place  = bytes.at() - file_.begin;
       bytes.skip(block.count, 8 * (1 + KindOfType(block.type).nodes));
@@ -176,9 +170,9 @@ void GmshFile::textBlocks(const char *name, std::vector<Block> &list, bool nodes
     at++;
     for (PetscInt b = 0; b < count; b++) {
       Words header(line(at), end_);
-      block.dim    = (int)header.integer();
-      block.entity = (int)header.integer();
-      block.type   = (int)header.integer();
+      block.dim    = header.small();
+      block.entity = header.small();
+      block.type   = header.small();
       block.count  = header.integer();
       block.place  = at + 1;
       at += 1 + Checked(block.count) * (nodes ? 2 : 1);

@@ -20,6 +20,8 @@ struct Kind {
 };
 
 Kind KindOfType(int type);
+/* A number of entries, which must not be negative */
+Size Checked(PetscInt count);
 /* Fails for solids that bodies are not made of */
 ElementType TypeOf(int type, PetscInt element);
 
@@ -52,6 +54,7 @@ private:
   std::map<std::string, Size>        section_; /* offset of its first byte, after the line with the name */
   std::vector<Block>                 nodes_, elements_;
   std::map<std::pair<int, int>, int> group_, region_; /* by dimension and tag */
+  std::map<std::pair<int, int>, int> physical_;       /* msh 2: number of each group in this rank's share */
 
   const char *nextLine(const char *p) const
   {
@@ -84,10 +87,11 @@ private:
   /* groups and regions: mesh_file.cpp */
   int  addGroup(int dim, int tag);
   void physicalNames();
+  void expectEnd(Words words, const char *name) const;
   void addRegion(int dim, int tag, const std::vector<int> &physical);
   void entities();
   template <class Source, class Int, class Count, class Real>
-  void           entitiesFrom(Source s, Int integer, Count many, Real real);
+  Source         entitiesFrom(Source s, Int integer, Count many, Real real);
   int            regionOf(int dim, int tag);
   PetscErrorCode regionsOfGroups();
 
@@ -99,6 +103,7 @@ private:
   void                    binaryNodes(const Block &b, Size from, Size to);
   template <class Next> void addElement(int type, PetscInt tag, PetscInt region, bool grouped, Next &&next);
   bool                       grouped(int region) const { return !mesh_.regions[region].groups.empty(); }
+  PetscInt                   provisional(int dim, PetscInt physical);
   void                       textElements(const Block &b, Size from, Size to);
   void                       binaryElements(const Block &b, Size from, Size to);
 };

@@ -43,6 +43,12 @@ ElementType TypeOf(int type, PetscInt element)
        type == 12 ? ": let Gmsh make them with Mesh.SecondOrderIncomplete = 1" : "");
 }
 
+Size Checked(PetscInt count)
+{
+  if (count < 0) Fail("it announces %lld entries", (long long)count);
+  return (Size)count;
+}
+
 /* ---- shares ---- */
 
 template <class F> void GmshFile::ofMine(const std::vector<Block> &list, F &&f)
@@ -59,7 +65,11 @@ template <class F> void GmshFile::ofMine(const std::vector<Block> &list, F &&f)
 
 void GmshFile::share()
 {
-  for (const Block &b : elements_) mesh_.elements += b.count;
+  for (const Block &b : elements_) {
+    if (b.count > std::numeric_limits<PetscInt>::max() - mesh_.elements)
+      Fail("it has more elements than this build of PETSc can count");
+    mesh_.elements += b.count;
+  }
   ofMine(nodes_,
          [&](const Block &b, Size from, Size to) { binary_ ? binaryNodes(b, from, to) : textNodes(b, from, to); });
   ofMine(elements_, [&](const Block &b, Size from, Size to) {
@@ -77,22 +87,17 @@ void GmshFile::addPoint(PetscInt tag, double x, double y, double z)
 
 void GmshFile::textNodes(const Block &b, Size from, Size to)
 {
-  if (!four_) {
-    Words w(line(b.place + from), end_);
-    for (Size k = from; k < to; k++) {
-      const PetscInt tag = w.integer();
-      const double   x = w.real(), y = w.real(), z = w.real();
-      addPoint(tag, x, y, z);
-    }
-    return;
-  }
-  const char *at = line(b.place + b.count + from);
-  Words       tags(line(b.place + from), end_);
+  const char *at = line(b.place + (four_ ? b.count : 0) + from);
+  Words       tags(line(b.place + from), four_ ? line(b.place + b.count) : end_);
   for (Size k = from; k < to; k++) {
-    Words        w(at, end_);
-    const double x = w.real(), y = w.real(), z = w.real();
-    addPoint(tags.integer(), x, y, z);
-    at = nextLine(w.at()); /* parametric coordinates may follow */
+    const char *const stop = nextLine(at);
+    Words             w(at, stop);
+    const PetscInt    tag = four_ ? tags.integer() : w.integer();
+    const double      x = w.real(), y = w.real(), z = w.real();
+    for (int i = 0; i < 3 && four_ && b.type && !w.ended(); i++) w.real(); /* parametric coordinates */
+    w.finish();
+    addPoint(tag, x, y, z);
+    at = stop;
   }
 }
 
@@ -133,8 +138,14 @@ void GmshFile::addElement(int type, PetscInt tag, PetscInt region, bool grouped,
   }
 }
 
-/* msh 2: regions are numbered 4 tag + dimension for the time being */
-static PetscInt Provisional(int dim, PetscInt physical) { return 4 * std::abs(physical) + dim; }
+/* msh 2: regions are numbered as this rank meets them for the time being */
+PetscInt GmshFile::provisional(int dim, PetscInt physical)
+{
+  if (std::abs((PetscInt64)physical) > std::numeric_limits<int>::max())
+    Fail("there is a physical group %lld, which is no number of 32 bits", (long long)physical);
+  const int number = (int)physical_.size();
+  return physical_.emplace(std::make_pair(dim, std::abs((int)physical)), number).first->second;
+}
 
 void GmshFile::textElements(const Block &b, Size from, Size to)
 {
@@ -148,14 +159,15 @@ void GmshFile::textElements(const Block &b, Size from, Size to)
     if (four_)
       addElement(b.type, tag, region, grouped(region), next);
     else {
-      const int type = (int)w.integer();
+      const int type = w.small();
       PetscInt  tags = w.integer(), physical = 0;
       for (PetscInt t = 0; t < tags; t++) {
         const PetscInt value = w.integer();
         if (t == 0) physical = value;
       }
-      addElement(type, tag, Provisional(KindOfType(type).dim, physical), physical != 0, next);
+      addElement(type, tag, provisional(KindOfType(type).dim, physical), physical != 0, next);
     }
+    w.finish();
     at = stop;
   }
 }
@@ -178,7 +190,7 @@ void GmshFile::binaryElements(const Block &b, Size from, Size to)
       const int value = w.get<int>();
       if (t == 0) physical = value;
     }
-    addElement(b.type, tag, Provisional(kind.dim, physical), physical != 0, [&] { return (PetscInt)w.get<int>(); });
+    addElement(b.type, tag, provisional(kind.dim, physical), physical != 0, [&] { return (PetscInt)w.get<int>(); });
   }
 }
 

@@ -2,10 +2,11 @@
 #ifndef HHTDAE_FLEXIBLE_GMSH_SOURCE_H
 #define HHTDAE_FLEXIBLE_GMSH_SOURCE_H
 
+#include "flexible/read_text.h"
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <petscsys.h>
@@ -42,38 +43,51 @@ public:
 
   PetscInt integer()
   {
-    long long  value = 0;
-    const auto r     = std::from_chars(skip(), end_, value);
-    if (r.ec != std::errc() || (r.ptr < end_ && !std::isspace((unsigned char)*r.ptr)))
-      Fail("an integer is expected at '%s'", here().c_str());
+    const char *const word = next();
+    PetscInt64        value;
+    if (!ParseInteger(word, at_, &value)) Fail("an integer is expected at '%s'", shown(word).c_str());
     if (value > std::numeric_limits<PetscInt>::max() || value < std::numeric_limits<PetscInt>::min())
-      Fail("the number %lld does not fit PetscInt; configure PETSc with 64-bit indices", value);
-    at_ = r.ptr;
+      Fail("the number %lld does not fit PetscInt; configure PETSc with 64-bit indices", (long long)value);
     return (PetscInt)value;
+  }
+  /* Numbers of dimensions, types and physical groups, which Gmsh keeps as int. The least one has no absolute value. */
+  int small()
+  {
+    const char *const word = next();
+    PetscInt64        value;
+    if (!ParseInteger(word, at_, &value) || std::abs(value) > std::numeric_limits<int>::max())
+      Fail("an integer of 32 bits is expected at '%s'", shown(word).c_str());
+    return (int)value;
   }
   double real()
   {
-    double value = 0;
-    auto   r     = std::from_chars(skip(), end_, value);
-    if (r.ec == std::errc::result_out_of_range)
-      value = 0; /* too small for a double, or too large */
-    else if (r.ec != std::errc() || !std::isfinite(value))
-      Fail("a finite number is expected at '%s'", here().c_str());
-    at_ = r.ptr;
+    const char *const word = next();
+    double            value;
+    if (!ParseReal(word, at_, &value)) Fail("a finite number is expected at '%s'", shown(word).c_str());
     return value;
   }
+  /* Nothing may follow. */
+  void finish()
+  {
+    const char *const word = next();
+    if (word < at_) Fail("more numbers than there can be in a line, at '%s'", shown(word).c_str());
+  }
+  bool        ended() { return skip() == end_; }
+  std::string word()
+  {
+    const char *const w = next();
+    return std::string(w, at_);
+  }
+  /* A name in quotes in the line */
   std::string quoted()
   {
-    const char *a = static_cast<const char *>(std::memchr(at_, '"', end_ - at_));
-    const char *b = a ? static_cast<const char *>(std::memchr(a + 1, '"', end_ - a - 1)) : nullptr;
-    if (!b) Fail("a name in quotes is expected at '%s'", here().c_str());
+    const char *line = static_cast<const char *>(std::memchr(at_, '\n', end_ - at_));
+    if (!line) line = end_;
+    const char *a = static_cast<const char *>(std::memchr(at_, '"', line - at_));
+    const char *b = a ? static_cast<const char *>(std::memchr(a + 1, '"', line - a - 1)) : nullptr;
+    if (!b) Fail("a name in quotes is expected at '%s'", shown(at_).c_str());
     at_ = b + 1;
     return std::string(a + 1, b);
-  }
-  std::string here() const
-  {
-    std::string s(at_, std::min(end_, at_ + 40));
-    return s.substr(0, s.find('\n'));
   }
 
 private:
@@ -81,8 +95,19 @@ private:
   const char *skip()
   {
     while (at_ < end_ && std::isspace((unsigned char)*at_)) at_++;
-    if (at_ < end_ && *at_ == '+') at_++;
     return at_;
+  }
+  /* Begin of the next word, whose end is at_ */
+  const char *next()
+  {
+    const char *const word = skip();
+    while (at_ < end_ && !std::isspace((unsigned char)*at_)) at_++;
+    return word;
+  }
+  std::string shown(const char *from) const
+  {
+    std::string s(from, std::min(end_, from + 40));
+    return s.substr(0, s.find('\n'));
   }
 };
 
@@ -102,6 +127,12 @@ public:
     T           value;
     skip(1, sizeof(T));
     std::memcpy(&value, from, sizeof(T));
+    return value;
+  }
+  int small()
+  {
+    const int value = get<int>();
+    if (value == std::numeric_limits<int>::min()) Fail("the number %d is impossible", value);
     return value;
   }
   PetscInt integer8()

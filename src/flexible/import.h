@@ -40,6 +40,10 @@ struct MatrixFile {
 
 PetscErrorCode OpenMatrix(MPI_Comm comm, const std::string &file, MatrixFile *matrix);
 
+/* Numbers of entries, columns and values of this rank's rows in a file of PETSc's, which MatLoad() takes as they are: columns
+   have to be in the matrix and ascending, values finite. Collective */
+PetscErrorCode CheckBinary(const FeModel &model, const MatrixFile &matrix);
+
 /* Rows "i j value" in Matrix Market's, Abaqus' or CalculiX' way; the largest number of a row, if the shape is not known
  */
 struct Triplets {

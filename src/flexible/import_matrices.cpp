@@ -1,10 +1,10 @@
 /* Matrices in memory or in files of Matrix Market, Abaqus or PETSc, with nodes and sets in plain lists. */
 #include "flexible/exchange.h"
 #include "flexible/import.h"
+#include "flexible/read_text.h"
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <sstream>
 #include <unordered_map>
 
 namespace hhtdae
@@ -88,75 +88,73 @@ PetscErrorCode HandOutElements(MPI_Comm comm, const ReadModel &read, FeModel *mo
 
 std::string BadLine(const std::string &file, long number, const std::string &line, const std::string &why)
 {
-  return file + ", line " + std::to_string(number) + ": \"" + line.substr(0, 60) + "\" " + why;
+  return file + ", line " + std::to_string(number) + ": " + Quoted(line) + " " + why;
 }
 
 bool Blank(const std::string &line)
 {
-  const std::size_t at = line.find_first_not_of(" \t\r");
-  return at == std::string::npos || line[at] == '#' || line[at] == '%';
+  const std::vector<std::string> words = SplitWords(line, true);
+  return words.empty() || words[0][0] == '#' || words[0][0] == '%';
 }
 
 /* "label x y z" a line */
 std::string ReadNodes(const std::string &file, ReadModel *read)
 {
+  std::string   line, why = WhyUnreadable(file);
   std::ifstream in(file);
-  std::string   line;
   long          number = 0;
-  if (!in) return "cannot read the nodes " + file + ": there is no such file, or no right to read it";
+  if (!why.empty()) return "cannot read the nodes " + file + ": " + why;
   while (std::getline(in, line)) {
     number++;
     if (Blank(line)) continue;
-    for (char &c : line)
-      if (c == ',') c = ' ';
-    std::istringstream words(line);
-    long long          label;
-    double             x, y, z;
-    std::string        more;
-    if (!(words >> label >> x >> y >> z) || words >> more) return BadLine(file, number, line, "is not \"label x y z\"");
-    if (label < 0 || label > (long long)PETSC_MAX_INT) return BadLine(file, number, line, "has an impossible label");
-    if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z))
-      return BadLine(file, number, line, "has a coordinate that is not finite");
+    const std::vector<std::string> word  = SplitWords(line, true);
+    PetscInt64                     label = 0;
+    double                         x[3];
+    if (word.size() != 4 || !ParseInteger(word[0], &label) || !ParseReal(word[1], &x[0]) || !ParseReal(word[2], &x[1]) ||
+        !ParseReal(word[3], &x[2]))
+      return BadLine(file, number, line, "is not \"label x y z\" with finite coordinates");
+    if (label < 0 || label > (PetscInt64)PETSC_MAX_INT) return BadLine(file, number, line, "has an impossible label");
     read->label.push_back((PetscInt)label);
-    read->coordinates.insert(read->coordinates.end(), {x, y, z});
+    read->coordinates.insert(read->coordinates.end(), x, x + 3);
   }
-  return read->label.empty() ? "cannot read the nodes " + file + ": there are none" : "";
+  if (read->label.empty()) return "cannot read the nodes " + file + ": there are none";
+  std::vector<PetscInt> sorted = read->label;
+  std::sort(sorted.begin(), sorted.end());
+  const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+  return twice == sorted.end() ? "" : file + ": two nodes have the label " + std::to_string(*twice);
 }
 
 /* "name label label ..." a line; several lines of one name are one set */
 std::string ReadSets(const std::string &file, ReadModel *read)
 {
+  std::string                            line, why = WhyUnreadable(file);
   std::ifstream                          in(file);
-  std::string                            line;
   std::unordered_map<PetscInt, PetscInt> place;
   long                                   number = 0;
-  if (!in) return "cannot read the sets " + file + ": there is no such file, or no right to read it";
-  for (std::size_t i = 0; i < read->label.size(); i++)
-    if (!place.emplace(read->label[i], (PetscInt)i).second)
-      return "two nodes have the label " + std::to_string(read->label[i]);
+  if (!why.empty()) return "cannot read the sets " + file + ": " + why;
+  for (std::size_t i = 0; i < read->label.size(); i++) place.emplace(read->label[i], (PetscInt)i);
   while (std::getline(in, line)) {
     number++;
     if (Blank(line)) continue;
-    std::istringstream words(line);
-    std::string        name, word;
-    words >> name;
-    auto &set = read->sets[name];
-    while (words >> word) {
-      char           *end;
-      const long long label = std::strtoll(word.c_str(), &end, 10);
-      if (*end) return BadLine(file, number, line, "has \"" + word + "\" in place of a node's label");
-      const auto found = label < 0 || label > (long long)PETSC_MAX_INT ? place.end() : place.find((PetscInt)label);
-      if (found == place.end()) return BadLine(file, number, line, "names node " + word + ", which is not there");
+    const std::vector<std::string> word = SplitWords(line, false);
+    auto                          &set  = read->sets[word[0]];
+    for (std::size_t k = 1; k < word.size(); k++) {
+      PetscInt64 label = 0;
+      if (!ParseInteger(word[k], &label))
+        return BadLine(file, number, line, "has " + Quoted(word[k]) + " in place of a node's label");
+      const auto found = label < 0 || label > (PetscInt64)PETSC_MAX_INT ? place.end() : place.find((PetscInt)label);
+      if (found == place.end()) return BadLine(file, number, line, "names node " + word[k] + ", which is not there");
       set.push_back(found->second);
     }
   }
   return "";
 }
 
-PetscErrorCode LoadBinary(const FeModel &model, const std::string &file, Mat *A)
+PetscErrorCode LoadBinary(const FeModel &model, const std::string &file, const MatrixFile &head, Mat *A)
 {
   PetscViewer viewer;
   PetscFunctionBegin;
+  PetscCall(CheckBinary(model, head));
   PetscCall(PetscViewerCreate(model.comm, &viewer));
   PetscCall(PetscViewerSetType(viewer, PETSCVIEWERBINARY));
   PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
@@ -300,7 +298,7 @@ PetscErrorCode FeModel::readMatrices(const std::string &stiffness, const std::st
   for (int k = 0; k < 2; k++) {
     Mat *A = k ? &M : &K;
     if (files[k].kind == MatrixFile::Binary)
-      PetscCall(LoadBinary(*this, names[k], A));
+      PetscCall(LoadBinary(*this, names[k], files[k], A));
     else
       PetscCall(Assemble(*this, names[k], &triplets[k], A));
     if (files[k].kind != MatrixFile::Binary && !files[k].symmetric) PetscCall(CheckSymmetric(comm, names[k], *A));

@@ -5,11 +5,11 @@
 */
 #include "flexible/exchange.h"
 #include "flexible/import.h"
+#include "flexible/read_text.h"
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <sstream>
@@ -54,9 +54,10 @@ std::string ReadBinaryHead(FILE *in, MatrixFile *m)
   if (m->rows < 0 || cols < 0) return "its sizes are not possible (written by a PETSc with other integers?)";
   if (cols != m->rows) return "it has " + std::to_string(m->rows) + " rows and " + std::to_string(cols) + " columns";
   if (m->entries < 0) return "it is stored as a dense matrix, a sparse one is asked for";
-  const int64_t bytes =
-      (int64_t)sizeof head + word * (m->rows + m->entries) + (int64_t)sizeof(PetscScalar) * m->entries;
-  if (m->bytes < bytes) return "it is truncated, or written by a PETSc with other integers or numbers";
+  const int64_t most = m->bytes / word; /* of rows and entries, before their bytes are added up */
+  if (m->rows > most || m->entries > most ||
+      m->bytes < (int64_t)sizeof head + word * (m->rows + m->entries) + (int64_t)sizeof(PetscScalar) * m->entries)
+    return "it is truncated, or written by a PETSc with other integers or numbers";
   return "";
 }
 
@@ -75,23 +76,28 @@ std::string ReadMarketHead(FILE *in, MatrixFile *m)
   do {
     if (!Line(in, &line)) return "it ends before the line of sizes";
   } while (line.empty() || line[0] == '%' || line.find_first_not_of(" \t\r") == std::string::npos);
-  long long rows = -1, cols = -1, entries = -1;
-  if (std::sscanf(line.c_str(), "%lld %lld %lld", &rows, &cols, &entries) != 3 || rows < 0 || entries < 0)
-    return "its line of sizes is not \"rows columns entries\": " + line;
-  if (rows != cols) return "it has " + std::to_string(rows) + " rows and " + std::to_string(cols) + " columns";
+  const std::vector<std::string> sizes = SplitWords(line, false);
+  PetscInt64                     size[3];
+  bool                           good = sizes.size() == 3;
+  for (std::size_t k = 0; k < 3 && good; k++) good = ParseInteger(sizes[k], &size[k]) && size[k] >= 0;
+  if (!good) return "its line of sizes is not \"rows columns entries\": " + Quoted(line);
+  if (size[0] != size[1])
+    return "it has " + std::to_string(size[0]) + " rows and " + std::to_string(size[1]) + " columns";
   m->kind      = MatrixFile::Market;
   m->symmetric = symmetry == "symmetric";
-  m->rows      = rows;
-  m->entries   = entries;
+  m->rows      = size[0];
+  m->entries   = size[2];
   m->begin     = std::ftell(in);
   return "";
 }
 
 std::string ReadHead(MatrixFile *m)
 {
-  unsigned char start[14] = {};
-  File          in        = Open(m->file);
-  if (!in) return "there is no such file, or no right to read it";
+  unsigned char     start[14] = {};
+  const std::string why       = WhyUnreadable(m->file);
+  if (!why.empty()) return why;
+  File in = Open(m->file);
+  if (!in) return "there is no right to read it";
   if (std::fseek(in.get(), 0, SEEK_END) || (m->bytes = std::ftell(in.get())) < 0) return "it is not a file";
   std::rewind(in.get());
   const std::size_t got = std::fread(start, 1, sizeof start, in.get());
@@ -104,20 +110,17 @@ std::string ReadHead(MatrixFile *m)
   return "";
 }
 
-/* A number with Fortran's exponent D too; null if there is none */
-const char *Number(const char *at, double *value)
+bool IsSpace(char c) { return std::isspace((unsigned char)c); }
+
+/* The next word of [*at, end), past one comma before it if there are words already */
+const char *Word(const char **at, const char *end, bool first)
 {
-  char *end;
-  *value = std::strtod(at, &end);
-  if (end == at) return nullptr;
-  if (*end == 'D' || *end == 'd') {
-    const std::string exponent = std::string(at, (std::size_t)(end - at)) + "e";
-    std::size_t       length   = 0;
-    while (std::isdigit((unsigned char)end[1 + length]) || (!length && (end[1] == '+' || end[1] == '-'))) length++;
-    *value = std::strtod((exponent + std::string(end + 1, length)).c_str(), nullptr);
-    end += 1 + length;
-  }
-  return end;
+  while (*at < end && IsSpace(**at)) ++*at;
+  if (!first && *at < end && **at == ',') ++*at;
+  while (*at < end && IsSpace(**at)) ++*at;
+  const char *const word = *at;
+  while (*at < end && !IsSpace(**at) && **at != ',') ++*at;
+  return word;
 }
 
 /* Reads lines, keeps entries, remembers the first thing that is wrong */
@@ -127,26 +130,26 @@ struct Collector {
   std::string        error;
   int                lower = 0, upper = 0;
 
-  void take(const char *line)
+  void take(const char *line, const char *end)
   {
-    while (std::isspace((unsigned char)*line)) line++;
-    if (!*line || *line == '%' || *line == '#' || *line == '*' || !error.empty()) return;
-    char       *end, *next;
-    double      value = 0;
-    long long   i = std::strtoll(line, &end, 10), j = 0;
-    const char *rest = nullptr;
-    if (end != line) {
-      if (*end == ',') end++;
-      j = std::strtoll(end, &next, 10);
-      if (next != end) rest = Number(next + (*next == ','), &value);
+    while (line < end && IsSpace(*line)) line++;
+    if (line == end || *line == '%' || *line == '#' || *line == '*' || !error.empty()) return;
+    PetscInt64  number[2] = {0, 0};
+    double      value     = 0;
+    bool        good      = true;
+    const char *at        = line;
+    for (int k = 0; k < 2; k++) {
+      const char *const word = Word(&at, end, k == 0);
+      good                   = good && ParseInteger(word, at, &number[k]);
     }
-    while (rest && std::isspace((unsigned char)*rest)) rest++;
-    if (!rest || *rest) return fail("is not \"row column value\"", line);
-    const long long rows = shape.rows < 0 ? (long long)PETSC_MAX_INT : (long long)shape.rows;
-    if (i < 1 || j < 1 || i > rows || j > rows)
-      return fail("has a row or column that is not among 1 .. " + std::to_string(rows), line);
-    if (!std::isfinite(value)) return fail("has a value that is not a finite number", line);
-    add((PetscInt)(i - 1), (PetscInt)(j - 1), value);
+    const char *const word = Word(&at, end, false);
+    good                   = good && ParseReal(word, at, &value);
+    while (at < end && IsSpace(*at)) at++;
+    if (!good || at < end) return fail("is not \"row column value\", or its value is not a finite number", line, end);
+    const PetscInt64 rows = shape.rows < 0 ? (PetscInt64)PETSC_MAX_INT : (PetscInt64)shape.rows;
+    if (number[0] < 1 || number[1] < 1 || number[0] > rows || number[1] > rows)
+      return fail("has a row or column that is not among 1 .. " + std::to_string(rows), line, end);
+    add((PetscInt)(number[0] - 1), (PetscInt)(number[1] - 1), value);
   }
 
 private:
@@ -165,9 +168,9 @@ private:
     to->value.push_back(value);
   }
 
-  void fail(const std::string &why, const char *line)
+  void fail(const std::string &why, const char *line, const char *end)
   {
-    error = "the line \"" + std::string(line).substr(0, 80) + "\" " + why;
+    error = "the line " + Quoted(std::string(line, end)) + " " + why;
   }
 };
 
@@ -189,7 +192,7 @@ std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end,
          p = newline + 1) {
       if (inside) {
         carry.append(p, newline);
-        to->take(carry.c_str());
+        to->take(carry.data(), carry.data() + carry.size());
       }
       carry.clear();
       inside = true;
@@ -199,7 +202,7 @@ std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end,
     at += (PetscInt64)got;
   }
   if (std::ferror(in.get())) return "reading it failed";
-  if (inside && to->error.empty()) to->take(carry.c_str());
+  if (inside && to->error.empty()) to->take(carry.data(), carry.data() + carry.size());
   return to->error;
 }
 
@@ -276,8 +279,34 @@ PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShap
   PetscFunctionReturn(0);
 }
 
+/* Entries of all ranks off the diagonal; `twice`: of the diagonal, where Assemble() adds one of its own to each row, one is
+   given more than once */
+static PetscErrorCode CountEntries(const FeModel &model, const Triplets &t, PetscInt64 *off, PetscBool *twice)
+{
+  Vec        count;
+  PetscReal  most;
+  PetscInt64 mine = 0;
+  PetscFunctionBegin;
+  PetscCall(VecCreateMPI(model.comm, 3 * model.own, 3 * model.nodes, &count));
+  for (std::size_t k = 0; k < t.i.size(); k++)
+    if (t.i[k] != t.j[k])
+      mine++;
+    else
+      PetscCall(VecSetValue(count, t.i[k], 1, ADD_VALUES));
+  PetscCall(VecAssemblyBegin(count));
+  PetscCall(VecAssemblyEnd(count));
+  PetscCall(VecMax(count, nullptr, &most));
+  PetscCall(VecDestroy(&count));
+  PetscCallMPI(MPI_Allreduce(&mine, off, 1, MPIU_INT64, MPI_SUM, model.comm));
+  *twice = (PetscBool)(most > 2.5);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets *t, Mat *A)
 {
+  PetscInt64 off;
+  PetscBool  twice;
+  MatInfo    info;
   PetscFunctionBegin;
   for (PetscInt row = 3 * model.first; row < 3 * (model.first + model.own);
        row++) { /* solvers ask for a whole diagonal */
@@ -290,7 +319,12 @@ PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets 
   PetscCall(MatSetSizes(*A, 3 * model.own, 3 * model.own, 3 * model.nodes, 3 * model.nodes));
   PetscCall(MatSetBlockSize(*A, 3));
   PetscCall(MatSetType(*A, MATAIJ));
+  PetscCall(CountEntries(model, *t, &off, &twice)); /* PETSc may change the numbers */
   PetscCall(MatSetPreallocationCOO(*A, (PetscInt)t->i.size(), t->i.data(), t->j.data()));
+  PetscCall(MatGetInfo(*A, MAT_GLOBAL_SUM, &info));
+  /* PETSc would add up what stands there twice. */
+  PetscCheck(!twice && info.nz_used == (double)(off + 3 * (PetscInt64)model.nodes), model.comm,
+             PETSC_ERR_FILE_UNEXPECTED, "cannot read the matrix %s: an entry stands in it twice", name.c_str());
   PetscCall(MatSetValuesCOO(*A, t->value.data(), INSERT_VALUES));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   *t = Triplets();

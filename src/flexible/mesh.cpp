@@ -46,6 +46,7 @@ template <class Shape> void AddFaces(const MeshCell &cell, PetscInt number, std:
     FaceRecord record{{-1, -1, -1, -1}, number, cell.tag};
     for (int i = 0; i < Shape::perface; i++) record.corner[i] = cell.node[Shape::face[f][i]];
     std::sort(record.corner, record.corner + Shape::perface);
+    if (std::unique(record.corner, record.corner + Shape::perface) - record.corner < 3) continue; /* an edge, or a point */
     out[record.corner[0] % out.size()].push_back(record);
   }
 }
@@ -58,6 +59,9 @@ std::vector<FaceLink> LinksOf(const FaceRecord *from, const FaceRecord *to)
       if (a != b) links.push_back({a->cell, b->cell, b->tag});
   return links;
 }
+
+const char *const overlapping =
+    ", so that they overlap (msh 2.2 writes an element of two physical groups twice; msh 4.1 does not)";
 
 /* Neighbours of this rank's cells, by global number; first: of this rank's first cell */
 PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vector<MeshCell> &cells,
@@ -88,10 +92,16 @@ PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vect
     for (std::size_t a = 0, b; a < faces.size(); a = b) {
       for (b = a + 1; b < faces.size() && faces[b].sameFace(faces[a]); b++) {
       }
+      if (b - a > 2 && problem.empty())
+        problem = "mesh " + file + ": elements " + std::to_string(faces[a].tag) + ", " +
+                  std::to_string(faces[a + 1].tag) + " and " + std::to_string(faces[a + 2].tag) +
+                  " share one face" + overlapping;
+      if (b - a > 2) continue; /* links would be as many as the square of the elements */
       for (const FaceLink &l : LinksOf(&faces[a], &faces[a] + (b - a)))
         out[std::upper_bound(offset.begin(), offset.end(), l.cell) - offset.begin() - 1].push_back(l);
     }
     std::vector<FaceRecord>().swap(faces);
+    PetscCall(Agree(comm, problem));
     PetscCall(Exchange(comm, out, &links, &unused));
   }
   std::sort(links.begin(), links.end());
@@ -102,8 +112,7 @@ PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vect
     if (k && links[k].cell == links[k - 1].cell && links[k].neighbour == links[k - 1].neighbour && problem.empty())
       problem = "mesh " + file + ": elements " + std::to_string(cells[cell].tag) + " and " +
                 std::to_string(links[k].tag) +
-                " share more than one face, so that they overlap (msh 2.2 writes an element of two physical groups "
-                "twice; msh 4.1 does not)";
+                " share more than one face" + overlapping;
     start[cell + 1]++;
     adjacent.push_back(links[k].neighbour);
   }

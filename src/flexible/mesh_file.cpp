@@ -8,7 +8,6 @@
 #include "flexible/mesh_file.h"
 #include "flexible/exchange.h"
 #include "flexible/gmsh_file.h"
-#include <set>
 #include <stdexcept>
 
 namespace hhtdae
@@ -44,6 +43,7 @@ void GmshFile::header()
   Words          words(nextLine(p), end_);
   const double   version = words.real();
   const PetscInt kind = words.integer(), size = words.integer();
+  if (kind != 0 && kind != 1) Fail("its kind of file is %lld: 0 is text, 1 binary", (long long)kind);
   if (std::abs(version - 4.1) > 1e-6 && std::abs(version - 2.2) > 1e-6)
     Fail("its format is %g; 4.1 and 2.2 are read (gmsh -format msh41)", version);
   four_   = version > 4;
@@ -93,9 +93,17 @@ void GmshFile::physicalNames()
   Words          words(file_.begin + at->second, end_);
   const PetscInt count = words.integer();
   for (PetscInt k = 0; k < count; k++) {
-    const int dim = (int)words.integer(), tag = (int)words.integer();
+    const int dim = words.small(), tag = words.small();
+    if (dim < 0 || dim > 3) Fail("a physical group has %d dimensions", dim);
     mesh_.groups[addGroup(dim, tag)].name = words.quoted();
   }
+  expectEnd(words, "$EndPhysicalNames");
+}
+
+void GmshFile::expectEnd(Words words, const char *name) const
+{
+  const std::string word = words.word();
+  if (word != name) Fail("'%s' stands where %s should be: the section has more or fewer entries than it announces", word.substr(0, 40).c_str(), name);
 }
 
 void GmshFile::addRegion(int dim, int tag, const std::vector<int> &physical)
@@ -108,20 +116,21 @@ void GmshFile::addRegion(int dim, int tag, const std::vector<int> &physical)
 }
 
 template <class Source, class Int, class Count, class Real>
-void GmshFile::entitiesFrom(Source s, Int integer, Count many, Real real)
+Source GmshFile::entitiesFrom(Source s, Int integer, Count many, Real real)
 {
   PetscInt count[4];
-  for (PetscInt &c : count) c = many(s);
+  for (PetscInt &c : count) Checked(c = many(s));
   for (int dim = 0; dim < 4; dim++)
     for (PetscInt k = 0; k < count[dim]; k++) {
       const int tag = integer(s);
       for (int i = 0; i < (dim ? 6 : 3); i++) real(s);
       std::vector<int> physical;
-      for (PetscInt i = many(s); i > 0; i--) physical.push_back(integer(s));
+      for (Size i = Checked(many(s)); i > 0; i--) physical.push_back(integer(s));
       if (dim)
-        for (PetscInt i = many(s); i > 0; i--) integer(s);
+        for (Size i = Checked(many(s)); i > 0; i--) integer(s);
       addRegion(dim, tag, physical);
     }
+  return s;
 }
 
 void GmshFile::entities()
@@ -131,12 +140,13 @@ void GmshFile::entities()
   const char *p = file_.begin + at->second;
   if (binary_)
     entitiesFrom(
-        Bytes(p, end_), [](Bytes &b) { return b.get<int>(); }, [](Bytes &b) { return b.integer8(); },
+        Bytes(p, end_), [](Bytes &b) { return b.small(); }, [](Bytes &b) { return b.integer8(); },
         [](Bytes &b) { b.get<double>(); });
   else
-    entitiesFrom(
-        Words(p, end_), [](Words &w) { return (int)w.integer(); }, [](Words &w) { return w.integer(); },
-        [](Words &w) { w.real(); });
+    expectEnd(entitiesFrom(
+                  Words(p, end_), [](Words &w) { return w.small(); }, [](Words &w) { return w.integer(); },
+                  [](Words &w) { w.real(); }),
+              "$EndEntities");
 }
 
 int GmshFile::regionOf(int dim, int tag)
@@ -150,19 +160,23 @@ int GmshFile::regionOf(int dim, int tag)
 /* msh 2: which physical groups there are shows in the elements only */
 PetscErrorCode GmshFile::regionsOfGroups()
 {
-  std::set<PetscInt>    seen;
-  std::vector<PetscInt> mine, all;
+  struct Physical {
+    int  tag, dim;
+    bool operator<(const Physical &o) const { return tag != o.tag ? tag < o.tag : dim < o.dim; }
+    bool operator==(const Physical &o) const { return tag == o.tag && dim == o.dim; }
+  };
+  std::vector<Physical> mine(physical_.size()), all;
+  std::vector<PetscInt> number;
   PetscFunctionBegin;
-  for (const MeshCell &c : mesh_.cells) seen.insert(c.region);
-  for (const MeshMember &m : mesh_.members) seen.insert(m.region);
-  mine.assign(seen.begin(), seen.end());
+  for (const auto &p : physical_) mine[p.second] = {p.first.second, p.first.first};
   PetscCall(GatherAll(comm_, mine, &all));
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
-  for (PetscInt r : all) addRegion((int)(r % 4), (int)(r / 4), {(int)(r / 4)});
-  const auto final = [&](PetscInt &r) { r = std::lower_bound(all.begin(), all.end(), r) - all.begin(); };
-  for (MeshCell &c : mesh_.cells) final(c.region);
-  for (MeshMember &m : mesh_.members) final(m.region);
+  for (const Physical &p : all) addRegion(p.dim, p.tag, {p.tag});
+  for (const Physical &p : mine)
+    number.push_back((PetscInt)(std::lower_bound(all.begin(), all.end(), p) - all.begin()));
+  for (MeshCell &c : mesh_.cells) c.region = number[c.region];
+  for (MeshMember &m : mesh_.members) m.region = number[m.region];
   PetscFunctionReturn(0);
 }
 

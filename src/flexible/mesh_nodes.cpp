@@ -19,14 +19,14 @@ PetscErrorCode MeshNodes::build(const std::string &file, MeshFile *mesh)
   PetscCallMPI(MPI_Comm_size(comm_, &size));
   for (const MeshPoint &p : mesh->points) largest = std::max(largest, p.tag);
   PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_INT, MPI_MAX, comm_));
-  const PetscInt range = all / size + 1; /* rank r keeps numbers from r range on */
+  const PetscInt64 range = all / size + (PetscInt64)1; /* rank r keeps numbers from r range on */
   PetscCall(collect(file, mesh, range));
   PetscCall(resolve(file, mesh, range));
   PetscCall(keepMembers(mesh));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode MeshNodes::collect(const std::string &file, MeshFile *mesh, PetscInt range)
+PetscErrorCode MeshNodes::collect(const std::string &file, MeshFile *mesh, PetscInt64 range)
 {
   PetscMPIInt              size;
   std::vector<std::size_t> from;
@@ -51,7 +51,7 @@ PetscErrorCode MeshNodes::collect(const std::string &file, MeshFile *mesh, Petsc
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode MeshNodes::resolve(const std::string &file, MeshFile *mesh, PetscInt range) const
+PetscErrorCode MeshNodes::resolve(const std::string &file, MeshFile *mesh, PetscInt64 range) const
 {
   PetscMPIInt           size, rank;
   std::vector<PetscInt> tags;

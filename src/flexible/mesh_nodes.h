@@ -26,8 +26,8 @@ private:
   std::vector<MeshMember> members_;
   std::vector<PetscInt>   offset_; /* index of each rank's first */
 
-  PetscErrorCode collect(const std::string &file, MeshFile *mesh, PetscInt range);
-  PetscErrorCode resolve(const std::string &file, MeshFile *mesh, PetscInt range) const;
+  PetscErrorCode collect(const std::string &file, MeshFile *mesh, PetscInt64 range);
+  PetscErrorCode resolve(const std::string &file, MeshFile *mesh, PetscInt64 range) const;
   PetscErrorCode keepMembers(MeshFile *mesh);
   int            home(PetscInt index) const;
 };

@@ -357,7 +357,7 @@ TEST(CalculixRanks, ErrorsOnAllRanks)
     return message;
   };
   EXPECT_SAYS(damaged(".inp", "*NODE\n1, 2, abc\n" + deck, deck), "box.inp, line 2");
-  EXPECT_SAYS(damaged(".inp", "*INCLUDE, INPUT=box.inp\n" + deck, deck), "more than 20 deep");
+  EXPECT_SAYS(damaged(".inp", "*INCLUDE, INPUT=box.inp\n" + deck, deck), "included more than 16 times");
   EXPECT_SAYS(damaged(".inp", deck + "*NSET, NSET=a\nnowhere\n", deck), "names the set nowhere");
   const std::size_t end_of_node = dof.find(".3\n", dof.size() / 2);
   EXPECT_SAYS(damaged(".dof", dof.substr(0, end_of_node + 3), dof), "of an element has no unknowns");

@@ -235,8 +235,9 @@ TEST(FeMeshParallelErrors, ComeToAllRanks)
     MPI_Allreduce(&one, &sum, 1, MPI_INT, MPI_SUM, PETSC_COMM_WORLD);
     EXPECT_EQ(sum, size);
   };
-  refused(text, "\n181 ", "\n181 4711 ", "node 4711"); /* among the last rank's elements */
+  refused(text, " 329 \n", " 4711 \n", "node 4711"); /* among the last rank's elements */
   refused(text, "\n181 ", "\n181 x ", "integer is expected");
+  refused(text, "\n181 ", "\n181 1 ", "more numbers");
   refused(text, "$EndElements", "$EndElement", "$EndElements");
   FeModel   model(PETSC_COMM_WORLD);
   ErrorTrap trap;

@@ -1,0 +1,49 @@
+/* Mass, inertia, frequencies and invariants that no body has; see modal_check.h. */
+#include "flexible/modal_check.h"
+#include <Eigen/Eigenvalues>
+#include <set>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* Rounding of symmetric matrices and of their eigenvalues, relative to their size */
+constexpr double rounding = 1e-9;
+/* Modes come from an iterative eigensolver: their products in the mass matrix differ from the identity by about its tolerance. */
+constexpr double orthonormal = 1e-3;
+
+bool Symmetric(const Eigen::MatrixXd &A) { return (A - A.transpose()).norm() <= rounding * A.norm(); }
+
+std::string ImpossibleInvariants(const ModalBody &m)
+{
+  if (!m.modes() || !m.quadratic[0].size()) return "";
+  for (std::size_t p = 0; p < 3; p++)
+    if (!Symmetric(m.quadratic[p])) return "invariants quadratic in the modes that are not symmetric";
+  const Eigen::MatrixXd sum = m.quadratic[0] + m.quadratic[1] + m.quadratic[2];
+  if (!((sum - Eigen::MatrixXd::Identity(m.modes(), m.modes())).cwiseAbs().maxCoeff() < orthonormal))
+    return "modes that are not orthonormal in the mass matrix (xx + yy + zz of the invariants quadratic in them is not the "
+           "identity)";
+  return "";
+}
+
+} // namespace
+
+std::string Impossible(const ModalBody &m)
+{
+  if (!(m.mass > 0)) return "a mass of " + std::to_string(m.mass) + ", which is not positive";
+  for (Eigen::Index k = 0; k < m.omega.size(); k++)
+    if (!(m.omega[k] > 0))
+      return "a frequency that is not positive, of mode " + std::to_string(k) + " (rigid-body modes are left out)";
+  const Eigen::SelfAdjointEigenSolver<Matrix3> moments(m.moments, Eigen::EigenvaluesOnly);
+  if (!Symmetric(m.moments) || moments.eigenvalues()[0] < -rounding * m.moments.norm())
+    return "moments of inertia that no distribution of mass has (not symmetric, or with a negative eigenvalue)";
+  std::set<std::string> names;
+  for (const ModalAttachment &a : m.attachments)
+    if (a.name.empty() || !names.insert(a.name).second)
+      return a.name.empty() ? "an attachment without a name" : "two attachments of the name " + a.name;
+  return ImpossibleInvariants(m);
+}
+
+} // namespace hhtdae
