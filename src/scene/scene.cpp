@@ -152,6 +152,7 @@ PetscErrorCode Scene::setUp()
   PetscFunctionBegin;
   if (s.run) PetscFunctionReturn(0);
   PetscCall(TSHHT3Initialize());
+  PetscCall(DeclareSceneOptions());
   PetscCall(ReadStartOptions(s));
   PetscCall(CheckDescription(s));
   auto     run = std::make_unique<Runtime>(s);

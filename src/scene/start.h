@@ -9,6 +9,7 @@ namespace hhtdae
 {
 
 /* options.cpp */
+PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
 

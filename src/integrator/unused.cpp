@@ -1,0 +1,177 @@
+/*
+  Options of ours that nobody has read, reported when PETSc ends, since until then an object may come that reads them: a name that was
+  misspelt, with the nearest one that exists, or an option of an object that was never asked to read its options.
+*/
+#include "unused.h"
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr int      max_families = 8;
+const char *const *families[max_families]; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
+
+const char *const names[] = {"ts_hhtdae_",
+                             "ts_hhtdae_form",
+                             "ts_hhtdae_alpha",
+                             "ts_hhtdae_radius",
+                             "ts_hhtdae_corrector_tolerance",
+                             "ts_hhtdae_predictor_degree",
+                             "ts_hhtdae_reuse",
+                             "ts_hhtdae_start",
+                             "ts_hhtdae_summary",
+                             "ts_hhtdae_progress",
+                             "ts_hhtdae_checkpoint",
+                             "ts_hhtdae_checkpoint_every",
+                             "ts_hhtdae_resume",
+                             nullptr};
+
+/* Where the name of an option begins behind the prefix of its object; npos if it is of another family */
+size_t Begin(const std::string &option, const std::string &stem)
+{
+  size_t at = option.find(stem);
+  while (at != std::string::npos && at > 0 && option[at - 1] != '_') at = option.find(stem, at + 1);
+  return at;
+}
+
+/* Letters to insert, delete or replace to make b of a */
+size_t Distance(const std::string &a, const std::string &b)
+{
+  std::vector<size_t> row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); j++) row[j] = j;
+  for (size_t i = 0; i < a.size(); i++) {
+    size_t diagonal = row[0];
+    row[0]          = i + 1;
+    for (size_t j = 0; j < b.size(); j++) {
+      const size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal              = row[j + 1];
+      row[j + 1]            = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+/* What to say of an unused option; nothing if it is none of ours */
+std::string Remark(const std::string &option)
+{
+  for (const char *const *family : families) {
+    const size_t at = family ? Begin(option, family[0]) : std::string::npos;
+    if (at == std::string::npos) continue;
+    const std::string prefix = option.substr(0, at), name = option.substr(at);
+    const char       *nearest = nullptr;
+    size_t            least   = SIZE_MAX;
+    for (const char *const *n = family + 1; *n; n++) {
+      const size_t d = Distance(name, *n);
+      if (d < least) {
+        least   = d;
+        nearest = *n;
+      }
+    }
+    if (least == 0) return "nobody has read it: is there an object with this options prefix, and was it set from options?";
+    return "there is no such option; the nearest is -" + prefix + (nearest ? nearest : "");
+  }
+  return "";
+}
+
+/* Ours among the options that the first rank has not used */
+PetscErrorCode UnusedOnFirstRank(PetscMPIInt rank, std::vector<std::string> &unused)
+{
+  PetscInt n = 0;
+  char   **name, **value;
+
+  PetscFunctionBegin;
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsLeftGet(NULL, &n, &name, &value));
+  for (PetscInt i = 0; i < n; i++)
+    if (!Remark(name[i]).empty()) unused.push_back(name[i]);
+  PetscCall(PetscOptionsLeftRestore(NULL, &n, &name, &value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An object on other ranks may have used what the first has not */
+PetscErrorCode UsedAnywhere(const std::string &option, PetscBool *used)
+{
+  char        name[256] = "";
+  PetscMPIInt mine, all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(name, option.c_str(), sizeof(name)));
+  PetscCallMPI(MPI_Bcast(name, sizeof(name), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(PetscOptionsUsed(NULL, name, used));
+  mine = *used;
+  PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_MAX, PETSC_COMM_WORLD));
+  *used = (PetscBool)(all > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode ReportUnusedOptions(void)
+{
+  std::vector<std::string> unused;
+  PetscMPIInt              rank, n;
+  PetscBool                used;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(UnusedOnFirstRank(rank, unused));
+  n = (PetscMPIInt)unused.size();
+  PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  unused.resize(n);
+  for (const std::string &option : unused) {
+    PetscCall(UsedAnywhere(option, &used));
+    if (!used) PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s: warning: option -%s was not used: %s\n", TSHHT3, option.c_str(), Remark(option).c_str()));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ForgetOptions(void)
+{
+  PetscFunctionBegin;
+  for (const char *const *&family : families) family = nullptr;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DeclareOwnOptions(void)
+{
+  PetscFunctionBegin;
+  PetscCall(TSHHT3DeclareOptions(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@C
+  TSHHT3DeclareOptions - Names options, so that those among the options database that look like them but are not used are reported in
+  `PetscFinalize()`
+
+  Not Collective
+
+  Input Parameter:
+. names - ended by NULL, without the leading "-", and alive until `PetscFinalize()`; the first entry is the beginning that all
+          others share, "scene_" for "scene_dt"
+
+  Level: developer
+
+  Notes:
+  A list is taken once. An option with the prefix of an object belongs to the names behind the prefix.
+
+.seealso: `TSHHT3`, `TSHHT3Initialize()`, `PetscOptionsLeft()`
+@*/
+PetscErrorCode TSHHT3DeclareOptions(const char *const names[])
+{
+  PetscFunctionBegin;
+  PetscAssertPointer(names, 1);
+  for (const char *const *&family : hht3::families) {
+    if (family == names) PetscFunctionReturn(PETSC_SUCCESS);
+    if (family) continue;
+    family = names;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "There is room for %d lists of options", hht3::max_families);
+}

@@ -1,0 +1,19 @@
+/* Options that were set and never read, unused.cpp. */
+#ifndef HHTDAE_UNUSED_H
+#define HHTDAE_UNUSED_H
+
+#include "compat.h"
+#include "hhtdae/hhtdae.h"
+#include "hhtdae/options.h"
+
+namespace hht3
+{
+
+PetscErrorCode DeclareOwnOptions(void);
+/* Prints them; collective on PETSC_COMM_WORLD, called when PETSc ends */
+PetscErrorCode ReportUnusedOptions(void);
+PetscErrorCode ForgetOptions(void);
+
+} // namespace hht3
+
+#endif

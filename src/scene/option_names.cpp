@@ -1,0 +1,31 @@
+/* The options of scenes, by which misspelt ones are found when PETSc ends. */
+#include "start.h"
+#include <hhtdae/options.h>
+
+namespace hhtdae
+{
+
+PetscErrorCode DeclareSceneOptions()
+{
+  static const char *const names[] = {"scene_",
+                                      "scene_assemble",
+                                      "scene_assemble_tol",
+                                      "scene_redundant",
+                                      "scene_equilibrium",
+                                      "scene_view",
+                                      "scene_start_time",
+                                      "scene_output",
+                                      "scene_csv",
+                                      "scene_dt",
+                                      "scene_rate",
+                                      "scene_animation",
+                                      "scene_animation_dt",
+                                      "scene_balance",
+                                      "scene_symmetric_storage",
+                                      nullptr};
+  PetscFunctionBegin;
+  PetscCall(TSHHT3DeclareOptions(names));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
