@@ -39,6 +39,13 @@ typedef PetscOptionItems HHT3OptionItems;
   #define HHT3_INT_MAX PETSC_INT_MAX
 #endif
 
+/* Of max_snes_failures: any negative number before */
+#if PETSC_VERSION_LT(3, 22, 0)
+  #define HHT3_UNLIMITED (-1)
+#else
+  #define HHT3_UNLIMITED PETSC_UNLIMITED
+#endif
+
 /* MatFDColoringSetFunction() took a function of no particular type */
 #if PETSC_VERSION_LT(3, 24, 0)
 typedef PetscErrorCode (*HHT3ColoringFunction)(void);

@@ -231,6 +231,22 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where the user's test decides, the rate is only measured, for the reuse of the matrix */
+PetscErrorCode Measure(TS ts, PetscReal e)
+{
+  Corrector      &c  = Get(ts).corrector;
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+
+  PetscFunctionBegin;
+  c.e     = e;
+  c.e_max = PetscMax(c.e_max, e);
+  if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
+  c.rate   = xi;
+  c.xi_max = PetscMax(c.xi_max, xi);
+  if (xi >= c.slow_rate && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CountCorrection(TS ts, PetscReal e)
 {
   Integrator &I = Get(ts);
@@ -239,7 +255,8 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e)
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
-  PetscCall(Judge(ts, e));
+  if (I.corrector.user_test) PetscCall(Measure(ts, e));
+  else PetscCall(Judge(ts, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,59 +276,31 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   PetscCall(SNESLineSearchGetVecs(ls, &X, &F, &Y, NULL, NULL));
   PetscCall(SNESLineSearchGetNorms(ls, &xnorm, &fnorm, &ynorm));
   PetscCall(SNESLineSearchSetReason(ls, SNES_LINESEARCH_SUCCEEDED));
-  if (I.mode == Mode::Start) {
-    PetscCall(VecAXPY(X, -1, Y));
-    PetscCall(RelativeNorm(X, Y, &e));
-  } else PetscCall(SubtractCorrection(ts, X, Y, &e));
+  PetscCall(SubtractCorrection(ts, X, Y, &e));
   PetscCall(CountCorrection(ts, e));
   monitors = snes->numbermonitors;
-  if (!I.corrector.reason || monitors) {
+  if (!I.corrector.reason || monitors || I.corrector.user_test) {
     PetscCall(SNESComputeFunction(snes, X, F));
-    if (monitors) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
+    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
   }
-  PetscCall(SNESLineSearchSetNorms(ls, 1, fnorm, I.corrector.e));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
-PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
-{
-  TS          ts = (TS)ctx;
-  Integrator &I  = Get(ts);
-  Vec         X, Y;
-  PetscReal   e;
-
-  PetscFunctionBegin;
-  *reason = SNES_CONVERGED_ITERATING;
-  if (!it) PetscFunctionReturn(PETSC_SUCCESS);
-  if (I.corrector.it < it) {
-    PetscCall(SNESGetSolution(snes, &X));
-    PetscCall(SNESGetSolutionUpdate(snes, &Y));
-    if (I.mode == Mode::Start) PetscCall(RelativeNorm(X, Y, &e));
-    else PetscCall(CorrectionNorm(ts, Y, &e));
-    PetscCall(CountCorrection(ts, e));
-  }
-  *reason = I.corrector.reason;
+  if (I.corrector.user_test) {
+    PetscCall(VecNorm(X, NORM_2, &xnorm));
+    PetscCall(VecNorm(Y, NORM_2, &ynorm));
+    PetscCall(SNESLineSearchSetNorms(ls, xnorm, fnorm, ynorm));
+  } else PetscCall(SNESLineSearchSetNorms(ls, 1, fnorm, I.corrector.e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* SNES ended without our judgement: a residual or a linear solve that went wrong, or a user's own test */
 PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 {
-  Integrator    &I = Get(ts);
-  KSP            ksp;
-  Vec            F;
-  PCFailedReason pcreason = PC_NOERROR;
-  PC             pc;
+  Integrator &I = Get(ts);
+  Vec         F;
 
   PetscFunctionBegin;
   I.corrector.no_solve = (PetscBool)(reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN);
   if (I.corrector.no_solve) {
-    PetscCall(SNESGetKSP(ts->snes, &ksp));
-    PetscCall(KSPGetPC(ksp, &pc));
-    PetscCall(PCGetFailedReason(pc, &pcreason));
-    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g, h = %g: %s", (double)I.t1, (double)I.h,
-                            pcreason || I.singular ? singular : "the Krylov method did not converge"));
+    PetscCall(ExplainLinearFailure(ts));
   } else if (reason != SNES_DIVERGED_DTOL) {
     PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
     PetscReal norm;
@@ -323,6 +312,41 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 }
 
 } // namespace
+
+/* The correction that a SNES has made without our line search. Newton's methods leave it behind; of others the iterate before is kept. */
+static PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
+{
+  Integrator &I = Get(ts);
+  PetscBool   newton;
+  Vec         X, Y;
+  PetscReal   e = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SNESNEWTONLS, SNESNEWTONTR, SNESNEWTONTRDC, ""));
+  PetscCall(SNESGetSolution(snes, &X));
+  PetscCall(SNESGetSolutionUpdate(snes, &Y));
+  if (!newton) {
+    if (!I.before) PetscCall(VecDuplicate(X, &I.before));
+    if (it) PetscCall(VecAYPX(I.before, -1, X));
+    Y = I.before;
+  }
+  if (it) PetscCall(CorrectionNorm(ts, Y, &e));
+  if (!newton) PetscCall(VecCopy(X, I.before));
+  if (it) PetscCall(CountCorrection(ts, e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
+PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
+{
+  TS          ts = (TS)ctx;
+  Integrator &I  = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.it < it || (!it && !I.hooks.line_search)) PetscCall(MeasureCorrection(ts, snes, it));
+  *reason = it ? I.corrector.reason : SNES_CONVERGED_ITERATING;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Whether the state at t1 and the residual F there are numbers, named if not */
 PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok)
@@ -361,30 +385,26 @@ PetscErrorCode CorrectorSetUp(TS ts)
   Integrator    &I = Get(ts);
   SNES           snes;
   SNESLineSearch ls;
-  PetscInt       maxit, maxf;
-  PetscReal      atol, rtol, stol;
+  PetscBool      shell;
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
-  PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, "-snes_lag_jacobian", &I.corrector.user_lag));
-  if (snes->lagjacobian > 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
-  PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* FormJacobian() says so of a singular matrix */
-  PetscCall(SNESGetTolerances(snes, &atol, &rtol, &stol, &maxit, &maxf));
-  if (maxit < I.corrector.max_it) I.corrector.max_it = maxit;
-  PetscCall(SNESSetConvergenceTest(snes, ConvergenceTest, ts, NULL));
   PetscCheck(!snes->mf || snes->mf_operator, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "-snes_mf leaves no matrix, which the consistent start needs; use -snes_mf_operator, whose preconditioner is the assembled matrix");
   /* before SNESSetType(), which gives backtracking to a line search without a type: TSSetFromOptions() need not have been called */
-  PetscCall(SNESGetLineSearch(snes, &ls));
-  if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
+  PetscCall(HooksLineSearch(ts));
   if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
-  PetscBool shell;
+  PetscCall(HooksInstall(ts));
+  PetscCall(SNESGetLineSearch(snes, &ls));
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
-  if (shell) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
+  if (!shell) I.hooks.line_search = PETSC_FALSE; /* an option has named another */
+  if (I.hooks.line_search) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
+  PetscCall(TakeSNESSettings(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES type that asks for no convergence test of ours (ksponly) has counted by itself */
+/* A SNES type that asks for no convergence test of ours (ksponly, ms) has counted by itself. How well the matrix served is not known:
+   where the problem is not linear, the next step gets a new one. */
 static PetscErrorCode CountForeign(TS ts)
 {
   Integrator &I = Get(ts);
@@ -395,7 +415,33 @@ static PetscErrorCode CountForeign(TS ts)
   I.corrector.it = its;
   I.stat.newton += its;
   I.stat.solves += its;
+  if (ts->problem_type != TS_LINEAR) I.corrector.xi_max = 1;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A type that never asks for the convergence test (ngs, ms) leaves it open whether the equations of the step hold. One linear solve is
+   the user's word that they do. */
+static PetscErrorCode CheckJudged(TS ts)
+{
+  SNESType  type;
+  PetscBool linear;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetType(ts->snes, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &linear));
+  PetscCheck(linear || Get(ts).corrector.user_test, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_type %s ended without asking for a test of convergence, so that nothing is known of its result: use %s or, for linear problems, %s", type, SNESNEWTONLS, SNESKSPONLY);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void BeginIteration(Integrator &I)
+{
+  Corrector &c = I.corrector;
+  c.it = c.base = c.renewals = 0;
+  c.e = c.e_max = c.xi_max = 0;
+  if (I.fixed_h) c.suspect = 0;
+  c.reason = SNES_CONVERGED_ITERATING;
+  c.fresh  = PETSC_FALSE;
 }
 
 /* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
@@ -407,22 +453,83 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscInt            its;
 
   PetscFunctionBegin;
-  c.it = c.base = c.renewals = 0;
-  c.e = c.e_max = c.xi_max = 0;
-  if (I.fixed_h) c.suspect = 0;
-  c.reason       = SNES_CONVERGED_ITERATING;
-  c.fresh        = PETSC_FALSE;
+  BeginIteration(I);
+  c.user_test = HooksUserTest(ts);
+  if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* since the set-up */
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   PetscCall(SNESSolve(ts->snes, NULL, I.X));
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
   ts->ksp_its += its;
-  if (!c.it) PetscCall(CountForeign(ts));
+  const bool foreign = !c.it;
+  *ok                = (PetscBool)(reason > 0);
+  if (foreign && *ok) PetscCall(CheckJudged(ts));
+  if (foreign) PetscCall(CountForeign(ts));
   ts->snes_its += c.it;
-  *ok = (PetscBool)(reason > 0);
   if (!*ok) PetscCall(ExplainSNES(ts, reason));
   if (*ok) PetscCall(StageVectors(ts, I.X));
+  if (*ok && (foreign || c.user_test)) PetscCall(CheckNumbers(ts, ts->snes->vec_func, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One correction of the start, with the assembled matrix */
+static PetscErrorCode CorrectStart(TS ts, KSP ksp, Vec F, Vec Y, PetscBool *ok)
+{
+  Integrator        &I = Get(ts);
+  KSPConvergedReason reason;
+  PetscInt           its;
+  PetscReal          e = 0;
+
+  PetscFunctionBegin;
+  PetscCall(KSPSolve(ksp, F, Y));
+  PetscCall(KSPGetIterationNumber(ksp, &its));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  ts->ksp_its += its;
+  *ok = (PetscBool)(reason >= 0);
+  if (!*ok) {
+    I.corrector.no_solve = PETSC_TRUE;
+    PetscCall(ExplainLinearFailure(ts));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecAXPY(I.X, -1, Y));
+  PetscCall(RelativeNorm(I.X, Y, &e));
+  PetscCall(CountCorrection(ts, e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The corrector of the start: the same iteration and judgement without SNES, whose type, test and number of iterations are the user's
+   and meant for steps. The matrix has been made. */
+PetscErrorCode IterateStart(TS ts, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+  KSP         ksp;
+  Mat         P;
+  Vec         F, Y;
+
+  PetscFunctionBegin;
+  BeginIteration(I);
+  c.user_test = PETSC_FALSE;
+  c.max_it    = CorrectorOptions().max_it;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(VecDuplicate(I.X, &F));
+  PetscCall(VecDuplicate(I.X, &Y));
+  *ok = PETSC_TRUE;
+  while (*ok && !c.reason) {
+    const PetscInt renewals = c.renewals;
+    PetscCall(FormFunction(ts->snes, I.X, F, ts));
+    PetscCall(CheckNumbers(ts, F, ok));
+    if (*ok) PetscCall(CorrectStart(ts, ksp, F, Y, ok));
+    if (*ok && c.renewals > renewals) PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
+  }
+  ts->snes_its += c.it;
+  *ok = (PetscBool)(*ok && c.reason > 0);
+  if (*ok) PetscCall(StageVectors(ts, I.X));
+  PetscCall(SNESSetConvergedReason(ts->snes, *ok ? SNES_CONVERGED_SNORM_RELATIVE : SNES_DIVERGED_INNER)); /* for TSAdapt */
+  PetscCall(VecDestroy(&Y));
+  PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -234,42 +234,6 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factor that failed on a matrix with NaN keeps its error, and PETSc would not try another matrix with it: PCSetUp_LU() forgives
-   zero pivots alone */
-PetscErrorCode ForgiveFactor(KSP ksp)
-{
-  PC             pc;
-  Mat            F;
-  MatFactorError error;
-  PCFailedReason reason;
-
-  PetscFunctionBegin;
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCGetFailedReason(pc, &reason));
-  if (reason != PC_FACTOR_OTHER) PetscFunctionReturn(PETSC_SUCCESS); /* so there is a factor */
-  PetscCall(PCFactorGetMatrix(pc, &F));
-  PetscCall(MatFactorGetError(F, &error));
-  if (error == MAT_FACTOR_OTHER) PetscCall(MatFactorClearError(F));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Some packages report a singular matrix as an error, others as a failed preconditioner: both become a failed correction */
-PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P)
-{
-  Integrator    &I = Get(ts);
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(KSPSetOperators(ksp, J, P));
-  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = ForgiveFactor(ksp);
-  if (!ierr) ierr = KSPSetUp(ksp);
-  PetscCall(PetscPopErrorHandler());
-  I.singular = (PetscBool)(ierr != 0);
-  if (ierr) PetscCall(PetscInfo(ts, "the factorization failed with PETSc error %d\n", (int)ierr));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace
 
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
@@ -352,11 +316,8 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     if (!I.linear_chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, &I.linear));
     I.linear_chosen = PETSC_TRUE;
   }
-  PetscCall(Factor(ts, ksp, J, P));
-  if (I.singular) {
-    I.corrector.have_matrix = PETSC_FALSE; /* there is nothing to solve with */
-    PetscCall(SNESSetJacobianDomainError(snes));
-  }
+  PetscCall(Factor(ts, J, P));
+  if (I.unfactored) PetscCall(SNESSetJacobianDomainError(snes));
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

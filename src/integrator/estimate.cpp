@@ -283,6 +283,7 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   const Corrector &c = I.corrector;
 
   PetscFunctionBegin;
+  if (!I.own_h) PetscFunctionReturn(PETSC_SUCCESS); /* the user's choice of TSAdapt stands */
   if (I.h_limit > 0 && *next > I.h_limit && !I.fixed_h) *next = PetscMax(h, I.h_limit);
   const PetscReal loss = I.constraints() && RelativeDamping(I.p.rho) < 1 ? 0.95 : 1;
   if (*next == h || *next <= loss * h || *next >= c.hold * h || I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);

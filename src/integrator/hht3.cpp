@@ -1,7 +1,7 @@
 /* The front door: registration, creation, options, set-up, view, destruction. Setters and getters stand in api.cpp. */
 #include "impl.h"
+#include "unused.h"
 #include <petscdm.h>
-#include <petscdmshell.h>
 
 const char *const TSHHT3Forms[]  = {"paper", "second_order", "TSHHT3Form", "TSHHT3_FORM_", NULL};
 const char *const TSHHT3Roles[]  = {"coordinate", "state", "holonomic", "nonholonomic", "variable", "force", "TSHHT3Role", "TSHHT3_", NULL};
@@ -15,6 +15,7 @@ Events events;
 namespace
 {
 
+PetscBool  registered = PETSC_FALSE;
 PetscBool  cited      = PETSC_FALSE;
 const char citation[] = "@article{Negrut2007,\n"
                         "  title   = {On an Implementation of the {Hilber-Hughes-Taylor} Method in the Context of Index 3\n"
@@ -57,49 +58,6 @@ PetscErrorCode AllocateForRoles(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix: the application's, the DM's, or one made from differences of the residual */
-PetscErrorCode SetUpJacobian(TS ts)
-{
-  HHT3I2Jacobian i2jacobian;
-  HHT3IJacobian  ijacobian;
-  DM             dm;
-  SNES           snes;
-  Mat            J, P;
-  PetscBool      shell;
-
-  PetscFunctionBegin;
-  PetscCall(TSGetSNES(ts, &snes));
-  PetscCall(TSGetDM(ts, &dm));
-  PetscCall(DMTSGetI2Jacobian(dm, &i2jacobian, NULL));
-  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
-  const bool jacobian = i2jacobian || ijacobian;
-  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
-  PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
-  if (!P && jacobian) {
-    PetscCheck(!shell, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "TSSetI2Jacobian() was given a function but no matrix, and the TS has no DM to make one");
-    PetscCall(DMCreateMatrix(dm, &P));
-    PetscCall(SNESSetJacobian(snes, J ? J : P, P, NULL, NULL));
-    PetscCall(MatDestroy(&P));
-  }
-  if (!jacobian && !Get(ts).differences) {
-    if (!P && !shell) {
-      PetscCall(DMCreateMatrix(dm, &P));
-      PetscCall(DifferencesCreate(ts, &P));
-      PetscCall(SNESSetJacobian(snes, P, P, NULL, NULL));
-      PetscCall(MatDestroy(&P));
-    } else {
-      const PetscBool mine = (PetscBool)!P;
-      PetscCall(DifferencesCreate(ts, &P));
-      if (mine) {
-        PetscCall(SNESSetJacobian(snes, P, P, NULL, NULL));
-        PetscCall(MatDestroy(&P));
-      }
-    }
-    PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode CheckProblem(TS ts)
 {
   HHT3I2Function f;
@@ -133,19 +91,18 @@ PetscErrorCode SetUp(TS ts)
   }
   PetscCall(PetscCitationsRegister(citation, &cited));
   PetscCall(CheckProblem(ts));
+  PetscCall(TSGetAdapt(ts, &ts->adapt));
+  PetscCall(CheckSettings(ts));
   PetscCall(UpdateParameters(ts));
   PetscCall(DuplicateAll(ts));
   PetscCall(SetUpJacobian(ts));
   PetscCall(SetUpRoles(ts));
   PetscCall(AllocateForRoles(ts));
-  KSP ksp;
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
-  if (!((PetscObject)ksp)->type_name) PetscCall(LinearDefaults(ksp, &I.linear));
-  PetscCall(CorrectorSetUp(ts));
+  PetscCall(SetUpSolvers(ts));
+  I.auto_h = (PetscBool)(ts->time_step == unset_step);
   if (I.constraints() && I.p.rho == 1)
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: alpha = 0 has no numerical damping and is weakly unstable on index-3 systems; "
                                                             "with constraints use alpha < 0 (-ts_hhtdae_alpha -0.05 is enough)\n"));
-  PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
   if (I.resume_file[0]) {
     PetscCall(CheckpointLoad(ts, I.resume_file));
@@ -159,7 +116,8 @@ PetscErrorCode Reset(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
+  PetscCall(HooksRemove(ts));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2]}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
@@ -168,15 +126,16 @@ PetscErrorCode Reset(TS ts)
   I.role.clear();
   I.moves.clear();
   I.states.clear();
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.have_step             = PETSC_FALSE;
-  I.change.stale          = PETSC_FALSE;
-  I.bent                  = Bend::None;
-  I.linear_chosen         = PETSC_FALSE;
-  I.norm_size             = 0;
-  I.h_last = I.h_regular = I.scaled_h = 0;
-  I.scaled_state         = 0;
+  if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* it is chosen again, unless the user has set one since */
+  static_cast<StepState &>(I)                = StepState();
+  static_cast<CorrectorState &>(I.corrector) = CorrectorState();
+  static_cast<PredictorState &>(I.predictor) = PredictorState();
+  static_cast<ChangeState &>(I.change)       = ChangeState();
+  I.linear_chosen = PETSC_FALSE;
+  I.scaled_h      = 0;
+  I.scaled_state  = 0;
+  I.stage_id      = 0;
+  I.wall0         = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -184,6 +143,8 @@ PetscErrorCode Destroy(TS ts)
 {
   PetscFunctionBegin;
   PetscCall(Reset(ts));
+  if (ts->time_step == unset_step) ts->time_step = petsc_step;
+  if (ts->max_snes_failures == HHT3_UNLIMITED && Get(ts).failures_unlimited) ts->max_snes_failures = 1;
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
   PetscCall(VecDestroy(&Get(ts).checkpoint_vec));
   delete static_cast<Integrator *>(ts->data);
@@ -247,26 +208,29 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   SNES        snes;
   KSP         ksp;
   Mat         J, P;
-  PetscBool   dt;
 
   PetscFunctionBegin;
   PetscOptionsHeadBegin(PetscOptionsObject, "HHT integrator for index-3 DAEs");
   PetscCall(MethodOptions(ts, PetscOptionsObject));
   PetscCall(OutputOptions(ts, PetscOptionsObject));
   PetscOptionsHeadEnd();
-  /* a step that was neither set nor given is PETSc's 0.1; then the first one is chosen in the start */
-  PetscCall(PetscOptionsHasName(((PetscObject)ts)->options, ((PetscObject)ts)->prefix, "-ts_dt", &dt));
-  if (!dt) PetscCall(PetscOptionsHasName(((PetscObject)ts)->options, ((PetscObject)ts)->prefix, "-ts_time_step", &dt));
-  I.auto_h = (PetscBool)(!dt && ts->time_step == (PetscReal)0.1);
   /* defaults go in before SNESSetFromOptions(), which TSSetFromOptions() calls next, so that options override them */
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; of one triangle there is no LU */
   PetscCall(LinearDefaults(ksp, &I.linear));
-  SNESLineSearch ls;
-  PetscCall(SNESGetLineSearch(snes, &ls));
-  if (!((PetscObject)ls)->type_name) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHSHELL));
+  PetscCall(HooksLineSearch(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TSSolve(ts, NULL) hands its null vector on, and would give it to the monitors next */
+PetscErrorCode InterpolateSolution(TS ts, PetscReal t, Vec U)
+{
+  PetscFunctionBegin;
+  PetscCheck(U, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_NULL,
+             "There is no vector for the solution at t = %g, which -ts_exact_final_time interpolate needs: call TSSolve(ts, U), or use matchstep or stepover", (double)t);
+  PetscCall(Interpolate(ts, t, U, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,6 +272,16 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
 
 } // namespace
 
+/* When PETSc ends; a program may start it again */
+static PetscErrorCode Finalize(void)
+{
+  PetscFunctionBegin;
+  PetscCall(ReportUnusedOptions());
+  PetscCall(ForgetOptions());
+  registered = cited = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode UpdateParameters(TS ts)
 {
   Integrator &I = Get(ts);
@@ -348,7 +322,18 @@ PetscErrorCode UpdateParameters(TS ts)
   Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it takes; all options of
   `SNES`, `KSP` and `PC` override the defaults. A correction that fails cuts the step; it does not end the run.
 
-  If no step size is set, the first one is chosen from the third derivative of the positions.
+  The corrector stops by its measured rate of convergence, so that -snes_rtol, -snes_atol, -snes_stol, -snes_max_funcs and
+  -snes_divergence_tolerance (`SNESSetTolerances()`) have no meaning, which is printed if they are set; -snes_convergence_test
+  <default,skip> or `SNESSetConvergenceTest()` puts the user's test in its place, and then they do. It makes full steps without a
+  line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it counts always; the program's
+  number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told from PETSc's defaults and want the option.
+  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. A step size chosen by
+  another type of `TSAdapt` than basic is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
+  or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
+
+  If no step size is set, the first one is chosen from the third derivative of the positions; TSSetTimeStep(ts, PETSC_DECIDE) asks for
+  that again. TSSetTimeStep(ts, 0.1), PETSc's default, counts as set if it comes after `TSSetType()`; before it, it cannot be told
+  from none.
 
   References:
 + * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007
@@ -369,13 +354,14 @@ PetscErrorCode Create(TS ts)
   ts->ops->step           = Step;
   ts->ops->evaluatewlte   = EvaluateWLTE;
   ts->ops->rollback       = RollBack;
-  ts->ops->interpolate    = [](TS s, PetscReal t, Vec U) { return Interpolate(s, t, U, nullptr, nullptr); };
+  ts->ops->interpolate    = InterpolateSolution;
   ts->ops->snesfunction   = FormFunction;
   ts->ops->snesjacobian   = FormJacobian;
   ts->default_adapt_type  = TSADAPTBASIC;
   ts->usessnes            = PETSC_TRUE;
-  Get(ts).auto_h          = (PetscBool)(ts->time_step == (PetscReal)0.1);
-  if (ts->max_snes_failures == 1) ts->max_snes_failures = -1; /* PETSc's default ends the run at the first failure */
+  if (ts->time_step == petsc_step) ts->time_step = unset_step;
+  Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, which ends the run at the first failure */
+  if (Get(ts).failures_unlimited) ts->max_snes_failures = HHT3_UNLIMITED;
   PetscCall(ComposeSetters(ts, true));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -396,13 +382,14 @@ PetscErrorCode Create(TS ts)
 @*/
 PetscErrorCode TSHHT3Initialize(void)
 {
-  static PetscBool registered = PETSC_FALSE;
-  PetscClassId     id;
+  PetscClassId id;
 
   PetscFunctionBegin;
-  if (registered) PetscFunctionReturn(PETSC_SUCCESS);
+  if (hht3::registered) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HHT3CheckPetscVersion());
-  registered = PETSC_TRUE;
+  hht3::registered = PETSC_TRUE;
+  PetscCall(PetscRegisterFinalize(hht3::Finalize));
+  PetscCall(hht3::DeclareOwnOptions());
   PetscCall(TSRegister(TSHHT3, hht3::Create));
   PetscCall(LinearRegister());
   PetscCall(PetscClassIdRegister("hhtdae", &id));

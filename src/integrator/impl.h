@@ -33,6 +33,7 @@ struct CorrectorOptions {
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
   PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
   PetscBool user_lag  = PETSC_FALSE; /* -snes_lag_jacobian: the user rules */
+  PetscBool user_test = PETSC_FALSE; /* the user's test of SNES decides; corrections are only measured */
 };
 
 struct CorrectorState {
@@ -97,6 +98,25 @@ struct StepLimit {
   void           *ctx   = nullptr;
 };
 
+/* hooks.cpp: what stands in the SNES, and what stood there before */
+struct Hooks {
+  SNES      snes        = nullptr;     /* that has them */
+  PetscBool test        = PETSC_FALSE; /* the convergence test is ours, or was before the user set another */
+  PetscBool line_search = PETSC_FALSE; /* the type of the line search was ours to choose */
+  PetscBool jacobian    = PETSC_FALSE; /* the matrix is filled by our differences */
+  Mat       J = nullptr, P = nullptr;  /* the matrices before, and who filled them */
+  decltype(_DMSNESOps::computejacobian) computejacobian = nullptr;
+  PetscContainer jacobianctx = nullptr;
+  void     *cnvP        = nullptr;     /* of the test before, with the function that destroys it */
+  PetscErrorCode (*convergeddestroy)(void *) = nullptr;
+  PetscInt  lag          = 1;
+  PetscBool check_domain = PETSC_FALSE;
+};
+
+/* ts->time_step as TSCreate() makes it, and what stands for "not set": a rounding error less, so that a 0.1 of the user's differs */
+constexpr PetscReal petsc_step = 0.1;
+constexpr PetscReal unset_step = petsc_step * (1 - PETSC_MACHINE_EPSILON);
+
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
 enum class Bend { None, Rates, Velocities };
 
@@ -118,9 +138,12 @@ struct StepState {
   PetscReal        h_proven    = 0;   /* largest step accepted since the last failed correction */
   PetscReal        h_limit     = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
-  PetscBool        auto_h      = PETSC_FALSE;
+  PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
+  PetscBool        h_chosen    = PETSC_FALSE; /* it was */
+  PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
-  PetscBool        singular    = PETSC_FALSE; /* the package could not factor the last matrix */
+  PetscBool        own_h       = PETSC_TRUE;  /* TSAdapt is of the default type, whose choice may be improved on, or none */
+  PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
   TSHHT3Statistics stat        = {};
 };
 
@@ -163,6 +186,7 @@ struct Integrator : StepState {
   Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see BaseOfCoordinates */
   PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
   PetscObjectState stage_state = 0;
+  Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
 
@@ -181,6 +205,9 @@ struct Integrator : StepState {
 
   Change    change;
   StepLimit limit;
+  Hooks     hooks;
+  PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
+  PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */
 
   /* bookkeeping: vec_sol and vec_dot as the integrator left them */
   PetscObjectState sol_state = 0, dot_state = 0;
@@ -206,9 +233,6 @@ inline PetscReal CorrectorTolerance(const Integrator &I)
   return I.corrector.c_given || !I.constraints() ? I.corrector.c : ConstrainedTolerance(I.corrector.c, I.p.rho);
 }
 
-/* how every failure by a singular matrix ends */
-constexpr char singular[] = "the Newton matrix is singular";
-
 /* log events, declared once in hht3.cpp */
 struct Events {
   PetscLogEvent start, predict, matrix, estimate;
@@ -217,6 +241,13 @@ extern Events events;
 
 /* hht3.cpp */
 PetscErrorCode UpdateParameters(TS ts);
+/* jacobian.cpp */
+PetscErrorCode SetUpJacobian(TS ts);
+PetscErrorCode SetUpSolvers(TS ts);
+PetscErrorCode TakeSNES(TS ts);
+/* settings.cpp */
+PetscErrorCode CheckSettings(TS ts);
+PetscErrorCode TakeSNESSettings(TS ts);
 /* setters.cpp */
 PetscErrorCode ComposeSetters(TS ts, bool attach);
 /* roles.cpp */
@@ -237,15 +268,27 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
+/* factor.cpp */
+PetscErrorCode Factor(TS ts, Mat J, Mat P);
+PetscErrorCode ExplainLinearFailure(TS ts);
+PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
+/* equations.cpp */
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 /* corrector.cpp */
 PetscErrorCode CorrectorSetUp(TS ts);
 PetscErrorCode Correct(TS ts, PetscBool *converged);
-PetscErrorCode Iterate(TS ts, PetscBool *converged);
+PetscErrorCode IterateStart(TS ts, PetscBool *converged);
 PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok);
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 PetscErrorCode FreshMatrixNextIteration(TS ts);
+PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal xnorm, PetscReal ynorm, PetscReal fnorm, SNESConvergedReason *reason, void *ctx);
+/* hooks.cpp */
+PetscErrorCode HooksLineSearch(TS ts);
+PetscErrorCode HooksJacobian(TS ts);
+PetscErrorCode HooksInstall(TS ts);
+PetscErrorCode HooksRemove(TS ts);
+PetscBool      HooksUserTest(TS ts);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);

@@ -107,7 +107,7 @@ PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, NULL, &P, NULL, NULL));
-  if (Get(ts).singular) PetscCall(NameRedundant(ts));
+  if (Get(ts).unfactored) PetscCall(NameRedundant(ts));
   PetscCall(KSPSetOperators(ksp, P, P));
   PetscCall(KSPSolve(ksp, rhs, d));
   Get(ts).stat.solves++;

@@ -34,11 +34,10 @@ void StopClocks(Integrator &I)
 /* TSSolve() calls its monitors a last time with the reason set, and that is when the line is due */
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
-  Integrator           &I = Get(ts);
-  const TSHHT3Statistics &s = I.stat;
-
   PetscFunctionBegin;
-  if (!ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->ops->step != Step || !ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  Integrator             &I = Get(ts);
+  const TSHHT3Statistics &s = I.stat;
   StopClocks(I);
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                         "summary: steps=%" PetscInt_FMT " rejected=%" PetscInt_FMT " newton=%" PetscInt_FMT " residuals=%" PetscInt_FMT
@@ -55,12 +54,12 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 /* One line, rewritten four times a second, with what is left of the run at its average rate */
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
 {
-  Integrator    &I = Get(ts);
   PetscReal      now, cpu;
   FILE          *out = PETSC_STDERR;
 
   PetscFunctionBegin;
-  if (step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->ops->step != Step || step < 0) PetscFunctionReturn(PETSC_SUCCESS); /* the TS may be of another type by now */
+  Integrator &I = Get(ts);
   ReadClocks(&now, &cpu);
   if (I.wall0 <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (!ts->reason && now - I.progress_last < 0.25) PetscFunctionReturn(PETSC_SUCCESS);

@@ -145,6 +145,23 @@ PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where the user has set none, also not since the set-up; TSSolve() may have cut what stood there to the length of the run */
+PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  const bool unset = ts->time_step == unset_step || ts->time_step == HHT3NextStop(ts) - ts->ptime;
+  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_step, HHT3NextStop(ts) - ts->ptime);
+  else if (I.auto_h && unset) {
+    PetscCall(FirstStep(ts, rate, &ts->time_step));
+    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
+    I.h_chosen = PETSC_TRUE;
+  }
+  I.auto_h = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided
    difference of the predictor (at a double node). Not if the rates are too wild to be believed. */
 PetscErrorCode MakeHistory(TS ts, Vec rate)
@@ -234,7 +251,7 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The singular matrix of the start, explained: an error in any case */
+/* The matrix of the start with which no solve is possible, explained: an error in any case */
 PetscErrorCode NameRedundant(TS ts)
 {
   Integrator           &I = Get(ts);
@@ -244,12 +261,16 @@ PetscErrorCode NameRedundant(TS ts)
   Mat                   P;
   char                  text[256] = "";
   size_t                used;
-  PetscBool             numbers;
+  PetscBool             numbers, is_singular;
 
   PetscFunctionBegin;
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   PetscCall(MatrixHasNumbers(P, &numbers));
   PetscCheck(numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g", (double)ts->ptime);
+  PetscCall(MatrixIsSingular(ts, &is_singular));
+  if (!is_singular) PetscCall(ExplainLinearFailure(ts));
+  PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
   PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
   for (size_t i = 0; i < I.role.size(); i++)
     if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) list.push_back(start + (PetscInt)i);
@@ -282,10 +303,10 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
     PetscCall(ConstraintDerivatives(ts, t, U, V, T, NULL, I.gamma));
   }
   if (!have_matrix) PetscCall(MakeStartMatrix(ts));
-  if (I.singular) {
+  if (I.unfactored) {
     I.mode = Mode::Step;
     *ok    = PETSC_FALSE;
-    PetscCall(PetscStrncpy(I.failure, singular, sizeof(I.failure)));
+    PetscCall(ExplainLinearFailure(ts));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* the matrix is made beforehand, since the first residual needs it */
@@ -293,8 +314,11 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
   I.corrector.want_matrix = PETSC_FALSE;
   I.corrector.have_matrix = PETSC_TRUE;
   I.corrector.floor       = 0;
-  PetscCall(Iterate(ts, ok));
+  I.corrector.no_solve    = PETSC_FALSE;
+  PetscCall(IterateStart(ts, ok));
+  const PetscBool no_solve = I.corrector.no_solve;
   I.corrector             = saved;
+  I.corrector.no_solve    = no_solve;
   I.corrector.have_matrix = PETSC_FALSE;
   I.corrector.want_matrix = PETSC_TRUE;
   I.corrector.h_matrix    = 0;
@@ -310,7 +334,7 @@ namespace
 PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
 {
   Integrator &I = Get(ts);
-  PetscBool   ok, is_singular;
+  PetscBool   ok;
   Vec         rate;
 
   PetscFunctionBegin;
@@ -318,8 +342,7 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
   PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, matrix_is_current, &ok));
   if (!ok) {
-    PetscCall(PetscStrendswith(I.failure, singular, &is_singular));
-    if (is_singular) PetscCall(NameRedundant(ts));
+    if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
   PetscCall(Distribute(I));
@@ -330,11 +353,7 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
 
   PetscCall(VecDuplicate(I.X, &rate));
   PetscCall(Rates(ts, rate));
-  if (I.auto_h && !I.fixed_h) {
-    PetscCall(FirstStep(ts, rate, &ts->time_step));
-    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
-    I.auto_h = PETSC_FALSE;
-  }
+  PetscCall(ChooseFirstStep(ts, rate));
   PetscCall(MakeHistory(ts, rate));
   PetscCall(VecDestroy(&rate));
   if (I.F0) {
@@ -355,6 +374,7 @@ PetscErrorCode Start(TS ts)
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
   PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
+  PetscCall(CheckSettings(ts));
   I.stat.restarts++;
   I.repaired = PETSC_FALSE;
   I.tiny_row = 0;

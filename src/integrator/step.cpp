@@ -143,7 +143,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
-  ts->time_step = next;
+  ts->time_step = I.h_next = next;
   if (!tiny) I.h_proven = PetscMax(h, I.h_proven);
   if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
@@ -196,7 +196,7 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
   PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
-  if (*accept && tiny && !I.fixed_h && !HHT3EventActive(ts)) /* no estimate, no growth by TSAdapt */
+  if (*accept && tiny && I.own_h && !I.fixed_h && !HHT3EventActive(ts)) /* no estimate, no growth by TSAdapt */
     *next = PetscMax(*next, PetscMin(I.h_regular > 0 ? I.h_regular : 10 * I.h, HHT3NextStop(ts) - I.t1));
   if (*next <= 0) *next = I.h;
   if (!*accept) {
@@ -264,9 +264,15 @@ PetscErrorCode Step(TS ts)
   PetscReal   next = ts->time_step;
 
   PetscFunctionBegin;
-  PetscCheck(ts->time_step > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
+  if (ts->time_step == PETSC_DECIDE) {
+    ts->time_step = I.have_step && !ts->steprestart ? I.h_next : unset_step;
+    I.auto_h      = PETSC_TRUE;
+  }
+  PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
+  if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ts->adapt, &I.own_h, TSADAPTBASIC, TSADAPTNONE, ""));
   PetscCall(Begin(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {

@@ -42,6 +42,31 @@ PetscErrorCode ViewWithTS(const Scene &scene, TS ts)
   PetscFunctionReturn(0);
 }
 
+/* With -ts_exact_final_time interpolate PETSc writes the solution at the final time into a vector of the caller's, and nowhere
+   without one. Here the TS itself has it at the end, with its velocities and time. */
+PetscErrorCode Solve(TS ts)
+{
+  TSExactFinalTimeOption option;
+  Vec                    U, V, u = nullptr;
+  PetscReal              t, end;
+  PetscFunctionBegin;
+  PetscCall(TSGetExactFinalTime(ts, &option));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  if (option == TS_EXACTFINALTIME_INTERPOLATE) {
+    PetscCall(VecDuplicate(U, &u));
+    PetscCall(VecCopy(U, u));
+  }
+  const PetscErrorCode failed = TSSolve(ts, u);
+  PetscCall(VecDestroy(&u));
+  PetscCall(failed);
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TSGetMaxTime(ts, &end));
+  if (option != TS_EXACTFINALTIME_INTERPOLATE || t <= end) PetscFunctionReturn(0);
+  PetscCall(TSHHT3Interpolate(ts, end, U, V, nullptr));
+  PetscCall(TSSetTime(ts, end));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode Scene::createTS(TS *ts)
@@ -84,7 +109,7 @@ PetscErrorCode Scene::solve(TS ts)
 {
   PetscFunctionBegin;
   PetscCall(AttachOutput(*data_->run, ts));
-  const PetscErrorCode failed = TSSolve(ts, nullptr);
+  const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
   if (!failed || data_->run->size == 1) PetscCall(FinishOutput(*data_->run));
   PetscCall(failed);

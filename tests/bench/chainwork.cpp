@@ -148,7 +148,7 @@ static PetscErrorCode RunTS(TS ts, double eps, PetscInt steps, Sample *sample)
   Moment before = {}, first = {}, last = {};
 
   PetscFunctionBegin;
-  PetscCall(TSSetTimeStep(ts, 0.1)); /* PETSc's default: the integrator chooses the first step */
+  PetscCall(TSSetTimeStep(ts, PETSC_DECIDE)); /* the integrator chooses the first step */
   PetscCall(TSSetMaxSteps(ts, steps));
   PetscCall(TSSetTolerances(ts, eps, nullptr, eps, nullptr));
   PetscCall(TSMonitorSet(ts, NoteBegin, &first, nullptr));

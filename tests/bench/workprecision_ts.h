@@ -309,7 +309,7 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
   PetscCall(TSSetType(r.ts, type[(int)r.settings.stepper]));
   PetscCall(TSSetMaxSteps(r.ts, 100000000));
   if (r.settings.stepper == Stepper::HHT) {
-    PetscCall(TSSetTimeStep(r.ts, 0.1)); /* PETSc's default: the integrator chooses the first step */
+    PetscCall(TSSetTimeStep(r.ts, PETSC_DECIDE)); /* the integrator chooses the first step */
     PetscCall(TSSetTolerances(r.ts, eps, nullptr, eps, nullptr));
   } else
     PetscCall(ConfigureOther(r, eps));

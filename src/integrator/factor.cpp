@@ -1,0 +1,111 @@
+/*
+  The factorization of the Newton matrix, and what a linear solve that failed says. A package that cannot factor a matrix says so
+  through its preconditioner (PCGetFailedReason()), on one rank alone if every rank has a block of its own: the ranks agree on it here,
+  and the correction fails. Errors of PETSc's (a package that is not there, a defect) go up.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* The gravest reason of all ranks; PC_SETUP_ERROR, which is negative, before the others */
+PetscErrorCode FailedReason(PC pc, PCFailedReason *reason)
+{
+  PetscMPIInt worst[2];
+
+  PetscFunctionBegin;
+  PetscCall(PCGetFailedReason(pc, reason));
+  const PetscMPIInt mine[2] = {(PetscMPIInt)*reason, -(PetscMPIInt)*reason};
+  PetscCallMPI(MPI_Allreduce(mine, worst, 2, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)pc)));
+  *reason = (PCFailedReason)(worst[1] > 0 ? -worst[1] : worst[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* No smaller step makes room. But pivots that are not numbers are delayed until nothing has room for them. */
+PetscErrorCode CheckMemory(TS ts, PC pc, Mat P)
+{
+  PetscBool     numbers = PETSC_FALSE;
+  MatSolverType package = NULL;
+  PetscInt      n;
+
+  PetscFunctionBegin;
+  if (Get(ts).unfactored != PC_FACTOR_OUTMEMORY) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatrixHasNumbers(P, &numbers));
+  PetscCall(MatGetSize(P, &n, NULL));
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCheck(!numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_MEM,
+             "There is not enough memory to factor the Newton matrix of %" PetscInt_FMT " rows by %s at t = %g: more ranks, or an iterative solver (-ksp_type cg -pc_type icc where nothing is held by multipliers)", n,
+             package ? package : "the preconditioner", (double)Get(ts).t1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode Factor(TS ts, Mat J, Mat P)
+{
+  Integrator &I = Get(ts);
+  KSP         ksp;
+  PC          pc;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  /* a factor that failed may keep its error: PCSetUp_LU() forgives zero pivots alone, and MUMPS under PETSc forgives nothing */
+  if (I.unfactored) PetscCall(PCReset(pc));
+  I.unfactored = PC_NOERROR;
+  PetscCall(KSPSetOperators(ksp, J, P));
+  if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
+  PetscCall(KSPSetUp(ksp));
+  PetscCall(FailedReason(pc, &I.unfactored));
+  PetscCall(CheckMemory(ts, pc, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the failure of the preconditioner means that the matrix has no inverse: not of an incomplete factorization, a relaxation or
+   blocks */
+PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes)
+{
+  KSP            ksp;
+  PC             pc;
+  PCFailedReason reason;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(FailedReason(pc, &reason));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, yes, PCLU, PCCHOLESKY, PCQR, PCREDUNDANT, ""));
+  *yes = (PetscBool)(*yes && (reason == PC_FACTOR_STRUCT_ZEROPIVOT || reason == PC_FACTOR_NUMERIC_ZEROPIVOT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Into the text of the failure */
+PetscErrorCode ExplainLinearFailure(TS ts)
+{
+  Integrator        &I = Get(ts);
+  KSP                ksp;
+  PC                 pc;
+  KSPType            ksp_type;
+  PCType             pc_type;
+  KSPConvergedReason ended;
+  PCFailedReason     reason;
+  PetscBool          singular;
+  char               why[256] = "the Newton matrix is singular";
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPGetType(ksp, &ksp_type));
+  PetscCall(PCGetType(pc, &pc_type));
+  PetscCall(MatrixIsSingular(ts, &singular));
+  PetscCall(FailedReason(pc, &reason));
+  PetscCall(KSPGetConvergedReason(ksp, &ended));
+  if (!singular && reason) PetscCall(PetscSNPrintf(why, sizeof(why), "the preconditioner %s cannot treat this matrix, %s", pc_type, PCFailedReasons[reason]));
+  else if (!singular) PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s", ksp_type, pc_type, KSPConvergedReasons[ended]));
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g, h = %g: %s", (double)I.t1, (double)I.h, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,114 @@
+/*
+  The matrix of the SNES and who fills it: the application's I2Jacobian, or differences of its residual where it has none or the user
+  asked for them. PETSc's own differences (-snes_fd, -snes_fd_color, -ts_fd_color) would difference the step's residual by the step's
+  unknowns, rounding of q divided by beta h^2 included, and not at all in the start: ours take their place.
+*/
+#include "impl.h"
+#include <petscdm.h>
+#include <petscdmshell.h>
+
+namespace hht3
+{
+
+namespace
+{
+
+/* The user's wish for differences, and whether their pattern is to be found, too */
+PetscErrorCode DifferencesWanted(DM dm, PetscBool *wanted, PetscBool *pattern)
+{
+  HHT3IJacobian ijacobian;
+  DMSNES        sdm;
+
+  PetscFunctionBegin;
+  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
+  PetscCall(DMGetDMSNES(dm, &sdm));
+  *pattern = (PetscBool)(sdm->ops->computejacobian == SNESComputeJacobianDefault);
+  *wanted  = (PetscBool)(*pattern || sdm->ops->computejacobian == SNESComputeJacobianDefaultColor || ijacobian == TSComputeIJacobianDefaultColor);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HasJacobian(DM dm, PetscBool *has)
+{
+  HHT3I2Jacobian i2jacobian;
+  HHT3IJacobian  ijacobian;
+
+  PetscFunctionBegin;
+  PetscCall(DMTSGetI2Jacobian(dm, &i2jacobian, NULL));
+  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
+  *has = (PetscBool)(i2jacobian || ijacobian);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetUpDifferences(TS ts, DM dm, Mat P, PetscBool shell)
+{
+  SNES            snes = ts->snes;
+  const PetscBool mine = (PetscBool)!P;
+
+  PetscFunctionBegin;
+  if (!P && !shell) PetscCall(DMCreateMatrix(dm, &P));
+  PetscCall(DifferencesCreate(ts, &P));
+  PetscCall(HooksJacobian(ts));
+  if (mine) {
+    PetscCall(SNESSetJacobian(snes, P, P, NULL, NULL));
+    PetscCall(MatDestroy(&P));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode SetUpJacobian(TS ts)
+{
+  DM        dm;
+  SNES      snes;
+  Mat       J, P;
+  PetscBool shell, has = PETSC_FALSE, wanted = PETSC_FALSE, pattern = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(TSGetDM(ts, &dm));
+  PetscCall(HasJacobian(dm, &has));
+  PetscCall(DifferencesWanted(dm, &wanted, &pattern));
+  PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
+  if (has && !wanted) {
+    if (P) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCheck(!shell, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, 
+               "The SNES of the TS has no matrix, and the TS has no DM to make one: TSSetI2Jacobian() was given a function without a matrix, or another TS with the same SNES was reset");
+    PetscCall(DMCreateMatrix(dm, &P));
+    PetscCall(SNESSetJacobian(snes, J ? J : P, P, NULL, NULL));
+    PetscCall(MatDestroy(&P));
+  } else if (!Get(ts).differences) PetscCall(SetUpDifferences(ts, dm, has && pattern ? NULL : P, has && pattern ? PETSC_TRUE : shell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the SNES needs to solve with the matrix */
+PetscErrorCode SetUpSolvers(TS ts)
+{
+  KSP ksp;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  if (!((PetscObject)ksp)->type_name) PetscCall(LinearDefaults(ksp, &Get(ts).linear));
+  PetscCall(CorrectorSetUp(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The user has given the TS another SNES since the last step, or lent its SNES to another TS in between */
+PetscErrorCode TakeSNES(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(HooksRemove(ts));
+  PetscCall(SNESSetDM(ts->snes, ts->dm));
+  I.linear_chosen         = PETSC_FALSE;
+  I.scaled_state          = 0;
+  I.corrector.have_matrix = PETSC_FALSE;
+  PetscCall(DifferencesDestroy(ts));
+  PetscCall(SetUpJacobian(ts));
+  PetscCall(SetUpSolvers(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,129 @@
+/* A first step that the user has set stands, however it was set; otherwise it is chosen, whether options were read or not */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A TS as a program makes it, without options unless it asks for them */
+class Program
+{
+public:
+  TS ts = nullptr;
+
+  explicit Program(PetscErrorCode (*before)(TS) = nullptr, double end = 3.) : problem_({1.}, {0.}, true, end)
+  {
+    TS made;
+    must(ProblemCreateTS(PETSC_COMM_SELF, problem_, &made, &U_, &V_, false));
+    ts = made;
+    must(TSSetTimeStep(ts, .1)); /* as TSCreate() leaves it */
+    must(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
+    if (before) must(before(ts));
+    must(TSSetType(ts, TSHHT3));
+  }
+  ~Program()
+  {
+    TSDestroy(&ts);
+    VecDestroy(&U_);
+    VecDestroy(&V_);
+  }
+  /* Length of the first step */
+  double first()
+  {
+    PetscReal t;
+    must(TSSetMaxSteps(ts, 1));
+    must(TSSolve(ts, nullptr));
+    must(TSGetTime(ts, &t));
+    return t;
+  }
+  double chosen() const
+  {
+    Program same(nullptr, problem_.t1);
+    return same.first();
+  }
+
+private:
+  const Oscillators problem_;
+  Vec               U_ = nullptr, V_ = nullptr;
+};
+
+} // namespace
+
+TEST(FirstStep, IsChosenWithoutAWordOfTheUser)
+{
+  Program   p, q;
+  Options   none("");
+  PetscReal h;
+  must(TSGetTimeStep(p.ts, &h));
+  EXPECT_NEAR(h, .1, 1e-15);
+  const double chosen = p.first();
+  must(TSSetFromOptions(q.ts));
+  MEASURED("first step %g", chosen);
+  EXPECT_GT(std::abs(chosen - .1), 1e-3); /* or the tests below would show nothing */
+  EXPECT_EQ(q.first(), chosen);
+}
+
+TEST(FirstStep, SetByTheProgram)
+{
+  for (double h : {1e-3, 1e-2, .1}) {
+    Program p, q, r;
+    must(TSSetTimeStep(p.ts, h));
+    EXPECT_EQ(p.first(), h);
+    must(TSSetUp(q.ts)); /* only then */
+    must(TSSetTimeStep(q.ts, h));
+    EXPECT_EQ(q.first(), h);
+    Options none("");
+    must(TSSetTimeStep(r.ts, h));
+    must(TSSetFromOptions(r.ts));
+    EXPECT_EQ(r.first(), h);
+  }
+  Program before([](TS ts) { return TSSetTimeStep(ts, 1e-3); });
+  EXPECT_EQ(before.first(), 1e-3);
+}
+
+TEST(FirstStep, SetByOption)
+{
+  for (double h : {1e-3, .1}) {
+    Options in(text("-ts_dt %g", h));
+    Program p;
+    must(TSSetFromOptions(p.ts));
+    EXPECT_EQ(p.first(), h);
+  }
+}
+
+TEST(FirstStep, OfARunShorterThanTheDefault)
+{
+  Program p(nullptr, .05), q(nullptr, .05);
+  EXPECT_LE(p.first(), .005 + 1e-15);
+  must(TSSetTimeStep(q.ts, 2e-3));
+  EXPECT_EQ(q.first(), 2e-3);
+}
+
+TEST(FirstStep, OfOneLengthIsPETScsDefault)
+{
+  Program p;
+  TSAdapt adapt;
+  must(TSGetAdapt(p.ts, &adapt));
+  must(TSAdaptSetType(adapt, TSADAPTNONE));
+  EXPECT_EQ(p.first(), .1);
+}
+
+TEST(FirstStep, IsChosenWhenAskedFor)
+{
+  Program p;
+  must(TSSetTimeStep(p.ts, 1e-3));
+  must(TSSetTimeStep(p.ts, PETSC_DECIDE));
+  EXPECT_EQ(p.first(), p.chosen());
+}
+
+TEST(FirstStep, AnotherTypeFindsPETScsDefault)
+{
+  Program   p;
+  PetscReal h;
+  must(TSSetType(p.ts, TSALPHA2));
+  must(TSGetTimeStep(p.ts, &h));
+  EXPECT_EQ(h, .1);
+  must(TSSetType(p.ts, TSHHT3));
+  EXPECT_EQ(p.first(), p.chosen());
+}

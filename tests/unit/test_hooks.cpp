@@ -1,0 +1,247 @@
+/* What the integrator puts into a SNES goes with TSReset(), TSDestroy() and another type, and the user's comes back */
+#include "integrator/impl.h"
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+SNES snesOf(TS ts)
+{
+  SNES snes;
+  must(TSGetSNES(ts, &snes));
+  return snes;
+}
+
+std::string lineSearchOf(SNES snes)
+{
+  SNESLineSearch ls;
+  must(SNESGetLineSearch(snes, &ls));
+  const char *type = ((PetscObject)ls)->type_name;
+  return type ? type : "";
+}
+
+/* Back to the problem's initial state */
+void rewind(Simulation &run)
+{
+  const Problem &p = run.problem;
+  Array          u0(p.n), v0(p.n);
+  p.initial(u0.data(), v0.data());
+  const std::pair<Vec, Array *> x[2] = {{run.U, &u0}, {run.V, &v0}};
+  for (auto &y : x) {
+    for (PetscInt i = 0; i < p.n; i++) must(VecSetValue(y.first, i, (*y.second)[i], INSERT_VALUES));
+    must(VecAssemblyBegin(y.first));
+    must(VecAssemblyEnd(y.first));
+  }
+  must(TS2SetSolution(run.ts, run.U, run.V));
+  must(TSSetTime(run.ts, p.t0));
+  must(TSSetStepNumber(run.ts, 0));
+  must(TSSetTimeStep(run.ts, 1e-3));
+}
+
+PetscErrorCode thirdIteration(SNES, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
+{
+  ++*static_cast<int *>(ctx);
+  *reason = it >= 3 ? SNES_CONVERGED_ITS : SNES_CONVERGED_ITERATING;
+  return 0;
+}
+
+const Oscillators &springs()
+{
+  static const Oscillators p({1., 3.}, {0., .1}, true, 1.);
+  return p;
+}
+
+} // namespace
+
+/* The user's program goes on with another type, with the monitors of the first */
+TEST(Hooks, AnotherTypeAfterSteps)
+{
+  Simulation run(springs(), tolerance(1e-6) + "-ts_hhtdae_summary -ts_hhtdae_progress");
+  Printed    out;
+  must(run.solve());
+  const Array u = run.u();
+  must(TSSetType(run.ts, TSALPHA2));
+  EXPECT_EQ(lineSearchOf(snesOf(run.ts)), SNESLINESEARCHBT);
+  PetscInt lag;
+  must(SNESGetLagJacobian(snesOf(run.ts), &lag));
+  EXPECT_EQ(lag, 1);
+  rewind(run);
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
+  must(TSSetType(run.ts, TSHHT3));
+  rewind(run);
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
+  EXPECT_GT(run.statistics().steps, 0);
+}
+
+TEST(Hooks, AnotherTypeBeforeSetUp)
+{
+  Simulation run(springs(), tolerance(1e-6) + "-ts_dt 1e-3");
+  must(TSSetType(run.ts, TSALPHA2));
+  must(run.solve());
+  EXPECT_LT(run.errors().q, 1e-3);
+}
+
+/* After differences of ours */
+TEST(Hooks, AnotherTypeAfterDifferences)
+{
+  Simulation run(springs(), tolerance(1e-6) + "-snes_fd_color");
+  must(run.solve());
+  const Array u = run.u();
+  must(TSSetType(run.ts, TSALPHA2));
+  rewind(run);
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
+}
+
+TEST(Hooks, GoWithReset)
+{
+  Simulation run(springs(), tolerance(1e-5));
+  const SNES snes = snesOf(run.ts);
+  must(run.solve());
+  EXPECT_EQ(snes->ops->converged, hht3::ConvergenceTest);
+  must(TSReset(run.ts));
+  EXPECT_EQ(snes->ops->converged, SNESConvergedDefault);
+  EXPECT_EQ(snes->cnvP, nullptr);
+  EXPECT_EQ(lineSearchOf(snes), SNESLINESEARCHBT);
+  PetscInt lag;
+  must(SNESGetLagJacobian(snes, &lag));
+  EXPECT_EQ(lag, 1);
+}
+
+/* A run after TSReset() needs no step number 0 to start afresh */
+TEST(Hooks, AnotherSetUpAfterReset)
+{
+  Simulation run(springs(), tolerance(1e-5));
+  must(run.solve());
+  const Array u = run.u();
+  const SNES  snes = snesOf(run.ts);
+  Mat         J;
+  Vec         A;
+  must(SNESGetJacobian(snes, &J, nullptr, nullptr, nullptr));
+  must(PetscObjectReference((PetscObject)J));
+  must(TSReset(run.ts));
+  {
+    ErrorTrap trap;
+    EXPECT_EQ(TSHHT3GetAcceleration(run.ts, &A), PETSC_ERR_ARG_WRONGSTATE);
+  }
+  must(SNESSetJacobian(snes, J, J, nullptr, nullptr));
+  must(MatDestroy(&J));
+  rewind(run);
+  must(TSSetStepNumber(run.ts, 7));
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
+  EXPECT_EQ(run.statistics().restarts, 1);
+}
+
+/* A SNES of the user's outlives the TS, with its own test in place */
+TEST(Hooks, SharedSNESOutlivesTheTS)
+{
+  SNES snes;
+  int  asked = 0;
+  Vec  x, r;
+  Mat  J;
+  {
+    Simulation run(springs(), tolerance(1e-5));
+    snes = snesOf(run.ts);
+    must(PetscObjectReference((PetscObject)snes));
+    must(run.solve());
+  }
+  EXPECT_EQ(snes->ops->converged, SNESConvergedDefault);
+  must(SNESReset(snes));
+  must(VecCreateSeq(PETSC_COMM_SELF, 1, &x));
+  must(VecDuplicate(x, &r));
+  must(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, nullptr, &J));
+  must(SNESSetFunction(
+      snes, r,
+      [](SNES, Vec y, Vec f, void *) {
+        must(VecPointwiseMult(f, y, y));
+        must(VecShift(f, -2.));
+        return (PetscErrorCode)0;
+      },
+      nullptr));
+  must(SNESSetJacobian(
+      snes, J, J,
+      [](SNES, Vec y, Mat, Mat P, void *) {
+        const PetscScalar *a;
+        must(VecGetArrayRead(y, &a));
+        must(MatSetValue(P, 0, 0, 2. * a[0], INSERT_VALUES));
+        must(VecRestoreArrayRead(y, &a));
+        must(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+        must(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+        return (PetscErrorCode)0;
+      },
+      nullptr));
+  must(VecSet(x, 1.));
+  must(SNESSolve(snes, nullptr, x));
+  EXPECT_NEAR(whole(x)[0], std::sqrt(2.), 1e-7);
+  must(SNESSetConvergenceTest(snes, thirdIteration, &asked, nullptr));
+  must(SNESSolve(snes, nullptr, x));
+  EXPECT_EQ(asked, 4);
+  must(SNESDestroy(&snes));
+  must(VecDestroy(&x));
+  must(VecDestroy(&r));
+  must(MatDestroy(&J));
+}
+
+/* Two TS that step in turn with one SNES */
+TEST(Hooks, OneSNESForTwoTS)
+{
+  const Pendulum p(-90., 0., .5), q(-60., 1., .5);
+  const auto     options = fixedSteps(1e-3) + "-ts_exact_final_time stepover ";
+  Simulation     a(p, options), b(q, options), c(p, options), d(q, options);
+  must(TSSetSNES(b.ts, snesOf(a.ts)));
+  for (int k = 0; k < 20; k++)
+    for (Simulation *run : {&a, &b, &c, &d}) must(run->step());
+  EXPECT_LT(relativeDifference(a.u(), c.u()), 1e-7); /* a matrix of its own for every step */
+  EXPECT_LT(relativeDifference(b.u(), d.u()), 1e-7);
+  must(TSDestroy(&a.ts)); /* resets the SNES, its matrix included */
+  ErrorTrap trap;
+  EXPECT_EQ(b.step(), PETSC_ERR_ARG_WRONGSTATE);
+  EXPECT_TRUE(trap.says("has no matrix")) << trap.message;
+}
+
+/* Another SNES in the middle of a run */
+TEST(Hooks, AnotherSNESBetweenSteps)
+{
+  const Pendulum p(-90., 0., .5);
+  const auto     options = tolerance(1e-6) + "-ts_dt 1e-3 -ts_exact_final_time stepover ";
+  Simulation     run(p, options), plain(p, options);
+  for (int k = 0; k < 10; k++) must(run.step());
+  SNES snes;
+  Mat  J;
+  must(SNESGetJacobian(snesOf(run.ts), &J, nullptr, nullptr, nullptr));
+  must(SNESCreate(PETSC_COMM_SELF, &snes));
+  must(SNESSetJacobian(snes, J, J, SNESTSFormJacobian, run.ts));
+  must(TSSetSNES(run.ts, snes));
+  must(SNESDestroy(&snes));
+  for (int k = 0; k < 10; k++) must(run.step());
+  for (int k = 0; k < 20; k++) must(plain.step());
+  EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-4);
+}
+
+/* The user's test rules, its context is neither lost nor destroyed before its time */
+TEST(Hooks, UsersTestStays)
+{
+  static int destroyed;
+  destroyed = 0;
+  int asked = 0;
+  {
+    Simulation run(springs(), tolerance(1e-5) + "-ts_dt 0.01 -ts_max_steps 5");
+    const SNES snes = snesOf(run.ts);
+    must(SNESSetConvergenceTest(snes, thirdIteration, &asked, [](void *) {
+      destroyed++;
+      return (PetscErrorCode)0;
+    }));
+    must(run.solve());
+    EXPECT_GE(asked, 20);
+    EXPECT_GE(run.statistics().newton, 15);
+    must(TSReset(run.ts));
+    EXPECT_EQ(snes->ops->converged, thirdIteration);
+    EXPECT_EQ(destroyed, 0);
+  }
+  EXPECT_EQ(destroyed, 1);
+}
