@@ -24,7 +24,8 @@ def shown(library):
 
 
 # The C interface: the two lists are the same.
-declared = set(re.findall(r"\b(TSHHT3\w+)\s*(?:\[\])?\s*(?:\([^()]*\))?;", "\n".join(re.findall(r"PETSC_EXTERN[^;]*;", header("hhtdae")))))
+external = re.findall(r"PETSC_EXTERN[^;]*;", header("hhtdae") + header("options"))
+declared = set(re.findall(r"\b(TSHHT3\w+)\s*(?:\[\])?\s*(?:\([^;]*\))?;", "\n".join(external)))
 check(len(declared) > 20, "the header declares only %s" % sorted(declared))
 names = set(shown(libraries[0]))
 difference = names ^ (declared | {"PetscDLLibraryRegister_hhtdae"})
