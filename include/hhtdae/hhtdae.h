@@ -100,6 +100,7 @@ PETSC_EXTERN PetscErrorCode TSHHT3SetStepLimit(TS, TSHHT3StepLimit, void *);
 /* The results */
 PETSC_EXTERN PetscErrorCode TSHHT3GetAcceleration(TS, Vec *);
 PETSC_EXTERN PetscErrorCode TSHHT3Interpolate(TS, PetscReal, Vec, Vec, Vec);
+PETSC_EXTERN PetscErrorCode TSHHT3EvaluateAt(TS, PetscReal, Vec, Vec, Vec);
 PETSC_EXTERN PetscErrorCode TSHHT3GetStatistics(TS, TSHHT3Statistics *);
 PETSC_EXTERN PetscErrorCode TSHHT3CheckpointSave(TS, const char[]);
 PETSC_EXTERN PetscErrorCode TSHHT3CheckpointLoad(TS, const char[]);

@@ -17,8 +17,9 @@
     -scene_animation_dt <dt>      time between frames; 0: every step
     -scene_balance [file]         energy and momentum at every step, into a file or printed; largest drift at the end
 
-  Samples between the ends of steps come from TSHHT3Interpolate(): positions and velocities are cubic in the step, accelerations
-  and multipliers linear. The first sample is the consistent start. Other types of TS are sampled at the ends of steps.
+  Samples between the ends of steps: positions and velocities are cubic in the step, TSHHT3Interpolate(). Where a channel needs
+  accelerations, reactions, variables or force states, the equations of motion are solved for them at the time of the sample,
+  TSHHT3EvaluateAt(), at about the cost of a matrix and its factorization; samples at the ends of steps cost nothing. The first sample is the consistent start. Other types of TS are sampled at the ends of steps.
 */
 #ifndef HHTDAE_OUTPUT_H
 #define HHTDAE_OUTPUT_H

@@ -353,10 +353,12 @@ PetscErrorCode TSHHT3GetAcceleration(TS ts, Vec *A)
 
   Level: intermediate
 
-  Note:
+  Notes:
   At both ends the values of the step itself are returned, to the last bit.
 
-.seealso: `TSHHT3`, `TSInterpolate()`, `TSHHT3GetAcceleration()`
+  What is linear is only as good as the step is short; `TSHHT3EvaluateAt()` solves for it.
+
+.seealso: `TSHHT3`, `TSHHT3EvaluateAt()`, `TSInterpolate()`, `TSHHT3GetAcceleration()`
 @*/
 PetscErrorCode TSHHT3Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {

@@ -43,6 +43,9 @@ void At(const Integrator &I, PetscReal x, PetscReal h, PetscInt n, const PetscSc
 
 } // namespace
 
+/* Where t lies in the last step: 0 to 1, and these at its ends exactly */
+PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
+
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
@@ -56,7 +59,7 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);
-  const PetscReal x = t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1);
+  const PetscReal x = StepFraction(I, t);
   PetscCall(VecGetLocalSize(I.U0, &n));
   for (int k = 0; k < 3; k++) {
     PetscCall(VecGetArrayRead(begin[k], &s0[k]));

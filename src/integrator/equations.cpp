@@ -192,25 +192,6 @@ PetscErrorCode ScaleResidual(Integrator &I, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already */
-PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
-{
-  PetscBool mffd, triangle;
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
-  if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(LinearStoresTriangle(A, &triangle));
-  if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
-  else {
-    PetscCall(FillRows(I));
-    PetscCall(FillColumns(I));
-    if (triangle) PetscCall(ScaleTriangle(I, A));
-    else PetscCall(MatDiagonalScale(A, I.row, I.col));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The rows of definitions that use q'', in the paper's form: d q''/d a is 1 there and ca in the equations of motion */
 PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 {
@@ -235,6 +216,25 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 }
 
 } // namespace
+
+/* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already */
+PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
+{
+  PetscBool mffd, triangle;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
+  if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LinearStoresTriangle(A, &triangle));
+  if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
+  else {
+    PetscCall(FillRows(I));
+    PetscCall(FillColumns(I));
+    if (triangle) PetscCall(ScaleTriangle(I, A));
+    else PetscCall(MatDiagonalScale(A, I.row, I.col));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
 {

@@ -121,6 +121,7 @@ PetscErrorCode Reset(TS ts)
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
+  PetscCall(SamplerDestroy(I));
   if (!I.is_set)
     for (IS &is : I.is) PetscCall(ISDestroy(&is));
   I.role.clear();
@@ -397,6 +398,7 @@ PetscErrorCode TSHHT3Initialize(void)
   PetscCall(PetscLogEventRegister("HHT3Predict", id, &hht3::events.predict));
   PetscCall(PetscLogEventRegister("HHT3Matrix", id, &hht3::events.matrix));
   PetscCall(PetscLogEventRegister("HHT3Estimate", id, &hht3::events.estimate));
+  PetscCall(PetscLogEventRegister("HHT3Sample", id, &hht3::events.sample));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

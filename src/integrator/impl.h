@@ -199,6 +199,7 @@ struct Integrator : StepState {
   Mode          scaled_mode = Mode::Step;
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
+  struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */
   LinearChoice  linear;
   PetscBool     linear_chosen = PETSC_FALSE;
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
@@ -235,7 +236,7 @@ inline PetscReal CorrectorTolerance(const Integrator &I)
 
 /* log events, declared once in hht3.cpp */
 struct Events {
-  PetscLogEvent start, predict, matrix, estimate;
+  PetscLogEvent start, predict, matrix, estimate, sample;
 };
 extern Events events;
 
@@ -268,6 +269,7 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
+PetscErrorCode ScaleMatrix(Integrator &I, Mat A);
 /* factor.cpp */
 PetscErrorCode Factor(TS ts, Mat J, Mat P);
 PetscErrorCode ExplainLinearFailure(TS ts);
@@ -333,7 +335,11 @@ PetscErrorCode Step(TS ts);
 PetscErrorCode RollBack(TS ts);
 PetscErrorCode Fail(TS ts, const char *what);
 /* dense.cpp */
+PetscReal      StepFraction(const Integrator &I, PetscReal t);
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
+/* evaluate_at.cpp: accelerations and multipliers between the ends of a step */
+PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A);
+PetscErrorCode SamplerDestroy(Integrator &I);
 /* report.cpp */
 void           ReadClocks(PetscReal *wall, PetscReal *cpu);
 void           StopClocks(Integrator &I);

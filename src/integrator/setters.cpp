@@ -159,6 +159,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(GetAcceleration);
   HHT3_COMPOSE(GetStatistics);
   HHT3_COMPOSE(Interpolate);
+  HHT3_COMPOSE(EvaluateAt);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
   HHT3_COMPOSE(SetCheckpointVec);

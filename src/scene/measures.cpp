@@ -291,6 +291,21 @@ constexpr int kComponents = 12; /* of a force, at most */
 
 bool NeedsAcceleration(const Measure &m) { return Accelerates(m.kind); }
 
+bool FollowsFromEquations(const SceneData &s, const Measure &m)
+{
+  if (Accelerates(m.kind) || IsJoint(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Value) return true;
+  if (m.kind != Measure::Component) return false;
+  PetscInt    row  = m.component;
+  const Part *part = FindPart(s, m.target, false, row);
+  if (!part) return false;
+  const std::vector<Expression> *own = part->store->expressions(part->index);
+  const auto follows = [&](const Measure &a) { return FollowsFromEquations(s, a); };
+  return part->store->carried(part->index) || part->store->inputs() > 0 ||
+         (own && std::any_of(own->begin(), own->end(), [&](const Expression &f) {
+            return std::any_of(f.arguments.begin(), f.arguments.end(), follows);
+          }));
+}
+
 bool NeedsAcceleration(const Expression &f)
 {
   for (const Measure &m : f.arguments)

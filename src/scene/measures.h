@@ -35,6 +35,8 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m);
 double MeasureValue(const LocalMeasure &m, const Evaluation &e);
 
 bool NeedsAcceleration(const Measure &m);
+/* Whether positions, velocities and states do not determine it, but accelerations, multipliers, variables or force states */
+bool FollowsFromEquations(const SceneData &s, const Measure &m);
 bool NeedsAcceleration(const Expression &f);
 
 /* What is wrong with a measure, empty if nothing; in_equation: as an argument of an expression, which needs its

@@ -75,6 +75,12 @@ PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l)
 
 const std::vector<PetscMPIInt> &ChannelOwners(const Runtime &R) { return R.channels->owner; }
 
+bool ChannelsFollowFromEquations(const Runtime &R)
+{
+  const auto &all = R.scene.channels;
+  return std::any_of(all.begin(), all.end(), [&](const ChannelData &c) { return FollowsFromEquations(R.scene, c.measure); });
+}
+
 PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<double> &values)
 {
   Balance b;

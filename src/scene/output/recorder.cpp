@@ -1,4 +1,5 @@
 #include "scene/output/recorder.h"
+#include <algorithm>
 #include <limits>
 
 namespace hhtdae
@@ -13,9 +14,10 @@ PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> 
   Runtime      &R = r.R;
   Vec           U = r.U, V = r.V;
   const double *u, *v, *a, *local[3];
+  const bool    solve = std::any_of(tasks.begin(), tasks.end(), [](const Task *task) { return task->from_equations; });
   PetscFunctionBegin;
-  if (r.dense) PetscCall(TSHHT3Interpolate(ts, t, U, V, r.A));
-  else PetscCall(TS2GetSolution(ts, &U, &V));
+  if (!r.dense) PetscCall(TS2GetSolution(ts, &U, &V));
+  else PetscCall((solve ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, U, V, r.A));
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(r.A, &a));

@@ -21,6 +21,7 @@ public:
 
   double   dt;       /* 0: the end of every step */
   PetscInt done = 0; /* samples so far */
+  bool     from_equations = false; /* it reads accelerations, multipliers or what depends on them */
 };
 
 struct Recorder {

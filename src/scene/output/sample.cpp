@@ -37,7 +37,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
     PetscCall(VecSetSizes(x, R.n, PETSC_DETERMINE));
     PetscCall(VecSetType(x, VECSTANDARD));
   }
-  PetscCall(TSHHT3Interpolate(ts, t, W[0], W[1], W[2]));
+  PetscCall((ChannelsFollowFromEquations(R) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
   /* The exchange carries accelerations only where elements read them. */
   if (R.size > 1 && !R.uses_acceleration) {

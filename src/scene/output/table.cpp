@@ -23,6 +23,7 @@ public:
       head_.name.push_back(c.name);
       head_.unit.push_back(c.unit);
     }
+    from_equations = ChannelsFollowFromEquations(R);
     column_.resize(R.size);
     for (std::size_t c = 0; c < head_.name.size(); c++) column_[ChannelOwners(R)[c]].push_back(c);
   }

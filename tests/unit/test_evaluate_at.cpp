@@ -1,0 +1,233 @@
+/* Accelerations, multipliers, variables and force states between the ends of a step, TSHHT3EvaluateAt() */
+#include "support.h"
+
+#include <array>
+
+using namespace hhtest;
+
+namespace
+{
+
+struct Sample {
+  Vec U, V, A;
+  explicit Sample(Vec like)
+  {
+    for (Vec *x : {&U, &V, &A}) must(VecDuplicate(like, x));
+  }
+  ~Sample()
+  {
+    for (Vec *x : {&U, &V, &A}) VecDestroy(x);
+  }
+  std::array<Array, 3> values() const { return {whole(U), whole(V), whole(A)}; }
+};
+
+struct SampleErrors {
+  double a = 0., other = 0.; /* q''; multipliers, variables and force states */
+  void   take(const Problem &p, const std::array<Array, 3> &e)
+  {
+    for (PetscInt i = 0; i < p.n; i++) {
+      if (p.role[i] == TSHHT3_COORDINATE) widen(a, std::abs(e[2][i]));
+      else if (p.role[i] != TSHHT3_STATE) widen(other, std::abs(e[0][i]));
+    }
+  }
+};
+
+/* Errors at the ends of steps, of samples between them, and of linear interpolation there; fixed steps to t = 1/2, the second half of
+   them looked at */
+struct Compared {
+  SampleErrors ends, samples, linear;
+  Compared(const Problem &p, double h, const std::string &options)
+  {
+    Simulation run(p, fixedSteps(h) + options);
+    Sample     x(run.U);
+    auto       errorsAt = [&](double t, bool interpolated) {
+      std::array<Array, 3> e = {Array(p.n), Array(p.n), Array(p.n)};
+      must((interpolated ? TSHHT3Interpolate : TSHHT3EvaluateAt)(run.ts, t, x.U, x.V, x.A));
+      p.reference(t, e[0].data(), e[1].data(), e[2].data());
+      const auto y = x.values();
+      for (int k = 0; k < 3; k++)
+        for (PetscInt i = 0; i < p.n; i++) e[k][i] = y[k][i] - e[k][i];
+      return e;
+    };
+    double last = 0.;
+    while (run.t() < .5) {
+      must(run.step());
+      const double t = run.t();
+      if (t > .25) {
+        ends.take(p, errorsAt(t, false));
+        for (double theta : {.01, .2, .5, .7, .99}) {
+          samples.take(p, errorsAt(last + theta * (t - last), false));
+          linear.take(p, errorsAt(last + theta * (t - last), true));
+        }
+      }
+      last = t;
+    }
+  }
+};
+
+/* Of second order, and about as accurate as the steps themselves */
+void expectOrder(const Problem &p, double h, const std::string &options = "")
+{
+  const Compared c(p, h, options), f(p, h / 2., options);
+  MEASURED("%-14s %-24s h %.3g: q'' error %.1e, order %.2f, at the steps %.1e, linear %.1e; lambda, V, F %.1e, %.2f, at the steps "
+           "%.1e, linear %.1e",
+           p.name.c_str(), options.c_str(), h / 2., f.samples.a, order(c.samples.a, f.samples.a), f.ends.a, f.linear.a, f.samples.other,
+           order(c.samples.other, f.samples.other), f.ends.other, f.linear.other);
+  EXPECT_GE(order(c.samples.a, f.samples.a), 1.9);
+  EXPECT_LT(f.samples.a, 1.2 * f.ends.a);
+  if (f.samples.other > 0.) {
+    EXPECT_GE(order(c.samples.other, f.samples.other), 1.9);
+    EXPECT_LT(f.samples.other, 2. * f.ends.other);
+  }
+}
+
+/* Rows of motion, states and definitions, relative to the largest multiplier or force that enters */
+double imbalance(Simulation &run, const Sample &x, double t)
+{
+  Vec F;
+  must(VecDuplicate(x.U, &F));
+  must(TSComputeI2Function(run.ts, t, x.U, x.V, x.A, F));
+  const Array f = whole(F), u = whole(x.U), a = whole(x.A);
+  double      worst = 0., scale = 1.;
+  for (size_t i = 0; i < f.size(); i++) {
+    const PetscInt r = run.problem.role[i];
+    scale            = std::max({scale, std::abs(u[i]), std::abs(a[i])});
+    if (r != TSHHT3_HOLONOMIC && r != TSHHT3_NONHOLONOMIC) widen(worst, std::abs(f[i]));
+  }
+  must(VecDestroy(&F));
+  return worst / scale;
+}
+
+} // namespace
+
+TEST(EvaluateAt, OrderBetweenSteps)
+{
+  for (const char *options : {"", "-ts_hhtdae_radius 0.5"}) {
+    expectOrder(DoublePendulum(1.), .01, options);
+    expectOrder(Pendulum(-60., 1., 1.), .02, options);
+    expectOrder(UserVars(1.), .004, options);
+    expectOrder(Oscillators({1., 3.}, {0., .1}, true, 1.), .02, options);
+  }
+}
+
+/* Every sample satisfies the equations of motion, states and definitions, whatever the problem; and both ends are the step's own */
+TEST(EvaluateAt, EquationsHold)
+{
+  for (const Factory &f : allProblems())
+    for (const char *form : {"", "-ts_hhtdae_form paper"}) {
+      const auto p = f.make();
+      Simulation run(*p, tolerance(1e-5) + form);
+      Sample     x(run.U);
+      double     worst = 0., last = p->t0;
+      for (int step = 0; step < 30 && run.t() < p->t1; step++) {
+        must(run.step());
+        for (double theta : {.1, .5, .8}) {
+          const double t = last + theta * (run.t() - last);
+          must(TSHHT3EvaluateAt(run.ts, t, x.U, x.V, x.A));
+          widen(worst, imbalance(run, x, t));
+        }
+        must(TSHHT3EvaluateAt(run.ts, run.t(), x.U, x.V, x.A));
+        EXPECT_EQ(whole(x.U), run.u());
+        EXPECT_EQ(whole(x.V), run.v());
+        EXPECT_EQ(whole(x.A), run.a());
+        const auto own = x.values();
+        last           = run.t();
+        if (step % 7 == 3 && run.t() < p->t1) {
+          must(run.step());
+          must(TSHHT3EvaluateAt(run.ts, last, x.U, x.V, x.A));
+          EXPECT_EQ(x.values(), own);
+          last = run.t();
+        }
+      }
+      MEASURED("%-14s %-24s largest residual of samples, relative: %.1e", f.name, form, worst);
+      EXPECT_LT(worst, 1e-8) << f.name << " " << form;
+    }
+}
+
+/* A run with samples is the run without, to the last bit and count */
+TEST(EvaluateAt, LeavesTheRunAlone)
+{
+  for (const Factory &f : allProblems())
+    for (const char *options : {"", "-ts_hhtdae_form paper"}) {
+      const auto         p = f.make();
+      Array              u[2], v[2], a[2];
+      TSHHT3Statistics   s[2];
+      for (int sampled = 0; sampled < 2; sampled++) {
+        Simulation run(*p, tolerance(1e-5) + options);
+        Sample     x(run.U);
+        double     last = p->t0;
+        run.watch       = [&](Simulation &r, PetscInt step, double t) {
+          if (sampled && step)
+            for (double theta : {.3, .9}) must(TSHHT3EvaluateAt(r.ts, last + theta * (t - last), x.U, x.V, x.A));
+          last = t;
+        };
+        must(run.solve());
+        u[sampled] = run.u();
+        v[sampled] = run.v();
+        a[sampled] = run.a();
+        s[sampled] = run.statistics();
+      }
+      EXPECT_EQ(u[0], u[1]) << f.name << " " << options;
+      EXPECT_EQ(v[0], v[1]) << f.name << " " << options;
+      EXPECT_EQ(a[0], a[1]) << f.name << " " << options;
+      EXPECT_EQ(s[0].residuals, s[1].residuals);
+      EXPECT_EQ(s[0].jacobians, s[1].jacobians);
+      EXPECT_EQ(s[0].factorizations, s[1].factorizations);
+      EXPECT_EQ(s[0].newton, s[1].newton);
+    }
+}
+
+/* Nor do samples of one step depend on those of earlier ones: what a resumed run records is what the whole run records */
+TEST(EvaluateAt, SamplesDependOnTheirStepAlone)
+{
+  for (const Factory &f : allProblems()) {
+    const auto                        p = f.make();
+    std::vector<std::array<Array, 3>> values[2];
+    for (int all = 0; all < 2; all++) {
+      Simulation run(*p, tolerance(1e-5));
+      Sample     x(run.U);
+      double     last = p->t0;
+      for (int step = 0; step < 40 && run.t() < p->t1; step++) {
+        must(run.step());
+        for (double theta : {.3, .8}) {
+          if (!all && step % 10 != 9) continue;
+          must(TSHHT3EvaluateAt(run.ts, last + theta * (run.t() - last), x.U, x.V, x.A));
+          if (step % 10 == 9) values[all].push_back(x.values());
+        }
+        last = run.t();
+      }
+    }
+    EXPECT_EQ(values[0], values[1]) << f.name;
+    EXPECT_FALSE(values[0].empty()) << f.name;
+  }
+}
+
+/* With a user's own solver */
+TEST(EvaluateAt, OtherSolvers)
+{
+  const DoublePendulum p(1.);
+  for (const char *options : {"", "-ksp_type gmres -pc_type lu", "-pc_type lu -pc_factor_mat_solver_type mumps"}) {
+    Simulation run(p, tolerance(1e-6) + options);
+    Sample     x(run.U);
+    for (int k = 0; k < 5; k++) must(run.step());
+    const double t = run.t() - 1e-3;
+    must(TSHHT3EvaluateAt(run.ts, t, x.U, x.V, x.A));
+    EXPECT_LT(imbalance(run, x, t), 1e-9) << options;
+    must(TSHHT3EvaluateAt(run.ts, t, nullptr, nullptr, x.A)); /* any of the three */
+    EXPECT_EQ(whole(x.A), x.values()[2]);
+  }
+}
+
+TEST(EvaluateAt, RefusesOtherTimes)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     run(p, tolerance(1e-5));
+  Sample         x(run.U);
+  ErrorTrap      trap;
+  must(TSSetUp(run.ts));
+  EXPECT_NE(TSHHT3EvaluateAt(run.ts, 0., x.U, nullptr, nullptr), 0);
+  EXPECT_TRUE(trap.says("no step")) << trap.message;
+  must(run.step());
+  EXPECT_NE(TSHHT3EvaluateAt(run.ts, 2. * run.t() + 1., x.U, x.V, x.A), 0);
+  EXPECT_TRUE(trap.says("not in the last step")) << trap.message;
+}
