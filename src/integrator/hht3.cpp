@@ -332,9 +332,8 @@ PetscErrorCode UpdateParameters(TS ts)
   another type of `TSAdapt` than basic is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
   or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
 
-  If no step size is set, the first one is chosen from the third derivative of the positions; TSSetTimeStep(ts, PETSC_DECIDE) asks for
-  that again. TSSetTimeStep(ts, 0.1), PETSc's default, counts as set if it comes after `TSSetType()`; before it, it cannot be told
-  from none.
+  If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
+  default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
 
   References:
 + * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007

@@ -264,10 +264,6 @@ PetscErrorCode Step(TS ts)
   PetscReal   next = ts->time_step;
 
   PetscFunctionBegin;
-  if (ts->time_step == PETSC_DECIDE) {
-    ts->time_step = I.have_step && !ts->steprestart ? I.h_next : unset_step;
-    I.auto_h      = PETSC_TRUE;
-  }
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
   if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));

@@ -36,8 +36,8 @@ public:
   {
     PetscFunctionBegin;
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, problem_, &ts, &U, &V));
+    PetscCall(TSSetTimeStep(ts, 0.1)); /* before the type PETSc's default, not set by anybody: the integrator chooses the first step */
     PetscCall(TSSetType(ts, TSHHT3));
-    PetscCall(TSSetTimeStep(ts, PETSC_DECIDE)); /* the integrator chooses the first step */
     PetscCall(run.prepare(ts, tolerance));
     if (fixed_h > 0) PetscCall(Run::fixSteps(ts, fixed_h));
     PetscCall(TSMonitorSet(ts, monitor, this, nullptr));

@@ -306,10 +306,11 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
     PetscCall(CreateNativeTS(r));
   else
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, r.counted, &r.ts, &r.U, &r.V));
+  /* before the type 0.1, PETSc's default, counts as set by nobody: TSHHT3 chooses the first step */
+  if (r.settings.stepper == Stepper::HHT && !r.which.createTS) PetscCall(TSSetTimeStep(r.ts, 0.1));
   PetscCall(TSSetType(r.ts, type[(int)r.settings.stepper]));
   PetscCall(TSSetMaxSteps(r.ts, 100000000));
   if (r.settings.stepper == Stepper::HHT) {
-    PetscCall(TSSetTimeStep(r.ts, PETSC_DECIDE)); /* the integrator chooses the first step */
     PetscCall(TSSetTolerances(r.ts, eps, nullptr, eps, nullptr));
   } else
     PetscCall(ConfigureOther(r, eps));

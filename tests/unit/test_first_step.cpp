@@ -109,14 +109,6 @@ TEST(FirstStep, OfOneLengthIsPETScsDefault)
   EXPECT_EQ(p.first(), .1);
 }
 
-TEST(FirstStep, IsChosenWhenAskedFor)
-{
-  Program p;
-  must(TSSetTimeStep(p.ts, 1e-3));
-  must(TSSetTimeStep(p.ts, PETSC_DECIDE));
-  EXPECT_EQ(p.first(), p.chosen());
-}
-
 TEST(FirstStep, AnotherTypeFindsPETScsDefault)
 {
   Program   p;

@@ -1,5 +1,6 @@
 /* The consistent start: accelerations and multipliers, projection and report of inconsistent values, singular problems
  */
+#include "integrator/impl.h"
 #include "support.h"
 
 using namespace hhtest;
@@ -323,7 +324,7 @@ TEST(Start, FirstStepIsChosen)
   for (double eps : {1e-4, 1e-8}) {
     const Pendulum p(-60., 1., 2.);
     Simulation     run(p, tolerance(eps));
-    must(TSSetTimeStep(run.ts, PETSC_DECIDE)); /* the integrator chooses the first step */
+    must(TSSetTimeStep(run.ts, hht3::unset_step));
     {
       Options in(tolerance(eps));
       must(TSSetFromOptions(run.ts));
