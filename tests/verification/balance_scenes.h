@@ -129,6 +129,26 @@ inline std::vector<BalanceCase> JointCases()
                      s.add(Gear{p.first, p.second, q.first, q.second, -1.7});
                      s.add(RackAndPinion{q.first, q.second, t.first, t.second, 0.4});
                    }});
+  for (bool planar : {false, true})
+    all.push_back({planar ? "gear and coupler on a carrier, planar" : "gear and coupler on a carrier", planar,
+                   [](BalanceScene &s) {
+                     const Body c = s.body("c", {-0.5, 0.4, 0}, 0.2), d = s.body("d", {0.4, -0.8, 0}, -0.2);
+                     const auto on = [&](Body k, const Vector3 &x) {
+                       const Marker i = s.at(k, x, 0.3);
+                       return std::make_pair(
+                           i, s.scene->markerAt(s.a, s.scene->data().frame(i).x, s.scene->data().frame(i).R));
+                     };
+                     s.add(Revolute{s.at(s.a, {0.2, 0.1, 0}), s.at(s.scene->ground(), {0.2, 0.1, 0})});
+                     const auto p = on(s.b, {1.1, 0.2, 0.1}), q = on(c, {-0.5, 0.3, 0}), t = on(d, {0.4, -0.8, 0.1});
+                     s.add(Revolute{p.first, p.second});
+                     s.add(Revolute{q.first, q.second});
+                     s.add(Translational{t.first, t.second});
+                     s.add(Gear{p.first, p.second, q.first, q.second, -1.7});
+                     Coupler k;
+                     k.terms = {{q.first, q.second, true, 0.7}, {t.first, t.second, false, 1.3}};
+                     s.add(k);
+                     s.add(SpringDamper{s.at(s.b, {1.4, 0.5, 0.4}), s.at(s.scene->ground(), {2, 2, 1}), 40, 1.5});
+                   }});
   all.push_back({"coupler of three", false, [](BalanceScene &s) {
                    const Body c = s.body("c", {-0.5, 0.4, 0}, 0.2);
                    Coupler    k;
