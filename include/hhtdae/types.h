@@ -2,9 +2,22 @@
 #ifndef HHTDAE_TYPES_H
 #define HHTDAE_TYPES_H
 
+/* Eigen's matrices go in and out of the library, so that their alignment and how they are freed must be the library's, whatever
+   instructions (-mavx, -march=native) or sanitizer a program is compiled with. The CMake package and pkg-config define the same. */
+#if !defined(EIGEN_CORE_H) && !defined(EIGEN_CORE_MODULE_H)
+  #if !defined(EIGEN_MAX_ALIGN_BYTES)
+    #define EIGEN_MAX_ALIGN_BYTES 16
+  #endif
+  #if !defined(EIGEN_MALLOC_ALREADY_ALIGNED)
+    #define EIGEN_MALLOC_ALREADY_ALIGNED 1
+  #endif
+#endif
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <petscsys.h>
+#if EIGEN_MAX_STATIC_ALIGN_BYTES != 16 || EIGEN_MAX_ALIGN_BYTES != 16 || !EIGEN_MALLOC_ALREADY_ALIGNED
+  #error "Eigen was included with another alignment than that of the hhtdae library: compile with -DEIGEN_MAX_ALIGN_BYTES=16 -DEIGEN_MALLOC_ALREADY_ALIGNED=1, or include hhtdae's headers first"
+#endif
 
 namespace hhtdae
 {

@@ -7,6 +7,7 @@ usage: instructions.py build-tree cmake configuration directory-of-PETSc.pc [dir
 
 import os
 import re
+import subprocess
 import sys
 import tempfile
 
@@ -47,3 +48,14 @@ with tempfile.TemporaryDirectory(prefix="instructions-", dir=build) as work:
     run([cmake, "-S", os.path.join(here, "numbers"), "-B", tree, "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_FLAGS=-march=native -O1"])
     run([cmake, "--build", tree])
     works(os.path.join(tree, "outside_numbers"), "with CMake, -march=native")
+
+    # Without the packages' flags hhtdae's headers see to it themselves, and refuse an Eigen that is there before them.
+    bare = [flag for flag in run(["pkg-config", "--cflags", "hhtscene"], PKG_CONFIG_PATH=paths).split() if not flag.startswith("-DEIGEN")]
+    for first, second, fits in (("hhtdae/types.h", "Eigen/Core", True), ("Eigen/Core", "hhtdae/types.h", False)):
+        source = os.path.join(work, "order.cpp")
+        with open(source, "w") as file:
+            file.write("#include <%s>\n#include <%s>\n" % (first, second))
+        done = subprocess.run([os.environ.get("CXX", "c++"), "-std=c++17", "-fsyntax-only", "-fsanitize=address", *bare, source],
+                              capture_output=True, text=True)
+        check((done.returncode == 0) == fits, "%s before %s: %s" % (first, second, done.stderr[-1000:]))
+        check(fits or "EIGEN_MALLOC_ALREADY_ALIGNED=1" in done.stderr, "what to define is not said: " + done.stderr[-1000:])
