@@ -1,11 +1,18 @@
 /*
-  Checkpoints. All that the next step depends on goes to a PETSc binary file: states at both ends of the last step, history of
-  the predictor, running maxima, step sizes, counters. The matrix does not: it is made anew in the step after a checkpoint,
-  in the run that wrote it as in the run that reads it, so that on the same ranks both go on bit for bit alike.
+  Checkpoints: all that the next step depends on, so that a run that is resumed repeats the uninterrupted one bit for bit, and writing
+  changes nothing in the run that writes.
+
+  The plain structs of impl.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
+  the coordinates and the memory that it was made in), and what the factor has taken over from the matrices before it, LinearSaveState().
+  It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
+
+  To tell whether a file belongs to the run: sizes, roles and method, and the residual at the state in the file, with other accelerations than
+  its own, at which it would be zero.
 */
 #include "impl.h"
+#include "checkpoint_file.h"
+#include "linear/archive.h"
 #include <cstdint>
-#include <cstdio>
 #include <string>
 
 namespace hht3
@@ -14,211 +21,335 @@ namespace hht3
 namespace
 {
 
-constexpr PetscInt magic = 1211306, version = 3;
+/* Residuals at the state in the file that differ by more than this part of the largest row's belong to another problem: rounding of
+   another machine is far below it. */
+constexpr PetscReal other_problem = 1e-11;
 
-/* Numbers of the integrator and of TS, in one order for writing and reading */
-struct Numbers {
-  std::vector<PetscInt *>  ints;
-  std::vector<PetscReal *> reals;
-  explicit Numbers(TS ts)
-  {
-    Integrator      &I = Get(ts);
-    TSHHT3Statistics &s = I.stat;
-    Predictor       &p = I.predictor;
-    ints  = {&ts->steps,  &ts->reject,    &ts->snes_its, &ts->ksp_its,         &ts->num_snes_failures, &s.steps,    &s.rejected,   &s.newton, &s.residuals,
-             &s.jacobians, &s.factorizations, &s.solves, &s.corrector_fails, &s.retries,            &s.restarts, &s.changes, &I.change.step, &s.tiny_steps, &I.tiny_row, &p.degree, &p.available};
-    reals = {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step, &I.t0, &I.t1, &I.h, &I.h_last, &I.h_regular, &s.h_min, &s.h_max, &I.corrector.wlte, &I.corrector.learned, &I.corrector.h_floor, &I.corrector.floor, &I.h_limit, &I.h_proven, &I.change.t};
-    for (PetscReal &t : p.t) reals.push_back(&t);
-  }
+/* FNV-1a */
+std::uint64_t Hash(const void *x, size_t n)
+{
+  std::uint64_t sum = 14695981039346656037ull;
+  for (size_t i = 0; i < n; i++) sum = (sum ^ static_cast<const unsigned char *>(x)[i]) * 1099511628211ull;
+  return sum;
+}
+
+/* What must be the same in both runs, rank by rank */
+struct Identity {
+  PetscInt      N, n, extra, extra_n; /* unknowns of all ranks and of this one; entries of the application's own likewise */
+  PetscInt      form, forces;         /* forces: whether there is F0 */
+  Parameters    p;
+  std::uint64_t roles;
 };
 
-std::vector<Vec> Vectors(TS ts)
-{
-  Integrator      &I = Get(ts);
-  std::vector<Vec> v = {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.X0, I.U1, I.V1, I.A1, I.X, I.ymax};
-  if (I.F0) v.push_back(I.F0);
-  for (PetscInt k = 0; k <= I.predictor.available; k++) v.push_back(I.predictor.D[k]);
-  if (I.checkpoint_vec) v.push_back(I.checkpoint_vec);
-  return v;
-}
-
-/* Entries of the application's vector, 0 without one */
-PetscErrorCode ExtraSize(const Integrator &I, PetscInt *n)
-{
-  PetscFunctionBegin;
-  *n = 0;
-  if (I.checkpoint_vec) PetscCall(VecGetSize(I.checkpoint_vec, n));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode Write(TS ts, PetscViewer viewer)
-{
-  Integrator    &I         = Get(ts);
-  const PetscInt header[5] = {magic, version, I.form, I.F0 ? 1 : 0, I.predictor.available};
-  PetscInt       N[2];
-
-  PetscFunctionBegin;
-  PetscCall(VecGetSize(ts->vec_sol, &N[0]));
-  PetscCall(ExtraSize(I, &N[1]));
-  PetscCall(PetscViewerBinaryWrite(viewer, header, 5, PETSC_INT));
-  PetscCall(PetscViewerBinaryWrite(viewer, N, 2, PETSC_INT));
-  PetscCall(PetscViewerBinaryWrite(viewer, &I.p, sizeof(I.p) / sizeof(PetscReal), PETSC_REAL));
-  Numbers numbers(ts);
-  for (PetscInt *i : numbers.ints) PetscCall(PetscViewerBinaryWrite(viewer, i, 1, PETSC_INT));
-  for (PetscReal *r : numbers.reals) PetscCall(PetscViewerBinaryWrite(viewer, r, 1, PETSC_REAL));
-  for (Vec v : Vectors(ts)) PetscCall(VecView(v, viewer));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode ReadHeader(TS ts, PetscViewer viewer, const char file[], PetscInt header[5])
+PetscErrorCode Identify(TS ts, Identity *id)
 {
   Integrator &I = Get(ts);
-  PetscInt    N[2], M[2];
-  Parameters  p;
-  MPI_Comm    comm = PetscObjectComm((PetscObject)ts);
 
   PetscFunctionBegin;
-  PetscCall(PetscViewerBinaryRead(viewer, header, 5, NULL, PETSC_INT));
-  PetscCheck(header[0] == magic, comm, PETSC_ERR_FILE_UNEXPECTED, "%s is not a checkpoint of TSHHT3", file);
-  PetscCheck(header[1] == version, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s is of version %" PetscInt_FMT ", this library reads version %" PetscInt_FMT, file, header[1], version);
-  PetscCall(PetscViewerBinaryRead(viewer, N, 2, NULL, PETSC_INT));
-  PetscCall(VecGetSize(ts->vec_sol, &M[0]));
-  PetscCall(ExtraSize(I, &M[1]));
-  PetscCheck(N[0] == M[0], comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, N[0], M[0]);
-  PetscCheck(N[1] == M[1], comm, PETSC_ERR_FILE_UNEXPECTED,
-             "Checkpoint %s has %" PetscInt_FMT " entries of the application's own, the run expects %" PetscInt_FMT ": give TSHHT3SetCheckpointVec() the vector of the run that wrote it", file, N[1], M[1]);
-  PetscCall(PetscViewerBinaryRead(viewer, &p, sizeof(p) / sizeof(PetscReal), NULL, PETSC_REAL));
-  PetscCheck(header[2] == (PetscInt)I.form && p.beta == I.p.beta && p.am == I.p.am, comm, PETSC_ERR_FILE_UNEXPECTED,
-             "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, TSHHT3Forms[header[2] == 0 ? 0 : 1], (double)p.af, TSHHT3Forms[I.form], (double)I.p.af);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode Read(TS ts, PetscViewer viewer, const char file[])
-{
-  Integrator &I = Get(ts);
-  PetscInt    header[5];
-
-  PetscFunctionBegin;
-  PetscCall(ReadHeader(ts, viewer, file, header));
-  Numbers numbers(ts);
-  for (PetscInt *i : numbers.ints) PetscCall(PetscViewerBinaryRead(viewer, i, 1, NULL, PETSC_INT));
-  for (PetscReal *r : numbers.reals) PetscCall(PetscViewerBinaryRead(viewer, r, 1, NULL, PETSC_REAL));
-  for (PetscInt k = 0; k <= I.predictor.available; k++)
-    if (!I.predictor.D[k]) PetscCall(VecDuplicate(ts->vec_sol, &I.predictor.D[k]));
-  for (Vec v : Vectors(ts)) PetscCall(VecLoad(v, viewer));
-  const PetscReal floor = I.corrector.floor; /* which the first call measures on the present state */
-  PetscCall(UpdateWeights(ts, I.U1));
-  I.corrector.floor = floor;
-  I.have_step = PETSC_TRUE;
-  I.auto_h    = PETSC_FALSE;
-  I.status    = TS_STEP_COMPLETE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* FNV-1a over the first `length` bytes of a file */
-bool Checksum(std::FILE *f, long length, std::uint64_t *sum)
-{
-  std::vector<unsigned char> buffer(1 << 16);
-  *sum = 14695981039346656037ull;
-  while (length > 0) {
-    const size_t n = std::fread(buffer.data(), 1, (size_t)PetscMin(length, (long)buffer.size()), f);
-    if (!n) return false;
-    for (size_t i = 0; i < n; i++) *sum = (*sum ^ buffer[i]) * 1099511628211ull;
-    length -= (long)n;
+  std::memset(id, 0, sizeof(*id));
+  PetscCall(VecGetSize(ts->vec_sol, &id->N));
+  PetscCall(VecGetLocalSize(ts->vec_sol, &id->n));
+  if (I.checkpoint_vec) {
+    PetscCall(VecGetSize(I.checkpoint_vec, &id->extra));
+    PetscCall(VecGetLocalSize(I.checkpoint_vec, &id->extra_n));
   }
-  return true;
-}
-
-/* Rank 0 appends the checksum to a file that is complete, and puts it in the place of the one before */
-bool Seal(const char part[], const char file[])
-{
-  std::uint64_t sum = 0;
-  std::FILE    *f   = std::fopen(part, "r+b");
-  if (!f) return false;
-  std::fseek(f, 0, SEEK_END);
-  const long length = std::ftell(f);
-  std::rewind(f);
-  bool ok = Checksum(f, length, &sum);
-  std::fseek(f, 0, SEEK_END);
-  ok = std::fwrite(&sum, sizeof(sum), 1, f) == 1 && ok;
-  ok = std::fclose(f) == 0 && ok;
-  return ok && std::rename(part, file) == 0;
-}
-
-/* Whether the file is as Seal() left it */
-PetscErrorCode CheckSeal(MPI_Comm comm, const char file[])
-{
-  PetscMPIInt   rank;
-  int           state[2] = {0, 0}; /* readable, whole */
-  std::uint64_t sum, stored;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  std::FILE *f = rank == 0 ? std::fopen(file, "rb") : NULL;
-  if (f) {
-    state[0] = 1;
-    std::fseek(f, 0, SEEK_END);
-    const long length = std::ftell(f) - (long)sizeof(sum);
-    std::rewind(f);
-    if (length > 0 && Checksum(f, length, &sum) && std::fread(&stored, sizeof(stored), 1, f) == 1) state[1] = sum == stored;
-    std::fclose(f);
-  }
-  PetscCallMPI(MPI_Bcast(state, 2, MPI_INT, 0, comm));
-  PetscCheck(state[0], comm, PETSC_ERR_FILE_OPEN, "Cannot open the checkpoint %s", file);
-  PetscCheck(state[1], comm, PETSC_ERR_FILE_UNEXPECTED, "%s is not a checkpoint of TSHHT3, or it is damaged or not complete", file);
+  id->form   = I.form;
+  id->forces = I.F0 != nullptr;
+  id->p      = I.p;
+  id->roles  = Hash(I.role.data(), I.role.size());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing of the matrix survives, not even the analysis of its pattern, which may depend on the values it was made with */
-PetscErrorCode RenewMatrix(TS ts)
+/* An answer for all ranks */
+PetscErrorCode Everywhere(TS ts, bool mine, bool *all)
 {
-  Integrator &I = Get(ts);
-  KSP         ksp;
+  int both = mine;
 
   PetscFunctionBegin;
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.corrector.rate        = -1;
-  I.linear_chosen         = PETSC_FALSE;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &both, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  *all = both;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
+{
+  Identity   is;
+  bool       same;
+  MPI_Comm   comm = PetscObjectComm((PetscObject)ts);
+  const auto form = [](PetscInt f) { return TSHHT3Forms[f == TSHHT3_FORM_PAPER ? 0 : 1]; };
+
+  PetscFunctionBegin;
+  PetscCall(Identify(ts, &is));
+  PetscCheck(was.N == is.N, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, was.N, is.N);
+  PetscCheck(was.form == is.form && was.forces == is.forces && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
+             "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
+             form(is.form), (double)is.p.af);
+  PetscCall(Everywhere(ts, was.n == is.n && was.roles == is.roles, &same));
+  PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
+             "Checkpoint %s belongs to another problem: its unknowns have other roles, or are divided among the ranks in another way", file);
+  PetscCall(Everywhere(ts, was.extra == is.extra && was.extra_n == is.extra_n, &same));
+  PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
+             "Checkpoint %s has %" PetscInt_FMT " entries of the application's own, the run expects %" PetscInt_FMT ", or has them on other ranks: give TSHHT3SetCheckpointVec() the vector of the run that wrote it",
+             file, was.extra, is.extra);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Options that the run may change, at the cost of repeating the uninterrupted one no more: for comparison and for the message */
+PetscErrorCode OptionsInWords(TS ts, std::string *text)
+{
+  const Integrator       &I = Get(ts);
+  const CorrectorOptions &c = I.corrector;
+  KSP                     ksp;
+  PC                      pc;
+  TSAdaptType             adapt;
+  SNESType                snes;
+  KSPType                 method;
+  PCType                  preconditioner;
+  MatSolverType           package = NULL;
+  char                    words[512];
+
+  PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
-  PetscCall(KSPReset(ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(TSAdaptGetType(ts->adapt, &adapt));
+  PetscCall(SNESGetType(ts->snes, &snes));
+  PetscCall(KSPGetType(ksp, &method));
+  PetscCall(PCGetType(pc, &preconditioner));
+  if (I.linear.user_package) PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCall(PetscSNPrintf(words, sizeof(words), "rtol %g%s, atol %g%s, adapt %s, corrector %g, %" PetscInt_FMT " iterations, reuse %g,%g,%g%s, predictor %" PetscInt_FMT "%s, %s, %s, %s%s%s",
+                          (double)ts->rtol, ts->vrtol ? " by entries" : "", (double)ts->atol, ts->vatol ? " by entries" : "", adapt ? adapt : "none", (double)CorrectorTolerance(I),
+                          c.max_it, (double)c.ratio, (double)c.slow_rate, (double)c.hold, c.user_lag ? " by the user" : "", I.predictor.degree_max, I.predictor.fixed ? " fixed" : "",
+                          snes ? snes : "", method ? method : "", I.linear.user_pc && preconditioner ? preconditioner : "own solver", package ? " of " : "", package ? package : ""));
+  *text = words;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers of TS and SNES */
+struct SolverState {
+  PetscInt  steps, reject, snes_its, ksp_its, failures, just_decreased, lag_jacobian, lag_preconditioner, jac_iter, pre_iter;
+  PetscReal t, t_prev, t_prev_rollback, h;
+  PetscBool restart;
+};
+
+void Transfer(TS ts, Archive &a)
+{
+  SNES        snes = ts->snes;
+  SolverState s    = {ts->steps,       ts->reject,     ts->snes_its,   ts->ksp_its,        ts->num_snes_failures, ts->adapt->timestepjustdecreased, snes->lagjacobian, snes->lagpreconditioner,
+                      snes->jac_iter,  snes->pre_iter, ts->ptime,      ts->ptime_prev,     ts->ptime_prev_rollback, ts->time_step, ts->steprestart};
+  a.plain(s);
+  if (!a.reading || !a.good) return;
+  ts->steps                        = s.steps;
+  ts->reject                       = s.reject;
+  ts->snes_its                     = s.snes_its;
+  ts->ksp_its                      = s.ksp_its;
+  ts->num_snes_failures            = s.failures;
+  ts->adapt->timestepjustdecreased = s.just_decreased;
+  snes->lagjacobian                = s.lag_jacobian;
+  snes->lagpreconditioner          = s.lag_preconditioner;
+  snes->jac_iter                   = s.jac_iter;
+  snes->pre_iter                   = s.pre_iter;
+  ts->ptime                        = s.t;
+  ts->ptime_prev                   = s.t_prev;
+  ts->ptime_prev_rollback          = s.t_prev_rollback;
+  ts->time_step                    = s.h;
+  ts->steprestart                  = s.restart;
+}
+
+void TransferStructs(TS ts, Archive &a)
+{
+  Integrator &I = Get(ts);
+
+  Transfer(ts, a);
+  a.plain(static_cast<StepState &>(I));
+  a.plain(static_cast<CorrectorState &>(I.corrector));
+  a.plain(static_cast<PredictorState &>(I.predictor));
+  a.plain(static_cast<ChangeState &>(I.change));
+  if (I.predictor.available < 0 || I.predictor.available > max_degree) a.good = false;
+}
+
+PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
+{
+  PetscScalar *array;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  if (!*x) PetscCall(VecDuplicate(ts->vec_sol, x));
+  PetscCall(VecGetLocalSize(*x, &n));
+  if (a.reading) {
+    PetscCall(VecGetArray(*x, &array));
+    a.array(array, (size_t)n);
+    PetscCall(VecRestoreArray(*x, &array));
+  } else { /* nobody is to believe that it has changed */
+    const PetscScalar *values;
+    PetscCall(VecGetArrayRead(*x, &values));
+    a.array(const_cast<PetscScalar *>(values), (size_t)n);
+    PetscCall(VecRestoreArrayRead(*x, &values));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
+{
+  PetscBool there = (PetscBool)(*x != NULL);
+
+  PetscFunctionBegin;
+  a.plain(there);
+  if (there && a.good) PetscCall(TransferVec(ts, a, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last step's two ends, the history, and what else there is at the time */
+PetscErrorCode TransferVectors(TS ts, Archive &a)
+{
+  Integrator        &I = Get(ts);
+  std::vector<Vec *> all = {&ts->vec_sol, &ts->vec_dot, &I.U0, &I.V0, &I.A0, &I.X0, &I.U1, &I.V1, &I.A1, &I.X, &I.ymax, &I.weight};
+
+  PetscFunctionBegin;
+  if (I.F0) all.push_back(&I.F0);
+  for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.D[k]);
+  if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
+  for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
+  for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1]}) PetscCall(TransferIfThere(ts, a, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual by which a problem is told: at the last state, with accelerations that leave the inertia forces in it */
+PetscErrorCode Probe(TS ts, Vec F)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  Vec                    A;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(I.A1, &A));
+  PetscCall(VecCopy(I.A1, A));
+  PetscCall(VecScale(A, 2));
+  PetscCall(VecShift(A, 1));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, F));
+  PetscCall(VecDestroy(&A));
+  I.stat = saved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckProbe(TS ts, const char file[], Vec was, Vec is)
+{
+  const PetscScalar *x, *y;
+  PetscReal          scale = 0;
+  PetscInt           n, start, bad[2] = {HHT3_INT_MAX, 0}, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(was, &n));
+  PetscCall(VecGetOwnershipRange(was, &start, NULL));
+  PetscCall(VecGetArrayRead(was, &x));
+  PetscCall(VecGetArrayRead(is, &y));
+  for (PetscInt i = 0; i < n; i++)
+    if (!PetscIsInfOrNanScalar(x[i])) scale = PetscMax(scale, PetscAbsScalar(x[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  for (PetscInt i = n - 1; i >= 0; i--) {
+    if (PetscIsInfOrNanScalar(x[i]) && PetscIsInfOrNanScalar(y[i])) continue;
+    if (!(PetscAbsScalar(x[i] - y[i]) <= other_problem * scale)) bad[0] = start + i;
+  }
+  PetscCallMPI(MPI_Allreduce(&bad[0], &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  PetscReal rows[2] = {0, 0};
+  if (first == bad[0] && first < HHT3_INT_MAX) {
+    rows[0] = PetscRealPart(x[first - start]);
+    rows[1] = PetscRealPart(y[first - start]);
+  }
+  PetscCall(VecRestoreArrayRead(is, &y));
+  PetscCall(VecRestoreArrayRead(was, &x));
+  if (first == HHT3_INT_MAX) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED,
+          "Checkpoint %s belongs to another problem: in its state the residual of row %" PetscInt_FMT " was %g, in this run it is %g. Resume the problem that wrote it; "
+          "what its residual depends on besides the state has to be in the vector of TSHHT3SetCheckpointVec()", file, first, (double)rows[0], (double)rows[1]);
+}
+
+/* What this rank has to say */
+PetscErrorCode Gather(TS ts, Archive &a)
+{
+  Identity          id;
+  std::string       options;
+  std::vector<char> words;
+  Vec               probe;
+
+  PetscFunctionBegin;
+  PetscCall(Identify(ts, &id));
+  PetscCall(OptionsInWords(ts, &options));
+  words.assign(options.begin(), options.end());
+  PetscCall(VecDuplicate(ts->vec_sol, &probe));
+  PetscCall(Probe(ts, probe));
+  a.plain(id);
+  a.list(words);
+  TransferStructs(ts, a);
+  PetscCall(TransferVectors(ts, a));
+  PetscCall(TransferVec(ts, a, &probe));
+  PetscCall(SaveMatrix(ts, a));
+  PetscCall(VecDestroy(&probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Other options are the user's right, but then the run is another one */
+PetscErrorCode CompareOptions(TS ts, const char file[], const std::vector<char> &words)
+{
+  std::string       is;
+  const std::string was(words.begin(), words.end());
+
+  PetscFunctionBegin;
+  PetscCall(OptionsInWords(ts, &is));
+  if (was != is)
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                          "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, was.c_str(), is.c_str()));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Spread(TS ts, const char file[], Archive &a)
+{
+  Integrator       &I  = Get(ts);
+  MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
+  Identity          id;
+  std::vector<char> words;
+  Vec               was, is;
+  bool              good;
+
+  PetscFunctionBegin;
+  a.plain(id);
+  a.list(words);
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckIdentity(ts, file, id));
+  TransferStructs(ts, a);
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(VecDuplicate(ts->vec_sol, &was));
+  PetscCall(VecDuplicate(ts->vec_sol, &is));
+  PetscCall(TransferVectors(ts, a));
+  PetscCall(TransferVec(ts, a, &was));
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  I.stage_id = 0;
+  I.scaled_h = 0;
+  PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
+  PetscCall(CompareOptions(ts, file, words));
+  PetscCall(Probe(ts, is));
+  PetscCall(CheckProbe(ts, file, was, is));
+  PetscCall(LoadMatrix(ts, a));
+  PetscCall(VecDestroy(&is));
+  PetscCall(VecDestroy(&was));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
 
-/* The viewer goes whatever happens: a run may live on without its checkpoint */
-static PetscErrorCode WritePart(TS ts, const char part[])
-{
-  PetscViewer    viewer = NULL;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  ierr = PetscViewerBinaryOpen(PetscObjectComm((PetscObject)ts), part, FILE_MODE_WRITE, &viewer);
-  if (!ierr) ierr = PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE);
-  if (!ierr) ierr = Write(ts, viewer);
-  PetscCall(PetscViewerDestroy(&viewer));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode CheckpointSave(TS ts, const char file[])
 {
-  Integrator       &I = Get(ts);
-  const std::string part = std::string(file) + ".part";
-  PetscMPIInt       rank;
-  MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
-  int               failed = 0;
+  Integrator &I = Get(ts);
+  Archive     a;
 
   PetscFunctionBegin;
-  PetscCheck(I.have_step, comm, PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
-  PetscCall(WritePart(ts, part.c_str()));
-  /* a run that dies while writing keeps the checkpoint before */
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (rank == 0) failed = !Seal(part.c_str(), file);
-  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, comm));
-  PetscCheck(!failed, comm, PETSC_ERR_FILE_WRITE, "Cannot complete %s and rename it to %s", part.c_str(), file);
-  PetscCall(RenewMatrix(ts));
+  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
+  PetscTryMethod(ts, "TSHHT3CheckpointPrepare_C", (TS), (ts));
+  PetscCall(Gather(ts, a));
+  PetscCall(CheckpointFileWrite(PetscObjectComm((PetscObject)ts), file, a.data));
   PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -226,25 +357,20 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
 /* Before the set-up it is only noted, and read at its end */
 PetscErrorCode CheckpointLoad(TS ts, const char file[])
 {
-  Integrator    &I = Get(ts);
-  PetscViewer    viewer;
-  PetscErrorCode ierr;
+  Integrator &I = Get(ts);
+  Archive     a;
 
   PetscFunctionBegin;
   if (!I.U0) {
     PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(CheckSeal(PetscObjectComm((PetscObject)ts), file));
-  PetscCall(PetscViewerBinaryOpen(PetscObjectComm((PetscObject)ts), file, FILE_MODE_READ, &viewer));
-  PetscCall(PetscViewerBinarySetSkipInfo(viewer, PETSC_TRUE));
-  ierr = Read(ts, viewer, file);
-  PetscCall(PetscViewerDestroy(&viewer)); /* of a file that is refused, too */
-  PetscCall(ierr);
-  PetscCall(RenewMatrix(ts));
-  ts->steprestart = PETSC_FALSE;
-  PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
+  PetscCall(CheckpointFileRead(PetscObjectComm((PetscObject)ts), file, a.data));
+  a.reading = true;
+  PetscCall(Spread(ts, file, a));
   PetscCall(NoteState(ts));
+  I.sol_id           = 0; /* compare the solution with the step's end: it may have been changed after it */
+  I.checkpoint_steps = I.stat.steps;
   if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));
   PetscCall(PetscInfo(ts, "resumed at t = %g, step %" PetscInt_FMT ", from %s\n", (double)ts->ptime, ts->steps, file));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -261,20 +387,25 @@ PetscErrorCode SetCheckpointVec(TS ts, Vec extra)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called inside TSStep(), which counts the step only afterwards: the file must hold the count as it will be */
+/* At the beginning of a step. While an event is being located the last step may yet be taken back: then after it. */
 PetscErrorCode CheckpointIfDue(TS ts)
 {
-  Integrator &I = Get(ts);
+  Integrator    &I     = Get(ts);
+  const PetscInt every = I.checkpoint_every;
 
   PetscFunctionBegin;
-  if (!I.checkpoint_file[0] || I.checkpoint_every <= 0 || I.stat.steps % I.checkpoint_every) PetscFunctionReturn(PETSC_SUCCESS);
-  if (HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS); /* the step may yet be rolled back */
-  const PetscReal prev = ts->ptime_prev;
-  ts->steps++;
-  ts->ptime_prev = I.t0;
+  if (!I.checkpoint_file[0] || every <= 0 || !I.have_step || ts->steprollback) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.stat.steps / every <= I.checkpoint_steps / every || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckpointSave(ts, I.checkpoint_file));
-  ts->steps--;
-  ts->ptime_prev = prev;
+  I.checkpoint_steps = I.stat.steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the last step there is no other one: TSSolve() calls its monitors then with the reason set */
+PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
+{
+  PetscFunctionBegin;
+  if (ts->reason > 0 && step >= 0) PetscCall(CheckpointIfDue(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -296,8 +427,11 @@ PetscErrorCode CheckpointIfDue(TS ts)
   Level: intermediate
 
   Note:
-  The matrix is renewed after a checkpoint, here and in the run that resumes, so that on the same number of ranks both go on
-  with the same bits. The file carries a checksum. Events and adaptors with a memory of their own (dsp) start anew.
+  Writing changes nothing in the run that writes, and one that resumes repeats it bit for bit: the Newton matrix and what its factor has
+  taken over from earlier ones are part of the file. Where that cannot be had the matrix is made anew in the run that resumes, which
+  then agrees to the accuracy of the tolerance, and -info says so: matrices that give no rows (shell, nest), and preconditioners that
+  keep something of which nothing is known. These are all but the direct solvers that are chosen by default; "mumpsnd" on several ranks
+  repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of their own (dsp) start anew. The file carries a checksum.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
 @*/
@@ -325,7 +459,7 @@ PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
 
   Note:
   Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones. A file of another
-  problem, method or version is refused.
+  problem, method, version or number of ranks is refused. Other tolerances and other options of the solvers are taken, and reported.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`
 @*/
@@ -353,6 +487,9 @@ PetscErrorCode TSHHT3CheckpointLoad(TS ts, const char file[])
   `TSHHT3SetCoordinateChange()` changes. A file is written with the values that the vector has then, and `TSHHT3CheckpointLoad()`
   overwrites them; then it calls commit of `TSHHT3SetCoordinateChange()`, if there is one, for the application to take them over. A
   file whose vector has another size, or that has one where the run has none or the other way round, is refused.
+
+  An application that has to do something before a file is written, to bring the vector up to date or to write what it has recorded so far,
+  composes a function of `ts` with it: PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", function).
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCoordinateChange()`
 @*/

@@ -198,6 +198,7 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   if (on) PetscCall(TSMonitorSet(ts, MonitorSummary, NULL, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_checkpoint", "File to write a checkpoint to", "TSHHT3CheckpointSave", I.checkpoint_file, I.checkpoint_file, sizeof(I.checkpoint_file), NULL));
   PetscCall(PetscOptionsInt("-ts_hhtdae_checkpoint_every", "Accepted steps from one checkpoint to the next", "TSHHT3CheckpointSave", I.checkpoint_every, &I.checkpoint_every, NULL));
+  if (I.checkpoint_file[0]) PetscCall(TSMonitorSet(ts, MonitorCheckpoint, NULL, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_resume", "Checkpoint to go on from", "TSHHT3CheckpointLoad", file, file, sizeof(file), &flg));
   if (flg && file[0]) PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -217,6 +217,7 @@ struct Integrator : StepState {
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
   PetscInt         checkpoint_every = 0;
+  PetscInt         checkpoint_steps = 0; /* accepted steps when the last one was written or read */
   Vec              checkpoint_vec = nullptr; /* the application's, saved and restored with the state */
   PetscReal        wall0 = 0, cpu0 = 0;
   PetscReal        progress_t0 = 0;
@@ -350,6 +351,10 @@ PetscErrorCode CheckpointIfDue(TS ts);
 PetscErrorCode CheckpointSave(TS ts, const char file[]);
 PetscErrorCode CheckpointLoad(TS ts, const char file[]);
 PetscErrorCode SetCheckpointVec(TS ts, Vec extra);
+PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+/* checkpoint_matrix.cpp */
+PetscErrorCode SaveMatrix(TS ts, Archive &a);
+PetscErrorCode LoadMatrix(TS ts, Archive &a);
 
 } // namespace hht3
 

@@ -269,6 +269,7 @@ PetscErrorCode Step(TS ts)
   if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ts->adapt, &I.own_h, TSADAPTBASIC, TSADAPTNONE, ""));
+  PetscCall(CheckpointIfDue(ts));
   PetscCall(Begin(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {
@@ -286,7 +287,6 @@ PetscErrorCode Step(TS ts)
       PetscCall(CheckRejections(ts, ++rejections));
     }
   }
-  if (I.status == TS_STEP_COMPLETE) PetscCall(CheckpointIfDue(ts));
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

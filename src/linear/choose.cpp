@@ -425,8 +425,12 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(SetPackage(pc, package));
   else if (package)
     PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
-  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", cholesky ? "LDL^T" : "LU",
-                          package ? package : "PETSc's default", size.text));
+  PetscMPIInt ranks;
+  PetscBool   mumps = PETSC_FALSE;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &ranks));
+  if (package && ranks > 1) PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &mumps));
+  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s%s: %s", cholesky ? "LDL^T" : "LU",
+                          package ? package : "PETSc's default", mumps ? " (runs repeat to rounding only)" : "", size.text));
   PetscFunctionReturn(0);
 }
 
@@ -481,5 +485,28 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice)
+{
+  PC        pc;
+  PetscBool available;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetPC(ksp, &pc));
+  if (choice->user_pc && choice->user_package) PetscFunctionReturn(0);
+  available = (PetscBool)(package[0] != 0);
+  if (available) PetscCall(MatGetFactorAvailable(P, package, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
+  if (!available || choice->user_package) {
+    PetscCall(LinearChoose(ksp, P, cholesky, choice));
+    PetscFunctionReturn(0);
+  }
+  if (choice->user_pc)
+    PetscCall(SetPackage(pc, package));
+  else
+    PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
+  choice->cholesky = (PetscBool)(cholesky && !choice->user_pc);
+  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", cholesky ? "LDL^T" : "LU", package));
   PetscFunctionReturn(0);
 }

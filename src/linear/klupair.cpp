@@ -11,6 +11,7 @@
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_data.h"
 #include "klupair_panels.h"
+#include "linear.h"
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
@@ -53,6 +54,8 @@ static PetscErrorCode Analyse(Mat A, const LinearRows &rows, KluPair *k)
   PetscCall(KluPairAnalyse(A, rows, k));
   k->panels.reset();
   k->panels_looked = k->panels_used = k->plan_tried = false;
+  k->analysed.assign(rows.val, rows.val + rows.start[rows.n]);
+  k->pivoted.clear();
   k->start.assign(rows.start, rows.start + rows.n + 1);
   k->col.assign(rows.col, rows.col + rows.start[rows.n]);
   PetscCall(PetscObjectGetId((PetscObject)A, &k->matrix));
@@ -156,6 +159,15 @@ static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
   PetscFunctionReturn(0);
 }
 
+/* Most often these are the values analysed, which are not kept twice */
+static void NotePivots(const LinearRows &rows, KluPair *k)
+{
+  if (std::equal(k->analysed.begin(), k->analysed.end(), rows.val))
+    k->pivoted.clear();
+  else
+    k->pivoted.assign(rows.val, rows.val + rows.start[rows.n]);
+}
+
 /* The first factorization after an analysis, by panels where they pay at once */
 static PetscErrorCode FactorAsPlanned(Mat F, const LinearRows &rows, bool *good)
 {
@@ -173,6 +185,7 @@ static PetscErrorCode FactorAsPlanned(Mat F, const LinearRows &rows, bool *good)
   *good = k->growth >= PLANNED_GROWTH;
   PetscCall(PetscInfo(F, "Pivots as planned %s: reciprocal growth %g\n", *good ? "taken" : "not good enough", k->growth));
   if (!*good) PetscFunctionReturn(0);
+  NotePivots(rows, k);
   k->panels        = panels;
   k->panels_looked = k->panels_used = true;
   ++k->panels_made;
@@ -184,6 +197,7 @@ static PetscErrorCode FactorWithPivoting(const LinearRows &rows, KluPair *k)
 {
   PetscFunctionBegin;
   KLU(free_numeric)(&k->numeric, &k->common);
+  NotePivots(rows, k);
   k->panels.reset();
   k->panels_looked = k->panels_used = false;
   k->numeric                        = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
@@ -256,6 +270,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(SamePattern(A, rows, k, &same));
   if (!same) PetscCall(Analyse(A, rows, k));
   PetscCall(Refactor(F, rows, &good));
+  k->old_pivots = good;
   if (!good) PetscCall(FactorAsPlanned(F, rows, &good));
   if (!good) {
     PetscCall(FactorWithPivoting(rows, k));
@@ -265,6 +280,81 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(ReportError(F, A));
   F->assembled = PETSC_TRUE;
   if (k->factored()) PetscCall(PetscLogFlops(k->panels_used ? k->panels->flops : k->common.flops));
+  PetscFunctionReturn(0);
+}
+
+/* ---- state ---- */
+
+namespace
+{
+enum class Pivots { None, Planned, Found };
+}
+
+static PetscErrorCode SaveState(Mat F, Archive *archive)
+{
+  KluPair     *k      = Data(F);
+  Pivots       pivots = k->numeric ? Pivots::Found : k->panels_used ? Pivots::Planned : Pivots::None;
+  bool         panels = k->panels != nullptr;
+  KluPairState state  = *k;
+
+  PetscFunctionBegin;
+  archive->plain(state);
+  archive->plain(pivots);
+  archive->plain(panels);
+  archive->list(k->analysed);
+  archive->list(k->pivoted);
+  PetscFunctionReturn(0);
+}
+
+/* The pivots again from the matrix that they were found with, and the panels that had been built for them */
+static PetscErrorCode RepeatPivots(Mat F, const LinearRows &rows, Pivots pivots, bool panels, bool *good)
+{
+  KluPair *k = Data(F);
+
+  PetscFunctionBegin;
+  *good = pivots == Pivots::None;
+  if (pivots == Pivots::Planned) PetscCall(FactorAsPlanned(F, rows, good));
+  if (pivots != Pivots::Found) PetscFunctionReturn(0);
+  PetscCall(FactorWithPivoting(rows, k));
+  *good = k->numeric != NULL;
+  if (!*good || !panels) PetscFunctionReturn(0);
+  k->panels = std::make_shared<KluPanels>();
+  PetscCall(KluPanelsBuild(rows, k, k->panels.get(), good));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
+{
+  KluPair                 *k = Data(F);
+  LinearRows               rows, old;
+  KluPairState             state;
+  Pivots                   pivots = Pivots::None;
+  bool                     panels = false, good;
+  std::vector<PetscScalar> analysed, pivoted;
+  double                   growth;
+
+  PetscFunctionBegin;
+  archive->plain(state);
+  archive->plain(pivots);
+  archive->plain(panels);
+  archive->list(analysed);
+  archive->list(pivoted);
+  PetscCall(KluPairGetRows(A, &rows));
+  const size_t entries = rows.start[rows.n];
+  *same = (PetscBool)(archive->good && analysed.size() == entries && (pivoted.empty() || pivoted.size() == entries));
+  if (*same) {
+    old     = rows;
+    old.val = analysed.data();
+    PetscCall(Analyse(A, old, k));
+    if (!pivoted.empty()) old.val = pivoted.data();
+    PetscCall(RepeatPivots(F, old, pivots, panels, &good));
+    if (good && state.old_pivots) PetscCall(FactorWithOldPivots(rows, k, &growth));
+    if (good) static_cast<KluPairState &>(*k) = state;
+    k->values = 0; /* of a matrix before this one */
+    *same     = (PetscBool)good;
+  }
+  PetscCall(KluPairRestoreRows(A, &rows));
+  F->factorerrortype = *same ? MAT_FACTOR_NOERROR : MAT_FACTOR_OTHER;
   PetscFunctionReturn(0);
 }
 
@@ -425,7 +515,8 @@ static PetscErrorCode Destroy(Mat F)
   KLU(free_symbolic)(&k->symbolic, &k->common);
   delete k;
   F->data = NULL;
-  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", NULL));
+  for (const char *name : {"MatFactorGetSolverType_C", LINEAR_SAVE_STATE, LINEAR_LOAD_STATE})
+    PetscCall(PetscObjectComposeFunction((PetscObject)F, name, NULL));
   PetscFunctionReturn(0);
 }
 
@@ -453,6 +544,8 @@ PetscErrorCode LinearKLUPairFactor(Mat A, MatFactorType type, Mat *factor)
   PetscCall(PetscStrallocpy(LINEAR_KLUPAIR, &F->solvertype));
   PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
   PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", GetSolverType));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, LINEAR_SAVE_STATE, SaveState));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, LINEAR_LOAD_STATE, LoadState));
   *factor = F;
   PetscFunctionReturn(0);
 }

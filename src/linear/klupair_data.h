@@ -22,7 +22,17 @@ struct KluPanels; /* klupair_panels.h */
 
 enum KluPairOrdering { KLUPAIR_AUTO, KLUPAIR_AMD, KLUPAIR_METIS };
 
-struct KluPair {
+/* What the next factorization goes by, besides the pivots: saved and restored as it is */
+struct KluPairState {
+  double   tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
+  double   growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
+  bool     panels_looked = false, panels_used = false, plan_tried = false;
+  bool     old_pivots    = false; /* the last factorization went with the pivots of another matrix */
+  PetscInt panels_made   = 0;     /* factorizations by panels */
+  PetscInt analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
+};
+
+struct KluPair : KluPairState {
   KLU(common) common;
   KLU(symbolic) *symbolic = NULL;
   KLU(numeric) *numeric   = NULL;
@@ -45,17 +55,13 @@ struct KluPair {
   LinearWork   work;                               /* foreseen for L of the symmetrized pattern */
   double       path_columns = 0, path_entries = 0; /* columns of L that the ends reach, and entries in them */
   const char  *ordering_used = "";
-  double       tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
-  double       growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
+  /* Values of the matrices that were analysed, and whose pivots are in use: from them comes all that a factor takes over */
+  std::vector<PetscScalar> analysed, pivoted;
   /* Dense panels for the pivots of `numeric`, whose own values are old while panels_used, or without it for those planned */
   std::shared_ptr<KluPanels> panels;
   PetscBool                  panels_wanted = PETSC_TRUE;
-  bool                       panels_looked = false, panels_used = false, plan_tried = false;
-  PetscInt                   panels_made = 0; /* factorizations by panels */
 
   bool factored() const { return numeric || panels_used; }
-
-  PetscInt analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
 };
 
 inline KluInt *KluIndices(const PetscInt *i) { return reinterpret_cast<KluInt *>(const_cast<PetscInt *>(i)); }

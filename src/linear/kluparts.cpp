@@ -7,6 +7,7 @@
 
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
+#include "linear.h"
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
@@ -321,6 +322,50 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscFunctionReturn(0);
 }
 
+/* ---- state ---- */
+
+static PetscErrorCode SaveState(Mat F, Archive *archive)
+{
+  KluParts     *p     = Data(F);
+  KluPartsState state = *p;
+
+  PetscFunctionBegin;
+  archive->plain(state);
+  archive->list(p->moved);
+  if (p->factor) PetscTryMethod(p->factor, LINEAR_SAVE_STATE, (Mat, Archive *), (p->factor, archive));
+  PetscFunctionReturn(0);
+}
+
+/* The same interface, the interior's factor as it was, and from both the Schur complement */
+static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
+{
+  KluParts     *p = Data(F);
+  KluPartsState state;
+  PetscInt      row;
+  PetscBool     finite;
+
+  PetscFunctionBegin;
+  archive->plain(state);
+  archive->list(p->moved);
+  PetscCall(Analyse(F, A, p));
+  *same = (PetscBool)archive->good;
+  if (*same && p->factor)
+    PetscTryMethod(p->factor, LINEAR_LOAD_STATE, (Mat, Mat, Archive *, PetscBool *), (p->factor, p->inner, archive, same));
+  if (p->klu && !p->klu->numeric) *same = PETSC_FALSE;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, p->comm));
+  F->factorerrortype = MAT_FACTOR_OTHER;
+  p->matrix          = 0; /* looked at anew unless all goes well */
+  if (!*same) PetscFunctionReturn(0);
+  static_cast<KluPartsState &>(*p) = state;
+  PetscCall(PartsFindReach(p));
+  PetscCall(PartsFactorSchur(p, &row, &finite));
+  *same = (PetscBool)(finite && row < 0);
+  if (!*same) PetscFunctionReturn(0);
+  F->factorerrortype = MAT_FACTOR_NOERROR;
+  PetscCall(PetscObjectGetId((PetscObject)A, &p->matrix));
+  PetscFunctionReturn(0);
+}
+
 /* ---- solve ---- */
 
 static PetscErrorCode MatSolve_KLUParts(Mat F, Vec b, Vec x)
@@ -438,7 +483,8 @@ static PetscErrorCode Destroy(Mat F)
   PetscFunctionBegin;
   PetscCall(Delete(PetscObjectComm((PetscObject)F), Data(F)));
   F->data = NULL;
-  PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", NULL));
+  for (const char *name : {"MatFactorGetSolverType_C", LINEAR_SAVE_STATE, LINEAR_LOAD_STATE})
+    PetscCall(PetscObjectComposeFunction((PetscObject)F, name, NULL));
   PetscFunctionReturn(0);
 }
 
@@ -464,6 +510,8 @@ static PetscErrorCode MatGetFactor_KLUParts(Mat A, MatFactorType type, Mat *fact
   PetscCall(PetscStrallocpy(LINEAR_KLUPARTS, &F->solvertype));
   PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
   PetscCall(PetscObjectComposeFunction((PetscObject)F, "MatFactorGetSolverType_C", GetSolverType));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, LINEAR_SAVE_STATE, SaveState));
+  PetscCall(PetscObjectComposeFunction((PetscObject)F, LINEAR_LOAD_STATE, LoadState));
   *factor = F;
   PetscFunctionReturn(0);
 }

@@ -46,7 +46,15 @@ struct PartsSplit {
   std::vector<PetscMPIInt> counts, first;
 };
 
-struct KluParts {
+/* What the next factorization goes by, besides the interior's factor: saved and restored as it is */
+struct KluPartsState {
+  PetscInt  factorizations = 0; /* of the interior with new pivots, when the reach was found */
+  PetscReal checked_rcond  = 0; /* KLU's rough measure when a solve was last checked */
+  PetscReal residual       = 0; /* of that solve: the largest part of what a row sums up */
+  PetscInt  checks = 0, splits = 0;
+};
+
+struct KluParts : KluPartsState {
   MPI_Comm    comm;
   PetscMPIInt rank, size;
   PartsSplit  split;
@@ -73,11 +81,6 @@ struct KluParts {
   std::vector<PetscReal>    row_scale, col_scale;
   std::vector<PetscBLASInt> pivots;
   std::vector<PetscScalar>  work, top, top_local; /* interior; interface; of it `local` */
-
-  PetscInt  factorizations = 0; /* of the interior with new pivots, when the reach was found */
-  PetscReal checked_rcond  = 0; /* KLU's rough measure when a solve was last checked */
-  PetscReal residual       = 0; /* of that solve: the largest part of what a row sums up */
-  PetscInt  checks = 0, splits = 0;
 };
 
 /* ---- kluparts_interface.cpp ---- */

@@ -5,6 +5,7 @@
 #ifndef HHTDAE_LINEAR_H
 #define HHTDAE_LINEAR_H
 
+#include "archive.h"
 #include <petscksp.h>
 
 /* What the user settled, and what was chosen in its place; one per integrator */
@@ -24,6 +25,22 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
 /* Once the Newton matrix P has its first values: the package and factorization, where the user chose none.
    The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);
+
+/* The same where a run goes on with the solver that it had: package and factorization are not looked for anew. */
+PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice);
+
+/*
+  What a factor takes over from the matrices before: pivots and orderings that were chosen for their values. LinearSaveState() notes
+  it, each rank its own. LinearLoadState() puts a factor that was set up with P into that state, so that it has the same bits and will
+  choose alike with the matrices to come; *same = PETSC_FALSE where this cannot be had: PETSc's own packages and preconditioners, of which
+  it is not known what they keep, and MUMPS on several ranks (mumpsnd.h). Without *usable the factor has to be made anew. Both collective.
+*/
+PetscErrorCode LinearSaveState(KSP ksp, Archive *archive);
+PetscErrorCode LinearLoadState(KSP ksp, Mat P, Archive *archive, PetscBool *same, PetscBool *usable);
+
+/* Functions of a factor by these names, (Mat F, Archive *) and (Mat F, Mat P, Archive *, PetscBool *same) */
+#define LINEAR_SAVE_STATE "LinearSaveState_C"
+#define LINEAR_LOAD_STATE "LinearLoadState_C"
 
 /* Whether A holds one triangle of a symmetric matrix, MATSBAIJ: its rows are upper parts of rows, and KLU cannot read it */
 PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle);

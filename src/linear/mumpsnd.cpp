@@ -9,6 +9,7 @@
 #include <petsc/private/matimpl.h>
 
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
+#include "linear.h"
 #include "mumpsnd_data.h"
 
 /* Rows below this, relative to the scaled matrix, count as null: redundant constraints leave rounding there */
@@ -205,6 +206,44 @@ static PetscErrorCode CholeskyFactorSymbolic(Mat F, Mat A, IS row, const MatFact
   return FactorSymbolic(F, A, row);
 }
 
+/* ---- state ---- */
+
+/* Pivots are chosen anew with every matrix, but the analysis has ordered the unknowns by the values of its own one */
+static PetscErrorCode SaveState(Mat F, Archive *archive)
+{
+  MumpsND  *m         = Data(F);
+  MUMPS_INT ordering  = m->icntl(7), workspace = m->icntl(14);
+
+  PetscFunctionBegin;
+  archive->plain(ordering);
+  archive->plain(workspace);
+  archive->plain(m->ordering);
+  archive->list(m->position);
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
+{
+  MumpsND  *m        = Data(F);
+  MUMPS_INT ordering = 0, workspace = 0;
+
+  PetscFunctionBegin;
+  archive->plain(ordering);
+  archive->plain(workspace);
+  archive->plain(m->ordering);
+  archive->list(m->position);
+  *same = (PetscBool)(archive->good && (ordering != 1 || m->rank || m->position.size() == (size_t)m->id.n));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, m->comm));
+  if (!*same) PetscFunctionReturn(0);
+  PetscCall(MumpsNDDropScatter(m));
+  m->icntl(14) = workspace;
+  MumpsNDAnalyseAgain(m, ordering);
+  PetscCall(ReportError(F, A, "analysis"));
+  if (!F->factorerrortype) PetscCall(FactorNumeric(F, A, NULL));
+  *same = (PetscBool)(!F->factorerrortype && m->size == 1);
+  PetscFunctionReturn(0);
+}
+
 /* ---- what can be asked of the factor ---- */
 
 static PetscErrorCode GetIcntl(Mat F, PetscInt i, PetscInt *value) { return *value = Data(F)->icntl((int)i), 0; }
@@ -264,7 +303,7 @@ static PetscErrorCode View(Mat F, PetscViewer viewer)
 
 static const char *const composed[] = {"MatFactorGetSolverType_C", "MatMumpsSetIcntl_C", "MatMumpsGetIcntl_C",
                                        "MatMumpsSetCntl_C",        "MatMumpsGetCntl_C",  "MatMumpsGetInfog_C",
-                                       "MatMumpsGetRinfog_C"};
+                                       "MatMumpsGetRinfog_C",      LINEAR_SAVE_STATE,    LINEAR_LOAD_STATE};
 
 static PetscErrorCode Compose(Mat F)
 {
@@ -278,6 +317,8 @@ static PetscErrorCode Compose(Mat F)
   PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetCntl_C", GetCntl));
   PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetInfog_C", GetInfog));
   PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetRinfog_C", GetRinfog));
+  PetscCall(PetscObjectComposeFunction(f, LINEAR_SAVE_STATE, SaveState));
+  PetscCall(PetscObjectComposeFunction(f, LINEAR_LOAD_STATE, LoadState));
   PetscFunctionReturn(0);
 }
 

@@ -6,6 +6,7 @@
 #include "linear.h"
 #include "mumpsnd_data.h"
 #include <cstring>
+#include <string>
 #include <unordered_set>
 
 static_assert(sizeof(MUMPS_INT) == sizeof(int), "MUMPS with 64-bit integers throughout is not supported");
@@ -153,6 +154,14 @@ static PetscErrorCode AnalyseBest(Mat A, MumpsND *m)
   PetscCall(PetscInfo(A, "Operations foreseen by MUMPS: %g with METIS, %g with its own ordering\n", m->rinfog(1), own));
   if (!failed && (m->infog(1) < 0 || m->rinfog(1) > own)) AnalyseBuiltIn(m, automatic);
   PetscFunctionReturn(0);
+}
+
+void MumpsNDAnalyseAgain(MumpsND *m, MUMPS_INT ordering)
+{
+  if (ordering == 1)
+    AnalyseGiven(m, std::string(m->ordering).c_str());
+  else
+    AnalyseBuiltIn(m, ordering);
 }
 
 PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m)

@@ -42,6 +42,9 @@ inline void MumpsRun(MumpsND *m, MumpsJob job)
 /* Runs the analysis of A, whose pattern m holds, with the ordering given by PETSc or else the best we can get */
 PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m);
 
+/* The analysis once more, with ICNTL(7) as it was and the positions that m has */
+void MumpsNDAnalyseAgain(MumpsND *m, MUMPS_INT ordering);
+
 /* Solves with one right-hand side and with many; the scatter of solutions holds for one factorization */
 void           MumpsNDSetSolves(Mat F);
 PetscErrorCode MumpsNDDropScatter(MumpsND *m);

@@ -50,6 +50,62 @@ std::vector<Step> record(Simulation &run)
   return steps;
 }
 
+void sameCounters(const TSHHT3Statistics &a, const TSHHT3Statistics &b)
+{
+  EXPECT_EQ(a.steps, b.steps);
+  EXPECT_EQ(a.rejected, b.rejected);
+  EXPECT_EQ(a.newton, b.newton);
+  EXPECT_EQ(a.residuals, b.residuals);
+  EXPECT_EQ(a.jacobians, b.jacobians);
+  EXPECT_EQ(a.factorizations, b.factorizations);
+  EXPECT_EQ(a.solves, b.solves);
+  EXPECT_EQ(a.corrector_fails, b.corrector_fails);
+  EXPECT_EQ(a.retries, b.retries);
+  EXPECT_EQ(a.restarts, b.restarts);
+  EXPECT_EQ(a.h_min, b.h_min);
+  EXPECT_EQ(a.h_max, b.h_max);
+}
+
+/* A run with checkpoints against one without */
+void unchanged(const Problem &p, const std::string &options, int every)
+{
+  SCOPED_TRACE(p.name + " " + options);
+  const File              file("unchanged");
+  Simulation              plain(p, options);
+  const std::vector<Step> steps = record(plain);
+  Simulation              writing(p, options + text(" -ts_hhtdae_checkpoint %s -ts_hhtdae_checkpoint_every %d ", file.name.c_str(), every));
+  EXPECT_TRUE(record(writing) == steps);
+  sameCounters(plain.statistics(), writing.statistics());
+  EXPECT_GT(file.read().size(), 100u);
+}
+
+/* Resumed at every step between two, from a checkpoint that step has left */
+void repeatEach(const Problem &p, const std::string &options, int first, int last)
+{
+  SCOPED_TRACE(p.name + " " + options);
+  const File              running("each");
+  std::vector<Step>       steps;
+  std::vector<std::string> files(last + 2);
+  Simulation              whole_run(p, options + text(" -ts_hhtdae_checkpoint %s -ts_hhtdae_checkpoint_every 1 ", running.name.c_str()));
+  whole_run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (step) steps.push_back({t, r.u(), r.v(), r.a()});
+    if (step > first && step <= last + 1) files[step - 1] = running.read();
+  };
+  must(whole_run.solve());
+  ASSERT_GT((int)steps.size(), last + 5);
+  int different = 0;
+  for (int k = first; k <= last; k++) {
+    const File file("one");
+    file.write(files[k]);
+    Simulation              resumed(p, options + " -ts_hhtdae_resume " + file.name);
+    const std::vector<Step> rest = record(resumed);
+    const size_t            left = steps.size() - k;
+    ASSERT_GE(rest.size(), left);
+    if (!std::equal(steps.begin() + k, steps.end(), rest.end() - left)) different++;
+  }
+  EXPECT_EQ(different, 0) << "of " << last - first + 1;
+}
+
 void repeat(const Problem &p, const std::string &options, int every, int interrupted)
 {
   SCOPED_TRACE(p.name + " " + options);
@@ -60,7 +116,7 @@ void repeat(const Problem &p, const std::string &options, int every, int interru
   std::vector<Step> steps;
   whole_run.watch = [&](Simulation &r, PetscInt step, double t) {
     if (step) steps.push_back({t, r.u(), r.v(), r.a()});
-    if (step == interrupted) kept.write(running.read());
+    if (step == interrupted + 1) kept.write(running.read()); /* written at the beginning of this step */
   };
   must(whole_run.solve());
   ASSERT_GT((int)steps.size(), interrupted + 5);
@@ -74,19 +130,7 @@ void repeat(const Problem &p, const std::string &options, int every, int interru
   size_t different = 0;
   for (size_t k = offset; k < rest.size(); k++) different += !(rest[k] == steps[interrupted + k - offset]);
   EXPECT_EQ(different, (size_t)0) << "of " << rest.size();
-  const TSHHT3Statistics a = whole_run.statistics(), b = resumed.statistics();
-  EXPECT_EQ(a.steps, b.steps);
-  EXPECT_EQ(a.rejected, b.rejected);
-  EXPECT_EQ(a.newton, b.newton);
-  EXPECT_EQ(a.residuals, b.residuals);
-  EXPECT_EQ(a.jacobians, b.jacobians);
-  EXPECT_EQ(a.factorizations, b.factorizations);
-  EXPECT_EQ(a.solves, b.solves);
-  EXPECT_EQ(a.corrector_fails, b.corrector_fails);
-  EXPECT_EQ(a.retries, b.retries);
-  EXPECT_EQ(a.restarts, b.restarts);
-  EXPECT_EQ(a.h_min, b.h_min);
-  EXPECT_EQ(a.h_max, b.h_max);
+  sameCounters(whole_run.statistics(), resumed.statistics());
   PetscInt na, nb;
   must(TSGetStepNumber(whole_run.ts, &na));
   must(TSGetStepNumber(resumed.ts, &nb));
@@ -94,6 +138,16 @@ void repeat(const Problem &p, const std::string &options, int every, int interru
   MEASURED("%-14s %-40s resumed after step %d: %d steps repeated, %d of them with other bits", p.name.c_str(),
            options.c_str(), interrupted, (int)(rest.size() - offset), (int)different);
 }
+
+/* The same numbers of unknowns and roles, but a wind of 1e-6 N */
+struct Blown : Pendulum {
+  using Pendulum::Pendulum;
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    Pendulum::residual(t, u, v, a, f);
+    f[0] -= 1e-6;
+  }
+};
 
 /* The error of resuming from a file with these bytes; empty if it was taken */
 std::string refusal(const Problem &p, const std::string &bytes, const std::string &options = "")
@@ -129,6 +183,36 @@ TEST(Checkpoint, PaperFormAndRadius)
 {
   repeat(DoublePendulum(1.), tolerance(1e-6) + "-ts_hhtdae_form paper ", 20, 60);
   repeat(DoublePendulum(1.), tolerance(1e-6) + "-ts_hhtdae_radius 0.8 ", 20, 60);
+}
+
+TEST(Checkpoint, WritingChangesNothing)
+{
+  unchanged(Andrews(.02), tolerance(1e-6), 7);
+  unchanged(UserVars(2.), tolerance(1e-5), 1);
+  unchanged(Oscillators({1., 5.}, {0., .1}, true, 5.), tolerance(1e-5), 5);
+  unchanged(Sleigh(5.), tolerance(1e-6), 3);
+  unchanged(FourBar(2, 3.), tolerance(1e-5), 4);
+  unchanged(DoublePendulum(1.), tolerance(1e-6) + "-ts_hhtdae_form paper ", 4);
+  unchanged(Pendulum(-90., 0., 2.), fixedSteps(.01), 10);
+}
+
+/* Whatever the state of the matrix, of the corrector and of the predictor */
+TEST(Checkpoint, AfterEveryStep)
+{
+  repeatEach(Andrews(.02), tolerance(1e-6), 1, 120);
+  repeatEach(UserVars(2.), tolerance(1e-5), 1, 60);
+  repeatEach(FourBar(2, 3.), tolerance(1e-5), 1, 60);
+  repeatEach(Sleigh(5.), tolerance(1e-6), 1, 60);
+}
+
+/* The solvers that it may be, and an option that rules the reuse of matrices */
+TEST(Checkpoint, OtherSolvers)
+{
+  for (const char *options : {"-pc_type lu -pc_factor_mat_solver_type mumpsnd ", "-pc_type lu -pc_factor_mat_solver_type klupair ", "-pc_factor_mat_solver_type klupair ",
+                              "-snes_lag_jacobian 3 ", "-ts_adapt_type none -ts_dt 1e-4 "}) {
+    repeat(Andrews(.02), tolerance(1e-6) + options, 50, 100);
+    unchanged(Andrews(.02), tolerance(1e-6) + options, 20);
+  }
 }
 
 TEST(Checkpoint, FixedSteps) { repeat(Pendulum(-90., 0., 2.), fixedSteps(.01), 30, 90); }
@@ -172,10 +256,17 @@ TEST(Checkpoint, ForeignFilesAreRefused)
   EXPECT_NE(refusal(UserVars(), good).find("3 unknowns"), std::string::npos);
   EXPECT_NE(refusal(p, good, "-ts_hhtdae_alpha -0.1 ").find("give the same options"), std::string::npos);
   EXPECT_NE(refusal(p, good, "-ts_hhtdae_form paper ").find("give the same options"), std::string::npos);
-  std::string other_version = good;
-  other_version[7]++;
+  EXPECT_NE(refusal(Blown(-90., 0., 2.), good).find("another problem"), std::string::npos);
+  std::string other_version = good, other_ranks = good, old = good;
+  other_version[8]++;
   seal(other_version);
-  EXPECT_NE(refusal(p, other_version), "");
+  EXPECT_NE(refusal(p, other_version).find("version"), std::string::npos);
+  other_ranks[12]++;
+  seal(other_ranks);
+  EXPECT_NE(refusal(p, other_ranks).find("ranks"), std::string::npos);
+  old.replace(0, 8, std::string("\x00\x12\x7b\xaa\x00\x00\x00\x03", 8));
+  seal(old);
+  EXPECT_NE(refusal(p, old).find("version 3"), std::string::npos);
 }
 
 TEST(Checkpoint, MissingFileIsAnError)

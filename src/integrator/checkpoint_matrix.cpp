@@ -1,0 +1,217 @@
+/*
+  The Newton matrix in a checkpoint: the values of its rows, and what the solver keeps. It is not evaluated again, because the application
+  may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
+*/
+#include "impl.h"
+#include "linear/archive.h"
+#include <cstdint>
+
+namespace hht3
+{
+
+namespace
+{
+
+struct MatrixState {
+  PetscBool there      = PETSC_FALSE; /* its values are in the file */
+  PetscBool cholesky   = PETSC_FALSE;
+  PetscBool chosen     = PETSC_FALSE; /* a linear solver was */
+  char      package[64] = "";
+};
+
+PetscErrorCode GivesRows(Mat A, PetscBool *yes)
+{
+  PetscBool foreign;
+
+  PetscFunctionBegin;
+  PetscCall(MatHasOperation(A, MATOP_GET_ROW, yes));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, ""));
+  if (foreign) *yes = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Rows(Mat A, std::vector<PetscScalar> &values, std::vector<PetscInt> &columns)
+{
+  PetscInt           begin, end, n;
+  const PetscInt    *col;
+  const PetscScalar *val;
+
+  PetscFunctionBegin;
+  values.clear();
+  columns.clear();
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  PetscCall(MatGetRowUpperTriangular(A));
+  for (PetscInt i = begin; i < end; i++) {
+    PetscCall(MatGetRow(A, i, &n, &col, &val));
+    values.insert(values.end(), val, val + n);
+    columns.push_back(n);
+    columns.insert(columns.end(), col, col + n);
+    PetscCall(MatRestoreRow(A, i, &n, &col, &val));
+  }
+  PetscCall(MatRestoreRowUpperTriangular(A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+std::uint64_t Hash(const std::vector<PetscInt> &x)
+{
+  std::uint64_t sum = 14695981039346656037ull;
+  for (const PetscInt i : x) sum = (sum ^ (std::uint64_t)i) * 1099511628211ull;
+  return sum;
+}
+
+PetscErrorCode SetRows(Mat A, const std::vector<PetscScalar> &values, const std::vector<PetscInt> &columns)
+{
+  PetscInt           begin, end;
+  const PetscInt    *col = columns.data();
+  const PetscScalar *val = values.data();
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt i = begin; i < end; i++) {
+    const PetscInt n = *col++;
+    PetscCall(MatSetValues(A, 1, &i, n, col, val, INSERT_VALUES));
+    col += n;
+    val += n;
+  }
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SaveRows(Mat A, Archive &a)
+{
+  std::vector<PetscScalar> values;
+  std::vector<PetscInt>    columns;
+
+  PetscFunctionBegin;
+  PetscCall(Rows(A, values, columns));
+  std::uint64_t pattern = Hash(columns);
+  a.plain(pattern);
+  a.list(values);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrix takes the values if it has the pattern that they belong to, on all ranks */
+PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
+{
+  std::vector<PetscScalar> values, now;
+  std::vector<PetscInt>    columns;
+  std::uint64_t            pattern = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Rows(A, now, columns));
+  a.plain(pattern);
+  a.list(values);
+  int same = a.good && values.size() == now.size() && pattern == Hash(columns);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  *good = same;
+  if (same) PetscCall(SetRows(A, values, columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* In the state at hand, for the pattern alone */
+PetscErrorCode MakePattern(TS ts, Mat J, Mat P)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+
+  PetscFunctionBegin;
+  PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, ShiftV(I.p, I.h), ShiftA(I.p, I.h), J, P));
+  I.stat = saved;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The factor of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
+PetscErrorCode LoadFactor(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
+{
+  Integrator    &I = Get(ts);
+  PC             pc;
+  PCFailedReason reason;
+  PetscBool      usable = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  *same = PETSC_FALSE;
+  if (!m.chosen) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPSetOperators(ksp, J, P));
+  PetscCall(LinearChooseAgain(ksp, P, m.package, m.cholesky, &I.linear));
+  I.linear_chosen = PETSC_TRUE;
+  PetscCall(KSPSetUp(ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetFailedReason(pc, &reason));
+  int factored = !reason;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &factored, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  *good = factored;
+  if (!factored) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LinearLoadState(ksp, P, &a, same, &usable));
+  *good = usable;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nothing of the matrix survives */
+void Renew(Integrator &I)
+{
+  I.corrector.have_matrix = PETSC_FALSE;
+  I.corrector.want_matrix = PETSC_TRUE;
+  I.corrector.rate        = -1;
+}
+
+} // namespace
+
+PetscErrorCode SaveMatrix(TS ts, Archive &a)
+{
+  Integrator   &I = Get(ts);
+  MatrixState   m;
+  Mat           J, P;
+  KSP           ksp;
+  PC            pc;
+  MatSolverType package = NULL;
+  PetscBool     rows;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(GivesRows(P, &m.there));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (package) PetscCall(PetscStrncpy(m.package, package, sizeof(m.package)));
+  m.chosen   = I.linear_chosen;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &m.cholesky));
+  a.plain(m);
+  if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SaveRows(P, a));
+  PetscCall(GivesRows(J, &rows));
+  if (J != P && rows) PetscCall(SaveRows(J, a));
+  PetscCall(LinearSaveState(ksp, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode LoadMatrix(TS ts, Archive &a)
+{
+  Integrator &I = Get(ts);
+  MatrixState m;
+  Mat         J, P;
+  KSP         ksp;
+  PetscBool   rows, same = PETSC_FALSE;
+  bool        good = true;
+
+  PetscFunctionBegin;
+  a.plain(m);
+  PetscCall(SNESSetUp(ts->snes));
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(GivesRows(J, &rows));
+  if (m.there) {
+    PetscCall(MakePattern(ts, rows ? J : P, P));
+    PetscCall(LoadRows(ts, P, a, &good));
+    if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
+    if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
+    if (good) PetscCall(LoadFactor(ts, ksp, J, P, m, a, &same, &good));
+  } else good = false;
+  if (!good) Renew(I);
+  if (!same)
+    PetscCall(PetscInfo(ts, "resumed with %s: the run agrees with the uninterrupted one to the tolerance, maybe not bit for bit\n",
+                        good ? "a linear solver that does not promise the same bits" : "a new Newton matrix, as the last one cannot be restored"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,68 @@
+/* A sequence of bytes that is written and read by the same lines of code: what a checkpoint holds of one rank. */
+#ifndef HHTDAE_LINEAR_ARCHIVE_H
+#define HHTDAE_LINEAR_ARCHIVE_H
+
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <vector>
+
+class Archive
+{
+public:
+  std::vector<char> data;
+  bool              reading = false;
+  bool              good    = true; /* all that was read so far was there, and of the size it should have */
+
+  /* Whole structs: a field added to one is kept without another line */
+  template <class T> void plain(T &x)
+  {
+    static_assert(std::is_trivially_copyable<T>::value, "only plain structs are saved as they are");
+    std::uint64_t size = sizeof(T);
+    bytes(&size, sizeof size);
+    if (size != sizeof(T)) good = false;
+    bytes(&x, sizeof(T));
+  }
+
+  template <class T> void list(std::vector<T> &x)
+  {
+    static_assert(std::is_trivially_copyable<T>::value, "only plain structs are saved as they are");
+    std::uint64_t size = sizeof(T), count = x.size();
+    bytes(&size, sizeof size);
+    bytes(&count, sizeof count);
+    if (size != sizeof(T) || (reading && count > (data.size() - at_) / sizeof(T))) good = false;
+    if (!good) return;
+    x.resize(count);
+    bytes(x.data(), count * sizeof(T));
+  }
+
+  /* An array whose length is known on both sides */
+  template <class T> void array(T *x, std::size_t count)
+  {
+    std::uint64_t n = count;
+    bytes(&n, sizeof n);
+    if (n != count) good = false;
+    bytes(x, count * sizeof(T));
+  }
+
+private:
+  std::size_t at_ = 0;
+
+  void bytes(void *x, std::size_t n)
+  {
+    if (!good || !n) return;
+    if (!reading) {
+      const char *from = static_cast<const char *>(x);
+      data.insert(data.end(), from, from + n);
+      return;
+    }
+    if (n > data.size() - at_) {
+      good = false;
+      return;
+    }
+    std::memcpy(x, data.data() + at_, n);
+    at_ += n;
+  }
+};
+
+#endif
