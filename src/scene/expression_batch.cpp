@@ -1,6 +1,7 @@
 #include "expression_batch.h"
 #include <cmath>
 #include <sstream>
+#include <stdexcept>
 
 namespace hhtdae
 {
@@ -25,13 +26,23 @@ void LocalFunction::report(const Evaluation &e, int piece, const Real *m, double
                                             e.t, text.str().c_str()));
 }
 
+/* The user's function, with its name in what it throws */
+Real LocalFunction::call(const Piece &p, const Real *m) const
+{
+  try {
+    return p.f(m);
+  } catch (const std::exception &e) {
+    throw std::runtime_error(name_ + ": " + e.what());
+  }
+}
+
 void LocalFunction::value(const Evaluation &e, double *f) const
 {
   Real m[16];
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];
     for (int k = 0; k < p.count; k++) m[k] = Real(arguments.value(p.first + k, e));
-    f[c] = p.f(m).value();
+    f[c] = call(p, m).value();
     if (!std::isfinite(f[c])) report(e, c, m, f[c]);
   }
 }
@@ -43,9 +54,12 @@ void LocalFunction::gradient(const Evaluation &e, double *f, Gradient &G) const
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];
     for (int k = 0; k < p.count; k++) m[k] = Real(arguments.value(p.first + k, e), p.count, k);
-    const Real x = p.f(m);
+    const Real x = call(p, m);
     f[c]         = x.value();
     if (x.derivatives().size() == 0) continue; /* a constant */
+    if (x.derivatives().size() != p.count)
+      throw std::runtime_error(name_ + " came back with " + std::to_string(x.derivatives().size()) + " derivatives for " + std::to_string(p.count) +
+                               " arguments: make its value from the arguments, or from plain numbers");
     for (int k = 0; k < p.count; k++) arguments.addGradient(p.first + k, e, x.derivatives()(k), G.row(c).data());
   }
 }

@@ -31,6 +31,7 @@ private:
   std::string        name_; /* "variable speed", for messages */
   std::vector<Piece> pieces_;
 
+  Real call(const Piece &p, const Real *m) const;
   void report(const Evaluation &e, int piece, const Real *m, double f) const;
 };
 

@@ -122,7 +122,8 @@ PetscErrorCode Test(TS ts, PetscReal, Vec U, Vec V, PetscBool *change, void *ctx
   PetscCall(ChooseNext(R, U, V));
   int any = !R.next_body.empty();
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
-  *change = any ? PETSC_TRUE : PETSC_FALSE;
+  R.changing = any;
+  *change    = any ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
 
@@ -162,6 +163,19 @@ PetscErrorCode Map(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
   PetscFunctionReturn(0);
 }
 
+/* A checkpoint has been loaded: the tolerances as the run had set them in its first step, and the rest of the vector */
+PetscErrorCode Resume(Runtime &R, TS ts)
+{
+  double *x;
+  PetscFunctionBegin;
+  PetscCall(AngleTolerances(R, ts));
+  PetscCall(VecGetArray(R.axes, &x));
+  const std::vector<double> end(x + 4 * R.bodies.own + Memories(R), x + 4 * R.bodies.own + Memories(R) + kept);
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscCall(ReadKept(R, end.data()));
+  PetscFunctionReturn(0);
+}
+
 /* New axes into the vector, and from it to where they are used; also after a checkpoint has been loaded */
 PetscErrorCode Commit(TS ts, void *ctx)
 {
@@ -178,6 +192,18 @@ PetscErrorCode Commit(TS ts, void *ctx)
   R.next_body.clear();
   R.next_axes.clear();
   PetscCall(UseAxes(R));
+  if (!R.changing) PetscCall(Resume(R, ts));
+  R.changing = false;
+  PetscFunctionReturn(0);
+}
+
+/* Before a checkpoint is written */
+PetscErrorCode Prepare(TS ts)
+{
+  void *ctx;
+  PetscFunctionBegin;
+  PetscCall(TSGetI2Function(ts, nullptr, nullptr, &ctx));
+  PetscCall(WriteKept(*static_cast<Runtime *>(ctx)));
   PetscFunctionReturn(0);
 }
 
@@ -195,9 +221,8 @@ PetscErrorCode MakeAxes(Runtime &R)
   R.remembers = global[1];
   PetscCall(VecDestroy(&R.axes));
   PetscCall(PetscSFDestroy(&R.axes_sf));
-  if (!R.turns && !R.remembers) PetscFunctionReturn(0);
   PetscCall(VecCreate(R.scene.comm, &R.axes));
-  PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R), PETSC_DETERMINE));
+  PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R) + kept, PETSC_DETERMINE));
   PetscCall(VecSetType(R.axes, VECSTANDARD));
   if (R.size > 1) PetscCall(MakeExchange(R));
   PetscCall(VecGetArray(R.axes, &x));
@@ -221,7 +246,6 @@ PetscErrorCode UseAxes(Runtime &R)
   double             *x;
   std::vector<double> other(4 * R.bodies.body.size());
   PetscFunctionBegin;
-  if (!R.axes) PetscFunctionReturn(0);
   PetscCall(VecGetArray(R.axes, &x));
   if (R.size > 1) {
     MPI_Datatype quaternion;
@@ -272,8 +296,9 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 PetscErrorCode AttachReframing(Runtime &R, TS ts)
 {
   PetscFunctionBegin;
-  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns ? Map : nullptr, R.axes ? Commit : nullptr, &R));
-  if (R.axes) PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
+  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns ? Map : nullptr, Commit, &R));
+  PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
+  PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", Prepare));
   PetscFunctionReturn(0);
 }
 

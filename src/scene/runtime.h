@@ -52,7 +52,8 @@ struct Runtime {
   std::vector<double>   off_value;
   bool given = false;
   IS   roles[TSHHT3_NUM_ROLES] = {};
-  Vec  axes = nullptr;   /* quaternions of the axes of own rigid bodies, and memories: what a checkpoint has to keep */
+  Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
+  bool changing = false; /* between the test that asked for other axes and their commit */
   bool turns = false, remembers = false; /* on any rank: rigid bodies in space, elements with memory */
   Vec       rtol    = nullptr; /* relative tolerances, none for angles */
   PetscReal rtol_of = -1;
@@ -88,6 +89,10 @@ PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
+/* kept.cpp: the end of the vector of checkpoints, of that many entries */
+constexpr PetscInt kept = 56;
+PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
+PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read */
 /* step_limit.cpp: no step goes through a contact, or loses a turn of an angle */
 PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */
@@ -97,6 +102,9 @@ PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
 PetscErrorCode AttachOutput(Runtime &R, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
+constexpr PetscInt recorded = 52; /* numbers by which a recording goes on */
+PetscErrorCode     SaveOutput(Runtime &R, double *x);
+PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
 /* triangle.cpp: one triangle of the matrix, MATSBAIJ, where nothing breaks its symmetry */
 PetscErrorCode WantTriangle(Runtime &R);  /* before Layout() */
 PetscErrorCode StoreTriangle(Runtime &R); /* after it */

@@ -1,4 +1,5 @@
 /* The scene as a problem of PETSc's TS. */
+#include "guard.h"
 #include "runtime.h"
 
 namespace hhtdae
@@ -10,14 +11,14 @@ namespace
 PetscErrorCode I2Function(TS, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F));
+  PetscCall(Guarded([&] { return Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F); }));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode I2Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Jacobian(*static_cast<Runtime *>(ctx), t, U, V, A, sv, sa, P));
+  PetscCall(Guarded([&] { return Jacobian(*static_cast<Runtime *>(ctx), t, U, V, A, sv, sa, P); }));
   if (J != P) {
     PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
@@ -74,7 +75,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   Vec U, V, F;
   Mat J;
   PetscFunctionBegin;
-  PetscCall(setUp());
+  PetscCall(Guarded([&] { return setUp(); }));
   Runtime &R = *data_->run;
   PetscCall(VecCreate(data_->comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));

@@ -4,6 +4,7 @@
 */
 #include "scene/output/mesh.h"
 #include "scene/output/recorder.h"
+#include "scene/output/table.h"
 #include "scene/output/vtp.h"
 #include <cstdio>
 
@@ -31,7 +32,6 @@ public:
     for (std::size_t b = 0; b < R.scene.bodies.size(); b++) own_[R.number.owner.empty() ? 0 : R.number.owner[b]].push_back((PetscInt)b);
     if (R.rank) PetscFunctionReturn(0);
     mesh_ = MakeMesh(R.scene);
-    PetscCall(writeIndex());
     PetscFunctionReturn(0);
   }
 
@@ -44,9 +44,33 @@ public:
       char number[16];
       std::snprintf(number, sizeof number, "_%06d", (int)frame_);
       PetscCall(WriteVTP(prefix_ + number + ".vtp", frame(pose)));
+      if (!end_) PetscCall(writeIndex());
       PetscCall(writeIndex(e.t, base_ + number + ".vtp"));
     }
     frame_++;
+    PetscFunctionReturn(0);
+  }
+
+  int slot() const override { return 1; }
+
+  PetscErrorCode save(Runtime &, double *x) override
+  {
+    x[0] = frame_;
+    x[1] = (double)end_;
+    return 0;
+  }
+
+  /* Frames that come later are written over; their entries in the index go */
+  PetscErrorCode resume(Runtime &R, const double *x) override
+  {
+    bool there = false;
+    PetscFunctionBegin;
+    frame_ = (PetscInt)x[0];
+    end_   = (long)x[1];
+    if (R.rank || !end_) PetscFunctionReturn(0);
+    PetscCall(ShortenFile(prefix_ + ".pvd", end_, &there));
+    if (!there) end_ = 0;
+    else PetscCall(closeIndex());
     PetscFunctionReturn(0);
   }
 
@@ -111,6 +135,14 @@ private:
   }
 
   /* The index is whole after every frame: a new entry goes where the closing tags were. */
+  PetscErrorCode closeIndex()
+  {
+    long end;
+    PetscFunctionBegin;
+    PetscCall(AppendText(prefix_ + ".pvd", false, "</Collection>\n</VTKFile>\n", &end));
+    PetscFunctionReturn(0);
+  }
+
   PetscErrorCode writeIndex(double t = 0, const std::string &file = "")
   {
     const std::string name = prefix_ + ".pvd";
@@ -125,7 +157,8 @@ private:
     }
     end_ = std::ftell(out);
     std::fputs("</Collection>\n</VTKFile>\n", out);
-    PetscCheck(std::fclose(out) == 0, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "writing the animation's index %s failed", name.c_str());
+    const bool written = !std::ferror(out);
+    PetscCheck(std::fclose(out) == 0 && written, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "writing the animation's index %s failed", name.c_str());
     PetscFunctionReturn(0);
   }
 };

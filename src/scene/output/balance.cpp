@@ -5,6 +5,7 @@
 */
 #include "scene/output/energy.h"
 #include "scene/output/recorder.h"
+#include "scene/output/table.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -19,22 +20,11 @@ class BalanceSheet : public Task
 {
 public:
   BalanceSheet() : Task(0) {}
-  ~BalanceSheet() override
-  {
-    if (out_) std::fclose(out_);
-  }
 
-  PetscErrorCode open(Runtime &R, const std::string &file)
+  void begin(Runtime &R, const std::string &file)
   {
-    PetscFunctionBegin;
     writes_ = R.rank == 0;
-    if (!writes_) PetscFunctionReturn(0);
-    if (!file.empty()) {
-      out_ = std::fopen(file.c_str(), "w");
-      PetscCheck(out_, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write the balance into %s", file.c_str());
-    }
-    PetscCall(line("time,kinetic,gravity,elastic,total,drift,px,py,pz,Lx,Ly,Lz"));
-    PetscFunctionReturn(0);
+    file_   = file;
   }
 
   PetscErrorCode record(Runtime &R, Evaluation &e) override
@@ -42,8 +32,13 @@ public:
     Balance b;
     PetscFunctionBegin;
     PetscCall(MakeBalance(R, e, b));
-    if (done == 0) {
-      first_ = b;
+    if (!begun_) {
+      begun_ = true;
+      PetscCall(line("time,kinetic,gravity,elastic,total,drift,px,py,pz,Lx,Ly,Lz"));
+    }
+    if (!have_first_ || done == 0) {
+      have_first_ = true;
+      first_      = b;
       worst_ = largest_kinetic_ = linear_ = angular_ = 0;
     }
     const double drift = b.total() - first_.total();
@@ -63,24 +58,75 @@ public:
   PetscErrorCode finish(Runtime &R) override
   {
     PetscFunctionBegin;
-    if (out_) std::fflush(out_);
-    if (done == 0) PetscFunctionReturn(0);
+    PetscCall(flush());
+    if (!have_first_) PetscFunctionReturn(0);
     PetscCall(PetscPrintf(R.scene.comm, "balance: energy=%.9g drift=%.3e largest_kinetic=%.3e momentum_change=%.3e angular_momentum_change=%.3e\n",
                           first_.total(), worst_, largest_kinetic_, linear_, angular_));
     PetscFunctionReturn(0);
   }
 
+  int slot() const override { return 2; }
+
+  PetscErrorCode save(Runtime &, double *x) override
+  {
+    PetscFunctionBegin;
+    PetscCall(flush());
+    const double all[task_numbers] = {first_.kinetic,    first_.gravity,    first_.elastic,    first_.linear(0), first_.linear(1), first_.linear(2), first_.angular(0), first_.angular(1),
+                                      first_.angular(2), worst_,            largest_kinetic_, linear_,          angular_,         (double)end_,     (double)have_first_};
+    std::copy(all, all + task_numbers, x);
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode resume(Runtime &, const double *x) override
+  {
+    PetscFunctionBegin;
+    first_.kinetic   = x[0];
+    first_.gravity   = x[1];
+    first_.elastic   = x[2];
+    first_.linear    = {x[3], x[4], x[5]};
+    first_.angular   = {x[6], x[7], x[8]};
+    worst_           = x[9];
+    largest_kinetic_ = x[10];
+    linear_          = x[11];
+    angular_         = x[12];
+    end_             = (long)x[13];
+    have_first_      = x[14] != 0;
+    if (writes_ && !file_.empty() && end_ > 0) PetscCall(ShortenFile(file_, end_, &there_));
+    begun_ = there_;
+    PetscFunctionReturn(0);
+  }
+
 private:
-  bool    writes_ = false;
-  FILE   *out_    = nullptr; /* none: printed */
-  Balance first_;
-  double  worst_ = 0, largest_kinetic_ = 0, linear_ = 0, angular_ = 0;
+  static constexpr std::size_t largest_block = 1 << 16; /* bytes */
+
+  bool        writes_ = false, begun_ = false, have_first_ = false; /* begun: the head line is written */
+  std::string file_, text_;                                         /* no name: printed; lines that are not yet in the file */
+  bool        there_ = false;                                       /* the file is begun */
+  long        end_   = 0;                                           /* its bytes */
+  Balance     first_;
+  double      worst_ = 0, largest_kinetic_ = 0, linear_ = 0, angular_ = 0;
 
   PetscErrorCode line(const char *text)
   {
     PetscFunctionBegin;
-    if (out_) std::fprintf(out_, "%s\n", text);
-    else PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s\n", text));
+    if (!writes_) PetscFunctionReturn(0);
+    if (file_.empty()) {
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s\n", text));
+      PetscFunctionReturn(0);
+    }
+    text_ += text;
+    text_ += '\n';
+    if (text_.size() >= largest_block || !there_) PetscCall(flush()); /* at once: a file that cannot be written is said at the start */
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode flush()
+  {
+    PetscFunctionBegin;
+    if (!writes_ || text_.empty()) PetscFunctionReturn(0);
+    PetscCall(AppendText(file_, !there_, text_, &end_));
+    there_ = true;
+    text_.clear();
     PetscFunctionReturn(0);
   }
 };
@@ -92,7 +138,7 @@ PetscErrorCode MakeBalanceSheet(Runtime &R, const OutputSettings &o, std::unique
   PetscFunctionBegin;
   if (!o.balance) PetscFunctionReturn(0);
   auto b = std::make_unique<BalanceSheet>();
-  PetscCall(b->open(R, o.balance_file));
+  b->begin(R, o.balance_file);
   task = std::move(b);
   PetscFunctionReturn(0);
 }

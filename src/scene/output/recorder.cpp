@@ -1,5 +1,7 @@
 #include "scene/output/recorder.h"
+#include "scene/guard.h"
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace hhtdae
@@ -46,7 +48,7 @@ double Due(const Recorder &r, const Task &task, double t)
   constexpr double never = std::numeric_limits<double>::infinity();
   if (task.done == 0) return r.begin;
   if (task.dt == 0) return r.last < t ? t : never;
-  const double due = r.begin + (double)task.done * task.dt;
+  const double due = r.begin + task.done * task.dt;
   return due <= t + 1e-9 * task.dt ? std::min(due, t) : never;
 }
 
@@ -67,7 +69,7 @@ PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
     now.clear();
     for (std::size_t k = 0; k < due.size(); k++)
       if (due[k] == next) now.push_back(r.tasks[k].get());
-    PetscCall(RecordAt(r, ts, next, now));
+    PetscCall(Guarded([&] { return RecordAt(r, ts, next, now); }));
   }
   r.last = t;
   for (auto &task : r.tasks) PetscCall(task->stepped(r.R));
@@ -156,6 +158,20 @@ PetscErrorCode FallBack(Recorder &r, TS ts)
 
 } // namespace
 
+/* Times between samples that a double cannot tell from one another would never pass */
+static PetscErrorCode CheckDistances(const Recorder &r, TS ts)
+{
+  PetscReal t, end;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TSGetMaxTime(ts, &end));
+  const double latest = end < PETSC_MAX_REAL / 2 ? std::max(std::abs(t), std::abs(end)) : std::abs(t), least = 16 * PETSC_MACHINE_EPSILON * latest;
+  for (const auto &task : r.tasks)
+    PetscCheck(task->dt == 0 || (task->dt > least && std::isfinite(task->dt)), r.R.scene.comm, PETSC_ERR_ARG_OUTOFRANGE,
+               "-scene_dt, -scene_animation_dt: samples cannot be %g apart in a run to t = %g; at least %g, or 0 for every step", task->dt, latest, least);
+  PetscFunctionReturn(0);
+}
+
 Recorder::~Recorder()
 {
   PetscBool gone = PETSC_FALSE;
@@ -192,8 +208,44 @@ PetscErrorCode AttachOutput(Runtime &R, TS ts)
   PetscCall(VecDuplicate(U, &r->V));
   PetscCall(VecDuplicate(U, &r->A));
   if (!dense) PetscCall(FallBack(*r, ts));
+  PetscCall(CheckDistances(*r, ts));
   PetscCall(TSMonitorSet(ts, Monitor, &R, nullptr));
   R.recorder = r;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SaveOutput(Runtime &R, double *x)
+{
+  PetscFunctionBegin;
+  if (!R.recorder) PetscFunctionReturn(0);
+  const Recorder &r = *R.recorder;
+  x[0]              = r.begun;
+  x[1]              = r.begin;
+  x[2]              = r.last;
+  for (const auto &task : r.tasks) {
+    double *own = x + 4 + task->slot() * (task_numbers + 1);
+    own[0]      = 1 + task->done;
+    PetscCall(task->save(R, own + 1));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* At the state of the checkpoint. What was not recorded before begins at the next of its times, in the grid of the others. */
+PetscErrorCode ResumeOutput(Runtime &R, const double *x)
+{
+  PetscFunctionBegin;
+  if (!R.recorder || !x[0]) PetscFunctionReturn(0);
+  Recorder &r = *R.recorder;
+  r.begun     = true;
+  r.begin     = x[1];
+  r.last      = x[2];
+  for (auto &task : r.tasks) {
+    const double *own = x + 4 + task->slot() * (task_numbers + 1);
+    if (own[0] > 0) {
+      task->done = own[0] - 1;
+      PetscCall(task->resume(R, own + 1));
+    } else task->done = task->dt > 0 ? 1 + std::floor((r.last - r.begin) / task->dt * (1 + 1e-9)) : 1;
+  }
   PetscFunctionReturn(0);
 }
 

@@ -18,11 +18,18 @@ public:
   virtual PetscErrorCode record(Runtime &R, Evaluation &e) = 0; /* collective, as all of them */
   virtual PetscErrorCode stepped(Runtime &) { return 0; }       /* after the samples of a step */
   virtual PetscErrorCode finish(Runtime &) { return 0; }        /* at the end of a solve; there may be another one */
+  virtual int            slot() const = 0;                      /* which of the numbers of a checkpoint are its own */
+  virtual PetscErrorCode save(Runtime &R, double *x)         = 0; /* brings files up to date, and notes where they end */
+  virtual PetscErrorCode resume(Runtime &R, const double *x) = 0; /* shortens files to that, and goes on behind it */
 
-  double   dt;       /* 0: the end of every step */
-  PetscInt done = 0; /* samples so far */
-  bool     from_equations = false; /* it reads accelerations, multipliers or what depends on them */
+  double dt;       /* 0: the end of every step */
+  double done = 0; /* times between samples since the recording began: a sample for each, but for one that began later */
+  bool   from_equations = false; /* it reads accelerations, multipliers or what depends on them */
 };
+
+/* Numbers of a checkpoint for each task */
+constexpr int task_slots = 3, task_numbers = 15;
+static_assert(recorded >= 4 + task_slots * (task_numbers + 1), "room for all tasks");
 
 struct Recorder {
   Runtime                           &R;

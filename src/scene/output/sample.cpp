@@ -1,4 +1,5 @@
 /* Scene::sample(): the channels at one time, without a file. */
+#include "scene/guard.h"
 #include "scene/output/channels.h"
 
 namespace hhtdae
@@ -47,7 +48,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   PetscCall(LocalState(R, w[0], w[1], w[2], local));
   if (!acceleration.empty()) local[2] = acceleration.data();
   R.bodies.move(local[0], local[1]);
-  PetscCall(ChannelValues(R, Evaluation{t, local[0], local[1], local[2], R.bodies, R.n}, own));
+  PetscCall(Guarded([&] { return ChannelValues(R, Evaluation{t, local[0], local[1], local[2], R.bodies, R.n}, own); }));
   PetscCall(Share(R, own, values));
   for (int k = 0; k < 3; k++) {
     PetscCall(VecRestoreArrayRead(W[k], &w[k]));

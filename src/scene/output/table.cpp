@@ -34,6 +34,7 @@ public:
     if (time_.empty()) PetscCall(PetscTime(&since_));
     time_.push_back(e.t);
     PetscCall(ChannelValues(R, e, own_));
+    if (time_.size() >= largest_block) PetscCall(write(R)); /* a step may be long, and samples close */
     PetscFunctionReturn(0);
   }
 
@@ -43,7 +44,7 @@ public:
     PetscFunctionBegin;
     if (time_.empty()) PetscFunctionReturn(0);
     PetscCall(PetscTime(&now));
-    int full = time_.size() >= largest_block || now - since_ > longest_wait; /* as the first rank's clock says */
+    int full = now - since_ > longest_wait; /* as the first rank's clock says */
     if (R.size > 1) PetscCallMPI(MPI_Bcast(&full, 1, MPI_INT, 0, R.scene.comm));
     if (full) PetscCall(write(R));
     PetscFunctionReturn(0);
@@ -52,7 +53,29 @@ public:
   PetscErrorCode finish(Runtime &R) override
   {
     PetscFunctionBegin;
-    if (!time_.empty() || first_) PetscCall(write(R));
+    if (!time_.empty() || rows_ == 0) PetscCall(write(R));
+    PetscFunctionReturn(0);
+  }
+
+  int slot() const override { return 0; }
+
+  PetscErrorCode save(Runtime &R, double *x) override
+  {
+    PetscFunctionBegin;
+    if (!time_.empty()) PetscCall(write(R));
+    x[0] = (double)rows_;
+    x[1] = (double)csv_end_;
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode resume(Runtime &R, const double *x) override
+  {
+    PetscFunctionBegin;
+    rows_    = (std::size_t)x[0];
+    csv_end_ = (long)x[1];
+    if (R.rank || !rows_) PetscFunctionReturn(0);
+    if (!csv_.empty()) PetscCall(ShortenFile(csv_, csv_end_, &csv_there_));
+    if (!hdf5_.empty()) PetscCall(ShortenHDF5(hdf5_, rows_, head_, &hdf5_there_));
     PetscFunctionReturn(0);
   }
 
@@ -62,7 +85,9 @@ private:
   std::vector<std::vector<std::size_t>> column_; /* channels of every rank */
   std::vector<double>                   time_, own_;
   PetscLogDouble                        since_ = 0;
-  bool                                  first_ = true;
+  std::size_t                           rows_    = 0; /* in the files */
+  long                                  csv_end_ = 0; /* bytes */
+  bool                                  csv_there_ = false, hdf5_there_ = false; /* begun: on the first rank */
 
   /* The block on the first rank, channels in their order */
   PetscErrorCode collect(const Runtime &R, Block &block)
@@ -93,11 +118,11 @@ private:
     Block block;
     PetscFunctionBegin;
     PetscCall(collect(R, block));
-    if (R.rank == 0) {
-      if (!csv_.empty()) PetscCall(AppendCSV(csv_, first_, head_, block));
-      if (!hdf5_.empty()) PetscCall(AppendHDF5(hdf5_, first_, head_, block));
-    }
-    first_ = false;
+    rows_ += block.time.size();
+    if (R.rank) PetscFunctionReturn(0);
+    if (!csv_.empty()) PetscCall(AppendCSV(csv_, !csv_there_, head_, block, &csv_end_));
+    if (!hdf5_.empty()) PetscCall(AppendHDF5(hdf5_, !hdf5_there_, head_, block));
+    csv_there_ = hdf5_there_ = true;
     PetscFunctionReturn(0);
   }
 };

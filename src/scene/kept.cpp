@@ -1,0 +1,129 @@
+/*
+  The end of the vector that checkpoints keep of a scene, the same on every rank: a digest of the description, and where the recording of
+  results stands, so that a run which is resumed goes on in the same files.
+*/
+#include "runtime.h"
+#include <cstdint>
+#include <cstring>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+static_assert(kept >= recorded + 2, "room for the digest and for the recording");
+
+/* FNV-1a over what is given, numbers in single precision: other machines and compilers round differently */
+class Digest
+{
+public:
+  void text(const std::string &x)
+  {
+    bytes(x.data(), x.size());
+    whole((long)x.size());
+  }
+  void whole(long x) { bytes(&x, sizeof x); }
+  void number(double x)
+  {
+    const float f = std::abs(x) < 1e-30 ? 0.f : (float)x;
+    bytes(&f, sizeof f);
+  }
+  template <class M> void numbers(const M &m)
+  {
+    for (Eigen::Index i = 0; i < m.size(); i++) number(m.data()[i]);
+  }
+  /* as two numbers that a vector holds exactly */
+  void put(double x[2]) const
+  {
+    x[0] = (double)(sum_ >> 32);
+    x[1] = (double)(sum_ & 0xffffffffu);
+  }
+
+private:
+  std::uint64_t sum_ = 14695981039346656037ull;
+  void          bytes(const void *x, std::size_t n)
+  {
+    for (std::size_t i = 0; i < n; i++) sum_ = (sum_ ^ static_cast<const unsigned char *>(x)[i]) * 1099511628211ull;
+  }
+};
+
+void Add(Digest &d, const BodyData &b)
+{
+  d.whole(b.point + 2 * b.massless + 4 * (b.flexible != nullptr));
+  d.whole(b.carrier);
+  d.whole(b.attachment);
+  d.number(b.mass);
+  if (!b.point) d.numbers(b.inertia);
+  d.numbers(b.center);
+  if (!b.flexible) return;
+  d.whole(b.flexible->model->modes());
+  for (const double x : b.flexible->damping) d.number(x);
+}
+
+void Add(Digest &d, const StoreBase &s)
+{
+  d.whole(s.isConstraint());
+  for (PetscInt e = 0; e < s.size(); e++) {
+    d.whole(s.element(e));
+    d.whole(s.active(e) + 256 * s.carried(e));
+    for (int k = 0; k < s.markers(); k++) d.whole(s.marker(e, k));
+    for (int i = 0; i < s.inputs(); i++) {
+      const ScalarRef r = s.input(e, i);
+      d.whole(r.kind + 8 * r.component);
+      d.whole(r.id);
+    }
+  }
+}
+
+/* What of the description is plain to see. Stiffnesses and users' functions are not among it: the residual tells them. */
+Digest MakeDigest(const SceneData &s)
+{
+  Digest d;
+  d.whole(s.planar);
+  d.numbers(s.gravity);
+  for (const BodyData &b : s.bodies) Add(d, b);
+  for (const MarkerData &m : s.markers) {
+    d.whole(m.body);
+    d.numbers(m.s);
+    d.numbers(m.R);
+  }
+  for (const ElementData &e : s.elements) {
+    d.text(e.type);
+    d.whole(e.i.id);
+    d.whole(e.j.id);
+  }
+  for (const StoreBase *store : s.order) Add(d, *store);
+  for (const auto *unknowns : {&s.variables, &s.states}) d.whole((long)unknowns->size());
+  return d;
+}
+
+} // namespace
+
+PetscErrorCode WriteKept(Runtime &R)
+{
+  double *x;
+  PetscInt n;
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(R.axes, &n));
+  PetscCall(VecGetArray(R.axes, &x));
+  double *end = x + n - kept;
+  std::fill(end, end + kept, 0.0);
+  MakeDigest(R.scene).put(end);
+  PetscCall(SaveOutput(R, end + 2));
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReadKept(Runtime &R, const double *x)
+{
+  double digest[2];
+  PetscFunctionBegin;
+  MakeDigest(R.scene).put(digest);
+  PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
+             "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
+  PetscCall(ResumeOutput(R, x + 2));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

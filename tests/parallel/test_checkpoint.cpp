@@ -1,0 +1,86 @@
+/* Checkpoints on several ranks: the run that writes is not changed, the one that resumes repeats it bit for bit, another number of ranks is refused */
+#include "hhtdae/scene.h"
+#include "scene_output.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* The same name on all ranks, and one file */
+struct SharedFile {
+  std::string name;
+  SharedFile()
+  {
+    int pid = getpid();
+    MPI_Bcast(&pid, 1, MPI_INT, 0, PETSC_COMM_WORLD);
+    name = testing::TempDir() + "hhtdae-ranks-" + std::to_string(pid) + ".checkpoint";
+  }
+  ~SharedFile()
+  {
+    int rank;
+    MPI_Barrier(PETSC_COMM_WORLD);
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    if (!rank) std::remove(name.c_str());
+  }
+};
+
+struct End {
+  Array            u, v;
+  TSHHT3Statistics s;
+};
+
+End fall(MPI_Comm comm, const std::string &options, int bodies = 12)
+{
+  Rods     rods(bodies, comm);
+  SceneRun run(rods.scene, 0.4, " -ts_rtol 1e-6 -ts_atol 1e-6 " + options);
+  Vec      U, V;
+  End      e;
+  must(run.solve());
+  must(TS2GetSolution(run.ts, &U, &V));
+  must(TSHHT3GetStatistics(run.ts, &e.s));
+  e.u = whole(U);
+  e.v = whole(V);
+  return e;
+}
+
+void repeat(const std::string &options)
+{
+  SCOPED_TRACE(options);
+  const SharedFile  file;
+  const std::string every = " -ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every ";
+  const End         plain = fall(PETSC_COMM_WORLD, options);
+  ASSERT_GT(plain.s.steps, 30);
+  const End writing = fall(PETSC_COMM_WORLD, options + every + "1 ");
+  EXPECT_EQ(plain.u, writing.u);
+  EXPECT_EQ(plain.v, writing.v);
+  for (int stop : {5, 17, 28}) {
+    fall(PETSC_COMM_WORLD, options + every + std::to_string(stop) + " -ts_max_steps " + std::to_string(stop) + " ");
+    const End resumed = fall(PETSC_COMM_WORLD, options + " -ts_hhtdae_resume " + file.name + " ");
+    EXPECT_EQ(plain.u, resumed.u) << stop;
+    EXPECT_EQ(plain.v, resumed.v) << stop;
+    EXPECT_EQ(plain.s.newton, resumed.s.newton) << stop;
+    EXPECT_EQ(plain.s.factorizations, resumed.s.factorizations) << stop;
+  }
+}
+
+} // namespace
+
+TEST(Checkpoint, RunsRepeatBitForBit)
+{
+  repeat("");
+  repeat("-ts_adapt_type none -ts_dt 0.005 ");
+}
+
+TEST(Checkpoint, OtherNumbersOfRanksAreRefused)
+{
+  const SharedFile file;
+  int              size;
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size == 1) GTEST_SKIP();
+  fall(PETSC_COMM_WORLD, "-ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every 10 -ts_max_steps 10 ");
+  ErrorTrap trap;
+  EXPECT_ANY_THROW(fall(PETSC_COMM_SELF, "-ts_hhtdae_resume " + file.name + " "));
+  EXPECT_TRUE(trap.says("ranks")) << trap.message;
+  MPI_Barrier(PETSC_COMM_WORLD);
+}
