@@ -32,13 +32,13 @@ static PetscErrorCode Run(void)
   PetscCall(TSSetFromOptions(ts));
 
   Reference    exact(section);
-  double       error = 0, closure = 0, drift = 0, start = 0;
+  double       error = 0, closure = 0, drift = 0, start = NAN;
   hhtex::Watch watch(scene, 0.02, [&](double t, const std::vector<double> &x) {
     Vector3 P[6];
     Reference::points(exact.at(t), P);
     for (int k = 2; k < 6; k++)
       hhtex::Widen(k < 5 ? error : closure, (Eigen::Map<const Vector3>(&x[3 * (k - 2)]) - P[k]).norm());
-    if (t == 0) start = x[12] + x[13];
+    if (std::isnan(start)) start = x[12] + x[13];
     hhtex::Widen(drift, x[12] + x[13], start);
   });
   PetscCall(watch.attach(ts));

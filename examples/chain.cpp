@@ -58,10 +58,10 @@ static PetscErrorCode Run(void)
   PetscCall(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
   PetscCall(TSSetFromOptions(ts));
   std::vector<double> x;
-  double              start = 0, drift = 0, exchanged = 0;
-  hhtex::Watch        watch(scene, end / 10, [&](double t, const std::vector<double> &c) {
+  double              start = NAN, drift = 0, exchanged = 0;
+  hhtex::Watch        watch(scene, end / 10, [&](double, const std::vector<double> &c) {
     const double T = c[c.size() - 2], V = c.back();
-    if (t == 0) start = T + V;
+    if (std::isnan(start)) start = T + V;
     hhtex::Widen(drift, T + V, start);
     exchanged = std::fmax(exchanged, T);
   });

@@ -57,9 +57,9 @@ static PetscErrorCode Run(void)
   /* ---- compared while it runs ---- */
   const long double    half_pi = std::acos(0.L);
   hhtex::Extrapolation exact(TwoAngles, 0, 0.02L, {half_pi, half_pi, 0, 0});
-  double               error = 0, drift = 0, start = 0;
+  double               error = 0, drift = 0, start = NAN;
   hhtex::Watch         watch(scene, 0.01, [&](double t, const std::vector<double> &x) {
-    if (t == 0) start = x[2] + x[3];
+    if (std::isnan(start)) start = x[2] + x[3];
     hhtex::Widen(drift, x[2] + x[3], start);
     if (spherical) return;
     const auto y = exact.at(t);

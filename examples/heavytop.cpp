@@ -43,12 +43,12 @@ static PetscErrorCode Solve(Scene &scene, PetscReal end, const hhtex::Watch::Loo
 static PetscErrorCode Spin(PetscReal end)
 {
   TS     ts;
-  double x = 0, omega = 0, force = 0, energy = 0, start = 0;
+  double x = 0, omega = 0, force = 0, energy = 0, start = NAN;
 
   PetscFunctionBeginUser;
   hhtex::FastTop model;
   const auto     compare = [&](double t, const std::vector<double> &c) {
-    if (t == 0) start = c[9] + c[10];
+    if (std::isnan(start)) start = c[9] + c[10];
     hhtex::Widen(energy, c[9] + c[10], start);
     for (const double *row : table) {
       if (std::fabs(row[0] - t) > 1e-9) continue;
@@ -71,13 +71,13 @@ static PetscErrorCode Tumble(PetscReal turns)
 {
   TS               ts;
   TSHHT3Statistics s;
-  double           angle = 0, last = 0, rate = 0, start = 0, drift = 0, largest = 0, turned = 0, low = 1, high = -1;
+  double           angle = 0, last = 0, rate = 0, start = NAN, drift = 0, largest = 0, turned = 0, low = 1, high = -1;
 
   PetscFunctionBeginUser;
   hhtex::TumblingTop model;
   const auto         look = [&](double t, const std::vector<double> &c) {
     const double w = Vector3(c[3], c[4], c[5]).norm();
-    if (t == 0)
+    if (std::isnan(start))
       start = c[9] + c[10];
     else
       angle += 0.5 * (w + rate) * (t - last);

@@ -66,12 +66,12 @@ static PetscErrorCode Disc(PetscReal end)
   hhtex::LeaningDisc model(lean * PETSC_PI / 180, R);
   const double       s = lean * PETSC_PI / 180, mass = model.mass, r = model.r, g = model.g, W = model.W;
 
-  double x = 0, force = 0, drift = 0, start = 0;
+  double x = 0, force = 0, drift = 0, start = NAN;
   PetscCall(Solve(model.scene, end, [&](double t, const std::vector<double> &c) {
     const double co = std::cos(W * t), si = std::sin(W * t), inward = -mass * W * W * R;
     hhtex::Widen(x, (Vector3(c[0], c[1], c[2]) - Vector3(R * co, R * si, r * std::cos(s))).norm());
     hhtex::Widen(force, (Vector3(c[3], c[4], c[5]) - Vector3(mass * g, inward * co, inward * si)).norm());
-    if (t == 0) start = c[6] + c[7];
+    if (std::isnan(start)) start = c[6] + c[7];
     hhtex::Widen(drift, c[6] + c[7], start);
   }));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "error: x=%.3e force=%.3e energy=%.3e\n", x, force, drift));

@@ -1,5 +1,5 @@
 /* Looks at a scene's channels in the course of a run: f(t, values) at the multiples of dt within its steps, on every
- * rank. */
+   rank. A run that goes on from a checkpoint is looked at from there. */
 #ifndef HHTEX_SCENE_WATCH_H
 #define HHTEX_SCENE_WATCH_H
 
@@ -25,7 +25,8 @@ private:
   hhtdae::Scene &scene_;
   double         dt_;
   Look           look_;
-  PetscInt       done_ = 0;
+  PetscInt       done_  = 0;
+  bool           begun_ = false;
 
   /* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. */
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
@@ -34,6 +35,12 @@ private:
     std::vector<double> values;
     PetscFunctionBegin;
     if (step <= 0) PetscFunctionReturn(0);
+    if (!w->begun_) {
+      PetscReal begin;
+      PetscCall(TSGetPrevTime(ts, &begin));
+      w->done_  = (PetscInt)std::ceil(begin / w->dt_ * (1 - 1e-12));
+      w->begun_ = true;
+    }
     for (; w->done_ * w->dt_ <= t * (1 + 1e-12); w->done_++) {
       const double at = std::fmin(w->done_ * w->dt_, t);
       PetscCall(w->scene_.sample(ts, at, values));

@@ -30,9 +30,9 @@ static PetscErrorCode Run(void)
   PetscCall(TSSetFromOptions(ts));
 
   hhtex::SliderCrankReference exact(speed);
-  double                      error = 0, drift = 0, start = 0;
+  double                      error = 0, drift = 0, start = NAN;
   hhtex::Watch                watch(scene, 0.01, [&](double t, const std::vector<double> &x) {
-    if (t == 0) start = x[1] + x[2];
+    if (std::isnan(start)) start = x[1] + x[2];
     hhtex::Widen(drift, x[1] + x[2], start);
     hhtex::Widen(error, x[0], exact.slider(t));
   });
