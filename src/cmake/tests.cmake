@@ -143,6 +143,17 @@ endif()
 hhtdae_script(exports ${PROJECT_SOURCE_DIR}/include ${libraries})
 hhtdae_script(unused_options $<TARGET_FILE:pendulum> $<TARGET_FILE:chain> ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG})
 hhtdae_script(python_pendulum $<TARGET_FILE:hhtdae>)
+if(HHTDAE_PROGRAMS)
+  # A slice of "make kill9", and every example resumed in its middle
+  hhtdae_script(kill9 ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/kill9 10)
+  foreach(ranks 1 2)
+    add_test(NAME integration.resume.${ranks}
+             COMMAND ${HHTDAE_PYTHON} -B ${PROJECT_SOURCE_DIR}/tests/integration/resume.py ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}
+                     ${PROJECT_BINARY_DIR}/resume ${ranks})
+    set_tests_properties(integration.resume.${ranks} PROPERTIES ENVIRONMENT "${test_environment}" TIMEOUT 900 LABELS integration
+                                                                PROCESSORS ${ranks})
+  endforeach()
+endif()
 hhtdae_script(install ${PROJECT_BINARY_DIR} ${CMAKE_COMMAND} $<CONFIG> ${PETSC_PCFILEDIR} ${SLEPC_PCFILEDIR})
 hhtdae_script(instructions ${PROJECT_BINARY_DIR} ${CMAKE_COMMAND} $<CONFIG> ${PETSC_PCFILEDIR} ${SLEPC_PCFILEDIR})
 if(TARGET hhtreduce)
