@@ -247,9 +247,41 @@ PetscErrorCode Measure(TS ts, PetscReal e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CountCorrection(TS ts, PetscReal e)
+PetscErrorCode FailUnproved(TS ts)
 {
   Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.corrector.reason = SNES_DIVERGED_DTOL;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
+                          "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
+                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two",
+                          (double)I.t1, (double)I.h, (double)I.verify.largest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual has not followed the correction: on with the iteration, whose rate will tell; then with a new matrix; and where that
+   one is no better, the application's Jacobian is at fault, of which less is left at a smaller h */
+PetscErrorCode GoOnUnproved(TS ts)
+{
+  Corrector &c = Get(ts).corrector;
+
+  PetscFunctionBegin;
+  c.reason  = SNES_CONVERGED_ITERATING;
+  c.learned = 0;
+  if (c.wrong_jacobian || c.it >= c.max_it) PetscCall(FailUnproved(ts));
+  else if (c.it - c.base >= 2) {
+    if (c.fresh || c.user_lag) PetscCall(FailUnproved(ts));
+    else PetscCall(FreshMatrixNextIteration(ts));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
+PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Integrator &I = Get(ts);
+  PetscBool   proved;
 
   PetscFunctionBegin;
   I.corrector.it++;
@@ -257,6 +289,13 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e)
   I.stat.solves++;
   if (I.corrector.user_test) PetscCall(Measure(ts, e));
   else PetscCall(Judge(ts, e));
+  if (I.corrector.reason > 0) {
+    PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
+    if (!proved) PetscCall(GoOnUnproved(ts));
+  } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
+    PetscCall(BlameJacobian(ts, X, dX, F, evaluated));
+    if (I.corrector.wrong_jacobian) PetscCall(FailUnproved(ts));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,6 +309,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   Vec         X, F, Y;
   PetscReal   xnorm, fnorm, ynorm, e;
   PetscInt    monitors;
+  PetscBool   evaluated = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(SNESLineSearchGetSNES(ls, &snes));
@@ -277,10 +317,10 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   PetscCall(SNESLineSearchGetNorms(ls, &xnorm, &fnorm, &ynorm));
   PetscCall(SNESLineSearchSetReason(ls, SNES_LINESEARCH_SUCCEEDED));
   PetscCall(SubtractCorrection(ts, X, Y, &e));
-  PetscCall(CountCorrection(ts, e));
+  PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
   monitors = snes->numbermonitors;
   if (!I.corrector.reason || monitors || I.corrector.user_test) {
-    PetscCall(SNESComputeFunction(snes, X, F));
+    if (!evaluated) PetscCall(SNESComputeFunction(snes, X, F));
     if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
   }
   if (I.corrector.user_test) {
@@ -318,8 +358,9 @@ static PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
 {
   Integrator &I = Get(ts);
   PetscBool   newton;
-  Vec         X, Y;
+  Vec         X, Y, F;
   PetscReal   e = 0;
+  PetscBool   evaluated = PETSC_TRUE;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SNESNEWTONLS, SNESNEWTONTR, SNESNEWTONTRDC, ""));
@@ -332,7 +373,8 @@ static PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
   }
   if (it) PetscCall(CorrectionNorm(ts, Y, &e));
   if (!newton) PetscCall(VecCopy(X, I.before));
-  if (it) PetscCall(CountCorrection(ts, e));
+  PetscCall(SNESGetFunction(snes, &F, NULL, NULL));
+  if (it) PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -442,6 +484,7 @@ static void BeginIteration(Integrator &I)
   if (I.fixed_h) c.suspect = 0;
   c.reason = SNES_CONVERGED_ITERATING;
   c.fresh  = PETSC_FALSE;
+  c.wrong_jacobian = PETSC_FALSE;
 }
 
 /* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
@@ -481,6 +524,7 @@ static PetscErrorCode CorrectStart(TS ts, KSP ksp, Vec F, Vec Y, PetscBool *ok)
   PetscInt           its;
   PetscReal          e = 0;
 
+  PetscBool          evaluated = PETSC_FALSE; /* of no use in the start, where nothing is to be proved */
   PetscFunctionBegin;
   PetscCall(KSPSolve(ksp, F, Y));
   PetscCall(KSPGetIterationNumber(ksp, &its));
@@ -494,7 +538,7 @@ static PetscErrorCode CorrectStart(TS ts, KSP ksp, Vec F, Vec Y, PetscBool *ok)
   }
   PetscCall(VecAXPY(I.X, -1, Y));
   PetscCall(RelativeNorm(I.X, Y, &e));
-  PetscCall(CountCorrection(ts, e));
+  PetscCall(CountCorrection(ts, e, I.X, Y, F, &evaluated));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -302,6 +302,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     if (J != P) PetscCall(ScaleMatrix(I, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
   }
+  PetscCall(NoteClaims(ts, X, P));
   I.corrector.h_matrix    = I.h;
   I.corrector.have_matrix = (PetscBool)(I.mode == Mode::Step);
   I.corrector.fresh       = PETSC_TRUE;

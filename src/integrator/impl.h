@@ -41,6 +41,7 @@ struct CorrectorState {
   PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
+  PetscBool wrong_jacobian = PETSC_FALSE; /* as verify.cpp has seen */
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
   PetscInt  renew_left  = 0;           /* of these, still to come */
@@ -60,6 +61,16 @@ struct CorrectorState {
 };
 
 struct Corrector : CorrectorOptions, CorrectorState {};
+
+struct VerificationState {
+  PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
+  PetscReal since = 0, missing = 0; /* time since the last proof, and the accelerations that may be missing since, by the weights */
+};
+
+/* Whether small corrections prove anything, verify.cpp */
+struct Verification : VerificationState {
+  Vec inertia = nullptr, claim = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
+};
 
 struct PredictorOptions {
   PetscInt  degree_max = max_degree; /* what the user allows */
@@ -156,6 +167,7 @@ struct Integrator : StepState {
   TSHHT3Start start_policy = TSHHT3_START_REPORT;
   Corrector   corrector;
   Predictor   predictor;
+  Verification verify;
 
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
   IS                         is[TSHHT3_NUM_ROLES] = {};
@@ -292,6 +304,10 @@ PetscErrorCode HooksJacobian(TS ts);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
+/* verify.cpp */
+PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
+PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
+PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);

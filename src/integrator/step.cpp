@@ -216,7 +216,8 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 
   PetscFunctionBegin;
   ts->reject++;
-  if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
+  if (I.corrector.wrong_jacobian) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
+  else if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
   else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
   else if (I.tiny_row >= max_tiny_row) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
   else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));

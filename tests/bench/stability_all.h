@@ -6,6 +6,7 @@
 #include "stability_constraints.h"
 #include "stability_events.h"
 #include "stability_faults.h"
+#include "stability_release.h"
 #include "stability_rotation.h"
 #include "stability_start.h"
 #include "stability_stiff.h"
@@ -23,6 +24,8 @@ inline Cases AllCases(const ConditionReport &report = {})
   AddSingular(cases);
   AddImpacts(cases);
   AddJumps(cases);
+  AddReleases(cases);
+  AddWrongJacobians(cases);
   AddStarts(cases);
   AddSteps(cases);
   AddRotation(cases);
