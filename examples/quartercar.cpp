@@ -34,9 +34,9 @@ static PetscErrorCode Run(void)
 
   hhtex::QuarterCarReference::Parameters p;
   if (!std::strcmp(road, "bump"))
-    p.road = TimeFunction::step(0.2, 0, 0.35, height);
+    p.road = TimeFunction::step5(0.2, 0, 0.35, height);
   else if (!std::strcmp(road, "curb"))
-    p.road = TimeFunction::step(0.2, 0, 0.24, height);
+    p.road = TimeFunction::step5(0.2, 0, 0.24, height);
   else if (!std::strcmp(road, "sine"))
     p.road = TimeFunction::formula([height](const TimeFunction::Number &t) -> TimeFunction::Number {
       return (1. - cos(t * 10.)) * (0.5 * height);

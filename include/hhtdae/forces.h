@@ -29,9 +29,9 @@ struct SpringDamper {
 /* Tension f(l, l') given by the user's function, differentiated automatically; the lambda must return a Real:
      [](const Real &l, const Real &v) -> Real { return 100. * pow(l - 1., 3) + 2. * v; } */
 struct NonlinearSpring {
-  Marker                                                    i, j;
-  std::function<Real(const Real &length, const Real &rate)> tension;
-  bool                                                      state = false;
+  Marker                                   i, j;
+  RealFunction<const Real &, const Real &> tension; /* of length and rate */
+  bool                                     state = false;
 };
 
 /*
@@ -50,10 +50,9 @@ struct TorsionalSpringDamper {
 };
 
 struct NonlinearTorsionalSpring {
-  Marker i, j;
-  std::function<Real(const Real &angle, const Real &rate)>
-       moment; /* on i's body, about z_j; a restoring one is negative */
-  bool state = false;
+  Marker                                   i, j;
+  RealFunction<const Real &, const Real &> moment; /* of angle and rate, on i's body, about z_j; a restoring one is negative */
+  bool                                     state = false;
 };
 
 /*

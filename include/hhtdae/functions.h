@@ -30,8 +30,11 @@ public:
   static TimeFunction polynomial(const std::vector<double> &coefficients);
   /* offset + amplitude sin(omega t + phase) */
   static TimeFunction harmonic(double amplitude, double omega, double phase = 0, double offset = 0);
-  /* from x0 before t0 to x1 after t1 by a quintic, twice continuously differentiable */
+  /* from x0 before t0 to x1 after t1, as STEP and STEP5 are known: by the cubic x0 + (x1 - x0) s^2 (3 - 2 s) with s = (t - t0)/(t1 - t0),
+     whose second derivative jumps at both ends, and by the quintic x0 + (x1 - x0) s^3 (10 - 15 s + 6 s^2), twice continuously
+     differentiable. A motion of positions takes the quintic: with the cubic accelerations and reactions jump. */
   static TimeFunction step(double t0, double x0, double t1, double x1);
+  static TimeFunction step5(double t0, double x0, double t1, double x1);
   /* natural cubic spline through (t_k, x_k), t increasing, continued linearly */
   static TimeFunction spline(const std::vector<double> &t, const std::vector<double> &x);
   /* any formula in t, differentiated automatically: [](TimeFunction::Number t) -> TimeFunction::Number { return sin(t) * t; } */
@@ -85,6 +88,7 @@ struct Measure {
   Marker   i, j, frame;
   int      component = 0;
   PetscInt target    = -1; /* element, variable, state or flexible body */
+  PetscInt scene     = 0;  /* of the target */
 
   static Measure time() { return {}; }
   static Measure displacement(Marker i, int component, Marker j = {}, Marker frame = {}) { return {Displacement, i, j, frame, component}; }
@@ -95,27 +99,51 @@ struct Measure {
   static Measure angle(Marker i, Marker j) { return {Angle, i, j, {}}; }
   static Measure angularVelocity(Marker i, int component, Marker j = {}, Marker frame = {}) { return {AngularVelocity, i, j, frame, component}; }
   static Measure angularAcceleration(Marker i, int component, Marker j = {}, Marker frame = {}) { return {AngularAcceleration, i, j, frame, component}; }
-  static Measure multiplier(Element joint, int row) { return {Multiplier, {}, {}, {}, row, joint.id}; }
-  static Measure jointForce(Element joint, int component, Marker frame = {}) { return {JointForce, {}, {}, frame, component, joint.id}; }
-  static Measure jointMoment(Element joint, int component, Marker frame = {}) { return {JointMoment, {}, {}, frame, component, joint.id}; }
-  static Measure force(Element force, int component) { return {Component, {}, {}, {}, component, force.id}; }
-  static Measure value(Variable v) { return {Value, {}, {}, {}, 0, v.id}; }
-  static Measure value(State s) { return {StateValue, {}, {}, {}, 0, s.id}; }
-  static Measure modal(Body flexible, int mode) { return {Modal, {}, {}, {}, mode, flexible.id}; }
+  static Measure multiplier(Element joint, int row) { return {Multiplier, {}, {}, {}, row, joint.id, joint.scene}; }
+  static Measure jointForce(Element joint, int component, Marker frame = {}) { return {JointForce, {}, {}, frame, component, joint.id, joint.scene}; }
+  static Measure jointMoment(Element joint, int component, Marker frame = {}) { return {JointMoment, {}, {}, frame, component, joint.id, joint.scene}; }
+  static Measure force(Element force, int component) { return {Component, {}, {}, {}, component, force.id, force.scene}; }
+  static Measure value(Variable v) { return {Value, {}, {}, {}, 0, v.id, v.scene}; }
+  static Measure value(State s) { return {StateValue, {}, {}, {}, 0, s.id, s.scene}; }
+  static Measure modal(Body flexible, int mode) { return {Modal, {}, {}, {}, mode, flexible.id, flexible.scene}; }
   static Measure kineticEnergy() { return {KineticEnergy, {}, {}, {}}; }
   static Measure potentialEnergy() { return {PotentialEnergy, {}, {}, {}}; }
 };
 
+using Real = Eigen::AutoDiffScalar<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>>; /* at most 16 arguments */
+
+/* STEP and STEP5 of x, for expressions and force laws: from h0 for x <= x0 to h1 for x >= x1 by the cubic and by the quintic of
+   TimeFunction::step() and step5() */
+Real step(const Real &x, double x0, double h0, double x1, double h1);
+Real step5(const Real &x, double x0, double h0, double x1, double h1);
+
+/*
+  A user's function that returns a Real (or a constant). A lambda has to say so by "-> Real": without it Eigen's expression is
+  returned, which refers to numbers that are gone by then, and such a lambda does not compile ("deleted function RealFunction").
+  Within the lambda the same holds for auto: write Real y = ..., not auto y = ....
+*/
+template <class... Arguments> class RealFunction : public std::function<Real(Arguments...)>
+{
+  using Base = std::function<Real(Arguments...)>;
+  template <class F> using Result = std::decay_t<std::invoke_result_t<F &, Arguments...>>;
+  template <class R> static constexpr bool isNumber = std::is_same<R, Real>::value || std::is_arithmetic<R>::value;
+
+public:
+  RealFunction() = default;
+  template <class F, class R = Result<F>, std::enable_if_t<isNumber<R>, int> = 0> RealFunction(F f) : Base(std::move(f)) {}
+  template <class F, class R = Result<F>, std::enable_if_t<!isNumber<R>, int> = 0>
+  RealFunction(F lambda_without_return_type_Real) = delete;
+};
+
 /* f(m_1, ..., m_n) of measures, differentiated automatically:
      Expression{{Measure::distance(a, b), Measure::value(s)}, [](const Real *m) -> Real { return 3.0 * m[0] * m[0] + sin(m[1]); }} */
-using Real = Eigen::AutoDiffScalar<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>>; /* at most 16 arguments */
 struct Expression {
-  std::vector<Measure>              arguments;
-  std::function<Real(const Real *)> f;
+  std::vector<Measure>       arguments;
+  RealFunction<const Real *> f;
 
   Expression() = default;
-  Expression(std::vector<Measure> a, std::function<Real(const Real *)> g) : arguments(std::move(a)), f(std::move(g)) {}
-  Expression(const Measure &m) : arguments{m}, f([](const Real *x) { return x[0]; }) {}
+  Expression(std::vector<Measure> a, RealFunction<const Real *> g) : arguments(std::move(a)), f(std::move(g)) {}
+  Expression(const Measure &m) : arguments{m}, f([](const Real *x) -> Real { return x[0]; }) {}
 };
 
 } // namespace hhtdae

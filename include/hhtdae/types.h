@@ -25,21 +25,26 @@ namespace hhtdae
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
 
-/* Handles: cheap to copy, valid in the scene that made them. A default one refers to nothing. */
+/* Handles: cheap to copy, valid in the scene that made them, whose number they bear. A default one refers to nothing. */
 struct Body {
-  PetscInt id = -2; /* -1: ground */
+  PetscInt id    = -2; /* -1: ground */
+  PetscInt scene = 0;
 };
 struct Marker {
-  PetscInt id = -1;
+  PetscInt id    = -1;
+  PetscInt scene = 0;
 };
 struct Element { /* joint, motion or force */
-  PetscInt id = -1;
+  PetscInt id    = -1;
+  PetscInt scene = 0;
 };
 struct Variable {
-  PetscInt id = -1;
+  PetscInt id    = -1;
+  PetscInt scene = 0;
 };
 struct State {
-  PetscInt id = -1;
+  PetscInt id    = -1;
+  PetscInt scene = 0;
 };
 
 } // namespace hhtdae

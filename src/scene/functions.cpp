@@ -38,6 +38,40 @@ Value Polynomial(const std::vector<double> &c, double t)
   return v;
 }
 
+/* The polynomials of steps on [0, 1] times d, with derivatives */
+Value Cubic(double s, double d) { return {d * s * s * (3 - 2 * s), d * 6 * s * (1 - s), d * (6 - 12 * s)}; }
+Value Quintic(double s, double d)
+{
+  const double r = 1 - s;
+  return {d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r, d * 60 * s * r * (r - s)};
+}
+
+/* From x0 before t0 to x1 after t1; a NaN stays one */
+Value Step(Value (*shape)(double, double), double t, double t0, double x0, double t1, double x1)
+{
+  const double h = t1 - t0, s = (t - t0) / h;
+  if (s <= 0) return {x0, 0, 0};
+  if (s >= 1) return {x1, 0, 0};
+  const Value p = shape(s, x1 - x0);
+  return {x0 + p.f, p.f1 / h, p.f2 / (h * h)};
+}
+
+/* The same of a Real. No width, no step: not a number, which the start of the run reports. */
+Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, double x1, double h1)
+{
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Value  y   = x1 > x0 ? Step(shape, x.value(), x0, h0, x1, h1) : Value{nan, nan, nan};
+  return Real(y.f, y.f1 * x.derivatives());
+}
+
+/* Whether a step of time can be made, else why not */
+std::string StepError(double t0, double x0, double t1, double x1)
+{
+  if (!Finite({t0, x0, t1, x1})) return "times and values of a step function must be finite";
+  if (!(t1 > t0)) return Text("a step function from t = ", t0, " to t = ", t1, " must end after it begins");
+  return "";
+}
+
 struct Spline {
   std::vector<double> t, x, m; /* knots and second derivatives there */
 
@@ -122,17 +156,19 @@ TimeFunction TimeFunction::harmonic(double amplitude, double omega, double phase
 
 TimeFunction TimeFunction::step(double t0, double x0, double t1, double x1)
 {
-  if (!Finite({t0, x0, t1, x1})) return faulty("times and values of a step function must be finite");
-  if (!(t1 > t0)) return faulty(Text("a step function from t = ", t0, " to t = ", t1, " must end after it begins"));
+  const std::string error = StepError(t0, x0, t1, x1);
+  if (!error.empty()) return faulty(error);
   TimeFunction g;
-  g.f_ = [=](double t) {
-    const double h = t1 - t0, d = x1 - x0, s = (t - t0) / h;
-    if (s <= 0) return Value{x0, 0, 0};
-    if (s >= 1) return Value{x1, 0, 0};
-    const double r = 1 - s; /* s^3 (10 - 15 s + 6 s^2) has derivatives 30 s^2 r^2 and 60 s r (r - s) */
-    return Value{x0 + d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r / h,
-                 d * 60 * s * r * (r - s) / (h * h)};
-  };
+  g.f_ = [=](double t) { return Step(Cubic, t, t0, x0, t1, x1); };
+  return g;
+}
+
+TimeFunction TimeFunction::step5(double t0, double x0, double t1, double x1)
+{
+  const std::string error = StepError(t0, x0, t1, x1);
+  if (!error.empty()) return faulty(error);
+  TimeFunction g;
+  g.f_ = [=](double t) { return Step(Quintic, t, t0, x0, t1, x1); };
   return g;
 }
 
@@ -153,6 +189,9 @@ TimeFunction TimeFunction::spline(const std::vector<double> &t, const std::vecto
   g.f_ = s;
   return g;
 }
+
+Real step(const Real &x, double x0, double h0, double x1, double h1) { return Step(Cubic, x, x0, h0, x1, h1); }
+Real step5(const Real &x, double x0, double h0, double x1, double h1) { return Step(Quintic, x, x0, h0, x1, h1); }
 
 TimeFunction TimeFunction::formula(std::function<Number(const Number &)> f)
 {

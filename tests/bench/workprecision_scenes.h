@@ -43,7 +43,7 @@ inline SceneProblem::Build QuarterCarOver(double rise)
 {
   return [=](MPI_Comm comm) {
     hhtex::QuarterCarReference::Parameters p;
-    p.road     = hhtdae::TimeFunction::step(0.2, 0, 0.2 + rise, 0.05);
+    p.road     = hhtdae::TimeFunction::step5(0.2, 0, 0.2 + rise, 0.05);
     auto model = std::make_shared<hhtex::QuarterCar>(p, true, comm);
     return std::shared_ptr<Scene>(model, &model->scene);
   };

@@ -118,7 +118,7 @@ public:
     case 1:
       return TimeFunction::polynomial({0, reach / T, -0.3 * reach / (T * T)});
     case 2:
-      return TimeFunction::step(0.1 * T, 0, (0.1 + r.uniform(0.3, 1)) * T, reach);
+      return TimeFunction::step5(0.1 * T, 0, (0.1 + r.uniform(0.3, 1)) * T, reach);
     case 3:
       return TimeFunction::spline({0, 0.4 * T, 0.9 * T, 1.7 * T, 3 * T}, {0, 0.5 * reach, -0.2 * reach, reach, 0});
     case 4:

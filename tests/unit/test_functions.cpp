@@ -66,7 +66,7 @@ TEST(TimeFunctions, HarmonicIsExact)
 TEST(TimeFunctions, StepIsAQuinticWithFlatEnds)
 {
   const double       t0 = 1, t1 = 3, x0 = -2, x1 = 5;
-  const TimeFunction f = TimeFunction::step(t0, x0, t1, x1);
+  const TimeFunction f = TimeFunction::step5(t0, x0, t1, x1);
   for (double t : {-1., 0., 1.}) {
     EXPECT_EQ(f(t).f, x0);
     EXPECT_EQ(f(t).f1, 0);
@@ -89,7 +89,7 @@ TEST(TimeFunctions, StepIsAQuinticWithFlatEnds)
 TEST(TimeFunctions, PiecesAreTwiceContinuouslyDifferentiable)
 {
   const std::vector<double> t{-1, 0, .3, 1.5, 2, 4}, x{2, -1, .5, .7, 3, -2};
-  const TimeFunction        spline = TimeFunction::spline(t, x), step = TimeFunction::step(0, 1, 2, -1);
+  const TimeFunction        spline = TimeFunction::spline(t, x), step = TimeFunction::step5(0, 1, 2, -1);
   const double              d = 1e-9;
   for (const auto &[f, joint] : {std::pair{spline, t}, std::pair{step, std::vector<double>{0, 2}}})
     for (double at : joint) {
@@ -205,9 +205,9 @@ TEST(TimeFunctions, BadInputIsNamed)
   says(TimeFunction::polynomial({}), "at least one");
   says(TimeFunction::polynomial({1, kInf}), "finite");
   says(TimeFunction::harmonic(1, kNaN), "omega nan");
-  says(TimeFunction::step(1, 0, 1, 1), "t = 1 to t = 1");
-  says(TimeFunction::step(2, 0, 1, 1), "end after it begins");
-  says(TimeFunction::step(0, kNaN, 1, 1), "finite");
+  says(TimeFunction::step5(1, 0, 1, 1), "t = 1 to t = 1");
+  says(TimeFunction::step5(2, 0, 1, 1), "end after it begins");
+  says(TimeFunction::step5(0, kNaN, 1, 1), "finite");
   says(TimeFunction::spline({0, 1, 2}, {0, 1}), "3 times and 2 values");
   says(TimeFunction::spline({}, {}), "0 points");
   says(TimeFunction::spline({1}, {1}), "1 point needs");
@@ -223,7 +223,7 @@ TEST(TimeFunctions, BadInputIsNamed)
 TEST(TimeFunctions, NotANumberPassesThrough)
 {
   for (const TimeFunction &f : {TimeFunction::polynomial({1, 2}), TimeFunction::harmonic(1, 1),
-                                TimeFunction::step(0, 0, 1, 1), TimeFunction::spline({0, 1, 2}, {0, 1, 0})})
+                                TimeFunction::step5(0, 0, 1, 1), TimeFunction::spline({0, 1, 2}, {0, 1, 0})})
     EXPECT_TRUE(std::isnan(f(kNaN).f));
   const TimeFunction late = TimeFunction::formula([](const Number &t) -> Number { return log(1.0 - t); });
   EXPECT_TRUE(std::isfinite(late(.5).f));

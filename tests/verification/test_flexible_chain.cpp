@@ -46,7 +46,7 @@ void mechanism(Scene &scene, Body hub, Body tip, const Motion &motion)
   const Element pin  = scene.add("pin", Revolute{axle, fixed});
   const Element weld = scene.add("weld", Fixed{end, scene.markerAt(load, q)});
   const Element drive =
-      scene.add("drive", RotationalMotion{axle, fixed, TimeFunction::step(0, 0, motion.duration, motion.angle)});
+      scene.add("drive", RotationalMotion{axle, fixed, TimeFunction::step5(0, 0, motion.duration, motion.angle)});
   scene.channel("deflection", Measure::displacement(end, 1, axle, axle));
   for (int c : {0, 1}) scene.channel(text("pin %d", c), Measure::jointForce(pin, c, axle));
   scene.channel("weld", Measure::jointMoment(weld, 2));

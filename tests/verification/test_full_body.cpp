@@ -243,7 +243,7 @@ TEST(FullBodyDynamics, BarInFastRotation)
     const Body   hub  = scene.add("hub", RigidBody{});
     const Marker axis = scene.marker(hub), ground = scene.marker(scene.ground());
     scene.add("bearing", Revolute{axis, ground});
-    scene.add("drive", RotationalMotion{axis, ground, TimeFunction::step(0, 0, 0.8, spin), MotionOf::Velocity});
+    scene.add("drive", RotationalMotion{axis, ground, TimeFunction::step5(0, 0, 0.8, spin), MotionOf::Velocity});
     scene.add("clamp", Fixed{scene.marker(ends.root), axis});
     scene.channel("x", Measure::displacement(scene.marker(ends.tip), 0, axis, axis));
     const double h = 2e-3 / (1 << k);

@@ -383,7 +383,7 @@ TEST(SceneReferences, RollingBall)
 TEST(SceneReferences, QuarterCar)
 {
   hhtex::QuarterCarReference::Parameters p;
-  p.road = TimeFunction::step(0.1, 0, 0.14, 0.1);
+  p.road = TimeFunction::step5(0.1, 0, 0.14, 0.1);
   hhtex::QuarterCarReference exact(p);
   const double               hub = 0.3 - p.sink();
   double                     air = 0;
