@@ -21,13 +21,27 @@ struct Cylindrical { Marker i, j; };    /* along and about z_j */
 struct Planar { Marker i, j; };         /* xy planes coincide */
 struct Fixed { Marker i, j; };
 struct Screw { Marker i, j; double pitch = 1; }; /* cylindrical, pitch of advance along z_j per turn */
-/* couplers of joint motions, each given by its two markers: angle about z_j (revolute, cylindrical) or advance along z_j */
+/*
+  Couplers of joint motions, each given by its two markers: angle about z_j (revolute, cylindrical) or advance along z_j. They load
+  the joints' own freedoms, a moment about z_j and a force along it, and nothing else: no bearing carries the force of teeth. The
+  gears and racks after them act at the pitch point.
+*/
 struct Gear { Marker i1, j1, i2, j2; double ratio = 1; };          /* angle_1 + ratio angle_2 = its value at the start */
 struct RackAndPinion { Marker i1, j1, i2, j2; double radius = 1; }; /* advance_2 - radius angle_1 = its value at the start */
 struct Coupler {                                                   /* sum of c_k s_k = its value at the start */
   struct Term { Marker i, j; bool rotation = true; double factor = 1; };
   std::vector<Term> terms; /* two or three */
 };
+
+/*
+  Teeth between two bodies on one carrier. The joints of the bodies on the carrier are given by their markers, j1 and j2 being on the
+  carrier (or the ground) as `mesh` is: its origin is the pitch point, its z axis (planar scenes: x axis) the direction of the force
+  of the teeth. Both bodies move alike there, along that direction, and push each other with a force through the pitch point, which
+  their bearings carry. Radii, ratio, bevel and pressure angle follow from where the markers are; z_mesh along the common tangent of
+  the pitch circles means teeth without pressure angle. Multiplier: force on body 1 along z_mesh.
+*/
+struct GearMesh { Marker i1, j1, i2, j2, mesh; };  /* wheels on revolute or cylindrical joints, about z_j1 and z_j2 */
+struct RackMesh { Marker i1, j1, i2, j2, mesh; };  /* wheel 1, and a rack 2 on a translational joint along z_j2 (planar: x_j2) */
 
 /* ---- primitives ---- */
 struct InLine { Marker i, j; };         /* origin of i on the z axis of j */

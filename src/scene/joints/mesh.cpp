@@ -1,0 +1,78 @@
+/* Gears and racks between two bodies on one carrier, whose force acts at the pitch point. */
+#include "scene/kernels/mesh.h"
+#include "scene/motions/moving_pair.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr double parallel = 1e-6; /* sine of the largest angle between z_i and z_j at the start, as assembly may still mend */
+
+template <class Spec> void CheckBodies(ElementBuilder &e, const Spec &s)
+{
+  const SceneData &scene = e.scene();
+  const auto       body  = [&](Marker m) { return scene.markers[m.id].body; };
+  e.require(s.i2, "marker i2");
+  e.require(s.j2, "marker j2");
+  e.require(s.mesh, "marker `mesh`");
+  if (!e.good()) return;
+  const PetscInt carrier = body(s.j1);
+  for (Marker m : {s.j2, s.mesh})
+    e.require(body(m) == carrier, std::string(m.id == s.j2.id ? "marker j2" : "marker `mesh`") + " is on " + scene.bodyName(body(m)) + " and j1 on " +
+                                    scene.bodyName(carrier) + ", must be on the same carrier");
+  e.require(body(s.i1) != body(s.i2), "both bodies are " + scene.bodyName(body(s.i1)) + ", must be two");
+  for (Marker m : {s.i1, s.i2})
+    e.require(body(m) < 0 || !scene.bodies[body(m)].point, "marker " + std::string(m.id == s.i1.id ? "i1" : "i2") + " is on the point mass " +
+                                                               scene.bodyName(body(m)) + ", must be on a rigid body");
+}
+
+void CheckWheel(ElementBuilder &e, Marker i, Marker j, const char *which)
+{
+  RequirePair(e, i, j, true, std::string(which) + ": ");
+  if (!e.good()) return;
+  const Vector3 a = e.frame(i).R.col(2), b = e.frame(j).R.col(2);
+  e.require(a.cross(b).norm() < parallel, std::string(which) + ": the z axes of its markers are not parallel, as those of a revolute or cylindrical joint are");
+}
+
+template <class K> void CheckLever(ElementBuilder &e, const typename K::Data &d, int k, const char *which)
+{
+  e.require(std::abs(K::perAngle(d, k)) > parallel * d.side[k].bearing.norm(),
+            std::string(which) + ": the force of the teeth has no lever about its axis; z of `mesh` (planar: x) is the direction of that force, its origin the pitch point");
+}
+
+template <bool Rack, class Spec> Element Mesh(ElementBuilder &e, const Spec &s)
+{
+  using K = MeshRow<Rack>;
+  CheckBodies(e, s);
+  if (e.good()) CheckWheel(e, s.i1, s.j1, "wheel 1");
+  if (e.good() && !Rack) CheckWheel(e, s.i2, s.j2, "wheel 2");
+  if (e.good() && Rack) RequirePair(e, s.i2, s.j2, false, "rack: ");
+  if (!e.good()) return e.done();
+  const Frame<double> f[3] = {e.frame(s.i1), e.frame(s.i2), e.frame(s.mesh)}, bearing[2] = {e.frame(s.j1), e.frame(s.j2)};
+  typename K::Data    d;
+  d.axis = e.planar() ? 0 : 2;
+  K::begin(d, f, bearing);
+  CheckLever<K>(e, d, 0, "wheel 1");
+  if (!Rack) CheckLever<K>(e, d, 1, "wheel 2");
+  else e.require(std::abs(K::perAdvance(d, e.planar() ? 0 : 2)) > parallel, "rack: the force of the teeth is across its way, z of j2 (planar: x)");
+  if (e.good()) e.constrain<K>({s.i1, s.i2, s.mesh}, d);
+  return e.done();
+}
+
+} // namespace
+
+template <> Element Scene::add(const std::string &name, const GearMesh &s)
+{
+  ElementBuilder e(*this, name, "gear mesh", ElementData::Joint, s.i1, s.j1);
+  return Mesh<false>(e, s);
+}
+
+template <> Element Scene::add(const std::string &name, const RackMesh &s)
+{
+  ElementBuilder e(*this, name, "rack mesh", ElementData::Joint, s.i1, s.j1);
+  return Mesh<true>(e, s);
+}
+
+} // namespace hhtdae

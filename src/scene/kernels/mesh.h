@@ -1,0 +1,129 @@
+/*
+  Teeth between two bodies on one carrier: with e the direction of the teeth's force and P the pitch point, both fixed in the carrier,
+  the bodies' points at P have moved alike along e,
+
+    start + s_2 - s_1 = 0,     s = e . d + m . phi,     m = (P - x) x e,
+
+  where d is the displacement of a body's marker against the carrier, phi its rotation, x where the marker is. phi about the axis of a
+  wheel is its angle, counted over full turns; about the other axes, and of a rack, it vanishes by the joint that holds the body,
+  and there are its derivatives alone: they make the load of the row on either body that of a force along e through P, exactly,
+  and leave none on the carrier. So the bearings carry the force. Where a wheel's marker leaves its axis s is no longer what it says,
+  but the joint's rows do not allow that.
+
+  Frames: marker of body 1, of body 2, and the one on the carrier, with origin P and e as an axis. Multiplier: force on body 1 along e.
+*/
+#ifndef HHTDAE_SCENE_KERNELS_MESH_H
+#define HHTDAE_SCENE_KERNELS_MESH_H
+
+#include "angle.h"
+
+namespace hhtdae
+{
+
+/* How a body is held, in the axes of the carrier's marker */
+struct MeshSide {
+  Vec3<double> bearing = Vec3<double>::Zero();     /* origin of the joint's marker on the carrier */
+  Mat3<double> axes    = Mat3<double>::Identity(); /* its axes */
+  Mat3<double> start   = Mat3<double>::Identity(); /* axes of the body's marker at the start */
+};
+
+template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
+  static constexpr const char *name   = Rack ? "rack mesh" : "gear mesh";
+  static constexpr int         memory = Rack ? 1 : 2;
+  struct Data {
+    double   memory[2] = {}; /* angles of the wheels at the last accepted step, unwound */
+    MeshSide side[2];
+    double   start = 0;
+    int      axis  = 2; /* of the carrier's marker: e */
+  };
+
+  /* a body's marker in the carrier's axes */
+  template <class T> static Frame<T> onCarrier(const Frame<T> &body, const Frame<T> &carrier)
+  {
+    const Vec3<T> u = body.x - carrier.x;
+    Frame<T>      f;
+    for (int r = 0; r < 3; r++) {
+      f.x(r) = u.dot(carrier.R.col(r));
+      for (int c = 0; c < 3; c++) f.R(r, c) = body.R.col(c).dot(carrier.R.col(r));
+    }
+    return f;
+  }
+
+  static Vec3<double> lever(const Vec3<double> &x, int axis) { return Vec3<double>::Unit(axis).cross(x); } /* (P - x) x e, P = 0 */
+
+  /* (P - x) x e, component c; x of any kind of number */
+  template <class T> static T leverComponent(const Vec3<T> &x, int axis, int c)
+  {
+    const int a = (axis + 1) % 3, b = (axis + 2) % 3; /* e x x = -x_b a + x_a b, with (e, a, b) right-handed */
+    return c == a ? T(-x(b)) : c == b ? T(x(a)) : T(0);
+  }
+
+  /* of a wheel about z of its bearing: z_i on the side of z_j on which it started */
+  template <class T> static T wheel(const MeshSide &s, const Frame<T> &f, double remembered, int axis)
+  {
+    const Frame<T> bearing = Constant<T>(Frame<double>{s.bearing, s.axes});
+    const double   side    = s.start.col(2).dot(s.axes.col(2)) < 0 ? -1 : 1;
+    const Vec3<T>  z       = f.R.col(2) * T(side);
+    const T        about_x = -z.dot(bearing.R.col(1)), about_y = z.dot(bearing.R.col(0)); /* z = z_j + phi x z_j */
+    const Vec3<T>  phi     = bearing.R.col(0) * about_x + bearing.R.col(1) * about_y;
+    T              tilt(0);
+    for (int c = 0; c < 3; c++) tilt += leverComponent<T>(f.x, axis, c) * phi(c);
+    return tilt + T(lever(s.bearing, axis).dot(s.axes.col(2))) * UnwoundAngle<T>(f, bearing, remembered);
+  }
+
+  /* of a body that does not turn: from R start^T = 1 + [phi] */
+  template <class T> static T rack(const MeshSide &s, const Frame<T> &f, int axis)
+  {
+    T sum(0);
+    for (int c = 0; c < 3; c++) {
+      const int a = (c + 1) % 3, b = (c + 2) % 3;
+      T         phi(0);
+      for (int k = 0; k < 3; k++) phi += f.R(b, k) * T(0.5 * s.start(a, k)) - f.R(a, k) * T(0.5 * s.start(b, k));
+      sum += leverComponent<T>(f.x, axis, c) * phi;
+    }
+    return sum;
+  }
+
+  template <class T> static T moved(const Data &d, const Frame<T> *f, int k)
+  {
+    const Frame<T> on   = onCarrier<T>(f[k], f[2]);
+    const T        turn = Rack && k == 1 ? rack<T>(d.side[k], on, d.axis) : wheel<T>(d.side[k], on, d.memory[k], d.axis);
+    return on.x(d.axis) + turn;
+  }
+
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi)
+  {
+    phi[0] = T(d.start) + moved<T>(d, f, 1) - moved<T>(d, f, 0);
+  }
+
+  static void accept(Data &d, const Frame<double> *f)
+  {
+    for (int k = 0; k < MeshRow::memory; k++)
+      d.memory[k] = UnwoundAngle<double>(onCarrier<double>(f[k], f[2]), {d.side[k].bearing, d.side[k].axes}, d.memory[k]);
+  }
+  static double longestStep(const Data &, const Frame<double> *, const Twist<double> *w, double, double angular)
+  {
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < MeshRow::memory; k++) least = std::min(least, LongestTurn((w[k].w - w[2].w).norm(), angular));
+    return least;
+  }
+
+  /* The pose at the start as reference; bearing: the joints' markers on the carrier */
+  static void begin(Data &d, const Frame<double> *f, const Frame<double> *bearing)
+  {
+    for (int k = 0; k < 2; k++) {
+      const Frame<double> j = onCarrier<double>(bearing[k], f[2]), i = onCarrier<double>(f[k], f[2]);
+      d.side[k]             = {j.x, j.R, i.R};
+      if (k < MeshRow::memory) d.memory[k] = PrincipalAngle<double>(i, j);
+    }
+    d.start = moved<double>(d, f, 0) - moved<double>(d, f, 1);
+  }
+
+  /* Displacement at P along e per angle of a wheel, per advance of the rack along axis `along` of its bearing */
+  static double perAngle(const Data &d, int k) { return lever(d.side[k].bearing, d.axis).dot(d.side[k].axes.col(2)); }
+  static double perAdvance(const Data &d, int along) { return d.side[1].axes(d.axis, along); }
+};
+
+} // namespace hhtdae
+
+#endif
