@@ -106,7 +106,7 @@ public:
   Scene &operator=(const Scene &) = delete;
 
   /* bodies; an empty name becomes "body 7" */
-  Body ground() const { return Body{-1}; }
+  Body ground() const { return Body{-1, number_}; }
   Body add(const std::string &name, const RigidBody &body);
   Body add(const std::string &name, const PointMass &body);
   Body add(const std::string &name, const FlexibleBody &body);
@@ -140,11 +140,13 @@ public:
   StartPolicy &start();
 
   /* Checks the scene, assembles it, drops redundant constraints, numbers and distributes it, looks for static equilibrium, all as
-     start() says; collective; called by createTS() when it has not been. After this the scene is fixed. */
+     start() says; collective; called by createTS() when it has not been. After this the scene is fixed: what is added later is an
+     error of the next createTS(), solve() or sample(). */
   PetscErrorCode setUp();
 
   /* A TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it, the scene must
-     outlive it. Set final time, step and options on it as on any TS. */
+     outlive it. Set final time, step and options on it as on any TS. Each run from the start takes a TS of its own: the scene holds
+     axes of Euler angles and unwound angles of the run at hand, which begins anew with each TS and ends those before. */
   PetscErrorCode createTS(TS *ts);
 
   /* TSSolve(), output. */
@@ -161,6 +163,7 @@ public:
   const SceneData &data() const { return *data_; }
 
 private:
+  PetscInt                   number_; /* of this scene, in the handles that it gives */
   std::unique_ptr<SceneData> data_;
   Body addFrame(Body flexible, PetscInt attachment);
 };

@@ -185,7 +185,7 @@ Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, con
   f.light_inertia = 1e-3 * mass * size * size;
   f.fixed_start   = true; /* the nodes do not move in the assembly phase */
   scene.data().bodies.push_back(f);
-  return Body{(PetscInt)scene.data().bodies.size() - 1};
+  return Body{(PetscInt)scene.data().bodies.size() - 1, scene.data().number};
 }
 
 /* Mass, and two opposite corners of the box around the body, for what has to be small or large beside them */
@@ -223,6 +223,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   PetscFunctionBegin;
   const std::string fault = scene.data().planar ? "it needs a scene in space" : Fault(model, body);
   PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
+  scene.data().refuseLate("finite-element body " + name);
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
   x->spec  = body;

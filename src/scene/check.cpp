@@ -23,6 +23,12 @@ std::string Text(double x)
 }
 std::string Text(const Vector3 &x) { return Text(x(0)) + ", " + Text(x(1)) + ", " + Text(x(2)); }
 
+bool SameStart(const StartPolicy &a, const StartPolicy &b)
+{
+  return a.assembly == b.assembly && a.tolerance == b.tolerance && a.redundant == b.redundant && a.equilibrium == b.equilibrium && a.view == b.view &&
+         a.time == b.time;
+}
+
 class Check
 {
 public:
@@ -154,20 +160,41 @@ private:
 
 } // namespace
 
-PetscErrorCode CheckDescription(SceneData &s)
+namespace
+{
+
+/* All of them as one error, as far as PETSc's message has room */
+PetscErrorCode Report(const SceneData &s, const std::vector<std::string> &errors, const char *what)
 {
   std::string       all;
-  Check             check(s);
   std::size_t       k    = 0;
-  const std::size_t room = 1500; /* of PETSc's message */
+  const std::size_t room = 1500;
   PetscFunctionBegin;
-  PetscCheck(!s.bodies.empty() || !s.extensions.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
-  check.all();
-  const std::vector<std::string> &errors = check.errors();
   for (; k < errors.size() && all.size() + errors[k].size() < room; k++) all += "\n  " + errors[k];
   for (std::size_t i = k; i < errors.size(); i++) PetscCall(PetscInfo(nullptr, "scene: %s\n", errors[i].c_str()));
   if (k < errors.size()) all += "\n  and " + std::to_string(errors.size() - k) + " more, see -info";
-  PetscCheck(errors.empty(), s.comm, PETSC_ERR_ARG_WRONG, "the scene cannot be built:%s", all.c_str());
+  PetscCheck(errors.empty(), s.comm, PETSC_ERR_ARG_WRONG, "%s:%s", what, all.c_str());
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode CheckDescription(SceneData &s)
+{
+  Check check(s);
+  PetscFunctionBegin;
+  PetscCheck(!s.bodies.empty() || !s.extensions.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
+  check.all();
+  PetscCall(Report(s, check.errors(), "the scene cannot be built"));
+  PetscFunctionReturn(0);
+}
+
+/* What was added or changed since setUp() */
+PetscErrorCode CheckUnchanged(const SceneData &s)
+{
+  PetscFunctionBegin;
+  PetscCall(Report(s, s.errors, "the scene was changed after it was set up"));
+  PetscCheck(SameStart(s.start, s.start_used), s.comm, PETSC_ERR_ORDER, "Scene::start() was changed after the scene was set up, which has no effect: change it before setUp() or createTS()");
   PetscFunctionReturn(0);
 }
 

@@ -119,14 +119,14 @@ std::string CheckMarkers(const SceneData &s, const Measure &m)
 
 std::string CheckModal(const SceneData &s, const Measure &m)
 {
-  if (m.target < 0 || m.target >= (PetscInt)s.bodies.size() || !s.bodies[m.target].flexible) return "its body is not a flexible one of this scene";
+  if (!s.valid(Body{m.target, m.scene}) || !s.bodies[m.target].flexible) return "its body is not a flexible one of this scene";
   const PetscInt n = s.bodies[m.target].flexible->model->modes();
   return m.component >= 0 && m.component < n ? "" : s.bodies[m.target].name + " has modes 0 to " + std::to_string(n - 1) + ", not " + std::to_string(m.component);
 }
 
 std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
 {
-  if (m.target < 0 || m.target >= (PetscInt)s.elements.size())
+  if (!s.valid(Element{m.target, m.scene}))
     return "its element is not one of this scene; add it first";
   const ElementData &e       = s.elements[m.target];
   const std::string  who     = std::string(e.type) + " " + e.name;
@@ -178,9 +178,9 @@ std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
   case Measure::PotentialEnergy:
     return in_equation ? "is for output alone" : "";
   case Measure::Value:
-    return m.target >= 0 && m.target < (PetscInt)s.variables.size() ? "" : "not a variable of this scene";
+    return s.mine(m) && m.target >= 0 && m.target < (PetscInt)s.variables.size() ? "" : "not a variable of this scene";
   case Measure::StateValue:
-    return m.target >= 0 && m.target < (PetscInt)s.states.size() ? "" : "not a state of this scene";
+    return s.mine(m) && m.target >= 0 && m.target < (PetscInt)s.states.size() ? "" : "not a state of this scene";
   case Measure::Modal:
     return CheckModal(s, m);
   case Measure::Multiplier:

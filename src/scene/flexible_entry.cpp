@@ -115,7 +115,7 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
 Body Scene::attachment(Body body, const std::string &name)
 {
   SceneData &s = *data_;
-  const bool good = body.id >= 0 && body.id < (PetscInt)s.bodies.size() && s.bodies[body.id].flexible;
+  const bool good = s.valid(body) && s.bodies[body.id].flexible;
   if (!good) {
     s.errors.push_back("attachment " + name + ": its body is not a flexible one of this scene");
     return Body{};
@@ -129,7 +129,7 @@ Body Scene::attachment(Body body, const std::string &name)
     return Body{};
   }
   for (std::size_t b = 0; b < s.bodies.size(); b++)
-    if (s.bodies[b].carrier == body.id && s.bodies[b].attachment == a) return Body{(PetscInt)b};
+    if (s.bodies[b].carrier == body.id && s.bodies[b].attachment == a) return Body{(PetscInt)b, s.number};
   return addFrame(body, a);
 }
 
@@ -159,7 +159,7 @@ Body Scene::addFrame(Body body, PetscInt a)
   f.carrier     = body.id;
   f.attachment  = a;
   s.bodies.push_back(f);
-  const Body frame{(PetscInt)s.bodies.size() - 1};
+  const Body frame{(PetscInt)s.bodies.size() - 1, s.number};
   s.markers.push_back({body.id, place, Matrix3::Identity()});
   s.markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
   const Marker   i{(PetscInt)s.markers.size() - 2}, j{(PetscInt)s.markers.size() - 1};

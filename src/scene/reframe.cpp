@@ -111,10 +111,29 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Test(TS ts, PetscReal, Vec U, Vec V, PetscBool *change, void *ctx)
+/* Axes and memories belong to the run of one TS, and go forward in time */
+PetscErrorCode CheckRun(Runtime &R, TS ts, PetscReal t)
+{
+  PetscObjectId id;
+  PetscFunctionBegin;
+  if (!R.axes) PetscFunctionReturn(0);
+  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
+  PetscCheck(id == R.ts, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "this TS ended when Scene::createTS() made another one of the scene: its axes of Euler angles and its unwound angles are those of the new run. "
+             "Finish a run before the next createTS(), or describe a scene for each");
+  PetscCheck(t >= R.accepted, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "the TS starts again at t = %g, but the scene's axes of Euler angles and its unwound angles are those of t = %g: take a new TS from "
+             "Scene::createTS() for another run, or TSHHT3CheckpointLoad() to go back",
+             (double)t, (double)R.accepted);
+  R.accepted = t;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
+  PetscCall(CheckRun(R, ts, t));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
   *change = PETSC_FALSE;
@@ -188,6 +207,7 @@ PetscErrorCode Commit(TS ts, void *ctx)
     PetscCall(PetscInfo(ts, "new axes for the Euler angles of %s\n", R.scene.bodyName(R.bodies.body[R.next_body[i]].id).c_str()));
   }
   PetscCall(VecRestoreArray(R.axes, &x));
+  if (R.next_body.empty()) R.accepted = PETSC_NINFINITY; /* a checkpoint, of any time */
   R.reframed += (PetscInt)R.next_body.size();
   R.next_body.clear();
   R.next_axes.clear();
@@ -235,6 +255,23 @@ PetscErrorCode MakeAxes(Runtime &R)
     b->copyMemory(m, false);
     m += b->memory();
   }
+  R.axes_start.assign(x, m);
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscCall(UseAxes(R));
+  PetscFunctionReturn(0);
+}
+
+/* As they were before the first run */
+PetscErrorCode RewindAxes(Runtime &R)
+{
+  double *x;
+  PetscFunctionBegin;
+  R.accepted = PETSC_NINFINITY;
+  R.next_axes.clear();
+  R.next_body.clear();
+  if (!R.axes) PetscFunctionReturn(0);
+  PetscCall(VecGetArray(R.axes, &x));
+  std::copy(R.axes_start.begin(), R.axes_start.end(), x);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscCall(UseAxes(R));
   PetscFunctionReturn(0);

@@ -58,6 +58,9 @@ struct Runtime {
   Vec       rtol    = nullptr; /* relative tolerances, none for angles */
   PetscReal rtol_of = -1;
   PetscSF axes_sf = nullptr; /* axes of others' bodies */
+  std::vector<double> axes_start;                         /* the vector before the first step of a run */
+  PetscObjectId       ts = 0;                             /* the TS made last: axes and memories are those of its run */
+  PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that they belong to */
   std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
   std::vector<PetscInt> next_body;
   PetscInt              reframed = 0; /* changes of axes so far, own bodies */
@@ -88,6 +91,7 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
 PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
+PetscErrorCode RewindAxes(Runtime &R);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
 constexpr PetscInt kept = 56;
@@ -110,8 +114,11 @@ PetscErrorCode WantTriangle(Runtime &R);  /* before Layout() */
 PetscErrorCode StoreTriangle(Runtime &R); /* after it */
 PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again);
 PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::function<void()> &add);
+/* ts.cpp: whether a TS is one of the scene's, for the call that is named */
+PetscErrorCode CheckTS(const SceneData &s, TS ts, const char *call);
 /* check.cpp: everything that is wrong with the description, as one error */
 PetscErrorCode CheckDescription(SceneData &s);
+PetscErrorCode CheckUnchanged(const SceneData &s);
 
 } // namespace hhtdae
 

@@ -6,11 +6,23 @@
 namespace hhtdae
 {
 
-SceneData::SceneData()  = default;
+namespace
+{
+
+PetscInt NextNumber()
+{
+  static PetscInt scenes = 0;
+  return ++scenes;
+}
+
+} // namespace
+
+SceneData::SceneData() : number(NextNumber()) {}
 SceneData::~SceneData() = default;
 
 Scene::Scene(MPI_Comm comm, Space space) : data_(std::make_unique<SceneData>())
 {
+  number_       = data_->number;
   data_->comm   = comm;
   data_->planar = space == Space::Planar;
 }
@@ -21,6 +33,7 @@ Body Scene::add(const std::string &name, const RigidBody &b)
 {
   BodyData d;
   d.name        = name.empty() ? "body " + std::to_string(data_->bodies.size()) : name;
+  data_->refuseLate("body " + d.name);
   d.mass        = b.mass;
   d.inertia     = b.inertia;
   d.center      = b.center;
@@ -30,7 +43,7 @@ Body Scene::add(const std::string &name, const RigidBody &b)
   d.w           = b.angular_velocity;
   d.fixed_start = b.fixed_start;
   data_->bodies.push_back(d);
-  return Body{(PetscInt)data_->bodies.size() - 1};
+  return Body{(PetscInt)data_->bodies.size() - 1, number_};
 }
 
 Body Scene::add(const std::string &name, const PointMass &b)
@@ -49,8 +62,9 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
 {
   SceneData     &s    = *data_;
   const PetscInt id   = (PetscInt)s.markers.size();
-  const bool     good = body.id >= -1 && body.id < (PetscInt)s.bodies.size();
+  const bool     good = body.id == -1 || s.valid(body);
   const std::string who = "marker " + (name.empty() ? std::to_string(id) : name);
+  s.refuseLate(who);
   if (!good) s.errors.push_back(who + ": its body is not one of this scene");
   else if (body.id >= 0 && s.bodies[body.id].flexible)
     s.errors.push_back(who + ": a flexible body is held at its attachments; use scene.attachment(" + s.bodies[body.id].name + ", ...) as the marker's body");
@@ -63,30 +77,33 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
   }
   s.markers.push_back(m);
   if (!name.empty()) s.marker_names[id] = name;
-  return Marker{id};
+  return Marker{id, number_};
 }
 
 Marker Scene::markerAt(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
-  if (body.id < 0 || body.id >= (PetscInt)data_->bodies.size()) return marker(body, position, axes, name);
+  if (!data_->valid(body)) return marker(body, position, axes, name);
   const BodyData &b = data_->bodies[body.id];
   return marker(body, b.A.transpose() * (position - b.r) + b.center, b.A.transpose() * axes, name);
 }
 
 Variable Scene::variable(const std::string &name, const Expression &definition, double initial)
 {
+  data_->refuseLate("variable " + name);
   data_->variables.push_back({name.empty() ? "variable " + std::to_string(data_->variables.size()) : name, definition, initial});
-  return Variable{(PetscInt)data_->variables.size() - 1};
+  return Variable{(PetscInt)data_->variables.size() - 1, number_};
 }
 
 State Scene::state(const std::string &name, const Expression &rate, double initial)
 {
+  data_->refuseLate("state " + name);
   data_->states.push_back({name.empty() ? "state " + std::to_string(data_->states.size()) : name, rate, initial});
-  return State{(PetscInt)data_->states.size() - 1};
+  return State{(PetscInt)data_->states.size() - 1, number_};
 }
 
 void Scene::gravity(const Vector3 &acceleration)
 {
+  data_->refuseLate("gravity");
   if (!acceleration.allFinite()) data_->errors.push_back("gravity must be finite");
   data_->gravity = acceleration;
 }
@@ -118,6 +135,7 @@ ElementBuilder::ElementBuilder(Scene &scene, const std::string &name, const char
   element_.kind = kind;
   element_.i    = i;
   element_.j    = j;
+  data_.refuseLate(element_.type + (" " + element_.name));
   require(i, "marker i");
   if (!pair) return;
   require(j, "marker j");
@@ -139,7 +157,7 @@ void ElementBuilder::require(Marker m, const char *what)
 Element ElementBuilder::done()
 {
   data_.elements.push_back(std::move(element_));
-  return Element{(PetscInt)data_.elements.size() - 1};
+  return Element{(PetscInt)data_.elements.size() - 1, data_.number};
 }
 
 /* ---- from description to work ---- */
@@ -168,7 +186,8 @@ PetscErrorCode Scene::setUp()
   PetscCall(StoreTriangle(R));
   if (s.start.equilibrium) PetscCall(FindEquilibrium(R));
   if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
-  s.run = std::move(run); /* not before everything is done: after an error setUp() starts anew */
+  s.start_used = s.start;
+  s.run        = std::move(run); /* not before everything is done: after an error setUp() starts anew */
   PetscFunctionReturn(0);
 }
 

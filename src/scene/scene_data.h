@@ -102,6 +102,7 @@ struct StartResult {
 struct Runtime; /* numbering, matrices, evaluation: runtime.h */
 
 struct SceneData {
+  const PetscInt              number; /* of the scene, which its handles bear */
   MPI_Comm                    comm;
   bool                        planar = false;
   std::vector<BodyData>       bodies;
@@ -120,12 +121,21 @@ struct SceneData {
   std::vector<std::string>    errors; /* found while the scene was described */
   StartPolicy                 start;
   StartResult                 started;
+  StartPolicy                 start_used; /* by setUp() */
   std::unique_ptr<Runtime>    run;
 
   SceneData();
   ~SceneData();
   std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
-  bool        valid(Marker m) const { return m.id >= 0 && m.id < (PetscInt)markers.size(); }
+  /* Whether a handle is of this scene. Number 0 stands for a handle made by hand. */
+  template <class Handle> bool mine(Handle h) const { return h.scene == 0 || h.scene == number; }
+  bool valid(Marker m) const { return mine(m) && m.id >= 0 && m.id < (PetscInt)markers.size(); }
+  bool valid(Body b) const { return mine(b) && b.id >= 0 && b.id < (PetscInt)bodies.size(); }
+  bool valid(Element e) const { return mine(e) && e.id >= 0 && e.id < (PetscInt)elements.size(); }
+  void refuseLate(const std::string &what) /* an error if the scene is fixed already */
+  {
+    if (run) errors.push_back(what + " came too late: the scene is fixed from createTS() or setUp() on");
+  }
   /* at the start */
   Frame<double> frame(Marker m) const;
   Twist<double> twist(Marker m) const;

@@ -70,13 +70,27 @@ PetscErrorCode Solve(TS ts)
 
 } // namespace
 
+/* What a TS has to be for a run of this scene */
+PetscErrorCode CheckTS(const SceneData &s, TS ts, const char *call)
+{
+  void *ctx = nullptr;
+  PetscFunctionBegin;
+  PetscCheck(s.run, s.comm, PETSC_ERR_ORDER, "%s: the scene has no TS yet, call Scene::createTS() first", call);
+  PetscCall(CheckUnchanged(s));
+  PetscCall(TSGetI2Function(ts, nullptr, nullptr, &ctx));
+  PetscCheck(ctx == s.run.get(), s.comm, PETSC_ERR_ARG_WRONG, "%s: the TS is not of this scene, it was not made by its createTS()", call);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Scene::createTS(TS *ts)
 {
   Vec U, V, F;
   Mat J;
   PetscFunctionBegin;
   PetscCall(Guarded([&] { return setUp(); }));
+  PetscCall(CheckUnchanged(*data_));
   Runtime &R = *data_->run;
+  PetscCall(RewindAxes(R));
   PetscCall(VecCreate(data_->comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));
@@ -89,6 +103,7 @@ PetscErrorCode Scene::createTS(TS *ts)
     R.given = true;
   } else PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
   PetscCall(TSCreate(data_->comm, ts));
+  PetscCall(PetscObjectGetId((PetscObject)*ts, &R.ts));
   PetscCall(TSSetProblemType(*ts, TS_NONLINEAR));
   PetscCall(TSSetType(*ts, TSHHT3));
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
@@ -109,6 +124,7 @@ PetscErrorCode Scene::createTS(TS *ts)
 PetscErrorCode Scene::solve(TS ts)
 {
   PetscFunctionBegin;
+  PetscCall(CheckTS(*data_, ts, "Scene::solve()"));
   PetscCall(AttachOutput(*data_->run, ts));
   const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */

@@ -431,6 +431,7 @@ private:
     PetscFunctionBegin;
     last_.u.clear();
     if (!R.axes) PetscFunctionReturn(0);
+    R.axes_start = axes_; /* which createTS() goes back to */
     PetscCall(VecGetArray(R.axes, &x));
     std::copy(axes_.begin(), axes_.end(), x);
     PetscCall(VecRestoreArray(R.axes, &x));

@@ -9,6 +9,7 @@ Channel Scene::channel(const std::string &given, const Measure &m, const std::st
   SceneData        &s    = *data_;
   const std::string name = given.empty() ? "channel " + std::to_string(s.channels.size()) : given;
   const std::string who = "channel " + name + ": ";
+  s.refuseLate("channel " + name);
   if (name.front() == '/' || name.back() == '/' || name.find("//") != std::string::npos)
     s.errors.push_back(who + "a name neither begins nor ends with /, which separates groups in the file");
   if (name == "time") s.errors.push_back(who + "this name is taken by the times of the samples");
@@ -23,7 +24,8 @@ Channel Scene::channel(const std::string &given, const Measure &m, const std::st
 void Scene::shape(Body body, const Shape &shape)
 {
   SceneData &s = *data_;
-  if (body.id < -1 || body.id >= (PetscInt)s.bodies.size()) {
+  s.refuseLate("shape of a body");
+  if (body.id != -1 && !s.valid(body)) {
     s.errors.push_back("shape: its body is not one of this scene");
     return;
   }
@@ -35,6 +37,7 @@ void Scene::line(const std::vector<Marker> &markers)
 {
   SceneData            &s = *data_;
   std::vector<PetscInt> ids;
+  s.refuseLate("line");
   for (Marker m : markers) {
     if (!s.valid(m) || s.markers[m.id].body < -1) s.errors.push_back("line: a marker is not one of this scene");
     ids.push_back(m.id);

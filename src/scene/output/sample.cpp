@@ -31,7 +31,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   const double       *w[3], *local[3];
   std::vector<double> own, acceleration;
   PetscFunctionBegin;
-  PetscCheck(data_->run, data_->comm, PETSC_ERR_ORDER, "the scene has no TS yet: call Scene::createTS() and solve first");
+  PetscCall(CheckTS(*data_, ts, "Scene::sample()"));
   Runtime &R = *data_->run;
   for (Vec &x : W) {
     PetscCall(VecCreate(data_->comm, &x));

@@ -1,0 +1,151 @@
+/* One scene, several runs; calls in the wrong order; handles of another scene: each a clear error, or right */
+#include "scene_output.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A wheel that turns many times against a torsional spring, whose angle is counted */
+struct Winder {
+  Scene   scene{PETSC_COMM_SELF};
+  Body    wheel;
+  Marker  on, at;
+  Element pin;
+
+  Winder()
+  {
+    RigidBody b;
+    b.angular_velocity = {0, 0, 9};
+    wheel              = scene.add("wheel", b);
+    on                 = scene.marker(wheel);
+    at                 = scene.marker(scene.ground());
+    pin                = scene.add("pin", Revolute{on, at});
+    scene.add("spring", TorsionalSpringDamper{on, at, 0.05, 0, 0, 0});
+  }
+};
+
+Array solution(TS ts)
+{
+  Vec U;
+  must(TSGetSolution(ts, &U));
+  return whole(U);
+}
+
+void expectError(PetscErrorCode code, const ErrorTrap &trap, const std::string &part)
+{
+  EXPECT_NE(code, 0) << part;
+  EXPECT_TRUE(trap.says(part)) << trap.message;
+}
+
+} // namespace
+
+/* Each TS starts from the description, angles and axes too */
+TEST(SceneRuns, ASecondTSIsASecondRun)
+{
+  Winder w;
+  Array  end[2];
+  for (Array &x : end) {
+    SceneRun run(w.scene, 3, tolerance(1e-6));
+    must(run.solve());
+    x = solution(run.ts);
+  }
+  EXPECT_EQ(end[0], end[1]);
+}
+
+TEST(SceneRuns, AnEndedTSSaysSo)
+{
+  Winder    w;
+  SceneRun  first(w.scene, 1, tolerance(1e-6)), second(w.scene, 1, tolerance(1e-6));
+  ErrorTrap trap;
+  expectError(first.solve(), trap, "this TS ended when Scene::createTS() made another one");
+  must(second.solve());
+}
+
+TEST(SceneRuns, TheSameTSDoesNotStartAgain)
+{
+  Winder   w;
+  SceneRun run(w.scene, 1, tolerance(1e-6));
+  must(run.solve());
+  must(TSSetMaxTime(run.ts, 2)); /* going on is all right */
+  must(run.solve());
+  must(TSSetTime(run.ts, 0));
+  must(TSSetStepNumber(run.ts, 0));
+  must(TSRestartStep(run.ts));
+  ErrorTrap trap;
+  expectError(run.solve(), trap, "the TS starts again at t = 0");
+  EXPECT_TRUE(trap.says("take a new TS")) << trap.message;
+}
+
+TEST(SceneRuns, SolveNeedsATSOfTheScene)
+{
+  Winder    a, b;
+  TS        ts;
+  ErrorTrap trap;
+  Array     values;
+  must(a.scene.createTS(&ts));
+  expectError(b.scene.solve(ts), trap, "Scene::solve(): the scene has no TS yet");
+  expectError(b.scene.sample(ts, 0, values), trap, "Scene::sample(): the scene has no TS yet");
+  SceneRun run(b.scene, 1, "");
+  expectError(b.scene.solve(ts), trap, "not of this scene");
+  must(TSDestroy(&ts));
+}
+
+TEST(SceneRuns, CallsAfterTheSetUp)
+{
+  using Call = std::function<void(Winder &)>;
+  const std::vector<std::pair<std::string, Call>> calls = {
+    {"body late", [](Winder &w) { w.scene.add("late", RigidBody()); }},
+    {"body point", [](Winder &w) { w.scene.add("point", PointMass()); }},
+    {"marker late", [](Winder &w) { w.scene.marker(w.wheel, {0, 0, 0}, Matrix3::Identity(), "late"); }},
+    {"spring-damper late", [](Winder &w) { w.scene.add("late", SpringDamper{w.on, w.at, 1}); }},
+    {"variable late", [](Winder &w) { w.scene.variable("late", Measure::time()); }},
+    {"state late", [](Winder &w) { w.scene.state("late", Measure::time(), 0); }},
+    {"gravity", [](Winder &w) { w.scene.gravity({0, 0, 1}); }},
+    {"channel late", [](Winder &w) { w.scene.channel("late", Measure::time()); }},
+    {"shape", [](Winder &w) { w.scene.shape(w.wheel, Shape::sphere(1)); }},
+    {"line", [](Winder &w) { w.scene.line({w.on, w.at}); }},
+    {"Scene::start()", [](Winder &w) { w.scene.start().tolerance = 1; }},
+  };
+  for (const auto &[name, call] : calls) {
+    Winder   w;
+    SceneRun run(w.scene, 0.1, "");
+    call(w);
+    ErrorTrap trap;
+    TS        ts;
+    expectError(run.solve(), trap, name);
+    EXPECT_TRUE(trap.says("after")) << trap.message;
+    expectError(w.scene.createTS(&ts), trap, name);
+  }
+}
+
+TEST(SceneRuns, HandlesOfAnotherScene)
+{
+  using Call = std::function<void(Winder &, Winder &)>;
+  const std::vector<std::pair<std::string, Call>> calls = {
+    {"marker i is not a marker of this scene", [](Winder &w, Winder &o) { w.scene.add("s", SpringDamper{o.on, w.at, 1}); }},
+    {"marker j is not a marker of this scene", [](Winder &w, Winder &o) { w.scene.add("s", SpringDamper{w.on, o.at, 1}); }},
+    {"its body is not one of this scene", [](Winder &w, Winder &o) { w.scene.marker(o.wheel); }},
+    {"its body is not one of this scene", [](Winder &w, Winder &o) { w.scene.markerAt(o.wheel, {0, 0, 0}); }},
+    {"shape: its body is not one of this scene", [](Winder &w, Winder &o) { w.scene.shape(o.wheel, Shape::sphere(1)); }},
+    {"a marker is not one of this scene", [](Winder &w, Winder &o) { w.scene.line({w.on, o.at}); }},
+    {"marker i is not one of this scene", [](Winder &w, Winder &o) { w.scene.channel("c", Measure::displacement(o.on, 0)); }},
+    {"marker `frame` is not one of this scene", [](Winder &w, Winder &o) { w.scene.channel("c", Measure::jointForce(w.pin, 0, o.at)); }},
+    {"its element is not one of this scene", [](Winder &w, Winder &o) { w.scene.channel("c", Measure::multiplier(o.pin, 0)); }},
+    {"not a variable of this scene", [](Winder &w, Winder &o) {
+       w.scene.variable("v", Measure::time());
+       w.scene.channel("c", Measure::value(o.scene.variable("v", Measure::time())));
+     }},
+    {"its joint is not an element of this scene", [](Winder &w, Winder &o) { w.scene.add("f", JointFriction{o.pin, 0.1, 0.1}); }},
+    {"marker i2 is not a marker of this scene", [](Winder &w, Winder &o) { w.scene.add("g", GearMesh{w.on, w.at, o.on, w.at, w.at}); }},
+  };
+  for (const auto &[message, call] : calls) {
+    Winder    w, other;
+    call(w, other);
+    ErrorTrap trap;
+    expectError(w.scene.setUp(), trap, message);
+  }
+  Winder w, other;
+  w.scene.marker(other.scene.ground()); /* the ground is one */
+  must(w.scene.setUp());
+}
