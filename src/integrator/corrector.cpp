@@ -523,7 +523,6 @@ static PetscErrorCode CorrectStart(TS ts, KSP ksp, Vec F, Vec Y, PetscBool *ok)
   KSPConvergedReason reason;
   PetscInt           its;
   PetscReal          e = 0;
-
   PetscBool          evaluated = PETSC_FALSE; /* of no use in the start, where nothing is to be proved */
   PetscFunctionBegin;
   PetscCall(KSPSolve(ksp, F, Y));

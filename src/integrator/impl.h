@@ -64,6 +64,7 @@ struct Corrector : CorrectorOptions, CorrectorState {};
 
 struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
+  PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
   PetscReal since = 0, missing = 0; /* time since the last proof, and the accelerations that may be missing since, by the weights */
 };
 
