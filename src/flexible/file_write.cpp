@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace hhtdae
 {
@@ -18,18 +21,29 @@ namespace
 
 /* ---- datasets ---- */
 
+/* Before it takes the place of another file */
+bool OnDisk(const std::string &name)
+{
+  const int  file = open(name.c_str(), O_RDONLY);
+  const bool good = file >= 0 && fsync(file) == 0;
+  if (file >= 0) close(file);
+  return good;
+}
+
 class Writer
 {
 public:
   Writer(MPI_Comm comm, const std::string &name) : comm_(comm), name_(name), part_(name + ".part")
   {
+    struct stat info;
     MPI_Comm_rank(comm, &rank_);
     MPI_Comm_size(comm, &size_);
+    if (!rank_ && !stat(name.c_str(), &info) && !S_ISREG(info.st_mode)) part_ = name; /* a device is written to, not replaced */
   }
   ~Writer()
   {
     if (file_ >= 0) H5Fclose(file_);
-    if (!rank_ && !complete_ && made_) std::remove(part_.c_str());
+    if (!rank_ && !complete_ && made_ && part_ != name_) std::remove(part_.c_str());
   }
   Writer(const Writer &) = delete;
 
@@ -102,7 +116,7 @@ public:
       file_             = -1;
       if (!good || !closed)
         fail("/");
-      else if (std::rename(part_.c_str(), name_.c_str()))
+      else if (part_ != name_ && (!OnDisk(part_) || std::rename(part_.c_str(), name_.c_str())))
         error_ = "cannot write the reduced body to " + name_ + ": " + std::strerror(errno);
       complete_ = error_.empty();
     }
