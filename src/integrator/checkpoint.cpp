@@ -265,6 +265,20 @@ PetscErrorCode CheckProbe(TS ts, const char file[], Vec was, Vec is)
           "what its residual depends on besides the state has to be in the vector of TSHHT3SetCheckpointVec()", file, first, (double)rows[0], (double)rows[1]);
 }
 
+/* A run writes no state that is not finite, and a residual that is NaN in both runs tells nothing. */
+PetscErrorCode CheckFinite(TS ts, const char file[])
+{
+  Integrator &I = Get(ts);
+  PetscReal   sum;
+
+  PetscFunctionBegin;
+  for (Vec x : {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.U1, I.V1, I.A1}) {
+    PetscCall(VecNorm(x, NORM_1, &sum)); /* the largest entry may pass over NaN */
+    PetscCheck(!PetscIsInfOrNanReal(sum), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a state that is not finite", file);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What this rank has to say */
 PetscErrorCode Gather(TS ts, Archive &a)
 {
@@ -327,6 +341,7 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCall(TransferVec(ts, a, &was));
   PetscCall(Everywhere(ts, a.good, &good));
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckFinite(ts, file));
   I.stage_id = 0;
   I.scaled_h = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
