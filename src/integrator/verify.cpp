@@ -38,6 +38,9 @@ PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.bet
 
 bool HasDefinitions(const Integrator &I) { return I.count[TSHHT3_VARIABLE] || I.count[TSHHT3_FORCE]; }
 
+/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
+
 /* inertia_i: M_ii of coordinates, dF/ds' of states, from the matrix of the start; later matrices bound it from above. A
    coordinate without mass moves with others: it gets their mean. */
 PetscErrorCode BoundInertia(TS ts, bool start, const PetscScalar *p, PetscInt n, PetscScalar *m)
@@ -354,7 +357,7 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscCall(MakeClaims(ts, P, start));
   v.measured = PETSC_FALSE;
   if (start) v.largest = v.since = v.missing = 0;
-  if (v.largest >= least_claim) {
+  if (Claims(I)) {
     if (!v.where) PetscCall(VecDuplicate(X, &v.where));
     PetscCall(VecCopy(X, v.where));
   }
@@ -415,7 +418,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
 
   PetscFunctionBegin;
   *proved = PETSC_TRUE;
-  if (I.mode != Mode::Step || v.largest <= 0 || (v.largest < least_claim && !HasDefinitions(I))) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.mode != Mode::Step || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1), k = PetscAbsReal(I.p.k) * I.h * I.h, T = v.since + I.h;
   PetscCall(Claimed(ts, dX, &E));
   E = PetscMax(E, k * v.missing);
@@ -432,7 +435,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
     *proved = (PetscBool)(Drift(I, left, T) <= limit && PetscAbsReal(part - 1) > stayed);
     if (attempt && !*proved) {
       PetscCall(Claimed(ts, dX, &E));
-      *proved = (PetscBool)(v.largest < least_claim || Drift(I, E, T) <= limit);
+      *proved = (PetscBool)(!Claims(I) || Drift(I, E, T) <= limit);
     }
     if (*proved) {
       v.missing = PetscMin(left, E) / k;
@@ -454,7 +457,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscReal   left = 0, part = 0;
 
   PetscFunctionBegin;
-  if (I.mode != Mode::Step || !I.corrector.fresh || I.verify.largest < least_claim) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.mode != Mode::Step || !I.corrector.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
   PetscCall(Model(ts, dX));

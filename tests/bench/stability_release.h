@@ -31,15 +31,17 @@ struct Release : hhtex::Problem {
   const Hold   hold;
   const double s;
   const bool   company;
+  const bool   as_force; /* what holds is a force state: its stiffness does not stand in the block's own row */
   const double g = 9.81, until = 0.5 + 1e-9, kept = 1e8; /* the last held step may end at 0.5 but for rounding */
 
-  Release(Hold hold_, double strength, bool company_) : hold(hold_), s(strength), company(company_)
+  Release(Hold hold_, double strength, bool company_, bool as_force_ = false) : hold(hold_), s(strength), company(company_), as_force(as_force_)
   {
     name = "release";
-    n    = company ? 7 : 3;
+    n    = (company ? 7 : 3) + as_force;
     t1   = 1;
     role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
     if (company) role.insert(role.end(), {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC, TSHHT3_COORDINATE});
+    if (as_force) role.push_back(TSHHT3_FORCE);
   }
   bool byState() const { return hold == Hold::Contact || hold == Hold::Friction; }
   void initial(double *u, double *v) const override
@@ -86,8 +88,9 @@ struct Release : hhtex::Problem {
     double f, k, c;
     force(t, u[1], v[1], f, k, c);
     r[0] = a[0] + u[2];
-    r[1] = a[1] + g - f;
+    r[1] = a[1] + g - (as_force ? u[n - 1] : f);
     r[2] = u[0];
+    if (as_force) r[n - 1] = u[n - 1] - f;
     if (!company) return;
     r[3] = a[3] + u[3] * u[5];
     r[4] = a[4] + g + u[4] * u[5];
@@ -100,7 +103,13 @@ struct Release : hhtex::Problem {
     force(t, u[1], v[1], f, k, c);
     J.add(0, 0, sa);
     J.add(0, 2, 1);
-    J.add(1, 1, sa - k - sv * c);
+    const PetscInt row = as_force ? n - 1 : 1; /* of the force's derivatives */
+    if (as_force) {
+      J.add(1, 1, sa);
+      J.add(1, row, -1);
+      J.add(row, row, 1);
+    }
+    J.add(row, 1, (as_force ? 0 : sa) - k - sv * c);
     J.add(2, 0, 1);
     if (!company) return;
     for (int i = 0; i < 2; i++) {
@@ -119,8 +128,8 @@ struct Release : hhtex::Problem {
     case Hold::Friction: return 20 * d * d * d / 6;
     case Hold::Damper:
     case Hold::Brake: {
-      double u[7], v[7];
-      initial(u, v);
+      std::vector<double> u(n), v(n);
+      initial(u.data(), v.data());
       return v[1] * t - g * d * d / 2;
     }
     case Hold::Spring:
@@ -131,9 +140,8 @@ struct Release : hhtex::Problem {
 };
 
 /* h: 0 under error control; positive, fixed steps; negative, largest step under error control */
-inline PetscErrorCode ReleaseCase(Run &run, Hold hold, double strength, bool company, double eps, double h)
+inline PetscErrorCode ReleaseCase(Run &run, const Release &p, double eps, double h)
 {
-  const Release p(hold, strength, company);
   ProblemRun    r(p);
   PetscFunctionBegin;
   PetscCall(r.create(run, eps, h > 0 ? h : 0));
@@ -165,7 +173,8 @@ inline void AddReleases(Cases &cases)
   for (const auto &hold : holds)
     for (double d : {2, 4, 6, 8, 10, 12})
       for (const auto &step : steps)
-        for (bool company : {false, true}) {
+        for (int with : {0, 1, 2}) {
+          const bool company = with == 1, as_force = with == 2;
           const double s = std::pow(10, d);
           /* Beyond, friction slips by 1e-7 m/s: Newton's method finds its way through so sharp a bend in tiny steps only. And a contact
              of 1e10 N/m bounces by what the tolerance lets it penetrate. */
@@ -173,9 +182,9 @@ inline void AddReleases(Cases &cases)
           /* a soft hold moves by itself: slips, swings, or slides at its steady speed */
           const double soft = hold.hold == Hold::Brake ? (d < 5 ? -1 : 0) : hold.hold == Hold::Friction ? 20 / s : d < 4 ? 0.15 : d < 6 ? 1e-3 : 0; /* swings by its static deflection */
           if (soft < 0) continue;
-          Case &c = Add(cases, "releases", std::string(hold.name) + Name(" %.0e, ", s) + step.name + (company ? ", company" : ""),
+          Case &c = Add(cases, "releases", std::string(hold.name) + Name(" %.0e, ", s) + step.name + (company ? ", company" : as_force ? ", force state" : ""),
               "height, exact", step.accept + soft,
-              [=](Run &r) { return ReleaseCase(r, hold.hold, s, company, step.eps, step.h); });
+              [=](Run &r) { return ReleaseCase(r, Release(hold.hold, s, company, as_force), step.eps, step.h); });
           if (hold.hold == Hold::Brake && s > 1e11) c.orFail("No "); /* 1e9 N held by a sliding of 1e-11 m/s: rounding may end it, with a word */
           if (d == 8 && step.h < 0) c.test();
         }
