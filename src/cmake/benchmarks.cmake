@@ -1,4 +1,4 @@
-# Each tests/bench/*.cpp and tests/soak/*.cpp is one program of its own.
+# Each tests/bench/*.cpp and tests/soak/*.cpp is one program of its own; the random models judge their bodies by tests/balance.
 
 # SUNDIALS IDA, to compare with: optional
 set(ida_libraries)
@@ -23,7 +23,11 @@ foreach(source IN LISTS bench_sources)
   # What includes nothing of the source tree uses the libraries as they are installed.
   file(STRINGS ${source} own_headers REGEX "#include \"")
   if(own_headers)
-    hhtdae_program(${name} OPEN ${source})
+    set(balance)
+    if(name STREQUAL models AND TARGET hhtflexible)
+      file(GLOB balance CONFIGURE_DEPENDS tests/balance/*.cpp)
+    endif()
+    hhtdae_program(${name} OPEN ${source} ${balance})
   else()
     hhtdae_program(${name} ${source})
   endif()

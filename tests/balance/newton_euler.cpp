@@ -160,7 +160,7 @@ std::vector<BodyBalance> NewtonEuler::bodies(const std::vector<double> &values) 
     const Vector3 rate = J * pose[b].alpha, gyro = pose[b].w.cross(J * pose[b].w);
     k.inertia = I.trace();
     k.moment  = -rate - gyro;
-    k.moments = rate.norm() + gyro.norm();
+    k.moments = rate.norm() + pose[b].w.norm() * (J * pose[b].w).norm();
   }
   for (const auto &of : loads(values, pose))
     for (const Load &l : of) {

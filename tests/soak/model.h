@@ -5,6 +5,7 @@
 
 #include "model_loads.h"
 #include "model_machines.h"
+#include "model_switches.h"
 #include <cstring>
 
 namespace soak
@@ -13,20 +14,21 @@ namespace soak
 enum class Observed { Position, Velocity, Reaction, Energy };
 
 struct Model {
-  std::shared_ptr<Scene>     scene;
-  bool                       planar = false, conservative = false;
-  int                        bodies = 0;
-  double                     end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
-  std::vector<Observed>      observed; /* what each channel of the scene is */
-  std::map<std::string, int> types;    /* elements by type, and features */
+  std::shared_ptr<Scene> scene;
+  hhtest::Specs          specs; /* of its elements, for the balances */
+  bool                   planar = false, conservative = false, switched = false;
+  int                    bodies = 0;
+  double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0, hardness = 0;
+  std::vector<Observed>  observed;  /* what each channel of the scene is */
+  std::map<std::string, int> types; /* elements by type, and features */
 };
 
 class Generator
 {
 public:
-  Generator(std::uint64_t seed, std::uint64_t number, bool small, const std::vector<ReducedPart> &parts,
+  Generator(std::uint64_t seed, std::uint64_t number, bool small, bool switches, const std::vector<ReducedPart> &parts,
             const Vector3 &push = Vector3::Zero())
-      : r(seed, number), small_(small), parts_(parts), push_(push)
+      : r(seed, number), later_(~seed, number), small_(small), switches_(switches), parts_(parts), push_(push)
   {
   }
 
@@ -43,8 +45,9 @@ public:
     decorate(b, loads);
     if (b.speed > 0 || b.project) m.scene->start().assembly = Assembly::Project;
     observe(b, machines, loads, m);
+    m.end = b.period * r.uniform(0.3, 2) * (b.bodies() > 60 ? 0.5 : 1);
+    addSwitches(b, m);
     m.bodies       = b.bodies();
-    m.end          = b.period * r.uniform(0.3, 2) * (m.bodies > 60 ? 0.5 : 1);
     m.length       = b.length;
     m.mass         = b.mass;
     m.period       = b.period;
@@ -52,13 +55,14 @@ public:
     m.softest      = b.softest;
     m.speed        = b.speed;
     m.conservative = !b.lossy && !dissipates(*m.scene);
+    m.specs        = b.specs;
     count(b, m);
     return m;
   }
 
 private:
-  Random                          r;
-  bool                            small_;
+  Random r, later_; /* later_: of what was added to the models later, so that the rest stays as it was */
+  bool   small_, switches_;
   const std::vector<ReducedPart> &parts_;
   const Vector3 push_; /* a small change of gravity and places, in parts of them: the same model, disturbed */
 
@@ -160,6 +164,26 @@ private:
       }
     look(Measure::kineticEnergy(), Observed::Energy);
     look(Measure::potentialEnergy(), Observed::Energy);
+  }
+
+  /* In two of five models, last, with random numbers of their own */
+  void addSwitches(Builder &b, Model &m)
+  {
+    if (!switches_ || !later_.chance(0.4)) return;
+    std::swap(r, later_);
+    Switches switches(b, m.end);
+    for (int k = r.integer(1, 3); k > 0; k--) switches.any();
+    std::swap(r, later_);
+    for (Marker at : switches.seen)
+      for (int kind = 0; kind < 2; kind++)
+        for (int c = 0; c < (b.planar ? 2 : 3); c++) {
+          m.scene->channel("c" + std::to_string(m.observed.size()),
+                           kind ? Measure::velocity(at, c) : Measure::displacement(at, c));
+          m.observed.push_back(kind ? Observed::Velocity : Observed::Position);
+        }
+    m.switched = true;
+    m.hardness = switches.hardness;
+    b.lossy    = true;
   }
 
   /* by elements that take or give energy as such; springs with damping are known to the builder */

@@ -5,6 +5,7 @@
 #ifndef HHTDAE_SOAK_MODEL_BUILDER_H
 #define HHTDAE_SOAK_MODEL_BUILDER_H
 
+#include "balance/specs.h"
 #include "hhtdae/scene.h"
 #include "model_parts.h"
 #include "model_random.h"
@@ -48,6 +49,7 @@ public:
   Scene                     &scene;
   Random                    &random;
   const bool                 planar;
+  hhtest::Specs              specs; /* of the elements, for the balances */
   std::vector<Placed>        placed;
   std::vector<Held>          held;
   std::map<std::string, int> used;                             /* what elements do not show by their type */
@@ -66,6 +68,8 @@ public:
   }
 
   int bodies() const { return (int)placed.size() - 1; }
+
+  template <class Spec> Element add(const Spec &spec) { return specs.add(scene, "", spec); }
 
   /* ---- places ---- */
   Vector3 direction()

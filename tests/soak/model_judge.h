@@ -15,14 +15,19 @@
   solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
   error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
   (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
-  first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that of
-  a run at eps / 1000 has to be smaller than both the first and the third.
+  first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that
+  of a run at eps / 1000 has to be smaller than both the first and the third.
 
   Besides, constraints have to hold to eps, and the reference has to keep the energy of a model that has no losses.
+
+  What shares nothing with residual and reference is judged as well, model_laws.h: the laws of Newton and Euler for
+  every body; and what is no matter of accuracy: the model described and run again, a checkpoint written half way and
+  gone on from, all of them digit for digit.
 */
 #ifndef HHTDAE_SOAK_MODEL_JUDGE_H
 #define HHTDAE_SOAK_MODEL_JUDGE_H
 
+#include "model_laws.h"
 #include "model_reference.h"
 
 namespace soak
@@ -30,9 +35,15 @@ namespace soak
 
 enum Verdict { Right, Wrong, Failed, Unknown, Crashed, Hung, verdicts };
 constexpr const char *verdict_name[] = {"right", "wrong", "failed", "no reference", "crashed", "hung"};
-enum Stage { Building, Default, Finer, Referring, Judging, Done };
-constexpr const char *stage_name[] = {"building the scene", "the run with defaults", "the run at a smaller tolerance",
-                                      "the reference",      "the verdict",           "done"};
+enum Stage { Building, Default, Finer, Referring, Judging, Laws, Again, Done };
+constexpr const char *stage_name[] = {"building the scene",
+                                      "the run with defaults",
+                                      "the run at a smaller tolerance",
+                                      "the reference",
+                                      "the verdict",
+                                      "the balance of bodies",
+                                      "the runs again",
+                                      "done"};
 enum By { ByNobody, ByIDA, ByHHT };
 constexpr const char *by_name[] = {"none", "IDA", "hhtdae"};
 
@@ -46,6 +57,9 @@ struct Outcome {
   double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
   double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
          doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of what is allowed */
+  double balance = -1, between = -1,
+         hardness = 0; /* of every body, relative to its loads: at ends of steps, between them */
+  int  unjudged = 0, switched = 0, repeated = 0, resumed = 0;
   char message[600] = "", types[2000] = "";
 };
 
@@ -58,9 +72,9 @@ inline void SetText(char *to, std::size_t room, const std::string &s)
 class Judge
 {
 public:
-  Judge(std::uint64_t seed, long number, bool small, const std::vector<ReducedPart> &parts, bool options,
-        Outcome *outcome)
-      : seed_(seed), small_(small), options_(options), parts_(parts), o_(*outcome)
+  Judge(std::uint64_t seed, long number, bool small, bool switches, bool again, const std::vector<ReducedPart> &parts,
+        bool options, Outcome *outcome)
+      : seed_(seed), small_(small), switches_(switches), again_(again), options_(options), parts_(parts), o_(*outcome)
   {
     o_.number = number;
   }
@@ -75,10 +89,12 @@ public:
     o_.stage           = Default;
     const Trajectory a = RunHHT(model_, defaults);
     costs(a);
-    if (a.arrived())
-      judge(a);
-    else
+    if (!a.arrived())
       fail(Failed, a.failure);
+    else {
+      judge(a);
+      if (o_.verdict == Right || o_.verdict == Unknown) again(a);
+    }
     o_.total = CpuSeconds() - start;
     o_.stage = Done;
   }
@@ -88,7 +104,7 @@ private:
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
   std::uint64_t                             seed_;
-  bool                                      small_, options_;
+  bool                                      small_, switches_, again_, options_;
   const std::vector<ReducedPart>           &parts_;
   Model                                     model_;
   Outcome                                  &o_;
@@ -98,7 +114,7 @@ private:
 
   Model build(const Vector3 &push = Vector3::Zero()) const
   {
-    return Generator(seed_, (std::uint64_t)o_.number, small_, parts_, push).make();
+    return Generator(seed_, (std::uint64_t)o_.number, small_, switches_, parts_, push).make();
   }
 
   void fail(Verdict v, const std::string &why)
@@ -111,6 +127,8 @@ private:
   {
     o_.bodies   = model_.bodies;
     o_.planar   = model_.planar;
+    o_.switched = model_.switched;
+    o_.hardness = model_.hardness;
     o_.end      = model_.end;
     o_.length   = model_.length;
     o_.mass     = model_.mass;
@@ -133,6 +151,28 @@ private:
     o_.cpu            = a.cpu;
     o_.misfit         = a.misfit;
     o_.slip           = a.slip < 0 ? -1 : a.slip * model_.period / ((1 + model_.speed) * model_.length);
+  }
+
+  /* ---- what is no matter of accuracy ---- */
+
+  void again(const Trajectory &a)
+  {
+    const int before       = o_.verdict;
+    o_.stage               = Laws;
+    const Trajectory sharp = RunHHT(build(), LawSettings(patience(4)));
+    o_.balance             = sharp.balance;
+    o_.between             = sharp.between;
+    o_.unjudged            = sharp.unjudged;
+    if (sharp.balance > AllowedImbalance(model_.hardness))
+      return fail(Wrong, "out of balance: " + sharp.out_of_balance);
+    o_.verdict = before;
+    if (!again_) return;
+    o_.stage = Again;
+    std::string    why;
+    const Repeated r = Repeat([&] { return build(); }, a, options_, &why);
+    o_.repeated      = r.again;
+    o_.resumed       = r.resumed;
+    if (!why.empty()) fail(Wrong, why);
   }
 
   /* ---- references ---- */
@@ -333,7 +373,8 @@ private:
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first)) stillFalls(first, second);
   }
 
-  /* Times of impacts and stops scatter: errors of neighbouring tolerances may be the other way round. A thousandth decides. */
+  /* Times of impacts and stops scatter: errors of neighbouring tolerances may be the other way round. A thousandth
+   * decides. */
   void stillFalls(double first, double second)
   {
     Settings s;
@@ -344,8 +385,8 @@ private:
     o_.stage          = Judging;
     const double last = largest(d, o_.window);
     if (!(last < 0.7 * first) || !(last < 0.7 * finest_))
-      fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first, second,
-                                 finest_, last));
+      fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first,
+                                 second, finest_, last));
   }
 
   /* for a model that is looked at alone: errors over tolerances, of both kinds of damping */

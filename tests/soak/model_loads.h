@@ -103,9 +103,9 @@ public:
                             ? motion(reach)
                             : motion(reach * rate * (of == MotionOf::Acceleration ? 0.5 * rate : 1));
     if (turn)
-      b.scene.add("", RotationalMotion{h.i, h.j, f, of});
+      b.add(RotationalMotion{h.i, h.j, f, of});
     else
-      b.scene.add("", TranslationalMotion{h.i, h.j, f, of, b.planar ? 0 : 2});
+      b.add(TranslationalMotion{h.i, h.j, f, of, b.planar ? 0 : 2});
   }
 
   /* zero at t = 0, of every kind of function */
@@ -167,11 +167,11 @@ private:
     /* strained by what keeps forces near weights */
     const double strain = b.weight(c) / s.k * r.uniform(-0.5, 0.5);
     const bool   zero   = r.chance(0.1) && s.omega * b.period < 40;
-    b.scene.add("", SpringDamper{i, j, s.k, s.c,
-                                 zero            ? 0
-                                 : r.chance(0.5) ? -1
-                                                 : std::max(0.2 * distance, distance + strain),
-                                 0, b.state()});
+    b.add(SpringDamper{i, j, s.k, s.c,
+                       zero            ? 0
+                       : r.chance(0.5) ? -1
+                                       : std::max(0.2 * distance, distance + strain),
+                       0, b.state()});
   }
   void spring()
   {
@@ -190,11 +190,10 @@ private:
     const Stiff  s = b.stiff(b.lighter(a, c));
     const double l = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(), hard = 1 / (b.length * b.length),
                  k = s.k, d = s.c;
-    b.scene.add("", NonlinearSpring{i, j,
-                                    [=](const Real &x, const Real &v) -> Real {
-                                      return k * (x - l) * (1. + hard * (x - l) * (x - l)) + d * v;
-                                    },
-                                    b.state()});
+    b.add(NonlinearSpring{
+        i, j,
+        [=](const Real &x, const Real &v) -> Real { return k * (x - l) * (1. + hard * (x - l) * (x - l)) + d * v; },
+        b.state()});
   }
 
   const Held *revolute()
@@ -209,9 +208,9 @@ private:
     const Held *h = revolute();
     if (!h) return;
     const Stiff s = b.stiff(0.08 * h->mass * h->size * h->size);
-    b.scene.add("", TorsionalSpringDamper{
-                        h->i, h->j, s.k, s.c,
-                        r.chance(0.5) ? 0 : r.uniform(-1, 1) * std::min(1., 10 / (s.omega * b.period)), 0, b.state()});
+    b.add(TorsionalSpringDamper{h->i, h->j, s.k, s.c,
+                                r.chance(0.5) ? 0 : r.uniform(-1, 1) * std::min(1., 10 / (s.omega * b.period)), 0,
+                                b.state()});
   }
   void nonlinearTorsion()
   {
@@ -219,9 +218,8 @@ private:
     if (!h) return;
     const Stiff  s = b.stiff(0.08 * h->mass * h->size * h->size);
     const double k = s.k, c = s.c;
-    b.scene.add("", NonlinearTorsionalSpring{h->i, h->j,
-                                             [=](const Real &x, const Real &v) -> Real { return -k * sin(x) - c * v; },
-                                             b.state()});
+    b.add(NonlinearTorsionalSpring{
+        h->i, h->j, [=](const Real &x, const Real &v) -> Real { return -k * sin(x) - c * v; }, b.state()});
   }
 
   void bushingBetween(int a, int c)
@@ -242,7 +240,7 @@ private:
     if (r.chance(0.2)) f.force = 0.1 * b.weight(c) * b.direction();
     f.state = b.state();
     b.lossy = b.lossy || !f.force.isZero(0);
-    b.scene.add("", f);
+    b.add(f);
   }
   void bushing()
   {
@@ -271,7 +269,7 @@ private:
     f.damping = std::max(0.01 / s.omega, 2 * s.zeta / s.omega);
     if (r.chance(0.3)) f.shear_y = f.shear_z = 0.8 * f.area;
     f.state = b.state();
-    b.scene.add("", f);
+    b.add(f);
   }
   void beam()
   {
@@ -288,7 +286,7 @@ private:
     if (may.empty()) return;
     Held        &h = b.held[may[(std::size_t)r.integer(0, (int)may.size() - 1)]];
     const double v = b.length / b.period;
-    b.scene.add("", JointFriction{h.joint, r.logarithmic(0.02, 0.3), 0.05 * b.length, v * r.logarithmic(3e-3, 3e-2)});
+    b.add(JointFriction{h.joint, r.logarithmic(0.02, 0.3), 0.05 * b.length, v * r.logarithmic(3e-3, 3e-2)});
     h.joint = Element{};
   }
 
@@ -310,11 +308,10 @@ private:
             [=](const Real *m) -> Real { return (l * (1. + 0.2 * sin(w * m[1])) - m[0] - m[2]) / tau; }},
             0);
     states.push_back(x);
-    b.scene.add("",
-                UserScalarForce{i, j,
-                                Expression{{Measure::value(x), Measure::rate(i, j)},
-                                           [=](const Real *m) -> Real { return gain * m[0] - 0.05 * gain / w * m[1]; }},
-                                false, b.state(0.4)});
+    b.add(UserScalarForce{i, j,
+                          Expression{{Measure::value(x), Measure::rate(i, j)},
+                                     [=](const Real *m) -> Real { return gain * m[0] - 0.05 * gain / w * m[1]; }},
+                          false, b.state(0.4)});
   }
 
   /* quadratic drag, written with expressions; a force without reaction */
@@ -332,7 +329,7 @@ private:
                                      return -k * speed * m[d];
                                    }});
     f.state = b.state(0.3);
-    b.scene.add("", f);
+    b.add(f);
   }
 
   void moment()
@@ -341,12 +338,11 @@ private:
     if (!h) return;
     const double w = 2 * M_PI / b.period * r.uniform(0.5, 3),
                  M = 0.1 * h->mass * h->size * b.weightPerMass() * r.uniform(-1, 1);
-    b.scene.add("", UserScalarForce{h->i, h->j,
-                                    Expression{{Measure::time(), Measure::angle(h->i, h->j)},
-                                               [=](const Real *m) -> Real {
-                                                 return M * sin(w * m[0]) - 0.3 * std::abs(M) * sin(m[1]);
-                                               }},
-                                    true, b.state(0.4)});
+    b.add(UserScalarForce{
+        h->i, h->j,
+        Expression{{Measure::time(), Measure::angle(h->i, h->j)},
+                   [=](const Real *m) -> Real { return M * sin(w * m[0]) - 0.3 * std::abs(M) * sin(m[1]); }},
+        true, b.state(0.4)});
   }
 
   /* a variable that other expressions use; now and then of accelerations or reactions */
@@ -373,7 +369,7 @@ private:
     for (int d = 0; d < 3; d++)
       f.force.push_back(
           Expression{{Measure::value(V)}, [=](const Real *m) -> Real { return (d == 0 ? -k : 0.) * m[0]; }});
-    b.scene.add("", f);
+    b.add(f);
   }
   Element lastJoint()
   {
@@ -398,7 +394,7 @@ private:
       f.moment.push_back(Expression{{Measure::time()},
                                     [=](const Real *m) -> Real { return (d == 2 ? 0.05 * F : 0.) * sin(w * m[0]); }});
     f.state = b.state(0.3);
-    b.scene.add("", f);
+    b.add(f);
   }
 };
 

@@ -40,11 +40,11 @@ public:
     }
     const double ratio = r.sign() * r.logarithmic(0.2, 5);
     if (kind == 0)
-      b.scene.add("", Gear{terms[0].i, terms[0].j, terms[1].i, terms[1].j, ratio});
+      b.add(Gear{terms[0].i, terms[0].j, terms[1].i, terms[1].j, ratio});
     else if (kind == 1)
-      b.scene.add("", RackAndPinion{terms[0].i, terms[0].j, terms[1].i, terms[1].j, 0.5 * b.length * ratio / 2});
+      b.add(RackAndPinion{terms[0].i, terms[0].j, terms[1].i, terms[1].j, 0.5 * b.length * ratio / 2});
     else
-      b.scene.add("", Coupler{terms});
+      b.add(Coupler{terms});
     return (int)turns.size();
   }
 
@@ -60,21 +60,21 @@ public:
     const Marker ground = b.at(0, touch, plane);
     if (b.planar) {
       const int ball = b.addBody(touch + radius * b.up, b.axes(), m, radius, Matrix3::Identity() * I);
-      b.scene.add("", RollingDisc{b.at(ball, b.placed[ball].at), ground, radius});
+      b.add(RollingDisc{b.at(ball, b.placed[ball].at), ground, radius});
       return 1 + load(ball);
     }
     switch (r.choose({1, 1, 1})) {
     case 0: {
       const int ball = b.addBody(touch + radius * plane.col(2), b.axes(), m, radius, Matrix3::Identity() * I);
-      b.scene.add("", RollingSphere{b.at(ball, b.placed[ball].at), ground, radius});
+      b.add(RollingSphere{b.at(ball, b.placed[ball].at), ground, radius});
       return 1 + (r.chance(0.4) ? load(ball) : 0);
     }
     case 1:
       return disc(touch, plane, ground, m, radius);
     default: {
       const int sleigh = b.addBody(touch, plane);
-      b.scene.add("", KnifeEdge{b.at(sleigh, touch + 0.3 * b.length * plane.col(0), plane), ground});
-      b.scene.add("", ParallelAxes{b.at(sleigh, touch, plane), ground});
+      b.add(KnifeEdge{b.at(sleigh, touch + 0.3 * b.length * plane.col(0), plane), ground});
+      b.add(ParallelAxes{b.at(sleigh, touch, plane), ground});
       return 1 + (r.chance(0.4) ? load(sleigh) : 0);
     }
     }
@@ -106,12 +106,11 @@ public:
     const Matrix3 R     = b.axes();
     const Marker  i = b.at(table, x, R), j = b.at(0, x, R);
     if (b.planar)
-      b.scene.add("", RotationalMotion{i, j, TimeFunction(0)});
+      b.add(RotationalMotion{i, j, TimeFunction(0)});
     else
-      b.scene.add("", Orientation{i, j});
+      b.add(Orientation{i, j});
     for (int axis = 0; axis < (b.planar ? 2 : 3); axis++)
-      b.scene.add("",
-                  TranslationalMotion{i, j, r.chance(0.4) ? TimeFunction(0) : motion(), MotionOf::Displacement, axis});
+      b.add(TranslationalMotion{i, j, r.chance(0.4) ? TimeFunction(0) : motion(), MotionOf::Displacement, axis});
     b.used["shaker"]++;
     b.project = true;
     return 1;
@@ -156,8 +155,8 @@ private:
   void spring(int a, int c)
   {
     const Stiff s = b.stiff(b.lighter(a, c));
-    b.scene.add("", SpringDamper{b.at(c, b.on(c)), b.at(a, b.placed[c].at + 1.5 * b.length * b.direction()), s.k, s.c,
-                                 -1, 0, b.state()});
+    b.add(SpringDamper{b.at(c, b.on(c)), b.at(a, b.placed[c].at + 1.5 * b.length * b.direction()), s.k, s.c, -1, 0,
+                       b.state()});
   }
 
   /* axes of a plane whose normal points up; planar: a line along x */
@@ -195,7 +194,7 @@ private:
     d.velocity         = d.angular_velocity.cross(center - touch);
     b.project          = true; /* what else hangs on it has to move along */
     const int wheel    = b.enter({b.scene.add("", d), center, A, m, radius, false, false});
-    b.scene.add("", RollingDisc{b.at(wheel, center, A), ground, radius});
+    b.add(RollingDisc{b.at(wheel, center, A), ground, radius});
     return 1;
   }
 
@@ -228,12 +227,12 @@ private:
     const Matrix3 R = plane(), I = Matrix3::Identity() * (0.4 * m * size * size);
     const int     below  = b.addBody(x, b.axes(), m, size, I);
     const Marker  center = b.at(below, x);
-    b.scene.add("", SpherePlane{center, b.at(0, x - (size + gap(size)) * normal(R), R), size, law(m, size), b.state()});
+    b.add(SpherePlane{center, b.at(0, x - (size + gap(size)) * normal(R), R), size, law(m, size), b.state()});
     if (!two) return 1;
     const double  other = size * r.uniform(0.5, 1);
     const Vector3 off = (normal(R) + 0.3 * b.direction()).normalized(), y = x + (size + other + gap(size)) * off;
     const int     above = b.addBody(y, b.axes(), m, other, Matrix3::Identity() * (0.4 * m * other * other));
-    b.scene.add("", SphereSphere{b.at(above, y), center, other, size, law(m, other), b.state()});
+    b.add(SphereSphere{b.at(above, y), center, other, size, law(m, other), b.state()});
     return 2;
   }
 
@@ -245,8 +244,8 @@ private:
     const int     body  = b.addBody(x, A, m, size, Builder::inertiaOfBox(m, e));
     const Vector3 n     = A.transpose() * normal(R);
     const double  reach = std::sqrt(s.cwiseProduct(n).squaredNorm());
-    b.scene.add("", EllipsoidPlane{b.at(body, x, A), b.at(0, x - (reach + gap(size)) * normal(R), R), s, law(m, size),
-                                   b.state()});
+    b.add(
+        EllipsoidPlane{b.at(body, x, A), b.at(0, x - (reach + gap(size)) * normal(R), R), s, law(m, size), b.state()});
     return 1;
   }
 
@@ -257,8 +256,8 @@ private:
                   A    = R * Eigen::AngleAxisd(M_PI / 2 + r.uniform(-0.3, 0.3), Vector3::UnitX()).toRotationMatrix();
     const double tube  = size * r.uniform(0.1, 0.3);
     const int    wheel = b.addBody(x, A, m, size, Vector3(0.3, 0.3, 0.5).asDiagonal() * (m * size * size));
-    b.scene.add("", TorusPlane{b.at(wheel, x, A), b.at(0, x - (size + tube + gap(size)) * R.col(2), R), size, tube,
-                               law(m, size), b.state()});
+    b.add(TorusPlane{b.at(wheel, x, A), b.at(0, x - (size + tube + gap(size)) * R.col(2), R), size, tube, law(m, size),
+                     b.state()});
     return 1;
   }
 
@@ -280,9 +279,9 @@ private:
       hold.damping             = Vector3::Constant(s.c + 0.1 * s.k / s.omega);
       hold.torsional_stiffness = Vector3::Constant(I * s.omega * s.omega);
       hold.torsional_damping   = Vector3::Constant(0.4 * I * s.omega);
-      b.scene.add("", hold);
+      b.add(hold);
     }
-    b.scene.add("", SphereBox{b.at(ball, x), b.at(box, y, R), size, half, law(m, size), b.state()});
+    b.add(SphereBox{b.at(ball, x), b.at(box, y, R), size, half, law(m, size), b.state()});
     return hung ? 2 : 1;
   }
 
@@ -291,7 +290,7 @@ private:
     const Matrix3 R = r.rotation();
     if (r.chance(0.4)) {
       const Marker i = b.at(frame, x, R), j = b.at(base, x, R);
-      b.scene.add("", Fixed{i, j});
+      b.add(Fixed{i, j});
     } else
       trees_.hold(r.chance(0.6) ? Held::Revolute : Held::Spherical, base, frame, x, R, true);
   }

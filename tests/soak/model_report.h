@@ -15,7 +15,10 @@ using hhtbench::Text;
 class Report
 {
 public:
-  Report(long seed, bool small, int planned) : seed_(seed), small_(small), planned_(planned) {}
+  Report(long seed, bool small, bool switches, int planned)
+      : seed_(seed), small_(small), switches_(switches), planned_(planned)
+  {
+  }
 
   void progress(const Outcome &o, int done)
   {
@@ -69,7 +72,7 @@ private:
     int models = 0, instances = 0;
   };
   long                       seed_;
-  bool                       small_;
+  bool                       small_, switches_;
   int                        planned_;
   std::vector<Outcome>       all_;
   std::map<std::string, Use> types_;
@@ -89,7 +92,8 @@ private:
 
   std::string command(const Outcome &o) const
   {
-    return Text("build/bin/models -seed %ld -first %ld -count 1%s", seed_, o.number, small_ ? " -small" : "");
+    return Text("build/bin/models -seed %ld -first %ld -count 1%s%s", seed_, o.number, small_ ? " -small" : "",
+                switches_ ? "" : " -switches 0");
   }
   std::string line(const Outcome &o) const
   {
@@ -101,19 +105,24 @@ private:
                 "  error %.2e, at eps/10 %.2e, at eps/100 %.2e; references differ by %.2e; judged samples %d of %d "
                 "(eps/100: %d); %.2f of what is allowed\n"
                 "  velocity %.1e, %.1e; reaction %.1e, %.1e; %ld steps, %ld at eps/10, %ld failed corrections, %ld "
-                "changes of axes; %.2f s in all\n  %s",
+                "changes of axes; %.2f s in all\n"
+                "  balance %.1e, between steps %.1e, %d bodies not judged; run again %d, gone on %d\n  %s",
                 o.number, verdict_name[o.verdict], by_name[o.by], o.legs, o.reference_steps, o.bodies, o.end, o.length,
                 o.mass, o.error, o.finer, o.finest, o.doubt, o.window, samples, o.finest_window, o.used, o.velocity,
                 o.finer_velocity, o.reaction, o.finer_reaction, o.steps, o.finer_steps, o.fails, o.changes, o.total,
-                o.message);
+                o.balance, o.between, o.unjudged, o.repeated, o.resumed, o.message);
   }
 
   std::vector<Page::Row> counts() const
   {
     const auto             percent = [&](int n) { return Text("%d (%.2f %%)", n, 100. * n / (double)all_.size()); };
     std::vector<Page::Row> r;
-    int                    whole = 0, finest = 0, part = 0, disturbed = 0, kept = 0;
+    int whole = 0, finest = 0, part = 0, disturbed = 0, kept = 0, switched = 0, balanced = 0, repeated = 0, resumed = 0;
     for (const Outcome &o : all_) {
+      switched += o.switched;
+      balanced += o.balance >= 0 && o.balance <= AllowedImbalance(o.hardness);
+      repeated += o.repeated;
+      resumed += o.resumed;
       disturbed += o.verdict == Right && o.disturbed;
       whole += o.verdict == Right && o.window == samples;
       finest += o.verdict == Right && o.window < samples && o.finest_window == samples;
@@ -135,6 +144,10 @@ private:
     r.push_back({"reference by SUNDIALS IDA", percent(by(ByIDA))});
     r.push_back({"reference by hhtdae, radius 0.8, 1e-7", percent(by(ByHHT))});
     r.push_back({"energy is kept, and checked", percent(kept)});
+    r.push_back({"with stiff elements that let go or take hold", percent(switched)});
+    r.push_back({"every body in balance by its channels", percent(balanced)});
+    r.push_back({"described and run again, digit for digit", percent(repeated)});
+    r.push_back({"gone on from a checkpoint, digit for digit", percent(resumed)});
     return r;
   }
 
@@ -177,6 +190,8 @@ private:
                      [&](const Outcome &o) { return judged(o, o.finer_reaction); }),
         distribution("constraints are off by", "%.1e", [](const Outcome &o) { return o.misfit; }),
         distribution("velocity constraints, off by", "%.1e", [](const Outcome &o) { return o.slip; }),
+        distribution("imbalance of bodies", "%.1e", [](const Outcome &o) { return o.balance; }),
+        distribution("the same between steps", "%.1e", [](const Outcome &o) { return o.between; }),
         distribution("drift of the reference's energy", "%.1e", [](const Outcome &o) { return o.energy; }),
         distribution("part of the span judged, defaults", "%.2f",
                      [&](const Outcome &o) { return judged(o, (double)o.window / samples); }),
@@ -196,7 +211,7 @@ private:
          "factorizations,corrector_fails,changes,cpu,total,error,finer,finest,"
          "velocity,finer_velocity,reaction,finer_reaction,doubt,misfit,slip,energy,finest_window,disturbed,window,used,"
          "legs,"
-         "reference_steps,message,types\n";
+         "reference_steps,switched,balance,between,unjudged,repeated,resumed,message,types\n";
     for (const Outcome &o : all_) {
       std::string message = o.message;
       std::replace(message.begin(), message.end(), '"', '\'');
@@ -207,8 +222,9 @@ private:
         << ',' << o.changes << ',' << o.cpu << ',' << o.total << ',' << o.error << ',' << o.finer << ',' << o.finest
         << ',' << o.velocity << ',' << o.finer_velocity << ',' << o.reaction << ',' << o.finer_reaction << ','
         << o.doubt << ',' << o.misfit << ',' << o.slip << ',' << o.energy << ',' << o.finest_window << ','
-        << o.disturbed << ',' << o.window << ',' << o.used << ',' << o.legs << ',' << o.reference_steps << ",\""
-        << message << "\"," << o.types << '\n';
+        << o.disturbed << ',' << o.window << ',' << o.used << ',' << o.legs << ',' << o.reference_steps << ','
+        << o.switched << ',' << o.balance << ',' << o.between << ',' << o.unjudged << ',' << o.repeated << ','
+        << o.resumed << ",\"" << message << "\"," << o.types << '\n';
     }
     f.close();
     PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,

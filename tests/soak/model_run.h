@@ -2,6 +2,7 @@
 #ifndef HHTDAE_SOAK_MODEL_RUN_H
 #define HHTDAE_SOAK_MODEL_RUN_H
 
+#include "balance/newton_euler.h"
 #include "bench/page.h"
 #include "model.h"
 #include <ctime>
@@ -19,7 +20,10 @@ struct Trajectory {
   double                           cpu    = 0;
   double                           misfit = 0, slip = -1; /* at ends of steps, see Misfit() */
   long                             steps = 0;
-  bool                             arrived() const { return failure.empty() && (int)x.size() == samples; }
+  double      balance = -1, between = -1; /* largest imbalance of a body at ends of steps, at samples between them */
+  int         unjudged = 0;               /* bodies */
+  std::string out_of_balance;             /* where and when balance was found */
+  bool        arrived() const { return failure.empty() && (int)x.size() == samples; }
 };
 
 inline double SampleTime(double end, int k) { return k == samples ? end : end * k / samples; }
@@ -54,18 +58,36 @@ private:
 /* ---- hhtdae ---- */
 
 struct Settings {
-  double eps     = 0; /* 0: as it comes */
-  bool   paper   = false;
-  double radius  = -1;    /* negative: as it comes */
-  bool   options = false; /* from the command line */
-  double seconds = 1e9;
+  double            eps       = 0; /* 0: as it comes */
+  bool              paper     = false;
+  double            radius    = -1;    /* negative: as it comes */
+  bool              options   = false; /* from the command line */
+  double            seconds   = 1e9;
+  double            corrector = 0;     /* 0: as it comes */
+  bool              laws      = false; /* judge the balance of every body */
+  double            slack     = 0;     /* of accelerations, times the step squared */
+  std::string       save, resume;      /* checkpoint to write, to go on from */
+  long              save_at = 0;       /* step */
+  const Trajectory *until   = nullptr; /* of a run that goes on: the samples before */
 };
 
 struct Watcher {
-  Scene      &scene;
-  double      end, deadline;
-  Trajectory &result;
+  Scene               &scene;
+  double               end, deadline;
+  const Settings      &settings;
+  std::size_t          observed; /* channels of the model; those of the laws come after */
+  hhtest::NewtonEuler *laws;
+  Trajectory          &result;
 };
+
+inline void JudgeLaws(Watcher &w, const std::vector<double> &values, double t, bool end, double slack)
+{
+  const hhtest::Imbalance now  = w.laws->judge(values, slack);
+  double                 &most = end ? w.result.balance : w.result.between;
+  if (end && now.largest > most)
+    w.result.out_of_balance = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
+  if (!(now.largest <= most)) most = now.largest;
+}
 
 /* How far the state is off the constraints: of positions, in lengths and sines; of velocities, as they are, and times
    the step, as every step solves them anew */
@@ -110,10 +132,21 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx
   const std::size_t   before = w.result.x.size();
   PetscFunctionBegin;
   if (step <= 0) PetscFunctionReturn(0);
+  if (step == w.settings.save_at && !w.settings.save.empty())
+    PetscCall(TSHHT3CheckpointSave(ts, w.settings.save.c_str()));
   while ((int)w.result.x.size() < samples && SampleTime(w.end, (int)w.result.x.size() + 1) <= t * (1 + 1e-12)) {
-    PetscCall(w.scene.sample(ts, std::fmin(t, SampleTime(w.end, (int)w.result.x.size() + 1)), values));
+    const double at = std::fmin(t, SampleTime(w.end, (int)w.result.x.size() + 1));
+    PetscCall(w.scene.sample(ts, at, values));
+    if (w.laws && at < t) JudgeLaws(w, values, at, false, 0);
+    values.resize(w.observed);
     w.result.x.push_back(values);
     w.result.steps_at.push_back((long)step);
+  }
+  if (w.laws && (w.result.x.size() > before || step < 20)) {
+    PetscCall(w.scene.sample(ts, t, values));
+    PetscReal last;
+    PetscCall(TSGetPrevTime(ts, &last));
+    JudgeLaws(w, values, t, true, w.settings.slack / ((t - last) * (t - last)));
   }
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
   if (step % 16 == 0 && CpuSeconds() > w.deadline) {
@@ -128,14 +161,25 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
   TS                ts;
   TSConvergedReason reason;
   PetscFunctionBegin;
+  std::unique_ptr<hhtest::NewtonEuler> laws;
+  if (s.laws) {
+    laws             = std::make_unique<hhtest::NewtonEuler>(*m.scene, m.specs);
+    result->unjudged = (int)m.scene->data().bodies.size() - laws->judged();
+  }
   PetscCall(m.scene->createTS(&ts));
   PetscCall(TSSetMaxTime(ts, m.end));
   PetscCall(TSSetMaxSteps(ts, 100000000));
   if (s.eps > 0) PetscCall(TSSetTolerances(ts, s.eps, nullptr, s.eps, nullptr));
   if (s.paper) PetscCall(TSHHT3SetForm(ts, TSHHT3_FORM_PAPER));
   if (s.radius >= 0) PetscCall(TSHHT3SetRadius(ts, s.radius));
+  if (s.corrector > 0) PetscCall(TSHHT3SetCorrectorTolerance(ts, s.corrector));
   if (s.options) PetscCall(TSSetFromOptions(ts));
-  Watcher watcher{*m.scene, m.end, CpuSeconds() + s.seconds, *result};
+  if (!s.resume.empty()) PetscCall(TSHHT3CheckpointLoad(ts, s.resume.c_str()));
+  if (s.until) {
+    result->x.assign(s.until->x.begin(), s.until->x.begin() + (long)s.until->x.size());
+    result->steps_at = s.until->steps_at;
+  }
+  Watcher watcher{*m.scene, m.end, CpuSeconds() + s.seconds, s, m.observed.size(), laws.get(), *result};
   PetscCall(TSMonitorSet(ts, WatchRun, &watcher, nullptr));
   const double         start  = CpuSeconds();
   const PetscErrorCode failed = m.scene->solve(ts);

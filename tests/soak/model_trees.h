@@ -91,7 +91,7 @@ public:
     for (int k = 0; k < n; k++) {
       const Vector3 x = b.on(top), y = x + b.length * r.uniform(0.8, 2) * r.direction();
       const Marker  i = b.at(top, x), j = b.at(0, y);
-      b.held.push_back({b.scene.add("", PointDistance{i, j}), i, j, Held::Other, false, b.placed[top].mass, b.length});
+      b.held.push_back({b.add(PointDistance{i, j}), i, j, Held::Other, false, b.placed[top].mass, b.length});
     }
     b.used["platform of links"]++;
     return 1;
@@ -103,10 +103,10 @@ public:
   {
     const Marker i = b.at(child, x, R), j = b.at(parent, x, R);
     Element      e;
-    if (kind == Held::Revolute) e = b.scene.add("", Revolute{i, j});
-    if (kind == Held::Translational) e = b.scene.add("", Translational{i, j});
-    if (kind == Held::Cylindrical) e = b.scene.add("", Cylindrical{i, j});
-    if (kind == Held::Spherical) e = b.scene.add("", Spherical{i, j});
+    if (kind == Held::Revolute) e = b.add(Revolute{i, j});
+    if (kind == Held::Translational) e = b.add(Translational{i, j});
+    if (kind == Held::Cylindrical) e = b.add(Cylindrical{i, j});
+    if (kind == Held::Spherical) e = b.add(Spherical{i, j});
     const int of = child ? child : parent;
     b.held.push_back({e, i, j, kind, free, b.placed[of].mass, b.placed[of].size});
     return e;
@@ -215,7 +215,7 @@ private:
   template <class Joint> Element add(int parent, int child, const Vector3 &x, const Matrix3 &Rj, const Matrix3 &Ri)
   {
     const Marker  i = b.at(child, x, Ri), j = b.at(parent, x, Rj);
-    const Element e = b.scene.add("", Joint{i, j});
+    const Element e = b.add(Joint{i, j});
     b.held.push_back({e, i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
     return e;
   }
@@ -235,8 +235,7 @@ private:
   {
     const double pitch = r.sign() * b.length * r.logarithmic(0.05, 3);
     const Marker i = b.at(child, x, R), j = b.at(parent, x, R);
-    b.held.push_back(
-        {b.scene.add("", Screw{i, j, pitch}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
+    b.held.push_back({b.add(Screw{i, j, pitch}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
   }
 
   void rod(int parent, int child)
@@ -246,7 +245,7 @@ private:
     if ((x - y).norm() < 0.2 * b.length) y = x + b.length * b.direction();
     const Marker i = b.at(child, x), j = b.at(parent, y);
     b.held.push_back(
-        {b.scene.add("", PointDistance{i, j}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
+        {b.add(PointDistance{i, j}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
   }
 
   /* An arc or a ring through x, in the axes of a marker of the parent */
@@ -262,8 +261,8 @@ private:
     }
     const std::size_t middle = closed ? 0 : n / 2;
     const Marker      i = b.at(child, x), j = b.at(parent, x - R * points[middle], R);
-    b.held.push_back({b.scene.add("", PointOnCurve{i, j, points, closed}), i, j, Held::Other, false,
-                      b.placed[child].mass, b.placed[child].size});
+    b.held.push_back({b.add(PointOnCurve{i, j, points, closed}), i, j, Held::Other, false, b.placed[child].mass,
+                      b.placed[child].size});
   }
 
   int bead(int parent, const Vector3 &x)
@@ -293,7 +292,7 @@ private:
     const Stiff s    = b.stiff(b.placed[child].mass);
     Vector3     from = b.on(child), to = x + b.length * (b.planar ? b.direction() : r.direction());
     if ((from - to).norm() < 0.3 * b.length) to += b.length * (b.planar ? Vector3(1, 0, 0) : Vector3(1, 1, 1));
-    b.scene.add("", SpringDamper{b.at(child, from), b.at(parent, to), s.k, s.c, -1, 0, b.state()});
+    b.add(SpringDamper{b.at(child, from), b.at(parent, to), s.k, s.c, -1, 0, b.state()});
   }
 
   void closePlane(int last, const std::vector<Vector3> &corner, const Matrix3 &R, int kind)
@@ -305,7 +304,7 @@ private:
       slide(last, x, R);
     else { /* in space: without saying things twice */
       const Marker i = b.at(last, x, R), j = b.at(0, x, R);
-      b.scene.add("", InLine{i, j});
+      b.add(InLine{i, j});
     }
   }
   /* the last link's end in a straight guide: by a slider, or, planar, by a curve that is almost straight */

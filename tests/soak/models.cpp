@@ -1,7 +1,9 @@
 static char help[] =
     "Random models of rigid and flexible bodies, run with default settings, each against an independent reference.\n"
     "  -seed <1>: of the models; -first <0>, -count <2000>: which of them\n"
-    "  -small: models of few bodies alone\n"
+    "  -small: models of few bodies alone; -switches <true>: stiff elements that let go or take hold, in two of five "
+    "models\n"
+    "  -again <true>: each model is described and run a second time, a checkpoint written and gone on from\n"
     "  -jobs <2>: processes at a time; -deadline <120>: CPU seconds for one model with its references\n"
     "  -output <build/soak>: .csv and .html are added; none: no files\n"
     "One model alone, with messages and any option of the integrator: models -seed s -first k -count 1 -ts_view\n"
@@ -16,8 +18,8 @@ using namespace soak;
 static PetscErrorCode Run(bool *passed)
 {
   PetscInt                 seed = 1, first = 0, count = 2000, jobs = 2;
-  PetscReal                deadline                   = 120;
-  PetscBool                small                      = PETSC_FALSE;
+  PetscReal                deadline = 120;
+  PetscBool                small = PETSC_FALSE, switches = PETSC_TRUE, again = PETSC_TRUE;
   char                     output[PETSC_MAX_PATH_LEN] = "build/soak";
   std::vector<ReducedPart> parts;
 
@@ -28,6 +30,8 @@ static PetscErrorCode Run(bool *passed)
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-jobs", &jobs, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-deadline", &deadline, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-small", &small, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-switches", &switches, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-again", &again, nullptr));
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-output", output, sizeof output, nullptr));
   PetscCheck(count > 0 && jobs > 0 && deadline > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "-count, -jobs and -deadline must be positive");
@@ -38,10 +42,11 @@ static PetscErrorCode Run(bool *passed)
 
   const bool one = count == 1;
   Pool       pool((int)count);
-  Report     report((long)seed, small, (int)count);
-  PetscCall(pool.run((long)first, (int)jobs, deadline, !one,
-                     [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, small, parts, one, o).run(); },
-                     [&](const Outcome &o, int done) { report.progress(o, done); }));
+  Report     report((long)seed, small, switches, (int)count);
+  PetscCall(
+      pool.run((long)first, (int)jobs, deadline, !one,
+               [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, small, switches, again, parts, one, o).run(); },
+               [&](const Outcome &o, int done) { report.progress(o, done); }));
   for (int k = 0; k < pool.size(); k++) report.add(pool[k]);
   report.print();
   if (std::string(output) != "none" && !one) PetscCall(report.write(output));

@@ -1,0 +1,89 @@
+/*
+  Judgements that need no reference: the laws of Newton and Euler for every body, from channels
+  (balance/newton_euler.h); the model described and run a second time in the same process; a checkpoint half way,
+  written and gone on from with a scene and a TS of their own.
+
+  The equations of motion hold at the end of a step as far as the corrector has gone. It may leave c eps/(beta h^2) in
+  an acceleration (norm of all; ten times that in one of them), at the default c no small part of the forces where steps
+  are short; so the laws are judged in a run with c = 1e-9, by what is left of the forces and moments on a body beyond
+  that, relative to all of them in absolute values. And a force of stiffness or damping K times what inertia has at the
+  scales of the model is known to the rounding of positions and velocities times K: of these, 1e-14 K.
+*/
+#ifndef HHTDAE_SOAK_MODEL_LAWS_H
+#define HHTDAE_SOAK_MODEL_LAWS_H
+
+#include "model_run.h"
+#include <cstdio>
+#include <unistd.h>
+
+namespace soak
+{
+
+constexpr double law_tolerance = 1e-4;
+inline double    AllowedImbalance(double hardness) { return law_tolerance + 1e-14 * hardness; }
+
+inline Settings LawSettings(double seconds)
+{
+  Settings s;
+  s.corrector = 1e-9;
+  s.slack     = 10 * s.corrector * 1e-4 / 0.3; /* beta is 0.42 by default */
+  s.laws      = true;
+  s.seconds   = seconds;
+  return s;
+}
+
+struct Repeated {
+  bool again = false, resumed = false; /* digit for digit */
+};
+
+/* The first difference of two runs from sample `from` on, empty: none */
+inline std::string Difference(const Trajectory &a, const Trajectory &b)
+{
+  if (!b.arrived()) return b.failure;
+  for (std::size_t k = 0; k < a.x.size(); k++) {
+    if (a.steps_at[k] != b.steps_at[k])
+      return hhtbench::Text("%ld steps until sample %d, not %ld", b.steps_at[k], (int)k + 1, a.steps_at[k]);
+    for (std::size_t c = 0; c < a.x[k].size(); c++)
+      if (a.x[k][c] != b.x[k][c])
+        return hhtbench::Text("channel %d at sample %d is %.17g, not %.17g", (int)c, (int)k + 1, b.x[k][c], a.x[k][c]);
+  }
+  return a.steps == b.steps ? "" : hhtbench::Text("%ld steps, not %ld", b.steps, a.steps);
+}
+
+template <class Build> Repeated Repeat(const Build &build, const Trajectory &a, bool options, std::string *why)
+{
+  Repeated          r;
+  const std::string file = hhtbench::Text("/tmp/soak-%ld.checkpoint", (long)getpid());
+  Settings          s;
+  s.options         = options;
+  const Model first = build(), second = build(); /* both described before either runs */
+  std::string different = Difference(a, RunHHT(first, s));
+  r.again               = different.empty();
+  if (!r.again) *why = "run again: " + different;
+  s.save    = file;
+  s.save_at = std::max(1L, a.steps / 2);
+  different = Difference(a, RunHHT(second, s));
+  if (!different.empty()) {
+    if (why->empty()) *why = "writing a checkpoint changes the run: " + different;
+  } else {
+    Trajectory  until = a;
+    std::size_t k     = 0;
+    while (k < a.x.size() && a.steps_at[k] <= s.save_at) k++;
+    until.x.resize(k);
+    until.steps_at.resize(k);
+    s.save.clear();
+    s.resume  = file;
+    s.until   = &until;
+    different = Difference(a, RunHHT(build(), s));
+    r.resumed = different.empty();
+    if (!r.resumed && why->empty())
+      *why = hhtbench::Text("gone on from step %ld of %ld: ", s.save_at, a.steps) + different;
+  }
+  std::remove(file.c_str());
+  std::remove((file + ".info").c_str());
+  return r;
+}
+
+} // namespace soak
+
+#endif
