@@ -308,6 +308,7 @@ PetscBool      HooksUserTest(TS ts);
 /* verify.cpp */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
+PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);

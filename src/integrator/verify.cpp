@@ -450,6 +450,16 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode ViewClaims(TS ts, PetscViewer viewer)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (Claims(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
+                                                  HasDefinitions(I) ? ", and definitions may hide more" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After a correction that has failed with a matrix of its own: whether the residual has not answered it at all */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
