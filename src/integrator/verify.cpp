@@ -167,7 +167,7 @@ PetscErrorCode PassDefinitionsOn(TS ts, Mat P, Vec R)
 }
 
 /* What the correction was to take away of the residual, by the linear model that it has solved, but for what the constraint forces of
-   its multipliers answer: model = P dX - P_lambda dLambda */
+   its multipliers answer: model = P dX - P_lambda dLambda. Those stand in work. */
 PetscErrorCode Model(TS ts, Vec dX)
 {
   Integrator   &I = Get(ts);
@@ -179,10 +179,14 @@ PetscErrorCode Model(TS ts, Vec dX)
   if (!v.work) PetscCall(VecDuplicate(dX, &v.work));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   if (I.constraints()) {
-    PetscCall(Keep(I, dX, TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, v.work));
-    PetscCall(VecAYPX(v.work, -1, dX));
-    PetscCall(MatMult(P, v.work, v.model));
-  } else PetscCall(MatMult(P, dX, v.model));
+    PetscCall(Keep(I, dX, TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, v.model));
+    PetscCall(MatMult(P, v.model, v.work));
+    PetscCall(MatMult(P, dX, v.model));
+    PetscCall(VecAXPY(v.model, -1, v.work));
+  } else {
+    PetscCall(VecZeroEntries(v.work));
+    PetscCall(MatMult(P, dX, v.model));
+  }
   PetscCall(PassDefinitionsOn(ts, P, v.model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -219,7 +223,8 @@ bool Followed(const RowScale &s, PetscReal now, PetscReal was)
 PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
 {
   Integrator        &I = Get(ts);
-  const PetscScalar *f, *r;
+  const bool         known = I.corrector.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
+  const PetscScalar *f, *r, *g;
   PetscReal          sum[3];
   Vec                now = F;
   Mat                P;
@@ -233,12 +238,14 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
   }
   PetscCall(VecGetArrayRead(now, &f));
   PetscCall(VecGetArrayRead(I.verify.model, &r));
+  PetscCall(VecGetArrayRead(I.verify.work, &g));
   PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
-    const PetscReal is = PetscRealPart(f[i]) * s.answer, was = PetscRealPart(r[i]) * s.answer;
-    local[0] += PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * PetscAbsReal(was) - s.rounding));
+    const PetscReal is = PetscRealPart(f[i]) * s.answer, was = PetscRealPart(r[i]) * s.answer, constraint = known ? PetscAbsReal(PetscRealPart(g[i])) * s.answer : 0;
+    local[0] += PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
     local[1] += is * was;
     local[2] += was * was;
   }));
+  PetscCall(VecRestoreArrayRead(I.verify.work, &g));
   PetscCall(VecRestoreArrayRead(I.verify.model, &r));
   PetscCall(VecRestoreArrayRead(now, &f));
   if (now != F) PetscCall(VecDestroy(&now));
