@@ -29,6 +29,8 @@ constexpr PetscReal least_claim = 10;  /* below it a correction is too small by 
 constexpr PetscReal allowed     = 0.1; /* unproved change of positions, in units of the tolerance */
 constexpr PetscReal least_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, too */
 constexpr PetscReal followed    = 0.3; /* a rate at which the iteration converges */
+constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
+constexpr PetscReal variation   = 1e3;   /* of inertia from one matrix to another; a sum that happens to cancel is none */
 constexpr PetscReal stayed      = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
 
 constexpr PetscReal hopeless    = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
@@ -41,28 +43,19 @@ bool HasDefinitions(const Integrator &I) { return I.count[TSHHT3_VARIABLE] || I.
 /* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
 bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
 
-/* inertia_i: M_ii of coordinates, dF/ds' of states, from the matrix of the start; later matrices bound it from above. A
-   coordinate without mass moves with others: it gets their mean. */
-PetscErrorCode BoundInertia(TS ts, bool start, const PetscScalar *p, PetscInt n, PetscScalar *m)
+/* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start. A coordinate without mass, but for
+   rounding, moves with others: it gets their mean. */
+PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar *m)
 {
-  Integrator     &I = Get(ts);
-  const PetscReal coordinate = start ? 1 : I.p.ca(), state = start ? 1 : StateInertia(I.p);
-  PetscReal       local[2] = {0, 0}, sum[2];
+  Integrator &I        = Get(ts);
+  PetscReal   local[2] = {0, 0}, sum[2];
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    if (!IsDifferential(r)) continue;
-    const PetscReal bound = PetscAbsScalar(p[i]) / (r == TSHHT3_STATE ? state : coordinate);
-    m[i] = start ? bound : bound > 0 ? PetscMin(m[i], bound) : m[i];
-  }
-  if (!start) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && m[i] > 0) local[0] += PetscLogReal(m[i]), local[1] += 1;
+    if (IsCoordinate(I, i) && PetscAbsScalar(p[i]) > 0) local[0] += PetscLogReal(PetscAbsScalar(p[i])), local[1] += 1;
   PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   const PetscReal mean = sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1;
-  for (PetscInt i = 0; i < n; i++)
-    if (IsDifferential(RoleOf(I, i)) && m[i] <= 0) m[i] = mean;
+  for (PetscInt i = 0; i < n; i++) m[i] = PetscAbsScalar(p[i]) > massless * mean ? PetscAbsScalar(p[i]) : mean;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -336,7 +329,7 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   PetscCall(VecGetLocalSize(v.claim, &n));
   PetscCall(VecGetArray(v.claim, &p));
   PetscCall(VecGetArray(v.inertia, &m));
-  PetscCall(BoundInertia(ts, start, p, n, m));
+  if (start) PetscCall(NoteInertia(ts, p, n, m));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
     p[i]    = IsDifferential(r) ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
@@ -405,7 +398,7 @@ static PetscErrorCode MeasureInertia(TS ts)
   PetscCall(VecGetArrayRead(F[1], &f));
   PetscCall(VecGetArray(v.inertia, &m));
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && PetscAbsScalar(f[i]) > 0) m[i] = PetscAbsScalar(f[i]);
+    if (IsCoordinate(I, i)) m[i] = PetscClipInterval(PetscAbsScalar(f[i]), m[i] / variation, m[i] * variation);
   PetscCall(VecRestoreArray(v.inertia, &m));
   PetscCall(VecRestoreArrayRead(F[1], &f));
   for (Vec &f_ : F) PetscCall(VecDestroy(&f_));
