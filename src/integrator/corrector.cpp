@@ -253,6 +253,7 @@ PetscErrorCode FailUnproved(TS ts)
 
   PetscFunctionBegin;
   I.corrector.reason = SNES_DIVERGED_DTOL;
+  if (I.corrector.wrong_jacobian) I.corrector.blames += 1;
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
                           "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
                           "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two",

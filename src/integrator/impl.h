@@ -41,7 +41,8 @@ struct CorrectorState {
   PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
-  PetscBool wrong_jacobian = PETSC_FALSE; /* as verify.cpp has seen */
+  PetscBool wrong_jacobian = PETSC_FALSE; /* as verify.cpp has seen in this correction */
+  PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
   PetscInt  renew_left  = 0;           /* of these, still to come */

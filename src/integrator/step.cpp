@@ -17,6 +17,10 @@ namespace
 /* Failures that cut h below rounding again and again: time hardly moves */
 constexpr PetscInt max_tiny_row = 50;
 
+/* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
+   has them again and again */
+constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
+
 constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
 /* Whether someone other than the integrator has changed the solution since the last step: an event, a post-step function,
@@ -147,6 +151,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   if (!tiny) I.h_proven = PetscMax(h, I.h_proven);
   if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
+  I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
   I.stat.steps++;
   I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
   I.stat.h_max = PetscMax(I.stat.h_max, h);
@@ -216,7 +221,7 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 
   PetscFunctionBegin;
   ts->reject++;
-  if (I.corrector.wrong_jacobian) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
+  if (I.corrector.blames >= max_blames) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
   else if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
   else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
   else if (I.tiny_row >= max_tiny_row) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));

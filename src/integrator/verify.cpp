@@ -43,8 +43,8 @@ bool HasDefinitions(const Integrator &I) { return I.count[TSHHT3_VARIABLE] || I.
 /* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
 bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
 
-/* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start. A coordinate without mass, but for
-   rounding, moves with others: it gets their mean. */
+/* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start; 0 for a coordinate without mass, but for
+   rounding, and for all others: of these nothing is asked */
 PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar *m)
 {
   Integrator &I        = Get(ts);
@@ -55,7 +55,7 @@ PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar 
     if (IsCoordinate(I, i) && PetscAbsScalar(p[i]) > 0) local[0] += PetscLogReal(PetscAbsScalar(p[i])), local[1] += 1;
   PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   const PetscReal mean = sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1;
-  for (PetscInt i = 0; i < n; i++) m[i] = PetscAbsScalar(p[i]) > massless * mean ? PetscAbsScalar(p[i]) : mean;
+  for (PetscInt i = 0; i < n; i++) m[i] = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(p[i]) > massless * mean ? PetscAbsScalar(p[i]) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,7 +117,7 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[3], Entry entry)
   PetscCall(GetRowScales(I, &s));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
-    if (IsDifferential(r)) entry(i, s.at(r, i), local);
+    if (PetscRealPart(s.m[i]) > 0) entry(i, s.at(r, i), local);
   }
   PetscCall(RestoreRowScales(I, &s));
   PetscCallMPI(MPI_Allreduce(local, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
@@ -332,7 +332,7 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   if (start) PetscCall(NoteInertia(ts, p, n, m));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
-    p[i]    = IsDifferential(r) ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
+    p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
     largest = PetscMax(largest, PetscRealPart(p[i]));
   }
   PetscCall(VecRestoreArray(v.inertia, &m));
@@ -398,7 +398,7 @@ static PetscErrorCode MeasureInertia(TS ts)
   PetscCall(VecGetArrayRead(F[1], &f));
   PetscCall(VecGetArray(v.inertia, &m));
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i)) m[i] = PetscClipInterval(PetscAbsScalar(f[i]), m[i] / variation, m[i] * variation);
+    if (IsCoordinate(I, i) && PetscRealPart(m[i]) > 0) m[i] = PetscClipInterval(PetscAbsScalar(f[i]), m[i] / variation, m[i] * variation);
   PetscCall(VecRestoreArray(v.inertia, &m));
   PetscCall(VecRestoreArrayRead(F[1], &f));
   for (Vec &f_ : F) PetscCall(VecDestroy(&f_));

@@ -72,9 +72,9 @@ inline void SetText(char *to, std::size_t room, const std::string &s)
 class Judge
 {
 public:
-  Judge(std::uint64_t seed, long number, bool small, bool switches, bool again, const std::vector<ReducedPart> &parts,
+  Judge(std::uint64_t seed, long number, bool small, bool switches, bool again, bool laws, const std::vector<ReducedPart> &parts,
         bool options, Outcome *outcome)
-      : seed_(seed), small_(small), switches_(switches), again_(again), options_(options), parts_(parts), o_(*outcome)
+      : seed_(seed), small_(small), switches_(switches), again_(again), laws_(laws), options_(options), parts_(parts), o_(*outcome)
   {
     o_.number = number;
   }
@@ -104,7 +104,7 @@ private:
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
   std::uint64_t                             seed_;
-  bool                                      small_, switches_, again_, options_;
+  bool                                      small_, switches_, again_, laws_, options_;
   const std::vector<ReducedPart>           &parts_;
   Model                                     model_;
   Outcome                                  &o_;
@@ -155,16 +155,21 @@ private:
 
   /* ---- what is no matter of accuracy ---- */
 
-  void again(const Trajectory &a)
+  void laws()
   {
-    const int before       = o_.verdict;
     o_.stage               = Laws;
     const Trajectory sharp = RunHHT(build(), LawSettings(patience(4)));
     o_.balance             = sharp.balance;
     o_.between             = sharp.between;
     o_.unjudged            = sharp.unjudged;
     if (sharp.balance > AllowedImbalance(model_.hardness))
-      return fail(Wrong, "out of balance: " + sharp.out_of_balance);
+      fail(Wrong, "out of balance: " + sharp.out_of_balance);
+  }
+  void again(const Trajectory &a)
+  {
+    const int before       = o_.verdict;
+    if (laws_) laws();
+    if (o_.verdict == Wrong) return;
     o_.verdict = before;
     if (!again_) return;
     o_.stage = Again;

@@ -4,6 +4,7 @@ static char help[] =
     "  -small: models of few bodies alone; -switches <true>: stiff elements that let go or take hold, in two of five "
     "models\n"
     "  -again <true>: each model is described and run a second time, a checkpoint written and gone on from\n"
+    "  -laws <true>: every body is held to the laws of Newton and Euler\n"
     "  -jobs <2>: processes at a time; -deadline <120>: CPU seconds for one model with its references\n"
     "  -output <build/soak>: .csv and .html are added; none: no files\n"
     "One model alone, with messages and any option of the integrator: models -seed s -first k -count 1 -ts_view\n"
@@ -19,7 +20,7 @@ static PetscErrorCode Run(bool *passed)
 {
   PetscInt                 seed = 1, first = 0, count = 2000, jobs = 2;
   PetscReal                deadline = 120;
-  PetscBool                small = PETSC_FALSE, switches = PETSC_TRUE, again = PETSC_TRUE;
+  PetscBool                small = PETSC_FALSE, switches = PETSC_TRUE, again = PETSC_TRUE, laws = PETSC_TRUE;
   char                     output[PETSC_MAX_PATH_LEN] = "build/soak";
   std::vector<ReducedPart> parts;
 
@@ -32,6 +33,7 @@ static PetscErrorCode Run(bool *passed)
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-small", &small, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-switches", &switches, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-again", &again, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-laws", &laws, nullptr));
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-output", output, sizeof output, nullptr));
   PetscCheck(count > 0 && jobs > 0 && deadline > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "-count, -jobs and -deadline must be positive");
@@ -45,7 +47,7 @@ static PetscErrorCode Run(bool *passed)
   Report     report((long)seed, small, switches, (int)count);
   PetscCall(
       pool.run((long)first, (int)jobs, deadline, !one,
-               [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, small, switches, again, parts, one, o).run(); },
+               [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, small, switches, again, laws, parts, one, o).run(); },
                [&](const Outcome &o, int done) { report.progress(o, done); }));
   for (int k = 0; k < pool.size(); k++) report.add(pool[k]);
   report.print();
