@@ -26,11 +26,12 @@ namespace
 {
 
 constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
+constexpr PetscReal most_claim  = 1e11; /* beyond it the residual is rounding of forces (modes of 1e7 Hz at h omega = 1e6) */
 constexpr PetscReal allowed     = 0.1; /* unproved change of positions, in units of the tolerance */
 constexpr PetscReal least_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, too */
 constexpr PetscReal followed    = 0.3; /* a rate at which the iteration converges */
 constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
-constexpr PetscReal variation   = 1e3;   /* of inertia from one matrix to another; a sum that happens to cancel is none */
+constexpr PetscReal variation   = 1e3;   /* of inertia from one matrix to another; beyond, a sum has cancelled or stiff forces have drowned it in rounding */
 constexpr PetscReal stayed      = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
 
 constexpr PetscReal hopeless    = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
@@ -77,7 +78,7 @@ struct RowScales {
 
 PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
 {
-  const PetscReal eps = 4 * PETSC_MACHINE_EPSILON, h = I.h, k = PetscAbsReal(I.p.k) * h * h;
+  const PetscReal eps = 64 * PETSC_MACHINE_EPSILON, h = I.h, k = PetscAbsReal(I.p.k) * h * h;
 
   PetscFunctionBegin;
   s->coordinate[0] = k / I.p.ca();
@@ -117,7 +118,7 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[3], Entry entry)
   PetscCall(GetRowScales(I, &s));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
-    if (PetscRealPart(s.m[i]) > 0) entry(i, s.at(r, i), local);
+    if (PetscRealPart(s.m[i]) > 0 && PetscRealPart(s.c[i]) < most_claim) entry(i, s.at(r, i), local);
   }
   PetscCall(RestoreRowScales(I, &s));
   PetscCallMPI(MPI_Allreduce(local, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
@@ -235,6 +236,7 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
   PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
     const PetscReal is = PetscRealPart(f[i]) * s.answer, was = PetscRealPart(r[i]) * s.answer, constraint = known ? PetscAbsReal(PetscRealPart(g[i])) * s.answer : 0;
     local[0] += PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
+    if (PetscAbsReal(was) <= s.rounding / 16) return; /* less cannot be told from rounding, even by what persists */
     local[1] += is * was;
     local[2] += was * was;
   }));
@@ -274,7 +276,7 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec all,
   PetscCall(VecGetArrayRead(v.model, &m));
   PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
     const PetscReal model = PetscRealPart(m[i]) * s.answer;
-    if (PetscAbsReal(way * model) < s.rounding || Followed(s, PetscRealPart(f[i]), PetscRealPart(m[i]))) return;
+    if (PetscAbsReal(way * model) < 10 * s.rounding || Followed(s, PetscRealPart(f[i]), PetscRealPart(m[i]))) return;
     local[1] += PetscRealPart(d[i]) * s.answer * model;
     local[2] += way * model * model;
   }));
@@ -333,7 +335,7 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
     p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
-    largest = PetscMax(largest, PetscRealPart(p[i]));
+    if (PetscRealPart(p[i]) < most_claim) largest = PetscMax(largest, PetscRealPart(p[i]));
   }
   PetscCall(VecRestoreArray(v.inertia, &m));
   PetscCall(VecRestoreArray(v.claim, &p));
@@ -398,7 +400,7 @@ static PetscErrorCode MeasureInertia(TS ts)
   PetscCall(VecGetArrayRead(F[1], &f));
   PetscCall(VecGetArray(v.inertia, &m));
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && PetscRealPart(m[i]) > 0) m[i] = PetscClipInterval(PetscAbsScalar(f[i]), m[i] / variation, m[i] * variation);
+    if (IsCoordinate(I, i) && PetscAbsScalar(f[i]) > m[i] / variation && PetscAbsScalar(f[i]) < m[i] * variation) m[i] = PetscAbsScalar(f[i]);
   PetscCall(VecRestoreArray(v.inertia, &m));
   PetscCall(VecRestoreArrayRead(F[1], &f));
   for (Vec &f_ : F) PetscCall(VecDestroy(&f_));

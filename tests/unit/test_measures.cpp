@@ -329,7 +329,7 @@ TEST(Measures, RefusedByName)
        }),
        {"variable speed", "17 arguments"});
   says(refusal([&](Mechanism &m) {
-         m.scene.state("integral", Expression{{time}, nullptr}, 0);
+         m.scene.state("integral", Expression({time}, {}), 0);
        }),
        {"state integral", "empty"});
   says(refusal([&](Mechanism &m) {
