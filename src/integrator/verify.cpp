@@ -36,6 +36,8 @@ constexpr PetscReal stayed      = 0.2; /* |1 - <r', r>/<r, r>| below it: the res
 
 constexpr PetscReal hopeless    = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
+constexpr PetscReal rounding_of_sums = 64 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+
 /* d s'/d w, which a row of a state has in place of ca */
 PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.beta; }
 
@@ -60,25 +62,25 @@ PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a row: units of the tolerance for a residual that inertia alone answers, and rounding of the unknown times its stiffness */
+/* Of a row: units of the tolerance for a residual that inertia alone answers, and rounding of the unknown, in q and in q'', times its stiffness */
 struct RowScale {
   PetscReal answer, claimed, rounding; /* claimed: of a residual over its inertia */
 };
 
 struct RowScales {
   PetscReal          coordinate[3], state[3]; /* of answer, rounding, claimed */
-  const PetscScalar *w, *y, *c, *m;
+  const PetscScalar *w, *y, *c, *m, *x;
 
   RowScale at(TSHHT3Role r, PetscInt i) const
   {
     const PetscReal *k = r == TSHHT3_STATE ? state : coordinate;
-    return {k[0] * PetscRealPart(w[i] / m[i]), k[2] * PetscRealPart(w[i]), k[1] * PetscRealPart(c[i] * y[i] * w[i])};
+    return {k[0] * PetscRealPart(w[i] / m[i]), k[2] * PetscRealPart(w[i]), PetscRealPart(c[i] * w[i]) * (k[1] * PetscRealPart(y[i]) + rounding_of_sums * k[2] * PetscAbsScalar(x[i]))};
   }
 };
 
 PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
 {
-  const PetscReal eps = 64 * PETSC_MACHINE_EPSILON, h = I.h, k = PetscAbsReal(I.p.k) * h * h;
+  const PetscReal eps = rounding_of_sums, h = I.h, k = PetscAbsReal(I.p.k) * h * h;
 
   PetscFunctionBegin;
   s->coordinate[0] = k / I.p.ca();
@@ -87,6 +89,7 @@ PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
   s->state[0]      = I.p.gamma_s * h / StateInertia(I.p);
   s->state[1]      = eps;
   s->state[2]      = I.p.gamma_s * h;
+  PetscCall(VecGetArrayRead(I.X, &s->x));
   PetscCall(VecGetArrayRead(I.weight, &s->w));
   PetscCall(VecGetArrayRead(I.ymax, &s->y));
   PetscCall(VecGetArrayRead(I.verify.claim, &s->c));
@@ -101,6 +104,7 @@ PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
   PetscCall(VecRestoreArrayRead(I.verify.claim, &s->c));
   PetscCall(VecRestoreArrayRead(I.ymax, &s->y));
   PetscCall(VecRestoreArrayRead(I.weight, &s->w));
+  PetscCall(VecRestoreArrayRead(I.X, &s->x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

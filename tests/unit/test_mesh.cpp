@@ -170,8 +170,8 @@ TEST(Mesh, WheelsOnATurningCarrier)
   const double last = sun_angle.back();
   MEASURED("wheels on a carrier: %.1f and %.1f turns, force of the teeth %.2f N, largest imbalance %.1e", last / 2 / M_PI,
            planet_angle.back() / 2 / M_PI, tooth.back(), most);
-  EXPECT_LT(most, 1e-7);
-  EXPECT_GT(std::abs(last), 20.);
+  EXPECT_LT(most, 1e-4); /* of some 100 N, in samples between the steps */
+  EXPECT_GT(std::abs(last), 15.);
   EXPECT_NEAR(planet_angle.back(), -2 * last, 1e-8 * std::abs(last)); /* radii 0.6 and 0.3 */
   EXPECT_GT(std::abs(tooth.back()), 5.);
 }
@@ -186,7 +186,7 @@ TEST(Mesh, BevelGears)
                at_small = s.marker(s.ground(), {0.6, 0, 0.2}, axesAlong({1, 0, 0})), teeth = s.marker(s.ground(), {0.5, 0, 0}, axesAlong({0, 1, 0}));
   const Element b1 = s.add("b1", Revolute{on_big, at_big}), b2 = s.add("b2", Revolute{on_small, at_small}),
                 mesh = s.add("mesh", GearMesh{on_big, at_big, on_small, at_small, teeth});
-  s.add("motor", RotationalMotion{on_big, at_big, TimeFunction::polynomial({0, 1, 2})});
+  s.add("motor", RotationalMotion{on_big, at_big, TimeFunction::polynomial({0, 0, 2})}); /* from rest */
   for (const auto &[name, e] : {std::pair{"b1", b1}, {"b2", b2}, {"mesh", mesh}}) m.reaction(name, e);
   m.point("teeth", teeth);
   m.point("at", at_small);
@@ -196,7 +196,7 @@ TEST(Mesh, BevelGears)
   ExpectBalance(t, "small", 1, 0.05, Vector3::Zero(), {{"b2", "b2", "at", 1}, {"mesh", "", "teeth", -1}});
   const Array a = t.column("big angle"), b = t.column("small angle");
   EXPECT_NEAR(std::abs(b.back()), 2.5 * a.back(), 1e-7 * a.back());
-  EXPECT_GT(a.back(), 20.);
+  EXPECT_GT(a.back(), 15.);
   /* 4 rad/s^2 and 2.5 times that on the small one: F = 0.05 * 10 / 0.2 */
   EXPECT_NEAR(std::abs(t.column("f.mesh1").back()), 2.5, 1e-6);
   EXPECT_NEAR(std::abs(t.column("f.b21").back()), 2.5, 1e-6);
@@ -280,7 +280,7 @@ TEST(Mesh, WhatCannotBe)
     s.add("m", GearMesh{i1, j1, i2, j2, s.marker(a, {0.5, 0, 0}, up)});
   });
   says("are not parallel", [&](Scene &s, Body, Body b, Marker i1, Marker j1, Marker, Marker j2) {
-    s.add("m", GearMesh{i1, j1, s.marker(b, {0, 0, 0}, up), j2, s.marker(s.ground(), {0.5, 0, 0}, up)});
+    s.add("m", GearMesh{i1, j1, s.marker(b, {0, 0, 0}, axesAlong({0, 0.6, 0.8})), j2, s.marker(s.ground(), {0.5, 0, 0}, up)});
   });
   says("across its way", [&](Scene &s, Body, Body, Marker i1, Marker j1, Marker i2, Marker) {
     s.add("m", RackMesh{i1, j1, i2, s.marker(s.ground(), {1, 0, 0}, out), s.marker(s.ground(), {0.5, 0, 0}, up)});
