@@ -10,7 +10,7 @@ from common import check, run
 from resuming import PLAIN, SCENES, command, content, states, summary
 
 bin, directory, ranks = sys.argv[1], sys.argv[2], int(sys.argv[3])
-names = sys.argv[4:] or list(PLAIN) + list(SCENES)
+names = sys.argv[4:] or (list(PLAIN) if ranks == 1 else []) + list(SCENES)  # the plain problems are written for one rank
 os.makedirs(directory, exist_ok=True)
 
 
