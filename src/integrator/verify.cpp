@@ -439,7 +439,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   for (int attempt = 0; attempt < 2; attempt++) {
     PetscCall(Compare(ts, F, &left, &part));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
-    const bool good = c.it - c.base >= 2 && c.rate >= 0 && c.rate < followed && part < 0.5;
+    const bool good = c.it - c.base >= 2 && c.rate >= 0 && c.rate < 0.5 && part < 0.5;
     *proved         = (PetscBool)((good || Drift(I, left, T) <= limit) && PetscAbsReal(part - 1) > stayed);
     if (attempt && !*proved) {
       PetscCall(Claimed(ts, dX, &E));
