@@ -271,9 +271,10 @@ inline double norm(const Array &x)
   return std::sqrt(s);
 }
 
-/* Largest difference relative to the largest entry of b */
+/* Largest difference relative to the largest entry of b; of arrays of other lengths infinite */
 inline double relativeDifference(const Array &a, const Array &b)
 {
+  if (a.size() != b.size()) return PETSC_INFINITY;
   double d = 0., m = 0.;
   for (size_t i = 0; i < b.size(); i++) {
     widen(d, std::abs(a[i] - b[i]));

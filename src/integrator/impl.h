@@ -65,13 +65,13 @@ struct Corrector : CorrectorOptions, CorrectorState {};
 
 struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
-  PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
+  PetscBool measured = PETSC_FALSE; /* inertia and rounding have been measured since the matrix was made */
   PetscReal since = 0, missing = 0; /* time since the last proof, and the accelerations that may be missing since, by the weights */
 };
 
 /* Whether small corrections prove anything, verify.cpp */
 struct Verification : VerificationState {
-  Vec inertia = nullptr, claim = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
+  Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
 };
 
 struct PredictorOptions {

@@ -62,19 +62,21 @@ PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a row: units of the tolerance for a residual that inertia alone answers, and rounding of the unknown, in q and in q'', times its stiffness */
+/* Of a row: units of the tolerance for a residual that inertia alone answers, and rounding: of the unknown, in q and in q'', times its
+   stiffness, and as measured */
 struct RowScale {
   PetscReal answer, claimed, rounding; /* claimed: of a residual over its inertia */
 };
 
 struct RowScales {
   PetscReal          coordinate[3], state[3]; /* of answer, rounding, claimed */
-  const PetscScalar *w, *y, *c, *m, *x;
+  const PetscScalar *w, *y, *c, *m, *x, *noise;
 
   RowScale at(TSHHT3Role r, PetscInt i) const
   {
     const PetscReal *k = r == TSHHT3_STATE ? state : coordinate;
-    return {k[0] * PetscRealPart(w[i] / m[i]), k[2] * PetscRealPart(w[i]), PetscRealPart(c[i] * w[i]) * (k[1] * PetscRealPart(y[i]) + rounding_of_sums * k[2] * PetscAbsScalar(x[i]))};
+    const PetscReal  answer = k[0] * PetscRealPart(w[i] / m[i]), own = k[1] * PetscRealPart(y[i]) + rounding_of_sums * k[2] * PetscAbsScalar(x[i]);
+    return {answer, k[2] * PetscRealPart(w[i]), PetscRealPart(c[i] * w[i]) * own + answer * PetscRealPart(noise[i])};
   }
 };
 
@@ -94,12 +96,14 @@ PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
   PetscCall(VecGetArrayRead(I.ymax, &s->y));
   PetscCall(VecGetArrayRead(I.verify.claim, &s->c));
   PetscCall(VecGetArrayRead(I.verify.inertia, &s->m));
+  PetscCall(VecGetArrayRead(I.verify.noise, &s->noise));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
 {
   PetscFunctionBegin;
+  PetscCall(VecRestoreArrayRead(I.verify.noise, &s->noise));
   PetscCall(VecRestoreArrayRead(I.verify.inertia, &s->m));
   PetscCall(VecRestoreArrayRead(I.verify.claim, &s->c));
   PetscCall(VecRestoreArrayRead(I.ymax, &s->y));
@@ -360,7 +364,9 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   if (!has || (!start && !v.inertia)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!v.inertia) PetscCall(VecDuplicate(I.X, &v.inertia));
   if (!v.claim) PetscCall(VecDuplicate(I.X, &v.claim));
+  if (!v.noise) PetscCall(VecDuplicate(I.X, &v.noise));
   PetscCall(MakeClaims(ts, P, start));
+  PetscCall(VecZeroEntries(v.noise));
   v.measured = PETSC_FALSE;
   if (start) v.largest = v.since = v.missing = 0;
   if (Claims(I)) {
@@ -370,10 +376,43 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Inertia that varies with the position looks like stiffness to a matrix of the start. Where that has raised a doubt, inertia is measured
-   anew at the state of the stage, once for each matrix: |F(q''=z) - F(q''=0)| for accelerations z of random signs, of the size that the
-   weights give them. */
-static PetscErrorCode MeasureInertia(TS ts)
+/* +1 or -1 */
+static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 : -1; }
+
+/* to = |F(x + dx) - F| for the residual F at x = U1, V1 and without accelerations, dx entries of random signs: all of them by rounding */
+static PetscErrorCode MeasureRounding(TS ts, Vec F, Vec to)
+{
+  Integrator       &I    = Get(ts);
+  const Vec         x[2] = {I.U1, I.V1};
+  Vec               y[3], change;
+  PetscInt          n, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetOwnershipRange(F, &first, NULL));
+  PetscCall(VecDuplicate(F, &change));
+  for (int k = 0; k < 3; k++) PetscCall(VecDuplicate(F, &y[k]));
+  for (int k = 0; k < 2; k++) {
+    PetscScalar *e;
+    PetscCall(VecCopy(x[k], y[k]));
+    PetscCall(VecGetArray(y[k], &e));
+    for (PetscInt i = 0; i < n; i++) e[i] *= 1 + rounding_of_sums * RandomSign(2 * (first + i) + k);
+    PetscCall(VecRestoreArray(y[k], &e));
+  }
+  PetscCall(VecZeroEntries(y[2]));
+  PetscCall(EvaluateResidual(ts, I.t1, y[0], y[1], y[2], change));
+  PetscCall(VecAXPY(change, -1, F));
+  PetscCall(VecAbs(change));
+  PetscCall(VecCopy(change, to));
+  for (Vec v : y) PetscCall(VecDestroy(&v));
+  PetscCall(VecDestroy(&change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Inertia that varies with the position looks like stiffness to a matrix of the start, and forces that cancel have more rounding than the
+   diagonal tells. Where that has raised a doubt, both are measured anew at the state of the stage, once for each matrix. Inertia:
+   |F(q''=z) - F(q''=0)| for accelerations z of random signs, of the size that the weights give them. */
+static PetscErrorCode MeasureRows(TS ts)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -390,12 +429,13 @@ static PetscErrorCode MeasureInertia(TS ts)
   for (Vec &f : F) PetscCall(VecDuplicate(I.X, &f));
   PetscCall(VecZeroEntries(Z));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, Z, F[0]));
+  PetscCall(MeasureRounding(ts, F[0], v.noise));
   PetscCall(VecGetLocalSize(Z, &n));
   PetscCall(VecGetOwnershipRange(Z, &first, NULL));
   PetscCall(VecGetArray(Z, &z));
   PetscCall(VecGetArrayRead(I.weight, &w));
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i)) z[i] = (((first + i) * 2654435761u >> 7) & 1 ? 1 : -1) / (PetscRealPart(w[i]) > 0 ? w[i] : 1);
+    if (IsCoordinate(I, i)) z[i] = RandomSign(first + i) / (PetscRealPart(w[i]) > 0 ? w[i] : 1);
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArray(Z, &z));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, Z, F[1]));
@@ -450,7 +490,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
       v.since   = left > 0 ? T : 0;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
-    if (!attempt) PetscCall(MeasureInertia(ts));
+    if (!attempt) PetscCall(MeasureRows(ts));
   }
   PetscCall(PetscInfo(ts, "corrector: a correction of %g of the tolerance at t = %g is no proof: the residual, %g of the tolerance by inertia alone, has not followed (%g of it as before)\n",
                       (double)c.e, (double)I.t1, (double)left, (double)part));

@@ -93,9 +93,13 @@ TEST(RefusedSettings, EveryTypeOfSNES)
       const PetscErrorCode code = run.solve();
       const double         e    = code ? NAN : relativeDifference(run.u(), plain.u());
       MEASURED("%-12s %s%g %s", type, code ? "error " : "", code ? (double)code : e, code ? trap.message.substr(0, 150).c_str() : "");
-      if (!code && run.t() >= .1) EXPECT_LT(e, 1e-2) << type;
-      if (code) EXPECT_FALSE(trap.message.empty()) << type;
-      if (std::string(type).find("newton") == 0 || std::string(type) == "ksponly") EXPECT_EQ(code, 0) << type << ": " << trap.message;
+      if (!code && run.t() >= .1) {
+        EXPECT_LT(e, 1e-2) << type;
+      }
+      EXPECT_EQ(code != 0, !trap.message.empty()) << type;
+      if (std::string(type).find("newton") == 0 || std::string(type) == "ksponly") {
+        EXPECT_EQ(code, 0) << type << ": " << trap.message;
+      }
     } catch (const std::runtime_error &) {
       EXPECT_FALSE(trap.message.empty()) << type; /* when options were read */
     }

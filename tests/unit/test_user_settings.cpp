@@ -173,7 +173,9 @@ TEST(UserSettings, TSAdaptOfTheUsers)
   ASSERT_EQ(o.code, 0) << o.message;
   for (size_t i = 2; i < o.times.size(); i++) {
     const double before = o.times[i - 1] - o.times[i - 2], h = o.times[i] - o.times[i - 1];
-    if (o.times[i] < .45) EXPECT_NEAR(h / before, 1.05, 1e-6) << i;
+    if (o.times[i] < .45) {
+      EXPECT_NEAR(h / before, 1.05, 1e-6) << i;
+    }
   }
 }
 
