@@ -75,8 +75,8 @@ struct RowScales {
   RowScale at(TSHHT3Role r, PetscInt i) const
   {
     const PetscReal *k = r == TSHHT3_STATE ? state : coordinate;
-    const PetscReal  answer = k[0] * PetscRealPart(w[i] / m[i]), own = k[1] * PetscRealPart(y[i]) + rounding_of_sums * k[2] * PetscAbsScalar(x[i]);
-    return {answer, k[2] * PetscRealPart(w[i]), PetscRealPart(c[i] * w[i]) * own + answer * PetscRealPart(noise[i])};
+    const PetscReal  answer = k[0] * PetscRealPart(w[i] / m[i]);
+    return {answer, k[2] * PetscRealPart(w[i]), answer * PetscRealPart(noise[i])};
   }
 };
 
@@ -112,12 +112,12 @@ PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* sum[0] the squares of what entry(row, role, scale) gives, sum[1] and sum[2] as it adds them, over all ranks */
+/* The sums that entry(row, scale, sum) adds to, over all rows of which something is asked and all ranks */
 template <class Entry>
-PetscErrorCode SumRows(TS ts, PetscReal sum[3], Entry entry)
+PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry)
 {
   Integrator &I        = Get(ts);
-  PetscReal   local[3] = {0, 0, 0};
+  PetscReal   local[4] = {0, 0, 0, 0};
   RowScales   s;
   PetscInt    n;
 
@@ -129,7 +129,7 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[3], Entry entry)
     if (PetscRealPart(s.m[i]) > 0 && PetscRealPart(s.c[i]) < most_claim) entry(i, s.at(r, i), local);
   }
   PetscCall(RestoreRowScales(I, &s));
-  PetscCallMPI(MPI_Allreduce(local, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Allreduce(local, sum, 4, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,7 +199,7 @@ PetscErrorCode Claimed(TS ts, Vec dX, PetscReal *E)
   Integrator        &I = Get(ts);
   const bool         definitions = HasDefinitions(I);
   const PetscScalar *d, *c;
-  PetscReal          sum[3];
+  PetscReal          sum[4];
 
   PetscFunctionBegin;
   if (definitions) PetscCall(Model(ts, dX));
@@ -222,12 +222,12 @@ bool Followed(const RowScale &s, PetscReal now, PetscReal was)
 }
 
 /* What is left of the residual F that the correction was to take away, in units of the tolerance; and how much of it is as it was */
-PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
+PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal *part)
 {
   Integrator        &I = Get(ts);
   const bool         known = I.corrector.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
   const PetscScalar *f, *r, *g;
-  PetscReal          sum[3];
+  PetscReal          sum[4];
   Vec                now = F;
   Mat                P;
 
@@ -243,7 +243,9 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
   PetscCall(VecGetArrayRead(I.verify.work, &g));
   PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
     const PetscReal is = PetscRealPart(f[i]) * s.answer, was = PetscRealPart(r[i]) * s.answer, constraint = known ? PetscAbsReal(PetscRealPart(g[i])) * s.answer : 0;
-    local[0] += PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
+    const PetscReal excess = PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
+    local[0] += excess;
+    if (PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was)) local[3] += excess;
     if (PetscAbsReal(was) <= s.rounding / 16) return; /* less cannot be told from rounding, even by what persists */
     local[1] += is * was;
     local[2] += was * was;
@@ -253,6 +255,7 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *part)
   PetscCall(VecRestoreArrayRead(now, &f));
   if (now != F) PetscCall(VecDestroy(&now));
   *left = PetscSqrtReal(sum[0] / I.norm_size);
+  *stay = PetscSqrtReal(sum[3] / I.norm_size);
   *part = sum[2] > 0 ? sum[1] / sum[2] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -265,7 +268,7 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec all,
   Integrator        &I = Get(ts);
   Verification      &v = I.verify;
   const PetscScalar *f, *m, *d;
-  PetscReal          sum[3];
+  PetscReal          sum[4];
   Vec                Y, change;
   Mat                P;
 
@@ -420,7 +423,7 @@ static PetscErrorCode MeasureRows(TS ts)
   Mat           P;
   PetscScalar  *z, *m;
   PetscInt      n, first;
-  const PetscScalar *w, *f;
+  const PetscScalar *w, *f, *zr, *e;
 
   PetscFunctionBegin;
   if (v.measured) PetscFunctionReturn(PETSC_SUCCESS);
@@ -440,12 +443,15 @@ static PetscErrorCode MeasureRows(TS ts)
   PetscCall(VecRestoreArray(Z, &z));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, Z, F[1]));
   PetscCall(VecAXPY(F[1], -1, F[0]));
-  PetscCall(VecPointwiseDivide(F[1], F[1], Z)); /* 0/0 where there is no coordinate, which is passed over */
   PetscCall(VecGetArrayRead(F[1], &f));
+  PetscCall(VecGetArrayRead(Z, &zr));
+  PetscCall(VecGetArrayRead(v.noise, &e));
   PetscCall(VecGetArray(v.inertia, &m));
   for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && PetscAbsScalar(f[i]) > m[i] / variation && PetscAbsScalar(f[i]) < m[i] * variation) m[i] = PetscAbsScalar(f[i]);
+    if (IsCoordinate(I, i) && PetscAbsScalar(f[i]) > PetscRealPart(e[i]) && PetscAbsScalar(f[i] / zr[i]) > m[i] / variation) m[i] = PetscAbsScalar(f[i] / zr[i]);
   PetscCall(VecRestoreArray(v.inertia, &m));
+  PetscCall(VecRestoreArrayRead(v.noise, &e));
+  PetscCall(VecRestoreArrayRead(Z, &zr));
   PetscCall(VecRestoreArrayRead(F[1], &f));
   for (Vec &f_ : F) PetscCall(VecDestroy(&f_));
   PetscCall(VecDestroy(&Z));
@@ -460,7 +466,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
   Corrector    &c = I.corrector;
-  PetscReal     E, left = 0, part = 0;
+  PetscReal     E, left = 0, stay = 0, part = 0;
 
   PetscFunctionBegin;
   *proved = PETSC_TRUE;
@@ -477,17 +483,17 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   *evaluated = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
-    PetscCall(Compare(ts, F, &left, &part));
+    PetscCall(Compare(ts, F, &left, &stay, &part));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
     const bool good = c.it - c.base >= 2 && c.rate >= 0 && c.rate < 0.5 && part < 0.5;
-    *proved         = (PetscBool)((good || Drift(I, left, T) <= limit) && PetscAbsReal(part - 1) > stayed);
+    *proved         = (PetscBool)((good || Drift(I, left, I.h) <= limit) && Drift(I, stay, T) <= limit && PetscAbsReal(part - 1) > stayed);
     if (attempt && !*proved) {
       PetscCall(Claimed(ts, dX, &E));
       *proved = (PetscBool)(!Claims(I) || Drift(I, E, T) <= limit);
     }
     if (*proved) {
-      v.missing = PetscMin(left, E) / k;
-      v.since   = left > 0 ? T : 0;
+      v.missing = PetscMin(stay, E) / k;
+      v.since   = stay > 0 ? T : 0;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
     if (!attempt) PetscCall(MeasureRows(ts));
@@ -512,14 +518,14 @@ PetscErrorCode ViewClaims(TS ts, PetscViewer viewer)
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);
-  PetscReal   left = 0, part = 0;
+  PetscReal   left = 0, stay = 0, part = 0;
 
   PetscFunctionBegin;
   if (I.mode != Mode::Step || !I.corrector.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
   PetscCall(Model(ts, dX));
-  PetscCall(Compare(ts, F, &left, &part));
+  PetscCall(Compare(ts, F, &left, &stay, &part));
   if (left > 0 && PetscAbsReal(part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
