@@ -62,38 +62,31 @@ PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a row: units of the tolerance for a residual that inertia alone answers, and rounding: of the unknown, in q and in q'', times its
-   stiffness, and as measured */
+/* Of a row, in units of the tolerance: a residual that inertia alone answers, the same of a residual over its inertia, and rounding */
 struct RowScale {
-  PetscReal answer, claimed, rounding; /* claimed: of a residual over its inertia */
+  PetscReal answer, claimed, rounding;
 };
 
 struct RowScales {
-  PetscReal          coordinate[3], state[3]; /* of answer, rounding, claimed */
-  const PetscScalar *w, *y, *c, *m, *x, *noise;
+  PetscReal          answer[2], claimed[2]; /* of coordinates, of states */
+  const PetscScalar *w, *c, *m, *noise;
 
   RowScale at(TSHHT3Role r, PetscInt i) const
   {
-    const PetscReal *k = r == TSHHT3_STATE ? state : coordinate;
-    const PetscReal  answer = k[0] * PetscRealPart(w[i] / m[i]);
-    return {answer, k[2] * PetscRealPart(w[i]), answer * PetscRealPart(noise[i])};
+    const int       k = r == TSHHT3_STATE;
+    const PetscReal a = answer[k] * PetscRealPart(w[i] / m[i]);
+    return {a, claimed[k] * PetscRealPart(w[i]), a * PetscRealPart(noise[i])};
   }
 };
 
 PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
 {
-  const PetscReal eps = rounding_of_sums, h = I.h, k = PetscAbsReal(I.p.k) * h * h;
-
   PetscFunctionBegin;
-  s->coordinate[0] = k / I.p.ca();
-  s->coordinate[1] = eps * k / ScalePosition(I.p, h);
-  s->coordinate[2] = k;
-  s->state[0]      = I.p.gamma_s * h / StateInertia(I.p);
-  s->state[1]      = eps;
-  s->state[2]      = I.p.gamma_s * h;
-  PetscCall(VecGetArrayRead(I.X, &s->x));
+  s->claimed[0] = PetscAbsReal(I.p.k) * I.h * I.h;
+  s->claimed[1] = I.p.gamma_s * I.h;
+  s->answer[0]  = s->claimed[0] / I.p.ca();
+  s->answer[1]  = s->claimed[1] / StateInertia(I.p);
   PetscCall(VecGetArrayRead(I.weight, &s->w));
-  PetscCall(VecGetArrayRead(I.ymax, &s->y));
   PetscCall(VecGetArrayRead(I.verify.claim, &s->c));
   PetscCall(VecGetArrayRead(I.verify.inertia, &s->m));
   PetscCall(VecGetArrayRead(I.verify.noise, &s->noise));
@@ -106,9 +99,7 @@ PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
   PetscCall(VecRestoreArrayRead(I.verify.noise, &s->noise));
   PetscCall(VecRestoreArrayRead(I.verify.inertia, &s->m));
   PetscCall(VecRestoreArrayRead(I.verify.claim, &s->c));
-  PetscCall(VecRestoreArrayRead(I.ymax, &s->y));
   PetscCall(VecRestoreArrayRead(I.weight, &s->w));
-  PetscCall(VecRestoreArrayRead(I.X, &s->x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -382,79 +373,106 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
 /* +1 or -1 */
 static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 : -1; }
 
-/* to = |F(x + dx) - F| for the residual F at x = U1, V1 and without accelerations, dx entries of random signs: all of them by rounding */
-static PetscErrorCode MeasureRounding(TS ts, Vec F, Vec to)
+/* noise = |F(X + dX) - F| for the residual F at X and dX of random signs: rounding of the unknowns, and, as changes of these, of the largest
+   terms that make up positions and states */
+static PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
-  Integrator       &I    = Get(ts);
-  const Vec         x[2] = {I.U1, I.V1};
-  Vec               y[3], change;
-  PetscInt          n, first;
+  Integrator        &I = Get(ts);
+  const PetscReal    position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);
+  const PetscScalar *y, *v;
+  PetscScalar       *x;
+  Vec                near;
+  PetscInt           n, first;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetOwnershipRange(F, &first, NULL));
-  PetscCall(VecDuplicate(F, &change));
-  for (int k = 0; k < 3; k++) PetscCall(VecDuplicate(F, &y[k]));
-  for (int k = 0; k < 2; k++) {
-    PetscScalar *e;
-    PetscCall(VecCopy(x[k], y[k]));
-    PetscCall(VecGetArray(y[k], &e));
-    for (PetscInt i = 0; i < n; i++) e[i] *= 1 + rounding_of_sums * RandomSign(2 * (first + i) + k);
-    PetscCall(VecRestoreArray(y[k], &e));
+  PetscCall(VecDuplicate(X, &near));
+  PetscCall(VecCopy(X, near));
+  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetOwnershipRange(X, &first, NULL));
+  PetscCall(VecGetArray(near, &x));
+  PetscCall(VecGetArrayRead(I.ymax, &y));
+  PetscCall(VecGetArrayRead(I.V1, &v));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r    = RoleOf(I, i);
+    const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y[i]) + I.h * PetscAbsScalar(v[i])) * (r == TSHHT3_STATE ? state : position) : 0;
+    x[i] += rounding_of_sums * RandomSign(first + i) * (PetscAbsScalar(x[i]) + size);
   }
-  PetscCall(VecZeroEntries(y[2]));
-  PetscCall(EvaluateResidual(ts, I.t1, y[0], y[1], y[2], change));
-  PetscCall(VecAXPY(change, -1, F));
-  PetscCall(VecAbs(change));
-  PetscCall(VecCopy(change, to));
-  for (Vec v : y) PetscCall(VecDestroy(&v));
-  PetscCall(VecDestroy(&change));
+  PetscCall(VecRestoreArrayRead(I.V1, &v));
+  PetscCall(VecRestoreArrayRead(I.ymax, &y));
+  PetscCall(VecRestoreArray(near, &x));
+  PetscCall(SNESComputeFunction(ts->snes, near, noise));
+  PetscCall(VecAXPY(noise, -1, F));
+  PetscCall(VecAbs(noise));
+  PetscCall(VecDestroy(&near));
+  PetscCall(StageVectors(ts, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Inertia that varies with the position looks like stiffness to a matrix of the start, and forces that cancel have more rounding than the
-   diagonal tells. Where that has raised a doubt, both are measured anew at the state of the stage, once for each matrix. Inertia:
-   |F(q''=z) - F(q''=0)| for accelerations z of random signs, of the size that the weights give them. */
-static PetscErrorCode MeasureRows(TS ts)
+/* z = 1/weight with random signs: accelerations of the size that the tolerances mean; zero where there is no coordinate */
+static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
 {
-  Integrator   &I = Get(ts);
-  Verification &v = I.verify;
-  Vec           Z, F[2];
-  Mat           P;
-  PetscScalar  *z, *m;
-  PetscInt      n, first;
-  const PetscScalar *w, *f, *zr, *e;
+  Integrator        &I = Get(ts);
+  const PetscScalar *w;
+  PetscScalar       *z;
+  PetscInt           n, first;
 
   PetscFunctionBegin;
-  if (v.measured) PetscFunctionReturn(PETSC_SUCCESS);
-  v.measured = PETSC_TRUE;
-  PetscCall(VecDuplicate(I.X, &Z));
-  for (Vec &f : F) PetscCall(VecDuplicate(I.X, &f));
-  PetscCall(VecZeroEntries(Z));
-  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, Z, F[0]));
-  PetscCall(MeasureRounding(ts, F[0], v.noise));
   PetscCall(VecGetLocalSize(Z, &n));
   PetscCall(VecGetOwnershipRange(Z, &first, NULL));
   PetscCall(VecGetArray(Z, &z));
   PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i)) z[i] = RandomSign(first + i) / (PetscRealPart(w[i]) > 0 ? w[i] : 1);
+  for (PetscInt i = 0; i < n; i++) z[i] = IsCoordinate(I, i) ? RandomSign(first + i) / (PetscRealPart(w[i]) > 0 ? w[i] : 1) : 0;
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArray(Z, &z));
-  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, Z, F[1]));
-  PetscCall(VecAXPY(F[1], -1, F[0]));
-  PetscCall(VecGetArrayRead(F[1], &f));
-  PetscCall(VecGetArrayRead(Z, &zr));
-  PetscCall(VecGetArrayRead(v.noise, &e));
-  PetscCall(VecGetArray(v.inertia, &m));
-  for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && PetscAbsScalar(f[i]) > PetscRealPart(e[i]) && PetscAbsScalar(f[i] / zr[i]) > m[i] / variation) m[i] = PetscAbsScalar(f[i] / zr[i]);
-  PetscCall(VecRestoreArray(v.inertia, &m));
-  PetscCall(VecRestoreArrayRead(v.noise, &e));
-  PetscCall(VecRestoreArrayRead(Z, &zr));
-  PetscCall(VecRestoreArrayRead(F[1], &f));
-  for (Vec &f_ : F) PetscCall(VecDestroy(&f_));
-  PetscCall(VecDestroy(&Z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel */
+static PetscErrorCode MeasureInertia(TS ts)
+{
+  Integrator        &I = Get(ts);
+  Vec                Z, A, F, change;
+  const PetscScalar *z, *f, *noise;
+  PetscScalar       *m;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDuplicate(I.X, v));
+  PetscCall(ProbingAccelerations(ts, Z));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
+  PetscCall(VecWAXPY(A, 1, Z, I.A1));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, change));
+  PetscCall(VecAXPY(change, -1, F));
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(Z, &z));
+  PetscCall(VecGetArrayRead(change, &f));
+  PetscCall(VecGetArrayRead(I.verify.noise, &noise));
+  PetscCall(VecGetArray(I.verify.inertia, &m));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!IsCoordinate(I, i)) continue;
+    const PetscReal now = PetscAbsScalar(f[i] / z[i]);
+    if (PetscAbsScalar(f[i]) > PetscRealPart(noise[i]) && now > PetscRealPart(m[i]) / variation) m[i] = now;
+  }
+  PetscCall(VecRestoreArray(I.verify.inertia, &m));
+  PetscCall(VecRestoreArrayRead(I.verify.noise, &noise));
+  PetscCall(VecRestoreArrayRead(change, &f));
+  PetscCall(VecRestoreArrayRead(Z, &z));
+  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDestroy(v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces have rounding, and inertia that varies with the position looks like stiffness to a matrix of the start. Where a doubt has been
+   raised, both are measured at the state of the stage, inertia once for each matrix. */
+static PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
+{
+  Verification &v = Get(ts).verify;
+  Mat           P;
+
+  PetscFunctionBegin;
+  PetscCall(MeasureRounding(ts, X, F, v.noise));
+  if (v.measured) PetscFunctionReturn(PETSC_SUCCESS);
+  v.measured = PETSC_TRUE;
+  PetscCall(MeasureInertia(ts));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   PetscCall(MakeClaims(ts, P, false));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -496,7 +514,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
       v.since   = stay > 0 ? T : 0;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
-    if (!attempt) PetscCall(MeasureRows(ts));
+    if (!attempt) PetscCall(MeasureRows(ts, X, F));
   }
   PetscCall(PetscInfo(ts, "corrector: a correction of %g of the tolerance at t = %g is no proof: the residual, %g of the tolerance by inertia alone, has not followed (%g of it as before)\n",
                       (double)c.e, (double)I.t1, (double)left, (double)part));
@@ -524,6 +542,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   if (I.mode != Mode::Step || !I.corrector.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
+  PetscCall(MeasureRows(ts, X, F));
   PetscCall(Model(ts, dX));
   PetscCall(Compare(ts, F, &left, &stay, &part));
   if (left > 0 && PetscAbsReal(part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
