@@ -276,6 +276,8 @@ PetscErrorCode CheckFinite(TS ts, const char file[])
     PetscCall(VecNorm(x, NORM_1, &sum)); /* the largest entry may pass over NaN */
     PetscCheck(!PetscIsInfOrNanReal(sum), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a state that is not finite", file);
   }
+  for (PetscReal t : {ts->ptime, ts->time_step, I.t0, I.t1, I.h, I.h_last})
+    PetscCheck(!PetscIsInfOrNanReal(t), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a time or a step size that is not finite", file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
