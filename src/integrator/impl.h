@@ -41,7 +41,7 @@ struct CorrectorState {
   PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
-  PetscBool wrong_jacobian = PETSC_FALSE; /* as verify.cpp has seen in this correction */
+  PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
   PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
@@ -306,10 +306,12 @@ PetscErrorCode HooksJacobian(TS ts);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
-/* verify.cpp */
+/* claims.cpp */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
-PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
+/* verify.cpp */
+PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
+/* blame.cpp */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */
 PetscErrorCode UpdateWeights(TS ts, Vec U);

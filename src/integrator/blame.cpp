@@ -1,0 +1,94 @@
+/* Is it the model that the residual does not follow a correction, or is the application's Jacobian wrong? See verify.cpp */
+#include "verify.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal hopeless    = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
+
+/* How much of the change that the matrix expects on a part `way` of dX, from where the matrix was made, the residual shows: 1 if the Jacobian
+   is right there. In the rows that have not followed dX, as far as they stand out of rounding; the constraint forces are taken as the
+   matrix has them. -1: there are no such rows. */
+PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec all, PetscReal *answer)
+{
+  Integrator        &I = Get(ts);
+  Verification      &v = I.verify;
+  const PetscScalar *f, *m, *d;
+  PetscReal          sum[4];
+  Vec                Y, change;
+  Mat                P;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(dX, &Y));
+  PetscCall(VecDuplicate(dX, &change));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(VecWAXPY(Y, -way, dX, v.where));
+  PetscCall(SNESComputeFunction(ts->snes, Y, change));
+  PetscCall(VecAYPX(change, -1, F_where));
+  PetscCall(PassDefinitionsOn(ts, P, change));
+  PetscCall(VecAXPY(change, -way, all));
+  PetscCall(VecAXPY(change, way, v.model));
+  PetscCall(VecGetArrayRead(F, &f));
+  PetscCall(VecGetArrayRead(change, &d));
+  PetscCall(VecGetArrayRead(v.model, &m));
+  PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
+    const PetscReal model = PetscRealPart(m[i]) * s.answer;
+    if (PetscAbsReal(way * model) < 10 * s.rounding || Followed(s, PetscRealPart(f[i]), PetscRealPart(m[i]))) return;
+    local[1] += PetscRealPart(d[i]) * s.answer * model;
+    local[2] += way * model * model;
+  }));
+  PetscCall(VecRestoreArrayRead(v.model, &m));
+  PetscCall(VecRestoreArrayRead(change, &d));
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(VecDestroy(&change));
+  PetscCall(VecDestroy(&Y));
+  *answer = sum[2] != 0 ? PetscAbsReal(sum[1] / sum[2]) : -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The residual at X does not follow the correction dX, made with a matrix of this very step: is that a property of the model, such as a
+   contact that ends on the way, or is the Jacobian wrong where it was evaluated? There one of the two directions along dX must answer. */
+PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
+{
+  Verification &v = Get(ts).verify;
+  PetscReal     answer[2];
+  Vec           F_where, all;
+  Mat           P;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(dX, &F_where));
+  PetscCall(VecDuplicate(dX, &all));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(MatMult(P, dX, all));
+  PetscCall(PassDefinitionsOn(ts, P, all));
+  PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));
+  for (int k = 0; k < 2; k++) PetscCall(Answer(ts, k ? -0.25 : 0.25, dX, F, F_where, all, &answer[k]));
+  PetscCall(VecDestroy(&all));
+  PetscCall(VecDestroy(&F_where));
+  *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < hopeless && answer[1] >= 0 && answer[1] < hopeless);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a correction that has failed with a matrix of its own: whether the residual has not answered it at all */
+PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Integrator &I = Get(ts);
+  PetscReal   left = 0, stay = 0, part = 0;
+
+  PetscFunctionBegin;
+  if (I.mode != Mode::Step || !I.corrector.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
+  *evaluated = PETSC_TRUE;
+  PetscCall(MeasureRows(ts, X, F));
+  PetscCall(Model(ts, dX));
+  PetscCall(Compare(ts, F, &left, &stay, &part));
+  if (left > 0 && PetscAbsReal(part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,229 @@
+/* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
+#include "verify.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
+constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
+constexpr PetscReal variation   = 1e3;   /* inertia that seems to have fallen by more has cancelled in a sum */
+constexpr PetscReal rounding_of_sums = 64 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+
+/* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start; 0 for a coordinate without mass, but for
+   rounding, and for all others: of these nothing is asked */
+PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar *m)
+{
+  Integrator &I        = Get(ts);
+  PetscReal   local[2] = {0, 0}, sum[2];
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n; i++)
+    if (IsCoordinate(I, i) && PetscAbsScalar(p[i]) > 0) local[0] += PetscLogReal(PetscAbsScalar(p[i])), local[1] += 1;
+  PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  const PetscReal mean = sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1;
+  for (PetscInt i = 0; i < n; i++) m[i] = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(p[i]) > massless * mean ? PetscAbsScalar(p[i]) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
+
+PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
+{
+  PetscFunctionBegin;
+  s->claimed[0] = PetscAbsReal(I.p.k) * I.h * I.h;
+  s->claimed[1] = I.p.gamma_s * I.h;
+  s->answer[0]  = s->claimed[0] / I.p.ca();
+  s->answer[1]  = s->claimed[1] / StateInertia(I.p);
+  PetscCall(VecGetArrayRead(I.weight, &s->w));
+  PetscCall(VecGetArrayRead(I.verify.claim, &s->c));
+  PetscCall(VecGetArrayRead(I.verify.inertia, &s->m));
+  PetscCall(VecGetArrayRead(I.verify.noise, &s->noise));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
+{
+  PetscFunctionBegin;
+  PetscCall(VecRestoreArrayRead(I.verify.noise, &s->noise));
+  PetscCall(VecRestoreArrayRead(I.verify.inertia, &s->m));
+  PetscCall(VecRestoreArrayRead(I.verify.claim, &s->c));
+  PetscCall(VecRestoreArrayRead(I.weight, &s->w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* claim_i of the matrix P with the inertia at hand, and the largest */
+static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscScalar  *p, *m;
+  PetscReal     largest = 0;
+  PetscInt      n;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetDiagonal(P, v.claim));
+  PetscCall(VecGetLocalSize(v.claim, &n));
+  PetscCall(VecGetArray(v.claim, &p));
+  PetscCall(VecGetArray(v.inertia, &m));
+  if (start) PetscCall(NoteInertia(ts, p, n, m));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r = RoleOf(I, i);
+    p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
+    if (PetscRealPart(p[i]) < most_claim) largest = PetscMax(largest, PetscRealPart(p[i]));
+  }
+  PetscCall(VecRestoreArray(v.inertia, &m));
+  PetscCall(VecRestoreArray(v.claim, &p));
+  PetscCallMPI(MPI_Allreduce(&largest, &v.largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To be called for every new matrix P, made at X */
+PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  const bool    start = I.mode == Mode::Start;
+  PetscBool     has;
+
+  PetscFunctionBegin;
+  PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
+  if (!has || (!start && !v.inertia)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v.inertia) PetscCall(VecDuplicate(I.X, &v.inertia));
+  if (!v.claim) PetscCall(VecDuplicate(I.X, &v.claim));
+  if (!v.noise) PetscCall(VecDuplicate(I.X, &v.noise));
+  PetscCall(MakeClaims(ts, P, start));
+  PetscCall(VecZeroEntries(v.noise));
+  v.measured = PETSC_FALSE;
+  if (start) v.largest = v.since = v.missing = 0;
+  if (Claims(I)) {
+    if (!v.where) PetscCall(VecDuplicate(X, &v.where));
+    PetscCall(VecCopy(X, v.where));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* +1 or -1 */
+static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 : -1; }
+
+/* noise = |F(X + dX) - F| for the residual F at X and dX of random signs: rounding of the unknowns, and, as changes of these, of the largest
+   terms that make up positions and states */
+static PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+{
+  Integrator        &I = Get(ts);
+  const PetscReal    position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);
+  const PetscScalar *y, *v;
+  PetscScalar       *x;
+  Vec                near;
+  PetscInt           n, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(X, &near));
+  PetscCall(VecCopy(X, near));
+  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetOwnershipRange(X, &first, NULL));
+  PetscCall(VecGetArray(near, &x));
+  PetscCall(VecGetArrayRead(I.ymax, &y));
+  PetscCall(VecGetArrayRead(I.V1, &v));
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r    = RoleOf(I, i);
+    const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y[i]) + I.h * PetscAbsScalar(v[i])) * (r == TSHHT3_STATE ? state : position) : 0;
+    x[i] += rounding_of_sums * RandomSign(first + i) * (PetscAbsScalar(x[i]) + size);
+  }
+  PetscCall(VecRestoreArrayRead(I.V1, &v));
+  PetscCall(VecRestoreArrayRead(I.ymax, &y));
+  PetscCall(VecRestoreArray(near, &x));
+  PetscCall(SNESComputeFunction(ts->snes, near, noise));
+  PetscCall(VecAXPY(noise, -1, F));
+  PetscCall(VecAbs(noise));
+  PetscCall(VecDestroy(&near));
+  PetscCall(StageVectors(ts, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z = 1/weight with random signs: accelerations of the size that the tolerances mean; zero where there is no coordinate */
+static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *w;
+  PetscScalar       *z;
+  PetscInt           n, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(Z, &n));
+  PetscCall(VecGetOwnershipRange(Z, &first, NULL));
+  PetscCall(VecGetArray(Z, &z));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  for (PetscInt i = 0; i < n; i++) z[i] = IsCoordinate(I, i) ? RandomSign(first + i) / (PetscRealPart(w[i]) > 0 ? w[i] : 1) : 0;
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel */
+static PetscErrorCode MeasureInertia(TS ts)
+{
+  Integrator        &I = Get(ts);
+  Vec                Z, A, F, change;
+  const PetscScalar *z, *f, *noise;
+  PetscScalar       *m;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDuplicate(I.X, v));
+  PetscCall(ProbingAccelerations(ts, Z));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
+  PetscCall(VecWAXPY(A, 1, Z, I.A1));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, change));
+  PetscCall(VecAXPY(change, -1, F));
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(Z, &z));
+  PetscCall(VecGetArrayRead(change, &f));
+  PetscCall(VecGetArrayRead(I.verify.noise, &noise));
+  PetscCall(VecGetArray(I.verify.inertia, &m));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!IsCoordinate(I, i)) continue;
+    const PetscReal now = PetscAbsScalar(f[i] / z[i]);
+    if (PetscAbsScalar(f[i]) > PetscRealPart(noise[i]) && now > PetscRealPart(m[i]) / variation) m[i] = now;
+  }
+  PetscCall(VecRestoreArray(I.verify.inertia, &m));
+  PetscCall(VecRestoreArrayRead(I.verify.noise, &noise));
+  PetscCall(VecRestoreArrayRead(change, &f));
+  PetscCall(VecRestoreArrayRead(Z, &z));
+  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDestroy(v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces have rounding, and inertia that varies with the position looks like stiffness to a matrix of the start. Where a doubt has been
+   raised, both are measured at the state of the stage, inertia once for each matrix. */
+PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
+{
+  Verification &v = Get(ts).verify;
+  Mat           P;
+
+  PetscFunctionBegin;
+  PetscCall(MeasureRounding(ts, X, F, v.noise));
+  if (v.measured) PetscFunctionReturn(PETSC_SUCCESS);
+  v.measured = PETSC_TRUE;
+  PetscCall(MeasureInertia(ts));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(MakeClaims(ts, P, false));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ViewClaims(TS ts, PetscViewer viewer)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (Claims(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
+                                                  HasDefinitions(I) ? ", and definitions may hide more" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
