@@ -88,9 +88,9 @@ if(GTest_FOUND)
   set_tests_properties(fuzz.readers PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS fuzz)
 endif()
 
-# A slice of the random models of "make soak", small ones of another seed, without stiff elements that switch, without resumed runs, and not held to the laws of Newton and Euler (NewtonEuler.* does that)
+# A slice of the random models of "make soak", small ones of another seed, without stiff elements that switch, and without resumed runs
 if(TARGET models)
-  add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -switches 0 -again 0 -laws 0 -output none)
+  add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -switches 0 -again 0 -output none)
   set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS soak)
 endif()
 

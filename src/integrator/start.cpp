@@ -74,7 +74,7 @@ PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
   PetscCall(TimeScale(ts, &T));
   I.mode = Mode::Start;
   I.t1   = t;
-  I.h    = 1e-12 * T; /* (beta h^2 K + gamma h C)/M is rounding for anything a double can integrate */
+  I.h    = 1e-28 * T; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
   PetscCall(VecCopy(U, I.U1));
   PetscCall(VecCopy(V, I.V1));
   PetscCall(VecZeroEntries(I.A1));

@@ -184,34 +184,60 @@ std::vector<BodyBalance> NewtonEuler::bodies(const std::vector<double> &values) 
   return all;
 }
 
-/* Against the loads on the body itself; where those are nothing but rounding, against a billionth of the largest on any
-   body, and moments against a billionth of the forces at the radius of gyration */
-Imbalance NewtonEuler::judge(const std::vector<double> &values, double slack) const
+/* The largest of amounts of force and moment against the loads on the body itself; where those are nothing but rounding,
+   against a billionth of the largest on any body, and moments against a billionth of the forces at the radius of
+   gyration */
+template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBalance> &all, const Amounts &amounts) const
 {
-  Imbalance                      worst;
-  const std::vector<BodyBalance> all   = bodies(values);
-  double                         force = 0, moment = 0;
+  Imbalance worst;
+  double    force = 0, moment = 0;
   for (const BodyBalance &k : all) {
     force  = std::max(force, k.forces);
     moment = std::max(moment, k.moments);
   }
-  const auto hold = [&](double left, double sum, double least, const char *what, PetscInt body) {
-    const double part = left == 0 ? 0 : left / std::max(sum, 1e-9 * least);
+  const auto hold = [&](double missing, double sum, double least, const char *what, PetscInt body) {
+    const double part = missing <= 0 ? 0 : missing / std::max(sum, 1e-9 * least);
     if (part <= worst.largest) return;
     worst.largest = part;
     worst.where   = std::string(what) + " on " + scene_.data().bodyName(body);
   };
   for (const BodyBalance &k : all) {
-    hold(std::max(0., k.force.norm() - k.mass * slack), k.forces, force, "force", k.body);
-    const double gyration = k.mass > 0 ? std::sqrt(k.inertia / k.mass) : 0;
-    hold(std::max(0., k.moment.norm() - k.inertia * slack), std::max(k.moments, 1e-9 * gyration * k.forces), moment,
-         "moment", k.body);
+    const double                    gyration = k.mass > 0 ? std::sqrt(k.inertia / k.mass) : 0;
+    const std::pair<double, double> missing  = amounts(k);
+    hold(missing.first, k.forces, force, "force", k.body);
+    hold(missing.second, std::max(k.moments, 1e-9 * gyration * k.forces), moment, "moment", k.body);
   }
+  return worst;
+}
+
+BodyResidual NewtonEuler::residualOf(PetscInt body, const std::vector<BodyResidual> &left) const
+{
+  const OfBody &of = body_[(std::size_t)body];
+  if (left.empty() || !of.judged) return {};
+  BodyResidual r = left[(std::size_t)body];
+  if (!of.moments) r.moment.setZero();
+  return r;
+}
+
+Imbalance NewtonEuler::judge(const std::vector<double> &values, const std::vector<BodyResidual> &left) const
+{
+  Imbalance worst = largest(bodies(values), [&](const BodyBalance &k) {
+    const BodyResidual r = residualOf(k.body, left);
+    return std::make_pair((k.force + r.force).norm(), (k.moment + r.moment).norm());
+  });
   if (kinetic_ >= 0) {
     const double own = kinetic(values), reported = values[(std::size_t)kinetic_], off = std::abs(own - reported);
     if (off > worst.largest * own) worst = {own > 0 ? off / own : 1, "kinetic energy of the scene"};
   }
   return worst;
+}
+
+Imbalance NewtonEuler::unsolved(const std::vector<double> &values, const std::vector<BodyResidual> &left) const
+{
+  return largest(bodies(values), [&](const BodyBalance &k) {
+    const BodyResidual r = residualOf(k.body, left);
+    return std::make_pair(r.force.norm() - r.force_allowed, r.moment.norm() - r.moment_allowed);
+  });
 }
 
 Powers NewtonEuler::powers(const std::vector<double> &values) const

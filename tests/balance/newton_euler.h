@@ -32,6 +32,13 @@ struct BodyBalance {
   double   forces = 0, moments = 0, mass = 0, inertia = 0;
 };
 
+/* What an integrator has left of the equations of motion of a body, m r'' - f and J w' + w x J w - m, by the residual that
+   it has solved, and how much it may leave */
+struct BodyResidual {
+  Vector3 force = Vector3::Zero(), moment = Vector3::Zero();
+  double  force_allowed = 0, moment_allowed = 0;
+};
+
 struct Imbalance {
   double      largest = 0; /* of |what is left| over the sum of absolute values, of forces and moments of all bodies */
   std::string where;       /* "moment on arm" */
@@ -51,8 +58,10 @@ public:
   NewtonEuler(hhtdae::Scene &scene, const Specs &specs);
 
   std::vector<BodyBalance> bodies(const std::vector<double> &values) const;
-  /* slack: what accelerations and angular accelerations may be off by; it is not held against a body */
-  Imbalance judge(const std::vector<double> &values, double slack = 0) const;
+  /* what is missing beyond the residuals `left`; none: nothing is left */
+  Imbalance judge(const std::vector<double> &values, const std::vector<BodyResidual> &left = {}) const;
+  /* by what the residuals exceed what they may be */
+  Imbalance unsolved(const std::vector<double> &values, const std::vector<BodyResidual> &left) const;
   Powers    powers(const std::vector<double> &values) const;
   std::vector<double>
   magnitudes(const std::vector<double> &values) const; /* of the loads of each element: their largest force or moment */
@@ -82,6 +91,8 @@ private:
   std::vector<std::string> unknown_;
 
   template <class Make> int three(const Make &make);
+  template <class Amounts> Imbalance largest(const std::vector<BodyBalance> &all, const Amounts &amounts) const;
+  BodyResidual              residualOf(PetscInt body, const std::vector<BodyResidual> &left) const;
   void                      look(PetscInt body);
   void                      lookAt(PetscInt element);
   void                      leaveOut(PetscInt element);

@@ -18,7 +18,7 @@ struct Model {
   hhtest::Specs          specs; /* of its elements, for the balances */
   bool                   planar = false, conservative = false, switched = false;
   int                    bodies = 0;
-  double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0, hardness = 0;
+  double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
   std::vector<Observed>  observed;  /* what each channel of the scene is */
   std::map<std::string, int> types; /* elements by type, and features */
 };
@@ -182,7 +182,6 @@ private:
           m.observed.push_back(kind ? Observed::Velocity : Observed::Position);
         }
     m.switched = true;
-    m.hardness = switches.hardness;
     b.lossy    = true;
   }
 

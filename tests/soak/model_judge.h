@@ -57,8 +57,8 @@ struct Outcome {
   double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
   double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
          doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of what is allowed */
-  double balance = -1, between = -1,
-         hardness = 0; /* of every body, relative to its loads: at ends of steps, between them */
+  double balance = -1, between = -1; /* of every body, relative to its loads: at ends of steps, between them */
+  double unsolved = -1;              /* residual of a body, relative to its loads */
   int  unjudged = 0, switched = 0, repeated = 0, resumed = 0;
   char message[600] = "", types[2000] = "";
 };
@@ -128,7 +128,6 @@ private:
     o_.bodies   = model_.bodies;
     o_.planar   = model_.planar;
     o_.switched = model_.switched;
-    o_.hardness = model_.hardness;
     o_.end      = model_.end;
     o_.length   = model_.length;
     o_.mass     = model_.mass;
@@ -161,9 +160,10 @@ private:
     const Trajectory sharp = RunHHT(build(), LawSettings(patience(4)));
     o_.balance             = sharp.balance;
     o_.between             = sharp.between;
+    o_.unsolved            = sharp.unsolved;
     o_.unjudged            = sharp.unjudged;
-    if (sharp.balance > AllowedImbalance(model_.hardness))
-      fail(Wrong, "out of balance: " + sharp.out_of_balance);
+    if (sharp.balance > allowed_imbalance) fail(Wrong, "out of balance: " + sharp.out_of_balance);
+    else if (sharp.unsolved > allowed_residual) fail(Wrong, "equations of motion not solved: " + sharp.where_unsolved);
   }
   void again(const Trajectory &a)
   {

@@ -106,11 +106,11 @@ private:
                 "(eps/100: %d); %.2f of what is allowed\n"
                 "  velocity %.1e, %.1e; reaction %.1e, %.1e; %ld steps, %ld at eps/10, %ld failed corrections, %ld "
                 "changes of axes; %.2f s in all\n"
-                "  balance %.1e, between steps %.1e, %d bodies not judged; run again %d, gone on %d\n  %s",
+                "  balance %.1e, between steps %.1e, residual %.1e, %d bodies not judged; run again %d, gone on %d\n  %s",
                 o.number, verdict_name[o.verdict], by_name[o.by], o.legs, o.reference_steps, o.bodies, o.end, o.length,
                 o.mass, o.error, o.finer, o.finest, o.doubt, o.window, samples, o.finest_window, o.used, o.velocity,
                 o.finer_velocity, o.reaction, o.finer_reaction, o.steps, o.finer_steps, o.fails, o.changes, o.total,
-                o.balance, o.between, o.unjudged, o.repeated, o.resumed, o.message);
+                o.balance, o.between, o.unsolved, o.unjudged, o.repeated, o.resumed, o.message);
   }
 
   std::vector<Page::Row> counts() const
@@ -120,7 +120,7 @@ private:
     int whole = 0, finest = 0, part = 0, disturbed = 0, kept = 0, switched = 0, balanced = 0, repeated = 0, resumed = 0;
     for (const Outcome &o : all_) {
       switched += o.switched;
-      balanced += o.balance >= 0 && o.balance <= AllowedImbalance(o.hardness);
+      balanced += o.balance >= 0 && o.balance <= allowed_imbalance;
       repeated += o.repeated;
       resumed += o.resumed;
       disturbed += o.verdict == Right && o.disturbed;
@@ -192,6 +192,7 @@ private:
         distribution("velocity constraints, off by", "%.1e", [](const Outcome &o) { return o.slip; }),
         distribution("imbalance of bodies", "%.1e", [](const Outcome &o) { return o.balance; }),
         distribution("the same between steps", "%.1e", [](const Outcome &o) { return o.between; }),
+        distribution("equations of motion not solved", "%.1e", [](const Outcome &o) { return o.unsolved; }),
         distribution("drift of the reference's energy", "%.1e", [](const Outcome &o) { return o.energy; }),
         distribution("part of the span judged, defaults", "%.2f",
                      [&](const Outcome &o) { return judged(o, (double)o.window / samples); }),
@@ -211,7 +212,7 @@ private:
          "factorizations,corrector_fails,changes,cpu,total,error,finer,finest,"
          "velocity,finer_velocity,reaction,finer_reaction,doubt,misfit,slip,energy,finest_window,disturbed,window,used,"
          "legs,"
-         "reference_steps,switched,balance,between,unjudged,repeated,resumed,message,types\n";
+         "reference_steps,switched,balance,between,unsolved,unjudged,repeated,resumed,message,types\n";
     for (const Outcome &o : all_) {
       std::string message = o.message;
       std::replace(message.begin(), message.end(), '"', '\'');
@@ -223,7 +224,7 @@ private:
         << ',' << o.velocity << ',' << o.finer_velocity << ',' << o.reaction << ',' << o.finer_reaction << ','
         << o.doubt << ',' << o.misfit << ',' << o.slip << ',' << o.energy << ',' << o.finest_window << ','
         << o.disturbed << ',' << o.window << ',' << o.used << ',' << o.legs << ',' << o.reference_steps << ','
-        << o.switched << ',' << o.balance << ',' << o.between << ',' << o.unjudged << ',' << o.repeated << ','
+        << o.switched << ',' << o.balance << ',' << o.between << ',' << o.unsolved << ',' << o.unjudged << ',' << o.repeated << ','
         << o.resumed << ",\"" << message << "\"," << o.types << '\n';
     }
     f.close();

@@ -5,6 +5,7 @@
 #include "balance/newton_euler.h"
 #include "bench/page.h"
 #include "model.h"
+#include "model_residual.h"
 #include <ctime>
 
 namespace soak
@@ -21,8 +22,9 @@ struct Trajectory {
   double                           misfit = 0, slip = -1; /* at ends of steps, see Misfit() */
   long                             steps = 0;
   double      balance = -1, between = -1; /* largest imbalance of a body at ends of steps, at samples between them */
+  double      unsolved = -1;              /* largest residual of a body at ends of steps, beyond what it may be */
   int         unjudged = 0;               /* bodies */
-  std::string out_of_balance;             /* where and when balance was found */
+  std::string out_of_balance, where_unsolved; /* where and when these were found */
   bool        arrived() const { return failure.empty() && (int)x.size() == samples; }
 };
 
@@ -65,7 +67,7 @@ struct Settings {
   double            seconds   = 1e9;
   double            corrector = 0;     /* 0: as it comes */
   bool              laws      = false; /* judge the balance of every body */
-  double            slack     = 0;     /* of accelerations, times the step squared */
+  double            slack     = 0;     /* what the corrector may leave of a position, model_residual.h */
   std::string       save, resume;      /* checkpoint to write, to go on from */
   long              save_at = 0;       /* step */
   const Trajectory *until   = nullptr; /* of a run that goes on: the samples before */
@@ -80,13 +82,23 @@ struct Watcher {
   Trajectory          &result;
 };
 
-inline void JudgeLaws(Watcher &w, const std::vector<double> &values, double t, bool end, double slack)
+/* The largest so far, and of its place a note */
+inline void Keep(const hhtest::Imbalance &now, double t, double *most, std::string *note)
 {
-  const hhtest::Imbalance now  = w.laws->judge(values, slack);
-  double                 &most = end ? w.result.balance : w.result.between;
-  if (end && now.largest > most)
-    w.result.out_of_balance = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
-  if (!(now.largest <= most)) most = now.largest;
+  if (now.largest > *most && note) *note = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
+  if (!(now.largest <= *most)) *most = now.largest;
+}
+
+inline PetscErrorCode JudgeLaws(Watcher &w, TS ts, double t)
+{
+  std::vector<double> values;
+  BodyResiduals       left(w.scene, w.settings.slack);
+  PetscFunctionBegin;
+  PetscCall(w.scene.sample(ts, t, values));
+  PetscCall(left.make(ts, t));
+  Keep(w.laws->judge(values, left.get()), t, &w.result.balance, &w.result.out_of_balance);
+  Keep(w.laws->unsolved(values, left.get()), t, &w.result.unsolved, &w.result.where_unsolved);
+  PetscFunctionReturn(0);
 }
 
 /* How far the state is off the constraints: of positions, in lengths and sines; of velocities, as they are, and times
@@ -137,17 +149,12 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx
   while ((int)w.result.x.size() < samples && SampleTime(w.end, (int)w.result.x.size() + 1) <= t * (1 + 1e-12)) {
     const double at = std::fmin(t, SampleTime(w.end, (int)w.result.x.size() + 1));
     PetscCall(w.scene.sample(ts, at, values));
-    if (w.laws && at < t) JudgeLaws(w, values, at, false, 0);
+    if (w.laws && at < t) Keep(w.laws->judge(values), at, &w.result.between, nullptr);
     values.resize(w.observed);
     w.result.x.push_back(values);
     w.result.steps_at.push_back((long)step);
   }
-  if (w.laws && (w.result.x.size() > before || step < 20)) {
-    PetscCall(w.scene.sample(ts, t, values));
-    PetscReal last;
-    PetscCall(TSGetPrevTime(ts, &last));
-    JudgeLaws(w, values, t, true, w.settings.slack / ((t - last) * (t - last)));
-  }
+  if (w.laws && (w.result.x.size() > before || step < 20)) PetscCall(JudgeLaws(w, ts, t));
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
   if (step % 16 == 0 && CpuSeconds() > w.deadline) {
     w.result.failure = hhtbench::Text("took longer than the limit, at t = %g of %g", t, w.end);

@@ -35,7 +35,6 @@ class Switches
 public:
   Switches(Builder &builder, double end) : b(builder), r(builder.random), end_(end) {}
   std::vector<Marker> seen; /* of the bodies that are let go or held */
-  double hardness = 0;      /* largest stiffness or damping, in parts of what the mass has at the model's scales */
 
   void any()
   {
@@ -77,9 +76,7 @@ private:
   double rate() const { return 1 / b.period; }
   double stiffness(double most = 1e12)
   {
-    const double k = r.logarithmic(1e2, most);
-    hardness       = std::max(hardness, k);
-    return k;
+    return r.logarithmic(1e2, most);
   }
 
   /* where things stand: a rigid body that is there, or the ground */

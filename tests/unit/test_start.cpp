@@ -100,6 +100,31 @@ struct Redundant : Pendulum {
   bool reference(double, double *, double *, double *) const override { return false; }
 };
 
+/* A mass of 1 kg in a damper that moves at its speed, m q'' + c (q' - v) = m: q'' = 1 however strong the damper */
+struct Dragged : Problem {
+  const double c;
+  explicit Dragged(double damping) : c(damping)
+  {
+    name = "dragged";
+    n    = 1;
+    t1   = 1.;
+    role = {TSHHT3_COORDINATE};
+  }
+  void initial(double *u, double *v) const override
+  {
+    u[0] = 0.;
+    v[0] = 1.;
+  }
+  void residual(double t, const double *, const double *v, const double *a, double *f) const override
+  {
+    f[0] = a[0] - 1. + c * (v[0] - (1. + t));
+  }
+  void jacobian(double, const double *, const double *, const double *, double sv, double sa, Entries &J) const override
+  {
+    J.add(0, 0, sa + c * sv);
+  }
+};
+
 /* Two coordinates that share one mass */
 struct SharedMass : Problem {
   SharedMass()
@@ -169,6 +194,15 @@ TEST(Start, MotionThatBeginsAtTheStart)
 }
 
 /* Every problem whose reference knows accelerations, multipliers, variables and force states at t_0 */
+/* The matrix of the start holds inertia alone */
+TEST(Start, StrongDampingIsNoInertia)
+{
+  for (double damping : {1e4, 1e9, 1e12, 1e15}) {
+    const StartValues s = startValues(Dragged(damping), "-ts_dt 1e-3");
+    EXPECT_NEAR(s.a[0], 1., 1e-12) << damping;
+  }
+}
+
 TEST(Start, AllReferences)
 {
   for (const Factory &f : allProblems()) {

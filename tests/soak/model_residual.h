@@ -1,0 +1,135 @@
+/*
+  What the end of a step leaves of the equations of motion of a body, as the scene's residual says, and how much of it a
+  corrector that has converged may leave.
+
+  It may leave an error dq in every position, and with it dq gamma/(beta h) in velocities and dq/(beta h^2) in
+  accelerations. In the equations of a body these make at most the sum of |J_ij| dq_j over all coordinates j, with
+  J = F_u + sigma_v F_v + sigma_a F_a: inertia times the error of an acceleration, and stiffness and damping times those of
+  positions and velocities, far more than that where h omega is large. Force states and variables are off by what
+  their definitions make of dq.
+*/
+#ifndef HHTDAE_SOAK_MODEL_RESIDUAL_H
+#define HHTDAE_SOAK_MODEL_RESIDUAL_H
+
+#include "balance/newton_euler.h"
+#include "hhtdae/hhtdae.h"
+#include "scene/runtime.h"
+
+namespace soak
+{
+
+class BodyResiduals
+{
+public:
+  BodyResiduals(Scene &scene, double dq) : R_(*scene.data().run), dq_(dq) {}
+
+  /* at the end of a step */
+  PetscErrorCode make(TS ts, PetscReal t)
+  {
+    Vec       U, V, A, F;
+    Mat       J;
+    PetscReal before;
+
+    PetscFunctionBegin;
+    PetscCall(TSGetPrevTime(ts, &before));
+    PetscCall(TS2GetSolution(ts, &U, &V));
+    PetscCall(TSHHT3GetAcceleration(ts, &A));
+    const double h = t - before;
+    PetscCall(VecDuplicate(U, &F));
+    PetscCall(MatDuplicate(R_.J, MAT_DO_NOT_COPY_VALUES, &J));
+    PetscCall(hhtdae::Residual(R_, t, U, V, A, F));
+    PetscCall(hhtdae::Jacobian(R_, t, U, V, A, gamma / (beta * h), 1 / (beta * h * h), J));
+    PetscCall(errors(ts, U, J));
+    PetscCall(loads(F, J));
+    PetscCall(VecDestroy(&F));
+    PetscCall(MatDestroy(&J));
+    PetscFunctionReturn(0);
+  }
+  const std::vector<hhtest::BodyResidual> &get() const { return of_; }
+
+private:
+  static constexpr double           beta = 0.4225, gamma = 0.8; /* of the default alpha, -0.3 */
+  hhtdae::Runtime                  &R_;
+  double                            dq_;
+  std::vector<double>               error_; /* of each unknown */
+  std::vector<hhtest::BodyResidual> of_;
+
+  /* sum of |J_ij| error_j */
+  PetscErrorCode row(Mat J, PetscInt i, double *sum, double *diagonal)
+  {
+    PetscInt           n;
+    const PetscInt    *column;
+    const PetscScalar *value;
+
+    PetscFunctionBegin;
+    PetscCall(MatGetRow(J, i, &n, &column, &value));
+    for (PetscInt k = 0; k < n; k++) {
+      *sum += std::abs(value[k]) * error_[(std::size_t)column[k]];
+      if (column[k] == i) *diagonal = std::abs(value[k]);
+    }
+    PetscCall(MatRestoreRow(J, i, &n, &column, &value));
+    PetscFunctionReturn(0);
+  }
+  /* definitions after the unknowns that they are made of */
+  PetscErrorCode errors(TS ts, Vec U, Mat J)
+  {
+    const PetscScalar *u;
+    IS                 is;
+    PetscInt           n;
+    const PetscInt    *at;
+
+    PetscFunctionBegin;
+    error_.assign((std::size_t)R_.n, 0);
+    PetscCall(VecGetArrayRead(U, &u));
+    for (TSHHT3Role role : {TSHHT3_COORDINATE, TSHHT3_STATE, TSHHT3_VARIABLE, TSHHT3_FORCE}) {
+      const bool          defined = role == TSHHT3_VARIABLE || role == TSHHT3_FORCE;
+      std::vector<double> own;
+      PetscCall(TSHHT3GetIS(ts, role, &is));
+      PetscCall(ISGetLocalSize(is, &n));
+      PetscCall(ISGetIndices(is, &at));
+      for (PetscInt k = 0; k < n; k++) {
+        double sum = 0, diagonal = 1;
+        if (defined)
+          PetscCall(row(J, at[k], &sum, &diagonal));
+        else
+          sum = dq_ * std::sqrt((double)n) * std::max(1., std::abs(u[at[k]]));
+        own.push_back(sum / diagonal);
+      }
+      for (PetscInt k = 0; k < n; k++) error_[(std::size_t)at[k]] = own[(std::size_t)k];
+      PetscCall(ISRestoreIndices(is, &at));
+    }
+    PetscCall(VecRestoreArrayRead(U, &u));
+    PetscFunctionReturn(0);
+  }
+  /* of the rows of each body */
+  PetscErrorCode loads(Vec F, Mat J)
+  {
+    const PetscScalar *f;
+
+    PetscFunctionBegin;
+    of_.assign(R_.scene.bodies.size(), {});
+    PetscCall(VecGetArrayRead(F, &f));
+    for (std::size_t b = 0; b < of_.size(); b++) {
+      const PetscInt           local  = R_.local_body[b];
+      const hhtdae::LocalBody &body   = R_.bodies.body[(std::size_t)local];
+      Vector3                  left[] = {Vector3::Zero(), Vector3::Zero()}, most[] = {Vector3::Zero(), Vector3::Zero()};
+      for (int g = 0; g < hhtdae::Groups(body.kind); g++)
+        for (int c = 0; c < hhtdae::GroupSize(body.kind, g); c++) {
+          const PetscInt i = R_.number.body[b] + hhtdae::GroupOffset(body.kind, g) + c;
+          const int      to = body.kind == hhtdae::BodyKind::Planar && g == 1 ? 2 : c;
+          double         diagonal;
+          left[g](to) = f[i];
+          PetscCall(row(J, i, &most[g](to), &diagonal));
+        }
+      hhtdae::Matrix3 G = hhtdae::Matrix3::Identity(); /* the rows of the Euler angles are G^T times the moment */
+      if (hhtdae::HasEulerAngles(body.kind)) G = R_.bodies.now[(std::size_t)local].euler.G().inverse().transpose().eval();
+      of_[b] = {left[0], G * left[1], most[0].norm(), G.norm() * most[1].norm()};
+    }
+    PetscCall(VecRestoreArrayRead(F, &f));
+    PetscFunctionReturn(0);
+  }
+};
+
+} // namespace soak
+
+#endif
