@@ -113,7 +113,7 @@ static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 
 
 /* noise = |F(X + dX) - F| for the residual F at X and dX of random signs: rounding of the unknowns, and, as changes of these, of the largest
    terms that make up positions and states */
-static PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
   Integrator        &I = Get(ts);
   const PetscReal    position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);

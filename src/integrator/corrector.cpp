@@ -11,6 +11,9 @@
   the last step instead, down to a hundredth of the tolerance under error control and without limit (and fifty times more
   strictly) at fixed steps.
 
+  A correction that no longer falls is accepted where rounding makes one of its size, which is measured then and there (rounding.cpp) and
+  holds for this correction alone: in a position where Phi_q nearly loses rank it is far above that of later steps, whose errors would grow with it.
+
   With constraints and little damping c is smaller, ConstrainedTolerance(): what is left of a correction in q excites the
   multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
   (h fell to 1e-6). A c that the user has set stands.
@@ -100,74 +103,34 @@ PetscErrorCode RelativeNorm(Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corrections that no longer fall may be rounding, at a level that only the problem knows (q'' of a short step as it enters
-   forces and states): with a matrix just made, if they have fallen a thousandfold, or tenfold and to a hundredth of the
-   tolerance, or never exceeded that. */
-bool LooksLikeRounding(const Corrector &c)
-{
-  if (c.rate < 0.5 || (!c.fresh && !c.user_lag)) return false; /* still converging, or a new matrix may */
-  return (c.e <= 1e-3 * c.e_max && c.e <= 0.1) || (c.e <= 0.01 && (c.e <= 0.1 * c.e_max || c.e_max <= 0.01));
-}
-
-PetscErrorCode AcceptRounding(TS ts)
+/* A correction that no longer falls is as good as it gets where rounding makes one of its size */
+PetscErrorCode AcceptRounding(TS ts, Vec X, PetscBool *accepted)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
+  PetscReal   noise;
 
   PetscFunctionBegin;
+  PetscCall(RoundingOfCorrection(ts, X, &noise));
+  *accepted = (PetscBool)(c.e <= noise);
+  if (!*accepted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
-  c.reason  = SNES_CONVERGED_SNORM_RELATIVE;
-  c.xi_max  = 0; /* a new matrix would not help */
-  c.learned = 2 * c.e;
-  c.h_floor = I.h;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  A stiff direction that the iteration does not follow looks the same. (Taken for rounding at first sight, it filled the motion
-  on a bushing of 1e14 N/m with energy that no error test saw.) But rounding stays where the iteration would converge: at a
-  smaller h, or, where h is not ours to cut, with a matrix made at the iterate itself.
-*/
-PetscErrorCode SuspectRounding(TS ts, PetscBool *settled)
-{
-  Integrator &I     = Get(ts);
-  Corrector  &c     = I.corrector;
-  const bool  stays = c.suspect > 0 && c.suspect_h > 0 && I.h < 0.9 * c.suspect_h && c.e > 0.3 * c.suspect;
-
-  PetscFunctionBegin;
-  *settled = PETSC_TRUE;
-  if (stays || (I.fixed_h && (c.user_lag || c.it >= c.max_it))) {
-    PetscCall(AcceptRounding(ts));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  c.suspect   = c.e;
-  c.suspect_h = I.h;
-  *settled    = I.fixed_h;
-  if (I.fixed_h) PetscCall(FreshMatrixNextIteration(ts));
+  c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  c.rate   = -1; /* that of noise says nothing of the matrix */
+  c.xi_max = 0; /* a new matrix would not help */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode Diverge(TS ts, const char *why)
 {
-  Integrator &I       = Get(ts);
-  Corrector  &c       = I.corrector;
-  PetscBool   settled = PETSC_FALSE;
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
 
   PetscFunctionBegin;
-  if (I.mode == Mode::Step && LooksLikeRounding(c)) PetscCall(SuspectRounding(ts, &settled));
-  if (settled) PetscFunctionReturn(PETSC_SUCCESS);
   c.reason = SNES_DIVERGED_DTOL;
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
                           why, (double)I.t1, (double)I.h, c.it, (double)c.e));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Rounding of q, or what an earlier step of about this length has learned; rounding may grow with 1/h */
-PetscReal Floor(const Integrator &I)
-{
-  const Corrector &c = I.corrector;
-  const bool       knows = I.mode == Mode::Step && c.learned > 0 && I.h > 0.7 * c.h_floor && I.h < 1.5 * c.h_floor;
-  return knows ? PetscMax(c.floor, c.learned) : c.floor;
 }
 
 /* What may be left of a correction, in units of the tolerance */
@@ -180,7 +143,7 @@ PetscReal Tolerance(const Integrator &I)
 }
 
 /* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
-PetscErrorCode Judge(TS ts, PetscReal e)
+PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
 {
   Integrator     &I     = Get(ts);
   Corrector      &c     = I.corrector;
@@ -189,23 +152,14 @@ PetscErrorCode Judge(TS ts, PetscReal e)
   const PetscInt  left  = c.max_it - c.it;
 
   PetscFunctionBegin;
-  c.e     = e;
-  c.e_max = PetscMax(c.e_max, e);
+  c.e = e;
   if (PetscIsInfOrNanReal(e)) {
-    c.e_max = PETSC_INFINITY;
     PetscCall(Diverge(ts, "produced a correction that is not a number"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (e <= Floor(I)) {
+  if (e <= c.floor) {
     c.reason = SNES_CONVERGED_SNORM_RELATIVE;
     PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (I.fixed_h && c.suspect > 0 && c.base == c.it - 1) { /* the matrix of a suspicion */
-    if (e > 0.1 * c.suspect && e < 10 * c.suspect) {
-      PetscCall(AcceptRounding(ts));
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    c.suspect = 0;
   }
   if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
     const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
@@ -222,11 +176,12 @@ PetscErrorCode Judge(TS ts, PetscReal e)
     if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
     else if (left <= 0 || xi > 2) PetscCall(Diverge(ts, "finds no consistent accelerations"));
     else PetscCall(FreshMatrixNextIteration(ts));
-  } else if (xi >= 1) {
-    PetscCall(Diverge(ts, "diverges"));
-  } else if (left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
+  } else if (xi >= 1 || left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
+    PetscBool rounding = PETSC_FALSE;
+    if (I.mode == Mode::Step) PetscCall(AcceptRounding(ts, X, &rounding));
+    if (rounding) PetscFunctionReturn(PETSC_SUCCESS);
     if (c.renewals < max_renewals && left > 2 && xi < 0.8) PetscCall(FreshMatrixNextIteration(ts));
-    else PetscCall(Diverge(ts, "converges too slowly"));
+    else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -238,8 +193,7 @@ PetscErrorCode Measure(TS ts, PetscReal e)
   const PetscReal xi = c.e > 0 ? e / c.e : 0;
 
   PetscFunctionBegin;
-  c.e     = e;
-  c.e_max = PetscMax(c.e_max, e);
+  c.e = e;
   if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
   c.rate   = xi;
   c.xi_max = PetscMax(c.xi_max, xi);
@@ -269,7 +223,6 @@ PetscErrorCode GoOnUnproved(TS ts)
 
   PetscFunctionBegin;
   c.reason  = SNES_CONVERGED_ITERATING;
-  c.learned = 0;
   if (c.wrong_jacobian || c.it >= c.max_it) PetscCall(FailUnproved(ts));
   else if (c.it - c.base >= 2) {
     if (c.fresh || c.user_lag) PetscCall(FailUnproved(ts));
@@ -289,7 +242,7 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   I.stat.newton++;
   I.stat.solves++;
   if (I.corrector.user_test) PetscCall(Measure(ts, e));
-  else PetscCall(Judge(ts, e));
+  else PetscCall(Judge(ts, e, X));
   if (I.corrector.reason > 0) {
     PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
     if (!proved) PetscCall(GoOnUnproved(ts));
@@ -481,8 +434,7 @@ static void BeginIteration(Integrator &I)
 {
   Corrector &c = I.corrector;
   c.it = c.base = c.renewals = 0;
-  c.e = c.e_max = c.xi_max = 0;
-  if (I.fixed_h) c.suspect = 0;
+  c.e = c.xi_max = 0;
   c.reason = SNES_CONVERGED_ITERATING;
   c.fresh  = PETSC_FALSE;
   c.wrong_jacobian = PETSC_FALSE;
@@ -581,7 +533,6 @@ PetscErrorCode IterateStart(TS ts, PetscBool *ok)
 static void LearnReuse(Corrector &c, bool converged, bool retried)
 {
   const bool reused = converged && !c.fresh;
-  if (converged) c.suspect_h = 0;
   if (retried) c.renew_steps = c.renew_left = PetscClipInterval(2 * c.renew_steps, 1, max_renew_steps);
   else if (reused) c.renew_steps = c.renew_left = 0;
   else if (c.renew_left > 0) c.renew_left--;

@@ -48,15 +48,12 @@ struct CorrectorState {
   PetscInt  renew_left  = 0;           /* of these, still to come */
   PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
-  PetscReal suspect = 0, suspect_h = 0; /* a correction that may have been rounding, and its h; 0 after a success */
-  PetscReal learned = 0, h_floor = 0;  /* level at which corrections of steps of about h_floor were seen to be rounding */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
   PetscInt            it     = 0; /* of the present correction */
   PetscInt            base   = 0; /* iteration after which the present matrix came into use */
   PetscInt            renewals = 0; /* matrices made in the course of it */
   PetscReal           e      = 0; /* last correction, in units of the tolerance */
-  PetscReal           e_max  = 0; /* largest correction so far */
   PetscReal           xi_max = 0; /* worst rate of this correction */
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
@@ -306,8 +303,11 @@ PetscErrorCode HooksJacobian(TS ts);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
+/* rounding.cpp */
+PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
 /* claims.cpp */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
+PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 /* verify.cpp */
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);

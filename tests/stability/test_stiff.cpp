@@ -164,6 +164,55 @@ TEST(Stiff, FourBarThroughItsSingularPosition)
   }
 }
 
+/* There rounding of Phi is magnified by 1/cos of the uprights' angle. Taken for the level of rounding ever after, it made the error grow as
+   h fell: 5e-5 for N = 2 at the second h, 4e-4 at the last. */
+TEST(Stiff, FourBarsAtFixedSteps)
+{
+  for (int windows : {2, 10}) {
+    double before = 0.;
+    for (double h : {3.90625e-4, 1.953125e-4, 9.765625e-5}) {
+      const FourBar p(windows, 10.);
+      Simulation    run(p, tolerance(1e-6) + text("-ts_adapt_type none -ts_dt %.17g", h));
+      must(run.solve());
+      const double           e = run.errors().q;
+      const TSHHT3Statistics s = run.statistics();
+      MEASURED("fourbar N = %d, h = %g: error q %.2e; %d steps, %d iterations", windows, h, e, (int)s.steps, (int)s.newton);
+      EXPECT_LT(e, before > 0. ? before / 3. : 2e-5);
+      EXPECT_EQ(s.corrector_fails, 0);
+      before = e;
+    }
+  }
+}
+
+/* Tolerances near and below what rounding leaves of a correction in the singular position */
+TEST(Stiff, FourBarsAtToleranceNearRounding)
+{
+  for (int windows : {1, 10}) {
+    const FourBar p(windows, 10.);
+    for (double eps : {3e-10, 1e-10}) {
+      Simulation run(p, tolerance(eps));
+      must(run.solve());
+      MEASURED("fourbar N = %d, tolerance %g: error q %.2e; %d steps", windows, eps, run.errors().q, (int)run.statistics().steps);
+      EXPECT_LT(run.errors().q, 1e-4);
+    }
+    for (double eps : {1e-11, 1e-14}) { /* 38 million iterations before an error, at 1e-11 */
+      Simulation run(p, tolerance(eps) + "-ts_adapt_type none -ts_dt 2.5e-4");
+      must(run.solve());
+      const TSHHT3Statistics s = run.statistics();
+      MEASURED("fourbar N = %d, fixed steps, tolerance %g: error q %.2e; %.2f iterations and %.2f residuals a step", windows, eps,
+               run.errors().q, double(s.newton) / s.steps, double(s.residuals) / s.steps);
+      EXPECT_EQ(s.steps, 40000);
+      EXPECT_LT(s.residuals, 5 * s.steps);
+      EXPECT_LT(run.errors().q, 1e-5);
+    }
+    Simulation run(p, tolerance(1e-13) + "-ts_error_if_step_fails 0 -ts_max_steps 10000000"); /* no step can pass: a word, and soon */
+    must(run.solve());
+    MEASURED("fourbar N = %d, tolerance 1e-13: %s at t = %g after %d iterations", windows, TSConvergedReasons[run.reason()], run.t(), (int)run.statistics().newton);
+    EXPECT_TRUE(run.reason() < 0 || run.errors().q < 1e-4);
+    EXPECT_LT(run.statistics().newton, 3000000);
+  }
+}
+
 /* A long chain lets go and falls: nothing but energy to judge by */
 TEST(Stiff, ChainKeepsItsEnergy)
 {

@@ -1,0 +1,81 @@
+/*
+  The size of a correction that is nothing but rounding. Only the residual knows how its terms cancel, and only the matrix how much of
+  that arrives in the unknowns: where Phi_q nearly loses rank, that is far more than rounding of q, and a step later it is not.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr int samples = 3; /* one alone may miss the direction in which the matrix is nearly singular */
+
+/* In [-1, 1] */
+PetscReal Random(PetscInt i, int sample)
+{
+  unsigned x = (unsigned)i * 2654435761u + (unsigned)(sample + 1) * 2246822519u;
+  x          = (x ^ (x >> 15)) * 2246822519u;
+  x          = (x ^ (x >> 13)) * 3266489917u;
+  return (x >> 8) / (PetscReal)(1 << 23) - 1;
+}
+
+/* r = noise with random factors, row by row: rounding of one row knows nothing of that of another. (A residual of unknowns that have been
+   moved a little is taken back to them by the matrix, however near to singular it is.) */
+PetscErrorCode Scatter(Vec noise, int sample, Vec r)
+{
+  PetscScalar *x;
+  PetscInt     n, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(noise, r));
+  PetscCall(VecGetLocalSize(r, &n));
+  PetscCall(VecGetOwnershipRange(r, &first, NULL));
+  PetscCall(VecGetArray(r, &x));
+  for (PetscInt i = 0; i < n; i++) x[i] *= Random(first + i, sample);
+  PetscCall(VecRestoreArray(r, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the correction that the matrix at hand makes of a residual r; 0 if it has none */
+PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
+{
+  KSP                ksp;
+  KSPConvergedReason reason;
+
+  PetscFunctionBegin;
+  *e = 0;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPSolve(ksp, r, dX));
+  Get(ts).stat.solves++;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (reason >= 0) PetscCall(CorrectionNorm(ts, dX, e));
+  if (PetscIsInfOrNanReal(*e)) *e = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* e of rounding at the iterate X, in units of the tolerance */
+PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
+{
+  Vec F, noise, r;
+
+  PetscFunctionBegin;
+  *e = 0;
+  if (!Get(ts).corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  for (Vec *v : {&F, &noise, &r}) PetscCall(VecDuplicate(X, v));
+  PetscCall(SNESComputeFunction(ts->snes, X, F));
+  PetscCall(MeasureRounding(ts, X, F, noise));
+  for (int sample = 0; sample < samples; sample++) {
+    PetscReal size;
+    PetscCall(Scatter(noise, sample, r));
+    PetscCall(SizeOfAnswer(ts, r, F, &size));
+    *e = PetscMax(*e, size);
+  }
+  for (Vec *v : {&F, &noise, &r}) PetscCall(VecDestroy(v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
