@@ -165,7 +165,7 @@ void TransferStructs(TS ts, Archive &a)
   a.plain(static_cast<PredictorState &>(I.predictor));
   a.plain(static_cast<ChangeState &>(I.change));
   a.plain(static_cast<VerificationState &>(I.verify));
-  if (I.predictor.available < 0 || I.predictor.available > max_degree) a.good = false;
+  if (I.predictor.available < 0 || I.predictor.available > max_degree || I.predictor.degree < 0 || I.predictor.degree > I.predictor.available) a.good = false;
 }
 
 PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
@@ -212,6 +212,14 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
   for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the vectors are there that the numbers speak of */
+bool HasItsVectors(const Integrator &I)
+{
+  const Verification &v = I.verify;
+  return (I.mode == Mode::Step || I.mode == Mode::Start) && (!I.have_misfit || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
+         (v.largest == 0 || (v.inertia && v.claim && v.noise));
 }
 
 /* The residual by which a problem is told: at the last state, with accelerations that leave the inertia forces in it */
@@ -341,7 +349,7 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCall(VecDuplicate(ts->vec_sol, &is));
   PetscCall(TransferVectors(ts, a));
   PetscCall(TransferVec(ts, a, &was));
-  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCall(Everywhere(ts, a.good && HasItsVectors(I), &good));
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
   PetscCall(CheckFinite(ts, file));
   I.stage_id = 0;

@@ -196,6 +196,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
 
   PetscFunctionBegin;
   a.plain(m);
+  m.package[sizeof(m.package) - 1] = 0;
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));

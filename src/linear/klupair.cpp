@@ -348,7 +348,9 @@ static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
     PetscCall(Analyse(A, old, k));
     if (!pivoted.empty()) old.val = pivoted.data();
     PetscCall(RepeatPivots(F, old, pivots, panels, &good));
+    good = good && (!state.old_pivots || k->factored());
     if (good && state.old_pivots) PetscCall(FactorWithOldPivots(rows, k, &growth));
+    good = good && (state.panels_used ? k->panels != nullptr : k->numeric || pivots == Pivots::None);
     if (good) static_cast<KluPairState &>(*k) = state;
     k->values = 0; /* of a matrix before this one */
     *same     = (PetscBool)good;

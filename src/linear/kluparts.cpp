@@ -341,14 +341,18 @@ static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
   KluParts     *p = Data(F);
   KluPartsState state;
-  PetscInt      row;
+  PetscInt      row, rows;
   PetscBool     finite;
 
   PetscFunctionBegin;
   archive->plain(state);
   archive->list(p->moved);
-  PetscCall(Analyse(F, A, p));
+  PetscCall(MatGetSize(A, &rows, NULL));
+  for (const PetscInt i : p->moved) archive->good = archive->good && i >= 0 && i < rows;
   *same = (PetscBool)archive->good;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, p->comm));
+  if (!*same) p->moved.clear();
+  PetscCall(Analyse(F, A, p));
   if (*same && p->factor)
     PetscTryMethod(p->factor, LINEAR_LOAD_STATE, (Mat, Mat, Archive *, PetscBool *), (p->factor, p->inner, archive, same));
   if (p->klu && !p->klu->numeric) *same = PETSC_FALSE;

@@ -222,6 +222,17 @@ static PetscErrorCode SaveState(Mat F, Archive *archive)
   PetscFunctionReturn(0);
 }
 
+/* 1 to n, each once */
+static bool IsPermutation(const std::vector<MUMPS_INT> &position, MUMPS_INT n)
+{
+  std::vector<bool> seen((size_t)n, false);
+  for (const MUMPS_INT p : position) {
+    if (p < 1 || p > n || seen[p - 1]) return false;
+    seen[p - 1] = true;
+  }
+  return position.size() == (size_t)n;
+}
+
 static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
   MumpsND  *m        = Data(F);
@@ -232,7 +243,7 @@ static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
   archive->plain(workspace);
   archive->plain(m->ordering);
   archive->list(m->position);
-  *same = (PetscBool)(archive->good && (ordering != 1 || m->rank || m->position.size() == (size_t)m->id.n));
+  *same = (PetscBool)(archive->good && (ordering != 1 || m->rank || IsPermutation(m->position, m->id.n)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, m->comm));
   if (!*same) PetscFunctionReturn(0);
   PetscCall(MumpsNDDropScatter(m));
