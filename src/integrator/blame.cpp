@@ -7,7 +7,8 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal hopeless    = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
+constexpr PetscReal stayed   = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
+constexpr PetscReal hopeless = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
 /* How much of the change that the matrix expects on a part `way` of dX, from where the matrix was made, the residual shows: 1 if the Jacobian
    is right there. In the rows that have not followed dX, as far as they stand out of rounding; the constraint forces are taken as the

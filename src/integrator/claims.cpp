@@ -100,7 +100,7 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscCall(MakeClaims(ts, P, start));
   PetscCall(VecZeroEntries(v.noise));
   v.measured = PETSC_FALSE;
-  if (start) v.largest = v.since = v.missing = 0;
+  if (start) v.largest = v.since = 0;
   if (Claims(I)) {
     if (!v.where) PetscCall(VecDuplicate(X, &v.where));
     PetscCall(VecCopy(X, v.where));

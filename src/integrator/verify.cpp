@@ -12,8 +12,7 @@
   missing since the last proof, a time T ago, and with them positions of A T^2/2. Before this exceeds a part of the tolerance, the
   residual is evaluated once more after the last correction. It must have followed: what is left of every entry is below
   `followed` times what it was (P dX, the linear model that the correction has solved), or rounding, which is then measured (claims.cpp),
-  or too little to move the positions: within this step, and since the last proof where an entry has stayed as it was. Nor may their sum
-  have stayed as it was, which tells forces that persist from rounding, which does not.
+  or too little to move the positions: within this step, and since the last proof where an entry has stayed as it was.
 
   Otherwise the iteration goes on; the rate that it then measures, or a new matrix, settles the matter.
 */
@@ -167,12 +166,10 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   PetscFunctionBegin;
   *proved = PETSC_TRUE;
   if (I.mode != Mode::Step || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1), k = PetscAbsReal(I.p.k) * I.h * I.h, T = v.since + I.h;
+  const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1), T = v.since + I.h;
   PetscCall(Claimed(ts, dX, &E));
-  E = PetscMax(E, k * v.missing);
   if (Drift(I, E, T) <= limit) {
-    v.missing = E / k;
-    v.since   = T;
+    v.since = T;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
@@ -182,14 +179,13 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
     PetscCall(Compare(ts, F, &left, &stay, &part));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
     const bool good = c.it - c.base >= 2 && c.rate >= 0 && c.rate < 0.5 && part < 0.5;
-    *proved         = (PetscBool)((good || Drift(I, left, I.h) <= limit) && Drift(I, stay, T) <= limit && PetscAbsReal(part - 1) > stayed);
+    *proved         = (PetscBool)((good || Drift(I, left, I.h) <= limit) && Drift(I, stay, T) <= limit);
     if (attempt && !*proved) {
       PetscCall(Claimed(ts, dX, &E));
       *proved = (PetscBool)(!Claims(I) || Drift(I, E, T) <= limit);
     }
     if (*proved) {
-      v.missing = PetscMin(stay, E) / k;
-      v.since   = stay > 0 ? T : 0;
+      v.since = stay > 0 ? T : 0;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
     if (!attempt) PetscCall(MeasureRows(ts, X, F));

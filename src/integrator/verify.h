@@ -7,9 +7,8 @@
 namespace hht3
 {
 
-constexpr PetscReal most_claim  = 1e11; /* beyond it the residual is rounding of forces (modes of 1e7 Hz at h omega = 1e6) */
-constexpr PetscReal followed    = 0.3; /* a rate at which the iteration converges */
-constexpr PetscReal stayed      = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
+constexpr PetscReal most_claim = 1e11; /* beyond it the residual is rounding of forces (modes of 1e7 Hz at h omega = 1e6) */
+constexpr PetscReal followed   = 0.3;  /* a rate at which the iteration converges */
 
 /* d s'/d w, which a row of a state has in place of ca */
 inline PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.beta; }

@@ -323,7 +323,7 @@ TEST(SceneReferences, HeavyTop)
     for (int k = 0; k < 3; k++) look(scene, Measure::displacement(scene.marker(B), k));
     for (int k = 0; k < 3; k++) look(scene, Measure::angularVelocity(pivot, k, {}, pivot));
     for (int k = 0; k < 3; k++) look(scene, Measure::jointForce(joint, k));
-    Watched run(scene, 0.2, 0.2, fixedSteps(fine ? 5e-5 : 1e-4), [&](double t, const std::vector<double> &c) {
+    Watched run(scene, 0.2, 0.2, fixedSteps(fine ? 5e-5 : 1e-4) + " -ts_hhtdae_corrector_tolerance 1e-6 ", [&](double t, const std::vector<double> &c) {
       if (t < 0.1) return;
       error[fine][0] = (Eigen::Map<const Vector3>(&c[0]) - x).norm();
       error[fine][1] = (Eigen::Map<const Vector3>(&c[3]) - Om).norm();
