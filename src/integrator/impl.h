@@ -62,7 +62,7 @@ struct Corrector : CorrectorOptions, CorrectorState {};
 
 struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
-  PetscBool measured = PETSC_FALSE; /* inertia and rounding have been measured since the matrix was made */
+  PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
   PetscReal since = 0;              /* time for which forces may have been missing that no proof has excluded */
 };
 

@@ -193,7 +193,6 @@ TEST(Start, MotionThatBeginsAtTheStart)
   }
 }
 
-/* Every problem whose reference knows accelerations, multipliers, variables and force states at t_0 */
 /* The matrix of the start holds inertia alone */
 TEST(Start, StrongDampingIsNoInertia)
 {
@@ -203,6 +202,7 @@ TEST(Start, StrongDampingIsNoInertia)
   }
 }
 
+/* Every problem whose reference knows accelerations, multipliers, variables and force states at t_0 */
 TEST(Start, AllReferences)
 {
   for (const Factory &f : allProblems()) {
