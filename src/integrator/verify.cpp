@@ -73,13 +73,15 @@ PetscReal Drift(const Integrator &I, PetscReal E, PetscReal T) { return E * Pets
 } // namespace
 
 /* Imbalances of variables and force states act on the equations of motion: R -= P R_B for B = V, F */
-PetscErrorCode PassDefinitionsOn(TS ts, Mat P, Vec R)
+PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
 {
   Integrator &I = Get(ts);
   Vec         only, product;
+  Mat         P;
 
   PetscFunctionBegin;
   if (!HasDefinitions(I)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   PetscCall(VecDuplicate(R, &only));
   PetscCall(VecDuplicate(R, &product));
   PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, only));
@@ -111,7 +113,7 @@ PetscErrorCode Model(TS ts, Vec dX)
     PetscCall(VecZeroEntries(v.work));
     PetscCall(MatMult(P, dX, v.model));
   }
-  PetscCall(PassDefinitionsOn(ts, P, v.model));
+  PetscCall(PassDefinitionsOn(ts, v.model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -124,14 +126,12 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal
   const PetscScalar *f, *r, *g;
   PetscReal          sum[4];
   Vec                now = F;
-  Mat                P;
 
   PetscFunctionBegin;
   if (HasDefinitions(I)) {
-    PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
     PetscCall(VecDuplicate(F, &now));
     PetscCall(VecCopy(F, now));
-    PetscCall(PassDefinitionsOn(ts, P, now));
+    PetscCall(PassDefinitionsOn(ts, now));
   }
   PetscCall(VecGetArrayRead(now, &f));
   PetscCall(VecGetArrayRead(I.verify.model, &r));

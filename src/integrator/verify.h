@@ -65,7 +65,7 @@ inline bool Followed(const RowScale &s, PetscReal now, PetscReal was)
 bool           Claims(const Integrator &I);
 PetscErrorCode MeasureRows(TS ts, Vec X, Vec F);
 /* verify.cpp */
-PetscErrorCode PassDefinitionsOn(TS ts, Mat P, Vec R);
+PetscErrorCode PassDefinitionsOn(TS ts, Vec R);
 PetscErrorCode Model(TS ts, Vec dX);
 PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal *part);
 /* blame.cpp */
