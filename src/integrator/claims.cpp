@@ -10,7 +10,7 @@ namespace
 constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
 constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
 constexpr PetscReal variation   = 1e3;   /* inertia that seems to have fallen by more has cancelled in a sum */
-constexpr PetscReal rounding_of_sums = 64 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
 
 /* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start; 0 for a coordinate without mass, but for
    rounding, and for all others: of these nothing is asked */
@@ -75,7 +75,7 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
     p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
-    if (PetscRealPart(p[i]) < most_claim) largest = PetscMax(largest, PetscRealPart(p[i]));
+    largest = PetscMax(largest, PetscRealPart(p[i]));
   }
   PetscCall(VecRestoreArray(v.inertia, &m));
   PetscCall(VecRestoreArray(v.claim, &p));

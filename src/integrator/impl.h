@@ -42,6 +42,7 @@ struct CorrectorState {
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
   PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
+  PetscBool rounding    = PETSC_FALSE; /* what is left of it is rounding */
   PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
   PetscReal h_matrix    = 0;           /* h it was made with */
   PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
@@ -63,6 +64,7 @@ struct Corrector : CorrectorOptions, CorrectorState {};
 struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
   PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
+  PetscBool looked   = PETSC_FALSE; /* the residual after the last correction was needed for its proof */
   PetscReal since = 0;              /* time for which forces may have been missing that no proof has excluded */
 };
 
@@ -290,21 +292,29 @@ PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 /* corrector.cpp */
-PetscErrorCode CorrectorSetUp(TS ts);
 PetscErrorCode Correct(TS ts, PetscBool *converged);
-PetscErrorCode IterateStart(TS ts, PetscBool *converged);
+/* iterate.cpp */
+PetscErrorCode CorrectorSetUp(TS ts);
+void           BeginIteration(Integrator &I);
+PetscErrorCode Iterate(TS ts, PetscBool *converged);
 PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok);
-PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
-PetscErrorCode FreshMatrixNextIteration(TS ts);
 PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal xnorm, PetscReal ynorm, PetscReal fnorm, SNESConvergedReason *reason, void *ctx);
+/* iterate_start.cpp */
+PetscErrorCode IterateStart(TS ts, PetscBool *converged);
+/* judge.cpp */
+PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated);
+PetscErrorCode FreshMatrixNextIteration(TS ts);
 /* hooks.cpp */
 PetscErrorCode HooksLineSearch(TS ts);
 PetscErrorCode HooksJacobian(TS ts);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
+/* between.cpp */
+PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found);
 /* rounding.cpp */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
+PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e);
 /* claims.cpp */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
@@ -314,6 +324,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
 /* blame.cpp */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */
+PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);

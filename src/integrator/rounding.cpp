@@ -38,6 +38,8 @@ PetscErrorCode Scatter(Vec noise, int sample, Vec r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+} // namespace
+
 /* Of the correction that the matrix at hand makes of a residual r; 0 if it has none */
 PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
 {
@@ -54,8 +56,6 @@ PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
   if (PetscIsInfOrNanReal(*e)) *e = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-} // namespace
 
 /* e of rounding at the iterate X, in units of the tolerance */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)

@@ -141,7 +141,7 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal
     const PetscReal excess = PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
     local[0] += excess;
     if (PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was)) local[3] += excess;
-    if (PetscAbsReal(was) <= s.rounding / 16) return; /* less cannot be told from rounding, even by what persists */
+    if (PetscAbsReal(was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
     local[1] += is * was;
     local[2] += was * was;
   }));
@@ -164,7 +164,8 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   PetscReal     E, left = 0, stay = 0, part = 0;
 
   PetscFunctionBegin;
-  *proved = PETSC_TRUE;
+  *proved  = PETSC_TRUE;
+  v.looked = PETSC_FALSE;
   if (I.mode != Mode::Step || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1), T = v.since + I.h;
   PetscCall(Claimed(ts, dX, &E));
@@ -173,7 +174,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
-  *evaluated = PETSC_TRUE;
+  *evaluated = v.looked = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
     PetscCall(Compare(ts, F, &left, &stay, &part));

@@ -1,0 +1,89 @@
+/*
+  Corrections that turn back. A force that is steep about one velocity and flat on both sides of it, as dry friction is, throws Newton's
+  iteration from one side to the other: on either side the matrix knows nothing of the steep part, and each correction is the last one
+  with the other sign. The solution lies between the two iterates. It is looked for on the line that joins them, by the sign of what the
+  next correction with the same matrix would be (the natural level function of Deuflhard, Newton Methods for Nonlinear Problems, 2004,
+  section 3.3); there a new matrix sees the steep part.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal even = 0.1; /* a middle so far from the mean of both ends, of their difference: the steep part is met */
+constexpr int       max_halvings = 60; /* beyond rounding: the force jumps */
+
+/* What the iterates of the line X(s) = X(0) - s dX share */
+struct Line {
+  Vec X, dX, begin, along, next; /* begin: X(0); along: dX weighted as in the norm of corrections; next: work */
+};
+
+/* along * the correction that the matrix would make at X(s); F: the residual there. Not a number if it makes none. */
+PetscErrorCode Along(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *phi)
+{
+  KSP                ksp;
+  KSPConvergedReason reason;
+  PetscScalar        dot;
+
+  PetscFunctionBegin;
+  PetscCall(VecWAXPY(l.X, -s, l.dX, l.begin));
+  PetscCall(SNESComputeFunction(ts->snes, l.X, F));
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPSolve(ksp, F, l.next));
+  Get(ts).stat.solves++;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(VecDot(l.next, l.along, &dot));
+  *phi = reason >= 0 ? PetscRealPart(dot) : NAN;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bisection between s = 0, where phi is `begin`, and s = 1, where it has to be negative, until phi changes evenly between the ends: while the
+   steep part is a bend between flat ones, the middle is about as far as one of the ends */
+PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s, PetscBool *found)
+{
+  PetscReal low = 0, high = 1, at_low = begin, at_high, phi;
+
+  PetscFunctionBegin;
+  *s = 1;
+  PetscCall(Along(ts, l, *s, F, &at_high));
+  if (!(at_high < 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < max_halvings && !*found; k++) {
+    *s = 0.5 * (low + high);
+    PetscCall(Along(ts, l, *s, F, &phi));
+    if (PetscIsInfOrNanReal(phi)) PetscFunctionReturn(PETSC_SUCCESS);
+    *found = (PetscBool)(PetscAbsReal(phi - 0.5 * (at_low + at_high)) < even * (at_low - at_high));
+    if (phi > 0) low = *s, at_low = phi;
+    else high = *s, at_high = phi;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The correction dX has led to X and is no smaller than the one before. If the next one turns back, X is moved to where the two meet, and F
+   is the residual there. */
+PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
+{
+  Integrator &I = Get(ts);
+  Line        l = {X, dX, nullptr, nullptr, nullptr};
+  PetscScalar begin;
+  PetscReal   s;
+
+  PetscFunctionBegin;
+  *found = PETSC_FALSE;
+  for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDuplicate(X, v));
+  PetscCall(VecWAXPY(l.begin, 1, dX, X));
+  PetscCall(VecPointwiseMult(l.next, dX, I.weight));
+  PetscCall(VecPointwiseMult(l.along, l.next, I.weight));
+  PetscCall(VecDot(l.along, dX, &begin));
+  PetscCall(Search(ts, l, PetscRealPart(begin), F, &s, found));
+  if (!*found) PetscCall(VecWAXPY(X, -1, dX, l.begin));
+  else PetscCall(PetscInfo(ts, "corrector: corrections turn back at t = %g, h = %g; the solution is at %g of the last one\n", (double)I.t1, (double)I.h, (double)s));
+  for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDestroy(v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,254 @@
+/*
+  One run of SNES: the full step as a line search, the judgement of corrections (judge.cpp) as its convergence test, and the explanation
+  of what went wrong. A user's line search, convergence test, lag or type stands.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+const char *RoleName(const Integrator &I, PetscInt local)
+{
+  static const char *const names[] = {"the equation of motion of a coordinate", "the equation of a first-order state",
+                                      "a holonomic constraint", "a velocity-level constraint",
+                                      "the definition of a variable", "the definition of a force state"};
+  return names[RoleOf(I, local)];
+}
+
+/* The first row of the residual that is not a number, for the message */
+PetscErrorCode NameBadRow(TS ts, Vec F)
+{
+  Integrator        &I = Get(ts);
+  const PetscScalar *f;
+  PetscInt           n, start, bad[2] = {HHT3_INT_MAX, 0}, first;
+  PetscMPIInt        rank;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(F, &start, NULL));
+  PetscCall(VecGetLocalSize(F, &n));
+  PetscCall(VecGetArrayRead(F, &f));
+  for (PetscInt i = n - 1; i >= 0; i--)
+    if (PetscIsInfOrNanScalar(f[i])) {
+      bad[0] = start + i;
+      bad[1] = RoleOf(I, i);
+    }
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCallMPI(MPI_Allreduce(&bad[0], &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)ts), &rank));
+  if (first < HHT3_INT_MAX) {
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
+                            "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s",
+                            (double)I.t1, first, bad[0] == first ? ", " : "", bad[0] == first ? RoleName(I, first - start) : ""));
+  } else {
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)I.t1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The full step, and no residual after the last one: (40) needs the correction alone. The judgement is handed to SNES by
+   ConvergenceTest(). */
+PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
+{
+  TS          ts = (TS)ctx;
+  Integrator &I  = Get(ts);
+  SNES        snes;
+  Vec         X, F, Y;
+  PetscReal   xnorm, fnorm, ynorm, e;
+  PetscInt    monitors;
+  PetscBool   evaluated = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(SNESLineSearchGetSNES(ls, &snes));
+  PetscCall(SNESLineSearchGetVecs(ls, &X, &F, &Y, NULL, NULL));
+  PetscCall(SNESLineSearchGetNorms(ls, &xnorm, &fnorm, &ynorm));
+  PetscCall(SNESLineSearchSetReason(ls, SNES_LINESEARCH_SUCCEEDED));
+  PetscCall(SubtractCorrection(ts, X, Y, &e));
+  PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
+  monitors = snes->numbermonitors;
+  if (!I.corrector.reason || monitors || I.corrector.user_test) {
+    if (!evaluated) PetscCall(SNESComputeFunction(snes, X, F));
+    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
+  }
+  if (I.corrector.user_test) {
+    PetscCall(VecNorm(X, NORM_2, &xnorm));
+    PetscCall(VecNorm(Y, NORM_2, &ynorm));
+    PetscCall(SNESLineSearchSetNorms(ls, xnorm, fnorm, ynorm));
+  } else PetscCall(SNESLineSearchSetNorms(ls, 1, fnorm, I.corrector.e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SNES ended without our judgement: a residual or a linear solve that went wrong, or a user's own test */
+PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
+{
+  Integrator &I = Get(ts);
+  Vec         F;
+
+  PetscFunctionBegin;
+  I.corrector.no_solve = (PetscBool)(reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN);
+  if (I.corrector.no_solve) {
+    PetscCall(ExplainLinearFailure(ts));
+  } else if (reason != SNES_DIVERGED_DTOL) {
+    PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
+    PetscReal norm;
+    PetscCall(VecNorm(F, NORM_2, &norm));
+    if (PetscIsInfOrNanReal(norm)) PetscCall(NameBadRow(ts, F));
+    else PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "SNES stopped with %s at t = %g, h = %g", SNESConvergedReasons[reason], (double)I.t1, (double)I.h));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The correction that a SNES has made without our line search. Newton's methods leave it behind; of others the iterate before is kept. */
+PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
+{
+  Integrator &I = Get(ts);
+  PetscBool   newton;
+  Vec         X, Y, F;
+  PetscReal   e = 0;
+  PetscBool   evaluated = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SNESNEWTONLS, SNESNEWTONTR, SNESNEWTONTRDC, ""));
+  PetscCall(SNESGetSolution(snes, &X));
+  PetscCall(SNESGetSolutionUpdate(snes, &Y));
+  if (!newton) {
+    if (!I.before) PetscCall(VecDuplicate(X, &I.before));
+    if (it) PetscCall(VecAYPX(I.before, -1, X));
+    Y = I.before;
+  }
+  if (it) PetscCall(CorrectionNorm(ts, Y, &e));
+  if (!newton) PetscCall(VecCopy(X, I.before));
+  PetscCall(SNESGetFunction(snes, &F, NULL, NULL));
+  if (it) PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A SNES type that asks for no convergence test of ours (ksponly, ms) has counted by itself. How well the matrix served is not known:
+   where the problem is not linear, the next step gets a new one. */
+PetscErrorCode CountForeign(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscInt    its;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetIterationNumber(ts->snes, &its));
+  I.corrector.it = its;
+  I.stat.newton += its;
+  I.stat.solves += its;
+  if (ts->problem_type != TS_LINEAR) I.corrector.xi_max = 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A type that never asks for the convergence test (ngs, ms) leaves it open whether the equations of the step hold. One linear solve is
+   the user's word that they do. */
+PetscErrorCode CheckJudged(TS ts)
+{
+  SNESType  type;
+  PetscBool linear;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetType(ts->snes, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &linear));
+  PetscCheck(linear || Get(ts).corrector.user_test, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_type %s ended without asking for a test of convergence, so that nothing is known of its result: use %s or, for linear problems, %s", type, SNESNEWTONLS, SNESKSPONLY);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
+PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
+{
+  TS          ts = (TS)ctx;
+  Integrator &I  = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.it < it || (!it && !I.hooks.line_search)) PetscCall(MeasureCorrection(ts, snes, it));
+  *reason = it ? I.corrector.reason : SNES_CONVERGED_ITERATING;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the state at t1 and the residual F there are numbers, named if not */
+PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok)
+{
+  Integrator &I     = Get(ts);
+  Vec         all[] = {F, I.U1, I.V1, I.A1};
+
+  PetscFunctionBegin;
+  *ok = PETSC_TRUE;
+  for (Vec x : all) {
+    PetscReal norm;
+    PetscCall(VecNorm(x, NORM_2, &norm));
+    if (PetscIsInfOrNanReal(norm)) *ok = PETSC_FALSE;
+  }
+  if (!*ok) PetscCall(NameBadRow(ts, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CorrectorSetUp(TS ts)
+{
+  Integrator    &I = Get(ts);
+  SNES           snes;
+  SNESLineSearch ls;
+  PetscBool      shell;
+
+  PetscFunctionBegin;
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscCheck(!snes->mf || snes->mf_operator, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_mf leaves no matrix, which the consistent start needs; use -snes_mf_operator, whose preconditioner is the assembled matrix");
+  /* before SNESSetType(), which gives backtracking to a line search without a type: TSSetFromOptions() need not have been called */
+  PetscCall(HooksLineSearch(ts));
+  if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
+  PetscCall(HooksInstall(ts));
+  PetscCall(SNESGetLineSearch(snes, &ls));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
+  if (!shell) I.hooks.line_search = PETSC_FALSE; /* an option has named another */
+  if (I.hooks.line_search) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
+  PetscCall(TakeSNESSettings(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void BeginIteration(Integrator &I)
+{
+  Corrector &c = I.corrector;
+  c.it = c.base = c.renewals = 0;
+  c.e = c.xi_max = 0;
+  c.reason = SNES_CONVERGED_ITERATING;
+  c.fresh  = PETSC_FALSE;
+  c.wrong_jacobian = PETSC_FALSE;
+  c.rounding       = PETSC_FALSE;
+}
+
+/* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
+PetscErrorCode Iterate(TS ts, PetscBool *ok)
+{
+  Integrator         &I = Get(ts);
+  Corrector          &c = I.corrector;
+  SNESConvergedReason reason;
+  PetscInt            its;
+
+  PetscFunctionBegin;
+  BeginIteration(I);
+  c.user_test = HooksUserTest(ts);
+  if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* since the set-up */
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));
+  ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
+  PetscCall(SNESSolve(ts->snes, NULL, I.X));
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */
+  PetscCall(SNESGetConvergedReason(ts->snes, &reason));
+  PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
+  ts->ksp_its += its;
+  const bool foreign = !c.it;
+  *ok                = (PetscBool)(reason > 0);
+  if (foreign && *ok) PetscCall(CheckJudged(ts));
+  if (foreign) PetscCall(CountForeign(ts));
+  ts->snes_its += c.it;
+  if (!*ok) PetscCall(ExplainSNES(ts, reason));
+  if (*ok) PetscCall(StageVectors(ts, I.X));
+  if (*ok && (foreign || c.user_test)) PetscCall(CheckNumbers(ts, ts->snes->vec_func, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,298 @@
+/*
+  When a correction ends: the stopping test, and what follows from it.
+
+  Stopping, (40) and (41b): with xi the ratio of two successive corrections, the iteration ends as soon as the error left,
+  xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. The rate
+  of the last corrections with the same matrix answers already after the first iteration.
+
+  Where h is not set by the error test (fixed steps, a largest h) the step's own error is far below the tolerance, and an
+  iteration error of c times the tolerance would be all that is left of its accuracy. Then c refers to the error estimate of
+  the last step instead, down to a hundredth of the tolerance under error control and without limit (and fifty times more
+  strictly) at fixed steps.
+
+  A correction that no longer falls is accepted where rounding makes one of its size, which is measured then and there (rounding.cpp) and
+  holds for this correction alone: in a position where Phi_q nearly loses rank it is far above that of later steps, whose errors would grow with it.
+
+  With constraints and little damping c is smaller, ConstrainedTolerance(): what is left of a correction in q excites the
+  multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
+  (h fell to 1e-6). A c that the user has set stands.
+
+  A last correction that proves nothing (verify.cpp), turns back (between.cpp) or is followed by another one goes on.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* A remembered rate is believed down to here: it was measured steps ago on smaller corrections, and the matrix has aged since.
+   With 0.02 the error that first iterations left behind was up to ten times that of the step (heavy top, 1e-7); 0.3 costs
+   5 to 20 % more iterations. */
+constexpr PetscReal remembered = 0.3;
+
+/* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
+constexpr PetscReal fixed = 0.02;
+
+/* Of the tolerance: a correction so small needs no rate */
+constexpr PetscReal at_once = 0.1;
+
+/* A rate below it may be an old matrix' fault, above it the iteration diverges */
+constexpr PetscReal slow = 0.8;
+
+/* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
+constexpr PetscReal stagnant = 0.5;
+
+/* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
+constexpr PetscReal of_rounding = 16;
+
+/* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
+constexpr PetscInt max_renewals = 3;
+
+/* A correction that no longer falls is as good as it gets where rounding makes one of its size and the matrix is not to blame */
+PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
+{
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+  PetscReal   noise;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (!I.fixed_h && c.e > 1) PetscFunctionReturn(PETSC_SUCCESS); /* no step to be accepted by the error test */
+  PetscCall(RoundingOfCorrection(ts, X, &noise));
+  *yes = (PetscBool)(c.e <= of_rounding * noise);
+  if (*yes) PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Diverge(TS ts, const char *why)
+{
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+
+  PetscFunctionBegin;
+  c.reason = SNES_DIVERGED_DTOL;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
+                          why, (double)I.t1, (double)I.h, c.it, (double)c.e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What may be left of a correction, in units of the tolerance */
+PetscReal Tolerance(const Integrator &I)
+{
+  const Corrector &c = I.corrector;
+  if (I.mode == Mode::Start) return 1e-13;
+  const PetscReal tol = CorrectorTolerance(I);
+  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, 0.01, 1);
+}
+
+/* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
+PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
+{
+  Integrator     &I     = Get(ts);
+  Corrector      &c     = I.corrector;
+  const PetscReal old_e = c.e;
+  const PetscReal tol   = Tolerance(I);
+  const PetscInt  left  = c.max_it - c.it;
+
+  PetscFunctionBegin;
+  c.e = e;
+  if (PetscIsInfOrNanReal(e)) {
+    PetscCall(Diverge(ts, "produced a correction that is not a number"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (e <= c.floor) {
+    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
+    const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
+    if (known || e <= at_once * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    else if (left <= 0) PetscCall(Diverge(ts, "needs too many iterations"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  const PetscReal xi = e / old_e;
+  c.rate             = xi;
+  c.xi_max           = PetscMax(c.xi_max, xi);
+  if (CorrectorError(xi, e) <= tol) {
+    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  } else if (I.mode == Mode::Start && xi > 0.3) {
+    if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
+    else if (left <= 0 || xi > 2) PetscCall(Diverge(ts, "finds no consistent accelerations"));
+    else PetscCall(FreshMatrixNextIteration(ts));
+  } else if (xi >= 1 || left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
+    PetscBool rounding = PETSC_FALSE;
+    if (I.mode == Mode::Step) PetscCall(IsRounding(ts, X, &rounding));
+    if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+    else if (c.renewals < max_renewals && left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
+    else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
+    c.rounding = (PetscBool)(c.reason > 0);
+    if (c.rounding) {
+      c.rate   = -1; /* that of noise says nothing of the matrix */
+      c.xi_max = 0;  /* a new matrix would not help */
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the user's test decides, the rate is only measured, for the reuse of the matrix */
+PetscErrorCode Measure(TS ts, PetscReal e)
+{
+  Corrector      &c  = Get(ts).corrector;
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+
+  PetscFunctionBegin;
+  c.e = e;
+  if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
+  c.rate   = xi;
+  c.xi_max = PetscMax(c.xi_max, xi);
+  if (xi >= c.slow_rate && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode FailUnproved(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.corrector.reason = SNES_DIVERGED_DTOL;
+  if (I.corrector.wrong_jacobian) I.corrector.blames += 1;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
+                          "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
+                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two",
+                          (double)I.t1, (double)I.h, (double)I.verify.largest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On with the iteration, whose matrices are of every iterate from now on: on the way through a stiff direction that turns, spurious forces
+   make one that is as wrong an iteration later */
+PetscErrorCode FreshMatrices(TS ts)
+{
+  PetscFunctionBegin;
+  if (Get(ts).corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FreshMatrixNextIteration(ts));
+  PetscCall(SNESSetLagJacobian(ts->snes, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual has not followed the correction: on with the iteration, whose rate will tell; then with new matrices, since stiffness may
+   end on the way of a correction; and where none is better, with a smaller h, at which less is left of it */
+PetscErrorCode GoOnUnproved(TS ts)
+{
+  Corrector &c = Get(ts).corrector;
+
+  PetscFunctionBegin;
+  c.reason  = SNES_CONVERGED_ITERATING;
+  if (c.wrong_jacobian || c.it >= c.max_it) PetscCall(FailUnproved(ts));
+  else if (c.it - c.base >= 2) {
+    if (c.renewals >= max_renewals || c.user_lag) PetscCall(FailUnproved(ts));
+    else PetscCall(FreshMatrices(ts));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A correction that has failed with a matrix of its own may have turned back and forth */
+PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Corrector &c = Get(ts).corrector;
+  PetscBool  found;
+
+  PetscFunctionBegin;
+  if (Get(ts).mode != Mode::Step || !(c.fresh || c.user_lag) || c.it >= c.max_it) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(BetweenIterates(ts, X, dX, F, &found));
+  *evaluated = found;
+  if (!found) PetscFunctionReturn(PETSC_SUCCESS);
+  c.reason = SNES_CONVERGED_ITERATING;
+  PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The part of `next` along dX, over dX */
+PetscErrorCode PartAlong(const Integrator &I, Vec dX, Vec next, PetscReal *part)
+{
+  Vec         weighted;
+  PetscScalar dot, square;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(dX, &weighted));
+  PetscCall(VecPointwiseMult(weighted, dX, I.weight));
+  PetscCall(VecPointwiseMult(weighted, weighted, I.weight));
+  PetscCall(VecDot(dX, weighted, &square));
+  PetscCall(VecDot(next, weighted, &dot));
+  PetscCall(VecDestroy(&weighted));
+  *part = PetscRealPart(square) > 0 ? PetscRealPart(dot / square) : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual F has followed the last correction, but may stand in other directions than those in which the matrix has answered it: turned
+   about the direction of a stiff spring it is a soft force, which a matrix that is a little off takes for a stiff one, correction after
+   correction. So the next correction is asked for: that it is small is no proof if it goes on in the direction of the last one. */
+PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
+{
+  Integrator     &I   = Get(ts);
+  Corrector      &c   = I.corrector;
+  const PetscReal tol = Tolerance(I);
+  Vec             next;
+  PetscReal       e, part;
+  PetscBool       rounding = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(X, &next));
+  PetscCall(SizeOfAnswer(ts, F, next, &e));
+  PetscCall(PartAlong(I, dX, next, &part));
+  PetscCall(VecDestroy(&next));
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+  if (CorrectorError(xi, e) <= tol || (e <= at_once * tol && part < stagnant)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
+  if (rounding) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g, %g of it in the same direction\n", (double)c.e, (double)e, (double)part));
+  c.reason = SNES_CONVERGED_ITERATING;
+  if (c.it >= c.max_it) PetscCall(Diverge(ts, "needs too many iterations"));
+  else if (xi >= stagnant) PetscCall(FreshMatrices(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
+PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Integrator &I = Get(ts);
+  PetscBool   proved;
+
+  PetscFunctionBegin;
+  I.corrector.it++;
+  I.stat.newton++;
+  I.stat.solves++;
+  if (I.corrector.user_test) PetscCall(Measure(ts, e));
+  else PetscCall(Judge(ts, e, X));
+  if (I.corrector.reason > 0) {
+    PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
+    if (!proved) PetscCall(GoOnUnproved(ts));
+    else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
+  } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
+    PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
+    if (!I.corrector.reason) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(BlameJacobian(ts, X, dX, F, evaluated));
+    if (I.corrector.wrong_jacobian) PetscCall(FailUnproved(ts));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A slow correction goes on with a matrix made at its present iterate */
+PetscErrorCode FreshMatrixNextIteration(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.rate, I.corrector.it));
+  PetscCall(SNESSetLagJacobian(ts->snes, -2));
+  I.corrector.renewals++;
+  I.corrector.base = I.corrector.it;
+  I.corrector.rate = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
