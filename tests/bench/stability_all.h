@@ -2,6 +2,7 @@
 #ifndef HHTDAE_BENCH_STABILITY_ALL_H
 #define HHTDAE_BENCH_STABILITY_ALL_H
 
+#include "stability_catch.h"
 #include "stability_condition.h"
 #include "stability_constraints.h"
 #include "stability_events.h"
@@ -25,6 +26,7 @@ inline Cases AllCases(const ConditionReport &report = {})
   AddImpacts(cases);
   AddJumps(cases);
   AddReleases(cases);
+  AddCatches(cases);
   AddWrongJacobians(cases);
   AddStarts(cases);
   AddSteps(cases);

@@ -178,7 +178,7 @@ inline void AddReleases(Cases &cases)
           const double s = std::pow(10, d);
           /* Beyond, friction slips by 1e-7 m/s: Newton's method finds its way through so sharp a bend in tiny steps only. And a contact
              of 1e10 N/m bounces by what the tolerance lets it penetrate. */
-          if (s > (hold.hold == Hold::Friction ? 1e6 : hold.hold == Hold::Contact ? 1e8 : 1e12)) continue;
+          if (s > (hold.hold == Hold::Contact ? 1e8 : 1e12)) continue;
           /* a soft hold moves by itself: slips, swings, or slides at its steady speed */
           const double soft = hold.hold == Hold::Brake ? (d < 5 ? -1 : 0) : hold.hold == Hold::Friction ? 20 / s : d < 4 ? 0.15 : d < 6 ? 1e-3 : 0; /* swings by its static deflection */
           if (soft < 0) continue;

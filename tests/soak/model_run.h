@@ -67,7 +67,8 @@ struct Settings {
   double            seconds   = 1e9;
   double            corrector = 0;     /* 0: as it comes */
   bool              laws      = false; /* judge the balance of every body */
-  double            slack     = 0;     /* what the corrector may leave of a position, model_residual.h */
+  double            tolerance = 0;     /* of the laws: that of the run, and what the corrector may leave of a position, */
+  double            slack     = 0;     /* model_residual.h */
   std::string       save, resume;      /* checkpoint to write, to go on from */
   long              save_at = 0;       /* step */
   const Trajectory *until   = nullptr; /* of a run that goes on: the samples before */
@@ -92,7 +93,7 @@ inline void Keep(const hhtest::Imbalance &now, double t, double *most, std::stri
 inline PetscErrorCode JudgeLaws(Watcher &w, TS ts, double t)
 {
   std::vector<double> values;
-  BodyResiduals       left(w.scene, w.settings.slack);
+  BodyResiduals       left(w.scene, w.settings.slack, w.settings.tolerance);
   PetscFunctionBegin;
   PetscCall(w.scene.sample(ts, t, values));
   PetscCall(left.make(ts, t));
