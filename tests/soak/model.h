@@ -19,6 +19,7 @@ struct Model {
   bool                   planar = false, conservative = false, switched = false;
   int                    bodies = 0;
   double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
+  double                 jump = 0; /* acceleration with which what is let go sets off; 0: nothing is */
   std::vector<Observed>  observed;  /* what each channel of the scene is */
   std::map<std::string, int> types; /* elements by type, and features */
 };
@@ -182,6 +183,7 @@ private:
           m.observed.push_back(kind ? Observed::Velocity : Observed::Position);
         }
     m.switched = true;
+    m.jump     = b.weightPerMass();
     b.lossy    = true;
   }
 

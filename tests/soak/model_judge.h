@@ -7,16 +7,18 @@
 
   A run at tolerance eps is right if at every sample time t
 
-    error(t) <= eps (N(t) + 50) (10 + 3 G(t)),
+    error(t) <= eps (N(t) + 50) (10 + 3 G(t)) + t sqrt(eps n^(1/2) a / k),
 
   N: its steps so far, each of which may leave an error of eps, and 50 for the start and impacts; G: how much the model
   itself makes grow of an error, as IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
-  10 eps_ref. It is asked for as long as the right-hand side is below 1: later the tolerance does not determine the
+  10 eps_ref. The last part is for what lets go with an acceleration a: a step h over the jump of it misses a velocity of
+  up to a h, and the error test lets h = sqrt(eps n^(1/2) / (k a)) pass (k of (26), 0.1; the n coordinates share one norm). It is asked for as long as the right-hand side is below 1: later the tolerance does not determine the
   solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
   error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
   (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
   first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that
-  of a run at eps / 1000 has to be smaller than both the first and the third.
+  of a run at eps / 1000 has to be smaller than both the first and the third,
+  or a sharper reference has to be nearer to it.
 
   Besides, constraints have to hold to eps, and the reference has to keep the energy of a model that has no losses.
 
@@ -282,7 +284,8 @@ private:
   {
     double doubt = 0;
     for (int l = 0; l <= k; l++) doubt = std::max(doubt, error(looser_, l));
-    return eps * (double)(a.steps_at[(std::size_t)k] + 50) * (per_step + per_growth * doubt / (10 * reference_eps));
+    return eps * (double)(a.steps_at[(std::size_t)k] + 50) * (per_step + per_growth * doubt / (10 * reference_eps)) +
+           SampleTime(model_.end, k + 1) * std::sqrt(eps * std::sqrt(6. * model_.bodies) * model_.jump / 0.1);
   }
 
   /* Samples for which the tolerance determines the solution; of these, whether all are right */
@@ -378,6 +381,21 @@ private:
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first)) stillFalls(first, second);
   }
 
+  /* Whether a reference at a hundredth of the tolerance is nearer to the run: IDA steps over the end of a brake, too */
+  bool referenceIsToBlame(const Trajectory &a, double before)
+  {
+#ifdef HHTDAE_HAVE_IDA
+    if (o_.by != ByIDA) return false;
+    o_.stage     = Referring;
+    Trajectory t = RunIDA(build(), 0.01 * reference_eps, patience(10), &o_.legs);
+    o_.stage     = Judging;
+    if (!t.arrived()) return false;
+    std::swap(reference_, t);
+    if (largest(a, o_.window) < 0.3 * before) return true;
+    std::swap(reference_, t);
+#endif
+    return false;
+  }
   /* Times of impacts and stops scatter: errors of neighbouring tolerances may be the other way round. A thousandth
    * decides. */
   void stillFalls(double first, double second)
@@ -389,8 +407,8 @@ private:
     if (!d.arrived()) return fail(Failed, "at a thousandth of the tolerance: " + d.failure);
     o_.stage          = Judging;
     const double last = largest(d, o_.window);
-    if (!(last < 0.7 * first) || !(last < 0.7 * finest_))
-      fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first,
+    if ((last < 0.7 * first && last < 0.7 * finest_) || referenceIsToBlame(d, last)) return;
+    fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first,
                                  second, finest_, last));
   }
 
