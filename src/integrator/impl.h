@@ -138,6 +138,7 @@ struct StepState {
   PetscReal        h_last      = 0;       /* length of the step that led to t_n */
   PetscReal        t_begin     = 0;       /* of the run */
   Mode             mode        = Mode::Step;
+  PetscReal        implicit    = 0;       /* h of the implicit step of settle.cpp, 0 in other starts */
   TSStepStatus     status      = TS_STEP_INCOMPLETE;
   PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
   PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
@@ -342,6 +343,8 @@ PetscErrorCode Start(TS ts);
 PetscErrorCode Repair(TS ts);
 PetscErrorCode TinyStep(TS ts, PetscBool *ok);
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
+/* settle.cpp */
+PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau);
 /* project.cpp */
 PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current);
 PetscErrorCode ProjectVelocities(TS ts);

@@ -14,11 +14,18 @@ namespace
 {
 
 /* U1, V1, A1 in the start: q, q', s are given; a, s', lambda, V, F are the unknowns */
-void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, const PetscScalar *const base[], PetscScalar *u, PetscScalar *v, PetscScalar *a)
 {
+  const PetscReal h = I.implicit;
   for (PetscInt i = 0; i < n; i++) {
     switch (RoleOf(I, i)) {
-    case TSHHT3_COORDINATE: a[i] = x[i]; break;
+    case TSHHT3_COORDINATE:
+      a[i] = x[i];
+      if (h > 0) {
+        u[i] = base[0][i] + h * h * x[i];
+        v[i] = base[1][i] + h * x[i];
+      }
+      break;
     case TSHHT3_STATE: v[i] = x[i]; break;
     default: u[i] = x[i]; break;
     }
@@ -198,7 +205,7 @@ PetscErrorCode StageVectors(TS ts, Vec X)
   if (has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(GetStage(I, &s));
-  if (I.mode == Mode::Start) StartStage(I, s.n, x, s.to[0], s.to[1], s.to[2]);
+  if (I.mode == Mode::Start) StartStage(I, s.n, x, s.base, s.to[0], s.to[1], s.to[2]);
   else {
     if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
     else Sweep(s.n, MakeStage<false>(I, s, x));

@@ -74,10 +74,14 @@ PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
   PetscCall(TimeScale(ts, &T));
   I.mode = Mode::Start;
   I.t1   = t;
-  I.h    = 1e-28 * T; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
+  I.h    = I.implicit > 0 ? I.implicit : 1e-28 * T; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
   PetscCall(VecCopy(U, I.U1));
   PetscCall(VecCopy(V, I.V1));
   PetscCall(VecZeroEntries(I.A1));
+  if (I.implicit > 0) {
+    PetscCall(VecWAXPY(I.base[0], I.implicit, V, U));
+    PetscCall(VecCopy(V, I.base[1]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -330,12 +334,13 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBo
 namespace
 {
 
-/* Everything of t_n from U0, V0: the common part of a start and of a repair */
-PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
+constexpr int max_transients = 30; /* one within the other; each time a tenth of one is left */
+
+/* Accelerations, multipliers and their rates from U0, V0 */
+PetscErrorCode Consistent(TS ts, PetscBool matrix_is_current, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscBool   ok;
-  Vec         rate;
 
   PetscFunctionBegin;
   PetscCall(VecZeroEntries(I.X));
@@ -348,12 +353,58 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
   PetscCall(Distribute(I));
   PetscCall(VecCopy(I.X, I.X0));
   PetscCall(VecCopy(I.X, I.predictor.D[0]));
+  PetscCall(Rates(ts, rate));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A consistent start from U0, V0, and the first step. Transients that are over long before its end are taken out of V0, one after the other, as
+   long as that takes their accelerations away. */
+PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
+{
+  Integrator     &I      = Get(ts);
+  const PetscReal given  = ts->time_step;
+  const PetscBool auto_h = I.auto_h;
+  PetscReal       before, after, tau;
+  bool            gone = true;
+  Vec             V;
+
+  PetscFunctionBegin;
+  PetscCall(Consistent(ts, matrix_is_current, rate));
+  PetscCall(ChooseFirstStep(ts, rate));
+  PetscCall(VecDuplicate(I.V0, &V));
+  for (int k = 0; gone && k < max_transients; k++) {
+    PetscCall(VecCopy(I.V0, V));
+    PetscCall(VecNorm(I.A0, NORM_2, &before));
+    PetscCall(SettleTransient(ts, ts->time_step, rate, &tau));
+    if (tau <= 0) break;
+    ts->time_step = given;
+    I.auto_h      = auto_h;
+    PetscCall(Consistent(ts, PETSC_FALSE, rate));
+    PetscCall(VecNorm(I.A0, NORM_2, &after));
+    gone = after < 0.5 * before;
+    if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
+    else {
+      PetscCall(VecCopy(V, I.V0));
+      PetscCall(Consistent(ts, PETSC_FALSE, rate));
+    }
+    PetscCall(ChooseFirstStep(ts, rate));
+    if (!gone && k) PetscCall(VecZeroEntries(rate)); /* those of what rounding leaves of the transient */
+  }
+  PetscCall(VecDestroy(&V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
+{
+  Integrator &I = Get(ts);
+  Vec         rate;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(I.X, &rate));
+  PetscCall(ConsistentStart(ts, matrix_is_current, rate));
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
-
-  PetscCall(VecDuplicate(I.X, &rate));
-  PetscCall(Rates(ts, rate));
-  PetscCall(ChooseFirstStep(ts, rate));
   PetscCall(MakeHistory(ts, rate));
   PetscCall(VecDestroy(&rate));
   if (I.F0) {

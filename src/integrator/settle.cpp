@@ -1,0 +1,95 @@
+/*
+  A start in the middle of a transient that is over long before the first step ends: strong damping holds what moves. The consistent q''_0
+  is that of the transient, and (2) takes a part of h^2 of it into q_1, far beyond rest: with h a hundred time constants, more than the way
+  of the whole transient. Where the error test lets that pass it leaves velocities that are far larger than those of the motion,
+  which nothing takes back where they have turned bodies that nothing damps.
+
+  What the transient leaves of the velocities follows from the equations of motion, with constraints differentiated as for every start,
+  for q' = q'_0 + h q'' and q = q_0 + h q' in place of q'_0 and q_0, with h ten time constants: the implicit Euler method, which damps
+  what is faster than h. The run starts at the same time and place with these velocities. Where h is chosen by the error test, bodies move by
+  less than the tolerance in the course of such a transient: a slower one is resolved. That it was one shows in its accelerations, which are
+  gone; those of an oscillation would be as before.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
+constexpr PetscReal noticeable = 1e-6; /* part of the velocities: what is left of a transient grows with h in the first steps */
+
+/* The time constant |q''|/|q'''| of what may be a transient: within the step accelerations change by more than they are. 0: none */
+PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
+{
+  Integrator     &I   = Get(ts);
+  const PetscReal old = I.h;
+  PetscReal       v, a, j;
+
+  PetscFunctionBegin;
+  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
+  PetscCall(CorrectionNorm(ts, I.V0, &v));
+  PetscCall(CorrectionNorm(ts, I.A0, &a));
+  PetscCall(CorrectionNorm(ts, rate, &j));
+  I.h  = old;
+  *tau = v > 0 && h * j > a && h * h * j > noticeable * v ? a / j : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The guess knows nothing of the transient, whose forces would make a matrix far from that of its end */
+PetscErrorCode GuessRest(const Integrator &I, Vec X)
+{
+  PetscScalar *x;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(X, &n));
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt i = 0; i < n; i++)
+    if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x[i] = 0;
+  PetscCall(VecRestoreArray(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V0 += h X in coordinates */
+PetscErrorCode TakeVelocities(const Integrator &I, PetscReal h)
+{
+  const PetscScalar *x;
+  PetscScalar       *v;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(I.V0, &n));
+  PetscCall(VecGetArrayRead(I.X, &x));
+  PetscCall(VecGetArray(I.V0, &v));
+  for (PetscInt i = 0; i < n; i++)
+    if (IsCoordinate(I, i)) v[i] += h * x[i];
+  PetscCall(VecRestoreArray(I.V0, &v));
+  PetscCall(VecRestoreArrayRead(I.X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0, V0 is
+   what a transient would leave (or as it was, if that could not be found), and the rest is to be made anew. */
+PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau)
+{
+  Integrator &I  = Get(ts);
+  PetscBool   ok = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *tau = 0;
+  PetscCall(TimeConstant(ts, h, rate, tau));
+  if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  I.implicit = PetscMin(constants * *tau, h);
+  PetscCall(GuessRest(I, I.X));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, PETSC_FALSE, &ok));
+  if (ok) PetscCall(TakeVelocities(I, I.implicit));
+  I.implicit = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
