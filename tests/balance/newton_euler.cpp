@@ -223,7 +223,7 @@ Imbalance NewtonEuler::judge(const std::vector<double> &values, const std::vecto
 {
   Imbalance worst = largest(bodies(values), [&](const BodyBalance &k) {
     const BodyResidual r = residualOf(k.body, left);
-    return std::make_pair((k.force + r.force).norm(), (k.moment + r.moment).norm());
+    return std::make_pair((k.force + r.force).norm() - r.force_rounding, (k.moment + r.moment).norm() - r.moment_rounding);
   });
   if (kinetic_ >= 0) {
     const double own = kinetic(values), reported = values[(std::size_t)kinetic_], off = std::abs(own - reported);

@@ -37,6 +37,7 @@ struct BodyBalance {
 struct BodyResidual {
   Vector3 force = Vector3::Zero(), moment = Vector3::Zero();
   double  force_allowed = 0, moment_allowed = 0;
+  double  force_rounding = 0, moment_rounding = 0; /* of loads evaluated twice */
 };
 
 struct Imbalance {

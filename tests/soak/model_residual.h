@@ -10,6 +10,8 @@
 
   And it may miss accelerations that move a position by a tenth of the tolerance within the step, which is what the
   integrator proves (src/integrator/verify.cpp): about an event, where steps are short, forces are known no better.
+
+  The same loads by channels have rounding of their own: stiffness and damping times some last digits of the unknowns.
 */
 #ifndef HHTDAE_SOAK_MODEL_RESIDUAL_H
 #define HHTDAE_SOAK_MODEL_RESIDUAL_H
@@ -45,10 +47,12 @@ public:
     PetscCall(VecDuplicate(U, &inertia));
     PetscCall(VecDuplicate(U, &stiffness));
     PetscCall(MatGetDiagonal(J, stiffness));
+    PetscCall(errors(ts, U, J, 16 * PETSC_MACHINE_EPSILON));
+    PetscCall(rounding(J));
     PetscCall(hhtdae::Jacobian(R_, t, U, V, A, gamma / (beta * h), 1 / (beta * h * h), J));
     PetscCall(MatGetDiagonal(J, inertia));
     PetscCall(VecAXPY(inertia, -1, stiffness));
-    PetscCall(errors(ts, U, J));
+    PetscCall(errors(ts, U, J, dq_));
     PetscCall(missing(U, inertia));
     PetscCall(loads(F, J));
     PetscCall(VecDestroy(&stiffness));
@@ -65,8 +69,18 @@ private:
   double                            dq_, tolerance_;
   std::vector<double>               error_; /* of each unknown */
   std::vector<double>               missing_; /* force of each row that moves its coordinate by a tenth of the tolerance */
+  std::vector<double>               rounding_; /* of the loads of each row, by that of the unknowns */
   std::vector<hhtest::BodyResidual> of_;
 
+  PetscErrorCode rounding(Mat J)
+  {
+    double diagonal;
+
+    PetscFunctionBegin;
+    rounding_.assign((std::size_t)R_.n, 0);
+    for (PetscInt i = 0; i < R_.n; i++) PetscCall(row(J, i, &rounding_[(std::size_t)i], &diagonal));
+    PetscFunctionReturn(0);
+  }
   /* sum of |J_ij| error_j */
   PetscErrorCode row(Mat J, PetscInt i, double *sum, double *diagonal)
   {
@@ -84,7 +98,7 @@ private:
     PetscFunctionReturn(0);
   }
   /* definitions after the unknowns that they are made of */
-  PetscErrorCode errors(TS ts, Vec U, Mat J)
+  PetscErrorCode errors(TS ts, Vec U, Mat J, double dq)
   {
     const PetscScalar *u;
     IS                 is;
@@ -105,7 +119,7 @@ private:
         if (defined)
           PetscCall(row(J, at[k], &sum, &diagonal));
         else
-          sum = dq_ * std::sqrt((double)n) * std::max(1., std::abs(u[at[k]]));
+          sum = dq * std::sqrt((double)n) * std::max(1., std::abs(u[at[k]]));
         own.push_back(sum / diagonal);
       }
       for (PetscInt k = 0; k < n; k++) error_[(std::size_t)at[k]] = own[(std::size_t)k];
@@ -140,7 +154,8 @@ private:
     for (std::size_t b = 0; b < of_.size(); b++) {
       const PetscInt           local  = R_.local_body[b];
       const hhtdae::LocalBody &body   = R_.bodies.body[(std::size_t)local];
-      Vector3                  left[] = {Vector3::Zero(), Vector3::Zero()}, most[] = {Vector3::Zero(), Vector3::Zero()};
+      Vector3                  left[] = {Vector3::Zero(), Vector3::Zero()}, most[] = {Vector3::Zero(), Vector3::Zero()},
+                               noise[] = {Vector3::Zero(), Vector3::Zero()};
       for (int g = 0; g < hhtdae::Groups(body.kind); g++)
         for (int c = 0; c < hhtdae::GroupSize(body.kind, g); c++) {
           const PetscInt i = R_.number.body[b] + hhtdae::GroupOffset(body.kind, g) + c;
@@ -149,10 +164,11 @@ private:
           left[g](to) = f[i];
           PetscCall(row(J, i, &most[g](to), &diagonal));
           most[g](to) += missing_[(std::size_t)i];
+          noise[g](to) = rounding_[(std::size_t)i];
         }
       hhtdae::Matrix3 G = hhtdae::Matrix3::Identity(); /* the rows of the Euler angles are G^T times the moment */
       if (hhtdae::HasEulerAngles(body.kind)) G = R_.bodies.now[(std::size_t)local].euler.G().inverse().transpose().eval();
-      of_[b] = {left[0], G * left[1], most[0].norm(), G.norm() * most[1].norm()};
+      of_[b] = {left[0], G * left[1], most[0].norm(), G.norm() * most[1].norm(), noise[0].norm(), G.norm() * noise[1].norm()};
     }
     PetscCall(VecRestoreArrayRead(F, &f));
     PetscFunctionReturn(0);
