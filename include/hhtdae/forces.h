@@ -125,8 +125,7 @@ struct EllipsoidPlane {
   ContactLaw law      = {};
   bool       state    = false;
 };
-/* tire: torus about z_i, plane as above. One that lies flat, to 1e-3 rad, has no lowest point: with u the part of the normal in its plane the force
-   acts 1e3 R (3/2 - 1e6 u.u/2) u from the middle, against u, so that it moves through the middle of the ring. */
+/* tire: torus about z_i, plane as above */
 struct TorusPlane {
   Marker     i, j;
   double     radius = 1, tube = 0.1;

@@ -131,7 +131,7 @@ Vector3 ElementLoads::touch(PetscInt element) const
   }
   if (const TorusPlane *s = specs_.of<TorusPlane>(element)) {
     const Vector3 axle = i.R.col(2), across = n - axle * axle.dot(n);
-    const double  y = across.squaredNorm() / 1e-6; /* about lying flat as forms of contact promise: through the middle */
+    const double  y = across.squaredNorm() / 1e-6; /* one that lies flat touches in the middle of its ring, see TorusPlaneShape */
     return i.x - s->radius * (y < 1 ? Vector3(1e3 * (1.5 - 0.5 * y) * across) : across.normalized()) - s->tube * n;
   }
   if (const SphereSphere *s = specs_.of<SphereSphere>(element)) {
