@@ -7,18 +7,18 @@
 
   A run at tolerance eps is right if at every sample time t
 
-    error(t) <= eps (N(t) + 50) (10 + 3 G(t)) + 2 t sqrt(eps n^(1/2) a / k),
+    error(t) <= eps (N(t) + 50) (10 + 3 G(t)) + 3 t sqrt(eps n^(1/2) a / k),
 
   N: its steps so far, each of which may leave an error of eps, and 50 for the start and impacts; G: how much the model
   itself makes grow of an error, as IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
-  10 eps_ref. The last part is for what lets go with an acceleration a: a step h over the jump of it misses a velocity of
-  up to a h, and the error test lets h = sqrt(eps n^(1/2) / (k a)) pass (k of (26), 0.1; the n coordinates share one norm). It is asked for as long as the right-hand side is below 1: later the tolerance does not determine the
-  solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
+  10 eps_ref. The last part is for what lets go with an acceleration a (the weight; loads of others make it more, hence
+  the 3): a step h over the jump of it misses a velocity of up to a h, and the error test lets
+  h = sqrt(eps n^(1/2) / (k a)) pass (k of (26), 0.1; the n coordinates share one norm). It is asked for as long as the
+  right-hand side is below 1: later the tolerance does not determine the solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
   error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
   (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
   first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that
-  of a run at eps / 1000 has to be smaller than both the first and the third,
-  or a sharper reference has to be nearer to it.
+  of a run at eps / 1000 has to be smaller than both the first and the third, or a sharper reference nearer to it.
 
   Besides, constraints have to hold to eps, and the reference has to keep the energy of a model that has no losses.
 
@@ -286,7 +286,7 @@ private:
     double doubt = 0;
     for (int l = 0; l <= k; l++) doubt = std::max(doubt, error(looser_, l));
     return eps * (double)(a.steps_at[(std::size_t)k] + 50) * (per_step + per_growth * doubt / (10 * reference_eps)) +
-           2 * SampleTime(model_.end, k + 1) * std::sqrt(eps * std::sqrt(6. * model_.bodies) * model_.jump / 0.1);
+           3 * SampleTime(model_.end, k + 1) * std::sqrt(eps * std::sqrt(6. * model_.bodies) * model_.jump / 0.1);
   }
 
   /* Samples for which the tolerance determines the solution; of these, whether all are right */
@@ -303,7 +303,7 @@ private:
       const double e = error(a, k), most = allowed(eps, a, k);
       o_.used = std::max(o_.used, e / most);
       if (e <= most) continue;
-      if (sharpen()) return right(eps, a, which);
+      if (sharpen(e)) return o_.verdict != Unknown && right(eps, a, which);
       if (e <= 3 * disturbance(0.5 * eps * (double)a.steps, k)) {
         o_.disturbed = 1;
         return true;
@@ -383,8 +383,9 @@ private:
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first)) stillFalls(first, second);
   }
 
-  /* Before a model is called wrong, once: the reference at a hundredth of its tolerance. IDA steps over the end of a brake, too. */
-  bool sharpen()
+  /* Before a model is called wrong, once: the reference at a hundredth of its tolerance. IDA steps over the end of a brake, too, and a reference
+     that still moves by a tenth of what is complained of is none. */
+  bool sharpen(double complaint)
   {
 #ifdef HHTDAE_HAVE_IDA
     if (sharpened_ || o_.by != ByIDA) return false;
@@ -392,8 +393,14 @@ private:
     o_.stage     = Referring;
     Trajectory t = RunIDA(build(), 0.01 * reference_eps, patience(10), &o_.legs);
     o_.stage     = Judging;
-    if (t.arrived()) std::swap(reference_, t);
-    return t.arrived();
+    if (!t.arrived()) return false;
+    const double differ = error(looser_);
+    std::swap(reference_, t);
+    if (error(t) > 0.3 * differ && error(t) > 0.1 * complaint) { /* two powers of ten further it should have moved by less than over the one before */
+      o_.verdict = Unknown;
+      SetText(o_.message, sizeof o_.message, hhtbench::Text("the reference moves by %.1e with its tolerance", error(t)));
+    }
+    return true;
 #else
     return false;
 #endif
@@ -409,7 +416,7 @@ private:
     if (!d.arrived()) return fail(Failed, "at a thousandth of the tolerance: " + d.failure);
     o_.stage          = Judging;
     const double last = largest(d, o_.window);
-    if ((last < 0.7 * first && last < 0.7 * finest_) || (sharpen() && largest(d, o_.window) < 0.3 * last)) return;
+    if ((last < 0.7 * first && last < 0.7 * finest_) || (sharpen(last) && (o_.verdict == Unknown || largest(d, o_.window) < 0.3 * last))) return;
     fail(Wrong, hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first,
                                  second, finest_, last));
   }
