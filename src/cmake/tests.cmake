@@ -88,9 +88,9 @@ if(GTest_FOUND)
   set_tests_properties(fuzz.readers PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS fuzz)
 endif()
 
-# A slice of the random models of "make soak", small ones of another seed, without stiff elements that switch, and without resumed runs
+# A slice of the random models of "make soak", small ones of another seed
 if(TARGET models)
-  add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -switches 0 -again 0 -output none)
+  add_test(NAME soak.models COMMAND models -small -seed 2 -count 100 -jobs 1 -output none)
   set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS soak)
 endif()
 
