@@ -205,7 +205,8 @@ template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBa
     const double                    gyration = k.mass > 0 ? std::sqrt(k.inertia / k.mass) : 0;
     const std::pair<double, double> missing  = amounts(k);
     hold(missing.first, k.forces, force, "force", k.body);
-    hold(missing.second, std::max(k.moments, 1e-9 * gyration * k.forces), moment, "moment", k.body);
+    /* where moments have died out rounding of forces times their arms is left of them */
+    hold(missing.second, std::max(k.moments, 1e-6 * gyration * k.forces), moment, "moment", k.body);
   }
   return worst;
 }
