@@ -338,6 +338,9 @@ PetscErrorCode UpdateParameters(TS ts)
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
 
+  Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
+  this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.
+
   References:
 + * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007
 - * - M. Arnold, O. Bruels, Multibody Syst. Dyn. 18, 2007
