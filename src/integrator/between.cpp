@@ -24,19 +24,15 @@ struct Line {
 /* along * the correction that the matrix would make at X(s); F: the residual there. Not a number if it makes none. */
 PetscErrorCode Along(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *phi)
 {
-  KSP                ksp;
-  KSPConvergedReason reason;
-  PetscScalar        dot;
+  PetscScalar dot;
+  PetscBool   solved;
 
   PetscFunctionBegin;
   PetscCall(VecWAXPY(l.X, -s, l.dX, l.begin));
   PetscCall(SNESComputeFunction(ts->snes, l.X, F));
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
-  PetscCall(KSPSolve(ksp, F, l.next));
-  Get(ts).stat.solves++;
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(AnswerOf(ts, F, l.next, &solved));
   PetscCall(VecDot(l.next, l.along, &dot));
-  *phi = reason >= 0 ? PetscRealPart(dot) : NAN;
+  *phi = solved ? PetscRealPart(dot) : NAN;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,8 +72,7 @@ PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
   *found = PETSC_FALSE;
   for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDuplicate(X, v));
   PetscCall(VecWAXPY(l.begin, 1, dX, X));
-  PetscCall(VecPointwiseMult(l.next, dX, I.weight));
-  PetscCall(VecPointwiseMult(l.along, l.next, I.weight));
+  PetscCall(WeightCorrection(I, dX, l.along));
   PetscCall(VecDot(l.along, dX, &begin));
   PetscCall(Search(ts, l, PetscRealPart(begin), F, &s, found));
   if (!*found) PetscCall(VecWAXPY(X, -1, dX, l.begin));

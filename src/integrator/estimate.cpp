@@ -189,6 +189,15 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* to = dX times the squares of its weights: a product with it is that of corrections, whose norm is CorrectionNorm() but for a factor */
+PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
+{
+  PetscFunctionBegin;
+  PetscCall(VecPointwiseMult(to, dX, I.weight));
+  PetscCall(VecPointwiseMult(to, to, I.weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* (26) of the coordinates: the sum of squares, or the largest, on this rank */
 static PetscErrorCode CoordinateErrors(const Integrator &I, NormType type, PetscReal *result)
 {

@@ -315,6 +315,7 @@ PetscBool      HooksUserTest(TS ts);
 PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found);
 /* rounding.cpp */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
+PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);
 PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e);
 /* claims.cpp */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
@@ -326,6 +327,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
+PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);

@@ -97,7 +97,8 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
   const PetscInt  left  = c.max_it - c.it;
 
   PetscFunctionBegin;
-  c.e = e;
+  c.e        = e;
+  c.rounding = PETSC_FALSE;
   if (PetscIsInfOrNanReal(e)) {
     PetscCall(Diverge(ts, "produced a correction that is not a number"));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -123,7 +124,7 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
     else PetscCall(FreshMatrixNextIteration(ts));
   } else if (xi >= 1 || left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
     PetscBool rounding = PETSC_FALSE;
-    if (I.mode == Mode::Step) PetscCall(IsRounding(ts, X, &rounding));
+    if (I.mode == Mode::Step && (c.base || xi >= slow)) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
     if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
     else if (c.renewals < max_renewals && left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
     else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
@@ -208,20 +209,16 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of `next` along dX, over dX */
-PetscErrorCode PartAlong(const Integrator &I, Vec dX, Vec next, PetscReal *part)
+/* Whether the correction `next` goes on in the direction of dX */
+PetscErrorCode GoesOn(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
 {
-  Vec         weighted;
   PetscScalar dot, square;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(dX, &weighted));
-  PetscCall(VecPointwiseMult(weighted, dX, I.weight));
-  PetscCall(VecPointwiseMult(weighted, weighted, I.weight));
-  PetscCall(VecDot(dX, weighted, &square));
-  PetscCall(VecDot(next, weighted, &dot));
-  PetscCall(VecDestroy(&weighted));
-  *part = PetscRealPart(square) > 0 ? PetscRealPart(dot / square) : 0;
+  PetscCall(WeightCorrection(I, dX, work));
+  PetscCall(VecDot(dX, work, &square));
+  PetscCall(VecDot(next, work, &dot));
+  *yes = (PetscBool)(PetscRealPart(dot) >= stagnant * PetscRealPart(square));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,23 +227,21 @@ PetscErrorCode PartAlong(const Integrator &I, Vec dX, Vec next, PetscReal *part)
    correction. So the next correction is asked for: that it is small is no proof if it goes on in the direction of the last one. */
 PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
 {
-  Integrator     &I   = Get(ts);
-  Corrector      &c   = I.corrector;
-  const PetscReal tol = Tolerance(I);
-  Vec             next;
-  PetscReal       e, part;
-  PetscBool       rounding = PETSC_FALSE;
+  Integrator     &I    = Get(ts);
+  Corrector      &c    = I.corrector;
+  const Vec       next = I.verify.work, work = I.verify.model; /* the proof has done with them */
+  const PetscReal tol  = Tolerance(I);
+  PetscReal       e;
+  PetscBool       goes_on = PETSC_TRUE, rounding = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(X, &next));
   PetscCall(SizeOfAnswer(ts, F, next, &e));
-  PetscCall(PartAlong(I, dX, next, &part));
-  PetscCall(VecDestroy(&next));
   const PetscReal xi = c.e > 0 ? e / c.e : 0;
-  if (CorrectorError(xi, e) <= tol || (e <= at_once * tol && part < stagnant)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
-  if (rounding) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g, %g of it in the same direction\n", (double)c.e, (double)e, (double)part));
+  if (CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e <= at_once * tol) PetscCall(GoesOn(I, dX, next, work, &goes_on));
+  if (goes_on && c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
+  if (!goes_on || rounding) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g\n", (double)c.e, (double)e));
   c.reason = SNES_CONVERGED_ITERATING;
   if (c.it >= c.max_it) PetscCall(Diverge(ts, "needs too many iterations"));
   else if (xi >= stagnant) PetscCall(FreshMatrices(ts));

@@ -40,19 +40,30 @@ PetscErrorCode Scatter(Vec noise, int sample, Vec r)
 
 } // namespace
 
-/* Of the correction that the matrix at hand makes of a residual r; 0 if it has none */
-PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
+/* The correction that the matrix at hand makes of a residual r */
+PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
 {
   KSP                ksp;
   KSPConvergedReason reason;
 
   PetscFunctionBegin;
-  *e = 0;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPSolve(ksp, r, dX));
   Get(ts).stat.solves++;
   PetscCall(KSPGetConvergedReason(ksp, &reason));
-  if (reason >= 0) PetscCall(CorrectionNorm(ts, dX, e));
+  *solved = (PetscBool)(reason >= 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Its size; 0 if it has none */
+PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
+{
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  *e = 0;
+  PetscCall(AnswerOf(ts, r, dX, &solved));
+  if (solved) PetscCall(CorrectionNorm(ts, dX, e));
   if (PetscIsInfOrNanReal(*e)) *e = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
