@@ -94,10 +94,8 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
     PetscCall(VecZeroEntries(I.A1));
     PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
   }
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.corrector.rate        = -1;
-  I.change.stale          = PETSC_TRUE;
+  ForgetMatrix(I);
+  I.change.stale = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -218,7 +218,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
 bool HasItsVectors(const Integrator &I)
 {
   const Verification &v = I.verify;
-  return (I.mode == Mode::Step || I.mode == Mode::Start) && (!I.have_misfit || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
+  return (!I.have_misfit || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
          (v.largest == 0 || (v.inertia && v.claim && v.noise));
 }
 

@@ -147,14 +147,6 @@ PetscErrorCode LoadFactor(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Ar
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing of the matrix survives */
-void Renew(Integrator &I)
-{
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.corrector.rate        = -1;
-}
-
 } // namespace
 
 PetscErrorCode SaveMatrix(TS ts, Archive &a)
@@ -208,7 +200,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
     if (good) PetscCall(LoadFactor(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;
-  if (!good) Renew(I);
+  if (!good) ForgetMatrix(I);
   if (!same)
     PetscCall(PetscInfo(ts, "resumed with %s: the run agrees with the uninterrupted one to the tolerance, maybe not bit for bit\n",
                         good ? "a linear solver that does not promise the same bits" : "a new Newton matrix, as the last one cannot be restored"));

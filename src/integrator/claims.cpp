@@ -1,4 +1,5 @@
 /* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
+#include "entries.h"
 #include "verify.h"
 
 namespace hht3
@@ -11,22 +12,6 @@ constexpr PetscReal least_claim = 10;  /* below it a correction is too small by 
 constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
 constexpr PetscReal variation   = 1e3;   /* inertia that seems to have fallen by more has cancelled in a sum */
 constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
-
-/* inertia_i: M_ii of coordinates, dF/ds' of states, the diagonal p of the matrix of the start; 0 for a coordinate without mass, but for
-   rounding, and for all others: of these nothing is asked */
-PetscErrorCode NoteInertia(TS ts, const PetscScalar *p, PetscInt n, PetscScalar *m)
-{
-  Integrator &I        = Get(ts);
-  PetscReal   local[2] = {0, 0}, sum[2];
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i) && PetscAbsScalar(p[i]) > 0) local[0] += PetscLogReal(PetscAbsScalar(p[i])), local[1] += 1;
-  PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  const PetscReal mean = sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1;
-  for (PetscInt i = 0; i < n; i++) m[i] = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(p[i]) > massless * mean ? PetscAbsScalar(p[i]) : 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 } // namespace
 
@@ -58,7 +43,7 @@ PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
 }
 
 /* claim_i of the matrix P with the inertia at hand, and the largest */
-static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
+static PetscErrorCode MakeClaims(TS ts, Mat P)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -71,7 +56,6 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   PetscCall(VecGetLocalSize(v.claim, &n));
   PetscCall(VecGetArray(v.claim, &p));
   PetscCall(VecGetArray(v.inertia, &m));
-  if (start) PetscCall(NoteInertia(ts, p, n, m));
   for (PetscInt i = 0; i < n; i++) {
     const TSHHT3Role r = RoleOf(I, i);
     p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
@@ -83,24 +67,46 @@ static PetscErrorCode MakeClaims(TS ts, Mat P, bool start)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To be called for every new matrix P, made at X */
+/* From the matrix P of the start. inertia_i: M_ii of coordinates, dF/ds' of states; 0 for a coordinate without mass, but for rounding, and
+   for all others: of these nothing is asked */
+PetscErrorCode NoteInertia(TS ts, Mat P)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscReal     local[2] = {0, 0}, sum[2];
+  PetscBool     has;
+
+  PetscFunctionBegin;
+  v.largest = v.since = 0;
+  PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
+  if (!has) PetscFunctionReturn(PETSC_SUCCESS);
+  for (Vec *x : {&v.inertia, &v.claim, &v.noise})
+    if (!*x) PetscCall(VecDuplicate(I.X, x));
+  PetscCall(MatGetDiagonal(P, v.inertia));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m) {
+      if (IsCoordinate(I, i) && PetscAbsScalar(m) > 0) local[0] += PetscLogReal(PetscAbsScalar(m)), local[1] += 1;
+    },
+    Read(v.inertia)));
+  PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  const PetscReal least = massless * (sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1);
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &m) { m = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(m) > least ? PetscAbsScalar(m) : 0; }, Write(v.inertia)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To be called for every new matrix P of a step, made at X */
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
-  const bool    start = I.mode == Mode::Start;
   PetscBool     has;
 
   PetscFunctionBegin;
   PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
-  if (!has || (!start && !v.inertia)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!v.inertia) PetscCall(VecDuplicate(I.X, &v.inertia));
-  if (!v.claim) PetscCall(VecDuplicate(I.X, &v.claim));
-  if (!v.noise) PetscCall(VecDuplicate(I.X, &v.noise));
-  PetscCall(MakeClaims(ts, P, start));
+  if (!has || !v.inertia) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MakeClaims(ts, P));
   PetscCall(VecZeroEntries(v.noise));
   v.measured = PETSC_FALSE;
-  if (start) v.largest = v.since = 0;
   if (Claims(I)) {
     if (!v.where) PetscCall(VecDuplicate(X, &v.where));
     PetscCall(VecCopy(X, v.where));
@@ -212,7 +218,7 @@ PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
   v.measured = PETSC_TRUE;
   PetscCall(MeasureInertia(ts));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(MakeClaims(ts, P, false));
+  PetscCall(MakeClaims(ts, P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

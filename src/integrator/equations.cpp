@@ -14,7 +14,7 @@
     states, V, F    F                                    (9c), (9d)
 
   and its Jacobian, D_r J(sigma_v, sigma_a) D_c, is the matrix (10) with the same row factors in D_r and the derivative of U
-  by X in D_c. Nothing is divided by h: for h -> 0 it tends to [M Phi_q^T; Phi_q 0].
+  by X in D_c. Nothing is divided by h: for h -> 0 it tends to [M Phi_q^T; Phi_q 0], the matrix of consistent.cpp.
 */
 #include "impl.h"
 #include "sweeps.h"
@@ -25,17 +25,9 @@ namespace hht3
 namespace
 {
 
-/* Shifts of the application's Jacobian and diagonal scalings that make it the Newton matrix */
-struct Scales {
-  PetscReal sv, sa;             /* d U'/dU, d U''/dU */
-  PetscReal coordinate, state;  /* columns */
-  PetscReal holonomic, velocity; /* rows */
-};
-
-Scales CurrentScales(const Integrator &I)
+Scales StepScales(const Integrator &I)
 {
   const PetscReal h = I.h;
-  if (I.mode == Mode::Start) return {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h};
   const Parameters &p = I.p;
   return {ShiftV(p, h),       ShiftA(p, h), ScalePosition(p, h), ScaleState(p, h), 1 / ScalePosition(p, h),
           1 / ScaleVelocity(p, h)};
@@ -81,30 +73,6 @@ PetscErrorCode TrueAccelerationRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (6b), (6c): in the start the constraint rows read Phi_q q'' + gamma = 0; the matrix holds Phi_q */
-PetscErrorCode AccelerationConstraintRows(TS ts, Vec X, Vec F)
-{
-  Integrator        &I = Get(ts);
-  const PetscScalar *g, *c;
-  PetscScalar       *f;
-  PetscInt           n;
-  Mat                P;
-
-  PetscFunctionBegin;
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(MatMult(P, X, I.work));
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(I.work, &g));
-  PetscCall(VecGetArrayRead(I.gamma, &c));
-  PetscCall(VecGetArray(F, &f));
-  for (PetscInt i = 0; i < n; i++)
-    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) f[i] = g[i] + c[i];
-  PetscCall(VecRestoreArray(F, &f));
-  PetscCall(VecRestoreArrayRead(I.gamma, &c));
-  PetscCall(VecRestoreArrayRead(I.work, &g));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* d[i] = value of the role of i */
 PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
 {
@@ -118,28 +86,23 @@ PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D_r; kept while h and the mode stay */
-PetscErrorCode FillRows(Integrator &I)
+/* D_r */
+PetscErrorCode FillRows(const Integrator &I, const Scales &s)
 {
-  const Scales s = CurrentScales(I);
-  PetscReal    value[TSHHT3_NUM_ROLES];
+  PetscReal value[TSHHT3_NUM_ROLES];
 
   PetscFunctionBegin;
-  if (I.scaled_h == I.h && I.scaled_mode == I.mode) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscReal &v : value) v = 1;
   value[TSHHT3_HOLONOMIC]    = s.holonomic;
   value[TSHHT3_NONHOLONOMIC] = s.velocity;
   PetscCall(FillByRole(I, value, I.row));
-  I.scaled_h    = I.h;
-  I.scaled_mode = I.mode;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* D_c = dU/dX */
-PetscErrorCode FillColumns(Integrator &I)
+PetscErrorCode FillColumns(const Integrator &I, const Scales &s)
 {
-  const Scales s = CurrentScales(I);
-  PetscReal    value[TSHHT3_NUM_ROLES];
+  PetscReal value[TSHHT3_NUM_ROLES];
 
   PetscFunctionBegin;
   for (PetscReal &v : value) v = 1;
@@ -181,9 +144,10 @@ PetscErrorCode ScaleResidual(Integrator &I, Vec F)
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(F, &n));
   PetscCall(VecGetArray(F, &f));
-  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, ScaledConstraints{I.moves.data(), CurrentScales(I).holonomic, f});
+  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, ScaledConstraints{I.moves.data(), StepScales(I).holonomic, f});
   else {
-    PetscCall(FillRows(I));
+    if (I.scaled_h != I.h) PetscCall(FillRows(I, StepScales(I)));
+    I.scaled_h = I.h;
     PetscCall(VecGetArrayRead(I.row, &row));
     Sweep(n, ScaledRows{row, f});
     PetscCall(VecRestoreArrayRead(I.row, &row));
@@ -196,7 +160,7 @@ PetscErrorCode ScaleResidual(Integrator &I, Vec F)
 PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 {
   Integrator     &I = Get(ts);
-  const Scales    s = CurrentScales(I);
+  const Scales    s = StepScales(I);
   const PetscReal sa = 1 / ScalePosition(I.p, I.h);
   PetscScalar    *r;
   PetscInt        n;
@@ -218,7 +182,7 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 } // namespace
 
 /* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already */
-PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
+PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
 {
   PetscBool mffd, triangle;
 
@@ -226,10 +190,11 @@ PetscErrorCode ScaleMatrix(Integrator &I, Mat A)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
   if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LinearStoresTriangle(A, &triangle));
-  if (I.coordinatesAlone()) PetscCall(MatScale(A, CurrentScales(I).coordinate));
+  if (I.coordinatesAlone()) PetscCall(MatScale(A, s.coordinate));
   else {
-    PetscCall(FillRows(I));
-    PetscCall(FillColumns(I));
+    PetscCall(FillRows(I, s));
+    PetscCall(FillColumns(I, s));
+    I.scaled_h = 0;
     if (triangle) PetscCall(ScaleTriangle(I, A));
     else PetscCall(MatDiagonalScale(A, I.row, I.col));
   }
@@ -270,10 +235,6 @@ PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
   PetscFunctionBegin;
   PetscCall(StageVectors(ts, X));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
-  if (I.mode == Mode::Start) {
-    if (I.constraints()) PetscCall(AccelerationConstraintRows(ts, X, F));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   if (I.F0) {
     if (I.definitions_use_acceleration) PetscCall(TrueAccelerationRows(ts, X, F));
     PetscCall(AddOldForces(I, F));
@@ -286,10 +247,9 @@ PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
 PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
 {
   Integrator      &I = Get(ts);
-  const Scales     s = CurrentScales(I);
+  const Scales     s = StepScales(I);
   PetscObjectState state;
   KSP              ksp;
-  PetscBool        symmetric;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.matrix, ts, 0, 0, 0));
@@ -297,27 +257,21 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P));
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
-    if (I.mode == Mode::Step && I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
-    PetscCall(ScaleMatrix(I, P));
-    if (J != P) PetscCall(ScaleMatrix(I, J));
+    if (I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
+    PetscCall(ScaleMatrix(I, s, P));
+    if (J != P) PetscCall(ScaleMatrix(I, s, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
   }
   PetscCall(NoteClaims(ts, X, P));
   I.corrector.h_matrix    = I.h;
-  I.corrector.have_matrix = (PetscBool)(I.mode == Mode::Step);
+  I.corrector.have_matrix = PETSC_TRUE;
   I.corrector.fresh       = PETSC_TRUE;
   I.corrector.rate        = -1;
   I.stat.factorizations++;
 
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (!I.linear_chosen || I.linear.cholesky) {
-    PetscCall(LinearIsSymmetric(P, &symmetric));
-    PetscBool numbers = PETSC_TRUE; /* NaN is not symmetric, but no reason to choose another solver */
-    if (I.linear_chosen && !symmetric) PetscCall(MatrixHasNumbers(P, &numbers));
-    if (!I.linear_chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, &I.linear));
-    I.linear_chosen = PETSC_TRUE;
-  }
-  PetscCall(Factor(ts, J, P));
+  PetscCall(ChooseSolver(ksp, P, &I.linear, &I.linear_chosen));
+  PetscCall(Factor(ts, ksp, J, P, &I.unfactored));
   if (I.unfactored) PetscCall(SNESSetJacobianDomainError(snes));
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

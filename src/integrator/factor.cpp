@@ -25,14 +25,14 @@ PetscErrorCode FailedReason(PC pc, PCFailedReason *reason)
 }
 
 /* No smaller step makes room. But pivots that are not numbers are delayed until nothing has room for them. */
-PetscErrorCode CheckMemory(TS ts, PC pc, Mat P)
+PetscErrorCode CheckMemory(TS ts, PC pc, Mat P, PCFailedReason failed)
 {
   PetscBool     numbers = PETSC_FALSE;
   MatSolverType package = NULL;
   PetscInt      n;
 
   PetscFunctionBegin;
-  if (Get(ts).unfactored != PC_FACTOR_OUTMEMORY) PetscFunctionReturn(PETSC_SUCCESS);
+  if (failed != PC_FACTOR_OUTMEMORY) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatrixHasNumbers(P, &numbers));
   PetscCall(MatGetSize(P, &n, NULL));
   PetscCall(PCFactorGetMatSolverType(pc, &package));
@@ -44,23 +44,35 @@ PetscErrorCode CheckMemory(TS ts, PC pc, Mat P)
 
 } // namespace
 
-PetscErrorCode Factor(TS ts, Mat J, Mat P)
+/* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
+PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen)
 {
-  Integrator &I = Get(ts);
-  KSP         ksp;
-  PC          pc;
+  PetscBool symmetric, numbers = PETSC_TRUE; /* NaN is not symmetric, but no reason to choose another solver */
 
   PetscFunctionBegin;
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  if (*chosen && !linear->cholesky) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LinearIsSymmetric(P, &symmetric));
+  if (*chosen && !symmetric) PetscCall(MatrixHasNumbers(P, &numbers));
+  if (!*chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, linear));
+  *chosen = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* failed: of the last factorization on entry, of this one on return, the same on all ranks */
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, PCFailedReason *failed)
+{
+  PC pc;
+
+  PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
   /* a factor that failed may keep its error: PCSetUp_LU() forgives zero pivots alone, and MUMPS under PETSc forgives nothing */
-  if (I.unfactored) PetscCall(PCReset(pc));
-  I.unfactored = PC_NOERROR;
+  if (*failed) PetscCall(PCReset(pc));
+  *failed = PC_NOERROR;
   PetscCall(KSPSetOperators(ksp, J, P));
   if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
   PetscCall(KSPSetUp(ksp));
-  PetscCall(FailedReason(pc, &I.unfactored));
-  PetscCall(CheckMemory(ts, pc, P));
+  PetscCall(FailedReason(pc, failed));
+  PetscCall(CheckMemory(ts, pc, P, *failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,8 +93,8 @@ PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Into the text of the failure */
-PetscErrorCode ExplainLinearFailure(TS ts)
+/* Into the text of the failure; h = 0: it has nothing to do with a step */
+PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
 {
   Integrator        &I = Get(ts);
   KSP                ksp;
@@ -92,7 +104,7 @@ PetscErrorCode ExplainLinearFailure(TS ts)
   KSPConvergedReason ended;
   PCFailedReason     reason;
   PetscBool          singular;
-  char               why[256] = "the Newton matrix is singular";
+  char               why[256] = "the Newton matrix is singular", step[32] = "";
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
@@ -104,7 +116,8 @@ PetscErrorCode ExplainLinearFailure(TS ts)
   PetscCall(KSPGetConvergedReason(ksp, &ended));
   if (!singular && reason) PetscCall(PetscSNPrintf(why, sizeof(why), "the preconditioner %s cannot treat this matrix, %s", pc_type, PCFailedReasons[reason]));
   else if (!singular) PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s", ksp_type, pc_type, KSPConvergedReasons[ended]));
-  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g, h = %g: %s", (double)I.t1, (double)I.h, why));
+  if (h > 0) PetscCall(PetscSNPrintf(step, sizeof(step), ", h = %g", (double)h));
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g%s: %s", (double)t, step, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,18 +6,13 @@
 #include "formulas.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
+#include <initializer_list>
 #include <vector>
 
 namespace hht3
 {
 
 constexpr PetscInt max_degree = 3; /* of the predictor */
-
-/* What the corrector's residual and matrix stand for */
-enum class Mode {
-  Step, /* (9) at t_{n+1} */
-  Start /* accelerations and multipliers from given q, q': h -> 0, constraints differentiated as in (6b), (6c) */
-};
 
 /*
   What a run is at any time is kept in plain structs, ...State: checkpoint.cpp writes them as they are, so that a field added to one of
@@ -137,8 +132,6 @@ struct StepState {
   PetscReal        t0 = 0, t1 = 0, h = 0; /* of the last accepted step, or of the attempt */
   PetscReal        h_last      = 0;       /* length of the step that led to t_n */
   PetscReal        t_begin     = 0;       /* of the run */
-  Mode             mode        = Mode::Step;
-  PetscReal        implicit    = 0;       /* h of the implicit step of settle.cpp, 0 in other starts */
   TSStepStatus     status      = TS_STEP_INCOMPLETE;
   PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
   PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
@@ -210,7 +203,6 @@ struct Integrator : StepState {
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
   PetscReal     scaled_h = 0;                 /* for which row stands */
-  Mode          scaled_mode = Mode::Step;
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */
@@ -241,7 +233,24 @@ struct Integrator : StepState {
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
+inline bool IsConstraint(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* The matrix of the run is another one than that of the last steps: the next correction makes its own */
+inline void ForgetMatrix(Integrator &I)
+{
+  I.corrector.have_matrix = PETSC_FALSE;
+  I.corrector.want_matrix = PETSC_TRUE;
+  I.corrector.h_matrix    = 0;
+  I.corrector.rate        = -1;
+}
+
+/* Shifts of the application's Jacobian and diagonal scalings that make it the Newton matrix */
+struct Scales {
+  PetscReal sv, sa;              /* d U'/dU, d U''/dU */
+  PetscReal coordinate, state;   /* columns */
+  PetscReal holonomic, velocity; /* rows */
+};
 
 /* c of (40) in force */
 inline PetscReal CorrectorTolerance(const Integrator &I)
@@ -284,10 +293,11 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
-PetscErrorCode ScaleMatrix(Integrator &I, Mat A);
+PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);
 /* factor.cpp */
-PetscErrorCode Factor(TS ts, Mat J, Mat P);
-PetscErrorCode ExplainLinearFailure(TS ts);
+PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, PCFailedReason *failed);
+PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
 /* equations.cpp */
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
@@ -296,12 +306,9 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts);
 PetscErrorCode Correct(TS ts, PetscBool *converged);
 /* iterate.cpp */
 PetscErrorCode CorrectorSetUp(TS ts);
-void           BeginIteration(Integrator &I);
 PetscErrorCode Iterate(TS ts, PetscBool *converged);
-PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok);
+PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, PetscBool *ok);
 PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal xnorm, PetscReal ynorm, PetscReal fnorm, SNESConvergedReason *reason, void *ctx);
-/* iterate_start.cpp */
-PetscErrorCode IterateStart(TS ts, PetscBool *converged);
 /* judge.cpp */
 PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 PetscErrorCode FreshMatrixNextIteration(TS ts);
@@ -318,6 +325,7 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);
 PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e);
 /* claims.cpp */
+PetscErrorCode NoteInertia(TS ts, Mat P);
 PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
@@ -339,9 +347,12 @@ PetscErrorCode Predict(TS ts, Vec X);
 PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok);
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok);
 PetscErrorCode NameRedundant(TS ts);
+PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V);
+PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current);
 PetscErrorCode Start(TS ts);
+/* repair.cpp */
 PetscErrorCode Repair(TS ts);
 PetscErrorCode TinyStep(TS ts, PetscBool *ok);
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);

@@ -19,7 +19,7 @@ const char *RoleName(const Integrator &I, PetscInt local)
 }
 
 /* The first row of the residual that is not a number, for the message */
-PetscErrorCode NameBadRow(TS ts, Vec F)
+PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F)
 {
   Integrator        &I = Get(ts);
   const PetscScalar *f;
@@ -41,9 +41,9 @@ PetscErrorCode NameBadRow(TS ts, Vec F)
   if (first < HHT3_INT_MAX) {
     PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
                             "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s",
-                            (double)I.t1, first, bad[0] == first ? ", " : "", bad[0] == first ? RoleName(I, first - start) : ""));
+                            (double)t, first, bad[0] == first ? ", " : "", bad[0] == first ? RoleName(I, first - start) : ""));
   } else {
-    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)I.t1));
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)t));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -89,12 +89,12 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
   PetscFunctionBegin;
   I.corrector.no_solve = (PetscBool)(reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN);
   if (I.corrector.no_solve) {
-    PetscCall(ExplainLinearFailure(ts));
+    PetscCall(ExplainLinearFailure(ts, I.t1, I.h));
   } else if (reason != SNES_DIVERGED_DTOL) {
     PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
     PetscReal norm;
     PetscCall(VecNorm(F, NORM_2, &norm));
-    if (PetscIsInfOrNanReal(norm)) PetscCall(NameBadRow(ts, F));
+    if (PetscIsInfOrNanReal(norm)) PetscCall(NameBadRow(ts, I.t1, F));
     else PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "SNES stopped with %s at t = %g, h = %g", SNESConvergedReasons[reason], (double)I.t1, (double)I.h));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,12 +170,9 @@ PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the state at t1 and the residual F there are numbers, named if not */
-PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok)
+/* Whether a residual, the first of all, and the state at t to which it belongs are numbers, named if not */
+PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, PetscBool *ok)
 {
-  Integrator &I     = Get(ts);
-  Vec         all[] = {F, I.U1, I.V1, I.A1};
-
   PetscFunctionBegin;
   *ok = PETSC_TRUE;
   for (Vec x : all) {
@@ -183,7 +180,7 @@ PetscErrorCode CheckNumbers(TS ts, Vec F, PetscBool *ok)
     PetscCall(VecNorm(x, NORM_2, &norm));
     if (PetscIsInfOrNanReal(norm)) *ok = PETSC_FALSE;
   }
-  if (!*ok) PetscCall(NameBadRow(ts, F));
+  if (!*ok) PetscCall(NameBadRow(ts, t, *all.begin()));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,7 +207,7 @@ PetscErrorCode CorrectorSetUp(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void BeginIteration(Integrator &I)
+static void BeginIteration(Integrator &I)
 {
   Corrector &c = I.corrector;
   c.it = c.base = c.renewals = 0;
@@ -247,7 +244,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   ts->snes_its += c.it;
   if (!*ok) PetscCall(ExplainSNES(ts, reason));
   if (*ok) PetscCall(StageVectors(ts, I.X));
-  if (*ok && (foreign || c.user_test)) PetscCall(CheckNumbers(ts, ts->snes->vec_func, ok));
+  if (*ok && (foreign || c.user_test)) PetscCall(CheckNumbers(ts, I.t1, {ts->snes->vec_func, I.U1, I.V1, I.A1}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -82,7 +82,6 @@ PetscErrorCode Diverge(TS ts, const char *why)
 PetscReal Tolerance(const Integrator &I)
 {
   const Corrector &c = I.corrector;
-  if (I.mode == Mode::Start) return 1e-13;
   const PetscReal tol = CorrectorTolerance(I);
   return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, 0.01, 1);
 }
@@ -118,13 +117,9 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
   c.xi_max           = PetscMax(c.xi_max, xi);
   if (CorrectorError(xi, e) <= tol) {
     c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-  } else if (I.mode == Mode::Start && xi > 0.3) {
-    if (e < 1e-8) c.reason = SNES_CONVERGED_SNORM_RELATIVE; /* rounding */
-    else if (left <= 0 || xi > 2) PetscCall(Diverge(ts, "finds no consistent accelerations"));
-    else PetscCall(FreshMatrixNextIteration(ts));
   } else if (xi >= 1 || left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
     PetscBool rounding = PETSC_FALSE;
-    if (I.mode == Mode::Step && (c.base || xi >= slow)) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
+    if (c.base || xi >= slow) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
     if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
     else if (c.renewals < max_renewals && left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
     else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
@@ -200,7 +195,7 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscBool  found;
 
   PetscFunctionBegin;
-  if (Get(ts).mode != Mode::Step || !(c.fresh || c.user_lag) || c.it >= c.max_it) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(c.fresh || c.user_lag) || c.it >= c.max_it) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(BetweenIterates(ts, X, dX, F, &found));
   *evaluated = found;
   if (!found) PetscFunctionReturn(PETSC_SUCCESS);

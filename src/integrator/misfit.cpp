@@ -91,18 +91,13 @@ PetscErrorCode TrySolve(TS ts, Vec dV, PetscBool *ok)
    with which the last correction failed, as it was singular: then another one. */
 PetscErrorCode SolveNormal(TS ts, Vec dV)
 {
-  Integrator     &I = Get(ts);
-  const PetscReal h = I.h, t1 = I.t1;
-  PetscBool       ok;
+  Integrator &I = Get(ts);
+  PetscBool   ok;
 
   PetscFunctionBegin;
   PetscCall(TrySolve(ts, dV, &ok));
   if (!ok) {
     PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-    I.mode                  = Mode::Step;
-    I.h                     = h;
-    I.t1                    = t1;
-    I.corrector.want_matrix = PETSC_TRUE;
     PetscCall(TrySolve(ts, dV, &ok));
   }
   if (!ok) PetscCall(VecZeroEntries(dV));

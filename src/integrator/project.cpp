@@ -9,6 +9,7 @@
   one-sided differences of the application's residual along q_0 + tau q'_0: exact in q'' by construction, blind to what
   happened before t_0 (a motion may start there), and each row takes the step tau at which it is most accurate.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -36,44 +37,22 @@ struct Refined {
   }
 };
 
-bool IsConstraint(const Integrator &I, PetscInt i)
+/* Copies the rows of holonomic constraints of F into R and clears the others */
+PetscErrorCode HolonomicRows(const Integrator &I, Vec F, Vec R)
 {
-  return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC;
-}
-
-/* Copies the constraint rows of F times s into R and clears the others */
-PetscErrorCode ConstraintRows(const Integrator &I, TSHHT3Role which, Vec F, Vec R)
-{
-  const PetscScalar *f;
-  PetscScalar       *r;
-  PetscInt           n;
-
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(F, &f));
-  PetscCall(VecGetArray(R, &r));
-  for (PetscInt i = 0; i < n; i++) r[i] = IsConstraint(I, i) && (which == TSHHT3_NUM_ROLES || RoleOf(I, i) == which) ? f[i] : 0;
-  PetscCall(VecRestoreArray(R, &r));
-  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &r) { r = RoleOf(I, i) == TSHHT3_HOLONOMIC ? f : 0; }, Read(F), Write(R)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Weighted root mean square of the entries of d that belong to coordinates, times s: in units of the tolerance */
 PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *x, *w;
-  PetscReal          sum = 0, total;
-  PetscInt           n;
+  Integrator &I   = Get(ts);
+  PetscReal   sum = 0, total;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(d, &n));
-  PetscCall(VecGetArrayRead(d, &x));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) == TSHHT3_COORDINATE) sum += PetscSqr(PetscRealPart(x[i] * w[i]) * s);
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(d, &x));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar w) { if (IsCoordinate(I, i)) sum += PetscSqr(PetscRealPart(x * w) * s); }, Read(d), Read(I.weight)));
   PetscCallMPI(MPI_Allreduce(&sum, &total, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   *e = PetscSqrtReal(total / PetscMax(I.norm_size, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -82,18 +61,8 @@ PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
 /* y -= d on coordinates */
 PetscErrorCode Move(const Integrator &I, Vec y, Vec d)
 {
-  const PetscScalar *x;
-  PetscScalar       *z;
-  PetscInt           n;
-
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(y, &n));
-  PetscCall(VecGetArrayRead(d, &x));
-  PetscCall(VecGetArray(y, &z));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) == TSHHT3_COORDINATE) z[i] -= x[i];
-  PetscCall(VecRestoreArray(y, &z));
-  PetscCall(VecRestoreArrayRead(d, &x));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &z) { if (IsCoordinate(I, i)) z -= x; }, Read(d), Write(y)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -158,7 +127,7 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     last = e;
     PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
     PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
-    PetscCall(ConstraintRows(I, TSHHT3_HOLONOMIC, I.gamma, I.work));
+    PetscCall(HolonomicRows(I, I.gamma, I.work));
     PetscCall(SolveStart(ts, I.work, I.X));
     PetscCall(Distance(ts, I.X, 1, &e));
     PetscCall(WorstRow(ts, I.work, &row, &value));
@@ -201,19 +170,15 @@ PetscErrorCode CheckVelocities(TS ts, PetscBool project, PetscReal *e, PetscInt 
 PetscErrorCode TimeScale(TS ts, PetscReal *T)
 {
   Integrator        &I = Get(ts);
-  const PetscScalar *v, *y;
-  PetscReal          local = 0, rate;
-  PetscInt           n;
+  PetscReal local = 0, rate;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(I.V0, &n));
-  PetscCall(VecGetArrayRead(I.V0, &v));
-  PetscCall(VecGetArrayRead(I.ymax, &y));
-  const PetscReal least = ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1;
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) == TSHHT3_COORDINATE) local = PetscMax(local, PetscAbsScalar(v[i]) / PetscMax(PetscRealPart(y[i]), PetscMax(least, 1e-8)));
-  PetscCall(VecRestoreArrayRead(I.ymax, &y));
-  PetscCall(VecRestoreArrayRead(I.V0, &v));
+  const PetscReal least = PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8);
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar v, PetscScalar y) {
+      if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
+    },
+    Read(I.V0), Read(I.ymax)));
   PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   /* not what is left of the run: differences over next to nothing are rounding */
   const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin ? ts->max_time - I.t_begin : 1;
@@ -228,7 +193,6 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   Integrator        &I = Get(ts);
   Vec                Ut, F, zero;
   PetscInt           n;
-  const PetscScalar *f;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(U, &n));
@@ -245,19 +209,14 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
         PetscCall(VecWAXPY(Ut, j * tau, V, U));
         PetscCall(EvaluateResidual(ts, t + j * tau, Ut, V, zero, F));
       }
-      PetscCall(VecGetArrayRead(F, &f));
-      for (PetscInt i = 0; i < n; i++) {
-        if (!IsConstraint(I, i)) continue;
-        if (j == 0) {
-          if (level == 0) f0[i] = PetscRealPart(f[i]);
-          s1[i] = first_weights[0] * f0[i];
-          s2[i] = second_weights[0] * f0[i];
-        } else {
-          s1[i] += first_weights[j] * PetscRealPart(f[i]);
-          s2[i] += second_weights[j] * PetscRealPart(f[i]);
-        }
-      }
-      PetscCall(VecRestoreArrayRead(F, &f));
+      PetscCall(ForEntries(
+        [&](PetscInt i, PetscScalar f) {
+          if (j == 0 && level == 0) f0[i] = PetscRealPart(f);
+          const PetscReal x = j ? PetscRealPart(f) : f0[i];
+          s1[i]             = (j ? s1[i] : 0) + first_weights[j] * x;
+          s2[i]             = (j ? s2[i] : 0) + second_weights[j] * x;
+        },
+        Read(F)));
     }
     for (PetscInt i = 0; i < n; i++) {
       if (!IsConstraint(I, i)) continue;
@@ -265,18 +224,17 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
       d2.take(i, level, s2[i] / (tau * tau));
     }
   }
-  PetscScalar *g;
   for (int order = 1; order <= 2; order++) {
     Vec out = order == 1 ? first : second;
     if (!out) continue;
-    PetscCall(VecGetArray(out, &g));
-    for (PetscInt i = 0; i < n; i++) {
-      g[i] = 0;
-      if (!IsConstraint(I, i)) continue;
-      if (I.role[i] == TSHHT3_HOLONOMIC) g[i] = order == 1 ? d1.best[i] : d2.best[i];
-      else g[i] = order == 1 ? f0[i] : d1.best[i];
-    }
-    PetscCall(VecRestoreArray(out, &g));
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar &g) {
+        g = 0;
+        if (!IsConstraint(I, i)) return;
+        if (I.role[i] == TSHHT3_HOLONOMIC) g = order == 1 ? d1.best[i] : d2.best[i];
+        else g = order == 1 ? f0[i] : d1.best[i];
+      },
+      Write(out)));
   }
   PetscCall(VecDestroy(&zero));
   PetscCall(VecDestroy(&F));

@@ -10,6 +10,7 @@
   less than the tolerance in the course of such a transient: a slower one is resolved. That it was one shows in its accelerations, which are
   gone; those of an oscillation would be as before.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -38,39 +39,6 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The guess knows nothing of the transient, whose forces would make a matrix far from that of its end */
-PetscErrorCode GuessRest(const Integrator &I, Vec X)
-{
-  PetscScalar *x;
-  PetscInt     n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(X, &n));
-  PetscCall(VecGetArray(X, &x));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x[i] = 0;
-  PetscCall(VecRestoreArray(X, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* V0 += h X in coordinates */
-PetscErrorCode TakeVelocities(const Integrator &I, PetscReal h)
-{
-  const PetscScalar *x;
-  PetscScalar       *v;
-  PetscInt           n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(I.V0, &n));
-  PetscCall(VecGetArrayRead(I.X, &x));
-  PetscCall(VecGetArray(I.V0, &v));
-  for (PetscInt i = 0; i < n; i++)
-    if (IsCoordinate(I, i)) v[i] += h * x[i];
-  PetscCall(VecRestoreArray(I.V0, &v));
-  PetscCall(VecRestoreArrayRead(I.X, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace
 
 /* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0, V0 is
@@ -84,11 +52,11 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   *tau = 0;
   PetscCall(TimeConstant(ts, h, rate, tau));
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  I.implicit = constants * *tau;
-  PetscCall(GuessRest(I, I.X));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, PETSC_FALSE, &ok));
-  if (ok) PetscCall(TakeVelocities(I, I.implicit));
-  I.implicit = 0;
+  const PetscReal euler = constants * *tau;
+  /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, PETSC_FALSE, &ok));
+  if (ok) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &v) { if (IsCoordinate(I, i)) v += euler * x; }, Read(I.X), Write(I.V0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

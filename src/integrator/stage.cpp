@@ -13,25 +13,6 @@ namespace hht3
 namespace
 {
 
-/* U1, V1, A1 in the start: q, q', s are given; a, s', lambda, V, F are the unknowns */
-void StartStage(const Integrator &I, PetscInt n, const PetscScalar *x, const PetscScalar *const base[], PetscScalar *u, PetscScalar *v, PetscScalar *a)
-{
-  const PetscReal h = I.implicit;
-  for (PetscInt i = 0; i < n; i++) {
-    switch (RoleOf(I, i)) {
-    case TSHHT3_COORDINATE:
-      a[i] = x[i];
-      if (h > 0) {
-        u[i] = base[0][i] + h * h * x[i];
-        v[i] = base[1][i] + h * x[i];
-      }
-      break;
-    case TSHHT3_STATE: v[i] = x[i]; break;
-    default: u[i] = x[i]; break;
-    }
-  }
-}
-
 struct Ends { /* of the step, read-only */
   const PetscScalar *u0, *v0, *a0, *x0, *begin; /* begin: q'_n as the step takes it, v0 or what VelocitiesAtBegin() has left in the base */
 };
@@ -186,7 +167,7 @@ PetscErrorCode HasStage(const Integrator &I, Vec X, bool *has)
   PetscFunctionBegin;
   PetscCall(PetscObjectGetId((PetscObject)X, &id));
   PetscCall(PetscObjectStateGet((PetscObject)X, &state));
-  *has = I.mode == Mode::Step && id == I.stage_id && state == I.stage_state;
+  *has = id == I.stage_id && state == I.stage_state;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -205,13 +186,10 @@ PetscErrorCode StageVectors(TS ts, Vec X)
   if (has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArrayRead(X, &x));
   PetscCall(GetStage(I, &s));
-  if (I.mode == Mode::Start) StartStage(I, s.n, x, s.base, s.to[0], s.to[1], s.to[2]);
-  else {
-    if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
-    else Sweep(s.n, MakeStage<false>(I, s, x));
-    StageOfStates(I, x, s.base, s.to);
-    PetscCall(NoteStage(I, X));
-  }
+  if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
+  else Sweep(s.n, MakeStage<false>(I, s, x));
+  StageOfStates(I, x, s.base, s.to);
+  PetscCall(NoteStage(I, X));
   PetscCall(RestoreStage(I, &s));
   PetscCall(VecRestoreArrayRead(X, &x));
   PetscFunctionReturn(PETSC_SUCCESS);

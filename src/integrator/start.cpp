@@ -1,15 +1,12 @@
 /*
-  A consistent start: q''_0, s'_0, lambda_0, V_0, F_0 from given q_0, q'_0, s_0.
-
-  As h -> 0 the matrix (10) becomes [M Phi_q^T; Phi_q 0], so that the start is solved by the step's own SNES in another mode:
-  equations of motion, states and definitions at t_0, constraints differentiated to the level of accelerations,
-  Phi_q q'' + (Phi_q q')_q q' + 2 Phi_qt q' + Phi_tt = 0 (6c), velocity-level ones once.
+  A consistent start: q''_0, s'_0, lambda_0, V_0, F_0 from given q_0, q'_0, s_0 (consistent.cpp).
 
   Then a second solve a little later gives q'''_0. From it come the first step, when the user gave none, and the start
   value of the algorithmic acceleration, a_0 = q''(t_0 + lag h): with a_0 = q''_0 the first steps excite an oscillation of
   the multipliers and an error of second order in q' (Arnold, Bruels 2007).
 */
-#include "impl.h"
+#include "consistent.h"
+#include "entries.h"
 
 namespace hht3
 {
@@ -17,87 +14,30 @@ namespace hht3
 namespace
 {
 
-/* Which entries of a vector of unknowns go where */
-PetscErrorCode CopyRoles(const Integrator &I, Vec from, Vec to, bool coordinates, bool states, bool algebraic)
-{
-  const PetscScalar *x;
-  PetscScalar       *y;
-  PetscInt           n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(from, &n));
-  PetscCall(VecGetArrayRead(from, &x));
-  PetscCall(VecGetArray(to, &y));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    if (r == TSHHT3_COORDINATE ? coordinates : r == TSHHT3_STATE ? states : algebraic) y[i] = x[i];
-  }
-  PetscCall(VecRestoreArray(to, &y));
-  PetscCall(VecRestoreArrayRead(from, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
-PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
-{
-  const PetscScalar *u0, *v0, *a0;
-  PetscScalar       *u, *v;
-  PetscInt           n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(VecGetArrayRead(I.U0, &u0));
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  PetscCall(VecGetArrayRead(I.A0, &a0));
-  PetscCall(VecGetArray(U, &u));
-  PetscCall(VecGetArray(V, &v));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    u[i]               = u0[i] + (r == TSHHT3_COORDINATE ? d * (v0[i] + d / 2 * a0[i]) : r == TSHHT3_STATE ? d * v0[i] : 0);
-    v[i]               = v0[i] + (r == TSHHT3_COORDINATE ? d * a0[i] : 0);
-  }
-  PetscCall(VecRestoreArray(V, &v));
-  PetscCall(VecRestoreArray(U, &u));
-  PetscCall(VecRestoreArrayRead(I.A0, &a0));
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
-  PetscCall(VecRestoreArrayRead(I.U0, &u0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* U1, V1, A1 = U, V, 0 and the mode, time and (tiny) step of the start */
-PetscErrorCode EnterStart(TS ts, PetscReal t, Vec U, Vec V)
+/* In the vectors, the matrix and the solver of the run. A matrix-free operator has nothing to differentiate before SNESSolve(): P alone. */
+PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 {
   Integrator &I = Get(ts);
-  PetscReal   T;
-
-  PetscFunctionBegin;
-  PetscCall(TimeScale(ts, &T));
-  I.mode = Mode::Start;
-  I.t1   = t;
-  I.h    = I.implicit > 0 ? I.implicit : 1e-28 * T; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
-  PetscCall(VecCopy(U, I.U1));
-  PetscCall(VecCopy(V, I.V1));
-  PetscCall(VecZeroEntries(I.A1));
-  if (I.implicit > 0) {
-    PetscCall(VecWAXPY(I.base[0], I.implicit, V, U));
-    PetscCall(VecCopy(V, I.base[1]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* There is no h to cut here: an application whose Jacobian is not a number is asked once more */
-PetscErrorCode MakeStartMatrix(TS ts)
-{
-  Integrator &I = Get(ts);
-  Mat         P; /* alone: a matrix-free operator has nothing to differentiate before SNESSolve() */
-  PetscBool   numbers = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(SNESSetUp(ts->snes));
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
-  PetscCall(MatrixHasNumbers(P, &numbers));
-  if (!numbers) PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &c->P, NULL, NULL));
+  PetscCall(SNESGetKSP(ts->snes, &c->ksp));
+  PetscCall(TimeScale(ts, &c->tiny));
+  c->tiny *= 1e-28; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
+  c->t      = t;
+  c->U      = I.U1;
+  c->V      = I.V1;
+  c->A      = I.A1;
+  c->X      = I.X;
+  c->linear = &I.linear;
+  c->chosen = &I.linear_chosen;
+  c->scaled = &I.scaled_state;
+  c->failed = &I.unfactored;
+  I.stage_id = 0; /* U1, V1, A1 belong to no stage from now on */
+  PetscCall(VecCopy(U, I.U1));
+  PetscCall(VecCopy(V, I.V1));
+  PetscCall(VecZeroEntries(I.A1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,7 +58,7 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(VecDuplicate(I.X, &V));
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, U, V, PETSC_FALSE, &ok));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, PETSC_FALSE, &ok));
   PetscCall(VecZeroEntries(rate));
   if (ok) {
     PetscCall(VecWAXPY(rate, -1, X0, I.X));
@@ -173,9 +113,6 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   Integrator        &I = Get(ts);
   Predictor         &p = I.predictor;
   const PetscReal    h = ts->time_step;
-  const PetscScalar *j;
-  PetscScalar       *x, *d0;
-  PetscInt           n;
   PetscReal          e;
 
   PetscFunctionBegin;
@@ -191,18 +128,13 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
     PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecGetLocalSize(rate, &n));
-  PetscCall(VecGetArrayRead(rate, &j));
-  PetscCall(VecGetArray(I.X0, &x));
-  PetscCall(VecGetArray(p.D[0], &d0));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    if (IsDifferential(r)) x[i] += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j[i];
-    if (r == TSHHT3_COORDINATE) d0[i] = x[i];
-  }
-  PetscCall(VecRestoreArray(p.D[0], &d0));
-  PetscCall(VecRestoreArray(I.X0, &x));
-  PetscCall(VecRestoreArrayRead(rate, &j));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar j, PetscScalar &x, PetscScalar &d) {
+      const TSHHT3Role r = RoleOf(I, i);
+      if (IsDifferential(r)) x += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j;
+      if (r == TSHHT3_COORDINATE) d = x;
+    },
+    Read(rate), Write(I.X0), Write(p.D[0])));
   if (e > 0) PetscCall(StartMisfit(ts, rate));
   if (e > 0 && (p.degree_max > 0 || I.count[TSHHT3_STATE])) {
     if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
@@ -218,40 +150,49 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
 PetscErrorCode Distribute(Integrator &I)
 {
   PetscFunctionBegin;
-  PetscCall(VecZeroEntries(I.A0));
-  PetscCall(CopyRoles(I, I.X, I.A0, true, false, false));
-  PetscCall(CopyRoles(I, I.X, I.V0, false, true, false));
-  PetscCall(CopyRoles(I, I.X, I.U0, false, false, true));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode ClearAlgebraicRates(Integrator &I, Vec V)
-{
-  PetscScalar *v;
-  PetscInt     n;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(V, &n));
-  PetscCall(VecGetArray(V, &v));
-  for (PetscInt i = 0; i < n; i++)
-    if (!IsDifferential(RoleOf(I, i))) v[i] = 0;
-  PetscCall(VecRestoreArray(V, &v));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const TSHHT3Role r                                     = RoleOf(I, i);
+      a                                                      = 0;
+      (r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u) = x;
+    },
+    Read(I.X), Write(I.U0), Write(I.V0), Write(I.A0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
 
+/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
+PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar a0, PetscScalar &u, PetscScalar &v) {
+      const TSHHT3Role r = RoleOf(I, i);
+      u                  = u0 + (r == TSHHT3_COORDINATE ? d * (v0 + d / 2 * a0) : r == TSHHT3_STATE ? d * v0 : 0);
+      v                  = v0 + (r == TSHHT3_COORDINATE ? d * a0 : 0);
+    },
+    Read(I.U0), Read(I.V0), Read(I.A0), Write(U), Write(V)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* X may be what a failed correction has left: multipliers that are not numbers would be part of the matrix */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
 {
   Integrator &I = Get(ts);
+  Consistent  c;
+  const char *why;
   PetscReal   norm;
+  PetscBool   ok;
 
   PetscFunctionBegin;
   PetscCall(VecNorm(I.X, NORM_2, &norm));
   if (PetscIsInfOrNanReal(norm)) PetscCall(VecCopy(I.X0, I.X));
-  PetscCall(EnterStart(ts, t, U, V));
-  PetscCall(MakeStartMatrix(ts));
+  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(TakeUnknowns(I, c));
+  PetscCall(ConsistentMatrix(ts, c, &ok, &why));
+  PetscCall(NoteInertia(ts, c.P));
+  ForgetMatrix(I);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,7 +213,7 @@ PetscErrorCode NameRedundant(TS ts)
   PetscCall(MatrixHasNumbers(P, &numbers));
   PetscCheck(numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g", (double)ts->ptime);
   PetscCall(MatrixIsSingular(ts, &is_singular));
-  if (!is_singular) PetscCall(ExplainLinearFailure(ts));
+  if (!is_singular) PetscCall(ExplainLinearFailure(ts, ts->ptime, 0));
   PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
   PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
@@ -294,40 +235,37 @@ PetscErrorCode NameRedundant(TS ts)
           "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);
 }
 
-/* X from U, V at t; X enters as the guess */
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok)
+/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok)
 {
   Integrator &I = Get(ts);
-  PetscReal   T;
+  Consistent  c;
+  const char *why;
 
   PetscFunctionBegin;
-  PetscCall(EnterStart(ts, t, U, V));
+  PetscCall(OfTheRun(ts, t, U, V, &c));
+  c.h        = h;
+  c.begin[0] = I.base[0];
+  c.begin[1] = I.base[1];
+  if (h > 0) PetscCall(VecWAXPY(c.begin[0], h, V, U));
+  if (h > 0) PetscCall(VecCopy(V, c.begin[1]));
   if (I.constraints()) {
-    PetscCall(TimeScale(ts, &T));
-    PetscCall(ConstraintDerivatives(ts, t, U, V, T, NULL, I.gamma));
+    c.gamma = I.gamma;
+    PetscCall(TimeScale(ts, &c.T));
+    PetscCall(ConstraintDerivatives(ts, t, U, V, c.T, NULL, c.gamma));
   }
-  if (!have_matrix) PetscCall(MakeStartMatrix(ts));
-  if (I.unfactored) {
-    I.mode = Mode::Step;
-    *ok    = PETSC_FALSE;
-    PetscCall(ExplainLinearFailure(ts));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  /* the matrix is made beforehand, since the first residual needs it */
-  const Corrector saved   = I.corrector;
-  I.corrector.want_matrix = PETSC_FALSE;
-  I.corrector.have_matrix = PETSC_TRUE;
-  I.corrector.floor       = 0;
-  I.corrector.no_solve    = PETSC_FALSE;
-  PetscCall(IterateStart(ts, ok));
-  const PetscBool no_solve = I.corrector.no_solve;
-  I.corrector             = saved;
-  I.corrector.no_solve    = no_solve;
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.corrector.h_matrix    = 0;
-  I.corrector.rate        = -1;
-  I.mode                  = Mode::Step;
+  if (!I.count[TSHHT3_STATE]) c.T = 0;
+  for (Vec *v : {&c.F, &c.d}) PetscCall(VecDuplicate(I.X, v));
+  PetscCall(SolveConsistent(ts, c, have_matrix, ok, &why));
+  for (Vec *v : {&c.F, &c.d}) PetscCall(VecDestroy(v));
+  if (!have_matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
+  ForgetMatrix(I);
+  ts->snes_its += c.its;
+  ts->ksp_its += c.ksp_its;
+  I.corrector.no_solve = (PetscBool)(I.unfactored != PC_NOERROR);
+  if (I.unfactored) PetscCall(ExplainLinearFailure(ts, t, 0));
+  else if (!*ok && why != I.failure) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "%s in the search for accelerations and multipliers at t = %g", why, (double)t));
+  PetscCall(SNESSetConvergedReason(ts->snes, *ok ? SNES_CONVERGED_SNORM_RELATIVE : SNES_DIVERGED_INNER)); /* for TSAdapt */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -343,9 +281,8 @@ PetscErrorCode Consistent(TS ts, PetscBool matrix_is_current, Vec rate)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(VecZeroEntries(I.X));
-  PetscCall(CopyRoles(I, I.U0, I.X, false, false, true));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, I.U0, I.V0, matrix_is_current, &ok));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = IsDifferential(RoleOf(I, i)) ? 0 : u; }, Read(I.U0), Write(I.X)));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, matrix_is_current, &ok));
   if (!ok) {
     if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
@@ -394,6 +331,8 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+} // namespace
+
 /* Everything of t_n from U0, V0: the common part of a start and of a repair */
 PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
 {
@@ -414,8 +353,6 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-} // namespace
-
 /* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode Start(TS ts)
 {
@@ -431,93 +368,12 @@ PetscErrorCode Start(TS ts)
   I.tiny_row = 0;
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
-  PetscCall(ClearAlgebraicRates(I, I.V0));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &v) { if (!IsDifferential(RoleOf(I, i))) v = 0; }, Write(I.V0)));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(CheckInitialState(ts, &current));
   PetscCall(StartFromState(ts, current));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
-  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So the
-  velocities of t_n are projected on the constraints and the step starts afresh, consistently, at the new h.
-*/
-PetscErrorCode Repair(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
-  PetscCall(PetscInfo(ts, "h falls from %g to %g at t = %g: velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
-  I.stat.restarts++;
-  if (!I.repaired) {
-    Vec now[2] = {I.U0, I.V0};
-    for (int k = 0; k < 2; k++) {
-      if (!I.accepted[k]) PetscCall(VecDuplicate(now[k], &I.accepted[k]));
-      PetscCall(VecCopy(now[k], I.accepted[k]));
-    }
-    I.repaired = PETSC_TRUE;
-  }
-  PetscCall(ProjectVelocities(ts));
-  PetscCall(StartFromState(ts, (PetscBool)!I.count[TSHHT3_NONHOLONOMIC]));
-  PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  A step so short that rounding of Phi, eps |q|/(beta h^2), would drown the accelerations: TSEvent may ask for one, or the
-  final time. q and q' advance by Taylor series, whose error is far below rounding of the corrector's, and accelerations
-  and multipliers are made consistent anew.
-*/
-PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
-{
-  Integrator &I = Get(ts);
-  PetscReal   T, e;
-
-  PetscFunctionBegin;
-  *tiny = PETSC_FALSE;
-  if (!I.count[TSHHT3_HOLONOMIC] || h > 1e-4 * I.h_regular) {
-    /* the common case is decided without a reduction: no step of regular size is tiny */
-    if (!I.count[TSHHT3_HOLONOMIC] || I.h_regular > 0) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  const PetscReal h0 = I.h;
-  I.h                = 1;
-  PetscCall(CorrectionNorm(ts, I.A0, &e));
-  I.h = h0;
-  PetscCall(TimeScale(ts, &T));
-  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
-  const PetscReal noise = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h);
-  *tiny                 = (PetscBool)(noise > 0.01 * a);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would */
-PetscErrorCode TinyStep(TS ts, PetscBool *ok)
-{
-  Integrator     &I = Get(ts);
-  const PetscReal h = I.h, t1 = I.t1;
-  Vec             U, V;
-
-  PetscFunctionBegin;
-  PetscCall(PetscInfo(ts, "step of %g is below what rounding of q allows the corrector: Taylor series\n", (double)h));
-  I.stat.tiny_steps++;
-  PetscCall(VecDuplicate(I.U0, &U));
-  PetscCall(VecDuplicate(I.U0, &V));
-  PetscCall(Advance(I, h, U, V));
-  PetscCall(VecCopy(I.predictor.D[0], I.X));
-  PetscCall(ConsistentAccelerations(ts, t1, U, V, PETSC_FALSE, ok));
-  I.h  = h;
-  I.t1 = t1;
-  if (*ok) {
-    /* the start has differentiated the constraints at times around t1: it need not have seen their values there */
-    PetscCall(EvaluateResidual(ts, t1, I.U1, I.V1, I.A1, U));
-    PetscCall(CheckNumbers(ts, U, ok));
-  }
-  PetscCall(VecDestroy(&V));
-  PetscCall(VecDestroy(&U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -21,6 +21,11 @@ public:
     std::uint64_t size = sizeof(T);
     bytes(&size, sizeof size);
     if (size != sizeof(T)) good = false;
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_clear_padding)
+    if (!reading) __builtin_clear_padding(&x); /* the same state makes the same file */
+#endif
+#endif
     bytes(&x, sizeof(T));
   }
 

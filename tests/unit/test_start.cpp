@@ -125,6 +125,38 @@ struct Dragged : Problem {
   }
 };
 
+/* A mass of 2 kg whose velocity is a state: 2 q'' + lambda = 0, s' + 3 s = 0, q' - s = 0 */
+struct Followed : Problem {
+  const double given; /* s' as the application says */
+  explicit Followed(double rate) : given(rate)
+  {
+    name = "followed";
+    n    = 3;
+    t1   = 1.;
+    role = {TSHHT3_COORDINATE, TSHHT3_STATE, TSHHT3_NONHOLONOMIC};
+  }
+  void initial(double *u, double *v) const override
+  {
+    u[0] = u[2] = v[2] = 0.;
+    u[1] = v[0] = 1.;
+    v[1]        = given;
+  }
+  void residual(double, const double *u, const double *v, const double *a, double *f) const override
+  {
+    f[0] = 2. * a[0] + u[2];
+    f[1] = v[1] + 3. * u[1];
+    f[2] = v[0] - u[1];
+  }
+  void jacobian(double, const double *, const double *, const double *, double sv, double sa, Entries &J) const override
+  {
+    J.add(0, 0, 2. * sa);
+    J.add(0, 2, 1.);
+    J.add(1, 1, sv + 3.);
+    J.add(2, 0, sv);
+    J.add(2, 1, -1.);
+  }
+};
+
 /* Two coordinates that share one mass */
 struct SharedMass : Problem {
   SharedMass()
@@ -190,6 +222,17 @@ TEST(Start, MotionThatBeginsAtTheStart)
     MEASURED("driven at w = %g: q''_0 to %.1e relative", w, std::abs(s.a[0] / (w * w) - 1.));
     EXPECT_NEAR(s.a[0] / (w * w), 1., 1e-6);
     EXPECT_NEAR(s.u[1] / (-2. * w * w), 1., 1e-6);
+  }
+}
+
+/* A constraint follows a state with the rate that the state has, whatever was given for it */
+TEST(Start, ConstraintsFollowStates)
+{
+  for (double given : {0., -3., 5.}) {
+    const StartValues s = startValues(Followed(given), tolerance(1e-6));
+    MEASURED("followed, s' given as %g: q''_0 %.10g (-3), lambda_0 %.10g (6)", given, s.a[0], s.u[2]);
+    EXPECT_NEAR(s.a[0], -3., 1e-8);
+    EXPECT_NEAR(s.u[2], 6., 1e-8);
   }
 }
 

@@ -1,0 +1,156 @@
+/*
+  Accelerations, multipliers and whatever else is algebraic at given positions, velocities and time: in starts, after steps that are too
+  short for the corrector, and between the ends of steps.
+
+    M q'' + Phi_q^T lambda = Q,    Phi_q q'' + gamma = 0,    gamma = (Phi_q q')_q q' + 2 Phi_qt q' + Phi_tt   (6c)
+
+  with velocity-level constraints differentiated once, and states, variables and force states by rows of their own. The matrix is (10) for
+  h -> 0, [M Phi_q^T; Phi_q 0], so that neither stiffness nor damping stands in it and a few corrections solve the equations. They end where they are
+  rounding, relative to the unknowns themselves: a tolerance there is none.
+
+  With h > 0 the velocities and positions follow from the accelerations, by the implicit Euler method (settle.cpp).
+*/
+#include "consistent.h"
+#include "entries.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* Corrections relative to the unknowns: converged; and the largest that may be rounding where they no longer fall */
+constexpr PetscReal converged = 1e-13, rounding = 1e-8;
+constexpr PetscReal slow      = 0.3; /* rate beyond which the matrix is made again at the iterate */
+constexpr PetscInt  max_it    = 20;
+
+/* Rows of constraints of F: Phi_q q'' + gamma. The columns of states are left out, since gamma follows s along V. */
+PetscErrorCode ConstraintRows(const Integrator &I, Consistent &c)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &d) { d = IsCoordinate(I, i) ? x : 0; }, Read(c.X), Write(c.d)));
+  PetscCall(MatMult(c.P, c.d, I.work));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar p, PetscScalar g, PetscScalar &f) { if (IsConstraint(I, i)) f = p + g; }, Read(I.work), Read(c.gamma), Write(c.F)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One correction of X, and its size relative to X, unless the solve failed on any rank */
+PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok)
+{
+  KSPConvergedReason reason;
+  PetscReal          d, x;
+  PetscInt           its;
+  PetscMPIInt        failed;
+
+  PetscFunctionBegin;
+  PetscCall(KSPSolve(c.ksp, c.F, c.d));
+  PetscCall(KSPGetIterationNumber(c.ksp, &its));
+  PetscCall(KSPGetConvergedReason(c.ksp, &reason));
+  Get(ts).stat.solves++;
+  Get(ts).stat.newton++;
+  c.its++;
+  c.ksp_its += its;
+  failed = reason < 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(VecAXPY(c.X, -1, c.d));
+  PetscCall(VecNorm(c.d, NORM_2, &d));
+  PetscCall(VecNorm(c.X, NORM_2, &x));
+  PetscCall(TakeUnknowns(Get(ts), c));
+  *e  = x > 0 ? d / x : d;
+  *ok = (PetscBool)(!failed && !PetscIsInfOrNanReal(d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* F at X */
+PetscErrorCode Residual(TS ts, Consistent &c)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (c.T > 0 && c.its) PetscCall(ConstraintDerivatives(ts, c.t, c.U, c.V, c.T, NULL, c.gamma));
+  PetscCall(EvaluateResidual(ts, c.t, c.U, c.V, c.A, c.F));
+  if (c.gamma) PetscCall(ConstraintRows(I, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U, V, A take X */
+PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c)
+{
+  const PetscReal h = c.h;
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const TSHHT3Role r                                     = RoleOf(I, i);
+      (r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u) = x;
+    },
+    Read(c.X), Write(c.U), Write(c.V), Write(c.A)));
+  if (h > 0)
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar x, PetscScalar u0, PetscScalar v0, PetscScalar &u, PetscScalar &v) {
+        if (!IsCoordinate(I, i)) return;
+        u = u0 + h * h * x;
+        v = v0 + h * x;
+      },
+      Read(c.X), Read(c.begin[0]), Read(c.begin[1]), Write(c.U), Write(c.V)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrix at U, V, A and its factors. An application whose matrix never changes may have left the scaled one in place. */
+PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why)
+{
+  Integrator      &I = Get(ts);
+  const PetscReal  h = c.h > 0 ? c.h : c.tiny;
+  PetscObjectState state;
+  PetscBool        numbers = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (int attempt = 0; attempt < 2 && !numbers; attempt++) { /* there is no h to cut: an application whose Jacobian is not a number is asked once more */
+    PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.P, c.P));
+    PetscCall(PetscObjectStateGet((PetscObject)c.P, &state));
+    if (state != *c.scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
+    PetscCall(PetscObjectStateGet((PetscObject)c.P, c.scaled));
+    PetscCall(MatrixHasNumbers(c.P, &numbers));
+  }
+  PetscCall(ChooseSolver(c.ksp, c.P, c.linear, c.chosen));
+  PetscCall(Factor(ts, c.ksp, c.P, c.P, c.failed));
+  I.stat.factorizations++;
+  if (!numbers && !*c.failed) *c.failed = PC_FACTOR_OTHER;
+  *ok  = (PetscBool)!*c.failed;
+  *why = !numbers ? "the application's Jacobian is not a number" : "the matrix is singular there, or the solver failed";
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.failed, where that was the linear solver. */
+PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
+{
+  PetscReal e = 0, last;
+  PetscBool renew = (PetscBool)!have_matrix;
+
+  PetscFunctionBegin;
+  *ok = PETSC_TRUE;
+  PetscCall(TakeUnknowns(Get(ts), c));
+  for (c.its = c.ksp_its = 0; c.its < max_it;) {
+    const PetscBool fresh = renew;
+    if (renew) PetscCall(ConsistentMatrix(ts, c, ok, why));
+    if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(Residual(ts, c));
+    PetscCall(CheckNumbers(ts, c.t, {c.F, c.U, c.V, c.A}, ok));
+    *why = Get(ts).failure;
+    if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+    last = e;
+    PetscCall(CorrectUnknowns(ts, c, &e, ok));
+    *why = "the matrix is singular there, or the solver failed";
+    if (!*ok) *c.failed = PC_SUBPC_ERROR;
+    const bool known = c.its > 1 && !fresh, falls = e <= slow * last;
+    if (!*ok || e <= converged || (known && (falls ? CorrectorError(e / last, e) <= converged : e <= rounding))) PetscFunctionReturn(PETSC_SUCCESS);
+    renew = (PetscBool)(c.its > 1 && !falls);
+  }
+  *ok  = PETSC_FALSE;
+  *why = "the iteration does not converge";
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,37 @@
+/* Accelerations and multipliers at given positions and velocities, consistent.cpp; and the matrix of the run for them, start.cpp. */
+#ifndef HHTDAE_CONSISTENT_H
+#define HHTDAE_CONSISTENT_H
+
+#include "impl.h"
+
+namespace hht3
+{
+
+/* Where they are solved for: in the vectors, matrix and solver of the run, or in those of samples between steps */
+struct Consistent {
+  Mat P   = nullptr; /* [M Phi_q^T; Phi_q 0] */
+  KSP ksp = nullptr;
+  Vec U = nullptr, V = nullptr, A = nullptr; /* the state; of it X has q'', s' and what is algebraic */
+  Vec X = nullptr;
+  Vec gamma = nullptr;               /* of the differentiated constraints (6b), (6c); null: there are none */
+  Vec F = nullptr, d = nullptr;      /* residual, correction */
+  PetscReal         t      = 0;
+  PetscReal         tiny   = 0;      /* the step that stands in the matrix for h -> 0 */
+  PetscReal         h      = 0;      /* of the implicit Euler method: q' = begin[1] + h q'', q = begin[0] + h^2 q''. 0: they are given */
+  Vec               begin[2] = {};
+  LinearChoice     *linear = nullptr;
+  PetscBool        *chosen = nullptr; /* linear has been chosen */
+  PetscObjectState *scaled = nullptr; /* of P when it was scaled last */
+  PCFailedReason   *failed = nullptr; /* of the last factorization */
+  PetscReal         T      = 0;       /* gamma is to be made again, for this time scale, once s' is known; 0: it need not */
+  PetscInt          its = 0, ksp_its = 0;
+};
+
+/* consistent.cpp */
+PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
+PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);
+PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why);
+
+} // namespace hht3
+
+#endif
