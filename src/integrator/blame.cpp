@@ -15,11 +15,9 @@ constexpr PetscReal hopeless = 0.1; /* part of a correction that the residual an
    matrix has them. -1: there are no such rows. */
 PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
 {
-  Integrator        &I = Get(ts);
-  Verification      &v = I.verify;
-  const PetscScalar *f, *m, *d;
-  PetscReal          sum[4];
-  Vec                Y, change;
+  Verification &v = Get(ts).verify;
+  PetscReal     sum[4];
+  Vec           Y, change;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(dX, &Y));
@@ -29,18 +27,15 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
   PetscCall(VecAYPX(change, -1, F_where));
   PetscCall(PassDefinitionsOn(ts, change));
   PetscCall(VecAXPY(change, -way, forces));
-  PetscCall(VecGetArrayRead(F, &f));
-  PetscCall(VecGetArrayRead(change, &d));
-  PetscCall(VecGetArrayRead(v.model, &m));
-  PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
-    const PetscReal model = PetscRealPart(m[i]) * s.answer;
-    if (PetscAbsReal(way * model) < 10 * s.rounding || Followed(s, PetscRealPart(f[i]), PetscRealPart(m[i]))) return;
-    local[1] += PetscRealPart(d[i]) * s.answer * model;
-    local[2] += way * model * model;
-  }));
-  PetscCall(VecRestoreArrayRead(v.model, &m));
-  PetscCall(VecRestoreArrayRead(change, &d));
-  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(SumRows(
+    ts, sum,
+    [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
+      const PetscReal model = m * s.answer;
+      if (PetscAbsReal(way * model) < 10 * s.rounding || Followed(s, f, m)) return;
+      local[1] += d * s.answer * model;
+      local[2] += way * model * model;
+    },
+    Read(F), Read(v.model), Read(change)));
   PetscCall(VecDestroy(&change));
   PetscCall(VecDestroy(&Y));
   *answer = sum[2] != 0 ? PetscAbsReal(sum[1] / sum[2]) : -1;

@@ -7,13 +7,13 @@
   new coordinates, and neither a rejection nor a roll-back leads to the old ones. What is mapped and how stands in
   history.cpp, what the constraints make of it in misfit.cpp. Of the rest:
 
-    weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at
-  once to what an angle happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same
-  h would fail the test that it has just passed. Kept, an entry's tolerance can only grow, as everywhere. h shortened
-  where the prediction tells that the error test would fail in the new coordinates matrix    made anew before the next
-  correction, from the prediction, with no more factorizations than one per change F0        of the paper's form:
-  evaluated anew, after commit dV        of misfit.cpp belongs to a step, and is measured in the new coordinates if h
-  changes
+    weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at once to what an angle
+            happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same h would fail the test that it has
+            just passed. Kept, an entry's tolerance can only grow, as everywhere.
+  h         shortened where the prediction tells that the error test would fail in the new coordinates
+  matrix    made anew before the next correction, from the prediction, with no more factorizations than one per change
+  F0        of the paper's form: evaluated anew, after commit
+  dV        of misfit.cpp belongs to a step, and is measured in the new coordinates if h changes
 */
 #include "impl.h"
 
@@ -165,16 +165,15 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
 } // namespace hht3
 
 /*@C
-  TSHHT3SetCoordinateChange - Lets the application take new generalized coordinates in the course of a run, without a
-restart
+  TSHHT3SetCoordinateChange - Lets the application take new generalized coordinates in the course of a run, without a restart
 
   Logically Collective
 
   Input Parameters:
 + ts     - the `TS` context
 . test   - whether new coordinates are wanted, or `NULL` for none ever
-. map    - from the old to the new coordinates; `NULL` if `test` never asks for any, and only takes note of accepted
-states . commit - the change is done, or `NULL`
+. map    - from the old to the new coordinates; `NULL` if `test` never asks for any, and only takes note of accepted states
+. commit - the change is done, or `NULL`
 - ctx    - context of the three functions
 
   Calling sequence of `test`:
@@ -200,21 +199,19 @@ states . commit - the change is done, or `NULL`
   Level: advanced
 
   Notes:
-  All three are called collectively. `test` sees every accepted state once, at the beginning of the step that starts
-from it, when monitors and dense output of the last step are over, and initial and otherwise changed states before their
-consistent start. Where it asks for a change, `map` is called for several triples, at times around that of the state: q^
-= T(q), q^' = T_q q', q^'' = T_q q'' + (T_q q')_q q', with one and the same smooth T, chosen by `test`. It must not
-depend on time nor on how often it is called, must change coordinates only, and must leave what it does not change as it
-is, bit for bit. During `map` the residual is not evaluated; from `commit` on it is, in the new coordinates only. Before
-a consistent start A is zero and what becomes of it is not used.
+  All three are called collectively. `test` sees every accepted state once, at the beginning of the step that starts from it, when monitors
+  and dense output of the last step are over, and initial and otherwise changed states before their consistent start. Where it asks for a
+  change, `map` is called for several triples, at times around that of the state: q^ = T(q), q^' = T_q q', q^'' = T_q q'' + (T_q q')_q q',
+  with one and the same smooth T, chosen by `test`. It must not depend on time nor on how often it is called, must change coordinates only,
+  and must leave what it does not change as it is, bit for bit. During `map` the residual is not evaluated; from `commit` on it is, in the
+  new coordinates only. Before a consistent start A is zero and what becomes of it is not used.
 
-  Multipliers, variables and force states keep their values: constraints and definitions must mean the same in both
-coordinates. Each entry keeps the largest value so far in its weight of the error test, and so should keep its unit and
-scale.
+  Multipliers, variables and force states keep their values: constraints and definitions must mean the same in both coordinates. Each entry
+  keeps the largest value so far in its weight of the error test, and so should keep its unit and scale.
 
-  A change is not taken back: steps that are rejected or rolled back start again in the new coordinates, without another
-call of `test`. What the new coordinates depend on belongs into the vector of `TSHHT3SetCheckpointVec()`; after a
-checkpoint is loaded, `commit` is called for the application to read it there.
+  A change is not taken back: steps that are rejected or rolled back start again in the new coordinates, without another call of `test`. What
+  the new coordinates depend on belongs into the vector of `TSHHT3SetCheckpointVec()`; after a checkpoint is loaded, `commit` is called for
+  the application to read it there.
 
 .seealso: `TSHHT3`, `TSHHT3SetCheckpointVec()`, `TSRestartStep()`, `TSRollBack()`
 @*/

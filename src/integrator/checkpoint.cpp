@@ -11,6 +11,7 @@
 */
 #include "impl.h"
 #include "checkpoint_file.h"
+#include "entries.h"
 #include "linear/archive.h"
 #include <cstdint>
 #include <string>
@@ -242,30 +243,23 @@ PetscErrorCode Probe(TS ts, Vec F)
 
 PetscErrorCode CheckProbe(TS ts, const char file[], Vec was, Vec is)
 {
-  const PetscScalar *x, *y;
-  PetscReal          scale = 0;
-  PetscInt           n, start, bad[2] = {HHT3_INT_MAX, 0}, first;
+  PetscReal scale = 0, rows[2] = {0, 0}, pair[2] = {0, 0};
+  PetscInt  start, bad = HHT3_INT_MAX, first;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(was, &n));
   PetscCall(VecGetOwnershipRange(was, &start, NULL));
-  PetscCall(VecGetArrayRead(was, &x));
-  PetscCall(VecGetArrayRead(is, &y));
-  for (PetscInt i = 0; i < n; i++)
-    if (!PetscIsInfOrNanScalar(x[i])) scale = PetscMax(scale, PetscAbsScalar(x[i]));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar x) { if (!PetscIsInfOrNanScalar(x)) scale = PetscMax(scale, PetscAbsScalar(x)); }, Read(was)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt i = n - 1; i >= 0; i--) {
-    if (PetscIsInfOrNanScalar(x[i]) && PetscIsInfOrNanScalar(y[i])) continue;
-    if (!(PetscAbsScalar(x[i] - y[i]) <= other_problem * scale)) bad[0] = start + i;
-  }
-  PetscCallMPI(MPI_Allreduce(&bad[0], &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  PetscReal rows[2] = {0, 0};
-  if (first == bad[0] && first < HHT3_INT_MAX) {
-    rows[0] = PetscRealPart(x[first - start]);
-    rows[1] = PetscRealPart(y[first - start]);
-  }
-  PetscCall(VecRestoreArrayRead(is, &y));
-  PetscCall(VecRestoreArrayRead(was, &x));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar y) {
+      if (bad < HHT3_INT_MAX || (PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) || PetscAbsScalar(x - y) <= other_problem * scale) return;
+      bad     = start + i;
+      pair[0] = PetscRealPart(x);
+      pair[1] = PetscRealPart(y);
+    },
+    Read(was), Read(is)));
+  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  if (first == bad) rows[0] = pair[0], rows[1] = pair[1];
   if (first == HHT3_INT_MAX) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED,

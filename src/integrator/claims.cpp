@@ -18,51 +18,21 @@ constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some ter
 /* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
 bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
 
-PetscErrorCode GetRowScales(const Integrator &I, RowScales *s)
-{
-  PetscFunctionBegin;
-  s->claimed[0] = PetscAbsReal(I.p.k) * I.h * I.h;
-  s->claimed[1] = I.p.gamma_s * I.h;
-  s->answer[0]  = s->claimed[0] / I.p.ca();
-  s->answer[1]  = s->claimed[1] / StateInertia(I.p);
-  PetscCall(VecGetArrayRead(I.weight, &s->w));
-  PetscCall(VecGetArrayRead(I.verify.claim, &s->c));
-  PetscCall(VecGetArrayRead(I.verify.inertia, &s->m));
-  PetscCall(VecGetArrayRead(I.verify.noise, &s->noise));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s)
-{
-  PetscFunctionBegin;
-  PetscCall(VecRestoreArrayRead(I.verify.noise, &s->noise));
-  PetscCall(VecRestoreArrayRead(I.verify.inertia, &s->m));
-  PetscCall(VecRestoreArrayRead(I.verify.claim, &s->c));
-  PetscCall(VecRestoreArrayRead(I.weight, &s->w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* claim_i of the matrix P with the inertia at hand, and the largest */
 static PetscErrorCode MakeClaims(TS ts, Mat P)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
-  PetscScalar  *p, *m;
   PetscReal     largest = 0;
-  PetscInt      n;
 
   PetscFunctionBegin;
   PetscCall(MatGetDiagonal(P, v.claim));
-  PetscCall(VecGetLocalSize(v.claim, &n));
-  PetscCall(VecGetArray(v.claim, &p));
-  PetscCall(VecGetArray(v.inertia, &m));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    p[i]    = PetscRealPart(m[i]) > 0 ? PetscAbsScalar(p[i]) / (m[i] * (r == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
-    largest = PetscMax(largest, PetscRealPart(p[i]));
-  }
-  PetscCall(VecRestoreArray(v.inertia, &m));
-  PetscCall(VecRestoreArray(v.claim, &p));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m, PetscScalar &p) {
+      p       = PetscRealPart(m) > 0 ? PetscAbsScalar(p) / (m * (RoleOf(I, i) == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
+      largest = PetscMax(largest, PetscRealPart(p));
+    },
+    Read(v.inertia), Write(v.claim)));
   PetscCallMPI(MPI_Allreduce(&largest, &v.largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -121,29 +91,22 @@ static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 
    terms that make up positions and states */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
-  Integrator        &I = Get(ts);
-  const PetscReal    position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);
-  const PetscScalar *y, *v;
-  PetscScalar       *x;
-  Vec                near;
-  PetscInt           n, first;
+  Integrator     &I = Get(ts);
+  const PetscReal position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);
+  Vec             near;
+  PetscInt        first;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(X, &near));
   PetscCall(VecCopy(X, near));
-  PetscCall(VecGetLocalSize(X, &n));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
-  PetscCall(VecGetArray(near, &x));
-  PetscCall(VecGetArrayRead(I.ymax, &y));
-  PetscCall(VecGetArrayRead(I.V1, &v));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r    = RoleOf(I, i);
-    const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y[i]) + I.h * PetscAbsScalar(v[i])) * (r == TSHHT3_STATE ? state : position) : 0;
-    x[i] += rounding_of_sums * RandomSign(first + i) * (PetscAbsScalar(x[i]) + size);
-  }
-  PetscCall(VecRestoreArrayRead(I.V1, &v));
-  PetscCall(VecRestoreArrayRead(I.ymax, &y));
-  PetscCall(VecRestoreArray(near, &x));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar y, PetscScalar v, PetscScalar &x) {
+      const TSHHT3Role r    = RoleOf(I, i);
+      const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y) + I.h * PetscAbsScalar(v)) * (r == TSHHT3_STATE ? state : position) : 0;
+      x += rounding_of_sums * RandomSign(first + i) * (PetscAbsScalar(x) + size);
+    },
+    Read(I.ymax), Read(I.V1), Write(near)));
   PetscCall(SNESComputeFunction(ts->snes, near, noise));
   PetscCall(VecAXPY(noise, -1, F));
   PetscCall(VecAbs(noise));
@@ -155,30 +118,20 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 /* z = 1/weight with random signs: accelerations of the size that the tolerances mean; zero where there is no coordinate */
 static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *w;
-  PetscScalar       *z;
-  PetscInt           n, first;
+  Integrator &I = Get(ts);
+  PetscInt    first;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(Z, &n));
   PetscCall(VecGetOwnershipRange(Z, &first, NULL));
-  PetscCall(VecGetArray(Z, &z));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i = 0; i < n; i++) z[i] = IsCoordinate(I, i) ? RandomSign(first + i) / (PetscRealPart(w[i]) > 0 ? w[i] : 1) : 0;
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArray(Z, &z));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel */
 static PetscErrorCode MeasureInertia(TS ts)
 {
-  Integrator        &I = Get(ts);
-  Vec                Z, A, F, change;
-  const PetscScalar *z, *f, *noise;
-  PetscScalar       *m;
-  PetscInt           n;
+  Integrator &I = Get(ts);
+  Vec         Z, A, F, change;
 
   PetscFunctionBegin;
   for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDuplicate(I.X, v));
@@ -187,20 +140,13 @@ static PetscErrorCode MeasureInertia(TS ts)
   PetscCall(VecWAXPY(A, 1, Z, I.A1));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, change));
   PetscCall(VecAXPY(change, -1, F));
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(Z, &z));
-  PetscCall(VecGetArrayRead(change, &f));
-  PetscCall(VecGetArrayRead(I.verify.noise, &noise));
-  PetscCall(VecGetArray(I.verify.inertia, &m));
-  for (PetscInt i = 0; i < n; i++) {
-    if (!IsCoordinate(I, i)) continue;
-    const PetscReal now = PetscAbsScalar(f[i] / z[i]);
-    if (PetscAbsScalar(f[i]) > PetscRealPart(noise[i]) && now > PetscRealPart(m[i]) / variation) m[i] = now;
-  }
-  PetscCall(VecRestoreArray(I.verify.inertia, &m));
-  PetscCall(VecRestoreArrayRead(I.verify.noise, &noise));
-  PetscCall(VecRestoreArrayRead(change, &f));
-  PetscCall(VecRestoreArrayRead(Z, &z));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar z, PetscScalar f, PetscScalar noise, PetscScalar &m) {
+      if (!IsCoordinate(I, i)) return;
+      const PetscReal now = PetscAbsScalar(f / z);
+      if (PetscAbsScalar(f) > PetscRealPart(noise) && now > PetscRealPart(m) / variation) m = now;
+    },
+    Read(Z), Read(change), Read(I.verify.noise), Write(I.verify.inertia)));
   for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

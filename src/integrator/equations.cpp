@@ -16,6 +16,7 @@
   and its Jacobian, D_r J(sigma_v, sigma_a) D_c, is the matrix (10) with the same row factors in D_r and the derivative of U
   by X in D_c. Nothing is divided by h: for h -> 0 it tends to [M Phi_q^T; Phi_q 0], the matrix of consistent.cpp.
 */
+#include "entries.h"
 #include "impl.h"
 #include "sweeps.h"
 
@@ -36,19 +37,10 @@ Scales StepScales(const Integrator &I)
 /* (9a): what the average takes from t_n. f_n is evaluated once per step, at the end of the last one */
 PetscErrorCode AddOldForces(const Integrator &I, Vec F)
 {
-  const PetscReal    w = -I.alpha / (1 + I.alpha);
-  const PetscScalar *f0;
-  PetscScalar       *f;
-  PetscInt           n;
+  const PetscReal w = -I.alpha / (1 + I.alpha);
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(I.F0, &f0));
-  PetscCall(VecGetArray(F, &f));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) == TSHHT3_COORDINATE) f[i] += w * f0[i];
-  PetscCall(VecRestoreArray(F, &f));
-  PetscCall(VecRestoreArrayRead(I.F0, &f0));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar &f) { if (IsCoordinate(I, i)) f += w * f0; }, Read(I.F0), Write(F)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -56,33 +48,19 @@ PetscErrorCode AddOldForces(const Integrator &I, Vec F)
    only for problems that have such definitions */
 PetscErrorCode TrueAccelerationRows(TS ts, Vec X, Vec F)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *g;
-  PetscScalar       *f;
-  PetscInt           n;
+  Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, X, I.work));
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(I.work, &g));
-  PetscCall(VecGetArray(F, &f));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) != TSHHT3_COORDINATE) f[i] = g[i];
-  PetscCall(VecRestoreArray(F, &f));
-  PetscCall(VecRestoreArrayRead(I.work, &g));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar g, PetscScalar &f) { if (!IsCoordinate(I, i)) f = g; }, Read(I.work), Write(F)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* d[i] = value of the role of i */
 PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
 {
-  const PetscInt n = (PetscInt)I.role.size();
-  PetscScalar   *x;
-
   PetscFunctionBegin;
-  PetscCall(VecGetArrayWrite(d, &x));
-  for (PetscInt i = 0; i < n; i++) x[i] = value[I.role[i]];
-  PetscCall(VecRestoreArrayWrite(d, &x));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x = value[I.role[i]]; }, Write(d)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,17 +140,12 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
   Integrator     &I = Get(ts);
   const Scales    s = StepScales(I);
   const PetscReal sa = 1 / ScalePosition(I.p, I.h);
-  PetscScalar    *r;
-  PetscInt        n;
 
   PetscFunctionBegin;
   if (!I.second) PetscCall(MatDuplicate(P, MAT_DO_NOT_COPY_VALUES, &I.second));
   PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, X, s.sv, sa, I.second, I.second));
-  PetscCall(VecGetLocalSize(I.work, &n));
   for (int motion = 1; motion >= 0; motion--) { /* keep the rows of motion of P, the others of I.second */
-    PetscCall(VecGetArrayWrite(I.work, &r));
-    for (PetscInt i = 0; i < n; i++) r[i] = ((RoleOf(I, i) == TSHHT3_COORDINATE) == (motion == 1)) ? 1 : 0;
-    PetscCall(VecRestoreArrayWrite(I.work, &r));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar &r) { r = IsCoordinate(I, i) == (motion == 1) ? 1 : 0; }, Write(I.work)));
     PetscCall(MatDiagonalScale(motion ? P : I.second, I.work, NULL));
   }
   PetscCall(MatAXPY(P, 1, I.second, SAME_NONZERO_PATTERN));

@@ -1,5 +1,5 @@
 /*
-  The error test: (26), (27) with the weights Y_i, and the decision to hold h.
+  The error test: (26), (27) with the weights Y_i.
 
   Positions are judged by delta = k h^2 (a_{n+1} - a_n); first-order states by k_s h^3 s''' with s''' from the last three
   derivatives s'; lambda, V and F never. In PETSc's terms weight_i = 1/max(atol_i, rtol_i Y_i) with Y_i the running maximum
@@ -276,29 +276,6 @@ PetscErrorCode NoteError(TS ts)
   PetscFunctionBegin;
   if (I.wlte_pending < 0) PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
   if (I.wlte_pending >= 0) I.corrector.wlte = I.wlte_pending;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
-   in h below the threshold costs more in matrices than it saves in steps. Not near the end of the run, where
-   TSAdapt fits the last steps to the final time.
-
-   With little damping small losses are not taken either, which at 0.9 of the h for an error of 1 leaves that below 1. They alternate
-   as the multipliers' oscillation does in the estimate, and each is a kick in step with it: at alpha = -0.003 (heavy
-   top, quaternions) the two drove one another until h had fallen tenfold. */
-PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
-{
-  Integrator      &I = Get(ts);
-  const Corrector &c = I.corrector;
-
-  PetscFunctionBegin;
-  if (!I.own_h) PetscFunctionReturn(PETSC_SUCCESS); /* the user's choice of TSAdapt stands */
-  if (I.h_limit > 0 && *next > I.h_limit && !I.fixed_h) *next = PetscMax(h, I.h_limit);
-  const PetscReal loss = I.constraints() && RelativeDamping(I.p.rho) < 1 ? 0.95 : 1;
-  if (*next == h || *next <= loss * h || *next >= c.hold * h || I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3NextStop(ts) - (ts->ptime + h) < 4 * *next) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
-  *next = h;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

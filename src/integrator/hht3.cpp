@@ -331,8 +331,9 @@ PetscErrorCode UpdateParameters(TS ts)
   <default,skip> or `SNESSetConvergenceTest()` puts the user's test in its place, and then they do. It makes full steps without a
   line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it counts always; the program's
   number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told from PETSc's defaults and want the option.
-  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. A step size chosen by
-  another type of `TSAdapt` than basic is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
+  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. The default type of `TSAdapt`, also called hhtdae,
+  is basic but for small gains of h, which it does not take since they cost a matrix, and growth after failures, which it slows. A step size
+  chosen by another type is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
   or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
@@ -363,7 +364,7 @@ PetscErrorCode Create(TS ts)
   ts->ops->interpolate    = InterpolateSolution;
   ts->ops->snesfunction   = FormFunction;
   ts->ops->snesjacobian   = FormJacobian;
-  ts->default_adapt_type  = TSADAPTBASIC;
+  ts->default_adapt_type  = TSHHT3;
   ts->usessnes            = PETSC_TRUE;
   if (ts->time_step == petsc_step) ts->time_step = unset_step;
   Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, which ends the run at the first failure */
@@ -397,6 +398,7 @@ PetscErrorCode TSHHT3Initialize(void)
   PetscCall(PetscRegisterFinalize(hht3::Finalize));
   PetscCall(hht3::DeclareOwnOptions());
   PetscCall(TSRegister(TSHHT3, hht3::Create));
+  PetscCall(TSAdaptRegister(TSHHT3, hht3::CreateAdapt));
   PetscCall(LinearRegister());
   PetscCall(PetscClassIdRegister("hhtdae", &id));
   PetscCall(PetscLogEventRegister("HHT3Start", id, &hht3::events.start));

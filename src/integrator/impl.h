@@ -148,7 +148,6 @@ struct StepState {
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
-  PetscBool        own_h       = PETSC_TRUE;  /* TSAdapt is of the default type, whose choice may be improved on, or none */
   PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
   TSHHT3Statistics stat        = {};
 };
@@ -340,7 +339,8 @@ PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
 PetscErrorCode NoteError(TS ts);
-PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next);
+/* adapt.cpp */
+PetscErrorCode CreateAdapt(TSAdapt adapt);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);

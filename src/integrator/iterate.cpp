@@ -2,6 +2,7 @@
   One run of SNES: the full step as a line search, the judgement of corrections (judge.cpp) as its convergence test, and the explanation
   of what went wrong. A user's line search, convergence test, lag or type stands.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -21,27 +22,17 @@ const char *RoleName(const Integrator &I, PetscInt local)
 /* The first row of the residual that is not a number, for the message */
 PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *f;
-  PetscInt           n, start, bad[2] = {HHT3_INT_MAX, 0}, first;
-  PetscMPIInt        rank;
+  Integrator &I = Get(ts);
+  PetscInt    start, bad = HHT3_INT_MAX, first;
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(F, &start, NULL));
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(F, &f));
-  for (PetscInt i = n - 1; i >= 0; i--)
-    if (PetscIsInfOrNanScalar(f[i])) {
-      bad[0] = start + i;
-      bad[1] = RoleOf(I, i);
-    }
-  PetscCall(VecRestoreArrayRead(F, &f));
-  PetscCallMPI(MPI_Allreduce(&bad[0], &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)ts), &rank));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { if (PetscIsInfOrNanScalar(f)) bad = PetscMin(bad, start + i); }, Read(F)));
+  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
   if (first < HHT3_INT_MAX) {
     PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
                             "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s",
-                            (double)t, first, bad[0] == first ? ", " : "", bad[0] == first ? RoleName(I, first - start) : ""));
+                            (double)t, first, bad == first ? ", " : "", bad == first ? RoleName(I, first - start) : ""));
   } else {
     PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)t));
   }

@@ -18,6 +18,7 @@
   derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
   spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -41,32 +42,15 @@ PetscReal Least(const Integrator &I)
 /* r = scale times the rows of holonomic constraints of F, added to what is there */
 PetscErrorCode AddHolonomicRows(const Integrator &I, PetscReal scale, Vec F, Vec r)
 {
-  const PetscScalar *f;
-  PetscScalar       *x;
-  PetscInt           n;
-
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArrayRead(F, &f));
-  PetscCall(VecGetArray(r, &x));
-  for (PetscInt i = 0; i < n; i++)
-    if (I.role[i] == TSHHT3_HOLONOMIC) x[i] += scale * f[i];
-  PetscCall(VecRestoreArray(r, &x));
-  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &x) { if (I.role[i] == TSHHT3_HOLONOMIC) x += scale * f; }, Read(F), Write(r)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
 {
-  PetscScalar *x;
-  PetscInt     n;
-
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(d, &n));
-  PetscCall(VecGetArray(d, &x));
-  for (PetscInt i = 0; i < n; i++)
-    if (I.role[i] != TSHHT3_COORDINATE) x[i] = 0;
-  PetscCall(VecRestoreArray(d, &x));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (!IsCoordinate(I, i)) x = 0; }, Write(d)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

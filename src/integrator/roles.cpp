@@ -9,6 +9,7 @@
   one without: an entry belongs to dF/dU'' if doubling sigma_a changes it. Two states are probed, the initial one and one
   moved off it, since at rest or in a symmetric position entries may vanish that are there otherwise.
 */
+#include "entries.h"
 #include "impl.h"
 #include <algorithm>
 
@@ -61,15 +62,10 @@ bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
 /* Flags of the local unknowns that a vector marks with positive entries; the vector is destroyed */
 PetscErrorCode TakeMarks(Vec *mark, std::vector<unsigned char> &flag)
 {
-  const PetscScalar *m;
-
   PetscFunctionBegin;
   PetscCall(VecAssemblyBegin(*mark));
   PetscCall(VecAssemblyEnd(*mark));
-  PetscCall(VecGetArrayRead(*mark, &m));
-  for (size_t i = 0; i < flag.size(); i++)
-    if (PetscRealPart(m[i]) > 0) flag[i] = 1;
-  PetscCall(VecRestoreArrayRead(*mark, &m));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar m) { if (PetscRealPart(m) > 0) flag[i] = 1; }, Read(*mark)));
   PetscCall(VecDestroy(mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -138,43 +134,35 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
 /* x moved by a fixed pseudo-random amount, of relative size r, that depends on the global index alone */
 PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
 {
-  PetscScalar *a;
-  PetscInt     n, start;
+  PetscInt start;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(x, &n));
   PetscCall(VecGetOwnershipRange(x, &start, NULL));
-  PetscCall(VecGetArray(x, &a));
-  for (PetscInt i = 0; i < n; i++) {
-    unsigned k = (unsigned)(start + i) * 2654435761u + salt * 40503u;
-    k ^= k >> 15;
-    k *= 2246822519u;
-    k ^= k >> 13;
-    a[i] += r * (1 + PetscAbsScalar(a[i])) * ((PetscReal)(k % 20001u) / 10000 - 1);
-  }
-  PetscCall(VecRestoreArray(x, &a));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar &a) {
+      unsigned k = (unsigned)(start + i) * 2654435761u + salt * 40503u;
+      k ^= k >> 15;
+      k *= 2246822519u;
+      k ^= k >> 13;
+      a += r * (1 + PetscAbsScalar(a)) * ((PetscReal)(k % 20001u) / 10000 - 1);
+    },
+    Write(x)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One triangle does not show whether the rows of multipliers depend on q': the residual does, with U and A as they are */
 PetscErrorCode ProbeRates(TS ts, Vec U, Vec V, Vec A, Probe &probe)
 {
-  Vec                F[2];
-  const PetscScalar *f[2];
+  Vec F[2];
 
   PetscFunctionBegin;
   for (int k = 0; k < 2; k++) {
     PetscCall(VecDuplicate(U, &F[k]));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F[k]));
-    PetscCall(VecGetArrayRead(F[k], &f[k]));
     if (!k) PetscCall(Shake(V, 1e-3, 4));
   }
-  for (size_t i = 0; i < probe.row_v.size(); i++)
-    if (f[0][i] != f[1][i]) probe.row_v[i] = 1;
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecRestoreArrayRead(F[k], &f[k]));
-    PetscCall(VecDestroy(&F[k]));
-  }
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar before, PetscScalar after) { if (before != after) probe.row_v[i] = 1; }, Read(F[0]), Read(F[1])));
+  for (Vec &f : F) PetscCall(VecDestroy(&f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

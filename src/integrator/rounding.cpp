@@ -2,6 +2,7 @@
   The size of a correction that is nothing but rounding. Only the residual knows how its terms cancel, and only the matrix how much of
   that arrives in the unknowns: where Phi_q nearly loses rank, that is far more than rounding of q, and a step later it is not.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -25,16 +26,11 @@ PetscReal Random(PetscInt i, int sample)
    moved a little is taken back to them by the matrix, however near to singular it is.) */
 PetscErrorCode Scatter(Vec noise, int sample, Vec r)
 {
-  PetscScalar *x;
-  PetscInt     n, first;
+  PetscInt first;
 
   PetscFunctionBegin;
-  PetscCall(VecCopy(noise, r));
-  PetscCall(VecGetLocalSize(r, &n));
   PetscCall(VecGetOwnershipRange(r, &first, NULL));
-  PetscCall(VecGetArray(r, &x));
-  for (PetscInt i = 0; i < n; i++) x[i] *= Random(first + i, sample);
-  PetscCall(VecRestoreArray(r, &x));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * Random(first + i, sample); }, Read(noise), Write(r)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,6 +2,7 @@
   What the user has set in TS, TSAdapt and SNES: refused where it makes no sense, reported where it has no meaning here, and taken
   otherwise.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -22,8 +23,7 @@ bool IsTolerance(PetscReal x) { return x >= 0 && !PetscIsInfReal(x); } /* NaN is
 /* The first entry that is no tolerance, of a vector where the user gave one */
 PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
 {
-  const PetscScalar *a;
-  PetscInt           n, start, bad = HHT3_INT_MAX, first;
+  PetscInt start, bad = HHT3_INT_MAX, first;
 
   PetscFunctionBegin;
   if (!v) {
@@ -32,11 +32,7 @@ PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetOwnershipRange(v, &start, NULL));
-  PetscCall(VecGetLocalSize(v, &n));
-  PetscCall(VecGetArrayRead(v, &a));
-  for (PetscInt i = n - 1; i >= 0; i--)
-    if (!IsTolerance(PetscRealPart(a[i]))) bad = start + i;
-  PetscCall(VecRestoreArrayRead(v, &a));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar a) { if (!IsTolerance(PetscRealPart(a))) bad = PetscMin(bad, start + i); }, Read(v)));
   PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
   PetscCheck(first == HHT3_INT_MAX, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "The %s tolerance of unknown %" PetscInt_FMT " must be a number from 0 on (TSSetTolerances())", name, first);

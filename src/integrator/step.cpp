@@ -5,6 +5,7 @@
   one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
   whatever happens in between.
 */
+#include "entries.h"
 #include "impl.h"
 #include <utility>
 
@@ -117,19 +118,8 @@ PetscErrorCode Begin(TS ts)
 /* The acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
 PetscErrorCode TrueAcceleration(Integrator &I)
 {
-  const PetscScalar *x;
-  PetscScalar       *a;
-  PetscInt           n;
-
   PetscFunctionBegin;
-  if (I.form != TSHHT3_FORM_PAPER) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetLocalSize(I.X, &n));
-  PetscCall(VecGetArrayRead(I.X, &x));
-  PetscCall(VecGetArray(I.A1, &a));
-  for (PetscInt i = 0; i < n; i++)
-    if (RoleOf(I, i) == TSHHT3_COORDINATE) a[i] = x[i];
-  PetscCall(VecRestoreArray(I.A1, &a));
-  PetscCall(VecRestoreArrayRead(I.X, &x));
+  if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,7 +132,6 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   PetscFunctionBegin;
   PetscCall(TrueAcceleration(I));
   PetscCall(UpdateWeights(ts, I.U1));
-  PetscCall(HoldStep(ts, h, &next));
   ts->ptime = I.t1;
   /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
@@ -201,8 +190,6 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
   PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
-  if (*accept && tiny && I.own_h && !I.fixed_h && !HHT3EventActive(ts)) /* no estimate, no growth by TSAdapt */
-    *next = PetscMax(*next, PetscMin(I.h_regular > 0 ? I.h_regular : 10 * I.h, HHT3NextStop(ts) - I.t1));
   if (*next <= 0) *next = I.h;
   if (!*accept) {
     PetscCall(VecCopy(I.U0, ts->vec_sol));
@@ -274,7 +261,6 @@ PetscErrorCode Step(TS ts)
   I.failure[0] = 0;
   if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)ts->adapt, &I.own_h, TSADAPTBASIC, TSADAPTNONE, ""));
   PetscCall(CheckpointIfDue(ts));
   PetscCall(Begin(ts));
   I.status = TS_STEP_INCOMPLETE;

@@ -30,39 +30,24 @@ constexpr PetscReal least_error = 1e-4; /* at fixed steps the error of the last 
 /* to = the entries of R whose role is among the two, zeros elsewhere */
 PetscErrorCode Keep(const Integrator &I, Vec R, TSHHT3Role one, TSHHT3Role other, Vec to)
 {
-  const PetscScalar *r;
-  PetscScalar       *t;
-  PetscInt           n;
-
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(R, &n));
-  PetscCall(VecGetArrayRead(R, &r));
-  PetscCall(VecGetArrayWrite(to, &t));
-  for (PetscInt i = 0; i < n; i++) t[i] = RoleOf(I, i) == one || RoleOf(I, i) == other ? r[i] : 0;
-  PetscCall(VecRestoreArrayWrite(to, &t));
-  PetscCall(VecRestoreArrayRead(R, &r));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar r, PetscScalar &t) { t = RoleOf(I, i) == one || RoleOf(I, i) == other ? r : 0; }, Read(R), Write(to)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* E: the correction times the claims. Definitions hide stiffness from the diagonal: then what inertia alone would make of the model */
 PetscErrorCode Claimed(TS ts, Vec dX, PetscReal *E)
 {
-  Integrator        &I = Get(ts);
-  const bool         definitions = HasDefinitions(I);
-  const PetscScalar *d, *c;
-  PetscReal          sum[4];
+  Integrator &I           = Get(ts);
+  const bool  definitions = HasDefinitions(I);
+  PetscReal   sum[4];
 
   PetscFunctionBegin;
-  if (definitions) PetscCall(Model(ts, dX));
-  const Vec R = definitions ? I.verify.model : dX;
-  PetscCall(VecGetArrayRead(R, &d));
-  PetscCall(VecGetArrayRead(I.verify.claim, &c));
-  PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
-    /* claim dX is P_ii dX_i / inertia_i: the diagonal's part of the model */
-    local[0] += PetscSqr(definitions ? PetscRealPart(d[i]) * s.answer : PetscRealPart(c[i] * d[i]) * s.claimed);
-  }));
-  PetscCall(VecRestoreArrayRead(I.verify.claim, &c));
-  PetscCall(VecRestoreArrayRead(R, &d));
+  if (definitions) {
+    PetscCall(Model(ts, dX));
+    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal model) { local[0] += PetscSqr(model * s.answer); }, Read(I.verify.model)));
+  } else /* claim dX is P_ii dX_i / inertia_i: the diagonal's part of the model */
+    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal d, PetscReal c) { local[0] += PetscSqr(c * d * s.claimed); }, Read(dX), Read(I.verify.claim)));
   *E = PetscSqrtReal(sum[0] / I.norm_size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -121,11 +106,10 @@ PetscErrorCode Model(TS ts, Vec dX)
    as they were; and which part of the whole is as it was */
 PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal *part)
 {
-  Integrator        &I = Get(ts);
-  const bool         known = I.corrector.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
-  const PetscScalar *f, *r, *g;
-  PetscReal          sum[4];
-  Vec                now = F;
+  Integrator &I     = Get(ts);
+  const bool  known = I.corrector.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
+  PetscReal   sum[4];
+  Vec         now = F;
 
   PetscFunctionBegin;
   if (HasDefinitions(I)) {
@@ -133,21 +117,18 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal
     PetscCall(VecCopy(F, now));
     PetscCall(PassDefinitionsOn(ts, now));
   }
-  PetscCall(VecGetArrayRead(now, &f));
-  PetscCall(VecGetArrayRead(I.verify.model, &r));
-  PetscCall(VecGetArrayRead(I.verify.work, &g));
-  PetscCall(SumRows(ts, sum, [&](PetscInt i, const RowScale &s, PetscReal local[]) {
-    const PetscReal is = PetscRealPart(f[i]) * s.answer, was = PetscRealPart(r[i]) * s.answer, constraint = known ? PetscAbsReal(PetscRealPart(g[i])) * s.answer : 0;
-    const PetscReal excess = PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
-    local[0] += excess;
-    if (PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was)) local[3] += excess;
-    if (PetscAbsReal(was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
-    local[1] += is * was;
-    local[2] += was * was;
-  }));
-  PetscCall(VecRestoreArrayRead(I.verify.work, &g));
-  PetscCall(VecRestoreArrayRead(I.verify.model, &r));
-  PetscCall(VecRestoreArrayRead(now, &f));
+  PetscCall(SumRows(
+    ts, sum,
+    [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal model, PetscReal force) {
+      const PetscReal is = f * s.answer, was = model * s.answer, constraint = known ? PetscAbsReal(force) * s.answer : 0;
+      const PetscReal excess = PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
+      local[0] += excess;
+      if (PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was)) local[3] += excess;
+      if (PetscAbsReal(was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
+      local[1] += is * was;
+      local[2] += was * was;
+    },
+    Read(now), Read(I.verify.model), Read(I.verify.work)));
   if (now != F) PetscCall(VecDestroy(&now));
   *left = PetscSqrtReal(sum[0] / I.norm_size);
   *stay = PetscSqrtReal(sum[3] / I.norm_size);

@@ -2,6 +2,7 @@
 #ifndef HHTDAE_VERIFY_H
 #define HHTDAE_VERIFY_H
 
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
@@ -19,38 +20,25 @@ struct RowScale {
   PetscReal answer, claimed, rounding;
 };
 
-struct RowScales {
-  PetscReal          answer[2], claimed[2]; /* of coordinates, of states */
-  const PetscScalar *w, *c, *m, *noise;
-
-  RowScale at(TSHHT3Role r, PetscInt i) const
-  {
-    const int       k = r == TSHHT3_STATE;
-    const PetscReal a = answer[k] * PetscRealPart(w[i] / m[i]);
-    return {a, claimed[k] * PetscRealPart(w[i]), a * PetscRealPart(noise[i])};
-  }
-};
-
-PetscErrorCode GetRowScales(const Integrator &I, RowScales *s);
-PetscErrorCode RestoreRowScales(const Integrator &I, RowScales *s);
-
-/* The sums that entry(row, scale, sum) adds to, over all rows of which something is asked and all ranks */
-template <class Entry>
-PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry)
+/* The sums that entry(scale, sum, x...) adds to, over all rows of which something is asked and all ranks; x: entries of further vectors */
+template <class Entry, class... More>
+PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
 {
-  Integrator &I        = Get(ts);
-  PetscReal   local[4] = {0, 0, 0, 0};
-  RowScales   s;
-  PetscInt    n;
+  Integrator         &I          = Get(ts);
+  const Verification &v          = I.verify;
+  PetscReal           local[4]   = {0, 0, 0, 0};
+  const PetscReal     claimed[2] = {PetscAbsReal(I.p.k) * I.h * I.h, I.p.gamma_s * I.h}; /* of coordinates, of states */
+  const PetscReal     answer[2]  = {claimed[0] / I.p.ca(), claimed[1] / StateInertia(I.p)};
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(I.X, &n));
-  PetscCall(GetRowScales(I, &s));
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    if (PetscRealPart(s.m[i]) > 0) entry(i, s.at(r, i), local);
-  }
-  PetscCall(RestoreRowScales(I, &s));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m, PetscScalar w, PetscScalar noise, auto... x) {
+      if (!(PetscRealPart(m) > 0)) return;
+      const int       k = RoleOf(I, i) == TSHHT3_STATE;
+      const PetscReal a = answer[k] * PetscRealPart(w / m);
+      entry(RowScale{a, claimed[k] * PetscRealPart(w), a * PetscRealPart(noise)}, local, PetscRealPart(x)...);
+    },
+    Read(v.inertia), Read(I.weight), Read(v.noise), more...));
   PetscCallMPI(MPI_Allreduce(local, sum, 4, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

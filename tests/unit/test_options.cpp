@@ -34,7 +34,7 @@ TEST(Options, Defaults)
   TSAdapt adapt;
   must(TSGetAdapt(run.ts, &adapt));
   must(TSSetUp(run.ts));
-  EXPECT_EQ(typeOf(adapt), TSADAPTBASIC);
+  EXPECT_EQ(typeOf(adapt), TSHHT3);
 }
 
 TEST(Options, AreRead)

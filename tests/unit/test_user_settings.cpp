@@ -65,6 +65,7 @@ TEST(UserSettings, EveryOptionHasItsEffect)
              [](O w, O o) { return w.message.find("-ts_max_snes_failures") != std::string::npos && !o.code && o.s.corrector_fails > 0; }},
     {"-ts_max_reject 0 -ts_dt .4 -ts_error_if_step_fails 0", "", [](O w, O) { return !w.code && w.t < .4; }},
     {"-ts_adapt_type none -ts_dt 1e-2", "", [](O w, O) { return w.s.steps == 50; }},
+    {"-ts_rtol 1e-8 -ts_atol 1e-8 -ts_adapt_type basic", "-ts_rtol 1e-8 -ts_atol 1e-8", [](O w, O o) { return w.s.newton != o.s.newton; }},
     {"-ts_adapt_type dsp", "", [](O w, O o) { return w.s.rejected < o.s.rejected && w.times[3] != o.times[3] && w.error < 1e-2; }},
     {"-ts_adapt_dt_max 1e-3", "", [](O w, O) { return w.s.h_max < 1.0101e-3; }},
     {"-ts_adapt_dt_min 2e-2 -ts_dt .05", "-ts_dt .05", [](O w, O o) { return w.s.rejected < o.s.rejected || w.s.steps < o.s.steps; }},

@@ -1,0 +1,74 @@
+/*
+  The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
+  than it says. It is replaced by any other type, as by -ts_adapt_type basic.
+*/
+#include "impl.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+using Choose = PetscErrorCode (*)(TSAdapt, TS, PetscReal, PetscInt *, PetscReal *, PetscBool *, PetscReal *, PetscReal *, PetscReal *);
+
+struct Basic {
+  Choose choose = nullptr;
+};
+
+/* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
+   in h below the threshold costs more in matrices than it saves in steps.
+
+   With little damping small losses are not taken either, which at 0.9 of the h for an error of 1 leaves that below 1. They alternate
+   as the multipliers' oscillation does in the estimate, and each is a kick in step with it: at alpha = -0.003 (heavy
+   top, quaternions) the two drove one another until h had fallen tenfold. */
+PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.h_limit > 0 && *next > I.h_limit) *next = PetscMax(h, I.h_limit);
+  const PetscReal loss = I.constraints() && RelativeDamping(I.p.rho) < 1 ? 0.95 : 1;
+  if (*next == h || *next <= loss * h || *next >= I.corrector.hold * h) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
+  *next = h;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
+PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
+{
+  PetscBool ours;
+
+  PetscFunctionBegin;
+  PetscCall((*static_cast<Basic *>(adapt->data)->choose)(adapt, ts, h, scheme, next, accept, wlte, wltea, wlter));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
+  if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
+  else *next = PetscMax(*next, Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DestroyAdapt(TSAdapt adapt)
+{
+  PetscFunctionBegin;
+  delete static_cast<Basic *>(adapt->data);
+  adapt->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The basic type, whose choice is looked at */
+PetscErrorCode CreateAdapt(TSAdapt adapt)
+{
+  PetscFunctionBegin;
+  PetscCall(TSAdaptSetType(adapt, TSADAPTBASIC));
+  adapt->data         = new Basic{adapt->ops->choose};
+  adapt->ops->choose  = ChooseStep;
+  adapt->ops->destroy = DestroyAdapt;
+  PetscCall(PetscObjectChangeTypeName((PetscObject)adapt, TSHHT3));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
