@@ -72,7 +72,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscReal   left = 0, stay = 0, part = 0;
 
   PetscFunctionBegin;
-  if (!I.corrector.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.corrector.matrix.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
   PetscCall(MeasureRows(ts, X, F));

@@ -94,7 +94,7 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
     PetscCall(VecZeroEntries(I.A1));
     PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
   }
-  ForgetMatrix(I);
+  I.corrector.matrix.forget();
   I.change.stale = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -143,7 +143,7 @@ PetscErrorCode MatrixAfterChange(TS ts)
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL)); /* alone, as in the start */
   PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
-  I.corrector.want_matrix = (PetscBool)!I.corrector.have_matrix;
+  I.corrector.matrix.want = (PetscBool)!I.corrector.matrix.have;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

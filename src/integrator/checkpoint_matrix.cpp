@@ -200,7 +200,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
     if (good) PetscCall(LoadFactor(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;
-  if (!good) ForgetMatrix(I);
+  if (!good) I.corrector.matrix.forget();
   if (!same)
     PetscCall(PetscInfo(ts, "resumed with %s: the run agrees with the uninterrupted one to the tolerance, maybe not bit for bit\n",
                         good ? "a linear solver that does not promise the same bits" : "a new Newton matrix, as the last one cannot be restored"));

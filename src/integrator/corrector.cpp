@@ -10,7 +10,7 @@
   Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) reuse costs a
   correction each time, and one that passes by chance after its first iteration may be far off: after a retry the next step
   gets a new matrix, after the second retry the next two, then four, ... until a reused matrix holds.
-  A step size that would grow by less than `hold` is kept, so that the factorization lives on (estimate.cpp).
+  A step size that would grow by less than `hold` is kept, so that the factorization lives on (adapt.cpp).
 
   All of it goes through SNESSetLagJacobian(): -2 is "once, now", -1 is "not again". A user's -snes_lag_jacobian, line search
   or convergence test stands.
@@ -20,44 +20,25 @@
 namespace hht3
 {
 
-namespace
-{
-
-/* Steps without reuse after old matrices have failed, at most */
-constexpr PetscInt max_renew_steps = 32;
-
-/* What the end of a correction says about the reuse of matrices in the next steps */
-void LearnReuse(Corrector &c, bool converged, bool retried)
-{
-  const bool reused = converged && !c.fresh;
-  if (retried) c.renew_steps = c.renew_left = PetscClipInterval(2 * c.renew_steps, 1, max_renew_steps);
-  else if (reused) c.renew_steps = c.renew_left = 0;
-  else if (c.renew_left > 0) c.renew_left--;
-  c.want_matrix = (PetscBool)(!converged || c.xi_max >= c.slow_rate || c.renew_left > 0);
-}
-
-} // namespace
-
 /* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
 PetscErrorCode Correct(TS ts, PetscBool *converged)
 {
-  Integrator     &I = Get(ts);
-  Corrector      &c = I.corrector;
-  const PetscReal q = c.h_matrix > 0 ? I.h / c.h_matrix : 0;
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
 
   PetscFunctionBegin;
-  if (!c.have_matrix || q > c.ratio || q * c.ratio < 1) c.want_matrix = PETSC_TRUE;
-  if (c.have_matrix && c.want_matrix) PetscCall(PetscInfo(ts, "corrector: new matrix, h/h_matrix = %g, rate %g\n", (double)q, (double)c.rate));
+  c.matrix.want = (PetscBool)c.matrix.due(I.h, c);
+  if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)I.h, (double)c.matrix.h, (double)c.matrix.rate));
   PetscCall(Iterate(ts, converged));
-  const bool retry = !*converged && !c.fresh && !c.user_lag;
+  const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
     I.stat.retries++;
-    c.want_matrix = PETSC_TRUE;
+    c.matrix.want = PETSC_TRUE;
     PetscCall(Predict(ts, I.X));
     PetscCall(Iterate(ts, converged));
   }
-  LearnReuse(c, *converged, retry);
+  c.matrix.learn(*converged, retry, c.xi_max, c);
   if (!*converged) {
     /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what steps since the last
        failure have shown to work */

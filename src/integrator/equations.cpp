@@ -236,10 +236,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
   }
   PetscCall(NoteClaims(ts, X, P));
-  I.corrector.h_matrix    = I.h;
-  I.corrector.have_matrix = PETSC_TRUE;
-  I.corrector.fresh       = PETSC_TRUE;
-  I.corrector.rate        = -1;
+  I.corrector.matrix.made(I.h);
   I.stat.factorizations++;
 
   PetscCall(SNESGetKSP(snes, &ksp));

@@ -3,9 +3,9 @@
 #define HHTDAE_IMPL_H
 
 #include "compat.h"
-#include "formulas.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
+#include "policy.h"
 #include <initializer_list>
 #include <vector>
 
@@ -20,29 +20,20 @@ constexpr PetscInt max_degree = 3; /* of the predictor */
 */
 
 /* The stopping test and the reuse ladder, section 5 of the paper */
-struct CorrectorOptions {
+struct CorrectorOptions : ReuseOptions {
   PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
   PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
   PetscInt  max_it    = 10;
-  PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
-  PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
-  PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
   PetscBool user_lag  = PETSC_FALSE; /* -snes_lag_jacobian: the user rules */
   PetscBool user_test = PETSC_FALSE; /* the user's test of SNES decides; corrections are only measured */
 };
 
 struct CorrectorState {
-  PetscBool have_matrix = PETSC_FALSE; /* the SNES matrix is (10) of some earlier step */
-  PetscBool want_matrix = PETSC_TRUE;  /* renew it before the next correction */
+  MatrixPolicy matrix;
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
-  PetscBool fresh       = PETSC_FALSE; /* it was made in the present correction */
   PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
   PetscBool rounding    = PETSC_FALSE; /* what is left of it is rounding */
   PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
-  PetscReal h_matrix    = 0;           /* h it was made with */
-  PetscInt  renew_steps = 0;           /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
-  PetscInt  renew_left  = 0;           /* of these, still to come */
-  PetscReal rate        = -1;          /* last measured rate with this matrix, -1 before the first measurement */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 
@@ -234,15 +225,6 @@ inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty(
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsConstraint(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC; }
 inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
-
-/* The matrix of the run is another one than that of the last steps: the next correction makes its own */
-inline void ForgetMatrix(Integrator &I)
-{
-  I.corrector.have_matrix = PETSC_FALSE;
-  I.corrector.want_matrix = PETSC_TRUE;
-  I.corrector.h_matrix    = 0;
-  I.corrector.rate        = -1;
-}
 
 /* Shifts of the application's Jacobian and diagonal scalings that make it the Newton matrix */
 struct Scales {

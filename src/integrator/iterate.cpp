@@ -204,7 +204,7 @@ static void BeginIteration(Integrator &I)
   c.it = c.base = c.renewals = 0;
   c.e = c.xi_max = 0;
   c.reason = SNES_CONVERGED_ITERATING;
-  c.fresh  = PETSC_FALSE;
+  c.matrix.fresh  = PETSC_FALSE;
   c.wrong_jacobian = PETSC_FALSE;
   c.rounding       = PETSC_FALSE;
 }
@@ -221,7 +221,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   BeginIteration(I);
   c.user_test = HooksUserTest(ts);
   if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* since the set-up */
-  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.want_matrix ? -2 : -1));
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.matrix.want ? -2 : -1));
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   PetscCall(SNESSolve(ts->snes, NULL, I.X));
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */

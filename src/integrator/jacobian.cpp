@@ -104,7 +104,7 @@ PetscErrorCode TakeSNES(TS ts)
   PetscCall(SNESSetDM(ts->snes, ts->dm));
   I.linear_chosen         = PETSC_FALSE;
   I.scaled_state          = 0;
-  I.corrector.have_matrix = PETSC_FALSE;
+  I.corrector.matrix.have = PETSC_FALSE;
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SetUpJacobian(ts));
   PetscCall(SetUpSolvers(ts));

@@ -27,16 +27,8 @@ namespace hht3
 namespace
 {
 
-/* A remembered rate is believed down to here: it was measured steps ago on smaller corrections, and the matrix has aged since.
-   With 0.02 the error that first iterations left behind was up to ten times that of the step (heavy top, 1e-7); 0.3 costs
-   5 to 20 % more iterations. */
-constexpr PetscReal remembered = 0.3;
-
 /* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
 constexpr PetscReal fixed = 0.02;
-
-/* Of the tolerance: a correction so small needs no rate */
-constexpr PetscReal at_once = 0.1;
 
 /* A rate below it may be an old matrix' fault, above it the iteration diverges */
 constexpr PetscReal slow = 0.8;
@@ -86,14 +78,32 @@ PetscReal Tolerance(const Integrator &I)
   return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, 0.01, 1);
 }
 
+/* The iteration does not converge as it is: is that rounding, may a new matrix help, or has it failed? */
+PetscErrorCode Stalled(TS ts, const Corrections &so_far, Vec X)
+{
+  Corrector      &c        = Get(ts).corrector;
+  const PetscReal xi       = so_far.rate();
+  PetscBool       rounding = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (c.base || xi >= slow) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
+  if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  else if (c.renewals < max_renewals && so_far.left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
+  else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
+  c.rounding = (PetscBool)(c.reason > 0);
+  if (c.rounding) {
+    c.matrix.rate = -1; /* that of noise says nothing of the matrix */
+    c.xi_max      = 0;  /* a new matrix would not help */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
 PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
 {
-  Integrator     &I     = Get(ts);
-  Corrector      &c     = I.corrector;
-  const PetscReal old_e = c.e;
-  const PetscReal tol   = Tolerance(I);
-  const PetscInt  left  = c.max_it - c.it;
+  Integrator       &I      = Get(ts);
+  Corrector        &c      = I.corrector;
+  const Corrections so_far = {e, c.e, c.it - c.base, c.max_it - c.it};
 
   PetscFunctionBegin;
   c.e        = e;
@@ -102,33 +112,14 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
     PetscCall(Diverge(ts, "produced a correction that is not a number"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (e <= c.floor) {
-    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-    PetscFunctionReturn(PETSC_SUCCESS);
+  const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, Tolerance(I), c.floor);
+  if (so_far.with_matrix >= 2 && e > c.floor) {
+    c.matrix.rate = so_far.rate();
+    c.xi_max      = PetscMax(c.xi_max, c.matrix.rate);
   }
-  if (c.it - c.base < 2) { /* no rate of this matrix in this correction yet */
-    const bool known = c.rate >= 0 && CorrectorError(PetscMax(c.rate, remembered), e) <= tol;
-    if (known || e <= at_once * tol) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-    else if (left <= 0) PetscCall(Diverge(ts, "needs too many iterations"));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  const PetscReal xi = e / old_e;
-  c.rate             = xi;
-  c.xi_max           = PetscMax(c.xi_max, xi);
-  if (CorrectorError(xi, e) <= tol) {
-    c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-  } else if (xi >= 1 || left <= 0 || PetscPowReal(xi, left) * CorrectorError(xi, e) > tol) {
-    PetscBool rounding = PETSC_FALSE;
-    if (c.base || xi >= slow) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
-    if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-    else if (c.renewals < max_renewals && left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
-    else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
-    c.rounding = (PetscBool)(c.reason > 0);
-    if (c.rounding) {
-      c.rate   = -1; /* that of noise says nothing of the matrix */
-      c.xi_max = 0;  /* a new matrix would not help */
-    }
-  }
+  if (verdict == Verdict::Converged) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  else if (verdict == Verdict::TooMany) PetscCall(Diverge(ts, "needs too many iterations"));
+  else if (verdict == Verdict::Stalled) PetscCall(Stalled(ts, so_far, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,7 +132,7 @@ PetscErrorCode Measure(TS ts, PetscReal e)
   PetscFunctionBegin;
   c.e = e;
   if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
-  c.rate   = xi;
+  c.matrix.rate   = xi;
   c.xi_max = PetscMax(c.xi_max, xi);
   if (xi >= c.slow_rate && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -195,7 +186,7 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscBool  found;
 
   PetscFunctionBegin;
-  if (!(c.fresh || c.user_lag) || c.it >= c.max_it) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(c.matrix.fresh || c.user_lag) || c.it >= c.max_it) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(BetweenIterates(ts, X, dX, F, &found));
   *evaluated = found;
   if (!found) PetscFunctionReturn(PETSC_SUCCESS);
@@ -277,11 +268,11 @@ PetscErrorCode FreshMatrixNextIteration(TS ts)
 
   PetscFunctionBegin;
   if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.rate, I.corrector.it));
+  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.matrix.rate, I.corrector.it));
   PetscCall(SNESSetLagJacobian(ts->snes, -2));
   I.corrector.renewals++;
   I.corrector.base = I.corrector.it;
-  I.corrector.rate = -1;
+  I.corrector.matrix.rate = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -158,9 +158,9 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
-  if (I.bent == Bend::Rates && I.corrector.have_matrix) PetscCall(ComputeBend(ts));
+  if (I.bent == Bend::Rates && I.corrector.matrix.have) PetscCall(ComputeBend(ts));
   if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
   I.misfit = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);

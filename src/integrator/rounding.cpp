@@ -71,7 +71,7 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
 
   PetscFunctionBegin;
   *e = 0;
-  if (!Get(ts).corrector.have_matrix) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!Get(ts).corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
   for (Vec *v : {&F, &noise, &r}) PetscCall(VecDuplicate(X, v));
   PetscCall(SNESComputeFunction(ts->snes, X, F));
   PetscCall(MeasureRounding(ts, X, F, noise));

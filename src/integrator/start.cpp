@@ -192,7 +192,7 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscCall(TakeUnknowns(I, c));
   PetscCall(ConsistentMatrix(ts, c, &ok, &why));
   PetscCall(NoteInertia(ts, c.P));
-  ForgetMatrix(I);
+  I.corrector.matrix.forget();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,7 +259,7 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   PetscCall(SolveConsistent(ts, c, have_matrix, ok, &why));
   for (Vec *v : {&c.F, &c.d}) PetscCall(VecDestroy(v));
   if (!have_matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
-  ForgetMatrix(I);
+  I.corrector.matrix.forget();
   ts->snes_its += c.its;
   ts->ksp_its += c.ksp_its;
   I.corrector.no_solve = (PetscBool)(I.unfactored != PC_NOERROR);

@@ -107,7 +107,7 @@ PetscErrorCode Model(TS ts, Vec dX)
 PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal *part)
 {
   Integrator &I     = Get(ts);
-  const bool  known = I.corrector.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
+  const bool  known = I.corrector.matrix.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
   PetscReal   sum[4];
   Vec         now = F;
 
@@ -160,7 +160,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   for (int attempt = 0; attempt < 2; attempt++) {
     PetscCall(Compare(ts, F, &left, &stay, &part));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
-    const bool good = c.it - c.base >= 2 && c.rate >= 0 && c.rate < 0.5 && part < 0.5;
+    const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && part < 0.5;
     *proved         = (PetscBool)((good || Drift(I, left, I.h) <= limit) && Drift(I, stay, T) <= limit);
     if (attempt && !*proved) {
       PetscCall(Claimed(ts, dX, &E));
@@ -174,7 +174,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   }
   PetscCall(PetscInfo(ts, "corrector: a correction of %g of the tolerance at t = %g is no proof: the residual, %g of the tolerance by inertia alone, has not followed (%g of it as before)\n",
                       (double)c.e, (double)I.t1, (double)left, (double)part));
-  if (c.fresh) PetscCall(CheckJacobian(ts, dX, F, &c.wrong_jacobian));
+  if (c.matrix.fresh) PetscCall(CheckJacobian(ts, dX, F, &c.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,118 @@
+/* The corrector's decisions, on numbers: when an iteration ends, and when a matrix is due */
+#include "integrator/policy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using namespace hht3;
+
+namespace
+{
+
+/* What is left when a linear iteration of rate xi, of which the first correction is e, is ended by the test, and after how many */
+struct End {
+  double left;
+  int    corrections;
+};
+
+End iterate(double xi, double e, double tol, double known)
+{
+  Corrections c;
+  for (int k = 1; k <= 10; k++) {
+    c.before      = c.last;
+    c.last        = e;
+    c.with_matrix = k;
+    c.left        = 10 - k;
+    const Verdict v = JudgeCorrections(c, known, tol, 0.);
+    if (k >= 2) known = c.rate();
+    if (v == Verdict::Converged) return {e * xi / (1. - xi), k};
+    if (v != Verdict::GoOn) return {-1., k};
+    e *= xi;
+  }
+  return {-1., 11};
+}
+
+} // namespace
+
+/* (40): whatever the rate, what is left is below the tolerance, and not far below it */
+TEST(Policy, ErrorLeftIsBelowTheTolerance)
+{
+  for (double xi : {1e-3, .05, .2, .3})
+    for (double e : {1e-3, 1., 30.}) {
+      const double tol = 1e-3;
+      const End    end = iterate(xi, e, tol, -1.);
+      EXPECT_GE(end.left, 0.) << xi << " " << e;
+      EXPECT_LE(end.left, tol) << xi << " " << e;
+      if (end.corrections > 2) {
+        EXPECT_GT(end.left, tol * xi * (1. - 1e-9)) << xi << " " << e;
+      }
+    }
+}
+
+/* A known rate saves the second correction where it may be believed, and never below `remembered` */
+TEST(Policy, KnownRates)
+{
+  EXPECT_EQ(iterate(1e-3, 1e-3, 1e-3, -1.).corrections, 2);
+  EXPECT_EQ(iterate(1e-3, 1e-3, 1e-3, 1e-3).corrections, 1);
+  EXPECT_EQ(iterate(1e-3, 2.2e-3, 1e-3, 1e-3).corrections, 1); /* 0.3/0.7 of it */
+  EXPECT_EQ(iterate(1e-3, 2.5e-3, 1e-3, 1e-3).corrections, 2);
+  EXPECT_EQ(iterate(.5, 1e-4, 1e-3, -1.).corrections, 1); /* so small that no rate matters */
+}
+
+TEST(Policy, WhatCannotConverge)
+{
+  const double tol = 1e-3;
+  EXPECT_EQ(JudgeCorrections({2., 1., 2, 8}, -1., tol, 0.), Verdict::Stalled);
+  EXPECT_EQ(JudgeCorrections({1., 1., 2, 8}, -1., tol, 0.), Verdict::Stalled);
+  EXPECT_EQ(JudgeCorrections({.9, 1., 2, 8}, -1., tol, 0.), Verdict::Stalled); /* 0.9^8 is not 1e-4 */
+  EXPECT_EQ(JudgeCorrections({.2, 1., 2, 8}, -1., tol, 0.), Verdict::GoOn);
+  EXPECT_EQ(JudgeCorrections({.2, 1., 2, 0}, -1., tol, 0.), Verdict::Stalled);
+  EXPECT_EQ(JudgeCorrections({1., 0., 1, 0}, -1., tol, 0.), Verdict::TooMany);
+  EXPECT_EQ(JudgeCorrections({1., .5, 5, 3}, -1., tol, 1.), Verdict::Converged); /* rounding of q */
+}
+
+/* While h is about the matrix' own and corrections converge, there is one matrix */
+TEST(Policy, MatrixServesManySteps)
+{
+  const ReuseOptions o;
+  MatrixPolicy       m;
+  EXPECT_TRUE(m.due(1., o));
+  m.made(1.);
+  m.learn(true, false, .01, o);
+  for (double h : {1., 1.39, 1. / 1.39}) EXPECT_FALSE(m.due(h, o)) << h;
+  for (double h : {1.41, 1. / 1.41}) EXPECT_TRUE(m.due(h, o)) << h;
+  m.fresh = PETSC_FALSE;
+  m.learn(true, false, .3, o); /* slow */
+  EXPECT_TRUE(m.due(1., o));
+  m.made(1.);
+  m.learn(true, false, .1, o);
+  EXPECT_FALSE(m.due(1., o));
+  m.forget();
+  EXPECT_TRUE(m.due(1., o));
+}
+
+/* Old matrices that fail again and again are tried less and less often, and as before once one has held */
+TEST(Policy, ReuseBacksOff)
+{
+  const ReuseOptions o;
+  MatrixPolicy       m;
+  int                steps[8] = {};
+  for (int failure = 0; failure < 8; failure++) {
+    m.made(1.); /* the retry */
+    m.learn(true, true, .1, o);
+    while (m.due(1., o)) {
+      steps[failure]++;
+      ASSERT_LT(steps[failure], 100);
+      m.made(1.);
+      m.learn(true, false, .1, o);
+    }
+    m.fresh = PETSC_FALSE; /* an old one is tried, and fails: once more */
+  }
+  const int expected[8] = {1, 2, 4, 8, 16, 32, 32, 32};
+  for (int k = 0; k < 8; k++) EXPECT_EQ(steps[k], expected[k]) << k;
+  m.learn(true, false, .1, o); /* it holds */
+  m.made(1.);
+  m.learn(true, true, .1, o);
+  EXPECT_EQ(m.renew_steps, 1);
+}
