@@ -55,9 +55,9 @@ static const double LARGE_PER_ENTRY = 40;
 
 /*
   Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.
-  Seconds of one factorization and three solves are estimated from counts per rank. MUMPS takes its time per unknown
-  rather than per operation where fronts are small. Measured with two ranks on two cores that others used, too
-  (milliseconds; operations as above, on one rank; "MUMPS" is the better of LU and L D L^T):
+  Both are weighed by operations on one rank, in units of KLU's, of one factorization and three solves: dense ones cost a
+  fifth of them, those of MUMPS' fronts a quarter, and where fronts are small MUMPS takes its time per unknown. Measured with
+  two ranks on two cores that others used, too (milliseconds; "MUMPS" is the better of LU and L D L^T):
 
       family, size                  n   interface     work   kluparts   MUMPS
       chain in space, 10000    110000           5   4.4e+06        41     590
@@ -72,8 +72,7 @@ static const double LARGE_PER_ENTRY = 40;
       plate, 24 x 24 bricks      3900         219   1.3e+07       124      45
       block, 8^3 bricks          2430         450   8.9e+06       162      39
 */
-static const double KLU_OPERATION = 2e-9, SWEEP_OPERATION = 2e-9, DENSE_OPERATION = 0.4e-9;
-static const double MUMPS_UNKNOWN = 13e-6, MUMPS_OPERATION = 0.5e-9;
+static const double DENSE_OPERATION = 0.2, MUMPS_UNKNOWN = 6500, MUMPS_OPERATION = 0.25;
 
 /* More than this between ranks is left to MUMPS without a closer look */
 static const double   MANY_COUPLINGS  = 2e5;
@@ -202,13 +201,12 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
     PetscFunctionReturn(0);
   }
   const double N = (double)w.interface, dense = N * N * N / 3;
-  const double parts = KLU_OPERATION * (2 * w.flops + 12 * w.factor) + SWEEP_OPERATION * w.sweeps +
-                       DENSE_OPERATION * (w.products + 2 * dense);
+  const double parts = 2 * w.flops + 12 * w.factor + w.sweeps + DENSE_OPERATION * (w.products + 2 * dense);
   const double mumps = MUMPS_UNKNOWN * (w.unknowns + N / ranks) +
                        MUMPS_OPERATION * (symmetric ? 1 : 2) * (w.flops + w.sweeps / 2 + dense / ranks);
   size->parts = parts < mumps ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(PetscSNPrintf(size->text, sizeof size->text,
-                          "interface of %" PetscInt_FMT " between %d processes, %.2g s a matrix; MUMPS %.2g s",
+                          "interface of %" PetscInt_FMT " between %d processes, work of %.2g operations, with MUMPS as much as %.2g",
                           w.interface, ranks, parts, mumps));
   PetscFunctionReturn(0);
 }
