@@ -17,19 +17,14 @@ struct Basic {
 };
 
 /* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
-   in h below the threshold costs more in matrices than it saves in steps.
-
-   With little damping small losses are not taken either, which at 0.9 of the h for an error of 1 leaves that below 1. They alternate
-   as the multipliers' oscillation does in the estimate, and each is a kick in step with it: at alpha = -0.003 (heavy
-   top, quaternions) the two drove one another until h had fallen tenfold. */
+   in h below the threshold costs more in matrices than it saves in steps. */
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 {
   const Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   if (I.h_limit > 0 && *next > I.h_limit) *next = PetscMax(h, I.h_limit);
-  const PetscReal loss = I.constraints() && RelativeDamping(I.p.rho) < 1 ? 0.95 : 1;
-  if (*next == h || *next <= loss * h || *next >= I.corrector.hold * h) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*next <= h || *next >= I.corrector.hold * h) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
   *next = h;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,5 +1,6 @@
 /* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
 #include "entries.h"
+#include "random.h"
 #include "verify.h"
 
 namespace hht3
@@ -84,9 +85,6 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* +1 or -1 */
-static PetscReal RandomSign(PetscInt i) { return (i * 2654435761u >> 7) & 1 ? 1 : -1; }
-
 /* noise = |F(X + dX) - F| for the residual F at X and dX of random signs: rounding of the unknowns, and, as changes of these, of the largest
    terms that make up positions and states */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
@@ -104,7 +102,7 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
     [&](PetscInt i, PetscScalar y, PetscScalar v, PetscScalar &x) {
       const TSHHT3Role r    = RoleOf(I, i);
       const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y) + I.h * PetscAbsScalar(v)) * (r == TSHHT3_STATE ? state : position) : 0;
-      x += rounding_of_sums * RandomSign(first + i) * (PetscAbsScalar(x) + size);
+      x += rounding_of_sums * RandomSign(first + i, 1) * (PetscAbsScalar(x) + size);
     },
     Read(I.ymax), Read(I.V1), Write(near)));
   PetscCall(SNESComputeFunction(ts->snes, near, noise));
@@ -123,7 +121,7 @@ static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(Z, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i, 1) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -11,6 +11,7 @@
 */
 #include "entries.h"
 #include "impl.h"
+#include "random.h"
 #include <algorithm>
 
 namespace hht3
@@ -138,15 +139,7 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(x, &start, NULL));
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar &a) {
-      unsigned k = (unsigned)(start + i) * 2654435761u + salt * 40503u;
-      k ^= k >> 15;
-      k *= 2246822519u;
-      k ^= k >> 13;
-      a += r * (1 + PetscAbsScalar(a)) * ((PetscReal)(k % 20001u) / 10000 - 1);
-    },
-    Write(x)));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &a) { a += r * (1 + PetscAbsScalar(a)) * RandomNumber(start + i, salt); }, Write(x)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

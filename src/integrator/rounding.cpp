@@ -4,6 +4,7 @@
 */
 #include "entries.h"
 #include "impl.h"
+#include "random.h"
 
 namespace hht3
 {
@@ -11,26 +12,15 @@ namespace hht3
 namespace
 {
 
-constexpr int samples = 3; /* one alone may miss the direction in which the matrix is nearly singular */
-
-/* In [-1, 1] */
-PetscReal Random(PetscInt i, int sample)
-{
-  unsigned x = (unsigned)i * 2654435761u + (unsigned)(sample + 1) * 2246822519u;
-  x          = (x ^ (x >> 15)) * 2246822519u;
-  x          = (x ^ (x >> 13)) * 3266489917u;
-  return (x >> 8) / (PetscReal)(1 << 23) - 1;
-}
-
 /* r = noise with random factors, row by row: rounding of one row knows nothing of that of another. (A residual of unknowns that have been
    moved a little is taken back to them by the matrix, however near to singular it is.) */
-PetscErrorCode Scatter(Vec noise, int sample, Vec r)
+PetscErrorCode Scatter(Vec noise, Vec r)
 {
   PetscInt first;
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(r, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * Random(first + i, sample); }, Read(noise), Write(r)));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * RandomNumber(first + i, 0); }, Read(noise), Write(r)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -75,12 +65,8 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
   for (Vec *v : {&F, &noise, &r}) PetscCall(VecDuplicate(X, v));
   PetscCall(SNESComputeFunction(ts->snes, X, F));
   PetscCall(MeasureRounding(ts, X, F, noise));
-  for (int sample = 0; sample < samples; sample++) {
-    PetscReal size;
-    PetscCall(Scatter(noise, sample, r));
-    PetscCall(SizeOfAnswer(ts, r, F, &size));
-    *e = PetscMax(*e, size);
-  }
+  PetscCall(Scatter(noise, r));
+  PetscCall(SizeOfAnswer(ts, r, F, e));
   for (Vec *v : {&F, &noise, &r}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
