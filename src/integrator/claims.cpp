@@ -11,7 +11,6 @@ namespace
 
 constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
 constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
-constexpr PetscReal variation   = 1e3;   /* inertia that seems to have fallen by more has cancelled in a sum */
 constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
 
 } // namespace
@@ -142,7 +141,7 @@ static PetscErrorCode MeasureInertia(TS ts)
     [&](PetscInt i, PetscScalar z, PetscScalar f, PetscScalar noise, PetscScalar &m) {
       if (!IsCoordinate(I, i)) return;
       const PetscReal now = PetscAbsScalar(f / z);
-      if (PetscAbsScalar(f) > PetscRealPart(noise) && now > PetscRealPart(m) / variation) m = now;
+      if (PetscAbsScalar(f) > PetscRealPart(noise)) m = now;
     },
     Read(Z), Read(change), Read(I.verify.noise), Write(I.verify.inertia)));
   for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDestroy(v));
