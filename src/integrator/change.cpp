@@ -7,7 +7,7 @@
   new coordinates, and neither a rejection nor a roll-back leads to the old ones. What is mapped and how stands in
   history.cpp, what the constraints make of it in misfit.cpp. Of the rest:
 
-    weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at once to what an angle
+  weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at once to what an angle
             happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same h would fail the test that it has
             just passed. Kept, an entry's tolerance can only grow, as everywhere.
   h         shortened where the prediction tells that the error test would fail in the new coordinates

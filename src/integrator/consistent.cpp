@@ -82,10 +82,7 @@ PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c)
 
   PetscFunctionBegin;
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
-      const TSHHT3Role r                                     = RoleOf(I, i);
-      (r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u) = x;
-    },
+    [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) { UnknownOf(RoleOf(I, i), u, v, a) = x; },
     Read(c.X), Write(c.U), Write(c.V), Write(c.A)));
   if (h > 0)
     PetscCall(ForEntries(

@@ -27,6 +27,9 @@ struct Consistent {
   PetscInt          its = 0, ksp_its = 0;
 };
 
+/* Where the unknown of a role stands in U, U', U'' */
+inline PetscScalar &UnknownOf(TSHHT3Role r, PetscScalar &u, PetscScalar &v, PetscScalar &a) { return r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u; }
+
 /* consistent.cpp */
 PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
 PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);

@@ -153,10 +153,7 @@ PetscErrorCode GuessUnknowns(const Integrator &I, Consistent &c)
 {
   PetscFunctionBegin;
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) {
-      const TSHHT3Role r = RoleOf(I, i);
-      x                  = r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u;
-    },
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(c.U), Read(c.V), Read(c.A), Write(c.X)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

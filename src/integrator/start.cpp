@@ -152,9 +152,8 @@ PetscErrorCode Distribute(Integrator &I)
   PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
-      const TSHHT3Role r                                     = RoleOf(I, i);
-      a                                                      = 0;
-      (r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u) = x;
+      a                                = 0;
+      UnknownOf(RoleOf(I, i), u, v, a) = x;
     },
     Read(I.X), Write(I.U0), Write(I.V0), Write(I.A0)));
   PetscFunctionReturn(PETSC_SUCCESS);
