@@ -84,26 +84,30 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* noise = |F(X + dX) - F| for the residual F at X and dX of random signs: rounding of the unknowns, and, as changes of these, of the largest
-   terms that make up positions and states */
+/* noise = |F(x + dx) - F| for the residual F at X and dx of random signs: rounding of all that the residual is made of, the unknowns, and
+   positions, states and velocities as sums of terms; of one unknown with one sign, lest they cancel. (By changes of X alone, rounding of
+   positions would be one of velocities too, far above theirs where h is small: what stands still in a steep brake would have no force.) */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
-  Integrator     &I = Get(ts);
-  const PetscReal position = 1 / ScalePosition(I.p, I.h), state = 1 / ScaleState(I.p, I.h);
-  Vec             near;
-  PetscInt        first;
+  Integrator &I = Get(ts);
+  Vec         near;
+  PetscInt    first;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(X, &near));
   PetscCall(VecCopy(X, near));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x += rounding_of_sums * RandomSign(first + i, 1) * PetscAbsScalar(x); }, Write(near)));
+  PetscCall(StageVectors(ts, near));
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar y, PetscScalar v, PetscScalar &x) {
-      const TSHHT3Role r    = RoleOf(I, i);
-      const PetscReal  size = IsDifferential(r) ? (PetscRealPart(y) + I.h * PetscAbsScalar(v)) * (r == TSHHT3_STATE ? state : position) : 0;
-      x += rounding_of_sums * RandomSign(first + i, 1) * (PetscAbsScalar(x) + size);
+    [&](PetscInt i, PetscScalar y, PetscScalar a, PetscScalar &u, PetscScalar &v) {
+      const TSHHT3Role r = RoleOf(I, i);
+      if (!IsDifferential(r)) return;
+      const PetscReal way = I.h * PetscAbsScalar(v), turn = r == TSHHT3_STATE ? 0 : I.h * PetscAbsScalar(a);
+      u += rounding_of_sums * RandomSign(first + i, 1) * (PetscRealPart(y) + way);
+      v += rounding_of_sums * RandomSign(first + i, 1) * (PetscAbsScalar(v) + turn);
     },
-    Read(I.ymax), Read(I.V1), Write(near)));
+    Read(I.ymax), Read(I.A1), Write(I.U1), Write(I.V1)));
   PetscCall(SNESComputeFunction(ts->snes, near, noise));
   PetscCall(VecAXPY(noise, -1, F));
   PetscCall(VecAbs(noise));
