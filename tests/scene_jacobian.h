@@ -2,8 +2,7 @@
 #ifndef HHTDAE_TESTS_SCENE_JACOBIAN_H
 #define HHTDAE_TESTS_SCENE_JACOBIAN_H
 
-#include "scene/runtime.h"
-#include "support.h"
+#include "scene_run.h"
 #include <random>
 
 namespace hhtest
@@ -12,12 +11,14 @@ namespace hhtest
 /* On one rank; the scene has been set up */
 class AnyState
 {
+  std::unique_ptr<hhtdae::Runtime> run_;
+
 public:
   hhtdae::Runtime &R;
   double           t = 0.3;
   Vec              U = nullptr, V = nullptr, A = nullptr, F = nullptr;
 
-  AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4) : R(*s.data().run)
+  AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4) : run_(layOut(s)), R(*run_)
   {
     must(MatCreateVecs(R.J, &U, &F));
     must(VecDuplicate(U, &V));

@@ -3,8 +3,7 @@
 #define HHTDAE_TESTS_SCENE_START_H
 
 #include "hhtdae/scene.h"
-#include "scene/runtime.h"
-#include "support.h"
+#include "scene_run.h"
 
 namespace hhtest
 {

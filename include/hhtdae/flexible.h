@@ -222,8 +222,7 @@ public:
   PetscErrorCode writeField(TS ts, PetscReal t, const std::string &file) const;
 
 private:
-  Scene                      *scene_ = nullptr;
-  class FullExtension        *extension_ = nullptr; /* owned by the scene */
+  PetscInt                    scene_ = 0, extension_ = -1; /* numbers of the scene, and of the body among those of its kind */
   std::map<std::string, Body> frames_;
 };
 

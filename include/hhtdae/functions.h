@@ -82,6 +82,8 @@ struct Measure {
     Value,               /* of a variable V */
     StateValue,          /* of a first-order state */
     Modal,               /* modal coordinate `component` of a flexible body */
+    ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output alone */
+    ElementMoment,       /* likewise, about marker i's origin */
     KineticEnergy, PotentialEnergy /* of the whole scene; for output alone */
   };
   Kind     kind      = Time;
@@ -103,6 +105,8 @@ struct Measure {
   static Measure jointForce(Element joint, int component, Marker frame = {}) { return {JointForce, {}, {}, frame, component, joint.id, joint.scene}; }
   static Measure jointMoment(Element joint, int component, Marker frame = {}) { return {JointMoment, {}, {}, frame, component, joint.id, joint.scene}; }
   static Measure force(Element force, int component) { return {Component, {}, {}, {}, component, force.id, force.scene}; }
+  static Measure elementForce(Element e, Marker on, int component, Marker frame = {}) { return {ElementForce, on, {}, frame, component, e.id, e.scene}; }
+  static Measure elementMoment(Element e, Marker on, int component, Marker frame = {}) { return {ElementMoment, on, {}, frame, component, e.id, e.scene}; }
   static Measure value(Variable v) { return {Value, {}, {}, {}, 0, v.id, v.scene}; }
   static Measure value(State s) { return {StateValue, {}, {}, {}, 0, s.id, s.scene}; }
   static Measure modal(Body flexible, int mode) { return {Modal, {}, {}, {}, mode, flexible.id, flexible.scene}; }

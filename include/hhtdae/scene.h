@@ -24,8 +24,11 @@
 #include "hhtdae/modal.h"
 #include "hhtdae/output.h"
 #include "hhtdae/types.h"
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace hhtdae
@@ -96,6 +99,30 @@ struct StartPolicy {
 };
 
 struct SceneData; /* src/scene/scene_data.h */
+struct Model;     /* src/scene/model.h */
+
+/* Where a marker is: position and axes (columns) */
+struct Place {
+  Vector3 position;
+  Matrix3 axes;
+  Place(const Vector3 &p = Vector3::Zero(), const Matrix3 &a = Matrix3::Identity()) : position(p), axes(a) {}
+};
+
+/* A number of the description that has a name and may be another one in the next run; Scene::parameter(). Copies are the same one. */
+class Parameter
+{
+public:
+  Parameter() = default;
+  double value() const { return *value_; }
+  operator double() const { return *value_; }
+
+private:
+  friend class Scene;
+  std::shared_ptr<double> value_ = std::make_shared<double>(0);
+};
+
+/* What describes something anew whenever parameters have changed: a function without arguments, and what it returns */
+template <class X> constexpr bool is_description = std::is_invocable<const X &>::value;
 
 class Scene
 {
@@ -122,7 +149,11 @@ public:
   Marker markerAt(Body body, const Vector3 &position, const Matrix3 &axes = Matrix3::Identity(), const std::string &name = "");
 
   /* joints, motions, forces: joints.h, forces.h */
-  template <class Spec> Element add(const std::string &name, const Spec &spec);
+  template <class Spec, std::enable_if_t<!is_description<Spec>, int> = 0> Element add(const std::string &name, const Spec &spec)
+  {
+    if (keeps()) keep([=](Scene &s) { s.enter(name, spec); });
+    return enter(name, spec);
+  }
 
   /* user-defined variable V = expression; first-order state x' = rate; see functions.h */
   Variable variable(const std::string &name, const Expression &definition, double initial = 0);
@@ -130,24 +161,82 @@ public:
 
   void gravity(const Vector3 &acceleration);
 
-  /* results, output.h: a channel to sample; what a body looks like, the ground too; a line through markers, a spring for example */
-  Channel         channel(const std::string &name, const Measure &measure, const std::string &unit = "");
+  /*
+    Parameters: numbers that may be others in the next run, without describing the scene again. They come before everything else.
+    What depends on them is given by a function without arguments, which is called whenever they have changed:
+
+      Parameter stiffness = scene.parameter("stiffness", 2e4), arm = scene.parameter("arm", 0.3);
+      Marker    i         = scene.marker(body, [=] { return Vector3(arm, 0, 0); });
+      scene.add("spring", [=] { return SpringDamper{i, j, stiffness}; });
+      for (double k : {1e4, 2e4, 4e4}) {
+        PetscCall(scene.set("stiffness", k));
+        PetscCall(scene.createTS(&ts));
+        ...
+
+    All that was described is then described anew in the same order, so that what follows from it, lengths at the start for
+    example, is right. Runs that were made before keep what they had. A function of the state (of an Expression, say) that holds
+    a Parameter reads its present value at every evaluation: a controller may change it between steps; after a jump
+    TSRestartStep() begins the integrator's history anew.
+  */
+  Parameter      parameter(const std::string &name, double value);
+  PetscErrorCode set(const std::string &parameter, double value);
+  template <class F, std::enable_if_t<is_description<F>, int> = 0> auto add(const std::string &name, const F &describe)
+  {
+    if (keeps()) keep([=](Scene &s) { s.add(name, describe()); });
+    const Quiet quiet(*this);
+    return add(name, describe());
+  }
+  /* An element that may be missing: without a value it has its place among the others, and nothing acts */
+  template <class Spec> Element add(const std::string &name, const std::optional<Spec> &spec)
+  {
+    if (keeps()) keep([=](Scene &s) { s.add(name, spec); });
+    const Quiet quiet(*this);
+    return spec ? add(name, *spec) : absent(name);
+  }
+  template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker marker(Body body, const F &describe, const std::string &name = "")
+  {
+    if (keeps()) keep([=](Scene &s) { s.marker(body, describe, name); });
+    const Quiet quiet(*this);
+    const Place p(describe());
+    return marker(body, p.position, p.axes, name);
+  }
+  template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker markerAt(Body body, const F &describe, const std::string &name = "")
+  {
+    if (keeps()) keep([=](Scene &s) { s.markerAt(body, describe, name); });
+    const Quiet quiet(*this);
+    const Place p(describe());
+    return markerAt(body, p.position, p.axes, name);
+  }
+  template <class F, std::enable_if_t<is_description<F>, int> = 0> void gravity(const F &describe)
+  {
+    if (keeps()) keep([=](Scene &s) { s.gravity(describe); });
+    const Quiet quiet(*this);
+    gravity(Vector3(describe()));
+  }
+
+  /* results, output.h: a channel to sample, a measure or an expression of some; what a body looks like, the ground too; a line through markers, a spring for example */
+  Channel         channel(const std::string &name, const Expression &value, const std::string &unit = "");
   void            shape(Body body, const Shape &shape);
   void            line(const std::vector<Marker> &markers);
-  OutputSettings &output();
+  OutputSettings &output() { return output_; }
 
   /* How the run starts; options come after it */
-  StartPolicy &start();
+  StartPolicy &start() { return start_; }
 
-  /* Checks the scene, assembles it, drops redundant constraints, numbers and distributes it, looks for static equilibrium, all as
-     start() says; collective; called by createTS() when it has not been. After this the scene is fixed: what is added later is an
-     error of the next createTS(), solve() or sample(). */
+  /* Checks the scene, assembles it, drops redundant constraints, numbers it, looks for static equilibrium, all as start() says;
+     collective; called by createTS() when it has not been. After this the scene is fixed, but for its parameters: what is added
+     later is an error of the next createTS(), solve() or sample(). */
   PetscErrorCode setUp();
 
-  /* A TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it, the scene must
-     outlive it. Set final time, step and options on it as on any TS. Each run from the start takes a TS of its own: the scene holds
-     axes of Euler angles and unwound angles of the run at hand, which begins anew with each TS and ends those before. */
+  /* A run from the start: a TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it.
+     Set final time, step and options on it as on any TS. It owns all that changes in the run, so that any number of runs may go on
+     side by side, and outlive the scene. */
   PetscErrorCode createTS(TS *ts);
+
+  /* A run that goes on where another one of this scene is: its time, positions, velocities and states, angles over full turns; with
+     parameters, and elements that may be missing, as they are now. Velocities that joints of now forbid are an error, or are
+     projected in the metric of the masses, which is a plastic impact: start().assembly = Assembly::Project. */
+  PetscErrorCode createTS(TS *ts, TS from);
 
   /* TSSolve(), output. */
   PetscErrorCode solve(TS ts);
@@ -158,14 +247,30 @@ public:
 
   PetscErrorCode view(PetscViewer viewer) const;
 
-  /* Everything, for the library's own rooms and for tests */
-  SceneData       &data() { return *data_; }
-  const SceneData &data() const { return *data_; }
-
 private:
-  PetscInt                   number_; /* of this scene, in the handles that it gives */
-  std::unique_ptr<SceneData> data_;
-  Body addFrame(Body flexible, PetscInt attachment);
+  friend struct SceneAccess; /* for the library's own rooms and for tests */
+  struct Journal; /* what was described, call by call; only where there are parameters */
+  struct Quiet {  /* what is called inside of another call is not noted */
+    Scene &scene;
+    explicit Quiet(Scene &s) : scene(s) { scene.quiet_++; }
+    ~Quiet() { scene.quiet_--; }
+  };
+
+  PetscInt                 number_; /* of this scene, in the handles that it gives */
+  std::shared_ptr<Model>   model_;
+  std::unique_ptr<Journal> journal_;
+  StartPolicy              start_;
+  OutputSettings           output_;
+  int                      quiet_ = 0;
+
+  template <class Spec> Element enter(const std::string &name, const Spec &spec);
+  bool       keeps() const { return journal_ && !quiet_; }
+  void       keep(std::function<void(Scene &)> call);
+  SceneData &data() const;
+  Element    absent(const std::string &name);
+  Body       addRigid(const std::string &name, const RigidBody &body);
+  Body       addFrame(Body flexible, PetscInt attachment);
+  void       describeAnew();
 };
 
 } // namespace hhtdae

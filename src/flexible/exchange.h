@@ -30,7 +30,7 @@ inline PetscErrorCode Agree(MPI_Comm comm, const std::string &problem, PetscErro
 }
 
 /* Pieces of a distributed thing, one after the other: this rank's first and the number of all. Collective */
-inline PetscErrorCode Place(MPI_Comm comm, PetscInt64 own, PetscInt64 *first, PetscInt64 *all)
+inline PetscErrorCode RangeOnRank(MPI_Comm comm, PetscInt64 own, PetscInt64 *first, PetscInt64 *all)
 {
   PetscMPIInt rank;
   PetscFunctionBegin;

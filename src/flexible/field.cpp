@@ -109,7 +109,7 @@ PetscErrorCode MakeCells(const ReducedBody &b, bool elements, Array cells[3])
   cells[1] = Array{"offsets", "Int64", 1, {}};
   cells[2] = Array{"types", "UInt8", 1, {}};
   for (const FeElement &e : b.elements) end += FeNodes(e.type);
-  PetscCall(Place(b.comm, elements ? end : (PetscInt64)b.own, &begin, &all));
+  PetscCall(RangeOnRank(b.comm, elements ? end : (PetscInt64)b.own, &begin, &all));
   end = begin;
   for (const FeElement &e : b.elements) {
     for (int k = 0; k < FeNodes(e.type); k++) Add<int64_t>(&cells[0].bytes, e.node[GmshPlace(e.type, k)]);

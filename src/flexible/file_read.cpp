@@ -324,7 +324,7 @@ PetscErrorCode GetElements(Reader *in, MPI_Comm comm, PetscMPIInt rank, PetscMPI
     else
       mine += FeNodes((ElementType)t);
   PetscCall(in->agree(comm));
-  PetscCall(Place(comm, mine, &begin, &all));
+  PetscCall(RangeOnRank(comm, mine, &begin, &all));
   node.resize((std::size_t)mine);
   in->part("/elements/node", {(hsize_t)all}, {1, (hsize_t)mine, (hsize_t)begin, (hsize_t)all, 1}, node.data());
   PetscCall(in->agree(comm));
@@ -368,7 +368,7 @@ PetscErrorCode GetStress(Reader *in, MPI_Comm comm, hsize_t n, ReducedBody *b)
                 own = std::max(first, FirstStressed(in, S, (int64_t)b->first + b->own)) - first;
   std::vector<int64_t> node(own);
   PetscCall(in->agree(comm));
-  PetscCall(Place(comm, (PetscInt64)own, &begin, &all));
+  PetscCall(RangeOnRank(comm, (PetscInt64)own, &begin, &all));
   if (all != (PetscInt64)S || begin != (PetscInt64)first) in->fail("/stress/node is not ascending among the nodes");
   const Dims values = in->dims<double>("/stress/values");
   if (in->error.empty() && values != Dims{n, S, 6})

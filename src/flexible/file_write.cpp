@@ -272,9 +272,9 @@ PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
   const Eigen::Index n = b.modal.omega.size();
   std::string        error;
   PetscFunctionBegin;
-  PetscCall(Place(b.comm, b.own, &kept->first, &kept->nodes));
-  PetscCall(Place(b.comm, (PetscInt64)b.stress.node.size(), &kept->first_stressed, &kept->stressed));
-  PetscCall(Place(b.comm, (PetscInt64)b.elements.size(), &kept->first_element, &kept->elements));
+  PetscCall(RangeOnRank(b.comm, b.own, &kept->first, &kept->nodes));
+  PetscCall(RangeOnRank(b.comm, (PetscInt64)b.stress.node.size(), &kept->first_stressed, &kept->stressed));
+  PetscCall(RangeOnRank(b.comm, (PetscInt64)b.elements.size(), &kept->first_element, &kept->elements));
   int some[2] = {!b.coordinates.empty(), b.shape.size() > 0};
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, some, 2, MPI_INT, MPI_MAX, b.comm));
   kept->coordinates = some[0];
@@ -353,7 +353,7 @@ PetscErrorCode PutElements(Writer *out, const ReducedBody &b, const Kept &kept)
   PetscFunctionBegin;
   if (!E) PetscFunctionReturn(0);
   for (const FeElement &e : b.elements) node.insert(node.end(), e.node, e.node + FeNodes(e.type));
-  PetscCall(Place(b.comm, (PetscInt64)node.size(), &begin, &all));
+  PetscCall(RangeOnRank(b.comm, (PetscInt64)node.size(), &begin, &all));
   PetscCall(out->putParts<uint8_t>("/elements/type", {E}, {1, own, first, E, 1}, [&b](hsize_t, hsize_t, uint8_t *to) {
     for (const FeElement &e : b.elements) *to++ = (uint8_t)e.type;
   }));

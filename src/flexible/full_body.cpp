@@ -28,15 +28,14 @@ void FullExtension::initial(double *x, double *y) const
   std::copy(v.begin(), v.end(), y);
 }
 
-void FullExtension::rest(const double *x)
+void FullExtension::startFrom(const double *x, const double *y)
 {
   std::copy(x, x + u.size(), u.begin());
-  std::fill(v.begin(), v.end(), 0.0);
+  std::copy(y, y + v.size(), v.begin());
 }
 
-void FullExtension::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches)
+void FullExtension::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const
 {
-  gravity = l.run->scene.gravity;
   if (spec.law == FeLaw::Small) LocalizeMatrices(*this, l, batches);
   else LocalizeElements(*this, l, batches);
   LocalizeTies(*this, l, batches);
@@ -184,8 +183,8 @@ Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, con
   f.light_mass    = 1e-3 * mass;
   f.light_inertia = 1e-3 * mass * size * size;
   f.fixed_start   = true; /* the nodes do not move in the assembly phase */
-  scene.data().bodies.push_back(f);
-  return Body{(PetscInt)scene.data().bodies.size() - 1, scene.data().number};
+  DataOf(scene).bodies.push_back(f);
+  return Body{(PetscInt)DataOf(scene).bodies.size() - 1, DataOf(scene).number};
 }
 
 /* Mass, and two opposite corners of the box around the body, for what has to be small or large beside them */
@@ -221,9 +220,12 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   double      mass;
   Vector3     corner[2];
   PetscFunctionBegin;
-  const std::string fault = scene.data().planar ? "it needs a scene in space" : Fault(model, body);
+  const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
-  scene.data().refuseLate("finite-element body " + name);
+  SceneAccess::keep(scene, [=, &model](Scene &s) {
+    if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
+  });
+  DataOf(scene).refuseLate("finite-element body " + name);
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
   x->spec  = body;
@@ -248,18 +250,18 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   PetscCall(MassAndBox(model, &mass, corner));
   const double extent = (corner[1] - corner[0]).norm();
   /* a scene takes its size from bodies and markers, and has none of this body else but its attachments */
-  for (const Vector3 &c : corner) scene.data().markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
+  for (const Vector3 &c : corner) DataOf(scene).markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
   for (const Attachment &a : body.attachments) {
     Vector3 point;
     PetscCall(MakeTie(*x, a, &point));
     const Body frame = AddFrame(scene, *x, name + "." + a.name, point, mass, extent);
-    scene.data().markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
-    x->ties.back().frame = Marker{(PetscInt)scene.data().markers.size() - 1};
+    DataOf(scene).markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
+    x->ties.back().frame = Marker{(PetscInt)DataOf(scene).markers.size() - 1};
     frames_[a.name]      = frame;
   }
-  scene_     = &scene;
-  extension_ = x.get();
-  scene.data().extensions.push_back(std::move(x));
+  scene_     = DataOf(scene).number;
+  extension_ = (PetscInt)DataOf(scene).extensions.size();
+  DataOf(scene).extensions.push_back(std::move(x));
   PetscFunctionReturn(0);
 }
 
@@ -269,19 +271,36 @@ Body FullFeBody::attachment(const std::string &name) const
   return found == frames_.end() ? Body{} : found->second;
 }
 
+namespace
+{
+
+/* The body in the run of a TS */
+PetscErrorCode Find(TS ts, PetscInt scene, PetscInt extension, const Runtime **R, const FullExtension **x)
+{
+  PetscFunctionBegin;
+  *R = RunOf(ts);
+  PetscCheck(*R && extension >= 0 && (*R)->scene.number == scene, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "the TS is not of the scene that this body was added to: take one that its createTS() made");
+  *x = static_cast<const FullExtension *>((*R)->scene.extensions[extension].get());
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
 PetscErrorCode FullFeBody::positions(TS ts, PetscReal t, std::vector<double> *x) const
 {
   Vec           U;
   const double *u;
+  const Runtime       *R;
+  const FullExtension *e;
   PetscFunctionBegin;
-  PetscCheck(scene_ && scene_->data().run, PETSC_COMM_SELF, PETSC_ERR_ORDER, "the scene has no TS yet: call Scene::createTS() first");
-  const Runtime &R = *scene_->data().run;
+  PetscCall(Find(ts, scene_, extension_, &R, &e));
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecDuplicate(U, &U));
   PetscCall(TSHHT3Interpolate(ts, t, U, nullptr, nullptr));
   PetscCall(VecGetArrayRead(U, &u));
-  const double *own = u + extension_->start[R.rank] - R.start;
-  x->assign(own, own + extension_->coordinates());
+  const double *own = u + e->start[R->rank] - R->start;
+  x->assign(own, own + e->coordinates());
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecDestroy(&U));
   PetscFunctionReturn(0);
@@ -289,10 +308,13 @@ PetscErrorCode FullFeBody::positions(TS ts, PetscReal t, std::vector<double> *x)
 
 PetscErrorCode FullFeBody::writeField(TS ts, PetscReal t, const std::string &file) const
 {
-  const FeModel      &m = *extension_->model;
-  std::vector<double> x;
-  ReducedBody         b; /* whose one mode is the displacement */
+  const Runtime       *R;
+  const FullExtension *e;
+  std::vector<double>  x;
+  ReducedBody          b; /* whose one mode is the displacement */
   PetscFunctionBegin;
+  PetscCall(Find(ts, scene_, extension_, &R, &e));
+  const FeModel &m = *e->model;
   PetscCall(positions(ts, t, &x));
   b.comm = m.comm;
   b.own = m.own;
@@ -303,7 +325,7 @@ PetscErrorCode FullFeBody::writeField(TS ts, PetscReal t, const std::string &fil
   b.coordinates.resize(x.size());
   b.shape.resize((PetscInt)x.size(), 1);
   for (PetscInt n = 0; n < m.own; n++) {
-    const Vector3 p = extension_->placed(&m.coordinates[3 * n]);
+    const Vector3 p = e->placed(&m.coordinates[3 * n]);
     for (int c = 0; c < 3; c++) {
       b.coordinates[3 * n + c] = p(c);
       b.shape(3 * n + c, 0)    = x[3 * n + c] - p(c);

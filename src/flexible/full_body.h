@@ -29,7 +29,6 @@ class FullExtension : public Extension
 public:
   FullBody              spec;
   const FeModel        *model = nullptr;
-  Vector3               gravity = Vector3::Zero();
   std::vector<PetscInt> node_first; /* first node of each rank, and the number of nodes */
   std::vector<double>   u, v;       /* own coordinates at the start */
   std::vector<TieNodes> ties;
@@ -45,9 +44,9 @@ public:
   PetscInt coordinates() const override { return 3 * model->own; }
   PetscInt multipliers() const override { return own_multipliers; }
   void     initial(double *x, double *y) const override;
-  void     rest(const double *x) override;
+  void     startFrom(const double *x, const double *y) override;
   bool     symmetric() const override { return true; } /* as K and M of the model are */
-  void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override;
+  void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
 
   PetscMPIInt ownerOf(PetscInt node) const;
   PetscInt    number(PetscInt node) const; /* global number of its first coordinate, once start is known */

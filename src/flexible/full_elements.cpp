@@ -40,7 +40,7 @@ public:
       fe::NodeVectors<Shape> u, a, f;
       const fe::NodeVectors<Shape> still = gather(ev.u, e) - e.X;
       u = still;
-      a = (gather(ev.a, e) + x.spec.mass_damping * gather(ev.v, e)).colwise() - x.gravity;
+      a = (gather(ev.a, e) + x.spec.mass_damping * gather(ev.v, e)).colwise() - ev.bodies.gravity;
       fe::LargeForce<Shape>(e.X, u, e.lame, f);
       f.noalias() += a * e.mass;
       for (int i = 0; i < n; i++) AddRows(ev, e.node[i], f.col(i));
@@ -74,7 +74,7 @@ public:
       fe::LargeForce<Shape>(e.X, u - e.X, e.lame, f, nullptr, &elastic);
       B.elastic += elastic;
       B.kinetic += 0.5 * p.cwiseProduct(v).sum();
-      B.gravity -= x.gravity.dot(u * e.mass.rowwise().sum());
+      B.gravity -= ev.bodies.gravity.dot(u * e.mass.rowwise().sum());
       B.linear += p.rowwise().sum();
       for (int i = 0; i < n; i++) B.angular += Vector3(u.col(i)).cross(Vector3(p.col(i)));
     }

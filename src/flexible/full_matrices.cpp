@@ -35,7 +35,7 @@ public:
       for (PetscInt k = x.block_first[n]; k < x.block_first[n + 1]; k++) {
         const NodePlace &j = near[x.block_near[k]];
         const Vector3    v = At(ev.v, j);
-        f += x.block_M[k] * (At(ev.a, j) - x.gravity + a * v) + x.block_K[k] * (displacement(ev, x.block_near[k]) + b * v);
+        f += x.block_M[k] * (At(ev.a, j) - ev.bodies.gravity + a * v) + x.block_K[k] * (displacement(ev, x.block_near[k]) + b * v);
       }
       AddRows(ev, near[own + n], f);
     }
@@ -54,7 +54,7 @@ public:
       Vector3          p = Vector3::Zero(), weight = p, f = p;
       for (PetscInt k = x.block_first[n]; k < x.block_first[n + 1]; k++) {
         p += x.block_M[k] * At(ev.v, near[x.block_near[k]]);
-        weight += x.block_M[k] * x.gravity;
+        weight += x.block_M[k] * ev.bodies.gravity;
         f += x.block_K[k] * displacement(ev, x.block_near[k]);
       }
       B.kinetic += 0.5 * p.dot(At(ev.v, i));

@@ -188,11 +188,11 @@ PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const 
 
 /* Gauss-Newton: every step is the smallest that meets the linearized constraints; halved where it does not bring them
  * nearer */
-PetscErrorCode ProjectPositions(Runtime &R, Hold hold, bool *ok)
+PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok)
 {
-  SceneData            &s    = R.scene;
+  SceneData            &s    = M.scene;
   const double          size = SceneSize(s), enough = 1e-3 * s.start.tolerance;
-  NearestSystem         system(R);
+  NearestSystem         system(M);
   std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, hold);
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
@@ -231,10 +231,10 @@ PetscErrorCode ProjectPositions(Runtime &R, Hold hold, bool *ok)
 namespace
 {
 
-PetscErrorCode ProjectVelocities(Runtime &R)
+PetscErrorCode ProjectVelocities(Model &M)
 {
-  SceneData          &s = R.scene;
-  NearestSystem       system(R);
+  SceneData          &s = M.scene;
+  NearestSystem       system(M);
   std::vector<double> rhs, d;
   PetscFunctionBegin;
   for (int it = 0; it < 3; it++) {
@@ -281,9 +281,9 @@ PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m)
 
 } // namespace
 
-PetscErrorCode Assemble(Runtime &R)
+PetscErrorCode Assemble(Model &M)
 {
-  SceneData              &s      = R.scene;
+  SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
   std::vector<Misfit>     m;
   bool                    ok;
@@ -295,7 +295,7 @@ PetscErrorCode Assemble(Runtime &R)
     PetscFunctionReturn(0);
   }
   if (s.started.misfit > 0) {
-    PetscCall(ProjectPositions(R, Hold::FixedStart, &ok));
+    PetscCall(ProjectPositions(M, Hold::FixedStart, &ok));
     if (!ok) {
       PetscCall(MeasureMisfit(s, m));
       const std::string left = WorstPositions(s, m, s.start.tolerance);
@@ -307,7 +307,7 @@ PetscErrorCode Assemble(Runtime &R)
     }
   }
   PetscCall(MeasureMisfit(s, m));
-  if (s.started.velocity_misfit > 0) PetscCall(ProjectVelocities(R));
+  if (s.started.velocity_misfit > 0) PetscCall(ProjectVelocities(M));
   PetscCall(MeasureMisfit(s, m));
   if (!(s.started.velocity_misfit <= s.start.tolerance)) {
     const std::string left = WorstVelocities(s, m, s.start.tolerance);

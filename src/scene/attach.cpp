@@ -300,7 +300,7 @@ private:
 
 } // namespace
 
-void AttachStore::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches)
+void AttachStore::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const
 {
   auto batch    = std::make_unique<AttachBatch>();
   batch->bodies = l.bodies;

@@ -49,7 +49,7 @@ public:
   bool          usesVelocities() const override { return false; }
   int           inputs() const override { return 0; }
   ScalarRef     input(PetscInt, int) const override { return {}; }
-  void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override;
+  void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override;
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override;
 };

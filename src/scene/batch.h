@@ -34,6 +34,7 @@ struct Evaluation {
 };
 
 struct Balance; /* output/energy.h */
+class StoreBase; /* store.h */
 
 class Batch
 {
@@ -56,6 +57,8 @@ public:
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }
+  /* out of one instance, by its number in the store that described it; false if it is not here */
+  virtual bool memoryOf(const StoreBase *, PetscInt, double *) const { return false; }
 
 protected:
   std::vector<PetscInt> request_; /* numbers of the blocks, in the order of assembly */
@@ -147,6 +150,19 @@ template <class K, class Instance> void Remember(Instance &e, const Bodies &B)
   (void)e;
   (void)B;
 }
+
+/* Which instances of a store a batch has, for kernels that remember */
+struct InstancesOf {
+  const StoreBase      *store = nullptr;
+  std::vector<PetscInt> number; /* increasing */
+
+  void     add(PetscInt e) { number.push_back(e); }
+  PetscInt find(const StoreBase *s, PetscInt e) const /* -1: not here */
+  {
+    const auto at = std::lower_bound(number.begin(), number.end(), e);
+    return s == store && at != number.end() && *at == e ? (PetscInt)(at - number.begin()) : -1;
+  }
+};
 
 /* out to x or in from it; returns what comes behind */
 template <class K, class Instance> double *CopyMemory(Instance &e, double *x, bool in)

@@ -5,6 +5,7 @@ namespace hhtdae
 
 void Bodies::move(const double *u, const double *v)
 {
+  moves++;
   for (std::size_t i = 0; i < body.size(); i++) {
     const LocalBody &k = body[i];
     BodyMotion      &b = now[i];

@@ -85,6 +85,7 @@ public:
   std::vector<LocalMarker> marker;
   std::vector<ModalPart>   modal;
   PetscInt                 own = 0;
+  long                     moves = 0; /* so far */
   Vector3                  gravity = Vector3::Zero();
 
   /* motion of all bodies from their coordinates and rates; clears the loads */

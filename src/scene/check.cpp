@@ -190,11 +190,11 @@ PetscErrorCode CheckDescription(SceneData &s)
 }
 
 /* What was added or changed since setUp() */
-PetscErrorCode CheckUnchanged(const SceneData &s)
+PetscErrorCode CheckUnchanged(const SceneData &s, const StartPolicy &start)
 {
   PetscFunctionBegin;
   PetscCall(Report(s, s.errors, "the scene was changed after it was set up"));
-  PetscCheck(SameStart(s.start, s.start_used), s.comm, PETSC_ERR_ORDER, "Scene::start() was changed after the scene was set up, which has no effect: change it before setUp() or createTS()");
+  PetscCheck(SameStart(start, s.start_given), s.comm, PETSC_ERR_ORDER, "Scene::start() was changed after the scene was set up, which has no effect: change it before setUp() or createTS()");
   PetscFunctionReturn(0);
 }
 

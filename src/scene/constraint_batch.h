@@ -95,6 +95,13 @@ public:
   bool     limitsSteps() const override { return HasLongestStep<K>::value && !all.empty(); }
   double   longestStep(const Evaluation &ev) const override { return LongestSteps<K>(all, ev); }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
+  bool     memoryOf(const StoreBase *s, PetscInt number, double *x) const override
+  {
+    const PetscInt i = of.find(s, number);
+    if constexpr (K::memory > 0)
+      if (i >= 0) std::copy(all[i].data.memory, all[i].data.memory + K::memory, x);
+    return i >= 0;
+  }
   void     copyMemory(double *x, bool in) override
   {
     for (Instance &e : all) x = CopyMemory<K>(e, x, in);
@@ -107,7 +114,8 @@ public:
         if (K::curved(a, b)) return true;
     return false;
   }
-  Bodies *bodies = nullptr;
+  Bodies     *bodies = nullptr;
+  InstancesOf of; /* where K::memory > 0 */
 
   /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
   static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)

@@ -11,6 +11,7 @@
   too far or has gone uphill.
 */
 #include "extension.h"
+#include "runtime.h"
 #include "start.h"
 #include <algorithm>
 #include <cmath>
@@ -46,13 +47,14 @@ struct Attempt {
 };
 
 struct Equilibrium {
+  Model   &M;
   Runtime &R;
   Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, start = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;
   double   size, scale = 0; /* of lengths, of forces */
 
-  explicit Equilibrium(Runtime &r) : R(r), size(SceneSize(r.scene)) {}
+  Equilibrium(Model &m, Runtime &r) : M(m), R(r), size(SceneSize(m.scene)) {}
   ~Equilibrium()
   {
     PetscCallAbort(PETSC_COMM_SELF, KSPDestroy(&ksp));
@@ -190,7 +192,7 @@ PetscErrorCode RenewAxes(Equilibrium &E)
   PetscCall(VecRestoreArrayRead(E.U, &u));
   PetscCallMPI(MPI_Allreduce(&mine, &any, 1, MPIU_BOOL, MPI_LOR, R.scene.comm));
   if (!any) PetscFunctionReturn(0);
-  PetscCall(WriteRest(R, E.U));
+  PetscCall(WriteState(E.M, R, E.U, nullptr));
   PetscCall(InitialState(R, E.next, E.V));
   PetscCall(VecSet(E.V, 0));
   PetscCall(VecGetArrayRead(E.next, &u));
@@ -248,7 +250,7 @@ PetscErrorCode Newton(Equilibrium &E, double *reach)
 {
   KSPConvergedReason reason;
   PetscFunctionBegin;
-  E.R.scene.started.equilibrium_iterations++;
+  E.M.scene.started.equilibrium_iterations++;
   *reach = INFINITY;
   PetscCall(KSPSolve(E.ksp, E.F, E.d));
   PetscCall(KSPGetConvergedReason(E.ksp, &reason));
@@ -344,7 +346,7 @@ bool Balanced(const Equilibrium &E, const Unbalanced &at, double h)
 
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
-  SceneData &s = E.R.scene;
+  const SceneData &s = E.R.scene;
   double     h = 0, first, before;
   Attempt    a;
   PetscFunctionBegin;
@@ -371,15 +373,18 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 
 } // namespace
 
-PetscErrorCode FindEquilibrium(Runtime &R)
+PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
 {
-  SceneData              &s         = R.scene;
+  SceneData              &s         = M->scene;
   const std::vector<Pose> before    = Poses(s);
   const auto              variables = s.variables, states = s.states;
-  Equilibrium             E(R);
+  Runtime                 R(M);
+  Equilibrium             E(*M, R);
   Unbalanced              at;
   bool                    found     = false;
   PetscFunctionBegin;
+  PetscCall(Layout(R));
+  PetscCall(StoreTriangle(R));
   PetscCall(Create(E));
   PetscCall(Relax(E, &found, at));
   if (!found) {
@@ -392,7 +397,7 @@ PetscErrorCode FindEquilibrium(Runtime &R)
             "Start nearer to it, or hold what is free to move for ever",
             (int)s.started.equilibrium_iterations, at.force, s.bodyName(at.body).c_str(), at.misfit);
   }
-  PetscCall(WriteRest(R, E.U));
+  PetscCall(WriteState(E.M, R, E.U, nullptr));
   PetscCall(ReportMoves(s, before, "equilibrium"));
   PetscFunctionReturn(0);
 }

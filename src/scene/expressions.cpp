@@ -11,18 +11,18 @@ namespace
 {
 
 /* The rank of a measure's first body or element; -1 if it has none */
-PetscMPIInt OwnerOf(const Runtime &R, const Measure &m)
+PetscMPIInt OwnerOf(const Model &M, const Measure &m)
 {
-  const SceneData &s = R.scene;
+  const SceneData &s = M.scene;
   for (Marker k : {m.i, m.j, m.frame})
-    if (s.valid(k) && s.markers[k.id].body >= 0) return R.number.owner[s.markers[k.id].body];
-  if (m.kind == Measure::Modal) return R.number.owner[m.target];
+    if (s.valid(k) && s.markers[k.id].body >= 0) return M.number.owner[s.markers[k.id].body];
+  if (m.kind == Measure::Modal) return M.number.owner[m.target];
   if (m.kind < Measure::Multiplier || m.kind > Measure::Component) return -1;
   const std::vector<Part> &parts = s.elements[m.target].parts;
-  return parts.empty() ? -1 : OwnerOf(R, *parts[0].store, parts[0].index);
+  return parts.empty() ? -1 : OwnerOf(M, *parts[0].store, parts[0].index);
 }
 
-void Place(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, const char *what, const ExpressionData &d,
+void AddRow(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, const char *what, const ExpressionData &d,
            PetscInt number)
 {
   batch.add(kind, LocalFunction(l, std::string(what) + " " + d.name, &d.expression, 1), l.local(number),
@@ -46,11 +46,11 @@ bool UsesAcceleration(const SceneData &s)
 
 } // namespace
 
-PetscMPIInt OwnerOf(const Runtime &R, const Expression &e)
+PetscMPIInt OwnerOf(const Model &M, const Expression &e)
 {
-  if (R.size == 1) return 0;
+  if (M.size == 1) return 0;
   for (const Measure &m : e.arguments) {
-    const PetscMPIInt owner = OwnerOf(R, m);
+    const PetscMPIInt owner = OwnerOf(M, m);
     if (owner >= 0) return owner;
   }
   return 0;
@@ -64,10 +64,10 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l)
   auto batch          = std::make_unique<ExpressionBatch>(R.bodies);
   for (std::size_t i = 0; i < s.variables.size(); i++)
     if (R.number.variable_owner[i] == R.rank)
-      Place(l, *batch, ExpressionBatch::Definition, "variable", s.variables[i], R.number.variable[i]);
+      AddRow(l, *batch, ExpressionBatch::Definition, "variable", s.variables[i], R.number.variable[i]);
   for (std::size_t i = 0; i < s.states.size(); i++)
     if (R.number.state_owner[i] == R.rank)
-      Place(l, *batch, ExpressionBatch::RateOfState, "state", s.states[i], R.number.state[i]);
+      AddRow(l, *batch, ExpressionBatch::RateOfState, "state", s.states[i], R.number.state[i]);
   if (!batch->empty()) R.batches.push_back(std::move(batch));
   PetscFunctionReturn(0);
 }
@@ -95,6 +95,8 @@ const char *NameOf(Measure::Kind k)
                                   "value of a variable",
                                   "value of a state",
                                   "modal coordinate",
+                                  "force of an element",
+                                  "moment of an element",
                                   "kinetic energy",
                                   "potential energy"};
   return name[k];
@@ -124,6 +126,20 @@ std::string CheckModal(const SceneData &s, const Measure &m)
   return m.component >= 0 && m.component < n ? "" : s.bodies[m.target].name + " has modes 0 to " + std::to_string(n - 1) + ", not " + std::to_string(m.component);
 }
 
+/* A load is read where the body is that it acts on */
+std::string CheckLoad(const SceneData &s, const Measure &m)
+{
+  if (!s.valid(Element{m.target, m.scene})) return "its element is not one of this scene; add it first";
+  if (m.component < 0 || m.component > 2) return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+  if (!Good(s, m.i)) return "its marker is not one of this scene";
+  if (m.frame.id != -1 && !Good(s, m.frame)) return "marker `frame` is not one of this scene";
+  const ElementData &e = s.elements[m.target];
+  for (const Part &p : e.parts)
+    for (int k = 0; k < p.store->markers(); k++)
+      if (s.markers[p.store->marker(p.index, k)].body == s.markers[m.i.id].body) return "";
+  return e.parts.empty() ? "" : std::string(e.type) + " " + e.name + " does not act on " + s.bodyName(s.markers[m.i.id].body);
+}
+
 std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
 {
   if (!s.valid(Element{m.target, m.scene}))
@@ -131,9 +147,9 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
   const ElementData &e       = s.elements[m.target];
   const std::string  who     = std::string(e.type) + " " + e.name;
   const bool         of_load = m.kind == Measure::Component;
+  if (e.parts.empty()) return ""; /* absent, or with errors of its own */
   if (of_load != (e.kind == ElementData::Force))
     return who + (of_load ? " is not a force" : " is not a joint or motion");
-  if (e.parts.empty()) return ""; /* it has errors of its own */
   if (m.kind == Measure::JointForce || m.kind == Measure::JointMoment) {
     if (m.component < 0 || m.component > 2)
       return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
@@ -181,6 +197,9 @@ std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
     return s.mine(m) && m.target >= 0 && m.target < (PetscInt)s.variables.size() ? "" : "not a variable of this scene";
   case Measure::StateValue:
     return s.mine(m) && m.target >= 0 && m.target < (PetscInt)s.states.size() ? "" : "not a state of this scene";
+  case Measure::ElementForce:
+  case Measure::ElementMoment:
+    return in_equation ? "is for output alone; an expression takes jointForce() or a force state" : CheckLoad(s, m);
   case Measure::Modal:
     return CheckModal(s, m);
   case Measure::Multiplier:

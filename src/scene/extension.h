@@ -17,8 +17,8 @@ public:
   virtual PetscInt coordinates() const        = 0; /* of this rank */
   virtual PetscInt multipliers() const        = 0; /* of this rank, behind its coordinates; their rows are holonomic constraints */
   virtual void     initial(double *u, double *v) const = 0; /* own coordinates */
-  virtual void     rest(const double *u) = 0; /* these become the initial coordinates, at rest */
-  virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  virtual void     startFrom(const double *u, const double *v) = 0; /* these become the initial coordinates and velocities */
+  virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
   virtual bool     symmetric() const { return false; } /* forces have a potential, damping is a constant symmetric matrix */
   PetscInt         unknowns() const { return coordinates() + multipliers(); }
 

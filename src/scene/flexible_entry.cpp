@@ -84,7 +84,8 @@ Eigen::VectorXd ModalDamping(const FlexibleData &f)
 
 Body Scene::add(const std::string &name, const FlexibleBody &b)
 {
-  const std::string who = name.empty() ? "body " + std::to_string(data_->bodies.size()) : name, fault = Fault(b, data_->planar);
+  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
+  const std::string who = name.empty() ? "body " + std::to_string(data().bodies.size()) : name, fault = Fault(b, data().planar);
   RigidBody         r;
   r.rotation         = b.rotation;
   r.velocity         = b.velocity;
@@ -96,9 +97,9 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
     r.inertia = b.model->inertia();
     r.center  = b.model->center;
   }
-  const Body body = add(who, r);
+  const Body body = addRigid(who, r);
   if (!fault.empty()) {
-    data_->errors.push_back("flexible body " + who + ": " + fault);
+    data().errors.push_back("flexible body " + who + ": " + fault);
     return body;
   }
   auto           f = std::make_shared<FlexibleData>();
@@ -108,13 +109,14 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
   f->deformation      = Sized(b.deformation, n);
   f->deformation_rate = Sized(b.deformation_rate, n);
   for (PetscInt k = 0; k < n; k++) f->damping.push_back(b.ratios.size() ? b.ratios(k) : RatioOf(b, b.model->omega(k) / (2 * M_PI)));
-  data_->bodies[body.id].flexible = f;
+  data().bodies[body.id].flexible = f;
   return body;
 }
 
 Body Scene::attachment(Body body, const std::string &name)
 {
-  SceneData &s = *data_;
+  if (keeps()) keep([=](Scene &s) { s.attachment(body, name); });
+  SceneData &s = data();
   const bool good = s.valid(body) && s.bodies[body.id].flexible;
   if (!good) {
     s.errors.push_back("attachment " + name + ": its body is not a flexible one of this scene");
@@ -136,7 +138,7 @@ Body Scene::attachment(Body body, const std::string &name)
 /* The frame starts where the deformation at the start has its point */
 Body Scene::addFrame(Body body, PetscInt a)
 {
-  SceneData             &s = *data_;
+  SceneData             &s = data();
   const BodyData        &b = s.bodies[body.id];
   const ModalAttachment &x = b.flexible->model->attachments[a];
   const PetscInt         n = b.flexible->model->modes();

@@ -15,7 +15,9 @@ PetscMPIInt OwnerOfBody(const Runtime &R, PetscInt b) { return R.number.owner.em
 class LocalizerOf : public Localizer
 {
 public:
-  LocalizerOf(Runtime &r, bool collecting) : R(r), collecting_(collecting), marker_(r.scene.markers.size(), -1)
+  /* Read: after the layout, without blocks of the matrix */
+  enum Pass { Collect, Place, Read };
+  LocalizerOf(Runtime &r, Pass pass) : R(r), pass_(pass), collecting_(pass == Collect), marker_(r.scene.markers.size(), -1)
   {
     bodies = &r.bodies;
     run    = &r;
@@ -23,7 +25,7 @@ public:
 
   bool needed(const StoreBase &s, PetscInt e) const override
   {
-    if (R.size == 1 || OwnerOf(R, s, e) == R.rank) return true;
+    if (R.size == 1 || OwnerOf(*R.model, s, e) == R.rank) return true;
     for (int k = 0; k < s.markers(); k++) {
       const PetscInt b = R.scene.markers[s.marker(e, k)].body;
       if (b >= 0 && OwnerOfBody(R, b) == R.rank) return true;
@@ -47,6 +49,7 @@ public:
 
   PetscInt group(PetscInt global, PetscInt size) override
   {
+    if (pass_ == Read) return -1;
     const bool own = global >= R.start && global < R.start + R.n;
     if (collecting_) {
       for (PetscInt i = 0; i < size && !own; i++) others.push_back(global + i);
@@ -115,6 +118,7 @@ private:
   }
 
   Runtime                               &R;
+  Pass                                   pass_;
   bool                                   collecting_;
   std::vector<PetscInt>                  marker_;
   std::unordered_map<PetscInt, PetscInt> group_;
@@ -124,7 +128,7 @@ PetscErrorCode Localize(Runtime &R, Localizer &l)
 {
   PetscFunctionBegin;
   R.batches.clear();
-  for (StoreBase *s : R.scene.order) s->localize(l, R.batches);
+  for (const StoreBase *s : R.scene.order) s->localize(l, R.batches);
   for (auto &x : R.scene.extensions) x->localize(l, R.batches);
   PetscCall(LocalizeExpressions(R, l));
   PetscCall(LocalizeChannels(R, l));
@@ -242,7 +246,7 @@ PetscErrorCode MakePattern(Runtime &R)
   }
   for (auto &b : R.batches) b->pattern(R.pattern);
   R.body_slot.resize(bodies);
-  PetscCall(ResolvePattern(R, false, R.wants_triangle));
+  PetscCall(ResolvePattern(R, false, R.model->wants_triangle));
   PetscFunctionReturn(0);
 }
 
@@ -259,7 +263,7 @@ PetscErrorCode MakeRoles(Runtime &R)
   }
   for (StoreBase *s : R.scene.order)
     for (PetscInt e = 0; e < s->size(); e++)
-      if (s->unknowns(e) && OwnerOf(R, *s, e) == R.rank)
+      if (s->unknowns(e) && OwnerOf(*R.model, *s, e) == R.rank)
         add(!s->isConstraint() ? TSHHT3_FORCE : s->isHolonomic() ? TSHHT3_HOLONOMIC : TSHHT3_NONHOLONOMIC, s->start[e], s->unknowns(e));
   for (std::size_t i = 0; i < R.number.variable.size(); i++)
     if (R.number.variable_owner[i] == R.rank) add(TSHHT3_VARIABLE, R.number.variable[i], 1);
@@ -285,7 +289,7 @@ PetscErrorCode Layout(Runtime &R)
   R.pattern = Pattern();
   R.others.clear();
   if (R.size > 1) {
-    LocalizerOf collect(R, true);
+    LocalizerOf collect(R, LocalizerOf::Collect);
     PetscCall(Localize(R, collect));
     other = collect.other_bodies;
     SortUnique(other);
@@ -295,13 +299,31 @@ PetscErrorCode Layout(Runtime &R)
     SortUnique(R.others);
   }
   MakeBodies(R, other);
-  LocalizerOf place(R, false);
+  LocalizerOf place(R, LocalizerOf::Place);
   PetscCall(Localize(R, place));
   if (R.size > 1) PetscCall(MakeExchange(R));
   PetscCall(MakePattern(R));
   PetscCall(MakeRoles(R));
   PetscCall(MakeAxes(R));
   PetscFunctionReturn(0);
+}
+
+/* What reads the parts of an element, made when it is first asked for; memories as they are now */
+const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element)
+{
+  const std::vector<Part>             &parts   = R.scene.elements[element].parts;
+  std::vector<std::unique_ptr<Probe>> &readers = R.readers[element];
+  if (readers.empty()) {
+    LocalizerOf read(R, LocalizerOf::Read);
+    for (const Part &p : parts) readers.push_back(p.store->probe(read, p.index));
+  }
+  std::vector<double> memory;
+  for (std::size_t k = 0; k < parts.size(); k++) {
+    memory.resize(readers[k]->memory());
+    for (const auto &b : R.batches)
+      if (!memory.empty() && b->memoryOf(parts[k].store, parts[k].index, memory.data())) readers[k]->copyMemory(memory.data(), true);
+  }
+  return readers;
 }
 
 } // namespace hhtdae

@@ -9,6 +9,7 @@ namespace
 {
 
 bool IsJoint(Measure::Kind k) { return k == Measure::JointForce || k == Measure::JointMoment; }
+bool IsLoad(Measure::Kind k) { return k == Measure::ElementForce || k == Measure::ElementMoment; }
 bool IsScalar(Measure::Kind k)
 {
   return k == Measure::Multiplier || k == Measure::Component || k == Measure::Value || k == Measure::StateValue ||
@@ -184,17 +185,17 @@ bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
   return e.bodies.marker[marker].body == e.bodies.marker[m.i].body;
 }
 
-/* the joint's force on i's body, or moment about i's origin */
+/* the force on i's body, or moment about i's origin, of a joint or of any element */
 Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
 {
   const Vector3  x = e.bodies.frame(m.i).x;
   Wrench<double> on[kMarkers];
   Vector3        sum = Vector3::Zero();
   for (const auto &p : m.probes) {
-    p->reaction(e, on);
+    p->loads(e, on);
     for (int k = 0; k < p->markers(); k++) {
       if (!OnBody(e, m, p->marker(k))) continue;
-      if (m.kind == Measure::JointForce)
+      if (m.kind == Measure::JointForce || m.kind == Measure::ElementForce)
         sum += on[k].f;
       else
         sum += on[k].m + (e.bodies.frame(p->marker(k)).x - x).cross(on[k].f);
@@ -285,6 +286,14 @@ void PlaceComponent(Localizer &l, const Measure &m, LocalMeasure &k)
   }
 }
 
+void PlaceLoad(Localizer &l, const Measure &m, LocalMeasure &k)
+{
+  const SceneData &s = l.run->scene;
+  k.i                = l.marker(m.i.id);
+  k.frame            = s.valid(m.frame) ? l.marker(m.frame.id) : -1;
+  for (const Part &p : s.elements[m.target].parts) k.probes.push_back(p.store->probe(l, p.index));
+}
+
 constexpr int kComponents = 12; /* of a force, at most */
 
 } // namespace
@@ -293,7 +302,7 @@ bool NeedsAcceleration(const Measure &m) { return Accelerates(m.kind); }
 
 bool FollowsFromEquations(const SceneData &s, const Measure &m)
 {
-  if (Accelerates(m.kind) || IsJoint(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Value) return true;
+  if (Accelerates(m.kind) || IsJoint(m.kind) || IsLoad(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Value) return true;
   if (m.kind != Measure::Component) return false;
   PetscInt    row  = m.component;
   const Part *part = FindPart(s, m.target, false, row);
@@ -319,6 +328,11 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
   LocalMeasure     k;
   k.kind      = m.kind;
   k.component = m.component;
+  const bool of_element = IsJoint(m.kind) || IsLoad(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Component;
+  if (of_element && s.elements[m.target].parts.empty()) { /* absent: a scalar that is nowhere, and zero */
+    k.kind = Measure::Multiplier;
+    return k;
+  }
   switch (m.kind) {
   case Measure::Time:
   case Measure::KineticEnergy:
@@ -343,6 +357,10 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
   case Measure::JointMoment:
     PlaceJoint(l, m, k);
     break;
+  case Measure::ElementForce:
+  case Measure::ElementMoment:
+    PlaceLoad(l, m, k);
+    break;
   default:
     k.i = l.marker(m.i.id);
     if (s.valid(m.j)) k.j = l.marker(m.j.id);
@@ -361,7 +379,7 @@ double MeasureValue(const LocalMeasure &m, const Evaluation &e)
     return c[m.component];
   }
   if (IsScalar(m.kind)) return e.input(m.input);
-  if (IsJoint(m.kind)) return AxisOf(m, e).dot(ReactionOf(m, e));
+  if (IsJoint(m.kind) || IsLoad(m.kind)) return AxisOf(m, e).dot(ReactionOf(m, e));
   if (m.i < 0) return 0;
   const bool           a = Accelerates(m.kind);
   MarkerMotion<double> i = Motion(e, m.i, a), j, frame;

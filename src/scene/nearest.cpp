@@ -63,22 +63,22 @@ NearestSystem::~NearestSystem()
 /* Rows go to the owners of their elements */
 PetscErrorCode NearestSystem::number(const std::vector<RowBlock> &blocks)
 {
-  std::vector<PetscInt>    next(R.size + 1, 0);
+  std::vector<PetscInt>    next(M.size + 1, 0);
   std::vector<PetscMPIInt> owner(blocks.size());
   PetscFunctionBegin;
   for (std::size_t k = 0; k < blocks.size(); k++) {
-    owner[k] = OwnerOf(R, *blocks[k].store, blocks[k].instance);
+    owner[k] = OwnerOf(M, *blocks[k].store, blocks[k].instance);
     next[owner[k] + 1] += blocks[k].rows;
   }
-  for (PetscMPIInt r = 0; r < R.size; r++) next[r + 1] += next[r];
-  start_ = next[R.rank];
-  n_     = next[R.rank + 1] - start_;
+  for (PetscMPIInt r = 0; r < M.size; r++) next[r + 1] += next[r];
+  start_ = next[M.rank];
+  n_     = next[M.rank + 1] - start_;
   row_.resize(blocks.size());
   for (std::size_t k = 0; k < blocks.size(); k++) {
     row_[k] = next[owner[k]];
     next[owner[k]] += blocks[k].rows;
   }
-  PetscCall(VecCreate(R.scene.comm, &b_));
+  PetscCall(VecCreate(M.scene.comm, &b_));
   PetscCall(VecSetSizes(b_, n_, PETSC_DETERMINE));
   PetscCall(VecSetType(b_, VECSTANDARD));
   PetscCall(VecDuplicate(b_, &x_));
@@ -92,7 +92,7 @@ PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
   struct At {
     std::size_t block, body;
   };
-  const SceneData             &s = R.scene;
+  const SceneData             &s = M.scene;
   std::vector<std::vector<At>> at(s.bodies.size());
   std::vector<PetscInt>        I, J;
   std::vector<PetscScalar>     values;
@@ -148,12 +148,12 @@ PetscErrorCode NearestSystem::factor(const std::vector<RowBlock> &blocks)
   if (!b_) PetscCall(number(blocks));
   PetscCall(assemble(blocks));
   if (!ksp_) {
-    PetscCall(KSPCreate(R.scene.comm, &ksp_));
+    PetscCall(KSPCreate(M.scene.comm, &ksp_));
     PetscCall(KSPSetOptionsPrefix(ksp_, "scene_assemble_"));
     PetscCall(KSPSetType(ksp_, KSPPREONLY));
     PetscCall(KSPGetPC(ksp_, &pc));
     PetscCall(PCSetType(pc, PCCHOLESKY));
-    if (R.size == 1) PetscCall(MatGetFactorAvailable(S_, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &cholmod));
+    if (M.size == 1) PetscCall(MatGetFactorAvailable(S_, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &cholmod));
     PetscCall(PCFactorSetMatSolverType(pc, cholmod ? MATSOLVERCHOLMOD : MATSOLVERMUMPS));
     PetscCall(KSPSetFromOptions(ksp_));
   }
@@ -164,7 +164,7 @@ PetscErrorCode NearestSystem::factor(const std::vector<RowBlock> &blocks)
 PetscErrorCode NearestSystem::solve(const std::vector<RowBlock> &blocks, const std::vector<double> &rhs,
                                     const std::vector<double> *from, std::vector<double> &d)
 {
-  const SceneData   &s = R.scene;
+  const SceneData   &s = M.scene;
   PetscScalar       *b;
   const PetscScalar *x;
   KSPConvergedReason reason;

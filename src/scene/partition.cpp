@@ -1,5 +1,5 @@
 /* METIS gives every rank its bodies: vertices weighted by their unknowns, edges by the joints and forces between them. */
-#include "runtime.h"
+#include "model.h"
 #include <algorithm>
 #include <metis.h>
 

@@ -30,6 +30,12 @@ public:
   /* of a force */
   virtual void components(const Evaluation &, double *) const {}
 
+  /* of either: on the bodies of its markers */
+  virtual void loads(const Evaluation &, Wrench<double> *on) const
+  {
+    for (int k = 0; k < markers(); k++) on[k] = {Vector3::Zero(), Vector3::Zero()};
+  }
+
   virtual void     accept(const Bodies &) {}
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }
@@ -75,6 +81,7 @@ public:
     const Matrix<6 * M, 1> load = -s.J.transpose() * Eigen::Map<const Matrix<R, 1>>(s.lambda);
     for (int k = 0; k < M; k++) on[k] = {load.template segment<3>(6 * k), load.template segment<3>(6 * k + 3)};
   }
+  void  loads(const Evaluation &ev, Wrench<double> *on) const override { reaction(ev, on); }
   int   multipliers() const override { return rows_; }
   Input multiplier(int i) const override { return {this->e.lambda + i, this->e.group, i}; }
   void  reactionGradient(const Evaluation &ev, const double *y, double *frames, double *lambda) const override
@@ -115,6 +122,20 @@ public:
   void components(const Evaluation &ev, double *c) const override
   {
     Frame<double> f[M];
+    components(ev, f, c);
+  }
+  void loads(const Evaluation &ev, Wrench<double> *on) const override
+  {
+    Frame<double> f[M];
+    double        c[K::count];
+    components(ev, f, c);
+    if (this->e.state >= 0) std::copy(ev.u + this->e.state, ev.u + this->e.state + K::count, c);
+    K::template apply<double>(this->e.data, f, c, on);
+  }
+
+private:
+  void components(const Evaluation &ev, Frame<double> *f, double *c) const
+  {
     Twist<double> w[M];
     double        z[Z > 0 ? Z : 1];
     for (int k = 0; k < M; k++) {

@@ -265,13 +265,13 @@ std::vector<RowRef> Find(SceneData &s, std::vector<RowBlock> &blocks)
 }
 
 /* Moves the bodies a little in a direction that the constraints allow; false if they allow none */
-PetscErrorCode MoveAside(Runtime &R, const std::vector<RowBlock> &blocks, bool *moved)
+PetscErrorCode MoveAside(Model &M, const std::vector<RowBlock> &blocks, bool *moved)
 {
-  SceneData                             &s    = R.scene;
+  SceneData                             &s    = M.scene;
   const double                           size = SceneSize(s);
   std::mt19937                           random(1);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  NearestSystem                          system(R);
+  NearestSystem                          system(M);
   std::vector<double>                    from(6 * s.bodies.size(), 0), d, rhs;
   double                                 most = 0;
   PetscFunctionBegin;
@@ -318,39 +318,39 @@ double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
 /* To a neighbouring position that all constraints are met at, redundant ones to less than what a start may be off.
    Found without the redundant ones, which near a position that is not consistent contradict the others; where that
    leads away from them, with them */
-PetscErrorCode Neighbour(Runtime &R, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
+PetscErrorCode Neighbour(Model &M, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
                          bool *moved, bool *ok)
 {
-  SceneData              &s      = R.scene;
+  SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
   const double            enough = 1e-3 * s.start.tolerance;
   PetscFunctionBegin;
   *ok = false;
-  PetscCall(MoveAside(R, DescribeAll(s, s.start.time, Hold::None), moved));
+  PetscCall(MoveAside(M, DescribeAll(s, s.start.time, Hold::None), moved));
   if (!*moved) PetscFunctionReturn(0);
   const std::vector<Pose> aside = Poses(s);
   SetActive(blocks, redundant, false);
-  const PetscErrorCode failed = ProjectPositions(R, Hold::None, ok);
+  const PetscErrorCode failed = ProjectPositions(M, Hold::None, ok);
   SetActive(blocks, redundant, true);
   PetscCall(failed);
   *ok = *ok && LargestMisfit(s, redundant) <= enough;
   if (*ok) PetscFunctionReturn(0);
   SetPoses(s, aside);
-  PetscCall(ProjectPositions(R, Hold::None, ok));
+  PetscCall(ProjectPositions(M, Hold::None, ok));
   *ok = *ok && LargestMisfit(s, redundant) <= enough;
   if (!*ok) SetPoses(s, before);
   PetscFunctionReturn(0);
 }
 
 /* Takes the rows out of `found` that are independent next to the start */
-PetscErrorCode KeepSingular(Runtime &R, const std::vector<RowBlock> &blocks, std::vector<RowRef> &found)
+PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::vector<RowRef> &found)
 {
-  SceneData              &s       = R.scene;
+  SceneData              &s       = M.scene;
   const std::vector<Pose> before  = Poses(s);
   const StartResult       started = s.started;
   bool                    moved = false, ok = false;
   PetscFunctionBegin;
-  PetscCall(Neighbour(R, blocks, found, &moved, &ok));
+  PetscCall(Neighbour(M, blocks, found, &moved, &ok));
   if (ok) {
     std::vector<RowBlock>     there = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
     const std::vector<RowRef> next  = Find(s, there);
@@ -400,9 +400,9 @@ PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, con
 
 } // namespace
 
-PetscErrorCode DropRedundant(Runtime &R)
+PetscErrorCode DropRedundant(Model &M)
 {
-  SceneData            &s      = R.scene;
+  SceneData            &s      = M.scene;
   std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
   PetscFunctionBegin;
   s.started.coordinates = s.started.rows = s.started.redundant = 0;
@@ -418,7 +418,7 @@ PetscErrorCode DropRedundant(Runtime &R)
     for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);
   std::vector<RowRef> found = Find(s, blocks);
-  if (!found.empty()) PetscCall(KeepSingular(R, blocks, found));
+  if (!found.empty()) PetscCall(KeepSingular(M, blocks, found));
   s.started.redundant = (PetscInt)found.size();
   if (found.empty()) PetscFunctionReturn(0);
   PetscCall(Tell(s, blocks, found));

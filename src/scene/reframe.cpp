@@ -71,18 +71,11 @@ PetscErrorCode Move(Runtime &R, Vec U, Vec V)
 /* Elements remember the accepted state */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
 {
-  double *x;
   PetscFunctionBegin;
   if (!R.remembers) PetscFunctionReturn(0);
   PetscCall(Move(R, U, V));
-  PetscCall(VecGetArray(R.axes, &x));
-  double *m = x + 4 * R.bodies.own;
-  for (auto &b : R.batches) {
-    b->accept(R.bodies);
-    b->copyMemory(m, false);
-    m += b->memory();
-  }
-  PetscCall(VecRestoreArray(R.axes, &x));
+  for (auto &b : R.batches) b->accept(R.bodies);
+  PetscCall(KeepMemories(R));
   PetscFunctionReturn(0);
 }
 
@@ -111,18 +104,12 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Axes and memories belong to the run of one TS, and go forward in time */
-PetscErrorCode CheckRun(Runtime &R, TS ts, PetscReal t)
+/* Axes and memories go forward in time */
+PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 {
-  PetscObjectId id;
   PetscFunctionBegin;
-  if (!R.axes) PetscFunctionReturn(0);
-  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
-  PetscCheck(id == R.ts, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "this TS ended when Scene::createTS() made another one of the scene: its axes of Euler angles and its unwound angles are those of the new run. "
-             "Finish a run before the next createTS(), or describe a scene for each");
   PetscCheck(t >= R.accepted, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "the TS starts again at t = %g, but the scene's axes of Euler angles and its unwound angles are those of t = %g: take a new TS from "
+             "the TS starts again at t = %g, but its axes of Euler angles and its unwound angles are those of t = %g: take a new TS from "
              "Scene::createTS() for another run, or TSHHT3CheckpointLoad() to go back",
              (double)t, (double)R.accepted);
   R.accepted = t;
@@ -133,7 +120,7 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
-  PetscCall(CheckRun(R, ts, t));
+  PetscCall(CheckTime(R, t));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
   *change = PETSC_FALSE;
@@ -229,6 +216,21 @@ PetscErrorCode Prepare(TS ts)
 
 } // namespace
 
+/* What elements remember into the vector that checkpoints keep */
+PetscErrorCode KeepMemories(Runtime &R)
+{
+  double *x;
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(R.axes, &x));
+  double *m = x + 4 * R.bodies.own;
+  for (auto &b : R.batches) {
+    b->copyMemory(m, false);
+    m += b->memory();
+  }
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscFunctionReturn(0);
+}
+
 /* Makes the vector, with the axes that the initial attitudes and angular velocities choose */
 PetscErrorCode MakeAxes(Runtime &R)
 {
@@ -239,8 +241,6 @@ PetscErrorCode MakeAxes(Runtime &R)
   PetscCallMPI(MPI_Allreduce(local, global, 2, MPI_INT, MPI_MAX, R.scene.comm));
   R.turns     = global[0];
   R.remembers = global[1];
-  PetscCall(VecDestroy(&R.axes));
-  PetscCall(PetscSFDestroy(&R.axes_sf));
   PetscCall(VecCreate(R.scene.comm, &R.axes));
   PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R) + kept, PETSC_DETERMINE));
   PetscCall(VecSetType(R.axes, VECSTANDARD));
@@ -250,29 +250,8 @@ PetscErrorCode MakeAxes(Runtime &R)
     const BodyData &d = R.scene.bodies[R.bodies.body[b].id];
     Store(HasAxes(R.bodies.body[b]) ? ChooseAxes(d.A, d.w) : Matrix3(Matrix3::Identity()), x + 4 * b);
   }
-  double *m = x + 4 * R.bodies.own;
-  for (auto &b : R.batches) {
-    b->copyMemory(m, false);
-    m += b->memory();
-  }
-  R.axes_start.assign(x, m);
   PetscCall(VecRestoreArray(R.axes, &x));
-  PetscCall(UseAxes(R));
-  PetscFunctionReturn(0);
-}
-
-/* As they were before the first run */
-PetscErrorCode RewindAxes(Runtime &R)
-{
-  double *x;
-  PetscFunctionBegin;
-  R.accepted = PETSC_NINFINITY;
-  R.next_axes.clear();
-  R.next_body.clear();
-  if (!R.axes) PetscFunctionReturn(0);
-  PetscCall(VecGetArray(R.axes, &x));
-  std::copy(R.axes_start.begin(), R.axes_start.end(), x);
-  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscCall(KeepMemories(R));
   PetscCall(UseAxes(R));
   PetscFunctionReturn(0);
 }

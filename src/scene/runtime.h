@@ -1,8 +1,8 @@
-/* A scene at work: its part on this rank, numbered, with all that an evaluation needs. */
+/* A run of a scene: this rank's part of the model, laid out, and everything that changes from step to step. It belongs to a TS. */
 #ifndef HHTDAE_SCENE_RUNTIME_H
 #define HHTDAE_SCENE_RUNTIME_H
 
-#include "scene_data.h"
+#include "model.h"
 #include <functional>
 #include <petscsf.h>
 #include <petscts.h>
@@ -10,24 +10,15 @@
 namespace hhtdae
 {
 
-/* Numbers of all unknowns of the scene, known on every rank; within a rank: bodies, multipliers and force states kernel by
-   kernel, variables, states */
-struct Numbering {
-  std::vector<PetscMPIInt> owner;    /* of bodies; empty on one rank */
-  std::vector<PetscInt>    first;    /* of ranks, and the total */
-  std::vector<PetscInt>    body;     /* first coordinate */
-  std::vector<PetscInt>    variable, state;
-  std::vector<PetscMPIInt> variable_owner, state_owner;
-};
-
 struct Recorder;    /* output/recorder.h */
 struct ChannelWork; /* output/channels.h */
 
 struct Runtime {
-  SceneData  &scene;
-  PetscMPIInt rank = 0, size = 1;
-  Numbering   number;
-  PetscInt    n = 0, start = 0; /* own unknowns, global number of the first */
+  const std::shared_ptr<const Model> model;
+  const SceneData                   &scene; /* of the model, as the next four */
+  const Numbering                   &number;
+  const PetscMPIInt                  rank, size;
+  const PetscInt                     n, start;
 
   Pattern                             pattern;
   Bodies                              bodies;
@@ -44,13 +35,11 @@ struct Runtime {
   std::vector<double>    send, receive;
   std::vector<double>    u, v, a; /* local unknowns, where there are others */
 
-  Mat  J = nullptr;      /* of the first TS; others get a duplicate */
-  /* one triangle of it: asked for, and so stored; off-diagonal values of own rows, which PETSc takes row by row there */
-  bool                  wants_triangle = false, triangle = false;
-  std::string           full_because; /* why the whole matrix is stored */
+  Mat  J = nullptr;
+  /* one triangle of it, and off-diagonal values of own rows, which PETSc takes row by row there */
+  bool                  triangle = false;
   std::vector<PetscInt> off_start, off_column;
   std::vector<double>   off_value;
-  bool given = false;
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
   bool changing = false; /* between the test that asked for other axes and their commit */
@@ -58,29 +47,36 @@ struct Runtime {
   Vec       rtol    = nullptr; /* relative tolerances, none for angles */
   PetscReal rtol_of = -1;
   PetscSF axes_sf = nullptr; /* axes of others' bodies */
-  std::vector<double> axes_start;                         /* the vector before the first step of a run */
-  PetscObjectId       ts = 0;                             /* the TS made last: axes and memories are those of its run */
-  PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that they belong to */
+  PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
   std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
   std::vector<PetscInt> next_body;
   PetscInt              reframed = 0; /* changes of axes so far, own bodies */
 
+  std::map<PetscInt, std::vector<std::unique_ptr<Probe>>> readers; /* of elements that were asked for, ReadersOf() */
   std::shared_ptr<ChannelWork> channels;
   std::shared_ptr<Recorder>    recorder; /* none unless output was asked for */
 
-  explicit Runtime(SceneData &s) : scene(s) {}
+  explicit Runtime(std::shared_ptr<const Model> m)
+      : model(std::move(m)), scene(model->scene), number(model->number), rank(model->rank), size(model->size), n(model->n), start(model->start)
+  {
+  }
   ~Runtime();
+  Runtime(const Runtime &) = delete;
 };
 
-/* partition.cpp: owners of bodies, METIS */
-PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt> &owner);
-/* numbering.cpp */
-PetscMPIInt    OwnerOf(const Runtime &R, const StoreBase &s, PetscInt e);
-PetscErrorCode Number(Runtime &R);
+/* The run that a TS of Scene::createTS() owns; null if it owns none */
+constexpr const char *run_of_ts = "hhtdae scene run";
+inline Runtime       *RunOf(TS ts)
+{
+  PetscContainer box = nullptr;
+  void          *run = nullptr;
+  PetscCallAbort(PETSC_COMM_SELF, PetscObjectQuery((PetscObject)ts, run_of_ts, (PetscObject *)&box));
+  if (box) PetscCallAbort(PETSC_COMM_SELF, PetscContainerGetPointer(box, &run));
+  return static_cast<Runtime *>(run);
+}
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
-BodyKind       KindOf(const SceneData &s, const BodyData &b);
-PetscInt       CoordinatesOf(const SceneData &s, const BodyData &b); /* modal ones too */
+const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element);
 /* initial.cpp: state of the description, with the axes of the Euler angles chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */
@@ -91,7 +87,7 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
 PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
-PetscErrorCode RewindAxes(Runtime &R);
+PetscErrorCode KeepMemories(Runtime &R);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
 constexpr PetscInt kept = 56;
@@ -101,24 +97,19 @@ PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read 
 PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */
 PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
-PetscMPIInt    OwnerOf(const Runtime &R, const Expression &e);
 /* output/channels.cpp: markers and unknowns that own channels read; output/recorder.cpp */
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
-PetscErrorCode AttachOutput(Runtime &R, TS ts);
+PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
 constexpr PetscInt recorded = 52; /* numbers by which a recording goes on */
 PetscErrorCode     SaveOutput(Runtime &R, double *x);
 PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
 /* triangle.cpp: one triangle of the matrix, MATSBAIJ, where nothing breaks its symmetry */
-PetscErrorCode WantTriangle(Runtime &R);  /* before Layout() */
-PetscErrorCode StoreTriangle(Runtime &R); /* after it */
+PetscErrorCode StoreTriangle(Runtime &R); /* after Layout() */
 PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again);
 PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::function<void()> &add);
-/* ts.cpp: whether a TS is one of the scene's, for the call that is named */
-PetscErrorCode CheckTS(const SceneData &s, TS ts, const char *call);
-/* check.cpp: everything that is wrong with the description, as one error */
-PetscErrorCode CheckDescription(SceneData &s);
-PetscErrorCode CheckUnchanged(const SceneData &s);
+/* ts.cpp: the run of this scene that the TS owns, for the call that is named */
+PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R);
 
 } // namespace hhtdae
 

@@ -1,5 +1,6 @@
 /* The scene as its user describes it. */
 #include "extension.h"
+#include "journal.h"
 #include "start.h"
 #include <cmath>
 
@@ -17,23 +18,31 @@ PetscInt NextNumber()
 
 } // namespace
 
-SceneData::SceneData() : number(NextNumber()) {}
+SceneData::SceneData()  = default;
 SceneData::~SceneData() = default;
 
-Scene::Scene(MPI_Comm comm, Space space) : data_(std::make_unique<SceneData>())
+Scene::Scene(MPI_Comm comm, Space space) : number_(NextNumber()), model_(std::make_shared<Model>())
 {
-  number_       = data_->number;
-  data_->comm   = comm;
-  data_->planar = space == Space::Planar;
+  data().number = number_;
+  data().comm   = comm;
+  data().planar = space == Space::Planar;
 }
 
 Scene::~Scene() = default;
 
+SceneData &Scene::data() const { return model_->scene; }
+
 Body Scene::add(const std::string &name, const RigidBody &b)
 {
+  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
+  return addRigid(name, b);
+}
+
+Body Scene::addRigid(const std::string &name, const RigidBody &b)
+{
   BodyData d;
-  d.name        = name.empty() ? "body " + std::to_string(data_->bodies.size()) : name;
-  data_->refuseLate("body " + d.name);
+  d.name        = name.empty() ? "body " + std::to_string(data().bodies.size()) : name;
+  data().refuseLate("body " + d.name);
   d.mass        = b.mass;
   d.inertia     = b.inertia;
   d.center      = b.center;
@@ -42,25 +51,27 @@ Body Scene::add(const std::string &name, const RigidBody &b)
   d.v           = b.velocity;
   d.w           = b.angular_velocity;
   d.fixed_start = b.fixed_start;
-  data_->bodies.push_back(d);
-  return Body{(PetscInt)data_->bodies.size() - 1, number_};
+  data().bodies.push_back(d);
+  return Body{(PetscInt)data().bodies.size() - 1, number_};
 }
 
 Body Scene::add(const std::string &name, const PointMass &b)
 {
+  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
   RigidBody r;
   r.mass        = b.mass;
   r.position    = b.position;
   r.velocity    = b.velocity;
   r.fixed_start = b.fixed_start;
-  const Body body = add(name, r);
-  data_->bodies[body.id].point = true;
+  const Body body = addRigid(name, r);
+  data().bodies[body.id].point = true;
   return body;
 }
 
 Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
-  SceneData     &s    = *data_;
+  if (keeps()) keep([=](Scene &s) { s.marker(body, position, axes, name); });
+  SceneData     &s    = data();
   const PetscInt id   = (PetscInt)s.markers.size();
   const bool     good = body.id == -1 || s.valid(body);
   const std::string who = "marker " + (name.empty() ? std::to_string(id) : name);
@@ -82,30 +93,35 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
 
 Marker Scene::markerAt(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
-  if (!data_->valid(body)) return marker(body, position, axes, name);
-  const BodyData &b = data_->bodies[body.id];
+  if (keeps()) keep([=](Scene &s) { s.markerAt(body, position, axes, name); });
+  const Quiet quiet(*this);
+  if (!data().valid(body)) return marker(body, position, axes, name);
+  const BodyData &b = data().bodies[body.id];
   return marker(body, b.A.transpose() * (position - b.r) + b.center, b.A.transpose() * axes, name);
 }
 
 Variable Scene::variable(const std::string &name, const Expression &definition, double initial)
 {
-  data_->refuseLate("variable " + name);
-  data_->variables.push_back({name.empty() ? "variable " + std::to_string(data_->variables.size()) : name, definition, initial});
-  return Variable{(PetscInt)data_->variables.size() - 1, number_};
+  if (keeps()) keep([=](Scene &s) { s.variable(name, definition, initial); });
+  data().refuseLate("variable " + name);
+  data().variables.push_back({name.empty() ? "variable " + std::to_string(data().variables.size()) : name, definition, initial});
+  return Variable{(PetscInt)data().variables.size() - 1, number_};
 }
 
 State Scene::state(const std::string &name, const Expression &rate, double initial)
 {
-  data_->refuseLate("state " + name);
-  data_->states.push_back({name.empty() ? "state " + std::to_string(data_->states.size()) : name, rate, initial});
-  return State{(PetscInt)data_->states.size() - 1, number_};
+  if (keeps()) keep([=](Scene &s) { s.state(name, rate, initial); });
+  data().refuseLate("state " + name);
+  data().states.push_back({name.empty() ? "state " + std::to_string(data().states.size()) : name, rate, initial});
+  return State{(PetscInt)data().states.size() - 1, number_};
 }
 
 void Scene::gravity(const Vector3 &acceleration)
 {
-  data_->refuseLate("gravity");
-  if (!acceleration.allFinite()) data_->errors.push_back("gravity must be finite");
-  data_->gravity = acceleration;
+  if (keeps()) keep([=](Scene &s) { s.gravity(acceleration); });
+  data().refuseLate("gravity");
+  if (!acceleration.allFinite()) data().errors.push_back("gravity must be finite");
+  data().gravity = acceleration;
 }
 
 Frame<double> SceneData::frame(Marker m) const
@@ -128,7 +144,7 @@ Twist<double> SceneData::twist(Marker m) const
 
 ElementBuilder::ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j,
                                bool pair)
-    : data_(scene.data())
+    : data_(DataOf(scene))
 {
   element_.name = name.empty() ? std::string(type) + " " + std::to_string(data_.elements.size()) : name;
   element_.type = type;
@@ -154,6 +170,16 @@ void ElementBuilder::require(Marker m, const char *what)
   require(data_.valid(m) && data_.markers[m.id].body >= -1, std::string(what) + " is not a marker of this scene");
 }
 
+Element Scene::absent(const std::string &name)
+{
+  ElementData e;
+  e.name = name.empty() ? "absent " + std::to_string(data().elements.size()) : name;
+  e.type = "absent";
+  data().refuseLate("element " + e.name);
+  data().elements.push_back(e);
+  return Element{(PetscInt)data().elements.size() - 1, number_};
+}
+
 Element ElementBuilder::done()
 {
   data_.elements.push_back(std::move(element_));
@@ -162,32 +188,30 @@ Element ElementBuilder::done()
 
 /* ---- from description to work ---- */
 
-StartPolicy &Scene::start() { return data_->start; }
-
 PetscErrorCode Scene::setUp()
 {
-  SceneData &s = *data_;
   PetscFunctionBegin;
-  if (s.run) PetscFunctionReturn(0);
+  describeAnew();
+  Model     &M = *model_;
+  SceneData &s = M.scene;
+  if (M.compiled) PetscFunctionReturn(0);
+  s.start = start_;
   PetscCall(TSHHT3Initialize());
   PetscCall(DeclareSceneOptions());
   PetscCall(ReadStartOptions(s));
   PetscCall(CheckDescription(s));
-  auto     run = std::make_unique<Runtime>(s);
-  Runtime &R   = *run;
-  PetscCallMPI(MPI_Comm_rank(s.comm, &R.rank));
-  PetscCallMPI(MPI_Comm_size(s.comm, &R.size));
-  PetscCall(Partition(s, R.size, R.number.owner));
-  PetscCall(Assemble(R));
-  PetscCall(DropRedundant(R));
-  PetscCall(Number(R));
-  PetscCall(WantTriangle(R));
-  PetscCall(Layout(R));
-  PetscCall(StoreTriangle(R));
-  if (s.start.equilibrium) PetscCall(FindEquilibrium(R));
+  PetscCallMPI(MPI_Comm_rank(s.comm, &M.rank));
+  PetscCallMPI(MPI_Comm_size(s.comm, &M.size));
+  if (M.continues) s.start.time = M.begin;
+  else PetscCall(Partition(s, M.size, M.number.owner));
+  PetscCall(Assemble(M));
+  PetscCall(DropRedundant(M));
+  PetscCall(Number(M));
+  PetscCall(WantTriangle(M));
+  if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
   if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
-  s.start_used = s.start;
-  s.run        = std::move(run); /* not before everything is done: after an error setUp() starts anew */
+  s.start_given = start_;
+  s.fixed = M.compiled = true; /* not before everything is done: after an error setUp() starts anew */
   PetscFunctionReturn(0);
 }
 

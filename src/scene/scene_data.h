@@ -62,7 +62,7 @@ struct ElementData {
   enum Kind { Joint, Motion, Force };
   std::string       name;
   const char       *type; /* "revolute" */
-  Kind              kind;
+  Kind              kind = Force;
   Marker            i, j; /* of the element; reactions are given on i's body */
   std::vector<Part> parts;
 };
@@ -75,7 +75,7 @@ struct ExpressionData { /* variable or state */
 
 struct ChannelData {
   std::string name, unit;
-  Measure     measure;
+  Expression  value;
 };
 
 struct ShapeData {
@@ -99,10 +99,8 @@ struct StartResult {
   PetscInt         degreesOfFreedom() const { return coordinates - (rows - redundant); }
 };
 
-struct Runtime; /* numbering, matrices, evaluation: runtime.h */
-
 struct SceneData {
-  const PetscInt              number; /* of the scene, which its handles bear */
+  PetscInt                    number = 0; /* of the scene, which its handles bear */
   MPI_Comm                    comm;
   bool                        planar = false;
   std::vector<BodyData>       bodies;
@@ -117,12 +115,11 @@ struct SceneData {
   std::vector<ChannelData>    channels;
   std::vector<ShapeData>      shapes;
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
-  OutputSettings              output;
   std::vector<std::string>    errors; /* found while the scene was described */
-  StartPolicy                 start;
+  StartPolicy                 start; /* of setUp(), with options */
+  StartPolicy                 start_given;
   StartResult                 started;
-  StartPolicy                 start_used; /* by setUp() */
-  std::unique_ptr<Runtime>    run;
+  bool                        fixed = false; /* from setUp() on */
 
   SceneData();
   ~SceneData();
@@ -134,7 +131,7 @@ struct SceneData {
   bool valid(Element e) const { return mine(e) && e.id >= 0 && e.id < (PetscInt)elements.size(); }
   void refuseLate(const std::string &what) /* an error if the scene is fixed already */
   {
-    if (run) errors.push_back(what + " came too late: the scene is fixed from createTS() or setUp() on");
+    if (fixed) errors.push_back(what + " came too late: the scene is fixed from createTS() or setUp() on");
   }
   /* at the start */
   Frame<double> frame(Marker m) const;
@@ -144,7 +141,7 @@ struct SceneData {
 /*
   What a joint's or force's file uses to enter itself:
 
-    template <> Element Scene::add(const std::string &name, const Revolute &s)
+    template <> Element Scene::enter(const std::string &name, const Revolute &s)
     {
       ElementBuilder e(*this, name, "revolute", ElementData::Joint, s.i, s.j);
       e.constrain<Coincide>({s.i, s.j});

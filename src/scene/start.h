@@ -2,7 +2,7 @@
 #ifndef HHTDAE_SCENE_START_H
 #define HHTDAE_SCENE_START_H
 
-#include "runtime.h"
+#include "model.h"
 #include <petscksp.h>
 
 namespace hhtdae
@@ -12,6 +12,8 @@ namespace hhtdae
 PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
+struct Runtime;
+PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer); /* view.cpp; R: a run of it, or null */
 
 /* ---- rows.cpp: all constraints where the description puts the bodies ---- */
 
@@ -48,7 +50,7 @@ int                     Width(const SceneData &s, PetscInt body); /* their numbe
 class NearestSystem
 {
 public:
-  explicit NearestSystem(Runtime &r) : R(r) {}
+  explicit NearestSystem(Model &m) : M(m) {}
   ~NearestSystem();
   NearestSystem(const NearestSystem &) = delete;
   PetscErrorCode factor(const std::vector<RowBlock> &blocks);
@@ -59,7 +61,7 @@ public:
   const std::vector<double> &weights() const { return weight_; } /* Phi_q M^-1 Phi_q^T, diagonal */
 
 private:
-  Runtime              &R;
+  Model                &M;
   std::vector<PetscInt> row_; /* first unknown of blocks */
   std::vector<double>   weight_;
   PetscInt              n_ = 0, start_ = 0;
@@ -82,17 +84,17 @@ std::vector<Pose> Poses(const SceneData &s);
 void              SetPoses(SceneData &s, const std::vector<Pose> &p);
 PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what);
 /* bodies to the constraints: largest misfit left; ok: within the tolerance */
-PetscErrorCode ProjectPositions(Runtime &R, Hold hold, bool *ok);
-PetscErrorCode Assemble(Runtime &R); /* reports or projects, as the policy says */
+PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok);
+PetscErrorCode Assemble(Model &M); /* reports or projects, as the policy says */
 
 /* ---- redundancy.cpp ---- */
-PetscErrorCode DropRedundant(Runtime &R);
+PetscErrorCode DropRedundant(Model &M);
 
-/* ---- equilibrium.cpp: after Layout() ---- */
-PetscErrorCode FindEquilibrium(Runtime &R);
+/* ---- equilibrium.cpp: after Number(), with a layout of its own ---- */
+PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M);
 
-/* ---- rest.cpp: poses, deformations, variables and states of U become the initial ones, at rest ---- */
-PetscErrorCode WriteRest(Runtime &R, Vec U);
+/* ---- state.cpp: poses, velocities, deformations, variables and states of a run become the initial ones; V null: at rest ---- */
+PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V);
 
 } // namespace hhtdae
 

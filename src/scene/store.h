@@ -47,7 +47,7 @@ public:
   virtual bool          symmetric(PetscInt) const { return false; } /* its part of the matrix, where nothing else breaks that */
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
-  virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) = 0;
+  virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
   virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint, before any numbering */
   /* one instance to be read where it is not assembled: loads of a constraint, components of a force that is not carried */
   virtual std::unique_ptr<Probe>         probe(Localizer &l, PetscInt e) const = 0;
@@ -110,10 +110,11 @@ public:
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override { DescribeRows<K>(s, this->all[e], t, rows); }
 
-  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
+  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
-    auto batch    = std::make_unique<ConstraintBatch<K>>();
-    batch->bodies = l.bodies;
+    auto batch      = std::make_unique<ConstraintBatch<K>>();
+    batch->bodies   = l.bodies;
+    batch->of.store = this;
     for (PetscInt e = 0; e < this->size(); e++) {
       if (!this->unknowns(e) || !l.needed(*this, e)) continue;
       typename ConstraintBatch<K>::Instance i;
@@ -122,6 +123,7 @@ public:
       i.lambda = l.local(this->start[e]);
       i.group  = l.group(this->start[e], this->unknowns(e));
       batch->all.push_back(i);
+      if constexpr (K::memory > 0) batch->of.add(e);
     }
     batch->all.shrink_to_fit();
     if (!batch->all.empty()) batches.push_back(std::move(batch));
@@ -148,7 +150,7 @@ public:
   int           rows() const override { return K::count; }
   unsigned char active(PetscInt) const override { return 0; }
 
-  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
+  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
     placeAll<ForceBatch<K>>(l, batches, false);
     if constexpr (K::carriable) placeAll<ForceStateBatch<K>>(l, batches, true);
@@ -162,10 +164,11 @@ private:
       if (Depends(K::depends, 2 * k + 1)) return true;
     return false;
   }
-  template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried)
+  template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried) const
   {
-    auto batch    = std::make_unique<B>();
-    batch->bodies = l.bodies;
+    auto batch      = std::make_unique<B>();
+    batch->bodies   = l.bodies;
+    batch->of.store = this;
     for (PetscInt e = 0; e < this->size(); e++) {
       if (this->all[e].carried != carried || !l.needed(*this, e)) continue;
       ForceInstance<K> i;
@@ -175,6 +178,7 @@ private:
         i.state_group = l.group(this->start[e], K::count);
       }
       batch->all.push_back(i);
+      if constexpr (K::memory > 0) batch->of.add(e);
     }
     if (!batch->all.empty()) batches.push_back(std::move(batch));
   }
@@ -183,6 +187,7 @@ private:
   {
     ForceInstance<K> i;
     this->place(l, this->all[e], i);
+    if (this->all[e].carried) i.state = l.local(this->start[e]);
     return std::make_unique<ForceProbe<K>>(i);
   }
 };

@@ -117,9 +117,9 @@ PetscErrorCode TryWhole(Runtime &R, double *asymmetry)
 } // namespace
 
 /* -mat_type decides as well: what the user wants wins, but not against the physics */
-PetscErrorCode WantTriangle(Runtime &R)
+PetscErrorCode WantTriangle(Model &M)
 {
-  const SceneData &s      = R.scene;
+  const SceneData &s      = M.scene;
   PetscBool        wanted = PETSC_FALSE, given;
   char             type[64] = "";
   PetscFunctionBegin;
@@ -131,9 +131,9 @@ PetscErrorCode WantTriangle(Runtime &R)
   const std::string breaks = Breaks(s);
   PetscCheck(!wanted || breaks.empty(), s.comm, PETSC_ERR_ARG_INCOMP, "one triangle of the matrix (%s) does not hold this scene: %s makes it unsymmetric",
              given ? "-scene_symmetric_storage" : "-mat_type", breaks.c_str());
-  R.wants_triangle = wanted;
-  R.full_because   = breaks.empty() ? "though it is symmetric (-scene_symmetric_storage stores one triangle)" : breaks + " makes it unsymmetric";
-  PetscCall(PetscInfo(nullptr, "scene: matrix: %s\n", wanted ? "one triangle" : ("all of it, " + R.full_because).c_str()));
+  M.wants_triangle = wanted;
+  M.full_because   = breaks.empty() ? "though it is symmetric (-scene_symmetric_storage stores one triangle)" : breaks + " makes it unsymmetric";
+  PetscCall(PetscInfo(nullptr, "scene: matrix: %s\n", wanted ? "one triangle" : ("all of it, " + M.full_because).c_str()));
   PetscFunctionReturn(0);
 }
 
@@ -160,7 +160,7 @@ PetscErrorCode StoreTriangle(Runtime &R)
 {
   double asymmetry = 0;
   PetscFunctionBegin;
-  if (!R.wants_triangle) PetscFunctionReturn(0);
+  if (!R.model->wants_triangle) PetscFunctionReturn(0);
   PetscCall(TryWhole(R, &asymmetry));
   PetscCheck(asymmetry <= 1, R.scene.comm, PETSC_ERR_ARG_INCOMP, "one triangle of the matrix does not hold this scene: off its initial state the matrix is unsymmetric by %g times rounding",
              asymmetry);

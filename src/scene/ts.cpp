@@ -1,6 +1,7 @@
 /* The scene as a problem of PETSc's TS. */
 #include "guard.h"
 #include "runtime.h"
+#include "start.h"
 
 namespace hhtdae
 {
@@ -27,7 +28,7 @@ PetscErrorCode I2Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, Pe
 }
 
 /* The scene belongs to what -ts_view shows */
-PetscErrorCode ViewWithTS(const Scene &scene, TS ts)
+PetscErrorCode ViewWithTS(const Runtime &R, TS ts)
 {
   PetscOptions      options;
   PetscViewer       viewer;
@@ -38,7 +39,7 @@ PetscErrorCode ViewWithTS(const Scene &scene, TS ts)
   PetscCall(PetscObjectGetOptions((PetscObject)ts, &options));
   PetscCall(PetscObjectGetOptionsPrefix((PetscObject)ts, &prefix));
   PetscCall(PetscOptionsGetViewer(PetscObjectComm((PetscObject)ts), options, prefix, "-ts_view", &viewer, &format, &asked));
-  if (asked) PetscCall(scene.view(viewer));
+  if (asked) PetscCall(ViewScene(*R.model, &R, viewer));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(0);
 }
@@ -70,45 +71,63 @@ PetscErrorCode Solve(TS ts)
 
 } // namespace
 
-/* What a TS has to be for a run of this scene */
-PetscErrorCode CheckTS(const SceneData &s, TS ts, const char *call)
+namespace
 {
-  void *ctx = nullptr;
+
+PetscErrorCode DestroyRun(void *run)
+{
   PetscFunctionBegin;
-  PetscCheck(s.run, s.comm, PETSC_ERR_ORDER, "%s: the scene has no TS yet, call Scene::createTS() first", call);
-  PetscCall(CheckUnchanged(s));
-  PetscCall(TSGetI2Function(ts, nullptr, nullptr, &ctx));
-  PetscCheck(ctx == s.run.get(), s.comm, PETSC_ERR_ARG_WRONG, "%s: the TS is not of this scene, it was not made by its createTS()", call);
+  delete static_cast<Runtime *>(run);
+  PetscFunctionReturn(0);
+}
+
+/* The TS owns the run */
+PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
+{
+  PetscContainer box;
+  PetscFunctionBegin;
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)ts), &box));
+  PetscCall(PetscContainerSetPointer(box, R.release()));
+  PetscCall(PetscContainerSetUserDestroy(box, DestroyRun));
+  PetscCall(PetscObjectCompose((PetscObject)ts, run_of_ts, (PetscObject)box));
+  PetscCall(PetscContainerDestroy(&box));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
+{
+  const SceneData &s = DataOf(scene);
+  PetscFunctionBegin;
+  *R = RunOf(ts);
+  PetscCheck(*R && (*R)->scene.number == s.number, s.comm, PETSC_ERR_ARG_WRONG, "%s: the TS is not of this scene, it was not made by its createTS()", call);
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Scene::createTS(TS *ts)
 {
   Vec U, V, F;
-  Mat J;
   PetscFunctionBegin;
   PetscCall(Guarded([&] { return setUp(); }));
-  PetscCall(CheckUnchanged(*data_));
-  Runtime &R = *data_->run;
-  PetscCall(RewindAxes(R));
-  PetscCall(VecCreate(data_->comm, &U));
+  PetscCall(CheckUnchanged(data(), start_));
+  auto     run = std::make_unique<Runtime>(model_);
+  Runtime &R   = *run;
+  PetscCall(Guarded([&] { return Layout(R); }));
+  PetscCall(StoreTriangle(R));
+  PetscCall(VecCreate(R.scene.comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));
   PetscCall(VecDuplicate(U, &V));
   PetscCall(VecDuplicate(U, &F));
   PetscCall(InitialState(R, U, V));
-  if (!R.given) {
-    J = R.J; /* a matrix of its own for each further one */
-    PetscCall(PetscObjectReference((PetscObject)J));
-    R.given = true;
-  } else PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
-  PetscCall(TSCreate(data_->comm, ts));
-  PetscCall(PetscObjectGetId((PetscObject)*ts, &R.ts));
+  PetscCall(TSCreate(R.scene.comm, ts));
+  PetscCall(GiveTo(*ts, std::move(run)));
   PetscCall(TSSetProblemType(*ts, TS_NONLINEAR));
   PetscCall(TSSetType(*ts, TSHHT3));
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
-  PetscCall(TSSetI2Jacobian(*ts, J, J, I2Jacobian, &R));
-  PetscCall(TSSetTime(*ts, data_->start.time));
+  PetscCall(TSSetI2Jacobian(*ts, R.J, R.J, I2Jacobian, &R));
+  PetscCall(TSSetTime(*ts, R.scene.start.time));
   PetscCall(TS2SetSolution(*ts, U, V));
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) PetscCall(TSHHT3SetIS(*ts, (TSHHT3Role)r, R.roles[r]));
@@ -117,20 +136,21 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&F));
-  PetscCall(MatDestroy(&J));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Scene::solve(TS ts)
 {
+  Runtime *R;
   PetscFunctionBegin;
-  PetscCall(CheckTS(*data_, ts, "Scene::solve()"));
-  PetscCall(AttachOutput(*data_->run, ts));
+  PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
+  PetscCall(CheckUnchanged(data(), start_));
+  PetscCall(AttachOutput(*R, output_, ts));
   const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
-  if (!failed || data_->run->size == 1) PetscCall(FinishOutput(*data_->run));
+  if (!failed || R->size == 1) PetscCall(FinishOutput(*R));
   PetscCall(failed);
-  PetscCall(ViewWithTS(*this, ts));
+  PetscCall(ViewWithTS(*R, ts));
   PetscFunctionReturn(0);
 }
 

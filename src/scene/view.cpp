@@ -1,5 +1,6 @@
 /* What the scene consists of, and what its solution does without because the scene has none of it: -scene_view, -ts_view. */
 #include "extension.h"
+#include "runtime.h"
 #include "start.h"
 
 namespace hhtdae
@@ -36,12 +37,18 @@ Contents Count(const SceneData &s)
 
 PetscErrorCode Scene::view(PetscViewer viewer) const
 {
-  const SceneData &s = *data_;
+  PetscFunctionBegin;
+  PetscCheck(model_->compiled, data().comm, PETSC_ERR_ARG_WRONGSTATE, "the scene can be viewed after setUp()");
+  PetscCall(ViewScene(*model_, nullptr, viewer));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
+{
+  const SceneData &s = M.scene;
   std::string      left;
   PetscFunctionBegin;
-  PetscCheck(s.run, s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene can be viewed after setUp()");
   PetscCall(ViewStart(s, viewer));
-  const Runtime &R = *s.run;
   const Contents c = Count(s);
   const auto     without = [&](bool is, const char *what) {
     if (!is) left += (left.empty() ? "" : ", ") + std::string(what);
@@ -54,16 +61,18 @@ PetscErrorCode Scene::view(PetscViewer viewer) const
   without(c.curved, "second derivatives of constraints");
   without(c.flexible, "flexible bodies");
   without(c.turning, "Euler angles and gyroscopic terms");
-  without(R.remembers, "angles over full turns");
-  without(R.uses_acceleration, "accelerations in definitions");
-  without(R.size > 1, "exchange between ranks");
-  without((bool)R.recorder, "output");
+  if (R) {
+    without(R->remembers, "angles over full turns");
+    without(R->uses_acceleration, "accelerations in definitions");
+    without((bool)R->recorder, "output");
+  }
+  without(M.size > 1, "exchange between ranks");
   without(!s.extensions.empty(), "finite-element bodies");
   PetscCall(PetscViewerASCIIPrintf(viewer, "  unknowns: %d, of these %d multipliers, %d force states, %d variables, %d states\n",
-                                   (int)R.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
+                                   (int)M.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
-  if (R.turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R.reframed));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  matrix: %s\n", R.triangle ? "one triangle" : ("all of it, " + R.full_because).c_str()));
+  if (R && R->turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->reframed));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  matrix: %s\n", M.wants_triangle ? "one triangle" : ("all of it, " + M.full_because).c_str()));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);
 }

@@ -16,12 +16,12 @@ bool Attaches(const ElementData &e) { return std::string(e.type) == "attachment"
 NewtonEuler::NewtonEuler(Scene &scene, const Specs &specs)
     : scene_(scene), specs_(specs), origin_(scene.marker(scene.ground()))
 {
-  const PetscInt bodies = (PetscInt)scene.data().bodies.size(), elements = (PetscInt)scene.data().elements.size();
+  const PetscInt bodies = (PetscInt)DataOf(scene).bodies.size(), elements = (PetscInt)DataOf(scene).elements.size();
   body_.resize((std::size_t)bodies);
   element_.resize((std::size_t)elements);
   for (PetscInt b = 0; b < bodies; b++) look(b);
   for (PetscInt e = 0; e < elements; e++) lookAt(e);
-  for (const BodyData &b : scene.data().bodies)
+  for (const BodyData &b : DataOf(scene).bodies)
     if (b.flexible) return;
   kinetic_ = scene.channel("balance kinetic", Measure::kineticEnergy()).id;
 }
@@ -29,14 +29,14 @@ NewtonEuler::NewtonEuler(Scene &scene, const Specs &specs)
 /* Channels of the components 0, 1, 2; the first one's place */
 template <class Make> int NewtonEuler::three(const Make &make)
 {
-  const int first = (int)scene_.data().channels.size();
+  const int first = (int)DataOf(scene_).channels.size();
   for (int c = 0; c < 3; c++) scene_.channel("balance " + std::to_string(first + c), make(c));
   return first;
 }
 
 void NewtonEuler::look(PetscInt b)
 {
-  const BodyData data = scene_.data().bodies[(std::size_t)b]; /* a copy: markers are added below */
+  const BodyData data = DataOf(scene_).bodies[(std::size_t)b]; /* a copy: markers are added below */
   OfBody        &k    = body_[(std::size_t)b];
   k.judged            = !data.flexible;
   if (!k.judged) return;
@@ -199,7 +199,7 @@ template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBa
     const double part = missing <= 0 ? 0 : missing / std::max(sum, 1e-9 * least);
     if (part <= worst.largest) return;
     worst.largest = part;
-    worst.where   = std::string(what) + " on " + scene_.data().bodyName(body);
+    worst.where   = std::string(what) + " on " + DataOf(scene_).bodyName(body);
   };
   for (const BodyBalance &k : all) {
     const double                    gyration = k.mass > 0 ? std::sqrt(k.inertia / k.mass) : 0;

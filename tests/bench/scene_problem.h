@@ -54,14 +54,21 @@ public:
     PetscCallAbort(PETSC_COMM_SELF, TSDestroy(&ts_));
   }
 
-  hhtdae::Scene &scene() const { return *scene_; }
+  hhtdae::Scene   &scene() const { return *scene_; }
+  hhtdae::Runtime &run() const { return *hhtdae::RunOf(ts_); } /* which residual and Jacobian belong to */
 
   /* A TS of the scene's own, as any user gets it, at the start; type TSHHT3 with defaults */
   PetscErrorCode createTS(TS *ts) const
   {
+    Vec U, V;
+
     PetscFunctionBegin;
-    PetscCall(rewind());
     PetscCall(scene_->createTS(ts));
+    hhtdae::Runtime &R = *hhtdae::RunOf(*ts);
+    latest_            = &R;
+    PetscCall(useAxes(R));
+    PetscCall(TS2GetSolution(*ts, &U, &V));
+    PetscCall(hhtdae::InitialState(R, U, V));
     PetscCall(TSSetMaxTime(*ts, t1));
     PetscCall(TSSetMaxSteps(*ts, 100000000));
     PetscFunctionReturn(0);
@@ -77,7 +84,7 @@ public:
 
     PetscFunctionBegin;
     *nearest = 1.;
-    PetscCall(run(eps, path, &changes));
+    PetscCall(runOnce(eps, path, &changes));
     if (!changes) PetscFunctionReturn(0);
     for (size_t b = 0; b < path.size(); b++)
       if (!path[b].empty()) *nearest = std::min(*nearest, ChooseAxes(path[b], &axes_[4 * b]));
@@ -102,11 +109,11 @@ public:
   }
   static constexpr double singular() { return 0.1; }
 
-  /* Coordinates and rates as hhtdae has them after changes of axes, into the axes of the start; angles on the turn next
-   * to near */
+  /* Coordinates and rates as hhtdae has them after changes of axes in the run of the latest TS, into the axes of the start; angles on
+     the turn next to near */
   void toStart(double *u, double *v, const double *near) const
   {
-    const hhtdae::Bodies &B = scene_->data().run->bodies;
+    const hhtdae::Bodies &B = latest_->bodies;
     for (PetscInt b = 0; b < B.own; b++) {
       const hhtdae::LocalBody &k = B.body[b];
       if (!hhtdae::HasEulerAngles(k.kind)) continue;
@@ -122,7 +129,7 @@ public:
   PetscErrorCode channels(double t, const double *u, const double *v, const double *a,
                           std::vector<double> &values) const
   {
-    hhtdae::Runtime &R = *scene_->data().run;
+    hhtdae::Runtime &R = run();
 
     PetscFunctionBegin;
     values.clear();
@@ -134,7 +141,7 @@ public:
   /* An accepted step, for who knows one: memories follow */
   void accept(const double *u, const double *v) const
   {
-    hhtdae::Runtime &R = *scene_->data().run;
+    hhtdae::Runtime &R = run();
     R.bodies.move(u, v);
     if (!R.remembers) return;
     for (auto &b : R.batches) b->accept(R.bodies);
@@ -159,7 +166,7 @@ public:
 
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
-    const bool remembers = scene_->data().run->remembers;
+    const bool remembers = run().remembers;
     if (remembers && t > last_.t && !last_.u.empty()) accept(last_.u.data(), last_.v.data());
     if (evaluate(t, u, v, a, f)) std::fill_n(f, n, std::nan("")); /* PETSc has printed what is wrong */
     if (!remembers || !std::all_of(u, u + n, [](double x) { return std::isfinite(x); })) return;
@@ -226,21 +233,22 @@ private:
   std::vector<double>            u0_, v0_, axes_; /* the start; axes and memories there */
   std::vector<State>             states_;
   mutable State                  last_;                                    /* evaluated */
+  mutable const hhtdae::Runtime *latest_          = nullptr;               /* of the TS made last */
   std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
 
   SceneProblem() = default;
 
   /* hhtdae from start to end; the attitudes of all bodies with Euler angles on the way */
-  PetscErrorCode run(double eps, std::vector<Attitudes> &path, PetscInt *changes) const
+  PetscErrorCode runOnce(double eps, std::vector<Attitudes> &path, PetscInt *changes) const
   {
-    AttitudeWatch     watch = {*scene_->data().run, path};
     TSHHT3Statistics  s;
     TSConvergedReason reason;
     TS                ts;
 
     PetscFunctionBegin;
-    path.assign(watch.R.bodies.own, {});
     PetscCall(createTS(&ts));
+    AttitudeWatch watch = {*hhtdae::RunOf(ts), path};
+    path.assign(watch.R.bodies.own, {});
     PetscCall(TSSetTolerances(ts, eps, nullptr, eps, nullptr));
     PetscCall(TSSetErrorIfStepFails(ts, PETSC_FALSE));
     PetscCall(TSMonitorSet(ts, WatchAttitudes, &watch, nullptr));
@@ -252,7 +260,6 @@ private:
     PetscCall(TSHHT3GetStatistics(ts, &s));
     *changes = s.changes;
     PetscCall(TSDestroy(&ts));
-    PetscCall(rewind());
     PetscFunctionReturn(0);
   }
 
@@ -282,14 +289,14 @@ private:
 
     PetscFunctionBegin;
     scene_ = build(PETSC_COMM_SELF);
-    PetscCheck(scene_ && scene_->data().comm == PETSC_COMM_SELF, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+    PetscCheck(scene_ && DataOf(*scene_).comm == PETSC_COMM_SELF, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
                "Scene %s: build it on the communicator that is passed, which is PETSC_COMM_SELF", name.c_str());
     PetscCall(scene_->createTS(&ts_));
     PetscCall(TSGetTime(ts_, &t0));
     t1 = end;
     PetscCall(TSGetSolution(ts_, &U));
     PetscCall(VecGetSize(U, &n));
-    if (scene_->data().run->axes) PetscCall(copy(scene_->data().run->axes, axes_));
+    PetscCall(copy(run().axes, axes_));
     PetscCall(TSGetI2Function(ts_, &F, &function_, &functionContext_));
     PetscCall(TSGetI2Jacobian(ts_, &J_, nullptr, &jacobian_, &jacobianContext_));
     for (Vec &x : x_) PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, nullptr, &x));
@@ -343,7 +350,7 @@ private:
   /* Rows that are f(t) minus an angle or an advance */
   template <class K> void findMotions()
   {
-    for (const auto &b : scene_->data().run->batches)
+    for (const auto &b : run().batches)
       if (const auto *batch = dynamic_cast<const hhtdae::ConstraintBatch<K> *>(b.get()))
         for (const auto &e : batch->all)
           if (e.active & 1) motions_.emplace_back(e.lambda, &e.data.function);
@@ -395,7 +402,8 @@ private:
     TSConvergedReason reason;
 
     PetscFunctionBegin;
-    PetscCall(scene_->createTS(&ts));
+    PetscCall(createTS(&ts));
+    PetscCall(remember(*hhtdae::RunOf(ts)));
     PetscCall(TSHHT3SetCoordinateChange(ts, nullptr, nullptr, nullptr, nullptr));
     PetscCall(TSHHT3SetStart(ts, TSHHT3_START_OFF));
     PetscCall(TS2GetSolution(ts, &U, &V));
@@ -422,20 +430,30 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Axes and memories back to the start */
+  /* Axes and memories of the start */
+  PetscErrorCode useAxes(hhtdae::Runtime &R) const
+  {
+    PetscFunctionBegin;
+    PetscCall(paste(axes_, R.axes));
+    PetscCall(hhtdae::UseAxes(R));
+    PetscFunctionReturn(0);
+  }
   PetscErrorCode rewind() const
   {
-    hhtdae::Runtime &R = *scene_->data().run;
-    double          *x;
-
     PetscFunctionBegin;
     last_.u.clear();
-    if (!R.axes) PetscFunctionReturn(0);
-    R.axes_start = axes_; /* which createTS() goes back to */
-    PetscCall(VecGetArray(R.axes, &x));
-    std::copy(axes_.begin(), axes_.end(), x);
-    PetscCall(VecRestoreArray(R.axes, &x));
-    PetscCall(hhtdae::UseAxes(R));
+    PetscCall(useAxes(run()));
+    PetscFunctionReturn(0);
+  }
+  /* What the elements remember now, into another run */
+  PetscErrorCode remember(hhtdae::Runtime &R) const
+  {
+    PetscFunctionBegin;
+    for (std::size_t k = 0; k < R.batches.size(); k++) {
+      std::vector<double> memory(R.batches[k]->memory());
+      run().batches[k]->copyMemory(memory.data(), false);
+      R.batches[k]->copyMemory(memory.data(), true);
+    }
     PetscFunctionReturn(0);
   }
 

@@ -32,11 +32,11 @@ difference = names ^ (declared | {"PetscDLLibraryRegister_hhtdae"})
 check(not difference, "shown or declared, but not both: %s" % sorted(difference))
 print("libhhtdae shows %d names" % len(names))
 
-# Scenes: members of the two classes with sources of their own, steps of the state; an add() for everything that holds markers or elements
+# Scenes: members of the classes with sources of their own, steps of the state; an enter() for everything that holds markers or elements
 names = shown(libraries[1])
-foreign = [name for name in names if not re.match(r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction)::|step5?\()", name)]
+foreign = [name for name in names if not re.match(r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction|Motion|Snapshot)::|step5?\()", name)]
 check(not foreign, "not declared in the headers: %s" % foreign)
-added = {match.group(1) for match in (re.match(r"hhtdae::Element hhtdae::Scene::add<hhtdae::(\w+)>", name) for name in names) if match}
+added = {match.group(1) for match in (re.match(r"hhtdae::Element hhtdae::Scene::enter<hhtdae::(\w+)>", name) for name in names) if match}
 elements = set()
 for text in (header("joints"), header("forces")):
     for name, body in re.findall(r"^struct (\w+) \{(.*?)(?:^\}| \});", text, flags=re.DOTALL | re.MULTILINE):

@@ -1,7 +1,7 @@
 /* Flexible bodies on several ranks: joined with each other and with rigid ones across ranks, the same as on one. */
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -37,7 +37,7 @@ Array runChain(MPI_Comm comm)
       to   = scene.marker(body, {0, 0, -0.5});
     }
     scene.add("joint" + std::to_string(k), Spherical{from, last});
-    at   = scene.data().frame(to).x;
+    at   = DataOf(scene).frame(to).x;
     last = to;
   }
   for (int k = 0; k < 3; k++) scene.channel(std::string(1, "xyz"[k]), Measure::displacement(last, k));

@@ -1,7 +1,7 @@
 /* A finite-element model in a scene on several ranks: the same as on one. */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -21,7 +21,7 @@ Array runBeam(MPI_Comm comm, FeLaw law)
   scene.gravity({0, 0, -9.81});
   must(fe.add(scene, "beam", model, b));
   const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
-  const auto   l = scene.data().frame(left), r = scene.data().frame(right);
+  const auto   l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
   if (law == FeLaw::Large) scene.add("hinge", Spherical{left, scene.marker(scene.ground(), l.x)});
   else scene.add("clamp", Fixed{left, scene.marker(scene.ground(), l.x, l.R)});
   RigidBody load;

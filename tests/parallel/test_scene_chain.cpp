@@ -1,6 +1,6 @@
 /* Scenes on all ranks together and on every rank alone: every body goes the same way */
 #include "hhtdae/scene.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -30,13 +30,13 @@ End run(MPI_Comm comm, Space space, const Build &build, double end, const std::s
   Scene scene(comm, space);
   build(scene);
   const int            directions = space == Space::Planar ? 2 : 3;
-  const PetscInt       bodies     = (PetscInt)scene.data().bodies.size();
+  const PetscInt       bodies     = (PetscInt)DataOf(scene).bodies.size();
   std::vector<Measure> velocity;
   for (PetscInt b = 0; b < bodies; b++)
     for (double side : {0., 0.3}) {
       const Body   body{b};
       const Marker m =
-          scene.marker(body, scene.data().bodies[b].point ? Vector3::Zero()
+          scene.marker(body, DataOf(scene).bodies[b].point ? Vector3::Zero()
                                                           : Vector3(side, side, space == Space::Planar ? 0 : -side));
       for (int k = 0; k < directions; k++) {
         scene.channel("x" + std::to_string(velocity.size()), Measure::displacement(m, k));

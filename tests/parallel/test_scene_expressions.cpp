@@ -77,7 +77,7 @@ Array run(MPI_Comm comm)
   must(c.scene.solve(ts));
   must(TS2GetSolution(ts, &U, &V));
   must(TSHHT3GetAcceleration(ts, &A));
-  const Numbering &N = c.scene.data().run->number;
+  const Numbering &N = ModelOf(c.scene).number;
   const Array      u = whole(U), v = whole(V), a = whole(A);
   Array            all;
   for (const Array *x : {&u, &v, &a})

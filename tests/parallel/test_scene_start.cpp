@@ -10,15 +10,15 @@ namespace
 
 void expectSame(const Scene &a, const Scene &b, double tolerance)
 {
-  const hhtdae::StartResult &x = a.data().started, &y = b.data().started;
+  const hhtdae::StartResult &x = DataOf(a).started, &y = DataOf(b).started;
   EXPECT_EQ(x.redundant, y.redundant);
   ASSERT_EQ(x.dropped.size(), y.dropped.size());
   for (std::size_t k = 0; k < x.dropped.size(); k++) {
     EXPECT_EQ(x.dropped[k].element, y.dropped[k].element);
     EXPECT_EQ(x.dropped[k].row, y.dropped[k].row);
   }
-  for (std::size_t i = 0; i < a.data().bodies.size(); i++) {
-    const hhtdae::BodyData &p = a.data().bodies[i], &q = b.data().bodies[i];
+  for (std::size_t i = 0; i < DataOf(a).bodies.size(); i++) {
+    const hhtdae::BodyData &p = DataOf(a).bodies[i], &q = DataOf(b).bodies[i];
     EXPECT_NEAR((p.r - q.r).norm(), 0, tolerance) << p.name;
     EXPECT_NEAR((p.A - q.A).norm(), 0, tolerance) << p.name;
     EXPECT_NEAR((p.v - q.v).norm() + (p.w - q.w).norm(), 0, 100 * tolerance) << p.name;
@@ -99,7 +99,7 @@ TEST(SceneStart, ARunWithRowsDropped)
     must(s.solve(ts));
     must(TS2GetSolution(ts, &U, &V));
     const Array u = whole(U);
-    for (int c = 0; c < 3; c++) r[k][c] = u[s.data().run->number.body[2] + c];
+    for (int c = 0; c < 3; c++) r[k][c] = u[ModelOf(s).number.body[2] + c];
     must(TSDestroy(&ts));
   }
   for (int c = 0; c < 3; c++) EXPECT_NEAR(r[0][c], r[1][c], 1e-5);

@@ -30,7 +30,7 @@ Outcome runBeam(MPI_Comm comm, bool triangle)
   scene.gravity({0, 0, -9.81});
   must(fe.add(scene, "beam", model, b));
   const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
-  const auto   l = scene.data().frame(left), r = scene.data().frame(right);
+  const auto   l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
   PointMass    load;
   load.mass     = 20;
   load.position = r.x;
@@ -41,7 +41,7 @@ Outcome runBeam(MPI_Comm comm, bool triangle)
   SceneRun run(scene, 0.05, storage + tolerance(1e-6) + " -ts_hhtdae_corrector_tolerance 1e-5 ");
   Outcome  o;
   Vec      U, V, A, x, y;
-  Runtime &R = *scene.data().run;
+  Runtime &R = *RunOf(run.ts);
   must(TS2GetSolution(run.ts, &U, &V));
   for (Vec *v : {&A, &x, &y}) must(VecDuplicate(U, v));
   must(VecSet(A, 1));

@@ -156,9 +156,9 @@ private:
     for (Body f : machines.modal) look(Measure::modal(f, 0), Observed::Position);
     for (State x : loads.states) look(Measure::value(x), Observed::Position);
     int seen = 0;
-    for (std::size_t k = 0; k < s.data().elements.size() && seen < 4;
-         k += std::max<std::size_t>(1, s.data().elements.size() / 8))
-      if (s.data().elements[k].kind != ElementData::Force && std::strcmp(s.data().elements[k].type, "attachment")) {
+    for (std::size_t k = 0; k < DataOf(s).elements.size() && seen < 4;
+         k += std::max<std::size_t>(1, DataOf(s).elements.size() / 8))
+      if (DataOf(s).elements[k].kind != ElementData::Force && std::strcmp(DataOf(s).elements[k].type, "attachment")) {
         for (int c = 0; c < components; c++)
           look(Measure::jointForce(Element{(PetscInt)k}, c, b.at(0, Vector3::Zero())), Observed::Reaction);
         seen++;
@@ -191,7 +191,7 @@ private:
   static bool dissipates(const Scene &s)
   {
     static const char *const takes[] = {"motion", "friction", "user", "beam", "contact", "nonlinear", "attachment"};
-    for (const ElementData &e : s.data().elements)
+    for (const ElementData &e : DataOf(s).elements)
       for (const char *word : takes)
         if (std::strstr(e.type, word)) return true;
     return false;
@@ -200,9 +200,9 @@ private:
   void count(Builder &b, Model &m)
   {
     m.types = b.used;
-    for (const ElementData &e : m.scene->data().elements) m.types[e.type]++;
-    if (!m.scene->data().variables.empty()) m.types["variable"] += (int)m.scene->data().variables.size();
-    if (!m.scene->data().states.empty()) m.types["first-order state"] += (int)m.scene->data().states.size();
+    for (const ElementData &e : DataOf(*m.scene).elements) m.types[e.type]++;
+    if (!DataOf(*m.scene).variables.empty()) m.types["variable"] += (int)DataOf(*m.scene).variables.size();
+    if (!DataOf(*m.scene).states.empty()) m.types["first-order state"] += (int)DataOf(*m.scene).states.size();
     m.types[m.planar ? "planar scene" : "spatial scene"]++;
   }
 };

@@ -154,7 +154,7 @@ private:
   }
   bool apart(Marker i, Marker j)
   {
-    return (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm() > 0.1 * b.length;
+    return (DataOf(b.scene).frame(i).x - DataOf(b.scene).frame(j).x).norm() > 0.1 * b.length;
   }
 
   void springBetween(int a, int c)
@@ -163,7 +163,7 @@ private:
     const Stiff s = b.stiff(b.lighter(a, c));
     ends(a, c, i, j);
     if (!apart(i, j)) return;
-    const double distance = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm();
+    const double distance = (DataOf(b.scene).frame(i).x - DataOf(b.scene).frame(j).x).norm();
     /* strained by what keeps forces near weights */
     const double strain = b.weight(c) / s.k * r.uniform(-0.5, 0.5);
     const bool   zero   = r.chance(0.1) && s.omega * b.period < 40;
@@ -188,7 +188,7 @@ private:
     ends(a, c, i, j);
     if (!apart(i, j)) return;
     const Stiff  s = b.stiff(b.lighter(a, c));
-    const double l = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(), hard = 1 / (b.length * b.length),
+    const double l = (DataOf(b.scene).frame(i).x - DataOf(b.scene).frame(j).x).norm(), hard = 1 / (b.length * b.length),
                  k = s.k, d = s.c;
     b.add(NonlinearSpring{
         i, j,
@@ -298,13 +298,13 @@ private:
     pair(a, c);
     ends(a, c, i, j);
     if (!apart(i, j)) return;
-    const double l   = (b.scene.data().frame(i).x - b.scene.data().frame(j).x).norm(),
+    const double l   = (DataOf(b.scene).frame(i).x - DataOf(b.scene).frame(j).x).norm(),
                  tau = b.period * r.logarithmic(0.01, 0.3), w = 2 * M_PI / b.period;
     const double gain = b.weight(c) / b.length * r.uniform(0.5, 2);
     const State  x    = b.scene.state(
             "",
             Expression{
-            {Measure::distance(i, j), Measure::time(), Measure::value(State{(PetscInt)b.scene.data().states.size()})},
+            {Measure::distance(i, j), Measure::time(), Measure::value(State{(PetscInt)DataOf(b.scene).states.size()})},
             [=](const Real *m) -> Real { return (l * (1. + 0.2 * sin(w * m[1])) - m[0] - m[2]) / tau; }},
             0);
     states.push_back(x);

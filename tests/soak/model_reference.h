@@ -37,7 +37,7 @@ struct Leg : hhtex::Problem {
     for (const LocalBody &b : runtime().bodies.body)
       if (HasEulerAngles(b.kind)) angles.push_back(b.first + 3);
   }
-  Runtime &runtime() const { return *p.scene().data().run; }
+  Runtime &runtime() const { return p.run(); }
 
   void initial(double *u, double *v) const override
   {

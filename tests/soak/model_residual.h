@@ -26,7 +26,7 @@ namespace soak
 class BodyResiduals
 {
 public:
-  BodyResiduals(Scene &scene, double dq, double tolerance) : R_(*scene.data().run), dq_(dq), tolerance_(tolerance) {}
+  BodyResiduals(TS ts, double dq, double tolerance) : R_(*hhtdae::RunOf(ts)), dq_(dq), tolerance_(tolerance) {}
 
   /* at the end of a step */
   PetscErrorCode make(TS ts, PetscReal t)

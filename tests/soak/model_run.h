@@ -93,7 +93,7 @@ inline void Keep(const hhtest::Imbalance &now, double t, double *most, std::stri
 inline PetscErrorCode JudgeLaws(Watcher &w, TS ts, double t)
 {
   std::vector<double> values;
-  BodyResiduals       left(w.scene, w.settings.slack, w.settings.tolerance);
+  BodyResiduals       left(ts, w.settings.slack, w.settings.tolerance);
   PetscFunctionBegin;
   PetscCall(w.scene.sample(ts, t, values));
   PetscCall(left.make(ts, t));
@@ -172,7 +172,7 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
   std::unique_ptr<hhtest::NewtonEuler> laws;
   if (s.laws) {
     laws             = std::make_unique<hhtest::NewtonEuler>(*m.scene, m.specs);
-    result->unjudged = (int)m.scene->data().bodies.size() - laws->judged();
+    result->unjudged = (int)DataOf(*m.scene).bodies.size() - laws->judged();
   }
   PetscCall(m.scene->createTS(&ts));
   PetscCall(TSSetMaxTime(ts, m.end));

@@ -1,6 +1,6 @@
 /* Contact: kernels by differences and by what forces have to do, entries of a scene */
 #include "contact_cases.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 
 using namespace hhtdae;
 
@@ -157,14 +157,14 @@ TEST(ContactEntry, RefusesByName)
                                                 "sphere-sphere contact d: radius of j is -2",
                                                 "sphere-box contact e: half length z is -4",
                                                 "sphere-plane contact f: markers i and j"};
-  const std::vector<std::string> &errors     = scene.data().errors;
+  const std::vector<std::string> &errors     = DataOf(scene).errors;
   EXPECT_EQ(errors.size(), std::size(expected));
   for (const char *start : expected) {
     const auto found =
         std::find_if(errors.begin(), errors.end(), [&](const std::string &e) { return e.find(start) == 0; });
     EXPECT_NE(found, errors.end()) << "no error begins with: " << start;
   }
-  for (const ElementData &e : scene.data().elements) EXPECT_TRUE(e.parts.empty());
+  for (const ElementData &e : DataOf(scene).elements) EXPECT_TRUE(e.parts.empty());
 }
 
 /* A ball thrown along the plane without spin ends up rolling at 5/7 of its speed, sunk in to where k d^e is its weight.

@@ -1,7 +1,7 @@
 /* Static equilibrium of thin parts: large rotations in few corrections, and not at a state that is not stable. */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "support.h"
 
 using namespace hhtest;
@@ -37,15 +37,15 @@ struct Plank {
     b.attachments[1].tie  = Tie::Average;
     must(fe.add(scene, "plank", model, b));
     const Marker left = scene.marker(fe.attachment("left"));
-    const auto   at   = scene.data().frame(left);
+    const auto   at   = DataOf(scene).frame(left);
     tip               = fe.attachment("right");
     scene.add("clamp", Fixed{left, scene.marker(scene.ground(), at.x, at.R)});
     load(scene, scene.marker(tip), force);
     scene.start().equilibrium = true;
     must(scene.setUp());
   }
-  Vector3 axis() const { return scene.data().bodies[tip.id].A.col(0); }
-  int     corrections() const { return (int)scene.data().started.equilibrium_iterations; }
+  Vector3 axis() const { return DataOf(scene).bodies[tip.id].A.col(0); }
+  int     corrections() const { return (int)DataOf(scene).started.equilibrium_iterations; }
 };
 
 } // namespace
@@ -125,9 +125,9 @@ TEST(Equilibrium, AChainOfBeamsBentFar)
   load(s, s.marker(last), {0, 3 * young * I, 0});
   s.start().equilibrium = true;
   must(s.setUp());
-  const Vector3 r = s.data().bodies[last.id].r;
-  MEASURED("chain of beams: tip at %.4f, %.4f in %d corrections", r(0), r(1), (int)s.data().started.equilibrium_iterations);
+  const Vector3 r = DataOf(s).bodies[last.id].r;
+  MEASURED("chain of beams: tip at %.4f, %.4f in %d corrections", r(0), r(1), (int)DataOf(s).started.equilibrium_iterations);
   EXPECT_NEAR(r(1), 0.6033, 2e-3);
   EXPECT_NEAR(r(0), 1 - 0.2544, 2e-3);
-  EXPECT_LE((int)s.data().started.equilibrium_iterations, 40);
+  EXPECT_LE((int)DataOf(s).started.equilibrium_iterations, 40);
 }

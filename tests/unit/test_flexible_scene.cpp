@@ -35,9 +35,9 @@ struct Arm {
     body              = scene.add("arm", b);
     const Body   hub  = scene.attachment(body, "hub"), tip = scene.attachment(body, "tip");
     const Marker i    = scene.marker(hub, {0.1, 0, 0});
-    const auto   at   = scene.data().frame(i);
+    const auto   at   = DataOf(scene).frame(i);
     const Marker free = scene.marker(tip);
-    const auto   end  = scene.data().frame(free);
+    const auto   end  = DataOf(scene).frame(free);
     scene.add("ball", Spherical{i, scene.marker(scene.ground(), at.x)});
     scene.add("spring", SpringDamper{free, scene.marker(scene.ground(), Vector3(end.x + Vector3(1, 1, 1))), 100, 5, 1});
     RigidBody load;
@@ -146,7 +146,7 @@ TEST(FlexibleScene, StaticEquilibrium)
   Scene        scene(PETSC_COMM_WORLD);
   const Body   body = scene.add("arm", b);
   const Marker hub  = scene.marker(scene.attachment(body, "hub"));
-  const auto   at   = scene.data().frame(hub);
+  const auto   at   = DataOf(scene).frame(hub);
   const Vector3 g(0.3, 1, -4);
   scene.gravity(g);
   scene.add("clamp", Fixed{hub, scene.marker(scene.ground(), at.x, at.R)});
@@ -156,7 +156,7 @@ TEST(FlexibleScene, StaticEquilibrium)
   must(VecSet(s.A, 0));
   must(VecSet(s.V, 0));
   /* the clamp's force -m g and the moment of the weight about it work on the modes at the attachment */
-  const BodyData        &d = scene.data().bodies[body.id];
+  const BodyData        &d = DataOf(scene).bodies[body.id];
   const ModalAttachment &a = c.body.attachments[0];
   const Eigen::Map<const Eigen::VectorXd> eta(d.flexible->deformation.data(), 5);
   const SmallTurn turn(a.rotation * eta);
@@ -216,10 +216,10 @@ TEST(FlexibleScene, AttachmentsStartOnTheDeformedBody)
   Scene scene(PETSC_COMM_WORLD);
   scene.attachment(scene.add("arm", b), "tip");
   must(scene.setUp()); /* the assembly phase refuses what does not meet */
-  EXPECT_LT(scene.data().started.misfit, 1e-12);
-  EXPECT_EQ(scene.data().started.degreesOfFreedom(), 11);
+  EXPECT_LT(DataOf(scene).started.misfit, 1e-12);
+  EXPECT_EQ(DataOf(scene).started.degreesOfFreedom(), 11);
   const Vector3 x = b.position + tilted * (c.X[1] + c.shape.middleRows<3>(3) * b.deformation);
-  EXPECT_LT((scene.data().bodies[1].r - x).norm(), 1e-12);
+  EXPECT_LT((DataOf(scene).bodies[1].r - x).norm(), 1e-12);
 }
 
 /* Loops that are redundant for a rigid body are not for a flexible one, and rows drop when modes do not make up for them */
@@ -231,13 +231,13 @@ TEST(FlexibleScene, ModesFreeLoopsOfRedundancy)
     const Body       body = scene.add("frame", flexible(c));
     for (const char *name : {"hub", "tip"}) {
       const Marker m = scene.marker(scene.attachment(body, name));
-      const auto   f = scene.data().frame(m);
+      const auto   f = DataOf(scene).frame(m);
       scene.add(std::string("fixed ") + name, Fixed{m, scene.marker(scene.ground(), f.x, f.R)});
     }
-    scene.data().bodies[body.id].v.setZero();
+    DataOf(scene).bodies[body.id].v.setZero();
     scene.start().assembly = Assembly::Off;
     must(scene.setUp());
-    EXPECT_EQ(scene.data().started.redundant, modes ? 0 : 6);
+    EXPECT_EQ(DataOf(scene).started.redundant, modes ? 0 : 6);
   }
 }
 

@@ -34,8 +34,8 @@ struct Fixture {
   {
     std::string all;
     scene.add("it", s);
-    for (const std::string &e : scene.data().errors) all += e + "\n";
-    scene.data().errors.clear();
+    for (const std::string &e : DataOf(scene).errors) all += e + "\n";
+    DataOf(scene).errors.clear();
     return all;
   }
 };
@@ -207,7 +207,7 @@ template <class Spec> PetscErrorCode Throw(const Spec &spec, Motion *m)
   PetscCall(TS2GetSolution(ts, &U, &V));
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
-  const PetscInt at = scene.data().run->number.body[body.id];
+  const PetscInt at = ModelOf(scene).number.body[body.id];
   for (int k = 0; k < 6; k++) {
     m->q(k) = u[at + k];
     m->v(k) = v[at + k];
@@ -263,7 +263,7 @@ TEST(ForceEntries, DampedOscillator)
     ASSERT_EQ(TS2GetSolution(ts, &U, &V), 0);
     ASSERT_EQ(VecGetArrayRead(U, &u), 0);
     const double d = c / (2 * m), w = std::sqrt(k / m - d * d);
-    EXPECT_NEAR(u[scene.data().run->number.body[b.id]] - 1,
+    EXPECT_NEAR(u[ModelOf(scene).number.body[b.id]] - 1,
                 x0 * std::exp(-d * T) * (std::cos(w * T) + d / w * std::sin(w * T)), 1e-5);
     ASSERT_EQ(VecRestoreArrayRead(U, &u), 0);
     ASSERT_EQ(TSDestroy(&ts), 0);

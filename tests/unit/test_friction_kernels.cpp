@@ -1,7 +1,7 @@
 /* Friction in joints: derivatives, the limits mu N and rest, power, and the loads that the reaction makes */
 #include "kernel_checks.h"
 #include "scene/kernels/friction.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 
 using namespace hhtdae;
 
@@ -164,7 +164,7 @@ namespace
 
 bool Mentions(Scene &scene, const std::string &text)
 {
-  for (const std::string &e : scene.data().errors)
+  for (const std::string &e : DataOf(scene).errors)
     if (e.find(text) != std::string::npos) return true;
   return false;
 }
@@ -184,10 +184,10 @@ TEST(JointFrictionEntry, TakesThePositionRowsOfItsJoint)
                 slider   = s.scene.add("rail", Translational{s.i, s.j});
   s.scene.add("friction", JointFriction{revolute, .1, .2});
   s.scene.add("sliding", JointFriction{slider, .1});
-  ASSERT_TRUE(s.scene.data().errors.empty()) << s.scene.data().errors[0];
+  ASSERT_TRUE(DataOf(s.scene).errors.empty()) << DataOf(s.scene).errors[0];
   const int rows[] = {3, 2};
   for (int k = 0; k < 2; k++) {
-    const ElementData &e = s.scene.data().elements[2 + k];
+    const ElementData &e = DataOf(s.scene).elements[2 + k];
     ASSERT_EQ(e.parts.size(), 1u);
     const StoreBase &store = *e.parts[0].store;
     ASSERT_EQ(store.inputs(), rows[k]);
@@ -206,14 +206,14 @@ TEST(JointFrictionEntry, RefusesByName)
   const Element pin = s.scene.add("pin", Revolute{s.i, s.j}), weld = s.scene.add("weld", Fixed{s.i, s.j});
   s.scene.add("f", JointFriction{weld, .1, .2});
   EXPECT_TRUE(Mentions(s.scene, "joint friction f: \"weld\" is of type fixed; friction is for revolute"))
-      << s.scene.data().errors.back();
+      << DataOf(s.scene).errors.back();
   s.scene.add("g", JointFriction{Element{}, .1, .2});
   EXPECT_TRUE(Mentions(s.scene, "joint friction g: its joint is not an element"));
   s.scene.add("h", JointFriction{pin, -.1, 0, -1});
   EXPECT_TRUE(Mentions(s.scene, "joint friction h: coefficient is -0.1"));
   EXPECT_TRUE(Mentions(s.scene, "joint friction h: radius of pin or ball is 0"));
   EXPECT_TRUE(Mentions(s.scene, "joint friction h: slip velocity is -1"));
-  EXPECT_TRUE(s.scene.data().elements.back().parts.empty());
+  EXPECT_TRUE(DataOf(s.scene).elements.back().parts.empty());
 }
 
 namespace

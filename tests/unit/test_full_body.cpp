@@ -47,7 +47,7 @@ struct Held {
     scene.gravity({0.3, 1, -9.81});
     must(fe.add(scene, "beam", beam.model, b));
     const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
-    const auto   l = scene.data().frame(left), r = scene.data().frame(right);
+    const auto   l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
     scene.add("ball", Spherical{left, scene.marker(scene.ground(), l.x)});
     RigidBody load;
     load.position = r.x;
@@ -106,8 +106,8 @@ TEST(FullBody, TiesHold)
   Held        h(FeLaw::Large);
   AnyState    s(h.scene, 1, 0);
   const Array f = s.residual();
-  for (std::size_t x = 0; x < h.scene.data().extensions.size(); x++) {
-    const Extension &e = *h.scene.data().extensions[x];
+  for (std::size_t x = 0; x < DataOf(h.scene).extensions.size(); x++) {
+    const Extension &e = *DataOf(h.scene).extensions[x];
     for (PetscInt i = 0; i < e.multipliers(); i++) EXPECT_NEAR(f[e.start[0] + e.coordinates() + i], 0, 1e-12);
     EXPECT_EQ(e.multipliers(), 3 * 4 + 6);
   }

@@ -37,8 +37,8 @@ struct Fixture {
   {
     std::string all;
     scene.add("it", s);
-    for (const std::string &e : scene.data().errors) all += e + "\n";
-    scene.data().errors.clear();
+    for (const std::string &e : DataOf(scene).errors) all += e + "\n";
+    DataOf(scene).errors.clear();
     return all;
   }
 };
@@ -77,8 +77,8 @@ template <class Spec> Rows RowsOf(Spec s, Space space)
   s.i             = f.i;
   s.j             = f.j;
   const Element e = f.scene.add("it", s);
-  if (!f.scene.data().errors.empty()) return kRefused;
-  for (const Part &p : f.scene.data().elements[e.id].parts)
+  if (!DataOf(f.scene).errors.empty()) return kRefused;
+  for (const Part &p : DataOf(f.scene).elements[e.id].parts)
     (p.store->isHolonomic() ? rows.position : rows.velocity) += p.store->rows();
   return rows;
 }
@@ -172,7 +172,7 @@ struct Final {
   Scene                  &scene;
   std::vector<BodyMotion> bodies;
 
-  Final(Scene &s, double T, double tolerance = 1e-9) : scene(s), bodies(s.data().bodies.size())
+  Final(Scene &s, double T, double tolerance = 1e-9) : scene(s), bodies(DataOf(s).bodies.size())
   {
     EXPECT_EQ(run(T, tolerance), 0);
   }
@@ -192,7 +192,7 @@ struct Final {
     PetscCall(TS2GetSolution(ts, &U, &V));
     PetscCall(VecGetArrayRead(U, &u));
     PetscCall(VecGetArrayRead(V, &v));
-    Runtime &R = *scene.data().run;
+    Runtime &R = *RunOf(ts);
     R.bodies.move(u, v);
     for (std::size_t b = 0; b < bodies.size(); b++) bodies[b] = R.bodies.now[R.local_body[b]];
     PetscCall(VecRestoreArrayRead(U, &u));
@@ -397,7 +397,7 @@ void FlyTogether(Spec s, const Vector3 &offset = {0, 0, 0}, const Matrix3 &turn 
   scene.add("joint", s);
   const Final end(scene, .5);
   for (int k = 0; k < 2; k++) behind.add(part[k], end[body[k]].r, end[body[k]].A, end[body[k]].v, end[body[k]].w);
-  SCOPED_TRACE(scene.data().elements[0].type);
+  SCOPED_TRACE(DataOf(scene).elements[0].type);
   EXPECT_LT((behind.linear - before.linear).norm(), 1e-9);
   EXPECT_LT((behind.angular - before.angular).norm(), 2e-5);
   EXPECT_NEAR(behind.energy, before.energy, 2e-5);

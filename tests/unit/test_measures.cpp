@@ -126,7 +126,7 @@ TEST_P(Both, DerivativesOfScalarsAndJoints)
   m.add(Expression{{Measure::value(v), Measure::force(m.spring, 0), Measure::multiplier(m.ball, 0)},
                    [](const Real *k) -> Real { return 1. / (2. + k[0] * k[0]) + k[1] * sin(k[2]); }});
   m.add(
-      Expression{{Measure::time(), Measure::value(Variable{(PetscInt)m.scene.data().variables.size()})}, /* of itself */
+      Expression{{Measure::time(), Measure::value(Variable{(PetscInt)DataOf(m.scene).variables.size()})}, /* of itself */
                  [](const Real *k) -> Real { return k[0] + .1 * k[1] * k[1]; }});
   for (int c = 0; c < 3; c++)
     for (Marker frame : {Marker{}, m.on_ground, m.on_b})
@@ -170,18 +170,18 @@ TEST(Measures, JointsWithRedundantRows)
     for (int r = 0; r < 5; r++) all.push_back(s.variable("", Measure::multiplier(hinge, r)));
   }
   EXPECT_LT(worstJacobian(s), 1e-7);
-  IS       is = s.data().run->roles[TSHHT3_HOLONOMIC];
+  AnyState state(s, 5);
+  IS       is = state.R.roles[TSHHT3_HOLONOMIC];
   PetscInt n;
   must(ISGetSize(is, &n));
   EXPECT_EQ(n, 5);
-  AnyState state(s, 5);
   int      zeros = 0;
   for (Variable v : all) zeros += state.definition(v) == 0;
   EXPECT_GE(zeros, 5);
   EXPECT_LT(zeros, (int)all.size());
   /* all forces on the door are the hinges' */
   const Array    f     = state.residual();
-  const PetscInt first = s.data().run->number.body[door.id];
+  const PetscInt first = ModelOf(s).number.body[door.id];
   for (int c = 0; c < 3; c++) {
     const double sum = state.definition(force[c]) + state.definition(force[3 + c]);
     EXPECT_NEAR(sum, 3 * state.get(state.A, first + c) - f[first + c], 1e-12);
@@ -237,7 +237,7 @@ TEST(Measures, ForcesOfAccelerationsAreCarried)
   m.add(Measure::force(e, 0));
   EXPECT_LT(worstJacobian(m.scene), 1e-7);
   AnyState state(m.scene, 4);
-  IS       is = m.scene.data().run->roles[TSHHT3_FORCE];
+  IS       is = state.R.roles[TSHHT3_FORCE];
   PetscInt n;
   must(ISGetSize(is, &n));
   EXPECT_EQ(n, 2);

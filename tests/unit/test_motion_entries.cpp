@@ -47,8 +47,8 @@ struct Parts {
   {
     std::string all;
     scene.add("it", s);
-    for (const std::string &e : scene.data().errors) all += e + "\n";
-    scene.data().errors.clear();
+    for (const std::string &e : DataOf(scene).errors) all += e + "\n";
+    DataOf(scene).errors.clear();
     return all;
   }
 };
@@ -66,11 +66,11 @@ double JacobianError(Scene &scene, unsigned seed)
 }
 
 /* Pose of a body where the run has arrived */
-Frame<double> Pose(Scene &scene, const SceneRun &run, Body body)
+Frame<double> Pose(const SceneRun &run, Body body)
 {
   Vec                U, V;
   const PetscScalar *u, *v;
-  Runtime           &R = *scene.data().run;
+  Runtime           &R = *RunOf(run.ts);
   must(TS2GetSolution(run.ts, &U, &V));
   must(VecGetArrayRead(U, &u));
   must(VecGetArrayRead(V, &v));
@@ -84,7 +84,7 @@ Frame<double> Pose(Scene &scene, const SceneRun &run, Body body)
 /* Multiplier of the last row of an element */
 double Multiplier(Scene &scene, const SceneRun &run, Element e)
 {
-  const Part part = scene.data().elements[e.id].parts.back();
+  const Part part = DataOf(scene).elements[e.id].parts.back();
   Vec        U, V;
   must(TS2GetSolution(run.ts, &U, &V));
   return whole(U)[part.store->start[part.index]];
@@ -205,7 +205,7 @@ TEST(MotionEntries, AScrewDrivenInThreeWays)
     scene.gravity({0, 0, -gravity});
     SceneRun run(scene, 1, tight);
     must(run.solve());
-    const Frame<double> pose = Pose(scene, run, nut);
+    const Frame<double> pose = Pose(run, nut);
     const double        dx   = (pose.x - AboutZ(angle) * c - Vector3(0, 0, lead * angle)).norm();
     const double        dR   = (pose.R - AboutZ(angle)).norm();
     EXPECT_LT(dx, 1e-6) << of;
@@ -232,8 +232,8 @@ TEST(MotionEntries, AGearOverManyTurns)
   scene.add("drive", RotationalMotion{i1, j1, TimeFunction::polynomial({0, 0, 10})});
   SceneRun run(scene, 2, tight);
   must(run.solve());
-  const double d1 = (Pose(scene, run, one).R - X * AboutZ(40) * X.transpose()).norm();
-  const double d2 = (Pose(scene, run, two).R - AboutZ(-16)).norm();
+  const double d1 = (Pose(run, one).R - X * AboutZ(40) * X.transpose()).norm();
+  const double d2 = (Pose(run, two).R - AboutZ(-16)).norm();
   EXPECT_LT(d1, 1e-8);
   EXPECT_LT(d2, 1e-8);
   MEASURED("gear: wheels at 40 and -16 rad to %.1e and %.1e", d1, d2);
@@ -265,8 +265,8 @@ void RackFalls(Space space)
   must(run.solve());
   const double fall = a * t * t / 2;
   EXPECT_GT(fall / r, kTurn); /* more than a turn */
-  const double dx = (Pose(scene, run, rack).x - place - Vector3(0, -fall, 0)).norm();
-  const double dR = (Pose(scene, run, pinion).R - AboutZ(fall / r)).norm();
+  const double dx = (Pose(run, rack).x - place - Vector3(0, -fall, 0)).norm();
+  const double dR = (Pose(run, pinion).R - AboutZ(fall / r)).norm();
   EXPECT_LT(dx, 1e-6);
   EXPECT_LT(dR, 1e-6);
   EXPECT_NEAR(Multiplier(scene, run, mesh), -m * (g - a),
@@ -299,8 +299,8 @@ TEST(MotionEntries, ADifferentialOfThreeWheels)
   scene.add("differential", Coupler{terms});
   SceneRun run(scene, 3, tight);
   must(run.solve());
-  EXPECT_LT((Pose(scene, run, wheel[0]).R - AboutZ(27)).norm(), 1e-7);
-  EXPECT_LT((Pose(scene, run, wheel[2]).R - AboutZ(7.5)).norm(), 1e-7);
+  EXPECT_LT((Pose(run, wheel[0]).R - AboutZ(27)).norm(), 1e-7);
+  EXPECT_LT((Pose(run, wheel[2]).R - AboutZ(7.5)).norm(), 1e-7);
 }
 
 /* A drive whose function ends in the middle of the run is an error, not a result */

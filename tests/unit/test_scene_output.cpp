@@ -178,7 +178,7 @@ TEST(SceneOutput, NothingIsRecordedThatWasNotAskedFor)
   rods.scene.channel("t", Measure::time());
   SceneRun run(rods.scene, 0.1, "");
   must(run.solve());
-  EXPECT_EQ(rods.scene.data().run->recorder, nullptr);
+  EXPECT_EQ(RunOf(run.ts)->recorder, nullptr);
 }
 
 TEST(SceneOutput, SaysWhatIsWrong)

@@ -1,5 +1,5 @@
 /* Scenes that go on from a checkpoint: the same bits, and what is recorded goes on in the same files; what users' functions do wrong */
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -51,7 +51,7 @@ struct Result {
 Result runRods(const std::string &options, int bodies = 2, double mass = 1, double end = 0.6)
 {
   Rods rods(bodies);
-  rods.scene.data().bodies[0].mass = mass;
+  DataOf(rods.scene).bodies[0].mass = mass;
   rods.scene.channel("y", Measure::displacement(rods.tip[bodies - 1], 1), "m");
   rods.scene.channel("angle", Measure::angle(rods.tip[0], rods.scene.marker(rods.scene.ground())), "rad");
   rods.scene.shape(rods.body[0], Shape::box({0.5, 0.1, 0.1}));

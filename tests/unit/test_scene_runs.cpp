@@ -53,13 +53,43 @@ TEST(SceneRuns, ASecondTSIsASecondRun)
   EXPECT_EQ(end[0], end[1]);
 }
 
-TEST(SceneRuns, AnEndedTSSaysSo)
+/* Step by step in turns, the same digits as one after the other */
+TEST(SceneRuns, SideBySide)
 {
-  Winder    w;
-  SceneRun  first(w.scene, 1, tolerance(1e-6)), second(w.scene, 1, tolerance(1e-6));
-  ErrorTrap trap;
-  expectError(first.solve(), trap, "this TS ended when Scene::createTS() made another one");
-  must(second.solve());
+  Winder   w;
+  SceneRun alone(w.scene, 3, tolerance(1e-6));
+  must(alone.solve());
+  SceneRun first(w.scene, 3, tolerance(1e-6)), second(w.scene, 3, tolerance(1e-6));
+  for (SceneRun *run : {&first, &second}) must(TSSetMaxSteps(run->ts, 0));
+  PetscInt steps;
+  must(TSGetStepNumber(alone.ts, &steps));
+  for (PetscInt k = 1; k <= steps; k++)
+    for (SceneRun *run : {&first, &second}) {
+      must(TSSetMaxSteps(run->ts, k));
+      must(run->solve());
+    }
+  EXPECT_EQ(solution(first.ts), solution(alone.ts));
+  EXPECT_EQ(solution(second.ts), solution(alone.ts));
+}
+
+/* A run owns what it needs of the scene */
+TEST(SceneRuns, OutlivesItsScene)
+{
+  TS    ts;
+  Array end;
+  {
+    Winder w;
+    must(w.scene.createTS(&ts));
+    SceneRun run(w.scene, 1, tolerance(1e-6));
+    must(run.solve());
+    end = solution(run.ts);
+  }
+  must(TSSetMaxTime(ts, 1));
+  Options in(tolerance(1e-6));
+  must(TSSetFromOptions(ts));
+  must(TSSolve(ts, nullptr));
+  EXPECT_EQ(solution(ts), end);
+  must(TSDestroy(&ts));
 }
 
 TEST(SceneRuns, TheSameTSDoesNotStartAgain)
@@ -84,10 +114,11 @@ TEST(SceneRuns, SolveNeedsATSOfTheScene)
   ErrorTrap trap;
   Array     values;
   must(a.scene.createTS(&ts));
-  expectError(b.scene.solve(ts), trap, "Scene::solve(): the scene has no TS yet");
-  expectError(b.scene.sample(ts, 0, values), trap, "Scene::sample(): the scene has no TS yet");
-  SceneRun run(b.scene, 1, "");
-  expectError(b.scene.solve(ts), trap, "not of this scene");
+  expectError(b.scene.solve(ts), trap, "Scene::solve(): the TS is not of this scene");
+  expectError(b.scene.sample(ts, 0, values), trap, "Scene::sample(): the TS is not of this scene");
+  must(TSDestroy(&ts));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  expectError(a.scene.solve(ts), trap, "not of this scene");
   must(TSDestroy(&ts));
 }
 

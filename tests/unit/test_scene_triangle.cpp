@@ -32,7 +32,7 @@ struct BeamScene {
     scene.gravity({0.3, 0, -9.81});
     must(fe.add(scene, "beam", model, b));
     const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
-    const auto   l = scene.data().frame(left), r = scene.data().frame(right);
+    const auto   l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
     scene.add("clamp", Fixed{left, scene.marker(scene.ground(), l.x, l.R)});
     PointMass load;
     load.mass     = 3;

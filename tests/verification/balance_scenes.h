@@ -61,7 +61,7 @@ template <class Joint> BalanceCase JointCase(const std::string &name, bool plana
             const Marker  j = s.at(s.a, x, 0.5),
                          i  = s.scene->markerAt(
                               s.b, s.planar ? Vector3(0.6, 0.2, 0) : x,
-                              Matrix3(s.scene->data().frame(j).R * Eigen::AngleAxisd(bend, Vector3::UnitX())));
+                              Matrix3(DataOf(*s.scene).frame(j).R * Eigen::AngleAxisd(bend, Vector3::UnitX())));
             s.add(Joint{i, j});
             s.add(SpringDamper{s.at(s.b, {1.4, 0.5, 0.4}), s.at(s.scene->ground(), {2, 2, 1}), 40, 1.5});
           }};
@@ -111,7 +111,7 @@ inline std::vector<BalanceCase> JointCases()
                  }});
   all.push_back({"motions", false, [](BalanceScene &s) {
                    const Marker i = s.at(s.b, {0.6, 0.2, 0.1}, 0.5),
-                                j = s.scene->markerAt(s.a, {0.6, 0.2, 0.1}, s.scene->data().frame(i).R);
+                                j = s.scene->markerAt(s.a, {0.6, 0.2, 0.1}, DataOf(*s.scene).frame(i).R);
                    s.add(Cylindrical{i, j});
                    s.add(RotationalMotion{i, j, TimeFunction::harmonic(0.5, 3)});
                    s.add(TranslationalMotion{i, j, TimeFunction::harmonic(0.2, 4), MotionOf::Velocity});
@@ -136,7 +136,7 @@ inline std::vector<BalanceCase> JointCases()
                      const auto on = [&](Body k, const Vector3 &x) {
                        const Marker i = s.at(k, x, 0.3);
                        return std::make_pair(
-                           i, s.scene->markerAt(s.a, s.scene->data().frame(i).x, s.scene->data().frame(i).R));
+                           i, s.scene->markerAt(s.a, DataOf(*s.scene).frame(i).x, DataOf(*s.scene).frame(i).R));
                      };
                      s.add(Revolute{s.at(s.a, {0.2, 0.1, 0}), s.at(s.scene->ground(), {0.2, 0.1, 0})});
                      const auto p = on(s.b, {1.1, 0.2, 0.1}), q = on(c, {-0.5, 0.3, 0}), t = on(d, {0.4, -0.8, 0.1});
@@ -212,7 +212,7 @@ inline std::vector<BalanceCase> ForceCases()
     add("torsional springs" + as, [state](BalanceScene &s) {
       const Marker i = s.at(s.b, {0.6, 0.2, 0.1}, 0.4),
                    j = s.scene->markerAt(s.a, s.planar ? Vector3(0.6, 0.2, 0) : Vector3(0.6, 0.2, 0.1),
-                                         s.scene->data().frame(i).R);
+                                         DataOf(*s.scene).frame(i).R);
       s.add(Revolute{i, j});
       s.add(TorsionalSpringDamper{i, j, 5, 0.3, 0.5, 1, state});
       s.add(NonlinearTorsionalSpring{i, j, [](const Real &x, const Real &v) -> Real { return -2. * sin(x) - 0.1 * v; },
@@ -266,7 +266,7 @@ inline std::vector<BalanceCase> ForceCases()
     const Body    c     = s.body("c", {1.9, 0.6, s.planar ? 0 : 0.1}, 0.2);
     const auto    joint = [&](Body i, Body j, const Vector3 &at) {
       const Marker m = s.at(i, at, 0.4);
-      return std::make_pair(m, s.scene->markerAt(j, s.scene->data().frame(m).x, s.scene->data().frame(m).R));
+      return std::make_pair(m, s.scene->markerAt(j, DataOf(*s.scene).frame(m).x, DataOf(*s.scene).frame(m).R));
     };
     const auto    r = joint(s.b, s.a, x), t = joint(c, s.b, y);
     const Element pin = s.add(Revolute{r.first, r.second}), slide = s.add(Translational{t.first, t.second});
@@ -314,7 +314,7 @@ inline std::vector<BalanceCase> PotentialCases()
                    }});
     all.push_back({"torsional spring" + in, plane, [](BalanceScene &s) {
                      const Marker i = s.at(s.b, {0.6, 0.2, 0.1}, 0.4);
-                     const Marker j = s.scene->markerAt(s.a, s.scene->data().frame(i).x, s.scene->data().frame(i).R);
+                     const Marker j = s.scene->markerAt(s.a, DataOf(*s.scene).frame(i).x, DataOf(*s.scene).frame(i).R);
                      s.add(Revolute{i, j});
                      s.add(TorsionalSpringDamper{i, j, 5, 0, 0.5, 1});
                    }});

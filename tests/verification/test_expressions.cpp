@@ -29,9 +29,9 @@ public:
   }
   ~SceneRun() { TSDestroy(&ts); }
   SceneRun(const SceneRun &) = delete;
-  double operator()(Variable v) const { return u[s_.data().run->number.variable[v.id]]; }
-  double operator()(State x) const { return u[s_.data().run->number.state[x.id]]; }
-  double position(Body b, int c) const { return u[s_.data().run->number.body[b.id] + c]; }
+  double operator()(Variable v) const { return u[ModelOf(s_).number.variable[v.id]]; }
+  double operator()(State x) const { return u[ModelOf(s_).number.state[x.id]]; }
+  double position(Body b, int c) const { return u[ModelOf(s_).number.body[b.id] + c]; }
 
   Array u;
 
@@ -155,7 +155,7 @@ TEST(Expressions, ReactionsOfACantilever)
   const Body   beam       = s.add("beam", b);
   const Marker root       = s.marker(beam, {-length, 0, 0}),
                wall       = s.marker(s.ground(), {0, 0, 0}, Eigen::AngleAxisd(.4, Vector3::UnitY()).toRotationMatrix());
-  const Matrix3         R = s.data().markers[wall.id].R;
+  const Matrix3         R = DataOf(s).markers[wall.id].R;
   const Element         clamp = s.add("clamp", Fixed{root, s.marker(s.ground())});
   std::vector<Variable> f, m, g;
   for (int c = 0; c < 3; c++) {

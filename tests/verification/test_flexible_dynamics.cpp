@@ -2,7 +2,7 @@
 #include "flexcrank_model.h"
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -67,8 +67,8 @@ TEST(FlexibleDynamics, WithoutModesIsTheRigidBody)
       pivot           = scene.marker(body, c.X[0]);
       far             = scene.marker(body, c.X[1]);
     }
-    const Vector3 at = scene.data().frame(pivot).x;
-    for (auto &b : scene.data().bodies) b.v = b.w.cross(b.r - at); /* turns about the pivot */
+    const Vector3 at = DataOf(scene).frame(pivot).x;
+    for (auto &b : DataOf(scene).bodies) b.v = b.w.cross(b.r - at); /* turns about the pivot */
     scene.add("ball", Spherical{pivot, scene.marker(scene.ground(), at)});
     for (int k = 0; k < 3; k++) scene.channel(std::string(1, "xyz"[k]), Measure::displacement(far, k));
     SceneRun run(scene, 1, fixed(1e-3) + " -ts_hhtdae_corrector_tolerance 1e-9 ");

@@ -115,7 +115,7 @@ void balance(const std::vector<BalanceCase> &cases)
     c.make(s);
     const Judged j = balances(c.name, *s.scene, s.specs, 0.5);
     for (std::size_t e = 0; e < j.acted.size(); e++)
-      EXPECT_GT(j.acted[e], 1e-3) << s.scene->data().elements[e].type << " of " << c.name << " does not act";
+      EXPECT_GT(j.acted[e], 1e-3) << DataOf(*s.scene).elements[e].type << " of " << c.name << " does not act";
   }
 }
 
@@ -190,7 +190,7 @@ TEST(NewtonEuler, OfTheQuarterCar)
   for (bool torus : {false, true}) {
     hhtex::QuarterCar car(p, torus, PETSC_COMM_SELF);
     Specs             specs;
-    const auto       &all = car.scene.data().elements;
+    const auto       &all = DataOf(car.scene).elements;
     for (std::size_t e = 0; e < all.size(); e++) {
       if (torus && all[e].name == "tire")
         specs.keep(Element{(PetscInt)e}, TorusPlane{all[e].i, all[e].j, car.radius - 0.1, 0.1, {}});

@@ -20,7 +20,7 @@ std::string complaint(Scene &s)
 
 #define SAYS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
-const hhtdae::BodyData &body(const Scene &s, Body b) { return s.data().bodies[b.id]; }
+const hhtdae::BodyData &body(const Scene &s, Body b) { return DataOf(s).bodies[b.id]; }
 Vector3 pointOf(const Scene &s, Body b, const Vector3 &in_body) { return body(s, b).r + body(s, b).A * in_body; }
 double  angleOf(const Scene &s, Body b) { return std::atan2(body(s, b).A(1, 0), body(s, b).A(0, 0)); }
 
@@ -61,7 +61,7 @@ TEST(SceneAssembly, ASmallMisfitPasses)
   const Body arm = s.add("arm", rod({0, 0, 0}, {1, 0, 0}));
   s.add("hinge", hhtdae::Revolute{s.marker(arm, {-0.5 + 1e-8, 0, 0}), s.marker(s.ground())});
   EXPECT_EQ(complaint(s), "");
-  EXPECT_NEAR(s.data().started.misfit, 2e-8, 1e-10); /* of the size, half a metre */
+  EXPECT_NEAR(DataOf(s).started.misfit, 2e-8, 1e-10); /* of the size, half a metre */
 }
 
 TEST(SceneAssembly, OffLetsEverythingPass)
@@ -141,8 +141,8 @@ TEST(SceneAssembly, AWronglyGivenFourBar)
     const Eigen::Vector2d turn = A.inverse() * (w * Eigen::Vector2d(-m.B(1), m.B(0)));
     EXPECT_NEAR(body(s, f.rocker).w(2), turn(0), 1e-8);
     EXPECT_NEAR(body(s, f.coupler).w(2), turn(1), 1e-8);
-    MEASURED("four-bar thrown off by %.2g assembled in %d iterations", s.data().started.moved,
-             (int)s.data().started.assembly_iterations);
+    MEASURED("four-bar thrown off by %.2g assembled in %d iterations", DataOf(s).started.moved,
+             (int)DataOf(s).started.assembly_iterations);
   }
 }
 
@@ -156,7 +156,7 @@ TEST(SceneAssembly, LargeTurns)
   s.start().assembly = Assembly::Project;
   ASSERT_EQ(s.setUp(), 0);
   EXPECT_NEAR((body(s, box).A - Matrix3::Identity()).norm(), 0, 1e-9);
-  EXPECT_NEAR(s.data().started.turned, 0.8, 1e-9);
+  EXPECT_NEAR(DataOf(s).started.turned, 0.8, 1e-9);
 }
 
 TEST(SceneAssembly, MotionsGiveVelocities)
@@ -221,9 +221,9 @@ TEST(SceneRedundant, TreesCostNothing)
     last = next;
   }
   ASSERT_EQ(s.setUp(), 0);
-  EXPECT_EQ(s.data().started.core, 0);
-  EXPECT_EQ(s.data().started.redundant, 0);
-  EXPECT_EQ(s.data().started.degreesOfFreedom(), 2000);
+  EXPECT_EQ(DataOf(s).started.core, 0);
+  EXPECT_EQ(DataOf(s).started.redundant, 0);
+  EXPECT_EQ(DataOf(s).started.degreesOfFreedom(), 2000);
 }
 
 TEST(SceneRedundant, APlanarFourBarOfSpatialHinges)
@@ -233,7 +233,7 @@ TEST(SceneRedundant, APlanarFourBarOfSpatialHinges)
   f.build(s);
   Printed printed;
   ASSERT_EQ(s.setUp(), 0);
-  const hhtdae::StartResult &r = s.data().started;
+  const hhtdae::StartResult &r = DataOf(s).started;
   EXPECT_EQ(r.coordinates, 18);
   EXPECT_EQ(r.rows, 20);
   EXPECT_EQ(r.redundant, 3);
@@ -256,7 +256,7 @@ TEST(SceneRedundant, TheMotionIsThatOfTheMinimalMechanism)
     s.gravity({0, -9.81, 0});
     Printed        quiet;
     const Array    u           = run(s, 0.5, options);
-    const PetscInt first       = s.data().run->number.body[f.rocker.id];
+    const PetscInt first       = ModelOf(s).number.body[f.rocker.id];
     x[space == Space::Spatial] = u[first];
     y[space == Space::Spatial] = u[first + 1];
   }
@@ -271,17 +271,18 @@ TEST(SceneRedundant, Bricard)
   Printed     printed;
   Array       v;
   const Array u = run(s, 1, "-ts_rtol 1e-7 -ts_atol 1e-7", &v);
-  EXPECT_EQ(s.data().started.rows, 30);
-  EXPECT_EQ(s.data().started.redundant, 1);
-  EXPECT_EQ(s.data().started.degreesOfFreedom(), 1);
-  hhtdae::Runtime &R = *s.data().run;
+  EXPECT_EQ(DataOf(s).started.rows, 30);
+  EXPECT_EQ(DataOf(s).started.redundant, 1);
+  EXPECT_EQ(DataOf(s).started.degreesOfFreedom(), 1);
+  const auto       run_ = layOut(s);
+  hhtdae::Runtime &R    = *run_;
   R.bodies.move(u.data(), v.data());
   double energy = 0, start = 0;
   for (PetscInt b = 0; b < 5; b++) {
     const hhtdae::BodyMotion &m = R.bodies.now[b];
     const Vector3             w = m.A.transpose() * m.w;
-    energy += 0.5 * m.v.squaredNorm() + 0.5 * w.dot(s.data().bodies[b].inertia * w) + 9.81 * m.r(1);
-    start += 9.81 * s.data().bodies[b].r(1);
+    energy += 0.5 * m.v.squaredNorm() + 0.5 * w.dot(DataOf(s).bodies[b].inertia * w) + 9.81 * m.r(1);
+    start += 9.81 * DataOf(s).bodies[b].r(1);
   }
   /* the last hinge, whose row was dropped or not */
   const Vector3 end = R.bodies.now[4].r + R.bodies.now[4].A * Vector3(0.5, 0, 0);
@@ -309,7 +310,7 @@ TEST(SceneRedundant, RefusedOrKept)
   f.build(s);
   s.start().redundant = Redundant::Keep;
   ASSERT_EQ(s.setUp(), 0);
-  EXPECT_EQ(s.data().run->n, 18 + 20);
+  EXPECT_EQ(ModelOf(s).n, 18 + 20);
 }
 
 /* Links in one line: a row is dependent there and nowhere else */
@@ -324,7 +325,7 @@ TEST(SceneRedundant, ASingularStartDropsNothing)
   pin(s, "D", c, s.ground(), {3, 0, 0});
   Printed printed;
   ASSERT_EQ(s.setUp(), 0);
-  EXPECT_EQ(s.data().started.redundant, 0);
+  EXPECT_EQ(DataOf(s).started.redundant, 0);
   EXPECT_TRUE(printed.says("singular position: 1 constraints are redundant there and 0 next to it")) << printed.text();
 }
 
@@ -339,8 +340,8 @@ TEST(SceneRedundant, NoDegreesOfFreedom)
   s.add("again", hhtdae::RotationalMotion{i, j, 0.0});
   Printed quiet;
   ASSERT_EQ(s.setUp(), 0);
-  EXPECT_EQ(s.data().started.degreesOfFreedom(), 0);
-  EXPECT_EQ(s.data().started.redundant, 1);
+  EXPECT_EQ(DataOf(s).started.degreesOfFreedom(), 0);
+  EXPECT_EQ(DataOf(s).started.redundant, 1);
 }
 
 TEST(SceneRedundant, ANetOfLoops)
@@ -352,7 +353,7 @@ TEST(SceneRedundant, ANetOfLoops)
     const auto begin = std::chrono::steady_clock::now();
     ASSERT_EQ(s.setUp(), 0);
     const double               time   = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    const hhtdae::StartResult &r      = s.data().started;
+    const hhtdae::StartResult &r      = DataOf(s).started;
     const int                  bodies = 2 * n * (n - 1), hinges = 2 * bodies - n * n + 1, loops = hinges - bodies;
     EXPECT_EQ(r.rows, 5 * hinges);
     EXPECT_EQ(r.redundant, 3 * loops);
@@ -377,7 +378,7 @@ TEST(SceneEquilibrium, AMassOnASpring)
   EXPECT_NEAR(body(s, b).r(2), -(L + m * g / k), 1e-8);
   EXPECT_NEAR(body(s, b).r.head<2>().norm(), 0, 1e-7);
   EXPECT_EQ(body(s, b).v, Vector3(0, 0, 0));
-  MEASURED("mass on a spring: %d steps to equilibrium", (int)s.data().started.equilibrium_iterations);
+  MEASURED("mass on a spring: %d steps to equilibrium", (int)DataOf(s).started.equilibrium_iterations);
 }
 
 /* A box hung by a spring off its centre of mass: spring, marker and centre of mass come to lie in one vertical line */
@@ -416,7 +417,7 @@ TEST(SceneEquilibrium, APendulumFromAnywhere)
     s.start().equilibrium = true;
     ASSERT_EQ(s.setUp(), 0);
     EXPECT_NEAR((body(s, arm).r - Vector3(0, -0.5, 0)).norm(), 0, 1e-8);
-    MEASURED("pendulum from above: %d steps", (int)s.data().started.equilibrium_iterations);
+    MEASURED("pendulum from above: %d steps", (int)DataOf(s).started.equilibrium_iterations);
   }
 }
 

@@ -47,7 +47,7 @@ void CheckPlacement(ElementBuilder &e, const Beam &s)
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const Beam &s)
+template <> Element Scene::enter(const std::string &name, const Beam &s)
 {
   ElementBuilder e(*this, name, "beam", ElementData::Force, s.i, s.j);
   double         length = s.length;

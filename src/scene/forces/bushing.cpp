@@ -19,7 +19,7 @@ void CheckRotation(ElementBuilder &e, const Bushing &s)
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const Bushing &s)
+template <> Element Scene::enter(const std::string &name, const Bushing &s)
 {
   ElementBuilder e(*this, name, "bushing", ElementData::Force, s.i, s.j);
   RequireNotNegative(e, "stiffness", s.stiffness);

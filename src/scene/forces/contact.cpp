@@ -38,7 +38,7 @@ int PlaneNormal(const ElementBuilder &e) { return e.planar() ? 1 : 2; }
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const SpherePlane &s)
+template <> Element Scene::enter(const std::string &name, const SpherePlane &s)
 {
   ElementBuilder e = Entry(*this, name, "sphere-plane contact", s.i, s.j);
   RequirePositive(e, "radius", s.radius);
@@ -47,7 +47,7 @@ template <> Element Scene::add(const std::string &name, const SpherePlane &s)
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const EllipsoidPlane &s)
+template <> Element Scene::enter(const std::string &name, const EllipsoidPlane &s)
 {
   ElementBuilder e = Entry(*this, name, "ellipsoid-plane contact", s.i, s.j);
   for (int k = 0; k < 3; k++) RequirePositive(e, Component("semiaxis", k), s.semiaxes(k));
@@ -56,7 +56,7 @@ template <> Element Scene::add(const std::string &name, const EllipsoidPlane &s)
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const TorusPlane &s)
+template <> Element Scene::enter(const std::string &name, const TorusPlane &s)
 {
   ElementBuilder e = Entry(*this, name, "torus-plane contact", s.i, s.j);
   e.require(!e.planar(), "a planar scene has no torus; a wheel is a SpherePlane with the outer radius");
@@ -67,7 +67,7 @@ template <> Element Scene::add(const std::string &name, const TorusPlane &s)
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const SphereSphere &s)
+template <> Element Scene::enter(const std::string &name, const SphereSphere &s)
 {
   ElementBuilder e = Entry(*this, name, "sphere-sphere contact", s.i, s.j);
   RequirePositive(e, "radius of i", s.radius_i);
@@ -77,7 +77,7 @@ template <> Element Scene::add(const std::string &name, const SphereSphere &s)
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const SphereBox &s)
+template <> Element Scene::enter(const std::string &name, const SphereBox &s)
 {
   ElementBuilder e = Entry(*this, name, "sphere-box contact", s.i, s.j);
   RequirePositive(e, "radius", s.radius);

@@ -29,10 +29,10 @@ void Check(ElementBuilder &e, const JointFriction &s, Marker i, Marker j, bool t
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const JointFriction &s)
+template <> Element Scene::enter(const std::string &name, const JointFriction &s)
 {
-  const auto       &all   = data_->elements;
-  const bool        known = data_->valid(s.joint);
+  const auto       &all   = data().elements;
+  const bool        known = data().valid(s.joint);
   const Marker      i = known ? all[s.joint.id].i : Marker{}, j = known ? all[s.joint.id].j : Marker{};
   const std::string type = known ? all[s.joint.id].type : "", joint = known ? all[s.joint.id].name : "";
   ElementBuilder    e(*this, name, "joint friction", ElementData::Force, i, j);

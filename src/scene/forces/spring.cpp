@@ -32,7 +32,7 @@ void CheckTension(ElementBuilder &e, const Curve &tension, double length, double
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const SpringDamper &s)
+template <> Element Scene::enter(const std::string &name, const SpringDamper &s)
 {
   ElementBuilder e(*this, name, "spring-damper", ElementData::Force, s.i, s.j);
   double         length = s.length;
@@ -54,7 +54,7 @@ template <> Element Scene::add(const std::string &name, const SpringDamper &s)
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const NonlinearSpring &s)
+template <> Element Scene::enter(const std::string &name, const NonlinearSpring &s)
 {
   ElementBuilder e(*this, name, "nonlinear spring", ElementData::Force, s.i, s.j);
   e.require((bool)s.tension, "it has no tension; give a function of length and rate");

@@ -31,7 +31,7 @@ void CheckMoment(ElementBuilder &e, const Curve &moment, double angle, double ra
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const TorsionalSpringDamper &s)
+template <> Element Scene::enter(const std::string &name, const TorsionalSpringDamper &s)
 {
   ElementBuilder e(*this, name, "torsional spring-damper", ElementData::Force, s.i, s.j);
   double         start = 0;
@@ -48,7 +48,7 @@ template <> Element Scene::add(const std::string &name, const TorsionalSpringDam
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const NonlinearTorsionalSpring &s)
+template <> Element Scene::enter(const std::string &name, const NonlinearTorsionalSpring &s)
 {
   ElementBuilder e(*this, name, "nonlinear torsional spring", ElementData::Force, s.i, s.j);
   double         start = 0;

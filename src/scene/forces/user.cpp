@@ -104,6 +104,12 @@ public:
       x += f.arguments.memory();
     }
   }
+  bool memoryOf(const StoreBase *s, PetscInt number, double *x) const override
+  {
+    const PetscInt i = this->of.find(s, number);
+    if (i >= 0) const_cast<LocalFunction &>(functions[i]).arguments.copyMemory(x, false);
+    return i >= 0;
+  }
 
 private:
   LocalFunction::Gradient G_; /* of the components */
@@ -135,20 +141,30 @@ private:
   }
 };
 
-/* Values of the components, for measures */
-class UserProbe : public Probe
+/* Values of the components, for measures, and the loads that they stand for */
+template <class K> class UserProbe : public Probe
 {
 public:
-  UserProbe(LocalFunction f) : f_(std::move(f)) {}
-  int      markers() const override { return 0; }
-  PetscInt marker(int) const override { return -1; }
+  UserProbe(const ForceInstance<K> &i, LocalFunction f) : e_(i), f_(std::move(f)) {}
+  int      markers() const override { return K::markers; }
+  PetscInt marker(int k) const override { return e_.marker[k]; }
+  void     loads(const Evaluation &ev, Wrench<double> *on) const override
+  {
+    Frame<double> f[K::markers];
+    double        c[K::count];
+    for (int k = 0; k < K::markers; k++) f[k] = ev.bodies.template frame<true>(e_.marker[k]);
+    if (e_.state >= 0) std::copy(ev.u + e_.state, ev.u + e_.state + K::count, c);
+    else f_.value(ev, c);
+    K::template apply<double>(e_.data, f, c, on);
+  }
   void     components(const Evaluation &e, double *c) const override { f_.value(e, c); }
   void     accept(const Bodies &B) override { f_.arguments.accept(B); }
   PetscInt memory() const override { return f_.arguments.memory(); }
   void     copyMemory(double *x, bool in) override { f_.arguments.copyMemory(x, in); }
 
 private:
-  LocalFunction f_;
+  ForceInstance<K> e_;
+  LocalFunction    f_;
 };
 
 template <class K> class UserStore : public StoreBase
@@ -171,12 +187,13 @@ public:
 
   const std::vector<Expression> *expressions(PetscInt e) const override { return &all[e].expressions; }
 
-  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) override
+  void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
     auto eliminated    = std::make_unique<UserBatch<K>>();
     auto loads         = std::make_unique<ForceBatch<K>>(); /* of force states */
     auto rows          = std::make_unique<ExpressionBatch>(*l.bodies);
     eliminated->bodies = loads->bodies = l.bodies;
+    eliminated->of.store               = this;
     for (PetscInt e = 0; e < size(); e++) {
       if (!l.needed(*this, e)) continue;
       ForceInstance<K> i;
@@ -185,11 +202,12 @@ public:
       if (!all[e].carried) {
         eliminated->all.push_back(i);
         eliminated->functions.push_back(function(l, e));
+        eliminated->of.add(e);
         continue;
       }
       for (int c = 0; c < K::count; c++) i.input[c] = l.input({ScalarRef::ForceState, all[e].element, c});
       loads->all.push_back(i);
-      if (OwnerOf(*l.run, *this, e) == l.run->rank)
+      if (OwnerOf(*l.run->model, *this, e) == l.run->rank)
         rows->add(ExpressionBatch::Definition, function(l, e), l.local(start[e]), l.group(start[e], K::count));
     }
     if (!eliminated->all.empty()) batches.push_back(std::move(eliminated));
@@ -199,7 +217,11 @@ public:
 
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
   {
-    return std::make_unique<UserProbe>(function(l, e));
+    ForceInstance<K> i;
+    for (int k = 0; k < K::markers; k++) i.marker[k] = l.marker(all[e].marker[k]);
+    i.data = all[e].data;
+    if (all[e].carried) i.state = l.local(start[e]);
+    return std::make_unique<UserProbe<K>>(i, function(l, e));
   }
 
 private:
@@ -227,7 +249,7 @@ void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename
 } // namespace
 
 /* Components as measures and force states: forces first, then moments. */
-template <> Element Scene::add(const std::string &name, const UserForce &s)
+template <> Element Scene::enter(const std::string &name, const UserForce &s)
 {
   /* the builder wants two markers; a force without reaction has one */
   const bool     reaction = s.j.id != -1, framed = s.frame.id != -1;
@@ -255,7 +277,7 @@ template <> Element Scene::add(const std::string &name, const UserForce &s)
 }
 
 /* The one component is the force, or the moment on i's body. */
-template <> Element Scene::add(const std::string &name, const UserScalarForce &s)
+template <> Element Scene::enter(const std::string &name, const UserScalarForce &s)
 {
   ElementBuilder e(*this, name, s.rotational ? "user scalar moment" : "user scalar force", ElementData::Force, s.i,
                    s.j);

@@ -66,7 +66,7 @@ Element Couple(ElementBuilder &e, Terms terms)
 } // namespace
 
 /* Multiplier: moment on the first wheel's body about its z_j; on the second it is ratio times that. */
-template <> Element Scene::add(const std::string &name, const Gear &s)
+template <> Element Scene::enter(const std::string &name, const Gear &s)
 {
   ElementBuilder e(*this, name, "gear", ElementData::Joint, s.i1, s.j1);
   e.require(std::isfinite(s.ratio) && s.ratio != 0, "ratio is " + Text(s.ratio) + ", must be finite and not zero");
@@ -75,7 +75,7 @@ template <> Element Scene::add(const std::string &name, const Gear &s)
 }
 
 /* Multiplier: force on the rack's body; the moment on the pinion's is -radius times that. */
-template <> Element Scene::add(const std::string &name, const RackAndPinion &s)
+template <> Element Scene::enter(const std::string &name, const RackAndPinion &s)
 {
   ElementBuilder e(*this, name, "rack and pinion", ElementData::Joint, s.i1, s.j1);
   e.require(std::isfinite(s.radius) && s.radius != 0, "radius is " + Text(s.radius) + ", must be finite and not zero");
@@ -84,7 +84,7 @@ template <> Element Scene::add(const std::string &name, const RackAndPinion &s)
 }
 
 /* Multiplier: the load on the k-th joint over its factor. */
-template <> Element Scene::add(const std::string &name, const Coupler &s)
+template <> Element Scene::enter(const std::string &name, const Coupler &s)
 {
   const bool     some = !s.terms.empty();
   ElementBuilder e(*this, name, "coupler", ElementData::Joint, some ? s.terms[0].i : Marker{},

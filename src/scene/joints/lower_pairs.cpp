@@ -12,7 +12,7 @@ namespace hhtdae
 {
 
 /* Force in space axes. */
-template <> Element Scene::add(const std::string &name, const Spherical &s)
+template <> Element Scene::enter(const std::string &name, const Spherical &s)
 {
   JointBuilder e(*this, name, "spherical", s.i, s.j);
   e.spatialOnly();
@@ -21,7 +21,7 @@ template <> Element Scene::add(const std::string &name, const Spherical &s)
 }
 
 /* Force in space axes; moment about j's x and y axes. */
-template <> Element Scene::add(const std::string &name, const Revolute &s)
+template <> Element Scene::enter(const std::string &name, const Revolute &s)
 {
   JointBuilder e(*this, name, "revolute", s.i, s.j);
   if (e.planar()) {
@@ -34,7 +34,7 @@ template <> Element Scene::add(const std::string &name, const Revolute &s)
 }
 
 /* Force in space axes; moment about z_j x z_i. */
-template <> Element Scene::add(const std::string &name, const Universal &s)
+template <> Element Scene::enter(const std::string &name, const Universal &s)
 {
   JointBuilder e(*this, name, "universal", s.i, s.j);
   e.spatialOnly();
@@ -45,7 +45,7 @@ template <> Element Scene::add(const std::string &name, const Universal &s)
 
 /* Force in space axes; moment, see convel.h. The z axes may point the same way or away from each other; the start
  * decides. */
-template <> Element Scene::add(const std::string &name, const ConstantVelocity &s)
+template <> Element Scene::enter(const std::string &name, const ConstantVelocity &s)
 {
   JointBuilder e(*this, name, "constant velocity", s.i, s.j);
   e.spatialOnly();
@@ -58,7 +58,7 @@ template <> Element Scene::add(const std::string &name, const ConstantVelocity &
 }
 
 /* Force along j's x and y axes, moment about j's axes. Planar: force along y_j, moment about z. */
-template <> Element Scene::add(const std::string &name, const Translational &s)
+template <> Element Scene::enter(const std::string &name, const Translational &s)
 {
   JointBuilder e(*this, name, "translational", s.i, s.j);
   if (e.planar()) {
@@ -72,7 +72,7 @@ template <> Element Scene::add(const std::string &name, const Translational &s)
 }
 
 /* Force along j's x and y axes, moment about them. */
-template <> Element Scene::add(const std::string &name, const Cylindrical &s)
+template <> Element Scene::enter(const std::string &name, const Cylindrical &s)
 {
   JointBuilder e(*this, name, "cylindrical", s.i, s.j);
   e.spatialOnly();
@@ -82,7 +82,7 @@ template <> Element Scene::add(const std::string &name, const Cylindrical &s)
 }
 
 /* Force along z_j, moment about j's x and y axes. */
-template <> Element Scene::add(const std::string &name, const Planar &s)
+template <> Element Scene::enter(const std::string &name, const Planar &s)
 {
   JointBuilder e(*this, name, "planar", s.i, s.j);
   e.spatialOnly();
@@ -92,7 +92,7 @@ template <> Element Scene::add(const std::string &name, const Planar &s)
 }
 
 /* Force in space axes, moment about j's axes. Planar: force along x and y, moment about z. */
-template <> Element Scene::add(const std::string &name, const Fixed &s)
+template <> Element Scene::enter(const std::string &name, const Fixed &s)
 {
   JointBuilder e(*this, name, "fixed", s.i, s.j);
   if (e.planar()) {

@@ -63,13 +63,13 @@ template <bool Rack, class Spec> Element Mesh(ElementBuilder &e, const Spec &s)
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const GearMesh &s)
+template <> Element Scene::enter(const std::string &name, const GearMesh &s)
 {
   ElementBuilder e(*this, name, "gear mesh", ElementData::Joint, s.i1, s.j1);
   return Mesh<false>(e, s);
 }
 
-template <> Element Scene::add(const std::string &name, const RackMesh &s)
+template <> Element Scene::enter(const std::string &name, const RackMesh &s)
 {
   ElementBuilder e(*this, name, "rack mesh", ElementData::Joint, s.i1, s.j1);
   return Mesh<true>(e, s);

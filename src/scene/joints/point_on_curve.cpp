@@ -21,7 +21,7 @@ template <int R> void Enter(JointBuilder &e, std::shared_ptr<const Curve> curve)
 
 /* Forces on i's body along the two normals of the curve; planar: along z x tangent, with the tangent in the direction
  * of the points */
-template <> Element Scene::add(const std::string &name, const PointOnCurve &s)
+template <> Element Scene::enter(const std::string &name, const PointOnCurve &s)
 {
   JointBuilder e(*this, name, "point on curve", s.i, s.j);
   auto         curve = std::make_shared<const Curve>(s.points, s.closed, e.planar());

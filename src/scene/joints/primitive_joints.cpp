@@ -7,7 +7,7 @@ namespace hhtdae
 {
 
 /* Force on i's body along j's x and y axes. */
-template <> Element Scene::add(const std::string &name, const InLine &s)
+template <> Element Scene::enter(const std::string &name, const InLine &s)
 {
   JointBuilder e(*this, name, "in-line", s.i, s.j);
   e.spatialOnly();
@@ -16,7 +16,7 @@ template <> Element Scene::add(const std::string &name, const InLine &s)
 }
 
 /* Force on i's body along z_j. */
-template <> Element Scene::add(const std::string &name, const InPlane &s)
+template <> Element Scene::enter(const std::string &name, const InPlane &s)
 {
   JointBuilder e(*this, name, "in-plane", s.i, s.j);
   e.spatialOnly();
@@ -25,7 +25,7 @@ template <> Element Scene::add(const std::string &name, const InPlane &s)
 }
 
 /* Moment on i's body about j's x and y axes. */
-template <> Element Scene::add(const std::string &name, const ParallelAxes &s)
+template <> Element Scene::enter(const std::string &name, const ParallelAxes &s)
 {
   JointBuilder e(*this, name, "parallel axes", s.i, s.j);
   e.spatialOnly();
@@ -34,7 +34,7 @@ template <> Element Scene::add(const std::string &name, const ParallelAxes &s)
 }
 
 /* Moment on i's body about z_j x z_i. */
-template <> Element Scene::add(const std::string &name, const Perpendicular &s)
+template <> Element Scene::enter(const std::string &name, const Perpendicular &s)
 {
   JointBuilder e(*this, name, "perpendicular", s.i, s.j);
   e.spatialOnly();
@@ -43,7 +43,7 @@ template <> Element Scene::add(const std::string &name, const Perpendicular &s)
 }
 
 /* Moment on i's body about j's axes. */
-template <> Element Scene::add(const std::string &name, const Orientation &s)
+template <> Element Scene::enter(const std::string &name, const Orientation &s)
 {
   JointBuilder e(*this, name, "orientation", s.i, s.j);
   e.spatialOnly();
@@ -52,7 +52,7 @@ template <> Element Scene::add(const std::string &name, const Orientation &s)
 }
 
 /* Tension. Where the markers meet the link has no direction. */
-template <> Element Scene::add(const std::string &name, const PointDistance &s)
+template <> Element Scene::enter(const std::string &name, const PointDistance &s)
 {
   JointBuilder e(*this, name, "point distance", s.i, s.j);
   if (!(s.length < 0)) e.positive("length", s.length);

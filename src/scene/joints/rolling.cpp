@@ -30,7 +30,7 @@ double CosineToNormal(const JointBuilder &e, int a) { return std::abs(e.start(0)
 
 /* Force along the normal away from the plane; friction along j's x and y axes. In planar scenes the disc is a wheel on
    the x axis of j: force along y_j, friction along x_j. */
-template <> Element Scene::add(const std::string &name, const RollingDisc &s)
+template <> Element Scene::enter(const std::string &name, const RollingDisc &s)
 {
   JointBuilder      e(*this, name, "rolling disc", s.i, s.j);
   const RollingData data = StartOnPlane(e, s.radius, e.planar() ? 1 : 2);
@@ -48,7 +48,7 @@ template <> Element Scene::add(const std::string &name, const RollingDisc &s)
 }
 
 /* Force along z_j; friction along j's x and y axes. */
-template <> Element Scene::add(const std::string &name, const RollingSphere &s)
+template <> Element Scene::enter(const std::string &name, const RollingSphere &s)
 {
   JointBuilder e(*this, name, "rolling sphere", s.i, s.j);
   e.spatialOnly();
@@ -59,7 +59,7 @@ template <> Element Scene::add(const std::string &name, const RollingSphere &s)
 }
 
 /* Force along z_j; force along y_i. */
-template <> Element Scene::add(const std::string &name, const KnifeEdge &s)
+template <> Element Scene::enter(const std::string &name, const KnifeEdge &s)
 {
   JointBuilder e(*this, name, "knife edge", s.i, s.j);
   e.spatialOnly();

@@ -8,7 +8,7 @@ namespace hhtdae
 {
 
 /* Rows: force on i's body along j's x and y axes, moment about them, axial force. */
-template <> Element Scene::add(const std::string &name, const Screw &s)
+template <> Element Scene::enter(const std::string &name, const Screw &s)
 {
   ElementBuilder e(*this, name, "screw", ElementData::Joint, s.i, s.j);
   e.require(!e.planar(), "a planar scene has no screws");

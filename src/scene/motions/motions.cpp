@@ -45,7 +45,7 @@ void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec 
 
 } // namespace
 
-template <> Element Scene::add(const std::string &name, const RotationalMotion &s)
+template <> Element Scene::enter(const std::string &name, const RotationalMotion &s)
 {
   ElementBuilder e(*this, name, "rotational motion", ElementData::Motion, s.i, s.j);
   CheckFunction(e, s.function, s.of);
@@ -57,7 +57,7 @@ template <> Element Scene::add(const std::string &name, const RotationalMotion &
   return e.done();
 }
 
-template <> Element Scene::add(const std::string &name, const TranslationalMotion &s)
+template <> Element Scene::enter(const std::string &name, const TranslationalMotion &s)
 {
   ElementBuilder e(*this, name, "translational motion", ElementData::Motion, s.i, s.j);
   const int      axes = e.planar() ? 2 : 3;

@@ -6,9 +6,10 @@ namespace hhtdae
 {
 
 struct ChannelWork {
-  std::vector<PetscMPIInt>  owner;
-  std::vector<LocalMeasure> own;
-  bool                      energies = false; /* any rank reads one */
+  std::vector<PetscMPIInt>        owner;
+  std::vector<LocalMeasure>       own;   /* arguments of own channels, one after the other */
+  std::vector<const ChannelData *> what; /* own channels */
+  bool                            energies = false; /* any rank reads one */
 };
 
 namespace
@@ -63,10 +64,12 @@ PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l)
   auto work = std::make_shared<ChannelWork>();
   PetscFunctionBegin;
   for (const ChannelData &c : R.scene.channels) {
-    const Measure &m = c.measure;
-    work->owner.push_back(OwnerOf(R, Expression(m)));
-    work->energies = work->energies || m.kind == Measure::KineticEnergy || m.kind == Measure::PotentialEnergy;
-    if (work->owner.back() == R.rank) work->own.push_back(PlaceMeasure(l, m));
+    work->owner.push_back(OwnerOf(*R.model, c.value));
+    for (const Measure &m : c.value.arguments) {
+      work->energies = work->energies || m.kind == Measure::KineticEnergy || m.kind == Measure::PotentialEnergy;
+      if (work->owner.back() == R.rank) work->own.push_back(PlaceMeasure(l, m));
+    }
+    if (work->owner.back() == R.rank) work->what.push_back(&c);
   }
   R.channels = work;
   if (!work->own.empty()) R.batches.push_back(std::make_unique<ChannelBatch>(work));
@@ -78,7 +81,9 @@ const std::vector<PetscMPIInt> &ChannelOwners(const Runtime &R) { return R.chann
 bool ChannelsFollowFromEquations(const Runtime &R)
 {
   const auto &all = R.scene.channels;
-  return std::any_of(all.begin(), all.end(), [&](const ChannelData &c) { return FollowsFromEquations(R.scene, c.measure); });
+  return std::any_of(all.begin(), all.end(), [&](const ChannelData &c) {
+    return std::any_of(c.value.arguments.begin(), c.value.arguments.end(), [&](const Measure &m) { return FollowsFromEquations(R.scene, m); });
+  });
 }
 
 PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<double> &values)
@@ -86,10 +91,15 @@ PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<
   Balance b;
   PetscFunctionBegin;
   if (R.channels->energies) PetscCall(MakeBalance(R, e, b));
-  for (const LocalMeasure &m : R.channels->own) {
-    if (m.kind == Measure::KineticEnergy) values.push_back(b.kinetic);
-    else if (m.kind == Measure::PotentialEnergy) values.push_back(b.potential());
-    else values.push_back(MeasureValue(m, e));
+  const LocalMeasure *m = R.channels->own.data();
+  for (const ChannelData *c : R.channels->what) {
+    std::vector<Real> x;
+    for (std::size_t k = 0; k < c->value.arguments.size(); k++, m++) {
+      if (m->kind == Measure::KineticEnergy) x.push_back(Real(b.kinetic));
+      else if (m->kind == Measure::PotentialEnergy) x.push_back(Real(b.potential()));
+      else x.push_back(Real(MeasureValue(*m, e)));
+    }
+    values.push_back(c->value.f(x.data()).value());
   }
   PetscFunctionReturn(0);
 }

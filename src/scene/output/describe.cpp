@@ -4,9 +4,10 @@
 namespace hhtdae
 {
 
-Channel Scene::channel(const std::string &given, const Measure &m, const std::string &unit)
+Channel Scene::channel(const std::string &given, const Expression &value, const std::string &unit)
 {
-  SceneData        &s    = *data_;
+  if (keeps()) keep([=](Scene &s) { s.channel(given, value, unit); });
+  SceneData        &s    = data();
   const std::string name = given.empty() ? "channel " + std::to_string(s.channels.size()) : given;
   const std::string who = "channel " + name + ": ";
   s.refuseLate("channel " + name);
@@ -15,15 +16,19 @@ Channel Scene::channel(const std::string &given, const Measure &m, const std::st
   if (name == "time") s.errors.push_back(who + "this name is taken by the times of the samples");
   for (const ChannelData &c : s.channels)
     if (!given.empty() && c.name == name) s.errors.push_back(who + "there is one of this name");
-  const std::string error = CheckMeasure(s, m, false);
-  if (!error.empty()) s.errors.push_back(who + error);
-  s.channels.push_back({name, unit, m});
+  if (!value.f) s.errors.push_back(who + "its function is empty");
+  for (const Measure &m : value.arguments) {
+    const std::string error = CheckMeasure(s, m, false);
+    if (!error.empty()) s.errors.push_back(who + error);
+  }
+  s.channels.push_back({name, unit, value});
   return Channel{(PetscInt)s.channels.size() - 1};
 }
 
 void Scene::shape(Body body, const Shape &shape)
 {
-  SceneData &s = *data_;
+  if (keeps()) keep([=](Scene &s) { s.shape(body, shape); });
+  SceneData &s = data();
   s.refuseLate("shape of a body");
   if (body.id != -1 && !s.valid(body)) {
     s.errors.push_back("shape: its body is not one of this scene");
@@ -35,7 +40,8 @@ void Scene::shape(Body body, const Shape &shape)
 
 void Scene::line(const std::vector<Marker> &markers)
 {
-  SceneData            &s = *data_;
+  if (keeps()) keep([=](Scene &s) { s.line(markers); });
+  SceneData            &s = data();
   std::vector<PetscInt> ids;
   s.refuseLate("line");
   for (Marker m : markers) {
@@ -45,7 +51,5 @@ void Scene::line(const std::vector<Marker> &markers)
   if (ids.size() < 2) s.errors.push_back("line: it takes two markers or more");
   s.lines.push_back(ids);
 }
-
-OutputSettings &Scene::output() { return data_->output; }
 
 } // namespace hhtdae

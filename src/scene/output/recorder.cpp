@@ -80,11 +80,8 @@ PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
    first sample waits for it. */
 PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
 {
-  Runtime      &R = *static_cast<Runtime *>(ctx);
-  PetscObjectId id;
+  Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
-  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
-  if (!R.recorder || R.recorder->ts != id) PetscFunctionReturn(0);
   if (step < 0) PetscFunctionReturn(0); /* a final time inside the last step, which has been sampled */
   Recorder &r = *R.recorder;
   if (!r.begun) {
@@ -179,22 +176,19 @@ Recorder::~Recorder()
   for (Vec *x : {&U, &V, &A}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-PetscErrorCode AttachOutput(Runtime &R, TS ts)
+PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
 {
-  OutputSettings o = R.scene.output;
-  PetscObjectId  id;
+  OutputSettings o = settings;
   PetscReal      t;
   Vec            U;
   PetscFunctionBegin;
-  PetscCall(PetscObjectGetId((PetscObject)ts, &id));
   PetscCall(TSGetTime(ts, &t));
-  if (R.recorder && R.recorder->ts == id) { /* a further solve goes on */
+  if (R.recorder) { /* a further solve goes on */
     if (t == R.recorder->last) PetscFunctionReturn(0);
     R.recorder->begun = false;
     for (auto &task : R.recorder->tasks) task->done = 0;
     PetscFunctionReturn(0);
   }
-  R.recorder.reset();
   PetscCall(ReadOptions(ts, o));
   auto r = std::make_shared<Recorder>(R);
   PetscCall(MakeTasks(*r, o));
@@ -202,7 +196,6 @@ PetscErrorCode AttachOutput(Runtime &R, TS ts)
   PetscBool dense;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &dense));
   r->dense = dense;
-  r->ts    = id;
   PetscCall(TS2GetSolution(ts, &U, nullptr));
   PetscCall(VecDuplicate(U, &r->U));
   PetscCall(VecDuplicate(U, &r->V));

@@ -33,7 +33,6 @@ static_assert(recorded >= 4 + task_slots * (task_numbers + 1), "room for all tas
 
 struct Recorder {
   Runtime                           &R;
-  PetscObjectId                      ts = 0;
   bool                               dense = true;  /* TSHHT3: values between the ends of steps, accelerations */
   bool                               begun = false;
   double                             begin = 0, last = 0; /* time of the first sample, of the end of the last step seen */

@@ -31,10 +31,12 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   const double       *w[3], *local[3];
   std::vector<double> own, acceleration;
   PetscFunctionBegin;
-  PetscCall(CheckTS(*data_, ts, "Scene::sample()"));
-  Runtime &R = *data_->run;
+  Runtime *run;
+  PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
+  PetscCall(CheckUnchanged(data(), start_));
+  Runtime &R = *run;
   for (Vec &x : W) {
-    PetscCall(VecCreate(data_->comm, &x));
+    PetscCall(VecCreate(R.scene.comm, &x));
     PetscCall(VecSetSizes(x, R.n, PETSC_DETERMINE));
     PetscCall(VecSetType(x, VECSTANDARD));
   }

@@ -1,5 +1,6 @@
-/* A state at rest out of the unknowns back into the description of the scene, on every rank. */
+/* A state out of the unknowns of a run into the description of a scene, on every rank: equilibrium, and runs that others go on from. */
 #include "extension.h"
+#include "runtime.h"
 #include "start.h"
 #include <algorithm>
 
@@ -9,21 +10,21 @@ namespace hhtdae
 namespace
 {
 
-/* The deformation of flexible bodies, from their owners to every rank */
-PetscErrorCode WriteBackModes(Runtime &R, const PetscScalar *u)
+/* The deformation of flexible bodies and its rate, from their owners to every rank */
+PetscErrorCode WriteModes(Model &M, const Runtime &R, const PetscScalar *u, const PetscScalar *v)
 {
-  SceneData &s = R.scene;
+  SceneData &s = M.scene;
   PetscFunctionBegin;
   for (std::size_t b = 0; b < s.bodies.size(); b++) {
     if (!s.bodies[b].flexible) continue;
     auto              f     = std::make_shared<FlexibleData>(*s.bodies[b].flexible);
     const PetscMPIInt owner = R.number.owner.empty() ? 0 : R.number.owner[b];
     if (owner == R.rank) {
-      const PetscScalar *eta = u + R.number.body[b] - R.start + 6;
-      std::copy(eta, eta + f->deformation.size(), f->deformation.begin());
+      const PetscInt at = R.number.body[b] - R.start + 6;
+      std::copy(u + at, u + at + f->deformation.size(), f->deformation.begin());
+      std::copy(v + at, v + at + f->deformation.size(), f->deformation_rate.begin());
     }
-    PetscCallMPI(MPI_Bcast(f->deformation.data(), (PetscMPIInt)f->deformation.size(), MPI_DOUBLE, owner, s.comm));
-    std::fill(f->deformation_rate.begin(), f->deformation_rate.end(), 0.0);
+    for (std::vector<double> *x : {&f->deformation, &f->deformation_rate}) PetscCallMPI(MPI_Bcast(x->data(), (PetscMPIInt)x->size(), MPI_DOUBLE, owner, s.comm));
     s.bodies[b].flexible = f;
   }
   PetscFunctionReturn(0);
@@ -31,17 +32,19 @@ PetscErrorCode WriteBackModes(Runtime &R, const PetscScalar *u)
 
 } // namespace
 
-PetscErrorCode WriteRest(Runtime &R, Vec U)
+PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
 {
-  SceneData               &s     = R.scene;
-  const int                width = 13; /* body, position, attitude */
-  const PetscScalar       *u;
+  SceneData               &s     = M.scene;
+  const int                width = 19; /* body, position, attitude, velocities */
+  const PetscScalar       *u, *v;
   const double            *local[3];
-  std::vector<double>      mine, all, v(R.n, 0.0);
+  std::vector<double>      mine, all, rest(V ? 0 : R.n, 0.0);
   std::vector<PetscMPIInt> count(R.size), from(R.size + 1, 0);
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(U, &u));
-  PetscCall(LocalState(R, u, v.data(), v.data(), local));
+  v = rest.data();
+  if (V) PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(LocalState(R, u, v, v, local));
   R.bodies.move(local[0], local[1]);
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const BodyMotion &m = R.bodies.now[b];
@@ -51,14 +54,20 @@ PetscErrorCode WriteRest(Runtime &R, Vec U)
     const bool     turns = HasEulerAngles(kind) || kind == BodyKind::Planar;
     const Matrix3  A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
     mine.insert(mine.end(), A.data(), A.data() + 9);
+    mine.insert(mine.end(), m.v.data(), m.v.data() + 3);
+    mine.insert(mine.end(), m.w.data(), m.w.data() + 3);
   }
   std::vector<double> scalars(s.variables.size() + s.states.size(), 0), sum(scalars.size());
   for (std::size_t i = 0; i < s.variables.size(); i++)
     if (R.number.variable_owner[i] == R.rank) scalars[i] = u[R.number.variable[i] - R.start];
   for (std::size_t i = 0; i < s.states.size(); i++)
     if (R.number.state_owner[i] == R.rank) scalars[s.variables.size() + i] = u[R.number.state[i] - R.start];
-  PetscCall(WriteBackModes(R, u));
-  for (auto &x : s.extensions) x->rest(u + x->start[R.rank] - R.start);
+  PetscCall(WriteModes(M, R, u, v));
+  for (std::size_t x = 0; x < s.extensions.size(); x++) {
+    const PetscInt at = R.scene.extensions[x]->start[R.rank] - R.start;
+    s.extensions[x]->startFrom(u + at, v + at);
+  }
+  if (V) PetscCall(VecRestoreArrayRead(V, &v));
   PetscCall(VecRestoreArrayRead(U, &u));
   const PetscMPIInt n = (PetscMPIInt)mine.size();
   PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count.data(), 1, MPI_INT, s.comm));
@@ -69,8 +78,8 @@ PetscErrorCode WriteRest(Runtime &R, Vec U)
     BodyData &b = s.bodies[(std::size_t)all[k]];
     b.r         = Eigen::Map<const Vector3>(&all[k + 1]);
     b.A         = Eigen::Map<const Matrix3>(&all[k + 4]);
-    b.v.setZero();
-    b.w.setZero();
+    b.v         = Eigen::Map<const Vector3>(&all[k + 13]);
+    b.w         = Eigen::Map<const Vector3>(&all[k + 16]);
   }
   if (!sum.empty())
     PetscCallMPI(MPI_Allreduce(scalars.data(), sum.data(), (PetscMPIInt)sum.size(), MPI_DOUBLE, MPI_SUM, s.comm));

@@ -1,0 +1,82 @@
+/*
+  What a run is doing: motion of any marker, loads of any element, energies, at any time of its last step, without having been asked
+  for beforehand.
+
+    Snapshot now;
+    PetscCall(now.take(ts, t));                         the state of the run at time t
+    Motion m;
+    PetscCall(now.motion(tip, &m));                     position, axes, velocities, accelerations; space axes
+    Load pin_load;
+    PetscCall(now.load(pin, tip, &pin_load));           what the joint does to the tip's body, moment about the tip
+    double l;
+    PetscCall(now.value(Measure::distance(a, b), &l));  any measure
+
+  All calls are collective: every rank asks the same questions and gets the same answers.
+*/
+#ifndef HHTDAE_QUERY_H
+#define HHTDAE_QUERY_H
+
+#include "hhtdae/functions.h"
+#include "hhtdae/types.h"
+#include <memory>
+#include <petscts.h>
+
+namespace hhtdae
+{
+
+/* Of a marker or body: everything in the axes asked for. */
+struct Motion {
+  Vector3 position = Vector3::Zero(), velocity = Vector3::Zero(), acceleration = Vector3::Zero();
+  Matrix3 axes = Matrix3::Identity(); /* its axes as columns */
+  Vector3 angular_velocity = Vector3::Zero(), angular_acceleration = Vector3::Zero();
+
+  Eigen::Quaterniond quaternion() const { return Eigen::Quaterniond(axes); }
+  Vector3 euler() const;  /* 3-1-3: phi, theta, psi with axes = Rz(phi) Rx(theta) Rz(psi), theta in [0, pi]; psi is 0 where theta is 0 or pi */
+  Vector3 bryant() const; /* 1-2-3: axes = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]; c is 0 at its ends */
+};
+
+struct Load {
+  Vector3 force = Vector3::Zero(), moment = Vector3::Zero();
+};
+
+class Snapshot
+{
+public:
+  Snapshot();
+  ~Snapshot();
+  Snapshot(const Snapshot &)            = delete;
+  Snapshot &operator=(const Snapshot &) = delete;
+
+  /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step. Accelerations, multipliers,
+     variables and force states are those that belong to positions and velocities at t, TSHHT3EvaluateAt(), at about the cost of a
+     factorization between the ends of a step, at none at its end. Before the first step the initial state is taken, with
+     accelerations and multipliers zero. */
+  PetscErrorCode take(TS ts, PetscReal t);
+  PetscErrorCode take(TS ts); /* at the end of the last step */
+  PetscReal      time() const;
+
+  /* of a marker in the axes of another one (default: space axes), seen from space: its velocity is that relative to the space
+     origin, resolved in these axes; position from the space origin */
+  PetscErrorCode motion(Marker m, Motion *x, Marker axes = {});
+  /* relative to another marker: position from its origin, and the motion that somebody on it sees, all in its axes */
+  PetscErrorCode relativeMotion(Marker m, Marker to, Motion *x);
+  /* of a body: its centre of mass (undeformed, of a flexible one) and its body axes, in space axes */
+  PetscErrorCode motion(Body b, Motion *x);
+  PetscErrorCode modes(Body flexible, std::vector<double> *coordinates);
+
+  /* What an element, joint, motion or force, does to the body of a marker: its force and its moment about the marker's origin, in the
+     axes of another marker (default: space axes). Zero if it does not touch that body. */
+  PetscErrorCode load(Element e, Marker on, Load *x, Marker axes = {});
+
+  PetscErrorCode value(const Measure &m, double *x);
+  /* kinetic, potential energy of the scene; the momenta are those about the space origin */
+  PetscErrorCode energy(double *kinetic, double *potential);
+
+private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+} // namespace hhtdae
+
+#endif

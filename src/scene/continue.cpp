@@ -1,0 +1,95 @@
+/* A run that goes on where another one is, with a description that may have changed. */
+#include "extension.h"
+#include "journal.h"
+#include "runtime.h"
+#include "start.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* Whether what was described anew has the coordinates, variables and states of before */
+bool SameUnknowns(const SceneData &a, const SceneData &b)
+{
+  bool same = a.bodies.size() == b.bodies.size() && a.variables.size() == b.variables.size() && a.states.size() == b.states.size() &&
+              a.extensions.size() == b.extensions.size();
+  for (std::size_t k = 0; same && k < a.bodies.size(); k++) same = CoordinatesOf(a, a.bodies[k]) == CoordinatesOf(b, b.bodies[k]);
+  for (std::size_t k = 0; same && k < a.extensions.size(); k++) same = a.extensions[k]->coordinates() == b.extensions[k]->coordinates();
+  return same;
+}
+
+std::vector<Batch *> ThatRemember(const Runtime &R)
+{
+  std::vector<Batch *> all;
+  for (const auto &b : R.batches)
+    if (b->memory()) all.push_back(b.get());
+  return all;
+}
+
+/* Angles over full turns and points on curves, which go on from where they are */
+PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
+{
+  const std::vector<Batch *> a = ThatRemember(from), b = ThatRemember(to);
+  int                        same = a.size() == b.size();
+  PetscFunctionBegin;
+  for (std::size_t k = 0; same && k < a.size(); k++) same = a[k]->memory() == b[k]->memory();
+  if (to.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, to.scene.comm));
+  PetscCheck(same, to.scene.comm, PETSC_ERR_SUP,
+             "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve: let others come and go");
+  for (std::size_t k = 0; k < a.size(); k++) {
+    std::vector<double> memory(a[k]->memory());
+    a[k]->copyMemory(memory.data(), false);
+    b[k]->copyMemory(memory.data(), true);
+  }
+  PetscCall(KeepMemories(to));
+  PetscFunctionReturn(0);
+}
+
+/* The same model: its vectors */
+PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
+{
+  Vec U, V, X, Y;
+  PetscFunctionBegin;
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(TS2GetSolution(next, &X, &Y));
+  PetscCall(VecCopy(U, X));
+  PetscCall(VecCopy(V, Y));
+  PetscCall(VecCopy(from.axes, to.axes));
+  PetscCall(UseAxes(to));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Scene::createTS(TS *ts, TS from)
+{
+  Runtime  *old;
+  PetscReal t;
+  Vec       U, V;
+  PetscFunctionBegin;
+  PetscCall(FindRun(*this, from, "Scene::createTS()", &old));
+  PetscCall(TSGetTime(from, &t));
+  PetscCall(TS2GetSolution(from, &U, &V));
+  if (journal_) {
+    journal_->stale = true;
+    describeAnew();
+    Model &M = *model_;
+    PetscCheck(SameUnknowns(old->scene, M.scene), old->scene.comm, PETSC_ERR_ARG_WRONG,
+               "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene are not those that it was made with");
+    M.continues    = true;
+    M.begin        = t;
+    M.number.owner = old->number.owner;
+    PetscCall(WriteState(M, *old, U, V));
+    PetscCall(createTS(ts));
+    PetscCall(CarryMemories(*old, *RunOf(*ts)));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(createTS(ts));
+  PetscCall(CopyState(*old, from, *RunOf(*ts), *ts));
+  PetscCall(TSSetTime(*ts, t));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,21 @@
+/* What was described, call by call, so that it can be described again with other parameters. */
+#ifndef HHTDAE_SCENE_JOURNAL_H
+#define HHTDAE_SCENE_JOURNAL_H
+
+#include "model.h"
+#include <functional>
+#include <map>
+
+namespace hhtdae
+{
+
+struct Scene::Journal {
+  std::vector<std::function<void(Scene &)>> calls;
+  std::map<std::string, Parameter>          parameters;
+  std::vector<std::string>                  errors; /* of parameters themselves */
+  bool                                      stale = false; /* a parameter has changed since the calls were made */
+};
+
+} // namespace hhtdae
+
+#endif

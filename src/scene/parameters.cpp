@@ -1,0 +1,58 @@
+/* Parameters of a scene: what depends on them is described anew when they have changed. */
+#include "journal.h"
+#include <cmath>
+
+namespace hhtdae
+{
+
+void Scene::keep(std::function<void(Scene &)> call) { journal_->calls.push_back(std::move(call)); }
+
+Parameter Scene::parameter(const std::string &name, double value)
+{
+  const SceneData &s = data();
+  if (!journal_) journal_ = std::make_unique<Journal>();
+  const auto fault = [&](const char *what) {
+    journal_->errors.push_back("parameter " + name + ": " + what);
+    data().errors.push_back(journal_->errors.back());
+  };
+  if (!s.bodies.empty() || !s.markers.empty() || !s.elements.empty() || !s.variables.empty() || !s.states.empty())
+    fault("it came too late, parameters are made before everything else");
+  if (journal_->parameters.count(name)) fault("there is one of this name");
+  if (!std::isfinite(value)) fault("its value is not finite");
+  Parameter &p = journal_->parameters[name];
+  *p.value_    = value;
+  return p;
+}
+
+PetscErrorCode Scene::set(const std::string &name, double value)
+{
+  PetscFunctionBegin;
+  std::string known;
+  if (journal_)
+    for (const auto &p : journal_->parameters) known += (known.empty() ? "" : ", ") + p.first;
+  PetscCheck(journal_ && journal_->parameters.count(name), data().comm, PETSC_ERR_ARG_WRONG, "Scene::set(): there is no parameter %s, %s%s", name.c_str(),
+             known.empty() ? "in fact none" : "but ", known.c_str());
+  PetscCheck(std::isfinite(value), data().comm, PETSC_ERR_ARG_OUTOFRANGE, "Scene::set(): %s cannot be %g", name.c_str(), value);
+  double &now     = *journal_->parameters[name].value_;
+  journal_->stale = journal_->stale || now != value;
+  now             = value;
+  PetscFunctionReturn(0);
+}
+
+/* The calls once more, into a model of its own: runs of the old one keep it */
+void Scene::describeAnew()
+{
+  if (!journal_ || !journal_->stale) return;
+  auto       next = std::make_shared<Model>();
+  SceneData &s    = next->scene;
+  s.number        = number_;
+  s.comm          = data().comm;
+  s.planar        = data().planar;
+  s.errors        = journal_->errors;
+  model_.swap(next);
+  const Quiet quiet(*this);
+  for (const auto &call : journal_->calls) call(*this);
+  journal_->stale = false;
+}
+
+} // namespace hhtdae

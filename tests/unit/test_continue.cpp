@@ -1,0 +1,140 @@
+/* Runs that go on where another one is: joints that let go or take hold, other parameters, the same scene. */
+#include "hhtdae/query.h"
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A bar that swings on a pin, which may be open, and may be caught by a vertical line that holds its centre */
+struct Swing {
+  Scene     scene{PETSC_COMM_SELF};
+  Parameter held, caught, line;
+  Body      bar;
+  Marker    end, centre, at, wall;
+
+  Swing()
+  {
+    held   = scene.parameter("held", 1);
+    caught = scene.parameter("caught", 0);
+    line   = scene.parameter("line", 0);
+    RigidBody b;
+    b.inertia  = Vector3(0.01, 1. / 12, 1. / 12).asDiagonal();
+    b.position = {0.5, 0, 0};
+    bar        = scene.add("bar", b);
+    end        = scene.marker(bar, {-0.5, 0, 0});
+    centre     = scene.marker(bar);
+    at         = scene.marker(scene.ground());
+    wall       = scene.marker(scene.ground(), [x = line] { return Place({x, 0, 0}, Eigen::AngleAxisd(M_PI / 2, Vector3::UnitX()).toRotationMatrix()); });
+    scene.add("pin", [h = held, i = end, j = at] { return h > 0 ? std::optional<Revolute>(Revolute{i, j}) : std::nullopt; });
+    scene.add("guide", [c = caught, i = centre, j = wall] { return c > 0 ? std::optional<InLine>(InLine{i, j}) : std::nullopt; });
+    scene.gravity({0, -9.81, 0});
+  }
+};
+
+Motion of(TS ts, Marker m)
+{
+  Snapshot now;
+  Motion   x;
+  must(now.take(ts));
+  must(now.motion(m, &x));
+  return x;
+}
+
+TS goOn(Scene &scene, TS from, double end)
+{
+  TS      ts;
+  Options in(tolerance(1e-8));
+  must(scene.createTS(&ts, from));
+  must(TSSetMaxTime(ts, end));
+  must(TSSetFromOptions(ts));
+  must(scene.solve(ts));
+  return ts;
+}
+
+} // namespace
+
+/* The pin opens at the bottom: the centre flies off along a parabola, the bar turns on */
+TEST(Continue, AJointLetsGo)
+{
+  Swing    s;
+  SceneRun run(s.scene, 0.5, tolerance(1e-8));
+  must(run.solve());
+  const Motion before = of(run.ts, s.centre);
+  must(s.scene.set("held", 0));
+  TS           ts    = goOn(s.scene, run.ts, 1.2);
+  const Motion after = of(ts, s.centre);
+  const double t     = 0.7;
+  EXPECT_LT((after.position - before.position - t * before.velocity - 0.5 * t * t * Vector3(0, -9.81, 0)).norm(), 1e-6);
+  EXPECT_LT((after.angular_velocity - before.angular_velocity).norm(), 1e-7);
+  EXPECT_GT(before.velocity.norm(), 1);
+  PetscReal now;
+  must(TSGetTime(ts, &now));
+  EXPECT_DOUBLE_EQ(now, 1.2);
+  must(TSDestroy(&ts));
+}
+
+/* And is caught by a guide: a plastic impact, the velocity across is lost and nothing else */
+TEST(Continue, AJointTakesHold)
+{
+  Swing    s;
+  SceneRun run(s.scene, 0.3, tolerance(1e-8));
+  must(run.solve());
+  const Motion x = of(run.ts, s.centre);
+  must(s.scene.set("held", 0));
+  must(s.scene.set("caught", 1));
+  must(s.scene.set("line", x.position(0)));
+  ErrorTrap trap;
+  TS        ts;
+  EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
+  EXPECT_TRUE(trap.says("the initial values violate constraints")) << trap.message;
+  s.scene.start().assembly = Assembly::Project;
+  must(s.scene.createTS(&ts, run.ts));
+  const Motion y = of(ts, s.centre);
+  EXPECT_NEAR(y.velocity(0), 0, 1e-9); /* across the line */
+  EXPECT_NEAR(y.velocity(1), x.velocity(1), 1e-9);
+  EXPECT_LT((y.angular_velocity - x.angular_velocity).norm(), 1e-9);
+  must(TSDestroy(&ts));
+}
+
+/* A run that goes on with nothing changed is the same motion, counted angles included */
+TEST(Continue, NothingChanged)
+{
+  for (bool with_parameters : {false, true}) {
+    Scene s(PETSC_COMM_SELF);
+    if (with_parameters) s.parameter("unused", 1);
+    RigidBody b;
+    b.angular_velocity = {0, 0, 9};
+    const Body   wheel = s.add("wheel", b);
+    const Marker on = s.marker(wheel), at = s.marker(s.ground());
+    s.add("pin", Revolute{on, at});
+    const Element       spring = s.add("spring", TorsionalSpringDamper{on, at, 0.05, 0, 0, 0});
+    SceneRun            whole(s, 3, tolerance(1e-8)), half(s, 1.5, tolerance(1e-8));
+    std::vector<double> x;
+    Snapshot            now;
+    double              moment[2];
+    must(whole.solve());
+    must(half.solve());
+    TS ts = goOn(s, half.ts, 3);
+    int k = 0;
+    for (TS end : {whole.ts, ts}) {
+      must(now.take(end));
+      must(now.value(Measure::force(spring, 0), &moment[k++]));
+    }
+    EXPECT_GT(std::abs(moment[0]), 0.05 * 2 * M_PI); /* more than a turn */
+    EXPECT_NEAR(moment[0], moment[1], 1e-6);
+    must(TSDestroy(&ts));
+  }
+}
+
+TEST(Continue, SaysWhatCannotBe)
+{
+  Swing     s, other;
+  SceneRun  run(other.scene, 0.1, "");
+  ErrorTrap trap;
+  TS        ts;
+  EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
+  EXPECT_TRUE(trap.says("the TS is not of this scene")) << trap.message;
+}

@@ -1,0 +1,177 @@
+/* Parameters: other numbers without another description. */
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A block on a guide, on a spring from the ground; the spring's free length is the distance at the start */
+struct Block {
+  Scene     scene{PETSC_COMM_SELF};
+  Parameter stiffness, mass, reach;
+  Body      block;
+  Marker    on, at;
+  Element   spring;
+
+  Block()
+  {
+    stiffness = scene.parameter("stiffness", 100);
+    mass      = scene.parameter("mass", 1);
+    reach     = scene.parameter("reach", 1);
+    block     = scene.add("block", [p = mass] {
+      PointMass b;
+      b.mass     = p;
+      b.velocity = {0, 0, 1};
+      return b;
+    });
+    on     = scene.marker(block);
+    at     = scene.marker(scene.ground(), [p = reach] { return Vector3(0, 0, -p); });
+    spring = scene.add("spring", [i = on, j = at, k = stiffness] { return SpringDamper{i, j, k}; });
+    scene.channel("z", Measure::displacement(on, 2), "m");
+    scene.channel("force", Measure::force(spring, 0), "N");
+  }
+
+  double after(double t, double *force = nullptr)
+  {
+    SceneRun            run(scene, t, tolerance(1e-9));
+    std::vector<double> x;
+    must(run.solve());
+    must(scene.sample(run.ts, t, x));
+    if (force) *force = x[1];
+    return x[0];
+  }
+};
+
+double sine(double k, double m, double t)
+{
+  const double w = std::sqrt(k / m);
+  return std::sin(w * t) / w;
+}
+
+} // namespace
+
+TEST(Parameters, TheNextRunHasThem)
+{
+  Block b;
+  EXPECT_NEAR(b.after(0.3), sine(100, 1, 0.3), 1e-6);
+  must(b.scene.set("stiffness", 400));
+  EXPECT_NEAR(b.after(0.3), sine(400, 1, 0.3), 1e-6);
+  must(b.scene.set("mass", 4));
+  EXPECT_NEAR(b.after(0.3), sine(400, 4, 0.3), 1e-6);
+}
+
+/* What was computed from the description follows: the free length of the spring is the new distance */
+TEST(Parameters, WhatFollowsFromThemFollows)
+{
+  Block  b;
+  double force;
+  must(b.scene.set("reach", 0.25));
+  const double z = b.after(0.3, &force);
+  EXPECT_NEAR(z, sine(100, 1, 0.3), 1e-6);
+  EXPECT_NEAR(std::abs(force), 100 * z, 1e-4);
+}
+
+/* The same numbers as a scene that was described with them */
+TEST(Parameters, TheSameDigitsAsDescribed)
+{
+  Block b;
+  b.after(0.2);
+  must(b.scene.set("stiffness", 321));
+  const double again = b.after(0.4);
+  Block        c;
+  must(c.scene.set("stiffness", 321));
+  EXPECT_EQ(again, c.after(0.4));
+  must(b.scene.set("stiffness", 100));
+  Block first;
+  EXPECT_EQ(b.after(0.4), first.after(0.4));
+}
+
+/* Runs that were begun before keep theirs, side by side with later ones */
+TEST(Parameters, ARunKeepsItsOwn)
+{
+  Block               b;
+  SceneRun            soft(b.scene, 0.3, tolerance(1e-9));
+  std::vector<double> x;
+  must(b.scene.set("stiffness", 400));
+  SceneRun hard(b.scene, 0.3, tolerance(1e-9));
+  must(TSSetMaxTime(soft.ts, 0.1));
+  must(soft.solve());
+  must(hard.solve());
+  must(TSSetMaxTime(soft.ts, 0.3));
+  must(soft.solve());
+  must(b.scene.sample(soft.ts, 0.3, x));
+  EXPECT_NEAR(x[0], sine(100, 1, 0.3), 1e-6);
+  must(b.scene.sample(hard.ts, 0.3, x));
+  EXPECT_NEAR(x[0], sine(400, 1, 0.3), 1e-6);
+}
+
+/* An element that is there or not; its loads are zero where it is not, and other handles stay good */
+TEST(Parameters, AnElementThatMayBeMissing)
+{
+  Scene           scene(PETSC_COMM_SELF);
+  const Parameter held = scene.parameter("held", 1);
+  const Body      body = scene.add("block", PointMass());
+  const Marker    on = scene.marker(body), at = scene.marker(scene.ground());
+  const Element   pin = scene.add("pin", [=] { return held > 0 ? std::optional<Spherical>(Spherical{on, at}) : std::nullopt; });
+  const Element   wind = scene.add("wind", UserForce{on, {}, {Expression{{}, [](const Real *) -> Real { return 0.0; }}, Measure::time(), Measure::time()}});
+  scene.gravity({0, 0, -2});
+  scene.channel("z", Measure::displacement(on, 2));
+  scene.channel("reaction", Measure::jointForce(pin, 2));
+  scene.channel("wind", Measure::force(wind, 2));
+  for (double there : {1., 0., 1.}) {
+    must(scene.set("held", there));
+    SceneRun            run(scene, 1, tolerance(1e-8));
+    std::vector<double> x;
+    must(run.solve());
+    must(scene.sample(run.ts, 1, x));
+    EXPECT_NEAR(x[0], there > 0 ? 0 : -1 + 1. / 6, 1e-6);
+    EXPECT_NEAR(x[1], there > 0 ? 1 : 0, 1e-6);
+    EXPECT_NEAR(x[2], 1, 1e-9);
+  }
+}
+
+/* A function of the state that holds a parameter reads it at every evaluation: a controller between steps */
+TEST(Parameters, AFunctionReadsThePresentValue)
+{
+  Scene           scene(PETSC_COMM_SELF);
+  const Parameter push = scene.parameter("push", 0);
+  const Body      body = scene.add("block", PointMass());
+  const Marker    on   = scene.marker(body);
+  const auto      none = Expression{{}, [](const Real *) -> Real { return 0.0; }};
+  scene.add("push", UserForce{on, {}, {none, none, Expression{{}, [=](const Real *) -> Real { return push.value(); }}}});
+  scene.channel("v", Measure::velocity(on, 2));
+  SceneRun            run(scene, 1, tolerance(1e-8));
+  std::vector<double> x;
+  must(run.solve());
+  must(scene.sample(run.ts, 1, x));
+  EXPECT_NEAR(x[0], 0, 1e-12);
+  must(scene.set("push", 3));
+  must(TSRestartStep(run.ts));
+  must(TSSetMaxTime(run.ts, 1.5));
+  must(run.solve());
+  must(scene.sample(run.ts, 1.5, x));
+  EXPECT_NEAR(x[0], 1.5, 1e-9);
+}
+
+TEST(Parameters, SayWhatIsWrong)
+{
+  Block     b;
+  ErrorTrap trap;
+  EXPECT_NE(b.scene.set("stifness", 1), 0);
+  EXPECT_TRUE(trap.says("no parameter stifness, but mass, reach, stiffness")) << trap.message;
+  EXPECT_NE(b.scene.set("mass", NAN), 0);
+  EXPECT_TRUE(trap.says("mass cannot be nan")) << trap.message;
+  must(b.scene.set("mass", -1));
+  TS ts;
+  EXPECT_NE(b.scene.createTS(&ts), 0);
+  EXPECT_TRUE(trap.says("mass is -1, must be positive")) << trap.message;
+  must(b.scene.set("mass", 2)); /* and goes on */
+  EXPECT_NEAR(b.after(0.3), sine(100, 2, 0.3), 1e-6);
+  Scene late(PETSC_COMM_SELF);
+  late.add("body", PointMass());
+  late.parameter("k", 1);
+  EXPECT_NE(late.setUp(), 0);
+  EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
+}

@@ -1,0 +1,207 @@
+/* Questions to a run, against what is known of the motion and against channels. */
+#include "hhtdae/query.h"
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A rod that swings about a pin on a turning disc, with a spring to the ground: every kind of motion and load */
+struct Machine {
+  Scene    scene;
+  Body     disc, rod;
+  Marker   hub, ground, pivot, at_pivot, tip, anchor, centre;
+  Element  axle, pin, spring, drive, winder;
+  Variable v;
+  State    x;
+
+  explicit Machine(MPI_Comm comm = PETSC_COMM_SELF) : scene(comm)
+  {
+    RigidBody d, r;
+    d.mass             = 2;
+    d.inertia          = Vector3(0.3, 0.3, 0.5).asDiagonal();
+    d.angular_velocity = {0, 0, 2};
+    r.mass             = 0.7;
+    r.inertia          = Vector3(0.01, 0.06, 0.06).asDiagonal();
+    r.position         = {0.9, 0, 0};
+    r.angular_velocity = {0, 0, 2};
+    r.velocity         = {0, 1.8, 0};
+    disc               = scene.add("disc", d);
+    rod                = scene.add("rod", r);
+    const Matrix3 about_y = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitX()).toRotationMatrix();
+    hub      = scene.marker(disc);
+    ground   = scene.marker(scene.ground());
+    pivot    = scene.marker(disc, {0.4, 0, 0}, about_y);
+    at_pivot = scene.marker(rod, {-0.5, 0, 0}, about_y);
+    tip      = scene.marker(rod, {0.5, 0, 0});
+    centre   = scene.marker(rod);
+    anchor   = scene.marker(scene.ground(), {1, 1, 1});
+    axle     = scene.add("axle", Revolute{hub, ground});
+    pin      = scene.add("pin", Revolute{at_pivot, pivot});
+    spring   = scene.add("spring", SpringDamper{tip, anchor, 8, 0.1});
+    winder   = scene.add("winder", TorsionalSpringDamper{hub, ground, 0.02, 0, 0, 0});
+    drive    = scene.add("drive", UserScalarForce{hub, ground, Expression{{Measure::time()}, [](const Real *t) -> Real { return 0.5 * t[0]; }}, true, true});
+    v        = scene.variable("v", Measure::distance(tip, anchor));
+    x        = scene.state("x", Measure::rate(tip, anchor), 0);
+    scene.gravity({0, 0, -9.81});
+  }
+
+  std::vector<Measure> measures() const
+  {
+    std::vector<Measure> all = {Measure::time(), Measure::distance(tip, anchor), Measure::rate(tip, anchor), Measure::value(v), Measure::value(x), Measure::force(spring, 0),
+                                Measure::force(drive, 0), Measure::force(winder, 0), energy(Measure::KineticEnergy), energy(Measure::PotentialEnergy)};
+    for (int c = 0; c < 3; c++) {
+      for (Marker frame : {Marker{}, tip}) {
+        all.push_back(Measure::displacement(tip, c, hub, frame));
+        all.push_back(Measure::velocity(tip, c, hub, frame));
+        all.push_back(Measure::acceleration(tip, c, hub, frame));
+        all.push_back(Measure::angularVelocity(tip, c, hub, frame));
+        all.push_back(Measure::angularAcceleration(tip, c, hub, frame));
+        all.push_back(Measure::jointForce(pin, c, frame));
+        all.push_back(Measure::jointMoment(pin, c, frame));
+        for (Element e : {axle, pin, spring, winder, drive}) {
+          const Marker on = e.id == axle.id || e.id == winder.id || e.id == drive.id ? hub : tip;
+          all.push_back(Measure::elementForce(e, on, c, frame));
+          all.push_back(Measure::elementMoment(e, on, c, frame));
+        }
+      }
+    }
+    for (int r = 0; r < 5; r++) all.push_back(Measure::multiplier(pin, r));
+    return all;
+  }
+};
+
+void expectNear(const Vector3 &a, const Vector3 &b, double tolerance) { EXPECT_LT((a - b).norm(), tolerance) << a.transpose() << " for " << b.transpose(); }
+
+} // namespace
+
+/* Every measure says the same as its channel, between steps and at their ends, while the winder turns more than once */
+TEST(Query, MeasuresAgreeWithChannels)
+{
+  Machine m;
+  const std::vector<Measure> all = m.measures();
+  for (const Measure &x : all) m.scene.channel("", x);
+  SceneRun run(m.scene, 5, tolerance(1e-7));
+  must(run.solve());
+  PetscReal before, end;
+  must(TSGetPrevTime(run.ts, &before));
+  must(TSGetTime(run.ts, &end));
+  Snapshot now;
+  for (double t : {0.3 * before + 0.7 * end, end}) {
+    std::vector<double> channel;
+    must(now.take(run.ts, t));
+    must(m.scene.sample(run.ts, t, channel));
+    for (std::size_t k = 0; k < all.size(); k++) {
+      double x;
+      must(now.value(all[k], &x));
+      EXPECT_NEAR(x, channel[k], 1e-9 * std::max(1., std::abs(channel[k]))) << "measure " << k << " of kind " << all[k].kind << ", component " << all[k].component;
+    }
+  }
+}
+
+/* Velocities and accelerations are the rates of positions and velocities, seen from space and from a moving marker */
+TEST(Query, MotionIsTheRateOfMotion)
+{
+  Machine  m;
+  SceneRun run(m.scene, 1, tolerance(1e-9));
+  must(run.solve());
+  PetscReal before, end;
+  must(TSGetPrevTime(run.ts, &before));
+  must(TSGetTime(run.ts, &end));
+  const double t = 0.5 * (before + end), d = 0.2 * (end - before);
+  Snapshot     now;
+  for (bool relative : {false, true}) {
+    Motion x[3];
+    for (int k = 0; k < 3; k++) {
+      must(now.take(run.ts, t + (k - 1) * d));
+      if (relative) must(now.relativeMotion(m.tip, m.hub, &x[k]));
+      else must(now.motion(m.tip, &x[k]));
+    }
+    expectNear(x[1].velocity, (x[2].position - x[0].position) / (2 * d), 1e-4);
+    expectNear(x[1].acceleration, (x[2].velocity - x[0].velocity) / (2 * d), 1e-2);
+    expectNear(x[1].angular_acceleration, (x[2].angular_velocity - x[0].angular_velocity) / (2 * d), 1e-2);
+    const Matrix3 turn = (x[2].axes - x[0].axes) / (2 * d) * x[1].axes.transpose();
+    expectNear(x[1].angular_velocity, {turn(2, 1), turn(0, 2), turn(1, 0)}, 1e-4);
+  }
+}
+
+/* Newton and Euler of the rod: m a and the rate of the angular momentum from all loads */
+TEST(Query, LoadsMakeTheMotion)
+{
+  Machine  m;
+  SceneRun run(m.scene, 2, tolerance(1e-8));
+  must(run.solve());
+  Snapshot now;
+  must(now.take(run.ts));
+  Motion x;
+  must(now.motion(m.rod, &x));
+  Vector3 f = 0.7 * Vector3(0, 0, -9.81), moment = Vector3::Zero();
+  for (Element e : {m.axle, m.pin, m.spring, m.winder, m.drive}) {
+    Load l;
+    must(now.load(e, m.centre, &l));
+    f += l.force;
+    moment += l.moment;
+  }
+  expectNear(f, 0.7 * x.acceleration, 1e-6);
+  const Matrix3 J = x.axes * Vector3(0.01, 0.06, 0.06).asDiagonal() * x.axes.transpose();
+  expectNear(moment, J * x.angular_acceleration + x.angular_velocity.cross(J * x.angular_velocity), 1e-6);
+  Load on_i, on_j;
+  must(now.load(m.pin, m.at_pivot, &on_i));
+  must(now.load(m.pin, m.pivot, &on_j));
+  expectNear(on_i.force, -on_j.force, 1e-9);
+  EXPECT_GT(on_i.force.norm(), 1);
+  must(now.load(m.spring, m.hub, &on_i));
+  EXPECT_EQ(on_i.force.norm(), 0); /* it does not touch the disc */
+}
+
+TEST(Query, Angles)
+{
+  for (const Vector3 &a : {Vector3(0.3, 1.1, -2.5), Vector3(-3, 0.2, 0.4)}) {
+    const auto about = [](double angle, const Vector3 &axis) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); };
+    Motion     m;
+    m.axes = about(a(0), Vector3::UnitZ()) * about(a(1), Vector3::UnitX()) * about(a(2), Vector3::UnitZ());
+    expectNear(m.euler(), a, 1e-12);
+    EXPECT_LT((m.quaternion().toRotationMatrix() - m.axes).norm(), 1e-12);
+    m.axes = about(a(0), Vector3::UnitX()) * about(a(1), Vector3::UnitY()) * about(a(2), Vector3::UnitZ());
+    expectNear(m.bryant(), a, 1e-12);
+  }
+  for (double sign : {1., -1.}) { /* at the singularities the attitude is right all the same */
+    Motion m;
+    m.axes << std::cos(0.4), -std::sin(0.4), 0, sign * std::sin(0.4), sign * std::cos(0.4), 0, 0, 0, sign;
+    Vector3 e = m.euler();
+    EXPECT_LT((Eigen::AngleAxisd(e(0), Vector3::UnitZ()) * Eigen::AngleAxisd(e(1), Vector3::UnitX()) * Eigen::AngleAxisd(e(2), Vector3::UnitZ()).toRotationMatrix() - m.axes).norm(), 1e-12);
+    m.axes = Eigen::AngleAxisd(0.7, Vector3::UnitX()).toRotationMatrix() * Eigen::AngleAxisd(sign * M_PI / 2, Vector3::UnitY()).toRotationMatrix();
+    e      = m.bryant();
+    expectNear(e, {0.7, sign * M_PI / 2, 0}, 1e-9);
+  }
+}
+
+TEST(Query, SaysWhatIsWrong)
+{
+  Machine   m, other;
+  Snapshot  now;
+  Motion    x;
+  Load      l;
+  double    y;
+  ErrorTrap trap;
+  const auto refused = [&](PetscErrorCode code, const char *why) {
+    EXPECT_NE(code, 0) << why;
+    EXPECT_TRUE(trap.says(why)) << trap.message;
+  };
+  refused(now.motion(m.tip, &x), "call take() first");
+  TS ts;
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  refused(now.take(ts, 0), "not one of a scene");
+  must(TSDestroy(&ts));
+  SceneRun run(m.scene, 0.1, "");
+  must(now.take(run.ts));
+  must(now.motion(m.tip, &x)); /* the start */
+  expectNear(x.position, {1.4, 0, 0}, 1e-12);
+  must(run.solve());
+  must(now.take(run.ts));
+  refused(now.motion(other.tip, &x), "not a marker of this scene");
+  refused(now.load(other.pin, m.tip, &l), "not one of this scene");
+  refused(now.value(Measure::displacement(other.tip, 0), &y), "marker i is not one of this scene");
+}
