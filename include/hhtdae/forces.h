@@ -26,12 +26,12 @@ struct SpringDamper {
   bool   state     = false;
 };
 
-/* Tension f(l, l') given by the user's function, differentiated automatically; the lambda must return a Real:
-     [](const Real &l, const Real &v) -> Real { return 100. * pow(l - 1., 3) + 2. * v; } */
+/* Tension f(l, l') given by the user's function, differentiated automatically:
+     [](const Real &l, const Real &v) { return 100 * pow(l - 1, 3) + 2 * v; } */
 struct NonlinearSpring {
-  Marker                                   i, j;
-  RealFunction<const Real &, const Real &> tension; /* of length and rate */
-  bool                                     state = false;
+  Marker   i, j;
+  ForceLaw tension; /* of length and rate */
+  bool     state = false;
 };
 
 /*
@@ -50,9 +50,9 @@ struct TorsionalSpringDamper {
 };
 
 struct NonlinearTorsionalSpring {
-  Marker                                   i, j;
-  RealFunction<const Real &, const Real &> moment; /* of angle and rate, on i's body, about z_j; a restoring one is negative */
-  bool                                     state = false;
+  Marker   i, j;
+  ForceLaw moment; /* of angle and rate, on i's body, about z_j; a restoring one is negative */
+  bool     state = false;
 };
 
 /*

@@ -4,12 +4,11 @@
 #ifndef HHTDAE_FUNCTIONS_H
 #define HHTDAE_FUNCTIONS_H
 
+#include "hhtdae/dual.h"
 #include "hhtdae/types.h"
 #include <functional>
 #include <memory>
 #include <string>
-#include <type_traits>
-#include <unsupported/Eigen/AutoDiff>
 #include <utility>
 #include <vector>
 
@@ -20,7 +19,7 @@ namespace hhtdae
 class TimeFunction
 {
 public:
-  using Number = Eigen::AutoDiffScalar<Eigen::Matrix<Eigen::AutoDiffScalar<Eigen::Matrix<double, 1, 1>>, 1, 1>>;
+  using Number = Dual<1, Dual<1>>; /* t with its first and second derivative by t */
   struct Value {
     double f, f1, f2;
   };
@@ -37,14 +36,8 @@ public:
   static TimeFunction step5(double t0, double x0, double t1, double x1);
   /* natural cubic spline through (t_k, x_k), t increasing, continued linearly */
   static TimeFunction spline(const std::vector<double> &t, const std::vector<double> &x);
-  /* any formula in t, differentiated automatically: [](TimeFunction::Number t) -> TimeFunction::Number { return sin(t) * t; } */
+  /* any formula in t, differentiated automatically: [](TimeFunction::Number t) { return sin(t) * t; } */
   static TimeFunction formula(std::function<Number(const Number &)> f);
-  /* A lambda without "-> TimeFunction::Number" may return an expression that refers to numbers which are gone. */
-  template <class F, class R = std::invoke_result_t<F, const Number &>> static TimeFunction formula(F f)
-  {
-    static_assert(std::is_same<std::decay_t<R>, Number>::value, "a formula must return TimeFunction::Number");
-    return formula(std::function<Number(const Number &)>(std::move(f)));
-  }
   /* values and derivatives by the user's own hand */
   static TimeFunction values(std::function<Value(double)> f);
 
@@ -114,40 +107,26 @@ struct Measure {
   static Measure potentialEnergy() { return {PotentialEnergy, {}, {}, {}}; }
 };
 
-using Real = Eigen::AutoDiffScalar<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>>; /* at most 16 arguments */
-
 /* STEP and STEP5 of x, for expressions and force laws: from h0 for x <= x0 to h1 for x >= x1 by the cubic and by the quintic of
    TimeFunction::step() and step5() */
 Real step(const Real &x, double x0, double h0, double x1, double h1);
 Real step5(const Real &x, double x0, double h0, double x1, double h1);
 
-/*
-  A user's function that returns a Real (or a constant). A lambda has to say so by "-> Real": without it Eigen's expression is
-  returned, which refers to numbers that are gone by then, and such a lambda does not compile ("deleted function RealFunction").
-  Within the lambda the same holds for auto: write Real y = ..., not auto y = ....
-*/
-template <class... Arguments> class RealFunction : public std::function<Real(Arguments...)>
-{
-  using Base = std::function<Real(Arguments...)>;
-  template <class F> using Result = std::decay_t<std::invoke_result_t<F &, Arguments...>>;
-  template <class R> static constexpr bool isNumber = std::is_same<R, Real>::value || std::is_arithmetic<R>::value;
+/* A user's function of Reals, which are differentiated automatically (dual.h); it returns a Real or a constant. */
+template <class... Arguments> using RealFunction = std::function<Real(Arguments...)>;
 
-public:
-  RealFunction() = default;
-  template <class F, class R = Result<F>, std::enable_if_t<isNumber<R>, int> = 0> RealFunction(F f) : Base(std::move(f)) {}
-  template <class F, class R = Result<F>, std::enable_if_t<!isNumber<R>, int> = 0>
-  RealFunction(F lambda_without_return_type_Real) = delete;
-};
+/* A force or moment as a function of a position and its rate */
+using ForceLaw = RealFunction<const Real &, const Real &>;
 
-/* f(m_1, ..., m_n) of measures, differentiated automatically:
-     Expression{{Measure::distance(a, b), Measure::value(s)}, [](const Real *m) -> Real { return 3.0 * m[0] * m[0] + sin(m[1]); }} */
+/* f(m_1, ..., m_n) of at most 16 measures, differentiated automatically:
+     Expression{{Measure::distance(a, b), Measure::value(s)}, [](const Real *m) { return 3 * m[0] * m[0] + sin(m[1]); }} */
 struct Expression {
   std::vector<Measure>       arguments;
   RealFunction<const Real *> f;
 
   Expression() = default;
   Expression(std::vector<Measure> a, RealFunction<const Real *> g) : arguments(std::move(a)), f(std::move(g)) {}
-  Expression(const Measure &m) : arguments{m}, f([](const Real *x) -> Real { return x[0]; }) {}
+  Expression(const Measure &m) : arguments{m}, f([](const Real *x) { return x[0]; }) {}
 };
 
 } // namespace hhtdae

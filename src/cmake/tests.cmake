@@ -4,6 +4,12 @@ if(NOT GTest_FOUND)
   message(STATUS "GoogleTest not found: only the integration tests are built (Debian: libgtest-dev)")
 endif()
 
+if(HHTDAE_PRECOMPILE AND GTest_FOUND)
+  hhtdae_precompiled(precompiled_for_tests <gtest/gtest.h>)
+  target_link_libraries(precompiled_for_tests PRIVATE GTest::gtest)
+  target_compile_options(precompiled_for_tests PRIVATE -O1)
+endif()
+
 # One thread per process, and Open MPI as root and with more ranks than cores
 set(test_environment OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1
                      OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
@@ -29,7 +35,7 @@ function(hhtdae_test_program folder)
   endif()
   set(${folder}_found FALSE PARENT_SCOPE)
   if(sources AND GTest_FOUND)
-    hhtdae_program(${folder}_tests OPEN ${sources} ${common})
+    hhtdae_program(${folder}_tests OPEN PRECOMPILED precompiled_for_tests ${sources} ${common})
     target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
     target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
     target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
@@ -76,7 +82,7 @@ if(NOT HHTDAE_HDF5_INCLUDE_DIR OR NOT HHTDAE_HDF5_LIBRARY)
   list(FILTER fuzz_sources EXCLUDE REGEX "bodies\\.cpp$")
 endif()
 if(GTest_FOUND)
-  hhtdae_program(fuzz ${fuzz_sources})
+  hhtdae_program(fuzz PRECOMPILED precompiled_for_tests ${fuzz_sources})
   target_include_directories(fuzz PRIVATE src tests)
   target_compile_options(fuzz PRIVATE -O1)
   target_link_libraries(fuzz PRIVATE GTest::gtest)

@@ -86,16 +86,6 @@ template <class Pair> bool Reaches(const Pair &pair, BodyKind row, int g, BodyKi
   return pair(0, 0) || (tr && pair(1, 0)) || (tc && pair(0, 1)) || (tr && tc && pair(1, 1));
 }
 
-/* The change of the moment s x f of a force held fixed in space when its body turns: [f][s], in coordinates */
-inline void AddLever(const Bodies &B, PetscInt b, const Vector3 &s, const Vector3 &f, Eigen::Matrix<double, 6, 6> &H)
-{
-  const BodyKind k = B.body[b].kind;
-  if (k == BodyKind::Planar) H(2, 2) -= f(0) * s(0) + f(1) * s(1);
-  if (k != BodyKind::Rigid) return;
-  const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
-  H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
-}
-
 /* ---- how long a step the instances of a kernel allow ---- */
 
 /* A kernel that has a limit says so by

@@ -2,7 +2,7 @@
 #ifndef HHTDAE_SCENE_CONSTRAINT_BATCH_H
 #define HHTDAE_SCENE_CONSTRAINT_BATCH_H
 
-#include "batch.h"
+#include "blocks.h"
 #include "kernel.h"
 
 namespace hhtdae
@@ -226,27 +226,19 @@ private:
     for (int k = 0; k < M; k++)
       for (int m = 0; m < M; m++) {
         const LocalBody            &b = bodyOf(ev.bodies, e, k), &c = bodyOf(ev.bodies, e, m);
-        Eigen::Matrix<double, 6, 6> D;
+        Six                         D;
         bool                        made = false;
         for (int g = 0; g < Groups(b.kind); g++)
           for (int h = 0; h < Groups(c.kind); h++) {
             if (!curves(b.kind, g, k, c.kind, h, m)) continue;
             if (!made) {
-              D.setZero();
-              if constexpr (curved) {
-                Eigen::Matrix<double, 6, 6> right = Eigen::Matrix<double, 6, 6>::Zero(), both = right;
-                ev.bodies.columns(e.marker[m], f[m], H.template block<6, 6>(6 * k, 6 * m), right);
-                ev.bodies.columns(e.marker[k], f[k], right.transpose(), both);
-                D = both.transpose();
-              }
-              if (k == m && Depends(K::depends, 2 * k)) {
-                const PetscInt body = ev.bodies.marker[e.marker[k]].body;
-                AddLever(ev.bodies, body, f[k].x - ev.bodies.now[body].r, J.template middleCols<3>(6 * k).transpose() * l, D);
-              }
+              if constexpr (curved) D = PairBlock(ev, e.marker[k], f[k], e.marker[m], f[m], H.template block<6, 6>(6 * k, 6 * m));
+              else D.setZero();
+              if (k == m && Depends(K::depends, 2 * k))
+                AddLever(ev.bodies, e.marker[k], f[k], J.template middleCols<3>(6 * k).transpose() * l, D);
               made = true;
             }
-            const int sb = GroupSize(b.kind, g), sc = GroupSize(c.kind, h);
-            ev.sink.add(*slot++, D.block(GroupOffset(b.kind, g), GroupOffset(c.kind, h), sb, sc), sb, sc);
+            AddBlock(ev.sink, *slot++, D, b.kind, g, c.kind, h);
           }
       }
     (void)w;

@@ -38,7 +38,7 @@ Real LocalFunction::call(const Piece &p, const Real *m) const
 
 void LocalFunction::value(const Evaluation &e, double *f) const
 {
-  Real m[16];
+  Real m[Real::most];
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];
     for (int k = 0; k < p.count; k++) m[k] = Real(arguments.value(p.first + k, e));
@@ -49,7 +49,7 @@ void LocalFunction::value(const Evaluation &e, double *f) const
 
 void LocalFunction::gradient(const Evaluation &e, double *f, Gradient &G) const
 {
-  Real m[16];
+  Real m[Real::most];
   G.setZero(size(), arguments.columns().width);
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];

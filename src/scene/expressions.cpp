@@ -170,10 +170,9 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
 
 void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors)
 {
-  constexpr std::size_t most = Real::DerType::MaxRowsAtCompileTime;
   if (!e.f) errors.push_back(who + ": its function is empty");
-  if (e.arguments.size() > most)
-    errors.push_back(who + ": " + std::to_string(e.arguments.size()) + " arguments, at most " + std::to_string(most) +
+  if (e.arguments.size() > Real::most)
+    errors.push_back(who + ": " + std::to_string(e.arguments.size()) + " arguments, at most " + std::to_string(Real::most) +
                      "; put parts of it into variables");
   for (std::size_t k = 0; k < e.arguments.size(); k++) {
     const std::string error = CheckMeasure(s, e.arguments[k], true);

@@ -2,7 +2,7 @@
 #ifndef HHTDAE_SCENE_FORCE_BATCH_H
 #define HHTDAE_SCENE_FORCE_BATCH_H
 
-#include "batch.h"
+#include "blocks.h"
 #include "kernel.h"
 #include <type_traits>
 #include <utility>
@@ -128,7 +128,6 @@ protected:
   static void bodyBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Wrench<double> *on, const Matrix<6 * M, 6 * M> &frames,
                          const Matrix<6 * M, 6 * M> *twists, const Slot *&slot)
   {
-    using Six = Eigen::Matrix<double, 6, 6>;
     for (int k = 0; k < M; k++)
       for (int l = 0; l < M; l++) {
         const LocalBody &b = bodyOf(ev.bodies, e, k), &c = bodyOf(ev.bodies, e, l);
@@ -138,24 +137,14 @@ protected:
           for (int h = 0; h < Groups(c.kind); h++) {
             if (!couples(b.kind, g, k, c.kind, h, l)) continue;
             if (!made) {
-              Six right = Six::Zero(), both = Six::Zero();
-              if (twists) {
-                const Six T = -twists->template block<6, 6>(6 * k, 6 * l);
-                ev.bodies.columns(e.marker[l], f[l], Six(ev.sv * T - frames.template block<6, 6>(6 * k, 6 * l)), right);
-                ev.bodies.convectiveColumns(e.marker[l], f[l], ev.v, T, right);
-              } else {
-                ev.bodies.columns(e.marker[l], f[l], Six(-frames.template block<6, 6>(6 * k, 6 * l)), right);
-              }
-              ev.bodies.columns(e.marker[k], f[k], right.transpose(), both);
-              D = both.transpose();
-              if (k == l && Depends(K::acts, 2 * k)) {
-                const PetscInt body = ev.bodies.marker[e.marker[k]].body;
-                AddLever(ev.bodies, body, f[k].x - ev.bodies.now[body].r, -on[k].f, D);
-              }
+              const Six A = -frames.template block<6, 6>(6 * k, 6 * l);
+              Six       V;
+              if (twists) V = -twists->template block<6, 6>(6 * k, 6 * l);
+              D = PairBlock(ev, e.marker[k], f[k], e.marker[l], f[l], A, twists ? &V : nullptr);
+              if (k == l && Depends(K::acts, 2 * k)) AddLever(ev.bodies, e.marker[k], f[k], -on[k].f, D);
               made = true;
             }
-            const int sb = GroupSize(b.kind, g), sc = GroupSize(c.kind, h);
-            ev.sink.add(*slot++, D.block(GroupOffset(b.kind, g), GroupOffset(c.kind, h), sb, sc), sb, sc);
+            AddBlock(ev.sink, *slot++, D, b.kind, g, c.kind, h);
           }
       }
   }
@@ -303,7 +292,7 @@ private:
       if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
     }
     if constexpr (Z > 0)
-      for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], n + moving + i);
     K::template components<T>(e.data, s, u.data(), T(ev.t), zs.data(), c);
     ev.sink.add(*slot++, Matrix<C, C>(Matrix<C, C>::Identity()), C, C);
     for (int i = 0; i < Z; i++) {
@@ -315,8 +304,8 @@ private:
       const LocalBody &b = Base::bodyOf(ev.bodies, e, k);
       Matrix<C, 6>     J, V = Matrix<C, 6>::Zero(), out = Matrix<C, 6>::Zero();
       for (int r = 0; r < C; r++) {
-        J.row(r) = -c[r].derivatives().template segment<6>(6 * k).transpose();
-        if constexpr (K::damped) V.row(r) = -c[r].derivatives().template segment<6>(n + 6 * k).transpose();
+        J.row(r) = -DerivativeRow<6>(c[r], 6 * k);
+        if constexpr (K::damped) V.row(r) = -DerivativeRow<6>(c[r], n + 6 * k);
       }
       ev.bodies.columns(e.marker[k], f[k], Matrix<C, 6>(J + ev.sv * V), out);
       if constexpr (K::damped) ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, V, out);
@@ -338,14 +327,14 @@ private:
     Matrix<n, n>         frames;
     Matrix<n, C>         columns;
     for (int k = 0; k < M; k++) s[k] = Seed<N>(f[k], 6 * k);
-    for (int i = 0; i < C; i++) c[i] = T(ev.u[e.state + i], N, n + i);
+    for (int i = 0; i < C; i++) c[i] = T(ev.u[e.state + i], n + i);
     K::template apply<T>(e.data, s, c, w);
     for (int k = 0; k < M; k++)
       for (int i = 0; i < 6; i++) {
         const T &x = i < 3 ? w[k].f(i) : w[k].m(i - 3);
         (i < 3 ? on[k].f(i) : on[k].m(i - 3)) = x.value();
-        frames.row(6 * k + i)  = x.derivatives().template head<n>().transpose();
-        columns.row(6 * k + i) = x.derivatives().template tail<C>().transpose();
+        frames.row(6 * k + i)  = DerivativeRow<n>(x, 0);
+        columns.row(6 * k + i) = DerivativeRow<C>(x, n);
       }
     Base::apply(ev, e, f, on);
     Base::bodyBlocks(ev, e, f, on, frames, nullptr, slot);

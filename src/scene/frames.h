@@ -1,22 +1,37 @@
-/* Marker frames, their motion and the loads on them, for numbers of any kind; rotations; automatic differentiation. */
+/* Marker frames, their motion and the loads on them, for numbers of any kind; rotations. */
 #ifndef HHTDAE_SCENE_FRAMES_H
 #define HHTDAE_SCENE_FRAMES_H
 
+#include "dual_vector.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <unsupported/Eigen/AutoDiff>
 
 namespace hhtdae
 {
 
-template <class T> using Vec3 = Eigen::Matrix<T, 3, 1>;
-template <class T> using Mat3 = Eigen::Matrix<T, 3, 3>;
+/* Of plain numbers they are Eigen's. */
+template <class T> struct Vectors {
+  using Vector = DualVector<T>;
+  using Matrix = DualMatrix<T>;
+};
+template <> struct Vectors<double> {
+  using Vector = Eigen::Matrix<double, 3, 1>;
+  using Matrix = Eigen::Matrix<double, 3, 3>;
+};
+template <class T> using Vec3 = typename Vectors<T>::Vector;
+template <class T> using Mat3 = typename Vectors<T>::Matrix;
 template <int R, int C> using Matrix = Eigen::Matrix<double, R, C>;
 
-/* a number with its derivatives in N directions, and with mixed second ones: Dual2<N> x has x.derivatives()(a).derivatives()(b) */
-template <int N> using Dual  = Eigen::AutoDiffScalar<Eigen::Matrix<double, N, 1>>;
-template <int N> using Dual2 = Eigen::AutoDiffScalar<Eigen::Matrix<Dual<N>, N, 1>>;
+/* with mixed second derivatives: x.derivatives()(a).derivatives()(b) */
+template <int N> using Dual2 = Dual<N, Dual<N>>;
+
+/* The derivatives as a row: of N directions, or n of them from the first on */
+template <int N> Eigen::Map<const Matrix<1, N>> DerivativeRow(const Dual<N> &x) { return Eigen::Map<const Matrix<1, N>>(x.derivatives().data()); }
+template <int n, int N> Eigen::Map<const Matrix<1, n>> DerivativeRow(const Dual<N> &x, int first)
+{
+  return Eigen::Map<const Matrix<1, n>>(x.derivatives().data() + first);
+}
 
 /* Everything in space axes. A wrench acts on the body of the marker; its moment is about the marker's origin. */
 template <class T> struct Frame {
@@ -34,13 +49,14 @@ template <class T> struct Wrench {
 template <class T> Mat3<T> Cross(const Vec3<T> &a)
 {
   Mat3<T> c;
-  c << T(0), -a(2), a(1), a(2), T(0), -a(0), -a(1), a(0), T(0);
+  for (int i = 0; i < 3; i++) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    c(i, i) = T(0);
+    c(k, j) = a(i);
+    c(j, k) = -a(i);
+  }
   return c;
 }
-
-/* The plain number inside a dual one */
-inline double Plain(double x) { return x; }
-template <class D> double Plain(const Eigen::AutoDiffScalar<D> &x) { return Plain(x.value()); }
 
 /* f(t) to second order from f, f', f'' at the plain value of t: exact for Dual and Dual2 */
 template <class T> T Taylor(double f, double f1, double f2, const T &t)
@@ -50,14 +66,6 @@ template <class T> T Taylor(double f, double f1, double f2, const T &t)
 }
 inline double Taylor(double f, double, double, double) { return f; }
 
-/* Eigen's own atan2 of duals takes memory for their derivatives, in each call */
-inline double Atan2(double y, double x) { return std::atan2(y, x); }
-template <class D> Eigen::AutoDiffScalar<D> Atan2(const Eigen::AutoDiffScalar<D> &y, const Eigen::AutoDiffScalar<D> &x)
-{
-  const typename D::Scalar r2 = y.value() * y.value() + x.value() * x.value();
-  return {Atan2(y.value(), x.value()), D((y.derivatives() * x.value() - y.value() * x.derivatives()) / r2)};
-}
-
 /*
   Frames of M markers as duals: directions 6k..6k+2 move marker k, 6k+3..6k+5 turn it about the space axes through its own origin,
   R -> (1 + [e]) R. In Dual2 the inner direction b perturbs first and the outer one a after it, R -> (1 + a[e_a])(1 + b[e_b]) R,
@@ -66,7 +74,7 @@ template <class D> Eigen::AutoDiffScalar<D> Atan2(const Eigen::AutoDiffScalar<D>
 template <int N> Frame<Dual<N>> Seed(const Frame<double> &f, int offset)
 {
   Frame<Dual<N>> s;
-  for (int i = 0; i < 3; i++) s.x(i) = Dual<N>(f.x(i), N, offset + i);
+  for (int i = 0; i < 3; i++) s.x(i) = Dual<N>(f.x(i), offset + i);
   for (int c = 0; c < 3; c++) {
     const Mat3<double> turn = -Cross<double>(f.R.col(c)); /* column k: e_k x R_c */
     for (int i = 0; i < 3; i++) {
@@ -100,15 +108,23 @@ template <int N> Twist<Dual<N>> Seed(const Twist<double> &w, int offset)
 {
   Twist<Dual<N>> s;
   for (int i = 0; i < 3; i++) {
-    s.v(i) = Dual<N>(w.v(i), N, offset + i);
-    s.w(i) = Dual<N>(w.w(i), N, offset + 3 + i);
+    s.v(i) = Dual<N>(w.v(i), offset + i);
+    s.w(i) = Dual<N>(w.w(i), offset + 3 + i);
   }
   return s;
 }
 
 /* Constants as duals */
-template <class T> Frame<T> Constant(const Frame<double> &f) { return {f.x.template cast<T>(), f.R.template cast<T>()}; }
-template <class T> Twist<T> Constant(const Twist<double> &w) { return {w.v.template cast<T>(), w.w.template cast<T>()}; }
+template <class T> Vec3<T> Constant(const Vec3<double> &x) { return {T(x(0)), T(x(1)), T(x(2))}; }
+template <class T> Mat3<T> Constant(const Mat3<double> &A)
+{
+  Mat3<T> B;
+  for (int c = 0; c < 3; c++)
+    for (int i = 0; i < 3; i++) B(i, c) = T(A(i, c));
+  return B;
+}
+template <class T> Frame<T> Constant(const Frame<double> &f) { return {Constant<T>(f.x), Constant<T>(f.R)}; }
+template <class T> Twist<T> Constant(const Twist<double> &w) { return {Constant<T>(w.v), Constant<T>(w.w)}; }
 
 } // namespace hhtdae
 

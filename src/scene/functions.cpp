@@ -61,7 +61,7 @@ Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, d
 {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Value  y   = x1 > x0 ? Step(shape, x.value(), x0, h0, x1, h1) : Value{nan, nan, nan};
-  return Real(y.f, y.f1 * x.derivatives());
+  return chain(x, y.f, y.f1);
 }
 
 /* Whether a step of time can be made, else why not */
@@ -198,9 +198,7 @@ TimeFunction TimeFunction::formula(std::function<Number(const Number &)> f)
   if (!f) return faulty("the formula is empty");
   TimeFunction g;
   g.f_ = [f](double t) {
-    using Inner = Number::Scalar;
-    Number       clock(Inner(t, 1, 0), 1, 0);
-    const Number y = f(clock);
+    const Number y = f(Number(Dual<1>(t, 0), 0));
     return Value{y.value().value(), y.value().derivatives()(0), y.derivatives()(0).derivatives()(0)};
   };
   return g;

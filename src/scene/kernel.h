@@ -96,7 +96,7 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
     Dual<N>        phi[R];
     SeedAll<N, M>(f, s);
     K::template value<Dual<N>>(d, s, Dual<N>(t), phi);
-    for (int r = 0; r < R; r++) J.row(r) = phi[r].derivatives().transpose();
+    for (int r = 0; r < R; r++) J.row(r) = DerivativeRow(phi[r]);
   }
 
   template <class Data>
@@ -108,7 +108,7 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
     K::template value<Dual2<N>>(d, s, Dual2<N>(Dual<N>(t)), phi);
     H.setZero();
     for (int r = 0; r < R; r++)
-      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * phi[r].derivatives()(a).derivatives().transpose();
+      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(phi[r].derivatives()(a));
   }
 
   /* partial derivatives Phi_t, Phi_tt; kernels without time inherit zeros */
@@ -119,8 +119,7 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
     if constexpr (K::driven) {
       using T = Dual2<1>;
       Frame<T> s[M];
-      T        phi[R], clock(Dual<1>(t, 1, 0));
-      clock.derivatives()(0) = Dual<1>(1);
+      T        phi[R], clock(Dual<1>(t, 0), 0);
       for (int k = 0; k < M; k++) s[k] = Constant<T>(f[k]);
       K::template value<T>(d, s, clock, phi);
       for (int r = 0; r < R; r++) {
@@ -154,11 +153,11 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
       u[k] = Seed<2 * N + Z>(w[k], N + 6 * k);
     }
     if constexpr (Z > 0)
-      for (int i = 0; i < Z; i++) zs[i] = T(z[i], 2 * N + Z, 2 * N + i);
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], 2 * N + i);
     evaluate<T>(d, s, u, T(t), zs.data(), psi);
     for (int r = 0; r < R; r++) {
-      P.row(r) = psi[r].derivatives().template head<N>().transpose();
-      J.row(r) = psi[r].derivatives().template segment<N>(N).transpose();
+      P.row(r) = DerivativeRow<N>(psi[r], 0);
+      J.row(r) = DerivativeRow<N>(psi[r], N);
       for (int i = 0; i < Z && zj; i++) zj[r * Z + i] = psi[r].derivatives()(2 * N + i);
     }
   }
@@ -194,7 +193,7 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
     evaluate<T>(d, s, u, T(Dual<N>(t)), zs.data(), psi);
     H.setZero();
     for (int r = 0; r < R; r++)
-      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * psi[r].derivatives()(a).derivatives().transpose();
+      for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(psi[r].derivatives()(a));
   }
   template <class Data>
   static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *lambda, Hessian &H)
@@ -251,7 +250,7 @@ template <class K, int M, int C> struct Force {
       if constexpr (K::damped) u[k] = Seed<N>(w[k], n + 6 * k);
     }
     if constexpr (Z > 0)
-      for (int i = 0; i < Z; i++) zs[i] = T(z[i], N, n + moving + i);
+      for (int i = 0; i < Z; i++) zs[i] = T(z[i], n + moving + i);
     K::template components<T>(d, s, u.data(), T(t), zs.data(), c);
     K::template apply<T>(d, s, c, load);
     J.twists.setZero();
@@ -259,9 +258,9 @@ template <class K, int M, int C> struct Force {
       for (int i = 0; i < 6; i++) {
         const T &x = i < 3 ? load[k].f(i) : load[k].m(i - 3);
         (i < 3 ? on[k].f(i) : on[k].m(i - 3)) = x.value();
-        J.frames.row(6 * k + i) = x.derivatives().template head<n>().transpose();
-        if constexpr (K::damped) J.twists.row(6 * k + i) = x.derivatives().template segment<n>(n).transpose();
-        if constexpr (Z > 0) J.inputs.row(6 * k + i) = x.derivatives().template tail<Z>().transpose();
+        J.frames.row(6 * k + i) = DerivativeRow<n>(x, 0);
+        if constexpr (K::damped) J.twists.row(6 * k + i) = DerivativeRow<n>(x, n);
+        if constexpr (Z > 0) J.inputs.row(6 * k + i) = DerivativeRow<Z>(x, N - Z);
       }
   }
 };

@@ -62,13 +62,13 @@ void RigidMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T>
   using std::cos;
   using std::sin;
   const T       sp = sin(q[0]), cp = cos(q[0]), st = sin(q[1]), ct = cos(q[1]), ss = sin(q[2]), cs = cos(q[2]), zero(0);
-  const Vec3<T> z(zero, zero, T(1)), g2(cp, sp, zero), g3(T(sp * st), T(-cp * st), ct), y(T(-sp * ct), T(cp * ct), st),
+  const Vec3<T> z(zero, zero, T(1)), g2(cp, sp, zero), g3(sp * st, -cp * st, ct), y(-sp * ct, cp * ct, st),
       g23 = g2.cross(g3);
   Mat3<T> E;
   E.col(0)          = g2 * cs + y * ss;
   E.col(1)          = y * cs - g2 * ss;
   E.col(2)          = g3;
-  A.noalias()       = E * l.C.cast<T>();
+  A                 = E * Constant<T>(l.C);
   m.w.w             = z * p[0] + g2 * p[1] + g3 * p[2];
   const Vec3<T> zw  = z.cross(m.w.w);
   const T       p12 = p[1] * p[2];
@@ -97,7 +97,7 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   const int          n = Coordinates(l.kind), directions = n == 2 || l.kind == BodyKind::Planar ? 2 : n ? 3 : 0;
   T                  q[6], p[6], s[6];
   for (int c = 0; c < n; c++) {
-    q[c]                          = T(e.u[l.first + c], N, first + c);
+    q[c]                          = T(e.u[l.first + c], first + c);
     p[c]                          = T(e.v[l.first + c]);
     s[c]                          = T(e.a[l.first + c]);
     p[c].derivatives()(first + c) = e.sv;
@@ -107,7 +107,7 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   Vec3<T>         r;
   Mat3<T>         A;
   for (Vec3<T> *x : {&r, &m.w.v, &m.w.w, &m.a, &m.alpha}) x->fill(T(0));
-  for (int i = 0; i < 9; i++) A(i) = T(i % 4 ? 0 : 1);
+  for (int i = 0; i < 9; i++) A(i % 3, i / 3) = T(i % 4 ? 0 : 1);
   for (int i = 0; i < directions; i++) {
     r(i)     = q[i];
     m.w.v(i) = p[i];
@@ -115,8 +115,8 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   }
   if (l.kind == BodyKind::Rigid) RigidMotion<T>(l, q + 3, p + 3, s + 3, A, m);
   if (l.kind == BodyKind::Planar) PlanarMotion<T>(q[2], p[2], s[2], A, m);
-  m.f.R.noalias()   = A * k.R.cast<T>();
-  const Vec3<T> arm = A * k.s.cast<T>();
+  m.f.R             = A * Constant<T>(k.R);
+  const Vec3<T> arm = A * Constant<T>(k.s);
   Attach<T>(r, arm, m);
   return m;
 }
@@ -147,12 +147,12 @@ T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, const MarkerMotion<T>
   case Measure::Displacement:
     return Component<T>(d, frame, m.component);
   case Measure::Distance:
-    return sqrt(T(d.dot(d)));
+    return sqrt(d.dot(d));
   case Measure::Velocity:
     return Component<T>(Difference<T>(i.w.v, j ? &j->w.v : nullptr), frame, m.component);
   case Measure::Rate: {
     const Vec3<T> w  = i.w.v - j->w.v;
-    const T       dw = d.dot(w), l = sqrt(T(d.dot(d)));
+    const T       dw = d.dot(w), l = sqrt(d.dot(d));
     return dw / l;
   }
   case Measure::Acceleration:

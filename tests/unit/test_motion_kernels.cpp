@@ -84,7 +84,7 @@ TEST(Angle, CountsFullTurnsBothWays)
 TEST(Angle, UnwindingKeepsDerivatives)
 {
   using T = Dual<1>;
-  T a(-3, 1, 0);
+  T a(-3, 0);
   EXPECT_NEAR(Unwind<T>(a, 3).value(), -3 + kTurn, 1e-14);
   EXPECT_EQ(Unwind<T>(a, 3).derivatives()(0), 1);
   EXPECT_EQ(Unwind<double>(.25, .3), .25);

@@ -19,7 +19,7 @@ void CheckDirection(ElementBuilder &e, const SpringDamper &s)
                                 " without a direction; move one of them or drop the preload");
 }
 
-void CheckTension(ElementBuilder &e, const Curve &tension, double length, double rate)
+void CheckTension(ElementBuilder &e, const ForceLaw &tension, double length, double rate)
 {
   const Real        y       = tension(Real(length, 2, 0), Real(rate, 2, 1));
   const char       *names[] = {"length", "rate"};

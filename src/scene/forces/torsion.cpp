@@ -18,7 +18,7 @@ void CheckMarkers(ElementBuilder &e, Marker i, Marker j)
               "the x axis of marker i is along the z axis of j, the angle about it is undefined; turn marker i");
 }
 
-void CheckMoment(ElementBuilder &e, const Curve &moment, double angle, double rate)
+void CheckMoment(ElementBuilder &e, const ForceLaw &moment, double angle, double rate)
 {
   const Real        y       = moment(Real(angle, 2, 0), Real(rate, 2, 1));
   const char       *names[] = {"angle", "rate"};

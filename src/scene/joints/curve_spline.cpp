@@ -9,11 +9,11 @@ namespace hhtdae
 namespace
 {
 
-using Vectors = std::vector<Vec3<double>>;
+using Points = std::vector<Vec3<double>>;
 
 /* diagonal d, off-diagonals e (e[k] between k and k + 1), symmetric and diagonally dominant; x comes in as the
  * right-hand side */
-void SolveTridiagonal(std::vector<double> d, const std::vector<double> &e, Vectors &x)
+void SolveTridiagonal(std::vector<double> d, const std::vector<double> &e, Points &x)
 {
   const std::size_t n = d.size();
   for (std::size_t k = 1; k < n; k++) {
@@ -29,11 +29,11 @@ void SolveTridiagonal(std::vector<double> d, const std::vector<double> &e, Vecto
 
 /* the same with a corner e[n - 1] between the last and the first, as A' + u v^T by the formula of Sherman and Morrison:
    u = (g, 0, ..., corner), v = (1, 0, ..., corner/g), g = -d[0] */
-void SolveCyclic(std::vector<double> d, const std::vector<double> &e, Vectors &x)
+void SolveCyclic(std::vector<double> d, const std::vector<double> &e, Points &x)
 {
   const std::size_t last   = d.size() - 1;
   const double      corner = e[last], g = -d[0], v = corner / g;
-  Vectors           y(d.size(), Vec3<double>::Zero());
+  Points           y(d.size(), Vec3<double>::Zero());
   d[0] -= g;
   d[last] -= corner * v;
   y[0].setConstant(g);
@@ -45,11 +45,11 @@ void SolveCyclic(std::vector<double> d, const std::vector<double> &e, Vectors &x
 }
 
 /* Second derivatives at the knots */
-Vectors SecondDerivatives(const std::vector<double> &s, const Vectors &y, bool periodic)
+Points SecondDerivatives(const std::vector<double> &s, const Points &y, bool periodic)
 {
   const std::size_t   n = s.size() - 1; /* pieces */
   std::vector<double> d, e;
-  Vectors             b, m(n + 1, Vec3<double>::Zero());
+  Points             b, m(n + 1, Vec3<double>::Zero());
   const auto          h     = [&](std::size_t k) { return s[k + 1] - s[k]; };
   const auto          slope = [&](std::size_t k) -> Vec3<double> { return (y[k + 1] - y[k]) / h(k); };
   for (std::size_t k = periodic ? 0 : 1; k < n; k++) {
@@ -75,11 +75,11 @@ constexpr int kParts = 4; /* nodes of the normal per piece of the path */
 
 } // namespace
 
-VectorSpline::VectorSpline(std::vector<double> knots, const Vectors &y, bool periodic)
+VectorSpline::VectorSpline(std::vector<double> knots, const Points &y, bool periodic)
     : periodic_(periodic), knots_(std::move(knots))
 {
   const std::size_t n = knots_.size() - 1;
-  const Vectors     m = SecondDerivatives(knots_, y, periodic);
+  const Points     m = SecondDerivatives(knots_, y, periodic);
   pieces_.resize(n + 2);
   for (std::size_t k = 0; k < n; k++) {
     const double h = knots_[k + 1] - knots_[k];
@@ -99,7 +99,7 @@ VectorSpline::VectorSpline(std::vector<double> knots, const Vectors &y, bool per
   }
 }
 
-Curve::Curve(Vectors points, bool closed, bool planar) : planar_(planar)
+Curve::Curve(Points points, bool closed, bool planar) : planar_(planar)
 {
   if (!checkPoints(points, closed)) return;
   if (closed) points.push_back(points.front());
@@ -114,7 +114,7 @@ Curve::Curve(Vectors points, bool closed, bool planar) : planar_(planar)
 }
 
 /* A closed curve may repeat its first point at the end; the repetition is dropped. */
-bool Curve::checkPoints(Vectors &points, bool closed)
+bool Curve::checkPoints(Points &points, bool closed)
 {
   double size = 0;
   for (std::size_t k = 0; k < points.size(); k++) {
@@ -148,7 +148,7 @@ bool Curve::checkPoints(Vectors &points, bool closed)
 void Curve::transportNormal(bool closed)
 {
   std::vector<double> s;
-  Vectors             t, m;
+  Points             t, m;
   Vec3<double>        c, c1, c2;
   const auto         &knots = path_.knots();
   for (std::size_t k = 0; k < knots.size(); k++)

@@ -32,7 +32,8 @@ template <class T> T Unwind(const T &theta, double near)
 template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
 {
   const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
-  return Atan2(s, c);
+  using std::atan2;
+  return atan2(s, c);
 }
 
 /* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn

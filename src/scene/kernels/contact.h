@@ -28,6 +28,16 @@ template <class T> Frame<double> PlainFrame(const Frame<T> &f)
   return p;
 }
 
+/* Derivatives of where two shapes touch by the 12 directions of their frames */
+struct ContactMovement {
+  Matrix<1, 12> depth;
+  Matrix<3, 12> normal, point;
+};
+
+/* The force on i at slip velocity v, and the derivatives of both wrenches, by the chain rule: the law along the 7 of (d, n, v) */
+Vector3 ContactDerivatives(const ContactLawData &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
+                           const Twist<double> *w, Matrix<12, 12> &frames, Matrix<12, 12> &twists);
+
 template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
   static constexpr const char *name           = Shape::name;
   static constexpr bool        needs_rotation = Shape::axes_of_j; /* spheres have no axes */
@@ -129,8 +139,6 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     }
   }
 
-  /* The chain rule by hand: depth, normal and point along the 12 directions of the frames; the law along the 7 of (d,
-   * n, v) */
   template <int Z>
   static void jacobian(const Data &d, const Frame<double> *f, const Twist<double> *w, double, const double *,
                        Wrench<double> *on, ForceJacobian<2, Z> &J)
@@ -143,58 +151,15 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
 
     Frame<Dual<12>> s[2];
     Touch<Dual<12>> moved;
+    ContactMovement by;
     SeedAll<12, 2>(f, s);
     Shape::template touch<Dual<12>>(d.shape, s, moved);
-    Matrix<1, 12> depth = moved.depth.derivatives().transpose();
-    Matrix<3, 12> normal, point, slide, F, Fw;
+    by.depth = DerivativeRow(moved.depth);
     for (int k = 0; k < 3; k++) {
-      normal.row(k) = moved.n(k).derivatives().transpose();
-      point.row(k)  = moved.p(k).derivatives().transpose();
+      by.normal.row(k) = DerivativeRow(moved.n(k));
+      by.point.row(k)  = DerivativeRow(moved.p(k));
     }
-    const Vector3 ri = t.p - f[0].x, rj = t.p - f[1].x;
-    slide = Cross<double>(w[0].w - w[1].w) * point;
-    slide.template middleCols<3>(0) -= Cross<double>(w[0].w);
-    slide.template middleCols<3>(6) += Cross<double>(w[1].w);
-
-    const Vector3 force = lawGradient(d.law, t, slip<double>(f, w, t.p), depth, normal, slide, F, Fw, ri, rj);
-    place<double>(f, t.p, force, on);
-    const Matrix3 cross = Cross<double>(force), arm_i = Cross<double>(ri), arm_j = Cross<double>(rj);
-    J.frames.template middleRows<3>(0) = F;
-    J.frames.template middleRows<3>(3) = arm_i * F - cross * point;
-    J.frames.template block<3, 3>(3, 0) += cross;
-    J.frames.template middleRows<3>(6) = -F;
-    J.frames.template middleRows<3>(9) = cross * point - arm_j * F;
-    J.frames.template block<3, 3>(9, 6) -= cross;
-    J.twists.template middleRows<3>(0) = Fw;
-    J.twists.template middleRows<3>(3) = arm_i * Fw;
-    J.twists.template middleRows<3>(6) = -Fw;
-    J.twists.template middleRows<3>(9) = -arm_j * Fw;
-  }
-
-private:
-  /* dF/d frames and dF/d twists from the derivatives of depth, normal and slip velocity along the frames' directions;
-   * returns F */
-  static Vector3 lawGradient(const ContactLawData &law, const Touch<double> &t, const Vector3 &v,
-                             const Matrix<1, 12> &depth, const Matrix<3, 12> &normal, const Matrix<3, 12> &slide,
-                             Matrix<3, 12> &F, Matrix<3, 12> &Fw, const Vector3 &ri, const Vector3 &rj)
-  {
-    using T = Dual<7>;
-    Vec3<T> ns, vs;
-    for (int k = 0; k < 3; k++) {
-      ns(k) = T(t.n(k), 7, 1 + k);
-      vs(k) = T(v(k), 7, 4 + k);
-    }
-    const Vec3<T> force = ContactForce<T>(law, T(t.depth, 7, 0), ns, vs);
-    Vector3       value;
-    Matrix<3, 7>  L;
-    for (int k = 0; k < 3; k++) {
-      value(k) = force(k).value();
-      L.row(k) = force(k).derivatives().transpose();
-    }
-    const Matrix3 Lv = L.rightCols<3>();
-    F                = L.col(0) * depth + L.middleCols<3>(1) * normal + Lv * slide;
-    Fw << Lv, -Lv * Cross<double>(ri), -Lv, Lv * Cross<double>(rj);
-    return value;
+    place<double>(f, t.p, ContactDerivatives(d.law, t, slip<double>(f, w, t.p), by, f, w, J.frames, J.twists), on);
   }
 };
 

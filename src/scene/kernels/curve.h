@@ -36,10 +36,10 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
     const Vec3<double> local = Local<double>(f);
     Dual<3>            phi[R];
     Vec3<Dual<3>>      p;
-    for (int i = 0; i < 3; i++) p(i) = Dual<3>(local(i), 3, i);
+    for (int i = 0; i < 3; i++) p(i) = Dual<3>(local(i), i);
     data.curve->misfit(p, data.memory[0], R, phi);
     Matrix<R, 3> G;
-    for (int r = 0; r < R; r++) G.row(r) = phi[r].derivatives().transpose();
+    for (int r = 0; r < R; r++) G.row(r) = DerivativeRow(phi[r]);
     J = G * Motion(f);
   }
   static void curvature(const Data &data, const Frame<double> *f, double, const double *lambda,
@@ -50,15 +50,12 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
     Vec3<Dual2<3>>     p;
     Vec3<double>       g = Vec3<double>::Zero();
     Mat3<double>       K = Mat3<double>::Zero();
-    for (int i = 0; i < 3; i++) {
-      p(i)                  = Dual2<3>(Dual<3>(local(i), 3, i));
-      p(i).derivatives()(i) = Dual<3>(1);
-    }
+    for (int i = 0; i < 3; i++) p(i) = Dual2<3>(Dual<3>(local(i), i), i);
     data.curve->misfit(p, data.memory[0], R, phi);
     for (int r = 0; r < R; r++)
       for (int a = 0; a < 3; a++) {
         g(a) += lambda[r] * phi[r].derivatives()(a).value();
-        K.row(a) += lambda[r] * phi[r].derivatives()(a).derivatives().transpose();
+        K.row(a) += lambda[r] * DerivativeRow(phi[r].derivatives()(a));
       }
     const Matrix<3, 12> A = Motion(f);
     AlongAxesCurvature(f[0].x - f[1].x, -f[1].R * g, H);

@@ -121,7 +121,7 @@ private:
   template <class T> static Vec3<T> Unit(const Vec3<T> &v)
   {
     using std::sqrt;
-    const T factor = T(1) / sqrt(T(v.squaredNorm()));
+    const T factor = T(1) / sqrt(v.squaredNorm());
     return v * factor;
   }
   bool checkPoints(std::vector<Vec3<double>> &points, bool closed);

@@ -55,7 +55,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
   template <class T> static T leverComponent(const Vec3<T> &x, int axis, int c)
   {
     const int a = (axis + 1) % 3, b = (axis + 2) % 3; /* e x x = -x_b a + x_a b, with (e, a, b) right-handed */
-    return c == a ? T(-x(b)) : c == b ? T(x(a)) : T(0);
+    return c == a ? -x(b) : c == b ? x(a) : T(0);
   }
 
   /* of a wheel about z of its bearing: z_i on the side of z_j on which it started */

@@ -27,6 +27,17 @@ template <class T> struct Relative {
   Vec3<T> v, wi, wj; /* v_i - v_j, angular velocities; undefined where the kernel is not damped */
 };
 
+/* What the matrix needs of a kernel at one state */
+struct RelativeDerivatives {
+  double       c[6];       /* components */
+  Matrix<6, 6> frame;      /* their derivatives by (d, phi) */
+  Matrix<6, 9> motion;     /* and by (v, w_i, w_j); undefined where the kernel is not damped */
+  Mat3<double> spin, turn; /* S, P */
+};
+
+/* Derivatives of both wrenches by the frames and, unless null, by the twists */
+void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDerivatives &by, Matrix<12, 12> &frames, Matrix<12, 12> *twists);
+
 template <class K, bool Damped> struct RelativeForce : Force<K, 2, 6> {
   static constexpr bool damped = Damped, symmetric = !Damped;
 
@@ -87,87 +98,39 @@ template <class K, bool Damped> struct RelativeForce : Force<K, 2, 6> {
   {
     Mat3<double>           E;
     const Relative<double> r = relative<double>(f, w, E);
-    double                 c[6];
-    Matrix<6, 6>           frame;
-    Matrix<6, 9>           motion;
-    differentiate(data, r, c, frame, motion);
-    balance<double>(E, f[0].x - f[1].x, c, on);
-
-    const Vec3<double> cf(c[0], c[1], c[2]), cm(c[3], c[4], c[5]), cj = cm + r.d.cross(cf);
-    const Mat3<double> S = K::spin(r.phi), P = K::turn(r.phi), D = Cross<double>(r.d), F = Cross<double>(cf);
-
-    /* columns theta_x, theta_i, theta_j; rows force on i, moment on i, minus the moment on j */
-    Matrix<9, 9> L;
-    Matrix<6, 3> spun = frame.template leftCols<3>() * D; /* by e */
-    if constexpr (Damped)
-      spun += motion.template leftCols<3>() * Cross<double>(r.v) +
-              motion.template middleCols<3>(3) * Cross<double>(r.wi) +
-              motion.template rightCols<3>() * Cross<double>(r.wj);
-    const Matrix<6, 3> turned    = frame.template rightCols<3>() * P;
-    L.template block<6, 3>(0, 0) = frame.template leftCols<3>();
-    L.template block<6, 3>(0, 3) = turned + spun * S;
-    L.template block<6, 3>(0, 6) = spun - spun * S - turned;
-    /* cm + d x cf, of which [cf] acts on dd = theta_x + [d] e */
-    L.template bottomRows<3>() = L.template middleRows<3>(3) + D * L.template topRows<3>();
-    L.template block<3, 3>(6, 0) -= F;
-    const Mat3<double> FD = F * D;
-    L.template block<3, 3>(6, 3) -= FD * S;
-    L.template block<3, 3>(6, 6) -= FD - FD * S;
-    /* the turning of the axes */
-    Matrix<9, 3> carried;
-    carried << F, Cross<double>(cm), Cross<double>(cj);
-    const Matrix<9, 3> carried_i = carried * S;
-    L.template middleCols<3>(3) -= carried_i;
-    L.template rightCols<3>() -= carried - carried_i;
-    spread(E, L, J.frames);
-    if constexpr (Damped) {
-      L.template topRows<6>()    = motion;
-      L.template bottomRows<3>() = motion.template bottomRows<3>() + D * motion.template topRows<3>();
-      spread(E, L, J.twists);
-    } else
-      J.twists.setZero();
+    RelativeDerivatives    by;
+    by.spin = K::spin(r.phi);
+    by.turn = K::turn(r.phi);
+    differentiate(data, r, by);
+    balance<double>(E, f[0].x - f[1].x, by.c, on);
+    Spread(E, r, by, J.frames, Damped ? &J.twists : nullptr);
+    if constexpr (!Damped) J.twists.setZero();
   }
 
 private:
   /* components and their derivatives in (d, phi) and (v, w_i, w_j) */
   template <class Data>
-  static void differentiate(const Data &data, const Relative<double> &r, double *c, Matrix<6, 6> &frame,
-                            Matrix<6, 9> &motion)
+  static void differentiate(const Data &data, const Relative<double> &r, RelativeDerivatives &by)
   {
     constexpr int N = Damped ? 15 : 6;
     using T         = Dual<N>;
     Relative<T> s;
     T           y[6];
     for (int k = 0; k < 3; k++) {
-      s.d(k)   = T(r.d(k), N, k);
-      s.phi(k) = T(r.phi(k), N, 3 + k);
+      s.d(k)   = T(r.d(k), k);
+      s.phi(k) = T(r.phi(k), 3 + k);
       if constexpr (Damped) {
-        s.v(k)  = T(r.v(k), N, 6 + k);
-        s.wi(k) = T(r.wi(k), N, 9 + k);
-        s.wj(k) = T(r.wj(k), N, 12 + k);
+        s.v(k)  = T(r.v(k), 6 + k);
+        s.wi(k) = T(r.wi(k), 9 + k);
+        s.wj(k) = T(r.wj(k), 12 + k);
       }
     }
     K::template local<T>(data, s, y);
     for (int k = 0; k < 6; k++) {
-      c[k]         = y[k].value();
-      frame.row(k) = y[k].derivatives().template head<6>().transpose();
-      if constexpr (Damped) motion.row(k) = y[k].derivatives().template tail<9>().transpose();
+      by.c[k]         = y[k].value();
+      by.frame.row(k) = DerivativeRow<6>(y[k], 0);
+      if constexpr (Damped) by.motion.row(k) = DerivativeRow<9>(y[k], 6);
     }
-  }
-
-  /* from the axes E to space, and from relative to both markers */
-  static void spread(const Mat3<double> &E, const Matrix<9, 9> &L, Matrix<12, 12> &J)
-  {
-    for (int col = 0; col < 3; col++) {
-      const int to = col == 0 ? 0 : col == 1 ? 3 : 9;
-      for (int row = 0; row < 3; row++) {
-        const Mat3<double> B = E * L.template block<3, 3>(3 * row, 3 * col) * E.transpose();
-        if (row < 2) J.template block<3, 3>(3 * row, to) = B;
-        if (row == 0) J.template block<3, 3>(6, to) = -B;
-        if (row == 2) J.template block<3, 3>(9, to) = -B;
-      }
-    }
-    J.template middleCols<3>(6) = -J.template leftCols<3>();
   }
 };
 

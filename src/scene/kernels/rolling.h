@@ -21,18 +21,11 @@ struct RollingData {
   double radius = 1, side = 1;
 };
 
-/* Eigen's own holds on to temporaries of duals */
-template <class T> Vec3<T> CrossProduct(const Vec3<T> &a, const Vec3<T> &b)
-{
-  const T x = a(1) * b(2) - a(2) * b(1), y = a(2) * b(0) - a(0) * b(2), z = a(0) * b(1) - a(1) * b(0);
-  return {x, y, z};
-}
-
 /* Velocity of i's body at the point of contact, seen from j's body */
 template <class T> Vec3<T> SlipVelocity(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &arm)
 {
   const Vec3<T> lever = f[0].x - f[1].x + arm;
-  const Vec3<T> on_i = CrossProduct<T>(w[0].w, arm), on_j = CrossProduct<T>(w[1].w, lever);
+  const Vec3<T> on_i = w[0].w.cross(arm), on_j = w[1].w.cross(lever);
   return w[0].v + on_i - w[1].v - on_j;
 }
 
@@ -57,7 +50,7 @@ struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
   {
     using std::sqrt;
     const Vec3<T> q = Upward<T>(data.side, f), d = f[0].x - f[1].x;
-    const T       length = sqrt(T(q.squaredNorm()));
+    const T       length = sqrt(q.squaredNorm());
     phi[0]               = length * T(data.radius) - d.dot(f[1].R.col(2)) * T(data.side);
   }
 };
@@ -76,7 +69,7 @@ struct DiscNoSlip : VelocityConstraint<DiscNoSlip, 2, 2> {
   {
     using std::sqrt;
     const Vec3<T> q      = Upward<T>(data.side, f);
-    const T       factor = T(-data.radius) / sqrt(T(q.squaredNorm()));
+    const T       factor = T(-data.radius) / sqrt(q.squaredNorm());
     const Vec3<T> slip   = SlipVelocity<T>(f, w, q * factor);
     for (int r = 0; r < 2; r++) psi[r] = -slip.dot(f[1].R.col(r));
   }

@@ -29,14 +29,14 @@ template <class T> Quaternion<T> UnitQuaternion(const Mat3<T> &R)
   for (int k = 1; k < 3; k++)
     if (Plain(R(k, k)) > Plain(R(i, i))) i = k;
   if (Plain(trace) >= Plain(R(i, i))) {
-    const T s = sqrt(T(T(1) + trace)), r = T(0.5) / s;
+    const T s = sqrt(T(1) + trace), r = T(0.5) / s;
     q.w    = T(0.5) * s;
     q.v(0) = r * (R(2, 1) - R(1, 2));
     q.v(1) = r * (R(0, 2) - R(2, 0));
     q.v(2) = r * (R(1, 0) - R(0, 1));
   } else {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const T   s = sqrt(T(T(1) + T(2) * R(i, i) - trace)), r = T(0.5) / s;
+    const T   s = sqrt(T(1) + T(2) * R(i, i) - trace), r = T(0.5) / s;
     q.w    = r * (R(k, j) - R(j, k));
     q.v(i) = T(0.5) * s;
     q.v(j) = r * (R(j, i) + R(i, j));
@@ -63,7 +63,7 @@ template <class T> Mat3<T> RotationMatrix(const Quaternion<T> &q)
 template <class T> Quaternion<T> HalfTurn(const Quaternion<T> &q)
 {
   using std::sqrt;
-  const T       w1 = T(1) + q.w, r = T(1) / sqrt(T(T(2) * w1));
+  const T       w1 = T(1) + q.w, r = T(1) / sqrt(T(2) * w1);
   Quaternion<T> h;
   h.w = w1 * r;
   h.v = q.v * r;
@@ -72,6 +72,7 @@ template <class T> Quaternion<T> HalfTurn(const Quaternion<T> &q)
 
 template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
 {
+  using std::atan2;
   using std::sqrt;
   const T v2 = q.v.dot(q.v);
   T       factor;
@@ -80,7 +81,7 @@ template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
     factor    = (T(1) - y * (T(1. / 3) - y * (T(1. / 5) - y * (T(1. / 7) - y * T(1. / 9))))) * T(2) / q.w;
   } else {
     const T v = sqrt(v2);
-    factor    = T(2) * Atan2(v, q.w) / v;
+    factor    = T(2) * atan2(v, q.w) / v;
   }
   return q.v * factor;
 }

@@ -12,7 +12,6 @@
 #include "hhtdae/functions.h"
 #include "scene/kernel.h"
 #include <cmath>
-#include <functional>
 #include <type_traits>
 
 namespace hhtdae
@@ -30,7 +29,7 @@ template <class T> struct Line {
     const T       l2 = d.dot(d);
     if (Plain(l2) > 0) {
       length = sqrt(l2);
-      along  = d * T(T(1) / length);
+      along  = d * (T(1) / length);
     } else {
       length = T(0);
       along  = Vec3<T>(T(0), T(0), T(0));
@@ -136,30 +135,20 @@ template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
   }
 };
 
-/* A function of two numbers that its user gives */
-using Curve = std::function<Real(const Real &, const Real &)>;
-
 /* f(a, b) to first order from its value and two derivatives at the plain numbers: exact for double and Dual */
-template <class T> T Evaluate(const Curve &f, const T &a, const T &b)
+template <class T> T Evaluate(const ForceLaw &f, const T &a, const T &b)
 {
   const Real y = f(Real(Plain(a), 2, 0), Real(Plain(b), 2, 1));
-  if constexpr (std::is_same_v<T, double>)
-    return y.value();
-  else {
-    T r(y.value());
-    if (y.derivatives().size() == 2) { /* a constant has none */
-      const double fa = y.derivatives()(0), fb = y.derivatives()(1);
-      r += (a - T(Plain(a))) * T(fa) + (b - T(Plain(b))) * T(fb);
-    }
-    return r;
-  }
+  if constexpr (std::is_same_v<T, double>) return y.value();
+  else if (y.derivatives().size() == 0) return T(y.value()); /* a constant */
+  else return chain(a, y.derivatives()(0), b, y.derivatives()(1), y.value());
 }
 
 /* tension f(l, l') */
 struct CurveSpring : LineForce<CurveSpring> {
   static constexpr const char *name = "nonlinear spring";
   struct Data {
-    Curve tension;
+    ForceLaw tension;
   };
 
   template <class T>

@@ -101,8 +101,8 @@ template <bool Damped> struct LinearTorsion : TurnForce<LinearTorsion<Damped>> {
 struct CurveTorsion : TurnForce<CurveTorsion> {
   static constexpr const char *name = "nonlinear torsional spring";
   struct Data {
-    double memory[1];
-    Curve  moment;
+    double   memory[1];
+    ForceLaw moment;
   };
 
   template <class T>
@@ -117,7 +117,7 @@ struct CurveTorsion : TurnForce<CurveTorsion> {
   {
     const double angle = UnwoundAngle<double>(f[0], f[1], p.memory[0]),
                  rate  = AngleRate<double>(f[0], f[1], w[0], w[1]);
-    Dual<2> M          = Evaluate<Dual<2>>(p.moment, Dual<2>(angle, 2, 0), Dual<2>(rate, 2, 1));
+    Dual<2> M          = Evaluate<Dual<2>>(p.moment, Dual<2>(angle, 0), Dual<2>(rate, 1));
     double  value      = M.value();
     apply<double>(p, f, &value, on);
     spread(value, M.derivatives()(0), M.derivatives()(1), f, w, J.frames, J.twists);

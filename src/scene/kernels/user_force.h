@@ -71,7 +71,7 @@ struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   {
     using std::sqrt;
     const Vec3<T> d = f[0].x - f[1].x;
-    const T       k = c[0] / sqrt(T(d.dot(d)));
+    const T       k = c[0] / sqrt(d.dot(d));
     on[0].f         = d * k;
     on[1].f         = -on[0].f;
     for (int i = 0; i < 2; i++) on[i].m.fill(T(0));

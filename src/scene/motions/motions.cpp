@@ -25,9 +25,7 @@ Expression Rate(const TimeFunction &f)
 {
   return {{Measure::time()}, [f](const Real *m) {
             const TimeFunction::Value v = f(m[0].value());
-            Real                      rate(v.f);
-            rate.derivatives() = v.f1 * m[0].derivatives();
-            return rate;
+            return chain(m[0], v.f, v.f1);
           }};
 }
 

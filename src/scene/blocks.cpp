@@ -1,0 +1,36 @@
+#include "blocks.h"
+
+namespace hhtdae
+{
+
+Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &A,
+              const Six *V)
+{
+  Six right = Six::Zero(), both = Six::Zero();
+  if (V) {
+    ev.bodies.columns(column, at_column, Six(A + ev.sv * *V), right);
+    ev.bodies.convectiveColumns(column, at_column, ev.v, *V, right);
+  } else
+    ev.bodies.columns(column, at_column, A, right);
+  ev.bodies.columns(row, at_row, Six(right.transpose()), both);
+  return both.transpose();
+}
+
+void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const Vector3 &f, Six &H)
+{
+  const PetscInt b = B.marker[marker].body;
+  const BodyKind k = B.body[b].kind;
+  const Vector3  s = at.x - B.now[b].r;
+  if (k == BodyKind::Planar) H(2, 2) -= f(0) * s(0) + f(1) * s(1);
+  if (k != BodyKind::Rigid) return;
+  const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
+  H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
+}
+
+void AddBlock(const Sink &sink, const Slot &slot, const Six &D, BodyKind row, int g, BodyKind column, int h)
+{
+  const int rows = GroupSize(row, g), columns = GroupSize(column, h);
+  sink.add(slot, D.block(GroupOffset(row, g), GroupOffset(column, h), rows, columns), rows, columns);
+}
+
+} // namespace hhtdae
