@@ -29,6 +29,8 @@ struct IDASettings {
                                           still looks at: with 1 it fails at small tolerances */
   long   maxSteps  = 20000;            /* after which IDA looks whether the time is over */
   double maxStep   = 0.;               /* largest step; 0: none */
+  double newton    = 0.; /* part of the error test at which its iteration ends, in up to ten corrections; 0: IDA's own, a third, in up to
+                            four. With that a matrix that is older than the end of a strong damper holds on to it. */
   double firstStep = 0.; /* 0: 0.01 sqrt(eps) of the run. IDA's own is so short where velocities are tested that
                             rounding drowns the accelerations and the first step fails. */
   /* sees every output point: t, U, U', U'' */
@@ -124,6 +126,10 @@ private:
     createMatrix();
     check(IDASetLinearSolver(memory_, solver_, matrix_), "IDASetLinearSolver");
     check(IDASetJacFn(memory_, jacobian), "IDASetJacFn");
+    if (settings_.newton > 0.) {
+      check(IDASetNonlinConvCoef(memory_, settings_.newton), "IDASetNonlinConvCoef");
+      check(IDASetMaxNonlinIters(memory_, 10), "IDASetMaxNonlinIters");
+    }
   }
 
   void createMatrix()

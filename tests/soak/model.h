@@ -20,6 +20,7 @@ struct Model {
   int                    bodies = 0;
   double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
   double                 jump = 0; /* acceleration with which what is let go sets off; 0: nothing is */
+  Impact                 impact; /* of hard contacts */
   std::vector<Observed>  observed;  /* what each channel of the scene is */
   std::map<std::string, int> types; /* elements by type, and features */
 };
@@ -184,6 +185,7 @@ private:
         }
     m.switched = true;
     m.jump     = b.weightPerMass();
+    m.impact   = switches.impact;
     b.lossy    = true;
   }
 

@@ -129,7 +129,7 @@ inline Way    WayOf(int k)
 }
 
 /* One leg, until IDA stops; the state at the last output point it got to becomes the start of the next */
-inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, double eps, double seconds,
+inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, double eps, double newton, double seconds,
                              std::string *failure)
 {
   std::vector<double> times, values;
@@ -140,6 +140,7 @@ inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, dou
     times.push_back(k == samples * fine ? leg.t1 : leg.t1 * k / (samples * fine));
   settings.form          = WayOf(way).form;
   settings.looser        = WayOf(way).looser;
+  settings.newton        = newton;
   settings.testVelocity  = settings.form == wp::FirstOrder::Form::Stabilized;
   double              at = leg.t0;
   std::vector<double> u, v, a;
@@ -167,7 +168,7 @@ inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, dou
   PetscFunctionReturn(failed);
 }
 
-inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double seconds)
+inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, double seconds)
 {
   std::string failure;
   PetscFunctionBegin;
@@ -182,7 +183,7 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double seconds)
   const double start = CpuSeconds();
   for (int point = 0, stuck = 0, way = 0; point < samples * fine;) {
     const int before = point;
-    PetscCall(RunLeg(r, leg, point, way, eps, seconds - (CpuSeconds() - start), &failure));
+    PetscCall(RunLeg(r, leg, point, way, eps, newton, seconds - (CpuSeconds() - start), &failure));
     if (failure.empty()) break;
     const bool late = r.legs > 100 || CpuSeconds() - start > seconds;
     stuck           = point == before ? stuck + 1 : 0;
@@ -199,12 +200,13 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double seconds)
   PetscFunctionReturn(0);
 }
 
-inline Trajectory RunIDA(Model model, double eps, double seconds, int *legs)
+/* newton: see wp::IDASettings */
+inline Trajectory RunIDA(Model model, double eps, double seconds, int *legs, double newton = 0)
 {
   ReferenceRun r;
   Quiet        quiet;
   r.model = std::move(model);
-  if (SolveByIDA(r, eps, seconds)) r.result.failure = "IDA: " + quiet.message;
+  if (SolveByIDA(r, eps, newton, seconds)) r.result.failure = "IDA: " + quiet.message;
   if (r.result.failure.empty() && (int)r.result.x.size() != samples) r.result.failure = "IDA ended early";
   *legs = r.legs;
   return r.result;

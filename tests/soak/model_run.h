@@ -65,6 +65,7 @@ struct Settings {
   double            radius    = -1;    /* negative: as it comes */
   bool              options   = false; /* from the command line */
   double            seconds   = 1e9;
+  double            first     = 0;     /* first step, from which steps grow by a fifth at most; 0: as they come */
   double            corrector = 0;     /* 0: as it comes */
   bool              laws      = false; /* judge the balance of every body */
   double            tolerance = 0;     /* of the laws: that of the run, and what the corrector may leave of a position, */
@@ -181,6 +182,12 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
   if (s.paper) PetscCall(TSHHT3SetForm(ts, TSHHT3_FORM_PAPER));
   if (s.radius >= 0) PetscCall(TSHHT3SetRadius(ts, s.radius));
   if (s.corrector > 0) PetscCall(TSHHT3SetCorrectorTolerance(ts, s.corrector));
+  if (s.first > 0) {
+    TSAdapt adapt;
+    PetscCall(TSSetTimeStep(ts, s.first));
+    PetscCall(TSGetAdapt(ts, &adapt));
+    PetscCall(TSAdaptSetClip(adapt, 0.1, 1.2));
+  }
   if (s.options) PetscCall(TSSetFromOptions(ts));
   if (!s.resume.empty()) PetscCall(TSHHT3CheckpointLoad(ts, s.resume.c_str()));
   if (s.until) {

@@ -30,11 +30,16 @@ struct Gate {
   }
 };
 
+struct Impact {
+  double time = 1e300, speed = 0, frequency = 0; /* the first, the largest and the highest one */
+};
+
 class Switches
 {
 public:
   Switches(Builder &builder, double end) : b(builder), r(builder.random), end_(end) {}
   std::vector<Marker> seen; /* of the bodies that are let go or held */
+  Impact              impact;
 
   void any()
   {
@@ -255,6 +260,17 @@ private:
     b.used["switched bushing"]++;
   }
 
+  /* A mass m at rest meets a contact after a way `gap` under the acceleration a. Its frequency is its speed v over the depth at which the energy
+     of the contact is m v^2/2. */
+  void meets(double m, double gap, double a, const ContactLaw &law)
+  {
+    const double v     = std::sqrt(2 * a * gap),
+                 depth = std::pow(0.5 * (law.exponent + 1) * m * v * v / law.stiffness, 1 / (law.exponent + 1));
+    impact.time      = std::min(impact.time, v / a);
+    impact.speed     = std::max(impact.speed, v);
+    impact.frequency = std::max(impact.frequency, v / depth);
+  }
+
   /* A ball that falls on a hard plane, or is pushed to it */
   void contact()
   {
@@ -272,6 +288,7 @@ private:
     law.stiffness     = m * r.logarithmic(1e2, 1e10) * rate() * rate() * std::pow(b.length, 1 - law.exponent);
     law.damping       = r.uniform(0.5, 2) / (push * end_);
     law.friction      = r.chance(0.5) ? r.uniform(0.1, 0.8) : 0;
+    meets(m, gap, push, law);
     law.slip_velocity = b.length * rate() * r.logarithmic(1e-3, 1e-2);
     const Matrix3 R   = b.planar ? b.axesFrom(Vector3(up(1), -up(0), 0)) : b.axesAlong(up);
     b.add(SpherePlane{b.at(ball, at), b.at(0, at - (size + gap) * up, R), size, law, b.state()});
