@@ -9,7 +9,7 @@
 #include "hhtdae/scene.h"
 #include "model_parts.h"
 #include "model_random.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 #include <map>
 #include <memory>
 #include <string>
