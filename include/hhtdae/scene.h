@@ -151,7 +151,7 @@ public:
   /* joints, motions, forces: joints.h, forces.h */
   template <class Spec, std::enable_if_t<!is_description<Spec>, int> = 0> Element add(const std::string &name, const Spec &spec)
   {
-    if (keeps()) keep([=](Scene &s) { s.enter(name, spec); });
+    if (recording()) record([=](Scene &s) { s.enter(name, spec); });
     return enter(name, spec);
   }
 
@@ -182,35 +182,35 @@ public:
   PetscErrorCode set(const std::string &parameter, double value);
   template <class F, std::enable_if_t<is_description<F>, int> = 0> auto add(const std::string &name, const F &describe)
   {
-    if (keeps()) keep([=](Scene &s) { s.add(name, describe()); });
-    const Quiet quiet(*this);
+    if (recording()) record([=](Scene &s) { s.add(name, describe()); });
+    const Nested nested(*this);
     return add(name, describe());
   }
   /* An element that may be missing: without a value it has its place among the others, and nothing acts */
   template <class Spec> Element add(const std::string &name, const std::optional<Spec> &spec)
   {
-    if (keeps()) keep([=](Scene &s) { s.add(name, spec); });
-    const Quiet quiet(*this);
+    if (recording()) record([=](Scene &s) { s.add(name, spec); });
+    const Nested nested(*this);
     return spec ? add(name, *spec) : absent(name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker marker(Body body, const F &describe, const std::string &name = "")
   {
-    if (keeps()) keep([=](Scene &s) { s.marker(body, describe, name); });
-    const Quiet quiet(*this);
+    if (recording()) record([=](Scene &s) { s.marker(body, describe, name); });
+    const Nested nested(*this);
     const Place p(describe());
     return marker(body, p.position, p.axes, name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker markerAt(Body body, const F &describe, const std::string &name = "")
   {
-    if (keeps()) keep([=](Scene &s) { s.markerAt(body, describe, name); });
-    const Quiet quiet(*this);
+    if (recording()) record([=](Scene &s) { s.markerAt(body, describe, name); });
+    const Nested nested(*this);
     const Place p(describe());
     return markerAt(body, p.position, p.axes, name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> void gravity(const F &describe)
   {
-    if (keeps()) keep([=](Scene &s) { s.gravity(describe); });
-    const Quiet quiet(*this);
+    if (recording()) record([=](Scene &s) { s.gravity(describe); });
+    const Nested nested(*this);
     gravity(Vector3(describe()));
   }
 
@@ -250,10 +250,10 @@ public:
 private:
   friend struct SceneAccess; /* for the library's own rooms and for tests */
   struct Journal; /* what was described, call by call; only where there are parameters */
-  struct Quiet {  /* what is called inside of another call is not noted */
+  struct Nested {  /* what is called inside of another call is not noted */
     Scene &scene;
-    explicit Quiet(Scene &s) : scene(s) { scene.quiet_++; }
-    ~Quiet() { scene.quiet_--; }
+    explicit Nested(Scene &s) : scene(s) { scene.nested_++; }
+    ~Nested() { scene.nested_--; }
   };
 
   PetscInt                 number_; /* of this scene, in the handles that it gives */
@@ -261,11 +261,11 @@ private:
   std::unique_ptr<Journal> journal_;
   StartPolicy              start_;
   OutputSettings           output_;
-  int                      quiet_ = 0;
+  int                      nested_ = 0;
 
   template <class Spec> Element enter(const std::string &name, const Spec &spec);
-  bool       keeps() const { return journal_ && !quiet_; }
-  void       keep(std::function<void(Scene &)> call);
+  bool       recording() const { return journal_ && !nested_; }
+  void       record(std::function<void(Scene &)> call);
   SceneData &data() const;
   Element    absent(const std::string &name);
   Body       addRigid(const std::string &name, const RigidBody &body);

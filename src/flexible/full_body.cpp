@@ -222,7 +222,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   PetscFunctionBegin;
   const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
-  SceneAccess::keep(scene, [=, &model](Scene &s) {
+  SceneAccess::record(scene, [=, &model](Scene &s) {
     if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
   });
   DataOf(scene).refuseLate("finite-element body " + name);

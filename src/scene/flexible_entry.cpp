@@ -84,7 +84,7 @@ Eigen::VectorXd ModalDamping(const FlexibleData &f)
 
 Body Scene::add(const std::string &name, const FlexibleBody &b)
 {
-  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
+  if (recording()) record([=](Scene &s) { s.add(name, b); });
   const std::string who = name.empty() ? "body " + std::to_string(data().bodies.size()) : name, fault = Fault(b, data().planar);
   RigidBody         r;
   r.rotation         = b.rotation;
@@ -115,7 +115,7 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
 
 Body Scene::attachment(Body body, const std::string &name)
 {
-  if (keeps()) keep([=](Scene &s) { s.attachment(body, name); });
+  if (recording()) record([=](Scene &s) { s.attachment(body, name); });
   SceneData &s = data();
   const bool good = s.valid(body) && s.bodies[body.id].flexible;
   if (!good) {

@@ -33,9 +33,9 @@ struct Model {
 struct SceneAccess {
   static std::shared_ptr<Model> &model(Scene &s) { return s.model_; }
   static const std::shared_ptr<Model> &model(const Scene &s) { return s.model_; }
-  static void keep(Scene &s, std::function<void(Scene &)> call) /* notes what another library adds */
+  static void record(Scene &s, std::function<void(Scene &)> call) /* notes what another library adds */
   {
-    if (s.keeps()) s.keep(std::move(call));
+    if (s.recording()) s.record(std::move(call));
   }
 };
 /* The model of a scene, whether it has been compiled or not; what has been is not to be changed */

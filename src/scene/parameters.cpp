@@ -5,7 +5,7 @@
 namespace hhtdae
 {
 
-void Scene::keep(std::function<void(Scene &)> call) { journal_->calls.push_back(std::move(call)); }
+void Scene::record(std::function<void(Scene &)> call) { journal_->calls.push_back(std::move(call)); }
 
 Parameter Scene::parameter(const std::string &name, double value)
 {
@@ -50,7 +50,7 @@ void Scene::describeAnew()
   s.planar        = data().planar;
   s.errors        = journal_->errors;
   model_.swap(next);
-  const Quiet quiet(*this);
+  const Nested nested(*this);
   for (const auto &call : journal_->calls) call(*this);
   journal_->stale = false;
 }

@@ -34,7 +34,7 @@ SceneData &Scene::data() const { return model_->scene; }
 
 Body Scene::add(const std::string &name, const RigidBody &b)
 {
-  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
+  if (recording()) record([=](Scene &s) { s.add(name, b); });
   return addRigid(name, b);
 }
 
@@ -57,7 +57,7 @@ Body Scene::addRigid(const std::string &name, const RigidBody &b)
 
 Body Scene::add(const std::string &name, const PointMass &b)
 {
-  if (keeps()) keep([=](Scene &s) { s.add(name, b); });
+  if (recording()) record([=](Scene &s) { s.add(name, b); });
   RigidBody r;
   r.mass        = b.mass;
   r.position    = b.position;
@@ -70,7 +70,7 @@ Body Scene::add(const std::string &name, const PointMass &b)
 
 Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
-  if (keeps()) keep([=](Scene &s) { s.marker(body, position, axes, name); });
+  if (recording()) record([=](Scene &s) { s.marker(body, position, axes, name); });
   SceneData     &s    = data();
   const PetscInt id   = (PetscInt)s.markers.size();
   const bool     good = body.id == -1 || s.valid(body);
@@ -93,8 +93,8 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
 
 Marker Scene::markerAt(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
-  if (keeps()) keep([=](Scene &s) { s.markerAt(body, position, axes, name); });
-  const Quiet quiet(*this);
+  if (recording()) record([=](Scene &s) { s.markerAt(body, position, axes, name); });
+  const Nested nested(*this);
   if (!data().valid(body)) return marker(body, position, axes, name);
   const BodyData &b = data().bodies[body.id];
   return marker(body, b.A.transpose() * (position - b.r) + b.center, b.A.transpose() * axes, name);
@@ -102,7 +102,7 @@ Marker Scene::markerAt(Body body, const Vector3 &position, const Matrix3 &axes, 
 
 Variable Scene::variable(const std::string &name, const Expression &definition, double initial)
 {
-  if (keeps()) keep([=](Scene &s) { s.variable(name, definition, initial); });
+  if (recording()) record([=](Scene &s) { s.variable(name, definition, initial); });
   data().refuseLate("variable " + name);
   data().variables.push_back({name.empty() ? "variable " + std::to_string(data().variables.size()) : name, definition, initial});
   return Variable{(PetscInt)data().variables.size() - 1, number_};
@@ -110,7 +110,7 @@ Variable Scene::variable(const std::string &name, const Expression &definition, 
 
 State Scene::state(const std::string &name, const Expression &rate, double initial)
 {
-  if (keeps()) keep([=](Scene &s) { s.state(name, rate, initial); });
+  if (recording()) record([=](Scene &s) { s.state(name, rate, initial); });
   data().refuseLate("state " + name);
   data().states.push_back({name.empty() ? "state " + std::to_string(data().states.size()) : name, rate, initial});
   return State{(PetscInt)data().states.size() - 1, number_};
@@ -118,7 +118,7 @@ State Scene::state(const std::string &name, const Expression &rate, double initi
 
 void Scene::gravity(const Vector3 &acceleration)
 {
-  if (keeps()) keep([=](Scene &s) { s.gravity(acceleration); });
+  if (recording()) record([=](Scene &s) { s.gravity(acceleration); });
   data().refuseLate("gravity");
   if (!acceleration.allFinite()) data().errors.push_back("gravity must be finite");
   data().gravity = acceleration;

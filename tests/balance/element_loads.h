@@ -7,7 +7,7 @@
 #define HHTDAE_TESTS_BALANCE_ELEMENT_LOADS_H
 
 #include "balance/specs.h"
-#include "scene/scene_data.h"
+#include "scene/model.h"
 
 namespace hhtest
 {

@@ -57,7 +57,7 @@ void NewtonEuler::look(PetscInt b)
 /* An element whose loads cannot be told: none of its bodies is judged */
 void NewtonEuler::leaveOut(PetscInt element)
 {
-  const SceneData &s = scene_.data();
+  const SceneData &s = DataOf(scene_);
   unknown_.push_back(s.elements[(std::size_t)element].type);
   for (const Part &p : s.elements[(std::size_t)element].parts)
     for (int k = 0; k < p.store->markers(); k++) {
@@ -68,7 +68,7 @@ void NewtonEuler::leaveOut(PetscInt element)
 
 void NewtonEuler::lookAt(PetscInt element)
 {
-  const SceneData   &s = scene_.data();
+  const SceneData   &s = DataOf(scene_);
   const ElementData &e = s.elements[(std::size_t)element];
   OfElement         &k = element_[(std::size_t)element];
   k.known              = ElementLoads::known(s, specs_, element) || Attaches(e);
@@ -118,7 +118,7 @@ std::vector<Pose> NewtonEuler::poses(const std::vector<double> &values) const
 std::vector<std::vector<Load>> NewtonEuler::loads(const std::vector<double> &values,
                                                   const std::vector<Pose>   &pose) const
 {
-  const SceneData               &s = scene_.data();
+  const SceneData               &s = DataOf(scene_);
   const ElementLoads             of(s, specs_, pose);
   std::vector<std::vector<Load>> all(element_.size());
   for (std::size_t e = 0; e < element_.size(); e++) {
@@ -142,7 +142,7 @@ std::vector<std::vector<Load>> NewtonEuler::loads(const std::vector<double> &val
 
 std::vector<BodyBalance> NewtonEuler::bodies(const std::vector<double> &values) const
 {
-  const SceneData         &s    = scene_.data();
+  const SceneData         &s    = DataOf(scene_);
   const std::vector<Pose>  pose = poses(values);
   std::vector<BodyBalance> all(body_.size());
   for (std::size_t b = 0; b < body_.size(); b++) {
@@ -243,7 +243,7 @@ Imbalance NewtonEuler::unsolved(const std::vector<double> &values, const std::ve
 
 Powers NewtonEuler::powers(const std::vector<double> &values) const
 {
-  const SceneData        &s    = scene_.data();
+  const SceneData        &s    = DataOf(scene_);
   const std::vector<Pose> pose = poses(values);
   const auto              load = loads(values, pose);
   Powers                  p;
@@ -287,7 +287,7 @@ std::vector<double> NewtonEuler::magnitudes(const std::vector<double> &values) c
 
 double NewtonEuler::kinetic(const std::vector<double> &values) const
 {
-  const SceneData        &s    = scene_.data();
+  const SceneData        &s    = DataOf(scene_);
   const std::vector<Pose> pose = poses(values);
   double                  sum  = 0;
   for (std::size_t b = 0; b < pose.size(); b++) {

@@ -94,7 +94,7 @@ private:
       g += Text("%.3f %.3f %.3f %.1f\n", x[0], x[1], x[2], 1e-6 * largest[i]);
     }
     g += "e\n";
-    const SceneData &s = atv_.scene.data();
+    const SceneData &s = DataOf(atv_.scene);
     for (const std::vector<PetscInt> &line : s.lines) {
       for (PetscInt m : line) {
         const Frame<double> f = s.frame(Marker{m});

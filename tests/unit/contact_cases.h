@@ -55,8 +55,8 @@ template <> struct Make<SphereBoxShape> {
 
 /* The box's nearest point on a face, an edge or a corner: away from the borders between them, where the normal has a
  * kink */
-template <class Shape> void Place(const typename Shape::Data &, Random &, Frame<double> *) {}
-template <> inline void     Place<SphereBoxShape>(const SphereBoxShape::Data &d, Random &random, Frame<double> *f)
+template <class Shape> void PutSomewhere(const typename Shape::Data &, Random &, Frame<double> *) {}
+template <> inline void     PutSomewhere<SphereBoxShape>(const SphereBoxShape::Data &d, Random &random, Frame<double> *f)
 {
   const int    region = 1 + (int)random(0, 6.999); /* bits of the directions that are outside */
   Vec3<double> c;
@@ -70,7 +70,7 @@ template <> inline void     Place<SphereBoxShape>(const SphereBoxShape::Data &d,
 template <class Shape> typename Contact<Shape>::Data Touching(Random &random, Frame<double> *f)
 {
   typename Contact<Shape>::Data d{Make<Shape>::data(random), SomeLaw(random)};
-  Place<Shape>(d.shape, random, f);
+  PutSomewhere<Shape>(d.shape, random, f);
   Press<Shape>(d.shape, f, random(.05, .3));
   return d;
 }

@@ -156,6 +156,31 @@ TEST(Query, LoadsMakeTheMotion)
   EXPECT_EQ(on_i.force.norm(), 0); /* it does not touch the disc */
 }
 
+/* A channel may be any function of measures, energies among them */
+TEST(Query, AnExpressionAsChannel)
+{
+  Machine m;
+  m.scene.channel("energy", Expression{{Measure::kineticEnergy(), Measure::potentialEnergy()}, [](const Real *e) -> Real { return e[0] + e[1]; }}, "J");
+  m.scene.channel("ratio", Expression{{Measure::distance(m.tip, m.anchor), Measure::jointForce(m.pin, 2)}, [](const Real *x) -> Real { return x[1] / (x[0] * x[0]); }});
+  SceneRun            run(m.scene, 1, tolerance(1e-7));
+  std::vector<double> x;
+  Snapshot            now;
+  double              kinetic, potential, distance, force;
+  must(run.solve());
+  must(m.scene.sample(run.ts, 1, x));
+  must(now.take(run.ts, 1));
+  must(now.energy(&kinetic, &potential));
+  must(now.value(Measure::distance(m.tip, m.anchor), &distance));
+  must(now.value(Measure::jointForce(m.pin, 2), &force));
+  EXPECT_NEAR(x[0], kinetic + potential, 1e-12 * std::abs(kinetic));
+  EXPECT_NEAR(x[1], force / (distance * distance), 1e-9 * std::abs(x[1]));
+  Machine empty;
+  empty.scene.channel("nothing", Expression());
+  ErrorTrap trap;
+  EXPECT_NE(empty.scene.setUp(), 0);
+  EXPECT_TRUE(trap.says("channel nothing: its function is empty")) << trap.message;
+}
+
 TEST(Query, Angles)
 {
   for (const Vector3 &a : {Vector3(0.3, 1.1, -2.5), Vector3(-3, 0.2, 0.4)}) {

@@ -6,7 +6,7 @@ namespace hhtdae
 
 Channel Scene::channel(const std::string &given, const Expression &value, const std::string &unit)
 {
-  if (keeps()) keep([=](Scene &s) { s.channel(given, value, unit); });
+  if (recording()) record([=](Scene &s) { s.channel(given, value, unit); });
   SceneData        &s    = data();
   const std::string name = given.empty() ? "channel " + std::to_string(s.channels.size()) : given;
   const std::string who = "channel " + name + ": ";
@@ -27,7 +27,7 @@ Channel Scene::channel(const std::string &given, const Expression &value, const 
 
 void Scene::shape(Body body, const Shape &shape)
 {
-  if (keeps()) keep([=](Scene &s) { s.shape(body, shape); });
+  if (recording()) record([=](Scene &s) { s.shape(body, shape); });
   SceneData &s = data();
   s.refuseLate("shape of a body");
   if (body.id != -1 && !s.valid(body)) {
@@ -40,7 +40,7 @@ void Scene::shape(Body body, const Shape &shape)
 
 void Scene::line(const std::vector<Marker> &markers)
 {
-  if (keeps()) keep([=](Scene &s) { s.line(markers); });
+  if (recording()) record([=](Scene &s) { s.line(markers); });
   SceneData            &s = data();
   std::vector<PetscInt> ids;
   s.refuseLate("line");
