@@ -166,10 +166,10 @@ TEST(SceneCheck, OptionsOfTheStart)
   s.start().equilibrium = false;
   Options in("-scene_assemble project -scene_assemble_tol 1e-4 -scene_redundant refuse -scene_start_time 2");
   ASSERT_EQ(s.setUp(), 0);
-  EXPECT_EQ(s.start().assembly, hhtdae::Assembly::Project);
-  EXPECT_EQ(s.start().tolerance, 1e-4);
-  EXPECT_EQ(s.start().redundant, hhtdae::Redundant::Refuse);
-  EXPECT_EQ(s.start().time, 2);
+  EXPECT_EQ(DataOf(s).start.assembly, hhtdae::Assembly::Project);
+  EXPECT_EQ(DataOf(s).start.tolerance, 1e-4);
+  EXPECT_EQ(DataOf(s).start.redundant, hhtdae::Redundant::Refuse);
+  EXPECT_EQ(DataOf(s).start.time, 2);
   Scene other(PETSC_COMM_SELF);
   other.add("arm", RigidBody());
   Options bad("-scene_assemble_tol -1");

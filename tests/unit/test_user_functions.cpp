@@ -14,7 +14,7 @@ const auto typed    = [](const Real &l, const Real &v) -> Real { return 100. * l
 const auto plain    = [](const Real &l, const Real &) { return l; };
 const auto constant = [](const Real &, const Real &) { return 3; };
 const auto several  = [](const Real *m) { return m[0] * m[1]; };
-const auto text     = [](const Real &, const Real &) { return "3"; };
+const auto words     = [](const Real &, const Real &) { return "3"; };
 
 template <class F> constexpr bool law        = std::is_constructible<decltype(NonlinearSpring::tension), F>::value;
 template <class F> constexpr bool torsion    = std::is_constructible<decltype(NonlinearTorsionalSpring::moment), F>::value;
@@ -33,7 +33,7 @@ TEST(UserFunctions, ALambdaHasToReturnANumber)
   EXPECT_TRUE(law<decltype(plain)>);
   EXPECT_TRUE(law<decltype(constant)>);
   EXPECT_FALSE(law<decltype(several)>); /* other arguments */
-  EXPECT_FALSE(law<decltype(text)>);
+  EXPECT_FALSE(law<decltype(words)>);
   EXPECT_TRUE((law<std::function<Real(const Real &, const Real &)>>));
 }
 
