@@ -74,12 +74,22 @@ PetscErrorCode Solve(TS ts)
 namespace
 {
 
+#if PETSC_VERSION_LT(3, 23, 0)
 PetscErrorCode DestroyRun(void *run)
 {
   PetscFunctionBegin;
   delete static_cast<Runtime *>(run);
   PetscFunctionReturn(0);
 }
+  #define PetscContainerSetCtxDestroy PetscContainerSetUserDestroy
+#else
+PetscErrorCode DestroyRun(void **run)
+{
+  PetscFunctionBegin;
+  delete static_cast<Runtime *>(*run);
+  PetscFunctionReturn(0);
+}
+#endif
 
 /* The TS owns the run */
 PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
@@ -88,7 +98,7 @@ PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
   PetscFunctionBegin;
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)ts), &box));
   PetscCall(PetscContainerSetPointer(box, R.release()));
-  PetscCall(PetscContainerSetUserDestroy(box, DestroyRun));
+  PetscCall(PetscContainerSetCtxDestroy(box, DestroyRun));
   PetscCall(PetscObjectCompose((PetscObject)ts, run_of_ts, (PetscObject)box));
   PetscCall(PetscContainerDestroy(&box));
   PetscFunctionReturn(0);
