@@ -1,0 +1,96 @@
+/*
+  What descriptions of scenes need again and again: axes along a direction, moments of inertia, joints from a point and an axis.
+
+    RigidBody rod;
+    rod.mass     = 2;
+    rod.inertia  = inertia::cylinder(rod.mass, 0.02, 1);           its axis is z
+    rod.rotation = axesAlong(direction);                           z along the rod
+    connect<Revolute>(scene, "pin", arm, scene.ground(), point, axis);
+*/
+#ifndef HHTDAE_HELPERS_H
+#define HHTDAE_HELPERS_H
+
+#include "hhtdae/scene.h"
+#include <cmath>
+
+namespace hhtdae
+{
+
+/* Orthonormal right-handed axes (columns) whose z axis is along a direction, which need not be of length one; x as near to `x` as can
+   be, any if that is along z or not given */
+inline Matrix3 axesAlong(const Vector3 &z, const Vector3 &x = Vector3::Zero())
+{
+  Matrix3 A;
+  A.col(2)        = z.normalized();
+  const Vector3 p = x - A.col(2).dot(x) * A.col(2);
+  if (p.norm() > 1e-8 * x.norm()) A.col(0) = p.normalized();
+  else A.col(0) = Vector3(A.col(2)).unitOrthogonal();
+  A.col(1) = A.col(2).cross(A.col(0));
+  return A;
+}
+
+/* Moments of inertia of homogeneous bodies about their centre of mass, in their own axes */
+namespace inertia
+{
+
+inline Matrix3 diagonal(double x, double y, double z) { return Vector3(x, y, z).asDiagonal(); }
+/* full edges along x, y, z */
+inline Matrix3 box(double mass, const Vector3 &e)
+{
+  const Vector3 s = e.cwiseAbs2();
+  return mass / 12 * diagonal(s(1) + s(2), s(2) + s(0), s(0) + s(1));
+}
+/* about z, hollow from `inner` to `outer` */
+inline Matrix3 tube(double mass, double outer, double inner, double length)
+{
+  const double r2 = outer * outer + inner * inner, side = mass * (r2 / 4 + length * length / 12);
+  return diagonal(side, side, mass * r2 / 2);
+}
+inline Matrix3 cylinder(double mass, double radius, double length) { return tube(mass, radius, 0, length); }
+inline Matrix3 disc(double mass, double radius) { return tube(mass, radius, 0, 0); }
+inline Matrix3 ellipsoid(double mass, const Vector3 &radii)
+{
+  const Vector3 s = radii.cwiseAbs2();
+  return mass / 5 * diagonal(s(1) + s(2), s(2) + s(0), s(0) + s(1));
+}
+inline Matrix3 sphere(double mass, double radius) { return ellipsoid(mass, Vector3::Constant(radius)); }
+
+/* from the centre of mass to a point at d from it: Steiner's parallel axes; what it gives about any point but the centre of mass is no
+   RigidBody::inertia */
+inline Matrix3 about(const Matrix3 &J, double mass, const Vector3 &d) { return J + mass * (d.squaredNorm() * Matrix3::Identity() - d * d.transpose()); }
+/* of a part whose axes are the columns of R, in the axes that R is given in */
+inline Matrix3 turned(const Matrix3 &J, const Matrix3 &R) { return R * J * R.transpose(); }
+
+} // namespace inertia
+
+/* A body of several rigid parts: mass, centre of mass and inertia of all, in the axes in which the parts' positions and rotations are
+   given, with its origin there */
+inline RigidBody composed(const std::vector<RigidBody> &parts)
+{
+  RigidBody all;
+  all.mass    = 0;
+  all.inertia = Matrix3::Zero();
+  for (const RigidBody &p : parts) {
+    all.mass += p.mass;
+    all.center += p.mass * (p.position + p.rotation * p.center);
+  }
+  all.center /= all.mass;
+  for (const RigidBody &p : parts) all.inertia += inertia::about(inertia::turned(p.inertia, p.rotation), p.mass, p.position + p.rotation * p.center - all.center);
+  return all;
+}
+
+/* A joint of two bodies from a point and an axis of space at the start: markers on both, z along the axis. For all joints that two
+   markers alike describe: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw, InLine, InPlane, ParallelAxes, Orientation */
+template <class Joint> Element connect(Scene &scene, const std::string &name, Body i, Body j, const Vector3 &point, const Vector3 &axis = Vector3::UnitZ())
+{
+  const Matrix3 A  = axesAlong(axis);
+  const auto    on = [&](Body b) { return b.id < 0 ? scene.marker(b, point, A) : scene.markerAt(b, point, A); };
+  Joint         joint;
+  joint.i = on(i);
+  joint.j = on(j);
+  return scene.add(name, joint);
+}
+
+} // namespace hhtdae
+
+#endif
