@@ -83,11 +83,10 @@ inline RigidBody composed(const std::vector<RigidBody> &parts)
    markers alike describe: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw, InLine, InPlane, ParallelAxes, Orientation */
 template <class Joint> Element connect(Scene &scene, const std::string &name, Body i, Body j, const Vector3 &point, const Vector3 &axis = Vector3::UnitZ())
 {
-  const Matrix3 A  = axesAlong(axis);
-  const auto    on = [&](Body b) { return b.id < 0 ? scene.marker(b, point, A) : scene.markerAt(b, point, A); };
+  const Matrix3 A = axesAlong(axis);
   Joint         joint;
-  joint.i = on(i);
-  joint.j = on(j);
+  joint.i = scene.markerAt(i, point, A);
+  joint.j = scene.markerAt(j, point, A);
   return scene.add(name, joint);
 }
 
