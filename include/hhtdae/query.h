@@ -11,7 +11,7 @@
     double l;
     PetscCall(now.value(Measure::distance(a, b), &l));  any measure
 
-  All calls are collective: every rank asks the same questions and gets the same answers.
+  All calls are collective: every rank asks the same questions and gets the same answers. A snapshot is of use as long as its TS is.
 */
 #ifndef HHTDAE_QUERY_H
 #define HHTDAE_QUERY_H

@@ -121,7 +121,7 @@ private:
   std::shared_ptr<double> value_ = std::make_shared<double>(0);
 };
 
-/* What describes something anew whenever parameters have changed: a function without arguments, and what it returns */
+/* Whether it describes something anew whenever parameters have changed: a function without arguments */
 template <class X> constexpr bool is_description = std::is_invocable<const X &>::value;
 
 class Scene
@@ -234,8 +234,8 @@ public:
   PetscErrorCode createTS(TS *ts);
 
   /* A run that goes on where another one of this scene is: its time, positions, velocities and states, angles over full turns; with
-     parameters, and elements that may be missing, as they are now. Velocities that joints of now forbid are an error, or are
-     projected in the metric of the masses, which is a plastic impact: start().assembly = Assembly::Project. */
+     parameters, and elements that may be missing, as they are now. Velocities that joints of now forbid are lost, in the metric of
+     the masses, as in a plastic impact, unless start().assembly is Off; positions that they forbid are an error as at any start. */
   PetscErrorCode createTS(TS *ts, TS from);
 
   /* TSSolve(), output. */

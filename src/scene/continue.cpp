@@ -81,8 +81,10 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.continues    = true;
     M.begin        = t;
     M.number.owner = old->number.owner;
-    PetscCall(WriteState(M, *old, U, V));
-    PetscCall(createTS(ts));
+    PetscErrorCode failed = WriteState(M, *old, U, V);
+    if (!failed) failed = createTS(ts);
+    journal_->stale = true; /* this model is of this run alone; the next one from the start is described anew */
+    PetscCall(failed);
     PetscCall(CarryMemories(*old, *RunOf(*ts)));
     PetscFunctionReturn(0);
   }

@@ -30,7 +30,6 @@ Vector3 Motion::bryant() const
 /* The run, and the unknowns of this rank and of its neighbours at the time asked for */
 struct Snapshot::Work {
   Runtime            *R = nullptr;
-  PetscObjectId       ts = 0;
   double              t = 0;
   std::vector<double> u, v, a;
   long                moved = -1; /* which move of the bodies was to this state */

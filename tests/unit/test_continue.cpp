@@ -85,12 +85,12 @@ TEST(Continue, AJointTakesHold)
   const Motion x = of(run.ts, s.centre);
   must(s.scene.set("held", 0));
   must(s.scene.set("caught", 1));
-  must(s.scene.set("line", x.position(0)));
   ErrorTrap trap;
   TS        ts;
+  must(s.scene.set("line", x.position(0) + 0.01)); /* not where the bar is */
   EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
-  EXPECT_TRUE(trap.says("the initial values violate constraints")) << trap.message;
-  s.scene.start().assembly = Assembly::Project;
+  EXPECT_TRUE(trap.says("in-line guide: not met by 0.01")) << trap.message;
+  must(s.scene.set("line", x.position(0)));
   must(s.scene.createTS(&ts, run.ts));
   const Motion y = of(ts, s.centre);
   EXPECT_NEAR(y.velocity(0), 0, 1e-9); /* across the line */
@@ -126,6 +126,31 @@ TEST(Continue, NothingChanged)
     EXPECT_GT(std::abs(moment[0]), 0.05 * 2 * M_PI); /* more than a turn */
     EXPECT_NEAR(moment[0], moment[1], 1e-6);
     must(TSDestroy(&ts));
+  }
+}
+
+/* Nor does it change what a run from the start is, whether the run that goes on can be made or not */
+TEST(Continue, TheStartStaysTheStart)
+{
+  Swing    s;
+  SceneRun run(s.scene, 0.3, tolerance(1e-8));
+  must(run.solve());
+  const Motion first = of(run.ts, s.centre);
+  must(TSSetMaxTime(run.ts, 0.5));
+  must(run.solve());
+  TS ts = goOn(s.scene, run.ts, 0.6);
+  must(TSDestroy(&ts));
+  for (int k = 0; k < 2; k++) {
+    SceneRun  again(s.scene, 0.3, tolerance(1e-8));
+    PetscReal begin;
+    must(TSGetTime(again.ts, &begin));
+    EXPECT_EQ(begin, 0);
+    must(again.solve());
+    EXPECT_EQ(of(again.ts, s.centre).position, first.position);
+    must(s.scene.set("caught", 1)); /* by a line through somewhere else: refused */
+    ErrorTrap trap;
+    EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
+    must(s.scene.set("caught", 0));
   }
 }
 
