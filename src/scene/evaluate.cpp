@@ -27,6 +27,19 @@ PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const do
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3])
+{
+  const bool apart = R.size > 1 && !R.uses_acceleration;
+  PetscFunctionBegin;
+  if (apart) {
+    PetscCall(LocalState(R, a, a, a, local));
+    room.assign(local[0], local[0] + R.u.size());
+  }
+  PetscCall(LocalState(R, u, v, a, local));
+  if (apart) local[2] = room.data();
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
 {
   const double *u, *v, *a, *local[3];

@@ -77,21 +77,15 @@ template <class F> PetscErrorCode FromOwner(const Runtime &R, PetscMPIInt owner,
   PetscFunctionReturn(0);
 }
 
-/* The unknowns on every rank that reads them, accelerations too, which the exchange carries only where elements read them */
+/* The unknowns on every rank that reads them */
 PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
 {
-  const double *w[3], *local[3];
+  const double       *w[3], *local[3];
+  std::vector<double> room;
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
-  const std::size_t n = R.n + R.others.size();
-  if (R.size > 1 && !R.uses_acceleration) {
-    PetscCall(LocalState(R, w[2], w[2], w[2], local));
-    out[2]->assign(local[0], local[0] + n);
-  }
-  PetscCall(LocalState(R, w[0], w[1], w[2], local));
-  out[0]->assign(local[0], local[0] + n);
-  out[1]->assign(local[1], local[1] + n);
-  if (R.size == 1 || R.uses_acceleration) out[2]->assign(local[2], local[2] + n);
+  PetscCall(LocalMotion(R, w[0], w[1], w[2], room, local));
+  for (int k = 0; k < 3; k++) out[k]->assign(local[k], local[k] + R.n + R.others.size());
   for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(W[k], &w[k]));
   PetscFunctionReturn(0);
 }

@@ -24,6 +24,15 @@ PetscInt Memories(const Runtime &R)
   return n;
 }
 
+/* out to x, or in from it */
+void CopyMemories(Runtime &R, double *x, bool in)
+{
+  for (auto &b : R.batches) {
+    b->copyMemory(x, in);
+    x += b->memory();
+  }
+}
+
 void Store(const Matrix3 &C, double *x)
 {
   const Eigen::Quaterniond q(C);
@@ -222,11 +231,7 @@ PetscErrorCode KeepMemories(Runtime &R)
   double *x;
   PetscFunctionBegin;
   PetscCall(VecGetArray(R.axes, &x));
-  double *m = x + 4 * R.bodies.own;
-  for (auto &b : R.batches) {
-    b->copyMemory(m, false);
-    m += b->memory();
-  }
+  CopyMemories(R, x + 4 * R.bodies.own, false);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscFunctionReturn(0);
 }
@@ -275,11 +280,7 @@ PetscErrorCode UseAxes(Runtime &R)
     const LocalBody &k = R.bodies.body[b];
     if (HasAxes(k)) R.bodies.setAxes(b, Load(b < R.bodies.own ? x + 4 * b : other.data() + 4 * (b - R.bodies.own)), R.scene.bodies[k.id].inertia);
   }
-  double *m = x + 4 * R.bodies.own;
-  for (auto &b : R.batches) {
-    b->copyMemory(m, true);
-    m += b->memory();
-  }
+  CopyMemories(R, x + 4 * R.bodies.own, true);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscFunctionReturn(0);
 }

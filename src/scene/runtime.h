@@ -81,6 +81,8 @@ const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt elemen
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
+/* with accelerations even where no element reads them, which the exchange then leaves out; room: for those of others */
+PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3]);
 PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);
 /* reframe.cpp: change of the axes of the Euler angles in the course of a run */

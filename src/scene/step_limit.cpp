@@ -22,13 +22,7 @@ PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *c
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(A, &a));
-  /* the exchange carries accelerations only where elements read them */
-  if (R.size > 1 && !R.uses_acceleration) {
-    PetscCall(LocalState(R, a, a, a, local));
-    acceleration.assign(local[0], local[0] + R.u.size());
-  }
-  PetscCall(LocalState(R, u, v, a, local));
-  if (!acceleration.empty()) local[2] = acceleration.data();
+  PetscCall(LocalMotion(R, u, v, a, acceleration, local));
   R.bodies.move(local[0], local[1]);
   const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
   for (const auto &b : R.batches) least = std::min(least, b->longestStep(e));

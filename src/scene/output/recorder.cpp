@@ -23,13 +23,7 @@ PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> 
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(r.A, &a));
-  /* The exchange carries accelerations only where elements read them. */
-  if (R.size > 1 && !R.uses_acceleration) {
-    PetscCall(LocalState(R, a, a, a, local));
-    r.acceleration.assign(local[0], local[0] + R.u.size());
-  }
-  PetscCall(LocalState(R, u, v, a, local));
-  if (R.size > 1 && !R.uses_acceleration) local[2] = r.acceleration.data();
+  PetscCall(LocalMotion(R, u, v, a, r.acceleration, local));
   R.bodies.move(local[0], local[1]);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
   for (Task *task : tasks) {

@@ -42,13 +42,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   }
   PetscCall((ChannelsFollowFromEquations(R) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
-  /* The exchange carries accelerations only where elements read them. */
-  if (R.size > 1 && !R.uses_acceleration) {
-    PetscCall(LocalState(R, w[2], w[2], w[2], local));
-    acceleration.assign(local[0], local[0] + R.u.size());
-  }
-  PetscCall(LocalState(R, w[0], w[1], w[2], local));
-  if (!acceleration.empty()) local[2] = acceleration.data();
+  PetscCall(LocalMotion(R, w[0], w[1], w[2], acceleration, local));
   R.bodies.move(local[0], local[1]);
   PetscCall(Guarded([&] { return ChannelValues(R, Evaluation{t, local[0], local[1], local[2], R.bodies, R.n}, own); }));
   PetscCall(Share(R, own, values));
