@@ -20,14 +20,19 @@ namespace
 {
 
 constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
-constexpr PetscReal noticeable = 1e-6; /* part of the velocities: what is left of a transient grows with h in the first steps */
+constexpr PetscReal noticeable = 1e-6; /* part of the velocities, at rest of the tolerance: what is left of a transient grows with h in the first steps */
+constexpr PetscReal against    = 0.5;  /* cosine of the angle between what accelerations are and what they lose */
 
-/* The time constant |q''|/|q'''| of what may be a transient: within a tenth of the step accelerations change by more than they are. 0: none */
+/* The time constant |q''|/|q'''| of what may be a transient: within a tenth of the step accelerations change by more than they are. 0: none.
+   What starts at rest may have large rates where damping spreads a load that has just set in, as over a body of finite elements: there they are not
+   against the accelerations, and three matrices are saved. */
 PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
 {
   Integrator     &I   = Get(ts);
   const PetscReal old = I.h;
   PetscReal       v, a, j;
+  PetscScalar     aj, aa;
+  Vec             weighted;
 
   PetscFunctionBegin;
   I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
@@ -35,7 +40,14 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscCall(CorrectionNorm(ts, I.A0, &a));
   PetscCall(CorrectionNorm(ts, rate, &j));
   I.h  = old;
-  *tau = v > 0 && h * j > constants * a && h * h * j > noticeable * v ? a / j : 0;
+  *tau = a > 0 && h * j > constants * a && h * h * j > noticeable * (v > 0 ? v : 1 / h) ? a / j : 0;
+  if (*tau <= 0 || v > 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(I.A0, &weighted));
+  PetscCall(WeightCorrection(I, I.A0, weighted));
+  PetscCall(VecDot(I.A0, weighted, &aa));
+  PetscCall(VecDot(rate, weighted, &aj));
+  PetscCall(VecDestroy(&weighted));
+  if (*tau * -PetscRealPart(aj) < against * PetscRealPart(aa)) *tau = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

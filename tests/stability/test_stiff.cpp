@@ -300,3 +300,24 @@ TEST(Stiff, LoadsAtRestInSteepBrakes)
     EXPECT_LT(unsolved, b.most);
   }
 }
+
+/* The same from rest by steps under error control: accelerations that the brakes take away at once are no part of the motion */
+TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
+{
+  for (double k : {1e8, 1e10, 1e12}) {
+    const Brakes p(3, k, std::min(1e-3, 1e6 / k), 1e4, 1.);
+    Simulation   run(p, tolerance(1e-4));
+    double       unsolved = 0.;
+    run.watch             = [&](Simulation &r, PetscInt step, double t) {
+      if (!step) return;
+      const Array u = r.u(), v = r.v(), a = r.a();
+      Array       f(u.size());
+      p.residual(t, u.data(), v.data(), a.data(), f.data());
+      for (double x : f) widen(unsolved, std::abs(x));
+    };
+    must(run.solve());
+    MEASURED("3 brakes of %g N s/m: %.1e N unsolved; %d steps, %d iterations", k, unsolved, (int)run.statistics().steps, (int)run.statistics().newton);
+    EXPECT_LT(unsolved, 1e-6);
+    EXPECT_LT(run.statistics().steps, 20);
+  }
+}

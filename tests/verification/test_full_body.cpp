@@ -69,8 +69,9 @@ Array history(Scene &scene, double end, const std::string &options, const std::s
 } // namespace
 
 /*
-  A cantilever swings about its sag; the damping lets the higher modes die out first. With alpha = 0 the method is the
-  trapezoidal rule, whose circular frequency with the step h is 2/h atan(omega h/2) for an undamped mode.
+  A cantilever swings about its sag; the damping lets the higher modes die out first. At alpha = 0 the method is the trapezoidal
+  rule, whose circular frequency with the step h is 2/h atan(omega h/2) for an undamped mode, and with constraints weakly unstable; alpha = -0.001
+  changes the frequency by 4e-6.
 */
 TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
 {
@@ -87,7 +88,7 @@ TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
   scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
   scene.channel("z", Measure::displacement(scene.marker(fe.attachment("tip")), 2));
   Array       time;
-  const Array z = history(scene, 30 * 50 * h, fixed(h) + " -ts_hhtdae_alpha 0 ", "z", &time);
+  const Array z = history(scene, 30 * 50 * h, fixed(h) + " -ts_hhtdae_alpha -0.001 ", "z", &time);
 
   double      sag = 0, amplitude = 0;
   std::size_t last = z.size() - 10 * 50;
