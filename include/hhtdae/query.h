@@ -24,6 +24,8 @@
 namespace hhtdae
 {
 
+struct Runtime;
+
 /* Of a marker or body: everything in the axes asked for. */
 struct Motion {
   Vector3 position = Vector3::Zero(), velocity = Vector3::Zero(), acceleration = Vector3::Zero();
@@ -73,6 +75,8 @@ public:
   PetscErrorCode energy(double *kinetic, double *potential);
 
 private:
+  friend class Linearization;
+  PetscErrorCode take(Runtime &run, PetscReal t, Vec state[3]);
   struct Work;
   std::unique_ptr<Work> work_;
 };

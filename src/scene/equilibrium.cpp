@@ -108,6 +108,8 @@ PetscErrorCode MeasureForces(Equilibrium &E, Vec F, Unbalanced &out)
   PetscFunctionReturn(0);
 }
 
+} // namespace
+
 /* As the integrator would: KLU where it is there, which it is on one rank alone; of one triangle MUMPS, which reads it */
 PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
 {
@@ -123,6 +125,9 @@ PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
   }
   PetscFunctionReturn(0);
 }
+
+namespace
+{
 
 PetscErrorCode Create(Equilibrium &E)
 {

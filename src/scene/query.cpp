@@ -166,11 +166,21 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
     PetscCall(VecZeroEntries(W[2]));
     PetscCall(TSGetTime(ts, &t));
   }
+  PetscCall(take(*w.R, t, W));
+  for (Vec &x : W) PetscCall(VecDestroy(&x));
+  PetscFunctionReturn(0);
+}
+
+/* u, u' and u'' of the run at t, whatever it has reached */
+PetscErrorCode Snapshot::take(Runtime &run, PetscReal t, Vec state[3])
+{
+  Work &w = *work_;
+  PetscFunctionBegin;
+  w.R                         = &run;
   w.t                         = t;
   w.moved                     = -1;
   std::vector<double> *out[3] = {&w.u, &w.v, &w.a};
-  PetscCall(Localize(*w.R, W, out));
-  for (Vec &x : W) PetscCall(VecDestroy(&x));
+  PetscCall(Localize(run, state, out));
   PetscFunctionReturn(0);
 }
 

@@ -1,0 +1,98 @@
+/*
+  Small motions about a state of a run: natural modes, frequency response, and the equations in minimal coordinates.
+
+    Linearization small;
+    PetscCall(small.take(ts));                                what has been reached; TSStep() once for the initial state
+    std::vector<Mode> modes;
+    PetscCall(small.modes(&modes));                           all of them; of a large scene SlowestModes(), hhtdae/modes.h
+    std::vector<std::complex<double>> h;
+    PetscCall(small.response(Excitation::force(tip, {0, 0, 1}), Measure::displacement(tip, 2), frequencies, &h));
+
+  The equations of motion F(t, u, u', u'') = 0 with their constraints, multipliers, variables and force states are expanded about the state,
+
+    M x'' + C x' + K x = b f,
+
+  x: displacements and small rotations of bodies in space axes, and all other unknowns as they are. M, C and K are those of this moment: modes
+  are motions where the state is at rest, or steady as seen from space. An axisymmetric rotor at speed is, a swinging rod is not.
+  All calls are collective, with the same results on every rank.
+*/
+#ifndef HHTDAE_LINEARIZE_H
+#define HHTDAE_LINEARIZE_H
+
+#include "hhtdae/query.h"
+#include <complex>
+#include <petscmat.h>
+
+namespace hhtdae
+{
+
+/* Motion that goes as exp(value t). Of a conjugate pair the one with a positive imaginary part stands for both. */
+struct Mode {
+  std::complex<double>              value;  /* 1/s */
+  std::vector<std::complex<double>> shape;  /* x, the unknowns of this rank; the largest displacement (in m) or rotation (in rad) of all is 1 */
+
+  double frequency() const { return std::abs(value) / (2 * M_PI); } /* undamped, Hz */
+  double dampingRatio() const { return std::abs(value) > 0 ? -value.real() / std::abs(value) : 0; }
+};
+
+/* A body's part in a mode: of its centre of mass in space axes, and how much of the kinetic energy it has */
+struct BodyPart {
+  Eigen::Vector3cd displacement = Eigen::Vector3cd::Zero(), rotation = Eigen::Vector3cd::Zero();
+  double           share = 0;
+};
+
+/* A force and a moment in space axes on the body of a marker, at its origin, for an input of 1 */
+struct Excitation {
+  Marker  at;
+  Vector3 load = Vector3::Zero(), moment = Vector3::Zero();
+  static Excitation force(Marker m, const Vector3 &f) { return {m, f, Vector3::Zero()}; }
+  static Excitation torque(Marker m, const Vector3 &f) { return {m, Vector3::Zero(), f}; }
+};
+
+/* z' = A z + B f, y = C z + D f; z: as many as there are degrees of freedom of positions and of velocities, and first-order states. Rows
+   are behind one another. */
+struct StateSpace {
+  PetscInt            states = 0, inputs = 0, outputs = 0;
+  std::vector<double> A, B, C, D;
+};
+
+class Linearization
+{
+public:
+  Linearization();
+  ~Linearization();
+  Linearization(const Linearization &)            = delete;
+  Linearization &operator=(const Linearization &) = delete;
+
+  /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step (TSHHT3EvaluateAt()); the run does not notice */
+  PetscErrorCode take(TS ts, PetscReal t);
+  PetscErrorCode take(TS ts); /* at the end of the last step */
+
+  /* All modes, by increasing |value|: dense algebra, for scenes of up to 1000 unknowns. A motion that nothing drives back has value 0. */
+  PetscErrorCode modes(std::vector<Mode> *all) const;
+  /* The body's displacement, rotation and share of the kinetic energy */
+  PetscErrorCode part(const Mode &m, Body b, BodyPart *part) const;
+  /* What a measure does in the mode, with the scale of the mode's shape */
+  PetscErrorCode value(const Mode &m, const Measure &what, std::complex<double> *x) const;
+
+  /* The measure's complex amplitude where the input is cos(w t), for circular frequencies w in rad/s: Re(amplitude exp(i w t)). Sparse, one
+     factorization of twice the unknowns for each of them; solver options have the prefix -scene_response_ */
+  PetscErrorCode response(const Excitation &in, const Measure &out, const std::vector<double> &circular, std::vector<std::complex<double>> *amplitude) const;
+  /* Minimal coordinates: dense algebra as that of modes() */
+  PetscErrorCode stateSpace(const std::vector<Excitation> &in, const std::vector<Measure> &out, StateSpace *s) const;
+
+  /* M, C, K above in MATAIJ, one row and column for each unknown of the scene; they belong to this object */
+  PetscErrorCode operators(Mat *M, Mat *C, Mat *K) const;
+
+  /* Scales the mode to its largest displacement or rotation */
+  PetscErrorCode normalize(Mode *m) const;
+
+  struct Work;
+
+private:
+  std::unique_ptr<Work> work_;
+};
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,41 @@
+/* What the parts of a linearization share: linearize.cpp makes it, minimal.cpp and response.cpp solve it. */
+#ifndef HHTDAE_SCENE_LINEARIZATION_H
+#define HHTDAE_SCENE_LINEARIZATION_H
+
+#include "hhtdae/linearize.h"
+#include "runtime.h"
+#include <array>
+
+namespace hhtdae
+{
+
+/* x, x', x'' of own unknowns */
+using SmallMotion = std::array<std::vector<double>, 3>;
+
+struct Linearization::Work {
+  Runtime                   *R = nullptr;
+  double                     t = 0, size = 1; /* of the scene */
+  Vec                        state[3] = {};   /* u, u', u'' */
+  Mat                        M = nullptr, C = nullptr, K = nullptr;
+  Mat                        turn[3] = {}; /* T of du = T x, T', T'': rates of Euler angles from those in space axes */
+  std::vector<unsigned char> role;         /* of own unknowns */
+  mutable Snapshot           moved;
+
+  ~Work() { clear(); }
+  void     clear();
+  MPI_Comm comm() const { return R->scene.comm; }
+  bool     coordinate(PetscInt i) const { return role[i] == TSHHT3_COORDINATE; }
+
+  PetscErrorCode check(const char *call) const;
+  PetscErrorCode differentiate();
+  PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double *x) const; /* how a measure changes */
+  PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
+  PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
+};
+
+/* The amplitude of a measure in the motion Re(x exp(s t)) */
+PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const std::vector<std::complex<double>> &x, std::complex<double> s, std::complex<double> *y);
+
+} // namespace hhtdae
+
+#endif

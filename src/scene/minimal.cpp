@@ -1,0 +1,282 @@
+/*
+  Small motions in minimal coordinates, by dense algebra, the same on every rank.
+
+  From positions q, velocities v, first-order states s and inputs f, accelerations and whatever is algebraic follow by the differentiated
+  constraints:
+
+    W (q'', s', lambda, V, F) = b f - K_q q - C_q v - K_s s,    rows of constraints: Phi_q q'' = 0,  Psi_v q'' = -Psi_q v - Psi_s s'
+
+  Positions are q = N z, N an orthonormal basis of what Phi_q leaves; velocities v = L y + P q + S s, L of what Phi_q and Psi_v leave, P and S the least
+  ones for which Psi_v v = -Psi_q q - Psi_s s. So
+
+    z' = N^T v,    y' = L^T q'',    s' from above.
+*/
+#include "linearization.h"
+#include <Eigen/Dense>
+#include <algorithm>
+#include <numeric>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+using Dense   = Eigen::MatrixXd;
+using Complex = std::complex<double>;
+
+constexpr PetscInt most = 1000; /* unknowns: a minute for all modes */
+
+/* All of a distributed matrix on every rank */
+PetscErrorCode Whole(Mat A, Dense &out)
+{
+  Mat         one;
+  PetscMPIInt size;
+  PetscInt    n;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)A), &size));
+  PetscCall(MatGetSize(A, &n, nullptr));
+  PetscCall(MatCreateRedundantMatrix(A, size, MPI_COMM_NULL, MAT_INITIAL_MATRIX, &one));
+  out = Dense::Zero(n, n);
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt           count;
+    const PetscInt    *column;
+    const PetscScalar *value;
+    PetscCall(MatGetRow(one, i, &count, &column, &value));
+    for (PetscInt k = 0; k < count; k++) out(i, column[k]) = value[k];
+    PetscCall(MatRestoreRow(one, i, &count, &column, &value));
+  }
+  PetscCall(MatDestroy(&one));
+  PetscFunctionReturn(0);
+}
+
+/* Own entries of every rank, on every rank */
+template <class T> PetscErrorCode Gather(const Linearization::Work &w, MPI_Datatype type, const std::vector<T> &own, std::vector<T> &all)
+{
+  std::vector<PetscMPIInt> count(w.R->size), first(w.R->size, 0);
+  const PetscMPIInt        n = (PetscMPIInt)own.size();
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count.data(), 1, MPI_INT, w.comm()));
+  for (int r = 1; r < w.R->size; r++) first[r] = first[r - 1] + count[r - 1];
+  all.resize(first.back() + count.back());
+  PetscCallMPI(MPI_Allgatherv(own.data(), n, type, all.data(), count.data(), first.data(), type, w.comm()));
+  PetscFunctionReturn(0);
+}
+
+/* Rows of A in another order, or columns */
+Dense Block(const Dense &A, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &columns)
+{
+  Dense B(rows.size(), columns.size());
+  for (std::size_t i = 0; i < rows.size(); i++)
+    for (std::size_t j = 0; j < columns.size(); j++) B((Eigen::Index)i, (Eigen::Index)j) = A(rows[i], columns[j]);
+  return B;
+}
+
+/* Rows of independent constraints, each of length 1: an orthonormal basis of what they leave, and the least x with A x = b */
+struct Subspace {
+  Dense A, free;
+  Eigen::VectorXd                        scale;
+  Eigen::CompleteOrthogonalDecomposition<Dense> solver;
+
+  explicit Subspace(const Dense &rows) : A(rows), scale(rows.rows())
+  {
+    const Eigen::Index n = A.cols(), m = A.rows();
+    if (!m) {
+      free = Dense::Identity(n, n);
+      return;
+    }
+    for (Eigen::Index i = 0; i < m; i++) {
+      scale(i) = A.row(i).norm() > 0 ? 1 / A.row(i).norm() : 1;
+      A.row(i) *= scale(i);
+    }
+    const Eigen::HouseholderQR<Dense> qr(A.transpose());
+    const Dense                       Q = qr.householderQ();
+    free                                 = Q.rightCols(n - m);
+    solver.compute(A);
+  }
+  Dense least(const Dense &b) const { return A.rows() ? Dense(solver.solve(scale.asDiagonal() * b)) : Dense::Zero(A.cols(), b.cols()); }
+};
+
+struct Minimal {
+  std::vector<PetscInt> q, holonomic, velocity, s, rest; /* global numbers; rest: what is algebraic, constraints' multipliers first */
+  Dense                N, L, P, S;
+  Dense                y; /* (q'', s', rest) from (z, y, s, f) */
+  Dense                A, B;
+  Eigen::Index          dz() const { return N.cols(); }
+  Eigen::Index          dy() const { return L.cols(); }
+  Eigen::Index          ds() const { return (Eigen::Index)s.size(); }
+  Eigen::Index          states() const { return dz() + dy() + ds(); }
+};
+
+/* Solves with rows and columns brought to a size of 1 */
+Dense Scaled(Dense W, Dense right)
+{
+  Eigen::VectorXd row(W.rows()), column(W.cols());
+  for (Eigen::Index i = 0; i < W.rows(); i++) {
+    const double x = W.row(i).cwiseAbs().maxCoeff();
+    row(i)         = x > 0 ? 1 / x : 1;
+  }
+  W     = row.asDiagonal() * W;
+  right = row.asDiagonal() * right;
+  for (Eigen::Index j = 0; j < W.cols(); j++) {
+    const double x = W.col(j).cwiseAbs().maxCoeff();
+    column(j)      = x > 0 ? 1 / x : 1;
+  }
+  W = W * column.asDiagonal();
+  return column.asDiagonal() * W.partialPivLu().solve(right);
+}
+
+PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation> &in, Minimal &m)
+{
+  Dense                     M, C, K;
+  std::vector<unsigned char> role;
+  PetscInt                   n;
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(w.M, &n, nullptr));
+  PetscCheck(n <= most, w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: %" PetscInt_FMT " unknowns are too many for dense algebra (%" PetscInt_FMT "); SlowestModes() and response() are sparse", n, most);
+  PetscCall(Whole(w.M, M));
+  PetscCall(Whole(w.C, C));
+  PetscCall(Whole(w.K, K));
+  PetscCall(Gather(w, MPI_UNSIGNED_CHAR, w.role, role));
+  std::vector<PetscInt> definitions;
+  for (PetscInt i = 0; i < n; i++)
+    (role[i] == TSHHT3_COORDINATE ? m.q : role[i] == TSHHT3_STATE ? m.s : role[i] == TSHHT3_HOLONOMIC ? m.holonomic : role[i] == TSHHT3_NONHOLONOMIC ? m.velocity : definitions).push_back(i);
+  m.rest = m.holonomic;
+  m.rest.insert(m.rest.end(), m.velocity.begin(), m.velocity.end());
+  m.rest.insert(m.rest.end(), definitions.begin(), definitions.end());
+
+  const Subspace position(Block(K, m.holonomic, m.q));
+  std::vector<PetscInt> both = m.holonomic;
+  both.insert(both.end(), m.velocity.begin(), m.velocity.end());
+  Dense rates(both.size(), m.q.size()), rest_q = Dense::Zero(rates.rows(), rates.cols()), rest_s = Dense::Zero(rates.rows(), m.ds());
+  const Eigen::Index h = (Eigen::Index)m.holonomic.size();
+  rates << Block(K, m.holonomic, m.q), Block(C, m.velocity, m.q);
+  rest_q.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.q);
+  rest_s.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.s);
+  const Subspace motion(rates);
+  m.N = position.free;
+  m.L = motion.free;
+  m.P = motion.least(rest_q);
+  m.S = motion.least(rest_s);
+
+  /* W, and the right-hand side for (q, v, s, f) */
+  std::vector<PetscInt> rows(n);
+  std::iota(rows.begin(), rows.end(), 0);
+  const Eigen::Index nq = (Eigen::Index)m.q.size(), ns = m.ds(), nf = (Eigen::Index)in.size();
+  Dense             W(n, n), right(n, 2 * nq + ns + nf);
+  W << Block(M, rows, m.q), Block(C, rows, m.s), Block(K, rows, m.rest);
+  right << -Block(K, rows, m.q), -Block(C, rows, m.q), -Block(K, rows, m.s), Dense::Zero(n, nf);
+  for (Eigen::Index f = 0; f < nf; f++) {
+    std::vector<double> own, all;
+    PetscCall(w.load(in[f], &own));
+    PetscCall(Gather(w, MPI_DOUBLE, own, all));
+    for (PetscInt i = 0; i < n; i++) right(i, 2 * nq + ns + f) = all[i];
+  }
+  for (PetscInt i : m.holonomic) {
+    W.row(i).setZero();
+    right.row(i).setZero();
+    for (Eigen::Index k = 0; k < nq; k++) W(i, k) = K(i, m.q[k]);
+  }
+  for (PetscInt i : m.velocity) {
+    W.row(i).setZero();
+    right.row(i).setZero();
+    for (Eigen::Index k = 0; k < nq; k++) {
+      W(i, k)          = C(i, m.q[k]);
+      right(i, nq + k) = -K(i, m.q[k]);
+    }
+    for (Eigen::Index k = 0; k < ns; k++) W(i, nq + k) = K(i, m.s[k]);
+  }
+  Dense expand = Dense::Zero(2 * nq + ns + nf, m.states() + nf);
+  expand.block(0, 0, nq, m.dz())                       = m.N;
+  expand.block(nq, 0, nq, m.dz())                      = m.P * m.N;
+  expand.block(nq, m.dz(), nq, m.dy())                 = m.L;
+  expand.block(nq, m.dz() + m.dy(), nq, ns)            = m.S;
+  expand.bottomRightCorner(ns + nf, ns + nf).setIdentity();
+  m.y = Scaled(W, right * expand);
+  PetscCheck(m.y.allFinite(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: accelerations and multipliers do not follow from the state: the constraints are singular there");
+
+  Dense rate(m.states(), m.states() + nf);
+  rate << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq), m.y.middleRows(nq, ns);
+  m.A = rate.leftCols(m.states());
+  m.B = rate.rightCols(nf);
+  PetscFunctionReturn(0);
+}
+
+/* x of own unknowns from (z, y, s) and inputs; second: their rates, and those of the rates */
+template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m, const Eigen::Matrix<T, Eigen::Dynamic, 1> &state, std::array<std::vector<T>, 3> &x)
+{
+  using Vector          = Eigen::Matrix<T, Eigen::Dynamic, 1>;
+  const PetscInt start  = w.R->start, n = w.R->n;
+  const Vector   z = state.head(m.dz()), y = state.segment(m.dz(), m.dy()), s = state.segment(m.dz() + m.dy(), m.ds());
+  const Vector   q = m.N * z, v = m.L * y + m.P * q + m.S * s, other = m.y * state;
+  for (auto &c : x) c.assign(n, 0);
+  auto put = [&](int order, PetscInt i, T value) {
+    if (i >= start && i < start + n) x[order][i - start] = value;
+  };
+  for (std::size_t k = 0; k < m.q.size(); k++) {
+    put(0, m.q[k], q((Eigen::Index)k));
+    put(1, m.q[k], v((Eigen::Index)k));
+    put(2, m.q[k], other((Eigen::Index)k));
+  }
+  for (std::size_t k = 0; k < m.s.size(); k++) {
+    put(0, m.s[k], s((Eigen::Index)k));
+    put(1, m.s[k], other((Eigen::Index)(m.q.size() + k)));
+  }
+  for (std::size_t k = 0; k < m.rest.size(); k++) put(0, m.rest[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
+}
+
+} // namespace
+
+PetscErrorCode Linearization::modes(std::vector<Mode> *all) const
+{
+  const Work &w = *work_;
+  Minimal     m;
+  PetscFunctionBegin;
+  PetscCall(w.check("Linearization::modes()"));
+  PetscCall(Reduce(w, {}, m));
+  all->clear();
+  if (!m.states()) PetscFunctionReturn(0); /* all motions are given */
+  const Eigen::EigenSolver<Dense> solver(m.A);
+  PetscCheck(solver.info() == Eigen::Success, w.comm(), PETSC_ERR_CONV_FAILED, "Linearization::modes(): the eigenvalues of the matrix of %d states were not found", (int)m.states());
+  std::vector<int> order;
+  for (int k = 0; k < (int)m.states(); k++)
+    if (solver.eigenvalues()(k).imag() >= 0) order.push_back(k);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(solver.eigenvalues()(a)) < std::abs(solver.eigenvalues()(b)); });
+  for (int k : order) {
+    Mode                                 mode;
+    std::array<std::vector<Complex>, 3>  x;
+    const Eigen::VectorXcd               vector = solver.eigenvectors().col(k);
+    Unknowns<Complex>(w, m, vector, x);
+    mode.value = solver.eigenvalues()(k);
+    mode.shape = x[0];
+    PetscCall(normalize(&mode));
+    all->push_back(mode);
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::stateSpace(const std::vector<Excitation> &in, const std::vector<Measure> &out, StateSpace *s) const
+{
+  const Work &w = *work_;
+  Minimal     m;
+  PetscFunctionBegin;
+  PetscCall(w.check("Linearization::stateSpace()"));
+  PetscCall(Reduce(w, in, m));
+  const Eigen::Index n = m.states(), nf = (Eigen::Index)in.size(), no = (Eigen::Index)out.size();
+  Dense             CD(no, n + nf);
+  for (Eigen::Index k = 0; k < n + nf; k++) {
+    SmallMotion x;
+    Unknowns<double>(w, m, Eigen::VectorXd::Unit(n + nf, k), x);
+    for (Eigen::Index o = 0; o < no; o++) PetscCall(w.derivative(out[o], x, &CD(o, k)));
+  }
+  auto rows = [](const Dense &X) {
+    std::vector<double> y;
+    for (Eigen::Index i = 0; i < X.rows(); i++)
+      for (Eigen::Index j = 0; j < X.cols(); j++) y.push_back(X(i, j));
+    return y;
+  };
+  *s = {(PetscInt)n, (PetscInt)nf, (PetscInt)no, rows(m.A), rows(m.B), rows(CD.leftCols(n)), rows(CD.rightCols(nf))};
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

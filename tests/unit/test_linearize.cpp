@@ -1,0 +1,294 @@
+/* Small motions against closed forms: modes, shapes, response, minimal coordinates. */
+#include "hhtdae/linearize.h"
+#include "hhtdae/modes.h"
+#include "scene_output.h"
+#include <Eigen/Dense>
+#include <algorithm>
+
+using namespace hhtest;
+using Complex = std::complex<double>;
+
+namespace
+{
+
+/* The start of a scene; the step that it takes is short */
+struct Started {
+  SceneRun      run;
+  Linearization small;
+  explicit Started(Scene &s, const std::string &options = "") : run(s, 1, tolerance(1e-8) + "-ts_dt 1e-4 " + options)
+  {
+    must(TSStep(run.ts));
+    must(small.take(run.ts, 0));
+  }
+  std::vector<Mode> modes() const
+  {
+    std::vector<Mode> all;
+    must(small.modes(&all));
+    return all;
+  }
+};
+
+/* Imaginary parts that are not zero, in order */
+std::vector<double> frequencies(const std::vector<Mode> &modes, double zero = 1e-6)
+{
+  std::vector<double> w;
+  for (const Mode &m : modes)
+    if (std::abs(m.value.imag()) > zero) w.push_back(m.value.imag());
+  std::sort(w.begin(), w.end());
+  return w;
+}
+
+RigidBody body(double mass, const Vector3 &inertia, const Vector3 &position = Vector3::Zero())
+{
+  RigidBody b;
+  b.mass     = mass;
+  b.inertia  = inertia.asDiagonal();
+  b.position = position;
+  return b;
+}
+
+constexpr double m = 2, c = 3, k = 500;
+
+/* A mass on a slider along x, with a spring and a damper, turned about an oblique axis so that no coordinate is along x */
+struct Slider {
+  Scene       scene{PETSC_COMM_SELF};
+  Marker      at, ground;
+  Element     spring;
+  Excitation  push;
+  Slider(double damping = c)
+  {
+    const Matrix3 R      = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+    const Matrix3 along_z = Eigen::AngleAxisd(M_PI / 2, Vector3::UnitY()).toRotationMatrix();
+    const Body    b      = scene.add("mass", body(m, {0.1, 0.2, 0.3}, R * Vector3(2, 0, 0)));
+    at                   = scene.marker(b, {0, 0, 0}, R * along_z);
+    ground               = scene.marker(scene.ground(), {0, 0, 0}, R * along_z);
+    scene.add("slide", Translational{at, ground});
+    spring = scene.add("spring", SpringDamper{at, ground, k, damping, 2});
+    push   = Excitation::force(at, R.col(0));
+  }
+};
+
+} // namespace
+
+TEST(Linearize, DampedOscillator)
+{
+  Slider        s;
+  const Started start(s.scene);
+  const auto    modes = start.modes();
+  ASSERT_EQ(modes.size(), 1u);
+  EXPECT_NEAR(modes[0].value.real(), -c / (2 * m), 1e-9);
+  EXPECT_NEAR(modes[0].value.imag(), std::sqrt(k / m - c * c / (4 * m * m)), 1e-8);
+  EXPECT_NEAR(modes[0].dampingRatio(), c / (2 * std::sqrt(k * m)), 1e-10);
+  EXPECT_NEAR(modes[0].frequency(), std::sqrt(k / m) / (2 * M_PI), 1e-9);
+}
+
+/* Displacement, acceleration, and the spring's force, which the load does not reach directly */
+TEST(Linearize, ResponseOfAnOscillator)
+{
+  Slider                     s;
+  const Started              start(s.scene);
+  const std::vector<double>  w = {0, 3, std::sqrt(k / m), 40, 1000};
+  const std::vector<Measure> what = {Measure::distance(s.at, s.ground), Measure::rate(s.at, s.ground), Measure::acceleration(s.at, 2, s.ground, s.ground), Measure::force(s.spring, 0)};
+  StateSpace                 space;
+  must(start.small.stateSpace({s.push}, what, &space));
+  ASSERT_EQ(space.states, 2);
+  Eigen::Map<Eigen::Matrix<double, 2, 2, Eigen::RowMajor>> A(space.A.data());
+  Eigen::Map<Eigen::Matrix<double, 2, 1>>                  B(space.B.data());
+  for (std::size_t o = 0; o < what.size(); o++) {
+    std::vector<Complex> h;
+    must(start.small.response(s.push, what[o], w, &h));
+    for (std::size_t i = 0; i < w.size(); i++) {
+      const Complex iw(0, w[i]), x = 1. / (k - m * w[i] * w[i] + c * iw), expected[] = {x, iw * x, iw * iw * x, (k + c * iw) * x};
+      const double  size = std::max({1 / k, std::abs(expected[o]), std::abs(x) * (o == 3 ? k : 0)});
+      EXPECT_LT(std::abs(h[i] - expected[o]), 1e-8 * size) << o << " at " << w[i] << " " << h[i] << " " << expected[o];
+      const Eigen::Vector2cd z = (iw * Eigen::Matrix2cd::Identity() - A.cast<Complex>()).partialPivLu().solve(B.cast<Complex>());
+      const Complex          y = space.C[2 * o] * z(0) + space.C[2 * o + 1] * z(1) + space.D[o];
+      EXPECT_LT(std::abs(y - expected[o]), 1e-8 * size) << o << " at " << w[i] << " by minimal coordinates";
+    }
+  }
+}
+
+/* Two rods that hang from one another: M and K of the angles */
+TEST(Linearize, DoublePendulum)
+{
+  for (Space kind : {Space::Planar, Space::Spatial}) {
+    Scene scene(PETSC_COMM_SELF, kind);
+    scene.gravity({0, -9.81, 0});
+    const Body   one = scene.add("one", body(1, {1. / 12, 1e-3, 1. / 12}, {0, -0.5, 0})), two = scene.add("two", body(1, {1. / 12, 1e-3, 1. / 12}, {0, -1.5, 0}));
+    const Marker elbow = scene.marker(one, {0, -0.5, 0});
+    scene.add("pin", Revolute{scene.marker(one, {0, 0.5, 0}), scene.marker(scene.ground())});
+    scene.add("elbow", Revolute{scene.marker(two, {0, 0.5, 0}), elbow});
+    const Started start(scene);
+    const auto    modes = start.modes();
+    ASSERT_EQ(modes.size(), 2u);
+    const Eigen::Matrix2d M = (Eigen::Matrix2d() << 4. / 3, 0.5, 0.5, 1. / 3).finished(), K = (Eigen::Matrix2d() << 1.5 * 9.81, 0, 0, 0.5 * 9.81).finished();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> expected(K, M);
+    for (int i = 0; i < 2; i++) {
+      EXPECT_NEAR(modes[i].value.imag(), std::sqrt(expected.eigenvalues()(i)), 1e-8);
+      EXPECT_NEAR(modes[i].value.real(), 0, 1e-8);
+      BodyPart a, b;
+      must(start.small.part(modes[i], one, &a));
+      must(start.small.part(modes[i], two, &b));
+      const auto v = expected.eigenvectors().col(i);
+      EXPECT_LT(std::abs(b.rotation(2) / a.rotation(2) - v(1) / v(0)), 1e-7);
+      EXPECT_LT(std::abs(b.displacement(0) / a.displacement(0) - (v(0) + v(1) / 2) / (v(0) / 2)), 1e-7);
+      EXPECT_NEAR(a.share + b.share, 1, 1e-9);
+      EXPECT_NEAR(a.share, v(0) * v(0) / 3 / (v.transpose() * M * v), 1e-7);
+      Complex height, sway;
+      must(start.small.value(modes[i], Measure::displacement(elbow, 0), &sway));
+      must(start.small.value(modes[i], Measure::displacement(elbow, 1), &height));
+      EXPECT_LT(std::abs(sway - a.rotation(2)), 1e-9);
+      EXPECT_LT(std::abs(height), 1e-9);
+    }
+  }
+}
+
+/* A top that sleeps: I s^2 - i I_a spin s - m g l = 0 for the inclination; coordinates and the joint's axes turn with it */
+TEST(Linearize, SleepingTop)
+{
+  const double mass = 3, l = 0.4, It = 0.3 + mass * l * l, Ia = 0.5, g = 9.81;
+  for (double spin : {15., 40.})
+    for (const Vector3 &up : {Vector3(0, 0, 1), Vector3(0.6, 0, 0.8), Vector3(1, 0, 0)}) {
+      Scene     scene(PETSC_COMM_SELF);
+      RigidBody b        = body(mass, {0.3, 0.3, Ia}, l * up);
+      b.rotation         = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), up).toRotationMatrix() * Eigen::AngleAxisd(0.3, Vector3::UnitZ()).toRotationMatrix();
+      b.angular_velocity = spin * up;
+      scene.gravity(-g * up);
+      const Body top = scene.add("top", b);
+      scene.add("tip", Spherical{scene.marker(top, {0, 0, -l}), scene.marker(scene.ground())});
+      const Started start(scene);
+      const auto    w    = frequencies(start.modes());
+      const double  root = std::sqrt(Ia * Ia * spin * spin - 4 * It * mass * g * l);
+      ASSERT_EQ(w.size(), 2u) << spin << " " << up.transpose();
+      EXPECT_NEAR(w[0], (Ia * spin - root) / (2 * It), 1e-6);
+      EXPECT_NEAR(w[1], (Ia * spin + root) / (2 * It), 1e-6);
+    }
+}
+
+/* A rotor in a bearing on springs: its frequencies split with speed. The axes of the joint turn with the rotor or stand with the bearing. */
+TEST(Linearize, WhirlOfARotor)
+{
+  const double It = 0.3, Ia = 0.5, Ib = 0.1, stiffness = 200;
+  for (double spin : {0., 5., 60.})
+    for (bool swap : {false, true}) {
+      Scene     scene(PETSC_COMM_SELF);
+      RigidBody r        = body(4, {It, It, Ia});
+      r.angular_velocity = {0, 0, spin};
+      const Body   rotor = scene.add("rotor", r), bearing = scene.add("bearing", body(1, {Ib, Ib, Ib}));
+      const Marker i = scene.marker(rotor), j = scene.marker(bearing);
+      scene.add("axle", swap ? Revolute{j, i} : Revolute{i, j});
+      scene.add("mount", Bushing{j, scene.marker(scene.ground()), Vector3(1e4, 1e4, 2e4), Vector3(stiffness, stiffness, 90)});
+      const Started start(scene);
+      auto          w = frequencies(start.modes());
+      const double  I = It + Ib, root = std::sqrt(Ia * Ia * spin * spin + 4 * I * stiffness);
+      std::vector<double> expected = {(root - Ia * spin) / (2 * I), (root + Ia * spin) / (2 * I), std::sqrt(90 / Ib), std::sqrt(1e4 / 5), std::sqrt(1e4 / 5), std::sqrt(2e4 / 5)};
+      std::sort(expected.begin(), expected.end());
+      ASSERT_EQ(w.size(), expected.size()) << spin;
+      for (std::size_t n = 0; n < w.size(); n++) EXPECT_NEAR(w[n], expected[n], 1e-6 * expected[n]) << spin;
+    }
+}
+
+/* A disc that rolls straight on: I (I + m r^2) s^2 = I m g r - I_a (I_a + m r^2) rate^2 for its inclination, unstable below a speed */
+TEST(Linearize, RollingDisc)
+{
+  const double mass = 1.5, r = 0.3, g = 9.81, It = mass * r * r / 4, Ia = mass * r * r / 2;
+  for (double rate : {2., 5., 12.}) {
+    Scene     scene(PETSC_COMM_SELF);
+    RigidBody b        = body(mass, {It, It, Ia}, {0, 0, r});
+    b.rotation         = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitX()).toRotationMatrix(); /* its axis along y */
+    b.angular_velocity = {0, rate, 0};
+    b.velocity         = {rate * r, 0, 0};
+    scene.gravity({0, 0, -g});
+    const Body disc = scene.add("disc", b);
+    scene.add("rolls", hhtdae::RollingDisc{scene.marker(disc), scene.marker(scene.ground()), r});
+    const Started start(scene);
+    const double  square = (It * mass * g * r - Ia * (Ia + mass * r * r) * rate * rate) / (It * (It + mass * r * r));
+    double        found  = INFINITY;
+    for (const Mode &mode : start.modes()) found = std::min(found, std::abs(mode.value * mode.value - square));
+    EXPECT_LT(found, 1e-6 * std::abs(square)) << rate << ": " << square;
+  }
+}
+
+/* A mass driven by a controller with a lag and a variable: m s^2 + c s + k + gain/(1 + tau s) = 0 */
+TEST(Linearize, StatesAndVariables)
+{
+  const double gain = 300, tau = 0.05;
+  Slider       s;
+  const Variable shown = s.scene.variable("shown", Expression{{Measure::distance(s.at, s.ground)}, [=](const Real *x) { return gain * (x[0] - 2.); }});
+  const State    filtered = s.scene.state("filtered", Expression{{Measure::value(shown), Measure::value(State{0})}, [=](const Real *x) { return (x[0] - x[1]) / tau; }}, 0);
+  s.scene.add("drive", UserScalarForce{s.at, s.ground, Expression{{Measure::value(filtered)}, [](const Real *x) { return -x[0]; }}});
+  const Started start(s.scene);
+  const auto    modes = start.modes();
+  ASSERT_EQ(modes.size(), 2u); /* a pair, and a real one */
+  for (const Mode &mode : modes) {
+    const Complex v = mode.value;
+    EXPECT_LT(std::abs((m * v * v + c * v + k) * (1. + tau * v) + gain), 1e-6 * (k + gain)) << v;
+  }
+  Complex x, y;
+  must(start.small.value(modes[0], Measure::distance(s.at, s.ground), &x));
+  must(start.small.value(modes[0], Measure::value(shown), &y));
+  EXPECT_LT(std::abs(y - gain * x), 1e-6 * gain);
+}
+
+/* The slowest ones of a chain by sparse and by dense algebra, and no trace of it all in the run */
+TEST(Linearize, SlowestModesOfAChain)
+{
+  Rods              rods(12);
+  for (int i = 0; i < 12; i++) rods.scene.add("", TorsionalSpringDamper{rods.centre[i], i ? rods.centre[i - 1] : rods.scene.marker(rods.scene.ground()), 400. + 10 * i, 0.2, 0});
+  const Started     start(rods.scene);
+  const auto        all = start.modes();
+  std::vector<Mode> slow;
+  must(SlowestModes(start.small, 5, &slow));
+  ASSERT_EQ(all.size(), 12u);
+  ASSERT_EQ(slow.size(), 5u);
+  for (int i = 0; i < 5; i++) {
+    EXPECT_LT(std::abs(slow[i].value - all[i].value), 1e-7 * std::abs(all[i].value));
+    for (std::size_t n = 0; n < 6 * 12; n++) EXPECT_LT(std::abs(slow[i].shape[n] - all[i].shape[n]), 1e-5) << i << " " << n;
+  }
+}
+
+TEST(Linearize, RunDoesNotNotice)
+{
+  Array end[2];
+  for (int asked = 0; asked < 2; asked++) {
+    Rods     rods(3);
+    SceneRun run(rods.scene, 0.5, tolerance(1e-6));
+    for (double t : {0.2, 0.5}) {
+      must(TSSetMaxTime(run.ts, t));
+      must(run.solve());
+      if (!asked) continue;
+      Linearization        small;
+      std::vector<Mode>    modes;
+      std::vector<Complex> h;
+      must(small.take(run.ts));
+      must(small.modes(&modes));
+      must(small.response(Excitation::force(rods.tip[2], {0, 1, 0}), Measure::displacement(rods.tip[2], 1), {5}, &h));
+    }
+    Vec U;
+    must(TSGetSolution(run.ts, &U));
+    end[asked] = whole(U);
+  }
+  EXPECT_EQ(end[0], end[1]);
+}
+
+TEST(Linearize, ErrorsThatSayWhatToDo)
+{
+  Slider        s;
+  SceneRun      run(s.scene, 1, "");
+  Linearization small;
+  std::vector<Mode>    modes;
+  std::vector<Complex> h;
+  ErrorTrap     trap;
+  EXPECT_NE(small.modes(&modes), 0);
+  EXPECT_TRUE(trap.says("take()")) << trap.message;
+  EXPECT_NE(small.take(run.ts), 0);
+  EXPECT_TRUE(trap.says("TSStep()")) << trap.message;
+  must(TSStep(run.ts));
+  must(small.take(run.ts));
+  EXPECT_NE(small.response(Excitation::force(s.ground, {1, 0, 0}), Measure::time(), {1}, &h), 0);
+  EXPECT_TRUE(trap.says("on the ground")) << trap.message;
+  EXPECT_NE(small.response(Excitation::force(Marker{1000}, {1, 0, 0}), Measure::time(), {1}, &h), 0);
+  EXPECT_TRUE(trap.says("not one of this scene")) << trap.message;
+  EXPECT_NE(SlowestModes(small, 0, &modes), 0);
+  EXPECT_TRUE(trap.says("must be positive")) << trap.message;
+}
