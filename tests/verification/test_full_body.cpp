@@ -1,9 +1,11 @@
 /* A finite-element model in motion: its frequency, what is conserved, against its own modes, in fast rotation. */
 #include "beam_bodies.h"
+#include "hhtdae/modes.h"
 #include "scene/scene_data.h"
 #include "scene_output.h"
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <numeric>
 
 using namespace hhtest;
 
@@ -259,4 +261,57 @@ TEST(FullBodyDynamics, BarInFastRotation)
   const double f = 0.3, beta = (1 + f) * (1 + f) / 4, gamma = 0.5 + f;
   const double c = -1. / 12 + (0.25 + beta - gamma / 2) - f * f / 2 + f * (1 - f) / 2;
   EXPECT_NEAR((error[0] - error[1]) / (spin * spin * 2e-3 * 2e-3 * 0.75), c, 0.1 * c);
+}
+
+/* Slowest modes about rest, by sparse algebra over nodes and multipliers, against the matrices themselves */
+TEST(FullBodyModes, ClampedBeam)
+{
+  const BeamMesh    m(slender());
+  Scene             scene(PETSC_COMM_SELF);
+  FullFeBody        fe;
+  FullBody          b;
+  const double      omega = firstFrequency(m.model), ratio = 0.02;
+  std::vector<Mode> modes;
+  Linearization     small;
+  b.law               = FeLaw::Small;
+  b.stiffness_damping = 2 * ratio / omega;
+  b.attachments       = hhtex::BeamAttachments();
+  must(fe.add(scene, "beam", m.model, b));
+  scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
+  SceneRun run(scene, 1, fixed(1e-4));
+  must(TSStep(run.ts));
+  must(small.take(run.ts));
+  must(SlowestModes(small, 4, &modes));
+  MEASURED("circular frequency %.9g, of the matrices %.9g; damping ratio %.6g", std::abs(modes[0].value), omega, modes[0].dampingRatio());
+  EXPECT_NEAR(std::abs(modes[0].value) / omega, 1, 1e-6);
+  EXPECT_NEAR(modes[0].dampingRatio() / ratio, 1, 1e-6);
+  for (std::size_t k = 1; k < modes.size(); k++) EXPECT_NEAR(modes[k].dampingRatio() / std::abs(modes[k].value), ratio / omega, 1e-6 * ratio / omega);
+}
+
+/* Nothing holds the body: six motions that nothing drives back, and the first bending modes */
+TEST(FullBodyModes, FreeBeam)
+{
+  const BeamMesh        m(slender());
+  Scene                 scene(PETSC_COMM_SELF);
+  FullFeBody            fe;
+  FullBody              b;
+  std::vector<PetscInt> rows(3 * m.model.nodes);
+  std::vector<Mode>     modes;
+  Linearization         small;
+  std::iota(rows.begin(), rows.end(), 0);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> expected(dense(m.model.K, rows), dense(m.model.M, rows), Eigen::EigenvaluesOnly);
+  b.law = FeLaw::Small;
+  must(fe.add(scene, "beam", m.model, b));
+  SceneRun run(scene, 1, fixed(1e-4));
+  must(TSStep(run.ts));
+  must(small.take(run.ts));
+  must(SlowestModes(small, 12, &modes));
+  std::vector<double> found;
+  for (const Mode &mode : modes)
+    if (mode.value.imag() > 1) found.push_back(mode.value.imag());
+  ASSERT_GE(found.size(), 2u);
+  for (int k = 0; k < 2; k++) {
+    MEASURED("circular frequency %.9g, of the matrices %.9g", found[k], std::sqrt(expected.eigenvalues()(6 + k)));
+    EXPECT_NEAR(found[k] / std::sqrt(expected.eigenvalues()(6 + k)), 1, 1e-5);
+  }
 }
