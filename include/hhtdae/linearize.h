@@ -84,6 +84,9 @@ public:
   /* M, C, K above in MATAIJ, one row and column for each unknown of the scene; they belong to this object */
   PetscErrorCode operators(Mat *M, Mat *C, Mat *K) const;
 
+  /* A period of the mode for ParaView: prefix.pvd and a file for each frame, the shape times `amplitude` (m or rad at its largest); bodies as
+     -scene_animation draws them. Times run from 0 to 1, also of a mode that does not oscillate, which goes to and fro. */
+  PetscErrorCode animate(const Mode &m, const std::string &prefix, double amplitude, int frames = 24) const;
   /* Scales the mode to its largest displacement or rotation */
   PetscErrorCode normalize(Mode *m) const;
 

@@ -1,4 +1,5 @@
 /* Channels, their files, the animation: what is written is what the run had. */
+#include "hhtdae/linearize.h"
 #include "scene/kernels/spring.h"
 #include "scene/kernels/spring_torsion.h"
 #include "scene/output/vtp.h"
@@ -292,6 +293,32 @@ TEST(SceneOutput, FramesOfTheAnimation)
   EXPECT_NEAR(p0[2], -0.2, 1e-6);
   EXPECT_GT(std::abs(p2[4] - p0[4]), 0.01);
   EXPECT_NEAR(std::hypot(p2[3] - p2[0], p2[4] - p2[1]), 1, 1e-5);
+}
+
+/* Opposite phases of a mode are on opposite sides of the state */
+TEST(SceneOutput, FramesOfAMode)
+{
+  Rods              rods(4);
+  Linearization     small;
+  std::vector<Mode> modes;
+  TemporaryFile     index("mode.pvd"), frame[] = {TemporaryFile("mode_000000.vtp"), TemporaryFile("mode_000001.vtp"), TemporaryFile("mode_000002.vtp"), TemporaryFile("mode_000003.vtp")};
+  for (int k = 0; k < 4; k++) rods.scene.shape(rods.body[k], Shape::box({0.5, 0.1, 0.1}));
+  SceneRun run(rods.scene, 0.1, tight);
+  must(TSStep(run.ts));
+  must(small.take(run.ts));
+  must(small.modes(&modes));
+  must(small.animate(modes.back(), index.name.substr(0, index.name.size() - 4), 0.1, 4));
+  EXPECT_EQ(Elements(index.text(), "DataSet"), 4);
+  std::vector<float> point[4];
+  for (int k = 0; k < 4; k++) point[k] = Data<float>(frame[k].text(), "points");
+  double moved = 0, between = 0;
+  ASSERT_EQ(point[0].size(), 4u * 8u * 3u);
+  for (std::size_t i = 0; i < point[0].size(); i++) {
+    widen(moved, std::abs(point[0][i] - point[2][i]));
+    widen(between, std::abs(point[0][i] + point[2][i] - point[1][i] - point[3][i]));
+  }
+  EXPECT_GT(moved, 0.1);
+  EXPECT_LT(between, 0.2 * moved); /* of second order in the rotations */
 }
 
 TEST(SceneOutput, Base64OfAnyLength)
