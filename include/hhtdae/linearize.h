@@ -2,7 +2,7 @@
   Small motions about a state of a run: natural modes, frequency response, and the equations in minimal coordinates.
 
     Linearization small;
-    PetscCall(small.take(ts));                                what has been reached; TSStep() once for the initial state
+    PetscCall(small.take(ts));                                what the run has reached; of one that has not begun, the start
     std::vector<Mode> modes;
     PetscCall(small.modes(&modes));                           all of them; of a large scene SlowestModes(), hhtdae/modes.h
     std::vector<std::complex<double>> h;
@@ -14,7 +14,7 @@
 
   x: displacements and small rotations of bodies in space axes, and all other unknowns as they are. M, C and K are those of this moment: modes
   are motions where the state is at rest, or steady as seen from space. An axisymmetric rotor at speed is, a swinging rod is not.
-  All calls are collective, with the same results on every rank.
+  All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */
 #ifndef HHTDAE_LINEARIZE_H
 #define HHTDAE_LINEARIZE_H
@@ -64,7 +64,8 @@ public:
   Linearization(const Linearization &)            = delete;
   Linearization &operator=(const Linearization &) = delete;
 
-  /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step (TSHHT3EvaluateAt()); the run does not notice */
+  /* The state of a run of Scene::createTS(), at time t between the ends of its last step (TSHHT3EvaluateAt()); before the first one the start. The
+     run does not notice. */
   PetscErrorCode take(TS ts, PetscReal t);
   PetscErrorCode take(TS ts); /* at the end of the last step */
 

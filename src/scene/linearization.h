@@ -13,6 +13,7 @@ namespace hhtdae
 using SmallMotion = std::array<std::vector<double>, 3>;
 
 struct Linearization::Work {
+  TS                         start = nullptr;   /* of a run that has not begun: one that has made the first step in its place */
   Runtime                   *R = nullptr;
   double                     t = 0, size = 1; /* of the scene */
   Vec                        state[3] = {};   /* u, u', u'' */

@@ -109,10 +109,31 @@ PetscErrorCode Roles(Linearization::Work &w)
   PetscFunctionReturn(0);
 }
 
+/* Accelerations and multipliers of the start are found by the first step */
+PetscErrorCode Begin(Linearization::Work &w, TS ts, PetscReal t)
+{
+  Vec       U, V, u, v;
+  PetscReal atol, rtol;
+  PetscFunctionBegin;
+  PetscCall(CreateRun(w.R->model, &w.start));
+  w.R = RunOf(w.start);
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(TS2GetSolution(w.start, &u, &v));
+  PetscCall(VecCopy(U, u));
+  PetscCall(VecCopy(V, v));
+  PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
+  PetscCall(TSSetTolerances(w.start, atol, nullptr, rtol, nullptr));
+  PetscCall(TSSetTime(w.start, t));
+  PetscCall(TSSetMaxTime(w.start, t + 1));
+  PetscCall(TSStep(w.start));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 void Linearization::Work::clear()
 {
+  PetscCallAbort(PETSC_COMM_SELF, TSDestroy(&start));
   for (Vec &x : state) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
   for (Mat *x : {&M, &C, &K, &turn[0], &turn[1], &turn[2]}) PetscCallAbort(PETSC_COMM_SELF, MatDestroy(x));
 }
@@ -267,8 +288,11 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
   PetscCheck(ours, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP, "Linearization::take(): only TS type hhtdae gives accelerations and multipliers");
   PetscCall(TSGetStepNumber(ts, &steps));
-  PetscCheck(steps, PetscObjectComm((PetscObject)ts), PETSC_ERR_ORDER,
-             "Linearization::take(): before the first step there are no accelerations and multipliers; call TSStep(), the start is at take(ts, its time)");
+  if (!steps) {
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(Begin(w, ts, t));
+    ts = w.start;
+  }
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
   PetscCall(TSHHT3EvaluateAt(ts, t, w.state[0], w.state[1], w.state[2]));

@@ -110,7 +110,8 @@ PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
 PetscErrorCode StoreTriangle(Runtime &R); /* after Layout() */
 PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again);
 PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::function<void()> &add);
-/* ts.cpp: the run of this scene that the TS owns, for the call that is named */
+/* ts.cpp: a run from the start, which the TS owns; the run of this scene that the TS owns, for the call that is named */
+PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts);
 PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R);
 
 } // namespace hhtdae

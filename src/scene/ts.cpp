@@ -117,12 +117,19 @@ PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
 
 PetscErrorCode Scene::createTS(TS *ts)
 {
-  Vec U, V, F;
   PetscFunctionBegin;
   PetscCall(Guarded([&] { return setUp(); }));
   PetscCall(CheckUnchanged(data(), start_));
-  auto     run = std::make_unique<Runtime>(model_);
+  PetscCall(CreateRun(model_, ts));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
+{
+  Vec      U, V, F;
+  auto     run = std::make_unique<Runtime>(std::move(model));
   Runtime &R   = *run;
+  PetscFunctionBegin;
   PetscCall(Guarded([&] { return Layout(R); }));
   PetscCall(StoreTriangle(R));
   PetscCall(VecCreate(R.scene.comm, &U));
