@@ -35,10 +35,12 @@ struct Mode {
   double dampingRatio() const { return std::abs(value) > 0 ? -value.real() / std::abs(value) : 0; }
 };
 
+using Vector3c = Eigen::Matrix<std::complex<double>, 3, 1, Eigen::DontAlign>; /* the same for all compiler's options */
+
 /* A body's part in a mode: of its centre of mass in space axes, and how much of the kinetic energy it has */
 struct BodyPart {
-  Eigen::Vector3cd displacement = Eigen::Vector3cd::Zero(), rotation = Eigen::Vector3cd::Zero();
-  double           share = 0;
+  Vector3c displacement = Vector3c::Zero(), rotation = Vector3c::Zero();
+  double   share = 0;
 };
 
 /* A force and a moment in space axes on the body of a marker, at its origin, for an input of 1 */
