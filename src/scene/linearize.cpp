@@ -203,8 +203,11 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
 {
   constexpr double reach = 1e-3, weight[2] = {8. / 12, -1. / 12};
   Vec              d[3], at[3];
-  double           largest = 0;
+  double           largest = 0, here = 0;
   PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) at[k] = state[k];
+  PetscCall(moved.take(*R, t, at));
+  PetscCall(moved.value(m, &here));
   for (int k = 0; k < 3; k++) {
     PetscCall(VecDuplicate(state[0], &d[k]));
     PetscCall(VecDuplicate(state[0], &at[k]));
@@ -221,6 +224,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
       for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
       PetscCall(moved.take(*R, t, at));
       PetscCall(moved.value(m, &y));
+      if (m.kind == Measure::Angle) y = std::remainder(y - here, 2 * M_PI); /* half a turn is both pi and -pi */
       *x += side * weight[k - 1] * y / e;
     }
   for (int k = 0; k < 3; k++) {

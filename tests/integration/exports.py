@@ -34,7 +34,7 @@ print("libhhtdae shows %d names" % len(names))
 
 # Scenes: members of the classes with sources of their own, steps of the state; an enter() for everything that holds markers or elements
 names = shown(libraries[1])
-foreign = [name for name in names if not re.match(r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction|Motion|Snapshot)::|step5?\()", name)]
+foreign = [name for name in names if not re.match(r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction|Motion|Snapshot|Linearization)::|step5?\()", name)]
 check(not foreign, "not declared in the headers: %s" % foreign)
 added = {match.group(1) for match in (re.match(r"hhtdae::Element hhtdae::Scene::enter<hhtdae::(\w+)>", name) for name in names) if match}
 elements = set()
@@ -48,7 +48,7 @@ print("libhhtscene shows %d names, %d kinds of elements among them" % (len(names
 
 # Flexible bodies: members of classes and functions that the header declares
 if len(libraries) > 2:
-    text = header("flexible")
+    text = header("flexible") + header("modes")
     functions = set(re.findall(r"^PetscErrorCode (\w+)\(", text, flags=re.MULTILINE))
     classes = set(re.findall(r"^(?:class|struct) (\w+)", text, flags=re.MULTILINE))
     names = shown(libraries[2])

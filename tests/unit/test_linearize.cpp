@@ -139,6 +139,20 @@ TEST(Linearize, DoublePendulum)
   }
 }
 
+/* An angle of half a turn, which is pi on one side and -pi on the other */
+TEST(Linearize, AngleOfHalfATurn)
+{
+  Scene scene(PETSC_COMM_SELF, Space::Planar);
+  scene.gravity({0, -9.81, 0});
+  const Body   rod = scene.add("rod", body(1, {1. / 12, 1e-3, 1. / 12}, {0, -0.5, 0}));
+  const Marker pin = scene.marker(rod, {0, 0.5, 0}), turned = scene.marker(scene.ground(), {0, 0, 0}, Eigen::AngleAxisd(M_PI, Vector3::UnitZ()).toRotationMatrix());
+  scene.add("pin", Revolute{pin, turned});
+  const Started start(scene);
+  Complex       angle;
+  must(start.small.value(start.modes()[0], Measure::angle(pin, turned), &angle));
+  EXPECT_LT(std::abs(angle - 1.), 1e-8);
+}
+
 /* A top that sleeps: I s^2 - i I_a spin s - m g l = 0 for the inclination; coordinates and the joint's axes turn with it */
 TEST(Linearize, SleepingTop)
 {
