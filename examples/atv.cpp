@@ -6,6 +6,7 @@ static char help[] =
     "  -end <2> -step_max <5e-4>: end time and largest step, s (0: as the tolerance allows)\n"
     "  -stress: the ten places of largest von Mises stress in the frame;  -spots <10>: how many\n"
     "  -field <prefix> -field_dt <0.02>: the frame with its stress for ParaView, prefix.pvd\n"
+    "  -modes <0>: that many of the slowest modes of the vehicle at rest\n"
     "  -scene_csv <file.csv>, -scene_animation <prefix>: channels every 4 ms; all parts for ParaView\n";
 
 #include "atv_model.h"
@@ -14,6 +15,7 @@ static char help[] =
 
 #include <fstream>
 #include <hhtdae/flexible.h>
+#include <hhtdae/modes.h>
 
 using namespace hhtdae;
 
@@ -21,7 +23,7 @@ struct Settings {
   std::string frame = "frame.h5", field;
   PetscReal   end = 2, step_max = 5e-4, field_dt = 0.02;
   PetscBool   stress = PETSC_FALSE;
-  PetscInt    spots  = 10;
+  PetscInt    spots  = 10, modes = 0;
 };
 
 static PetscErrorCode ReadSettings(Settings *s)
@@ -38,6 +40,7 @@ static PetscErrorCode ReadSettings(Settings *s)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-field_dt", &s->field_dt, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-stress", &s->stress, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-spots", &s->spots, nullptr));
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-modes", &s->modes, nullptr));
   PetscCheck(s->end > 0 && s->step_max >= 0 && s->field_dt > 0 && s->spots > 0, PETSC_COMM_WORLD,
              PETSC_ERR_ARG_OUTOFRANGE, "-end, -field_dt and -spots must be positive, -step_max not negative");
   PetscFunctionReturn(0);
@@ -114,6 +117,23 @@ static PetscErrorCode CreateTS(const Settings &s, hhtex::Atv &atv, TS *ts)
   PetscFunctionReturn(0);
 }
 
+/* About the equilibrium, in which the run starts */
+static PetscErrorCode PrintModes(TS ts, const hhtex::Atv &atv, PetscInt count)
+{
+  Linearization     small;
+  std::vector<Mode> modes;
+  PetscFunctionBeginUser;
+  PetscCall(small.take(ts));
+  PetscCall(SlowestModes(small, count, &modes));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "mode  frequency Hz  damping ratio  frame's part of the energy\n"));
+  for (std::size_t k = 0; k < modes.size(); k++) {
+    BodyPart frame;
+    PetscCall(small.part(modes[k], atv.frame, &frame));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%4d  %12.5f  %13.5f  %10.3f\n", (int)k + 1, modes[k].frequency(), modes[k].dampingRatio(), frame.share));
+  }
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode Run()
 {
   Settings       s;
@@ -141,6 +161,7 @@ static PetscErrorCode Run()
     if (!failed && !s.field.empty()) failed = series.add(t, x);
   });
   if (recover) PetscCall(watch.attach(ts));
+  if (s.modes > 0) PetscCall(PrintModes(ts, atv, s.modes));
   PetscCall(atv.scene.solve(ts));
   PetscCall(failed);
   if (s.stress) PetscCall(PrintSpots(hot, s.spots));
