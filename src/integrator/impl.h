@@ -40,12 +40,15 @@ struct CorrectorState {
   PetscInt            it     = 0; /* of the present correction */
   PetscInt            base   = 0; /* iteration after which the present matrix came into use */
   PetscInt            renewals = 0; /* matrices made in the course of it */
+  PetscInt            met    = 0; /* times that corrections have turned back and met */
   PetscReal           e      = 0; /* last correction, in units of the tolerance */
   PetscReal           xi_max = 0; /* worst rate of this correction */
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
 
-struct Corrector : CorrectorOptions, CorrectorState {};
+struct Corrector : CorrectorOptions, CorrectorState {
+  PetscInt limit() const { return max_it + 2 * met; } /* of iterations; -snes_max_it ends them before */
+};
 
 struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
@@ -300,7 +303,7 @@ PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
 /* between.cpp */
-PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found);
+PetscErrorCode BetweenIterates(TS ts, PetscReal least, Vec X, Vec dX, Vec F, PetscBool *found);
 /* rounding.cpp */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);

@@ -201,7 +201,7 @@ PetscErrorCode CorrectorSetUp(TS ts)
 static void BeginIteration(Integrator &I)
 {
   Corrector &c = I.corrector;
-  c.it = c.base = c.renewals = 0;
+  c.it = c.base = c.renewals = c.met = 0;
   c.e = c.xi_max = 0;
   c.reason = SNES_CONVERGED_ITERATING;
   c.matrix.fresh  = PETSC_FALSE;

@@ -321,3 +321,38 @@ TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
     EXPECT_LT(run.statistics().steps, 20);
   }
 }
+
+/* Brakes in series that slide at the start, in directions that differ: all catch within microseconds, which the run has to step over */
+TEST(Stiff, SlidingBrakesInSeriesCatch)
+{
+  struct Sliding : Brakes {
+    using Brakes::Brakes;
+    void initial(double *u, double *v) const override
+    {
+      Brakes::initial(u, v);
+      for (PetscInt i = 0; i < n; i++) v[i] = 2. * std::sin(3. * (double)i + 1.);
+    }
+  };
+  long steps = 0, failed = 0;
+  for (double eps : {1e-3, 1e-4, 1e-6})
+    for (double position : {1., 1e4})
+      for (double k : {1e6, 1e8, 1e10, 1e12})
+        for (int count : {2, 3, 5}) {
+          const Sliding p(count, k, std::min(1e-3, 1e6 / k), position, 1.);
+          Simulation    run(p, tolerance(eps) + " -ts_max_steps 3000 ");
+          double        fastest = 0., end = 0.;
+          run.watch             = [&](Simulation &r, PetscInt, double t) {
+            end = t;
+            if (t < 0.5) return;
+            for (double x : r.v()) widen(fastest, std::abs(x));
+          };
+          must(run.solve()); /* loads of some 20 N leave that over k */
+          EXPECT_EQ(end, 1.) << eps << " " << position << " " << k << " " << count;
+          EXPECT_LT(fastest, 100. / k + 1e-2 * eps * position) << eps << " " << position << " " << k << " " << count;
+          steps += run.statistics().steps;
+          failed += run.statistics().corrector_fails;
+        }
+  MEASURED("72 runs: %ld steps, %ld failed corrections", steps, failed);
+  EXPECT_LT(steps, 15000);
+  EXPECT_LT(failed, 200);
+}
