@@ -38,14 +38,14 @@ PetscErrorCode Along(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *phi)
 
 /* Bisection between s = 0, where phi is `begin`, and s = 1, where it has to be negative, until phi changes evenly between the ends: while the
    steep part is a bend between flat ones, the middle is about as far as one of the ends */
-PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, PetscReal least, Vec F, PetscReal *s, PetscBool *found)
+PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s, PetscBool *found)
 {
   PetscReal low = 0, high = 1, at_low = begin, at_high, phi;
 
   PetscFunctionBegin;
   *s = 1;
   PetscCall(Along(ts, l, *s, F, &at_high));
-  if (!(at_high < -least * begin)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(at_high < 0)) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < max_halvings && !*found; k++) {
     *s = 0.5 * (low + high);
     PetscCall(Along(ts, l, *s, F, &phi));
@@ -59,9 +59,9 @@ PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, PetscReal least, Ve
 
 } // namespace
 
-/* The correction dX has led to X. If the next one turns back, by the part `least` of this one or more, X is moved to where the two meet, and F is the
+/* The correction dX has led to X. If the next one turns back, X is moved to where the two meet, and F is the
    residual there. */
-PetscErrorCode BetweenIterates(TS ts, PetscReal least, Vec X, Vec dX, Vec F, PetscBool *found)
+PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 {
   Integrator &I = Get(ts);
   Line        l = {X, dX, nullptr, nullptr, nullptr};
@@ -74,7 +74,7 @@ PetscErrorCode BetweenIterates(TS ts, PetscReal least, Vec X, Vec dX, Vec F, Pet
   PetscCall(VecWAXPY(l.begin, 1, dX, X));
   PetscCall(WeightCorrection(I, dX, l.along));
   PetscCall(VecDot(l.along, dX, &begin));
-  PetscCall(Search(ts, l, PetscRealPart(begin), least, F, &s, found));
+  PetscCall(Search(ts, l, PetscRealPart(begin), F, &s, found));
   if (!*found) PetscCall(VecWAXPY(X, -1, dX, l.begin));
   else PetscCall(PetscInfo(ts, "corrector: corrections turn back at t = %g, h = %g; the solution is at %g of the last one\n", (double)I.t1, (double)I.h, (double)s));
   for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDestroy(v));

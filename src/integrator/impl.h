@@ -303,7 +303,7 @@ PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 PetscBool      HooksUserTest(TS ts);
 /* between.cpp */
-PetscErrorCode BetweenIterates(TS ts, PetscReal least, Vec X, Vec dX, Vec F, PetscBool *found);
+PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found);
 /* rounding.cpp */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e);
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);

@@ -36,9 +36,6 @@ constexpr PetscReal slow = 0.8;
 /* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
 constexpr PetscReal stagnant = 0.5;
 
-/* Once corrections have turned back, the next ones are cut short at once where they would turn back by this part or more */
-constexpr PetscReal turned = 0.5;
-
 /* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
 constexpr PetscReal of_rounding = 16;
 
@@ -184,14 +181,14 @@ PetscErrorCode GoOnUnproved(TS ts)
 
 /* A correction that has failed with a matrix of its own may have turned back and forth; one that follows a meeting point may do so at once. In a system
    of several steep forces the next meeting point is in another one, and each earns two more iterations. */
-PetscErrorCode GoOnBetween(TS ts, PetscReal least, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Corrector &c = Get(ts).corrector;
   PetscBool  found;
 
   PetscFunctionBegin;
   if (!(c.matrix.fresh || c.user_lag) || c.it >= c.limit()) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(BetweenIterates(ts, least, X, dX, F, &found));
+  PetscCall(BetweenIterates(ts, X, dX, F, &found));
   *evaluated = found;
   if (!found) PetscFunctionReturn(PETSC_SUCCESS);
   c.reason = SNES_CONVERGED_ITERATING;
@@ -258,11 +255,11 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
     if (!proved) PetscCall(GoOnUnproved(ts));
     else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
   } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
-    PetscCall(GoOnBetween(ts, 0, X, dX, F, evaluated));
+    PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
     if (!I.corrector.reason) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(BlameJacobian(ts, X, dX, F, evaluated));
     if (I.corrector.wrong_jacobian) PetscCall(FailUnproved(ts));
-  } else if (!I.corrector.reason && I.corrector.met && I.corrector.it - I.corrector.base == 1) PetscCall(GoOnBetween(ts, turned, X, dX, F, evaluated));
+  } else if (!I.corrector.reason && I.corrector.met && I.corrector.it - I.corrector.base == 1) PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
