@@ -1,4 +1,4 @@
-/* What the parts of a linearization share: linearize.cpp makes it, minimal.cpp and response.cpp solve it. */
+/* What the parts of a linearization share: linearize.cpp makes it, minimal.cpp and response.cpp solve it, small_motion.cpp reads what they find. */
 #ifndef HHTDAE_SCENE_LINEARIZATION_H
 #define HHTDAE_SCENE_LINEARIZATION_H
 

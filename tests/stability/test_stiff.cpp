@@ -99,6 +99,18 @@ struct Brakes : Problem {
   }
 };
 
+/* The largest force that nothing balances at the end of a step */
+void watchForces(Simulation &run, const Problem &p, double &unsolved)
+{
+  run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (!step) return;
+    const Array u = r.u(), v = r.v(), a = r.a();
+    Array       f(u.size());
+    p.residual(t, u.data(), v.data(), a.data(), f.data());
+    for (double x : f) widen(unsolved, std::abs(x));
+  };
+}
+
 /* Kinetic and potential energy of the four-bar mechanism */
 double energy(const FourBar &p, const Array &u, const Array &v)
 {
@@ -287,13 +299,7 @@ TEST(Stiff, LoadsAtRestInSteepBrakes)
     const Brakes p(b.count, b.k, std::min(1e-3, 1e6 / b.k), 1e4, 50. * b.h);
     Simulation   run(p, tolerance(1e-4) + text("-ts_hhtdae_corrector_tolerance 1e-9 -ts_adapt_type none -ts_dt %g", b.h));
     double       unsolved = 0.;
-    run.watch             = [&](Simulation &r, PetscInt step, double t) {
-      if (!step) return;
-      const Array u = r.u(), v = r.v(), a = r.a();
-      Array       f(u.size());
-      p.residual(t, u.data(), v.data(), a.data(), f.data());
-      for (double x : f) widen(unsolved, std::abs(x));
-    };
+    watchForces(run, p, unsolved);
     must(run.solve());
     MEASURED("%d brakes of %g N s/m, h = %g: %.1e N unsolved; %d iterations, %d failed corrections", b.count, b.k, b.h, unsolved,
              (int)run.statistics().newton, (int)run.statistics().corrector_fails);
@@ -308,13 +314,7 @@ TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
     const Brakes p(3, k, std::min(1e-3, 1e6 / k), 1e4, 1.);
     Simulation   run(p, tolerance(1e-4));
     double       unsolved = 0.;
-    run.watch             = [&](Simulation &r, PetscInt step, double t) {
-      if (!step) return;
-      const Array u = r.u(), v = r.v(), a = r.a();
-      Array       f(u.size());
-      p.residual(t, u.data(), v.data(), a.data(), f.data());
-      for (double x : f) widen(unsolved, std::abs(x));
-    };
+    watchForces(run, p, unsolved);
     must(run.solve());
     MEASURED("3 brakes of %g N s/m: %.1e N unsolved; %d steps, %d iterations", k, unsolved, (int)run.statistics().steps, (int)run.statistics().newton);
     EXPECT_LT(unsolved, 1e-6);

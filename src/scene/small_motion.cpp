@@ -1,0 +1,193 @@
+/* Small motions about the state of a linearization: what a measure makes of one, and a mode's parts. */
+#include "linearization.h"
+#include <algorithm>
+#include <cmath>
+
+namespace hhtdae
+{
+
+/* Of multipliers, variables and force states the equations have no rates, of states no second ones */
+PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) const
+{
+  Vec in;
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(state[0], &in));
+  for (int k = 0; k < 3; k++) PetscCall(VecSet(d[k], 0));
+  for (int k = 0; k < 3; k++) {
+    constexpr double binomial[3][3] = {{1, 0, 0}, {1, 1, 0}, {1, 2, 1}};
+    double          *y;
+    PetscCall(VecGetArrayWrite(in, &y));
+    std::copy(x[k].begin(), x[k].end(), y);
+    for (PetscInt i = 0; i < R->n; i++)
+      if (k && !coordinate(i) && !(k == 1 && role[i] == TSHHT3_STATE)) y[i] = 0;
+    PetscCall(VecRestoreArrayWrite(in, &y));
+    for (int order = k; order < 3; order++) {
+      Vec product;
+      PetscCall(VecDuplicate(in, &product));
+      PetscCall(MatMult(turn[order - k], in, product));
+      if (order == k || order - k > 0) PetscCall(VecAXPY(d[order], binomial[order][k], product));
+      PetscCall(VecDestroy(&product));
+    }
+  }
+  PetscCall(VecDestroy(&in));
+  PetscFunctionReturn(0);
+}
+
+/* By differences of fourth order: along most of a small motion measures are polynomials, or nearly so */
+PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double *x) const
+{
+  constexpr double reach = 1e-3, weight[2] = {8. / 12, -1. / 12};
+  Vec              d[3], at[3];
+  double           largest = 0, here = 0;
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) at[k] = state[k];
+  PetscCall(moved.take(*R, t, at));
+  PetscCall(moved.value(m, &here));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecDuplicate(state[0], &d[k]));
+    PetscCall(VecDuplicate(state[0], &at[k]));
+  }
+  PetscCall(toState(along, d));
+  for (PetscInt i = 0; i < R->n; i++)
+    if (coordinate(i)) largest = std::max(largest, std::abs(along[0][i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
+  const double e = reach * std::min(1., size) / (largest > 0 ? largest : 1);
+  *x             = 0;
+  for (int k = 1; k <= 2; k++)
+    for (int side : {1, -1}) {
+      double y;
+      for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
+      PetscCall(moved.take(*R, t, at));
+      PetscCall(moved.value(m, &y));
+      if (m.kind == Measure::Angle) y = std::remainder(y - here, 2 * M_PI); /* half a turn is both pi and -pi */
+      *x += side * weight[k - 1] * y / e;
+    }
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecDestroy(&d[k]));
+    PetscCall(VecDestroy(&at[k]));
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<double> *b) const
+{
+  const SceneData &s = R->scene;
+  Motion           m, centre;
+  PetscFunctionBegin;
+  b->assign(R->n, 0);
+  PetscCheck(s.valid(in.at), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is not one of this scene");
+  const PetscInt body = s.markers[in.at.id].body;
+  PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");
+  Vec at[3] = {state[0], state[1], state[2]};
+  PetscCall(moved.take(*R, t, at));
+  PetscCall(moved.motion(in.at, &m));
+  PetscCall(moved.motion(Body{body}, &centre));
+  const PetscInt local = R->local_body[body];
+  if (local < 0 || !R->bodies.body[local].owned) PetscFunctionReturn(0);
+  const LocalBody &k        = R->bodies.body[local];
+  const Vector3    moment   = in.moment + (m.position - centre.position).cross(in.load);
+  const int        position = GroupSize(k.kind, 0);
+  double          *row      = b->data() + k.first;
+  for (int c = 0; c < position; c++) row[c] = in.load(c);
+  if (k.kind == BodyKind::Planar) row[2] = moment(2);
+  else if (HasEulerAngles(k.kind)) std::copy(moment.data(), moment.data() + 3, row + 3);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const std::vector<std::complex<double>> &x, std::complex<double> s, std::complex<double> *y)
+{
+  double part[2];
+  PetscFunctionBegin;
+  for (int imaginary = 0; imaginary < 2; imaginary++) {
+    SmallMotion          along;
+    std::complex<double> power = 1;
+    for (int k = 0; k < 3; k++, power *= s) {
+      along[k].resize(x.size());
+      for (std::size_t i = 0; i < x.size(); i++) along[k][i] = imaginary ? (power * x[i]).imag() : (power * x[i]).real();
+    }
+    PetscCall(w.derivative(m, along, &part[imaginary]));
+  }
+  *y = {part[0], part[1]};
+  PetscFunctionReturn(0);
+}
+
+/* By the entry itself, so that it becomes 1; of several as large the first on the lowest rank */
+PetscErrorCode Linearization::normalize(Mode *m) const
+{
+  const Work          &w    = *work_;
+  std::complex<double> best = 0;
+  PetscFunctionBegin;
+  PetscCall(w.check("Linearization::normalize()"));
+  for (PetscInt i = 0; i < w.R->n; i++)
+    if (w.coordinate(i) && std::abs(m->shape[i]) > (1 + 1e-9) * std::abs(best)) best = m->shape[i];
+  std::vector<std::complex<double>> all(w.R->size);
+  PetscCallMPI(MPI_Allgather(&best, 2, MPI_DOUBLE, all.data(), 2, MPI_DOUBLE, w.comm()));
+  best = 0;
+  for (const auto &x : all)
+    if (std::abs(x) > (1 + 1e-9) * std::abs(best)) best = x;
+  if (std::abs(best) > 0)
+    for (auto &x : m->shape) x /= best;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::value(const Mode &m, const Measure &what, std::complex<double> *x) const
+{
+  PetscFunctionBegin;
+  PetscCall(work_->check("Linearization::value()"));
+  PetscCall(AmplitudeOf(*work_, what, m.shape, m.value, x));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
+{
+  const Work    &w = *work_;
+  const Runtime &R = *w.R;
+  Vec            x, y;
+  double         sum[14] = {0}; /* displacement, rotation; kinetic energy of the body and of all */
+  PetscFunctionBegin;
+  PetscCall(w.check("Linearization::part()"));
+  PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
+  const PetscInt local = R.local_body[b.id];
+  const bool     mine  = local >= 0 && R.bodies.body[local].owned;
+  const PetscInt first = mine ? R.bodies.body[local].first : 0, last = mine ? first + R.bodies.coordinates(local) : 0;
+  PetscCall(MatCreateVecs(w.M, &x, &y));
+  for (int imaginary = 0; imaginary < 2; imaginary++) {
+    double       *put;
+    const double *get;
+    PetscCall(VecGetArrayWrite(x, &put));
+    for (PetscInt i = 0; i < R.n; i++) put[i] = !w.coordinate(i) ? 0 : imaginary ? m.shape[i].imag() : m.shape[i].real();
+    PetscCall(VecRestoreArrayWrite(x, &put));
+    PetscCall(MatMult(w.M, x, y));
+    PetscCall(VecGetArrayRead(y, &get));
+    for (PetscInt i = 0; i < R.n; i++) {
+      const double e = !w.coordinate(i) ? 0 : get[i] * (imaginary ? m.shape[i].imag() : m.shape[i].real());
+      sum[13] += e;
+      if (i >= first && i < last) sum[12] += e;
+    }
+    PetscCall(VecRestoreArrayRead(y, &get));
+  }
+  PetscCall(VecDestroy(&x));
+  PetscCall(VecDestroy(&y));
+  if (mine) {
+    const BodyKind kind     = R.bodies.body[local].kind;
+    const int      position = GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : HasEulerAngles(kind) ? 3 : 0;
+    for (int c = 0; c < position; c++) {
+      sum[2 * c]     = m.shape[first + c].real();
+      sum[2 * c + 1] = m.shape[first + c].imag();
+    }
+    for (int c = 0; c < rotations; c++) {
+      const int to = 6 + 2 * (rotations == 1 ? 2 : c);
+      sum[to]      = m.shape[first + position + c].real();
+      sum[to + 1]  = m.shape[first + position + c].imag();
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 14, MPI_DOUBLE, MPI_SUM, w.comm()));
+  for (int c = 0; c < 3; c++) {
+    part->displacement(c) = {sum[2 * c], sum[2 * c + 1]};
+    part->rotation(c)     = {sum[6 + 2 * c], sum[7 + 2 * c]};
+  }
+  part->share = sum[13] != 0 ? sum[12] / sum[13] : 0;
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
