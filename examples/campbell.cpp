@@ -3,6 +3,7 @@ static char help[] = "Campbell diagram of a disc at the end of an elastic shaft:
                      "and how far the disc goes round under a force that turns with it, an unbalance.\n"
                      "  -speeds <7>: of them, from 0 to -fastest <6000> revolutions per minute\n"
                      "  -unbalance <1e-4>: kg m\n"
+                     "  a picture: build/bin/campbell -speeds 61 > campbell.txt; gnuplot -p -e \"plot for [k=2:5] 'campbell.txt' using 1:k with lines\"\n"
                      "  -film PREFIX: the first mode at the highest speed, for ParaView\n";
 
 #include "problem.h"
@@ -144,9 +145,9 @@ PetscErrorCode Run()
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-unbalance", &unbalance, nullptr));
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-film", film, sizeof film, nullptr));
   PetscCheck(speeds > 1 && fastest > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE, "-speeds %d must be 2 or more, -fastest %g positive", (int)speeds, (double)fastest);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    1/min  frequencies of bending, Hz                      unbalance, m\n"));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "#   1/min  frequencies of bending, Hz                      unbalance, m\n"));
   for (PetscInt k = 0; k < speeds; k++) PetscCall(At(fastest * M_PI / 30 * (double)k / (double)(speeds - 1), unbalance, k + 1 < speeds ? "" : film, worst));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "largest relative difference from Stodola's equation: %.1e, under the unbalance %.1e\n", worst[0], worst[1]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "# largest relative difference from Stodola's equation: %.1e, under the unbalance %.1e\n", worst[0], worst[1]));
   PetscFunctionReturn(0);
 }
 

@@ -9,9 +9,9 @@
 
   T^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
 */
+#include "euler.h"
 #include "linearization.h"
 #include "start.h"
-#include <cmath>
 
 namespace hhtdae
 {
@@ -37,16 +37,17 @@ PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv,
   PetscFunctionReturn(0);
 }
 
-/* T, T', T'' of 3-1-3 angles: G = [z g2 g3], n = z x g2, g3 = -sin(theta) n + cos(theta) z */
+/* T = G^-1, T', T''. G = [z g2 g3] turns about z with phi, and g3 about g2 with theta: d g3/d theta = p, dp/d theta = -g3 */
 void AngleRates(const double *angle, const double *rate, const double *second, Matrix3 T[3])
 {
-  const double  st = std::sin(angle[1]), ct = std::cos(angle[1]), p = rate[0], q = rate[1];
-  const Vector3 z = Vector3::UnitZ(), g2(std::cos(angle[0]), std::sin(angle[0]), 0), n = z.cross(g2), g3 = ct * z - st * n;
-  Matrix3       G, G1, G2;
-  G << z, g2, g3;
-  G1 << Vector3::Zero(), p * n, -q * (ct * n + st * z) + p * st * g2;
-  G2 << Vector3::Zero(), second[0] * n - p * p * g2, -second[1] * (ct * n + st * z) + q * q * (st * n - ct * z) + (2 * p * q * ct + second[0] * st) * g2 + p * p * st * n;
-  T[0] = G.inverse();
+  const double phi = rate[0], theta = rate[1];
+  Matrix3      A, G1, G2;
+  EulerAxes    e;
+  EulerFrame(angle, A, e);
+  const Vector3 zero = Vector3::Zero(), p = e.p(), z2 = CrossZ(e.g2), z3 = CrossZ(e.g3);
+  G1 << zero, phi * z2, phi * z3 + theta * p;
+  G2 << zero, second[0] * z2 + phi * phi * CrossZ(z2), second[0] * z3 + phi * phi * CrossZ(z3) + 2 * phi * theta * CrossZ(p) + second[1] * p - theta * theta * e.g3;
+  T[0] = e.G().inverse();
   T[1] = -T[0] * G1 * T[0];
   T[2] = -T[0] * (G2 * T[0] + 2 * G1 * T[1]);
 }
@@ -146,7 +147,7 @@ PetscErrorCode Linearization::Work::check(const char *call) const
 
 PetscErrorCode Linearization::Work::differentiate()
 {
-  Mat F[3], left;
+  Mat F[3];
   PetscFunctionBegin;
   PetscCall(DerivativeMatrix(*R, t, state, 0, 0, nullptr, &F[0]));
   PetscCall(DerivativeMatrix(*R, t, state, apart, 0, F[0], &F[1]));
@@ -158,14 +159,12 @@ PetscErrorCode Linearization::Work::differentiate()
   PetscCall(MatMatMult(F[0], turn[0], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &K));
   PetscCall(AddProduct(K, 1, F[1], turn[1]));
   PetscCall(AddProduct(K, 1, F[2], turn[2]));
-  PetscCall(MatTranspose(turn[0], MAT_INITIAL_MATRIX, &left));
   for (Mat *x : {&M, &C, &K}) {
     Mat product;
-    PetscCall(MatMatMult(left, *x, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+    PetscCall(MatTransposeMatMult(turn[0], *x, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
     PetscCall(MatDestroy(x));
     *x = product;
   }
-  PetscCall(MatDestroy(&left));
   for (Mat &f : F) PetscCall(MatDestroy(&f));
   PetscFunctionReturn(0);
 }

@@ -94,6 +94,7 @@ struct Subspace {
     free                                 = Q.rightCols(n - m);
     solver.compute(A);
   }
+  bool  independent() const { return !A.rows() || solver.rank() == A.rows(); }
   Dense least(const Dense &b) const { return A.rows() ? Dense(solver.solve(scale.asDiagonal() * b)) : Dense::Zero(A.cols(), b.cols()); }
 };
 
@@ -154,6 +155,7 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   rest_q.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.q);
   rest_s.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.s);
   const Subspace motion(rates);
+  PetscCheck(position.independent() && motion.independent(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: the constraints depend on one another in this position, where the number of degrees of freedom is not defined");
   m.N = position.free;
   m.L = motion.free;
   m.P = motion.least(rest_q);

@@ -9,62 +9,80 @@ namespace hhtdae
 namespace
 {
 
-/* [S -w C; w C S], S = K - w^2 M */
-PetscErrorCode DynamicStiffness(const Linearization::Work &w, double omega, Mat *all)
+/* One pattern for all frequencies, which is analyzed once */
+struct Response {
+  Mat K = nullptr, A = nullptr; /* K with the pattern of M, too; the system */
+  Vec b = nullptr, x = nullptr;
+  KSP ksp = nullptr;
+};
+
+/* A = [S -w C; w C S], S = K - w^2 M */
+PetscErrorCode DynamicStiffness(const Linearization::Work &w, double omega, Response &r)
 {
   Mat S, up, down, nest;
   PetscFunctionBegin;
-  PetscCall(MatDuplicate(w.K, MAT_COPY_VALUES, &S));
-  PetscCall(MatAXPY(S, -omega * omega, w.M, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatDuplicate(r.K, MAT_COPY_VALUES, &S));
+  PetscCall(MatAXPY(S, -omega * omega, w.M, SUBSET_NONZERO_PATTERN));
   PetscCall(MatDuplicate(w.C, MAT_COPY_VALUES, &up));
   PetscCall(MatScale(up, -omega));
   PetscCall(MatDuplicate(w.C, MAT_COPY_VALUES, &down));
   PetscCall(MatScale(down, omega));
   Mat block[4] = {S, up, down, S};
   PetscCall(MatCreateNest(w.comm(), 2, nullptr, 2, nullptr, block, &nest));
-  PetscCall(MatConvert(nest, MATAIJ, MAT_INITIAL_MATRIX, all));
+  PetscCall(MatConvert(nest, MATAIJ, r.A ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r.A));
   PetscCall(MatDestroy(&nest));
   for (Mat *x : {&S, &up, &down}) PetscCall(MatDestroy(x));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Solve(const Linearization::Work &w, double omega, const std::vector<double> &load, std::vector<std::complex<double>> &x)
+PetscErrorCode Begin(const Linearization::Work &w, double omega, const std::vector<double> &load, Response &r)
 {
-  Mat                A;
-  Vec                b, y;
-  KSP                ksp;
-  PC                 pc;
-  KSPConvergedReason reason;
-  double            *put;
-  const double      *get;
-  const std::size_t  n = load.size();
+  PC      pc;
+  double *put;
   PetscFunctionBegin;
-  PetscCall(DynamicStiffness(w, omega, &A));
-  PetscCall(MatCreateVecs(A, &y, &b));
-  PetscCall(VecGetArrayWrite(b, &put));
+  PetscCall(MatDuplicate(w.M, MAT_COPY_VALUES, &r.K));
+  PetscCall(MatScale(r.K, 0));
+  PetscCall(MatAXPY(r.K, 1, w.K, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(DynamicStiffness(w, omega, r));
+  PetscCall(MatCreateVecs(r.A, &r.x, &r.b));
+  PetscCall(VecSet(r.b, 0));
+  PetscCall(VecGetArray(r.b, &put));
   std::copy(load.begin(), load.end(), put);
-  std::fill(put + n, put + 2 * n, 0.);
-  PetscCall(VecRestoreArrayWrite(b, &put));
-  PetscCall(KSPCreate(w.comm(), &ksp));
-  PetscCall(KSPSetOptionsPrefix(ksp, "scene_response_"));
-  PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPSetOperators(ksp, A, A));
-  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(VecRestoreArray(r.b, &put));
+  PetscCall(KSPCreate(w.comm(), &r.ksp));
+  PetscCall(KSPSetOptionsPrefix(r.ksp, "scene_response_"));
+  PetscCall(KSPSetType(r.ksp, KSPPREONLY));
+  PetscCall(KSPSetOperators(r.ksp, r.A, r.A));
+  PetscCall(KSPGetPC(r.ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
-  PetscCall(ChoosePackage(A, pc, false));
-  PetscCall(KSPSetFromOptions(ksp));
-  PetscCall(KSPSolve(ksp, b, y));
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(ChoosePackage(r.A, pc, false));
+  PetscCall(KSPSetFromOptions(r.ksp));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode End(Response &r)
+{
+  PetscFunctionBegin;
+  for (Mat *x : {&r.K, &r.A}) PetscCall(MatDestroy(x));
+  for (Vec *x : {&r.b, &r.x}) PetscCall(VecDestroy(x));
+  PetscCall(KSPDestroy(&r.ksp));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Solve(const Linearization::Work &w, double omega, Response &r, std::vector<std::complex<double>> &x)
+{
+  KSPConvergedReason reason;
+  const double      *get;
+  const std::size_t  n = (std::size_t)w.R->n;
+  PetscFunctionBegin;
+  PetscCall(KSPSolve(r.ksp, r.b, r.x));
+  PetscCall(KSPGetConvergedReason(r.ksp, &reason));
   PetscCheck(reason > 0, w.comm(), PETSC_ERR_NOT_CONVERGED, "Linearization::response(): no solution at %g rad/s (%s): an undamped mode has that frequency, or a body that nothing holds is pushed at 0 rad/s",
              omega, KSPConvergedReasons[reason]);
-  PetscCall(VecGetArrayRead(y, &get));
   x.resize(n);
+  PetscCall(VecGetArrayRead(r.x, &get));
   for (std::size_t i = 0; i < n; i++) x[i] = {get[i], get[n + i]};
-  PetscCall(VecRestoreArrayRead(y, &get));
-  PetscCall(KSPDestroy(&ksp));
-  PetscCall(VecDestroy(&b));
-  PetscCall(VecDestroy(&y));
-  PetscCall(MatDestroy(&A));
+  PetscCall(VecRestoreArrayRead(r.x, &get));
   PetscFunctionReturn(0);
 }
 
@@ -78,11 +96,14 @@ PetscErrorCode Linearization::response(const Excitation &in, const Measure &out,
   PetscCall(w.check("Linearization::response()"));
   PetscCall(w.load(in, &load));
   amplitude->resize(circular.size());
+  Response r;
   for (std::size_t k = 0; k < circular.size(); k++) {
     std::vector<std::complex<double>> x;
-    PetscCall(Solve(w, circular[k], load, x));
+    PetscCall(k ? DynamicStiffness(w, circular[k], r) : Begin(w, circular[0], load, r));
+    PetscCall(Solve(w, circular[k], r, x));
     PetscCall(AmplitudeOf(w, out, x, {0, circular[k]}, &(*amplitude)[k]));
   }
+  PetscCall(End(r));
   PetscFunctionReturn(0);
 }
 

@@ -25,7 +25,7 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
       Vec product;
       PetscCall(VecDuplicate(in, &product));
       PetscCall(MatMult(turn[order - k], in, product));
-      if (order == k || order - k > 0) PetscCall(VecAXPY(d[order], binomial[order][k], product));
+      PetscCall(VecAXPY(d[order], binomial[order][k], product));
       PetscCall(VecDestroy(&product));
     }
   }
@@ -33,38 +33,50 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
   PetscFunctionReturn(0);
 }
 
-/* By differences of fourth order: along most of a small motion measures are polynomials, or nearly so */
+/* Differences of fourth order at one reach after the other: along most of a small motion measures are polynomials, or nearly so, and two agree at once.
+   Where a force is steep, as those of contacts are, the first ones are outside of where it is linear; too near, they are rounding. */
 PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double *x) const
 {
-  constexpr double reach = 1e-3, weight[2] = {8. / 12, -1. / 12};
+  constexpr double weight[2] = {8. / 12, -1. / 12}, agree = 1e-9;
   Vec              d[3], at[3];
-  double           largest = 0, here = 0;
+  double           largest = 0, here, before = 0, best = INFINITY;
   PetscFunctionBegin;
-  for (int k = 0; k < 3; k++) at[k] = state[k];
+  for (int c = 0; c < 3; c++) at[c] = state[c];
   PetscCall(moved.take(*R, t, at));
   PetscCall(moved.value(m, &here));
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecDuplicate(state[0], &d[k]));
-    PetscCall(VecDuplicate(state[0], &at[k]));
+  for (int c = 0; c < 3; c++) {
+    PetscCall(VecDuplicate(state[0], &d[c]));
+    PetscCall(VecDuplicate(state[0], &at[c]));
   }
   PetscCall(toState(along, d));
   for (PetscInt i = 0; i < R->n; i++)
     if (coordinate(i)) largest = std::max(largest, std::abs(along[0][i]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
-  const double e = reach * std::min(1., size) / (largest > 0 ? largest : 1);
-  *x             = 0;
-  for (int k = 1; k <= 2; k++)
-    for (int side : {1, -1}) {
-      double y;
-      for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
-      PetscCall(moved.take(*R, t, at));
-      PetscCall(moved.value(m, &y));
-      if (m.kind == Measure::Angle) y = std::remainder(y - here, 2 * M_PI); /* half a turn is both pi and -pi */
-      *x += side * weight[k - 1] * y / e;
+  *x = 0;
+  for (double reach : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
+    const double e   = reach * std::min(1., size) / (largest > 0 ? largest : 1);
+    double       now = 0;
+    for (int k = 1; k <= 2; k++)
+      for (int side : {1, -1}) {
+        double y;
+        for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
+        PetscCall(moved.take(*R, t, at));
+        PetscCall(moved.value(m, &y));
+        y -= here;
+        if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* half a turn is both pi and -pi */
+        now += side * weight[k - 1] * y / e;
+      }
+    const double change = reach < 1e-3 ? std::abs(now - before) : INFINITY;
+    if (change < best) {
+      best = change;
+      *x   = now;
     }
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecDestroy(&d[k]));
-    PetscCall(VecDestroy(&at[k]));
+    before = now;
+    if (best <= agree * std::abs(now)) break;
+  }
+  for (int c = 0; c < 3; c++) {
+    PetscCall(VecDestroy(&d[c]));
+    PetscCall(VecDestroy(&at[c]));
   }
   PetscFunctionReturn(0);
 }
@@ -143,7 +155,8 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   const Work    &w = *work_;
   const Runtime &R = *w.R;
   Vec            x, y;
-  double         sum[14] = {0}; /* displacement, rotation; kinetic energy of the body and of all */
+  double         energy[2] = {0, 0}; /* of the body, of all */
+  Vector3c       motion[2] = {Vector3c::Zero(), Vector3c::Zero()};
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::part()"));
   PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
@@ -161,8 +174,8 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
     PetscCall(VecGetArrayRead(y, &get));
     for (PetscInt i = 0; i < R.n; i++) {
       const double e = !w.coordinate(i) ? 0 : get[i] * (imaginary ? m.shape[i].imag() : m.shape[i].real());
-      sum[13] += e;
-      if (i >= first && i < last) sum[12] += e;
+      energy[1] += e;
+      if (i >= first && i < last) energy[0] += e;
     }
     PetscCall(VecRestoreArrayRead(y, &get));
   }
@@ -171,22 +184,14 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   if (mine) {
     const BodyKind kind     = R.bodies.body[local].kind;
     const int      position = GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : HasEulerAngles(kind) ? 3 : 0;
-    for (int c = 0; c < position; c++) {
-      sum[2 * c]     = m.shape[first + c].real();
-      sum[2 * c + 1] = m.shape[first + c].imag();
-    }
-    for (int c = 0; c < rotations; c++) {
-      const int to = 6 + 2 * (rotations == 1 ? 2 : c);
-      sum[to]      = m.shape[first + position + c].real();
-      sum[to + 1]  = m.shape[first + position + c].imag();
-    }
+    for (int c = 0; c < position; c++) motion[0](c) = m.shape[first + c];
+    for (int c = 0; c < rotations; c++) motion[1](rotations == 1 ? 2 : c) = m.shape[first + position + c];
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 14, MPI_DOUBLE, MPI_SUM, w.comm()));
-  for (int c = 0; c < 3; c++) {
-    part->displacement(c) = {sum[2 * c], sum[2 * c + 1]};
-    part->rotation(c)     = {sum[6 + 2 * c], sum[7 + 2 * c]};
-  }
-  part->share = sum[13] != 0 ? sum[12] / sum[13] : 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPI_DOUBLE, MPI_SUM, w.comm()));
+  for (Vector3c &x : motion) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x.data(), 6, MPI_DOUBLE, MPI_SUM, w.comm()));
+  part->displacement = motion[0];
+  part->rotation     = motion[1];
+  part->share        = energy[1] != 0 ? energy[0] / energy[1] : 0;
   PetscFunctionReturn(0);
 }
 

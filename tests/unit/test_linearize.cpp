@@ -139,6 +139,95 @@ TEST(Linearize, DoublePendulum)
   }
 }
 
+/* Two runs that differ a little, at any moment of any motion: their difference in space axes solves M x'' + C x' + K x = 0, as no force is between them
+   but what the expansion has. Rotations: x' = dw + w x x, x'' = da + a x x + w x x'. */
+TEST(Linearize, DifferenceOfTwoTumblingRuns)
+{
+  constexpr double apart = 1e-6;
+  for (double spin : {1., 7.}) {
+    Linearization small;
+    Motion        motion[2];
+    TS            first = nullptr;
+    for (int run = 0; run < 2; run++) {
+      Scene     scene(PETSC_COMM_SELF);
+      RigidBody b        = body(2, {0.3, 0.5, 0.7}, Vector3(1, 2, 3) + run * apart * Vector3(1, -2, 0.5));
+      b.rotation         = Eigen::AngleAxisd(run * apart, Vector3(2, 1, -1).normalized()).toRotationMatrix() * Eigen::AngleAxisd(0.9, Vector3(1, 1, 2).normalized()).toRotationMatrix();
+      b.velocity         = Vector3(0.3, -0.2, 0.1) + run * apart * Vector3(0.5, 1, 2);
+      b.angular_velocity = spin * Vector3(1, -0.5, 0.8) + run * apart * Vector3(-1, 3, 0.7);
+      const Body one     = scene.add("one", b);
+      scene.add("spring", SpringDamper{scene.marker(one, {0.2, 0.1, -0.3}), scene.marker(scene.ground(), {3, 1, 2}), 40, 0.5, 1});
+      SceneRun ts(scene, 1, tolerance(1e-10));
+      Snapshot now;
+      must(TSStep(ts.ts));
+      must(now.take(ts.ts, 0));
+      must(now.motion(one, &motion[run]));
+      if (run) continue;
+      must(small.take(ts.ts, 0));
+      must(PetscObjectReference((PetscObject)ts.ts));
+      first = ts.ts;
+    }
+    const Motion &p = motion[0], &q = motion[1];
+    const Eigen::AngleAxisd turn(Matrix3(q.axes * p.axes.transpose()));
+    Eigen::Matrix<double, 6, 1> x[3];
+    const Vector3 theta = turn.angle() * turn.axis(), rate = q.angular_velocity - p.angular_velocity + p.angular_velocity.cross(theta);
+    x[0] << q.position - p.position, theta;
+    x[1] << q.velocity - p.velocity, rate;
+    x[2] << q.acceleration - p.acceleration, q.angular_acceleration - p.angular_acceleration + p.angular_acceleration.cross(theta) + p.angular_velocity.cross(rate);
+    Mat part[3]; /* M, C, K */
+    must(small.operators(&part[0], &part[1], &part[2]));
+    Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+    double                      size = 0;
+    for (int k = 0; k < 3; k++) {
+      Vec in, out;
+      must(MatCreateVecs(part[k], &in, &out));
+      for (int i = 0; i < 6; i++) must(VecSetValue(in, i, x[2 - k](i), INSERT_VALUES));
+      must(VecAssemblyBegin(in));
+      must(VecAssemblyEnd(in));
+      must(MatMult(part[k], in, out));
+      const Array y = whole(out);
+      for (int i = 0; i < 6; i++) {
+        sum(i) += y[i];
+        widen(size, std::abs(y[i]));
+      }
+      must(VecDestroy(&in));
+      must(VecDestroy(&out));
+    }
+    EXPECT_GT(size, apart);
+    EXPECT_LT(sum.norm(), 1e-4 * size) << spin << ": " << sum.transpose() << " of " << size;
+    must(TSDestroy(&first));
+  }
+}
+
+/* A force that is linear only within a hundredth of a millimetre */
+TEST(Linearize, SteepForces)
+{
+  constexpr double width = 1e-5, stiffness = 1e6;
+  Scene            scene(PETSC_COMM_SELF);
+  const Body       b  = scene.add("b", body(m, {1, 1, 1}, {2, 0, 0}));
+  const Marker     at = scene.marker(b), ground = scene.marker(scene.ground());
+  const Element    grip = scene.add("grip", UserForce{at, ground, {}, {Expression{{Measure::displacement(at, 0)}, [=](const Real *x) { return -stiffness * width * tanh((x[0] - 2.) / width); }}, Expression{{}, [](const Real *) { return Real(0.); }}, Expression{{}, [](const Real *) { return Real(0.); }}}, {}});
+  const Started    start(scene);
+  std::vector<Complex> h;
+  must(start.small.response(Excitation::force(at, {1, 0, 0}), Measure::force(grip, 0), {100, 1500}, &h));
+  for (int k = 0; k < 2; k++) {
+    const double w = k ? 1500 : 100, expected = -stiffness / (stiffness - m * w * w);
+    EXPECT_LT(std::abs(h[k] - expected), 1e-7 * std::abs(expected)) << h[k] << " " << expected;
+  }
+}
+
+/* One triangle of the matrix */
+TEST(Linearize, SymmetricStorage)
+{
+  std::vector<Mode> modes[2];
+  for (int half = 0; half < 2; half++) {
+    Options in(half ? "-scene_symmetric_storage true" : "-scene_symmetric_storage false");
+    Rods    rods(4);
+    modes[half] = Started(rods.scene).modes();
+  }
+  ASSERT_EQ(modes[0].size(), modes[1].size());
+  for (std::size_t k = 0; k < modes[0].size(); k++) EXPECT_LT(std::abs(modes[0][k].value - modes[1][k].value), 1e-9);
+}
+
 /* An angle of half a turn, which is pi on one side and -pi on the other */
 TEST(Linearize, AngleOfHalfATurn)
 {
