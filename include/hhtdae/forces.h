@@ -147,6 +147,31 @@ struct SphereBox {
   bool       state = false;
 };
 
+/*
+  Stops, the ends of a travel: nothing acts while the coordinate is between lower and upper, beyond them a force or moment of the
+  contact law, which never pulls; its friction must be zero. Component: the force or moment on i's body along the growing coordinate;
+  of a DistanceStop the tension.
+*/
+struct RotationalStop { /* of the angle of i's x axis about z_j, counted over full turns; law in moment and radians */
+  Marker     i, j;
+  double     lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
+  ContactLaw law   = {};
+  bool       state = false;
+};
+struct TranslationalStop { /* of the displacement of i from j along an axis of j */
+  Marker     i, j;
+  double     lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
+  ContactLaw law   = {};
+  int        axis  = 2;
+  bool       state = false;
+};
+struct DistanceStop { /* of the distance of the origins; with upper alone a rope */
+  Marker     i, j;
+  double     lower = 0, upper = std::numeric_limits<double>::infinity();
+  ContactLaw law   = {};
+  bool       state = false;
+};
+
 /* friction in a revolute, translational, cylindrical or spherical joint, from its reaction: moment mu r N or force mu N
    against the relative motion, regularized */
 struct JointFriction {

@@ -64,6 +64,20 @@ struct RollingDisc { /* a disc about z_i through i's origin on the xy plane of j
 struct RollingSphere { Marker i, j; double radius = 1; }; /* about i's origin on the xy plane of j */
 struct KnifeEdge { Marker i, j; };      /* no velocity of i's origin along y_i; in the xy plane of j */
 
+/*
+  The user's own constraint: expressions that stay zero. A row reads displacements, distances, angles and time; or, at velocity level,
+  velocities, rates and angular velocities as well, which it has to be linear in, and up to two variables or states. It may name six
+  markers. The load of a row on the bodies is its multiplier times the derivatives of the expression by positions (at velocity level, by
+  velocities): where the expression is a displacement less a constant, the force on i's body along it. Joint forces as measures are those
+  on the body of the first marker, in the axes of the first marker on another body (default: space axes).
+
+    scene.add("cam", UserConstraint{{Expression{{Measure::displacement(follower, 2), Measure::angle(shaft, bearing)},
+                                                [=](const Real *m) { return m[0] - lift * (1 - cos(m[1])); }}}});
+*/
+struct UserConstraint {
+  std::vector<Expression> rows;
+};
+
 /* ---- motions of i relative to j ---- */
 enum class MotionOf { Displacement, Velocity, Acceleration };
 struct RotationalMotion { Marker i, j; TimeFunction function; MotionOf of = MotionOf::Displacement; }; /* about z_j */

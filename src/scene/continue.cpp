@@ -63,6 +63,35 @@ PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
 
 } // namespace
 
+PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
+{
+  PetscInt steps;
+  PetscFunctionBegin;
+  *R = RunOf(ts);
+  PetscCheck(*R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "%s: the TS is not one of a scene, Scene::createTS() makes them", call);
+  PetscCall(TSGetStepNumber(ts, &steps));
+  PetscCheck(!steps, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+             "%s: the run has begun and is not to be moved; make one that goes on from it, Scene::createTS(&next, ts)", call);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
+{
+  Runtime  *R = RunOf(ts);
+  PetscReal t, atol, rtol;
+  PetscFunctionBegin;
+  PetscCall(CreateRun(R->model, copy));
+  PetscCall(CopyState(*R, ts, *RunOf(*copy), *copy));
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
+  PetscCall(TSSetTolerances(*copy, atol, nullptr, rtol, nullptr));
+  PetscCall(TSSetTime(*copy, t));
+  PetscCall(TSSetMaxTime(*copy, t + 1));
+  PetscCall(TSHHT3SetStart(*copy, start));
+  PetscCall(TSStep(*copy));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Scene::createTS(TS *ts, TS from)
 {
   Runtime  *old;

@@ -7,6 +7,7 @@
 #define HHTDAE_SCENE_DESCRIBED_ROWS_H
 
 #include "kernel.h"
+#include <algorithm>
 
 namespace hhtdae
 {
@@ -20,6 +21,24 @@ struct DescribedRows {
   Eigen::Matrix<double, max_rows, 6 * max_markers> J; /* Phi_q or Psi_q', columns (x, theta) of the markers */
   Eigen::MatrixXd modal; /* by the modal coordinates of marker 0's body; empty: the rows do not depend on them */
 };
+
+/* The rows of units of their own, divided by the largest gradient at a marker: lengths, or angles where they depend on rotations alone */
+template <int R, int M> void MakeLengths(DescribedRows &rows)
+{
+  for (int r = 0; r < R; r++) {
+    double by_position = 0, by_rotation = 0;
+    for (int k = 0; k < M; k++) {
+      by_position = std::max(by_position, rows.J.block<1, 3>(r, 6 * k).norm());
+      by_rotation = std::max(by_rotation, rows.J.block<1, 3>(r, 6 * k + 3).norm());
+    }
+    const double scale = by_position > 0 ? by_position : by_rotation;
+    rows.length        = by_position > 0;
+    if (!(scale > 0)) continue;
+    rows.value[r] /= scale;
+    rows.rate[r] /= scale;
+    rows.J.row(r) /= scale;
+  }
+}
 
 /* Variables and states are what they are at the start, multipliers and force states nothing yet */
 inline double InitialInput(const SceneData &s, const ScalarRef &r)
@@ -43,9 +62,8 @@ template <class K, class D> void DescribeRows(const SceneData &s, const D &d, do
     if (Depends(K::depends, 2 * k)) rows.length = true;
   }
   if constexpr (K::holonomic) {
-    double second[R];
     K::value(d.data, f, t, rows.value);
-    K::time(d.data, f, t, rows.rate, second);
+    K::time(d.data, f, t, rows.rate);
     K::gradient(d.data, f, t, J);
   } else {
     Twist<double>        w[M];
@@ -61,6 +79,7 @@ template <class K, class D> void DescribeRows(const SceneData &s, const D &d, do
     for (int r = 0; r < R; r++) rows.value[r] = 0;
   }
   rows.J.template topLeftCorner<R, 6 * M>() = J;
+  if constexpr (K::own_units) MakeLengths<R, M>(rows);
 }
 
 } // namespace hhtdae

@@ -1,7 +1,6 @@
 #include "expression_batch.h"
 #include <cmath>
 #include <sstream>
-#include <stdexcept>
 
 namespace hhtdae
 {
@@ -12,55 +11,45 @@ LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expres
     : name_(name)
 {
   for (std::size_t c = 0; c < count; c++) {
-    pieces_.push_back({e[c].f, arguments.size(), (int)e[c].arguments.size()});
+    pieces_.push_back({UserFunction(name, e[c]), arguments.size()});
     for (const Measure &m : e[c].arguments) arguments.place(l, m);
   }
 }
 
 /* What -info tells of the step that fails for it */
-void LocalFunction::report(const Evaluation &e, int piece, const Real *m, double f) const
+void LocalFunction::report(const Evaluation &e, const Piece &p, const double *m, double f) const
 {
   std::ostringstream text;
-  for (int k = 0; k < pieces_[piece].count; k++) text << (k ? ", " : "") << m[k].value();
+  for (int k = 0; k < p.f.arguments(); k++) text << (k ? ", " : "") << m[k];
   PetscCallAbort(PETSC_COMM_SELF, PetscInfo(nullptr, "%s is %g at t = %g, its arguments are (%s)\n", name_.c_str(), f,
                                             e.t, text.str().c_str()));
 }
 
-/* The user's function, with its name in what it throws */
-Real LocalFunction::call(const Piece &p, const Real *m) const
+void LocalFunction::read(const Evaluation &e, const Piece &p, double *m) const
 {
-  try {
-    return p.f(m);
-  } catch (const std::exception &e) {
-    throw std::runtime_error(name_ + ": " + e.what());
-  }
+  for (int k = 0; k < p.f.arguments(); k++) m[k] = arguments.value(p.first + k, e);
 }
 
 void LocalFunction::value(const Evaluation &e, double *f) const
 {
-  Real m[Real::most];
+  double m[Real::most];
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];
-    for (int k = 0; k < p.count; k++) m[k] = Real(arguments.value(p.first + k, e));
-    f[c] = call(p, m).value();
-    if (!std::isfinite(f[c])) report(e, c, m, f[c]);
+    read(e, p, m);
+    f[c] = p.f.value(m);
+    if (!std::isfinite(f[c])) report(e, p, m, f[c]);
   }
 }
 
 void LocalFunction::gradient(const Evaluation &e, double *f, Gradient &G) const
 {
-  Real m[Real::most];
+  double m[Real::most], g[Real::most];
   G.setZero(size(), arguments.columns().width);
   for (int c = 0; c < size(); c++) {
     const Piece &p = pieces_[c];
-    for (int k = 0; k < p.count; k++) m[k] = Real(arguments.value(p.first + k, e), p.count, k);
-    const Real x = call(p, m);
-    f[c]         = x.value();
-    if (x.derivatives().size() == 0) continue; /* a constant */
-    if (x.derivatives().size() != p.count)
-      throw std::runtime_error(name_ + " came back with " + std::to_string(x.derivatives().size()) + " derivatives for " + std::to_string(p.count) +
-                               " arguments: make its value from the arguments, or from plain numbers");
-    for (int k = 0; k < p.count; k++) arguments.addGradient(p.first + k, e, x.derivatives()(k), G.row(c).data());
+    read(e, p, m);
+    f[c] = p.f.gradient(m, g);
+    for (int k = 0; k < p.f.arguments(); k++) arguments.addGradient(p.first + k, e, g[k], G.row(c).data());
   }
 }
 

@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_EXPRESSION_BATCH_H
 
 #include "measures.h"
+#include "user_function.h"
 
 namespace hhtdae
 {
@@ -25,14 +26,14 @@ public:
 
 private:
   struct Piece {
-    std::function<Real(const Real *)> f;
-    int                               first, count; /* of its arguments */
+    UserFunction f;
+    int          first; /* of its arguments */
   };
   std::string        name_; /* "variable speed", for messages */
   std::vector<Piece> pieces_;
 
-  Real call(const Piece &p, const Real *m) const;
-  void report(const Evaluation &e, int piece, const Real *m, double f) const;
+  void read(const Evaluation &e, const Piece &p, double *m) const;
+  void report(const Evaluation &e, const Piece &p, const double *m, double f) const;
 };
 
 class ExpressionBatch : public Batch

@@ -77,31 +77,6 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l)
 namespace
 {
 
-const char *NameOf(Measure::Kind k)
-{
-  constexpr const char *name[] = {"time",
-                                  "displacement",
-                                  "distance",
-                                  "velocity",
-                                  "rate",
-                                  "acceleration",
-                                  "angle",
-                                  "angular velocity",
-                                  "angular acceleration",
-                                  "multiplier",
-                                  "joint force",
-                                  "joint moment",
-                                  "force",
-                                  "value of a variable",
-                                  "value of a state",
-                                  "modal coordinate",
-                                  "force of an element",
-                                  "moment of an element",
-                                  "kinetic energy",
-                                  "potential energy"};
-  return name[k];
-}
-
 bool Good(const SceneData &s, Marker m) { return s.valid(m) && s.markers[m.id].body >= -1; }
 
 std::string CheckMarkers(const SceneData &s, const Measure &m)
@@ -168,21 +143,32 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
          std::to_string(m.component);
 }
 
-void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors)
-{
-  if (!e.f) errors.push_back(who + ": its function is empty");
-  if (e.arguments.size() > Real::most)
-    errors.push_back(who + ": " + std::to_string(e.arguments.size()) + " arguments, at most " + std::to_string(Real::most) +
-                     "; put parts of it into variables");
-  for (std::size_t k = 0; k < e.arguments.size(); k++) {
-    const std::string error = CheckMeasure(s, e.arguments[k], true);
-    if (!error.empty())
-      errors.push_back(who + ", argument " + std::to_string(k + 1) + " (" + NameOf(e.arguments[k].kind) +
-                       "): " + error);
-  }
-}
-
 } // namespace
+
+const char *NameOf(Measure::Kind k)
+{
+  constexpr const char *name[] = {"time",
+                                  "displacement",
+                                  "distance",
+                                  "velocity",
+                                  "rate",
+                                  "acceleration",
+                                  "angle",
+                                  "angular velocity",
+                                  "angular acceleration",
+                                  "multiplier",
+                                  "joint force",
+                                  "joint moment",
+                                  "force",
+                                  "value of a variable",
+                                  "value of a state",
+                                  "modal coordinate",
+                                  "force of an element",
+                                  "moment of an element",
+                                  "kinetic energy",
+                                  "potential energy"};
+  return name[k];
+}
 
 std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
 {
@@ -208,6 +194,20 @@ std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation)
     return CheckElement(s, m, in_equation);
   default:
     return CheckMarkers(s, m);
+  }
+}
+
+void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors)
+{
+  if (!e.f) errors.push_back(who + ": its function is empty");
+  if (e.arguments.size() > Real::most)
+    errors.push_back(who + ": " + std::to_string(e.arguments.size()) + " arguments, at most " + std::to_string(Real::most) +
+                     "; put parts of it into variables");
+  for (std::size_t k = 0; k < e.arguments.size(); k++) {
+    const std::string error = CheckMeasure(s, e.arguments[k], true);
+    if (!error.empty())
+      errors.push_back(who + ", argument " + std::to_string(k + 1) + " (" + NameOf(e.arguments[k].kind) +
+                       "): " + error);
   }
 }
 

@@ -76,6 +76,7 @@ template <class K, int M, int R> struct ConstraintBase {
   static constexpr int      memory = 0, inputs = 0;
   static constexpr unsigned depends = Everything(M);
   static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
+  static constexpr bool     own_units = false;     /* rows are in units of the user's own, neither lengths nor sines */
   static constexpr bool     translates = false;    /* row r is component r of the second marker's position less that of the first, and nothing else */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;
@@ -111,21 +112,18 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
       for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(phi[r].derivatives()(a));
   }
 
-  /* partial derivatives Phi_t, Phi_tt; kernels without time inherit zeros */
+  /* the partial derivative Phi_t; kernels without time inherit zeros */
   static constexpr bool driven = false; /* value() depends on t */
-  template <class Data> static void time(const Data &d, const Frame<double> *f, double t, double *first, double *second)
+  template <class Data> static void time(const Data &d, const Frame<double> *f, double t, double *rate)
   {
-    for (int r = 0; r < R; r++) first[r] = second[r] = 0;
+    for (int r = 0; r < R; r++) rate[r] = 0;
     if constexpr (K::driven) {
-      using T = Dual2<1>;
+      using T = Dual<1>;
       Frame<T> s[M];
-      T        phi[R], clock(Dual<1>(t, 0), 0);
+      T        phi[R];
       for (int k = 0; k < M; k++) s[k] = Constant<T>(f[k]);
-      K::template value<T>(d, s, clock, phi);
-      for (int r = 0; r < R; r++) {
-        first[r]  = phi[r].value().derivatives()(0);
-        second[r] = phi[r].derivatives()(0).derivatives()(0);
-      }
+      K::template value<T>(d, s, T(t, 0), phi);
+      for (int r = 0; r < R; r++) rate[r] = phi[r].derivatives()(0);
     }
   }
 };

@@ -69,6 +69,7 @@ public:
 
   Input input(const ScalarRef &r) override
   {
+    if (r.id < 0) return {}; /* none */
     switch (r.kind) {
     case ScalarRef::Variable:
       return place(R.number.variable[r.id], 1, 0);
@@ -324,6 +325,22 @@ const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt elemen
       if (!memory.empty() && b->memoryOf(parts[k].store, parts[k].index, memory.data())) readers[k]->copyMemory(memory.data(), true);
   }
   return readers;
+}
+
+PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role)
+{
+  PetscFunctionBegin;
+  role.assign(R.n, TSHHT3_COORDINATE);
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
+    if (!R.roles[r]) continue;
+    const PetscInt *index;
+    PetscInt        n;
+    PetscCall(ISGetLocalSize(R.roles[r], &n));
+    PetscCall(ISGetIndices(R.roles[r], &index));
+    for (PetscInt k = 0; k < n; k++) role[index[k] - R.start] = (unsigned char)r;
+    PetscCall(ISRestoreIndices(R.roles[r], &index));
+  }
+  PetscFunctionReturn(0);
 }
 
 } // namespace hhtdae

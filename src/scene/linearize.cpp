@@ -92,43 +92,6 @@ PetscErrorCode AddProduct(Mat A, double f, Mat X, Mat Y)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Roles(Linearization::Work &w)
-{
-  Runtime &R = *w.R;
-  PetscFunctionBegin;
-  w.role.assign(R.n, TSHHT3_COORDINATE);
-  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
-    if (!R.roles[r]) continue;
-    const PetscInt *index;
-    PetscInt        n;
-    PetscCall(ISGetLocalSize(R.roles[r], &n));
-    PetscCall(ISGetIndices(R.roles[r], &index));
-    for (PetscInt k = 0; k < n; k++) w.role[index[k] - R.start] = (unsigned char)r;
-    PetscCall(ISRestoreIndices(R.roles[r], &index));
-  }
-  PetscFunctionReturn(0);
-}
-
-/* Accelerations and multipliers of the start are found by the first step */
-PetscErrorCode Begin(Linearization::Work &w, TS ts, PetscReal t)
-{
-  Vec       U, V, u, v;
-  PetscReal atol, rtol;
-  PetscFunctionBegin;
-  PetscCall(CreateRun(w.R->model, &w.start));
-  w.R = RunOf(w.start);
-  PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(TS2GetSolution(w.start, &u, &v));
-  PetscCall(VecCopy(U, u));
-  PetscCall(VecCopy(V, v));
-  PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
-  PetscCall(TSSetTolerances(w.start, atol, nullptr, rtol, nullptr));
-  PetscCall(TSSetTime(w.start, t));
-  PetscCall(TSSetMaxTime(w.start, t + 1));
-  PetscCall(TSStep(w.start));
-  PetscFunctionReturn(0);
-}
-
 } // namespace
 
 void Linearization::Work::clear()
@@ -187,8 +150,9 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   PetscCall(TSGetStepNumber(ts, &steps));
   if (!steps) {
     PetscCall(TSGetTime(ts, &t));
-    PetscCall(Begin(w, ts, t));
-    ts = w.start;
+    PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, &w.start));
+    ts  = w.start;
+    w.R = RunOf(ts);
   }
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
@@ -196,7 +160,7 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   w.t    = t;
   w.size = SceneSize(w.R->scene);
   if (!(w.size > 0)) w.size = 1;
-  PetscCall(Roles(w));
+  PetscCall(RolesOf(*w.R, w.role));
   PetscCall(w.differentiate());
   PetscFunctionReturn(0);
 }

@@ -1,5 +1,5 @@
 #include "measures.h"
-#include "kernels/angle.h"
+#include "kernels/marker_measure.h"
 #include "runtime.h"
 
 namespace hhtdae
@@ -17,21 +17,6 @@ bool IsScalar(Measure::Kind k)
 }
 
 /* ---- motion of a marker ---- */
-
-template <class T> struct MarkerMotion {
-  Frame<T> f;
-  Twist<T> w;
-  Vec3<T>  a, alpha;
-};
-
-/* A marker at s from the centre of mass of a body with R, v, w, a, alpha; space axes */
-template <class T> void Attach(const Vec3<T> &r, const Vec3<T> &s, MarkerMotion<T> &m)
-{
-  const Vec3<T> ws = m.w.w.cross(s), wws = m.w.w.cross(ws), as = m.alpha.cross(s);
-  m.f.x = r + s;
-  m.w.v += ws;
-  m.a += as + wws;
-}
 
 MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerations)
 {
@@ -119,53 +104,6 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
   const Vec3<T> arm = A * Constant<T>(k.s);
   Attach<T>(r, arm, m);
   return m;
-}
-
-/* ---- values ---- */
-
-/* component of x in the axes of frame, or space axes */
-template <class T> T Component(const Vec3<T> &x, const MarkerMotion<T> *frame, int c)
-{
-  if (!frame) return x(c);
-  const Vec3<T> axis = frame->f.R.col(c);
-  return axis.dot(x);
-}
-
-template <class T> Vec3<T> Difference(const Vec3<T> &x, const Vec3<T> *y)
-{
-  if (!y) return x;
-  return x - *y;
-}
-
-/* Measures of markers; j and frame may be none */
-template <class T>
-T Formula(const LocalMeasure &m, const MarkerMotion<T> &i, const MarkerMotion<T> *j, const MarkerMotion<T> *frame)
-{
-  using std::sqrt;
-  const Vec3<T> d = Difference<T>(i.f.x, j ? &j->f.x : nullptr);
-  switch (m.kind) {
-  case Measure::Displacement:
-    return Component<T>(d, frame, m.component);
-  case Measure::Distance:
-    return sqrt(d.dot(d));
-  case Measure::Velocity:
-    return Component<T>(Difference<T>(i.w.v, j ? &j->w.v : nullptr), frame, m.component);
-  case Measure::Rate: {
-    const Vec3<T> w  = i.w.v - j->w.v;
-    const T       dw = d.dot(w), l = sqrt(d.dot(d));
-    return dw / l;
-  }
-  case Measure::Acceleration:
-    return Component<T>(Difference<T>(i.a, j ? &j->a : nullptr), frame, m.component);
-  case Measure::Angle:
-    return UnwoundAngle<T>(i.f, j->f, m.angle);
-  case Measure::AngularVelocity:
-    return Component<T>(Difference<T>(i.w.w, j ? &j->w.w : nullptr), frame, m.component);
-  case Measure::AngularAcceleration:
-    return Component<T>(Difference<T>(i.alpha, j ? &j->alpha : nullptr), frame, m.component);
-  default:
-    return T(0);
-  }
 }
 
 bool Accelerates(Measure::Kind k) { return k == Measure::Acceleration || k == Measure::AngularAcceleration; }
@@ -269,7 +207,8 @@ void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
   const SceneData   &s = l.run->scene;
   const ElementData &e = s.elements[m.target];
   k.i                  = l.marker(e.i.id);
-  k.frame              = l.marker(s.valid(m.frame) ? m.frame.id : e.j.id);
+  const Marker axes    = s.valid(m.frame) ? m.frame : e.j;
+  k.frame              = s.valid(axes) ? l.marker(axes.id) : -1;
   for (const Part &p : e.parts)
     if (p.store->isConstraint() && p.store->unknowns(p.index)) k.probes.push_back(p.store->probe(l, p.index));
 }
@@ -385,7 +324,7 @@ double MeasureValue(const LocalMeasure &m, const Evaluation &e)
   MarkerMotion<double> i = Motion(e, m.i, a), j, frame;
   if (m.j >= 0) j = Motion(e, m.j, a);
   if (m.frame >= 0) frame = Motion(e, m.frame, false);
-  return Formula<double>(m, i, m.j < 0 ? nullptr : &j, m.frame < 0 ? nullptr : &frame);
+  return MarkerMeasure<double>(m.kind, m.component, m.angle, i, m.j < 0 ? nullptr : &j, m.frame < 0 ? nullptr : &frame);
 }
 
 void LocalMeasure::accept(const Bodies &B)
@@ -488,7 +427,7 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
   MarkerMotion<T> motion[3];
   for (int i = 0; i < 3; i++)
     if (marker[i] >= 0) motion[i] = Motion<N>(e, marker[i], i * max_coordinates);
-  const T x = Formula<T>(m, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
+  const T x = MarkerMeasure<T>(m.kind, m.component, m.angle, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
   for (int i = 0; i < 3; i++) {
     if (at[i] < 0) continue;
     const int n = Coordinates(e.bodies.body[e.bodies.marker[marker[i]].body].kind);

@@ -42,6 +42,9 @@ bool NeedsAcceleration(const Expression &f);
 /* What is wrong with a measure, empty if nothing; in_equation: as an argument of an expression, which needs its
  * derivatives */
 std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation);
+const char *NameOf(Measure::Kind k); /* "angular velocity" */
+/* who: "variable speed"; adds what is wrong */
+void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors);
 /* Variables, states and user's forces: adds what is wrong with them */
 void CheckExpressions(const SceneData &s, std::vector<std::string> &errors);
 

@@ -159,13 +159,13 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   Vec U, V;
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
-  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, W[0], W[1], W[2]));
-  else {
-    PetscCall(VecCopy(U, W[0]));
-    PetscCall(VecCopy(V, W[1]));
-    PetscCall(VecZeroEntries(W[2]));
+  TS start = nullptr;
+  if (!steps) {
     PetscCall(TSGetTime(ts, &t));
+    PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, &start));
   }
+  PetscCall(TSHHT3EvaluateAt(start ? start : ts, t, W[0], W[1], W[2]));
+  PetscCall(TSDestroy(&start));
   PetscCall(take(*w.R, t, W));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
   PetscFunctionReturn(0);

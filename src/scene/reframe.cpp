@@ -77,17 +77,6 @@ PetscErrorCode Move(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Elements remember the accepted state */
-PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
-{
-  PetscFunctionBegin;
-  if (!R.remembers) PetscFunctionReturn(0);
-  PetscCall(Move(R, U, V));
-  for (auto &b : R.batches) b->accept(R.bodies);
-  PetscCall(KeepMemories(R));
-  PetscFunctionReturn(0);
-}
-
 /* Own bodies that need other axes, and which */
 PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
 {
@@ -95,6 +84,8 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   PetscFunctionBegin;
   R.next_body.clear();
   R.next_axes.clear();
+  R.changing = false;
+  if (!R.turns) PetscFunctionReturn(0);
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
@@ -110,6 +101,9 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   }
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
+  int any = !R.next_body.empty();
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
+  R.changing = any;
   PetscFunctionReturn(0);
 }
 
@@ -132,13 +126,8 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
   PetscCall(CheckTime(R, t));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
-  *change = PETSC_FALSE;
-  if (!R.turns) PetscFunctionReturn(0);
   PetscCall(ChooseNext(R, U, V));
-  int any = !R.next_body.empty();
-  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
-  R.changing = any;
-  *change    = any ? PETSC_TRUE : PETSC_FALSE;
+  *change = R.changing ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
 
@@ -224,6 +213,32 @@ PetscErrorCode Prepare(TS ts)
 }
 
 } // namespace
+
+/* Elements remember the accepted state */
+PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  if (!R.remembers) PetscFunctionReturn(0);
+  PetscCall(Move(R, U, V));
+  for (auto &b : R.batches) b->accept(R.bodies);
+  PetscCall(KeepMemories(R));
+  PetscFunctionReturn(0);
+}
+
+/* Before a run has begun: new axes for the bodies that need them, at the same attitudes and angular velocities */
+PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V)
+{
+  Vec A;
+  PetscFunctionBegin;
+  PetscCall(ChooseNext(R, U, V));
+  if (!R.changing) PetscFunctionReturn(0);
+  PetscCall(VecDuplicate(U, &A));
+  PetscCall(VecZeroEntries(A));
+  PetscCall(Map(nullptr, 0, U, V, A, &R));
+  PetscCall(VecDestroy(&A));
+  PetscCall(Commit(nullptr, &R));
+  PetscFunctionReturn(0);
+}
 
 /* What elements remember into the vector that checkpoints keep */
 PetscErrorCode KeepMemories(Runtime &R)

@@ -77,6 +77,7 @@ inline Runtime       *RunOf(TS ts)
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
 const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element);
+PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* of own unknowns */
 /* initial.cpp: state of the description, with the axes of the Euler angles chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */
@@ -90,6 +91,8 @@ PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
 PetscErrorCode KeepMemories(Runtime &R);
+PetscErrorCode Remember(Runtime &R, Vec U, Vec V);
+PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
 constexpr PetscInt kept = 56;
@@ -113,6 +116,10 @@ PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::functio
 /* ts.cpp: a run from the start, which the TS owns; the run of this scene that the TS owns, for the call that is named */
 PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts);
 PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R);
+/* continue.cpp: the run of a TS that has made no step yet, for the call that is named; a run of the same model that has made its first step from where ts is, before its own first one: it has accelerations and
+   multipliers of the start; the caller destroys it */
+PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R);
+PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy);
 
 } // namespace hhtdae
 

@@ -166,7 +166,7 @@ public:
 
   /* a constraint kernel on these markers; returns the first of its rows among the element's rows */
   template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});
-  template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs);
+  template <class K> PetscInt constrain(const std::vector<Marker> &markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs);
   /* a force kernel; inputs: the scalars z of components(); state: carry the components as force states */
   template <class K>
   void load(std::initializer_list<Marker> markers, const typename K::Data &data = {}, const std::vector<ScalarRef> &inputs = {},

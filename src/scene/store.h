@@ -213,11 +213,11 @@ template <class S> void ElementBuilder::put(typename S::Item item)
 
 template <class K> PetscInt ElementBuilder::constrain(std::initializer_list<Marker> markers, const typename K::Data &data)
 {
-  return constrain<K>(markers, data, {});
+  return constrain<K>(std::vector<Marker>(markers), data, {});
 }
 
 template <class K>
-PetscInt ElementBuilder::constrain(std::initializer_list<Marker> markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs)
+PetscInt ElementBuilder::constrain(const std::vector<Marker> &markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs)
 {
   const PetscInt row = rows_;
   if (!good_) return row;

@@ -34,15 +34,19 @@ print("libhhtdae shows %d names" % len(names))
 
 # Scenes: members of the classes with sources of their own, steps of the state; an enter() for everything that holds markers or elements
 names = shown(libraries[1])
-foreign = [name for name in names if not re.match(r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction|Motion|Snapshot|Linearization)::|step5?\()", name)]
+analyses = re.findall(r"^PetscErrorCode (\w+)\(", header("analyses"), flags=re.MULTILINE)
+known = r"(hhtdae::Element )?hhtdae::((Scene|TimeFunction|Motion|Snapshot|Linearization)::|(step5?|%s)\()" % "|".join(analyses)
+foreign = [name for name in names if not re.match(known, name)]
 check(not foreign, "not declared in the headers: %s" % foreign)
 added = {match.group(1) for match in (re.match(r"hhtdae::Element hhtdae::Scene::enter<hhtdae::(\w+)>", name) for name in names) if match}
 elements = set()
 for text in (header("joints"), header("forces")):
     for name, body in re.findall(r"^struct (\w+) \{(.*?)(?:^\}| \});", text, flags=re.DOTALL | re.MULTILINE):
-        if re.search(r"^\s*(Marker|Element)\b|struct Term", body, flags=re.MULTILINE):
+        if re.search(r"^\s*(Marker|Element)\b|struct Term|vector<Expression>", body, flags=re.MULTILINE):
             elements.add(name)
 check(len(elements) > 35, "joints.h and forces.h declare only %s" % sorted(elements))
+for name in analyses:
+    check(any(shows.startswith("hhtdae::%s(" % name) for shows in names), "declared and not shown: " + name)
 check(added == elements, "an element without Scene::add(), or the other way round: %s" % sorted(added ^ elements))
 print("libhhtscene shows %d names, %d kinds of elements among them" % (len(names), len(added)))
 

@@ -252,18 +252,11 @@ template <class K> void CompareWithAutomatic(const Sample<K> &s, const DynamicVe
   ExpectClose(Curvature(s, lambda), H, 1e-10, "curvature");
 }
 
-template <class K> void CheckTimeDerivatives(const Sample<K> &s)
+template <class K> void CheckTimeDerivative(const Sample<K> &s)
 {
-  using Vector = Eigen::Map<Matrix<K::rows, 1>>;
-  double first[K::rows], second[K::rows], ignored[K::rows];
-  K::time(s.data, s.f, s.t, first, second);
-  ExpectClose(Vector(first), s.alongTime(Value<K>), tolerance, "Phi_t");
-  ExpectClose(Vector(second), s.alongTime([&](const Sample<K> &moved) {
-    double f1[K::rows];
-    K::time(moved.data, moved.f, moved.t, f1, ignored);
-    return ToVector<K::rows>(f1);
-  }),
-              tolerance, "Phi_tt");
+  double rate[K::rows];
+  K::time(s.data, s.f, s.t, rate);
+  ExpectClose(Eigen::Map<Matrix<K::rows, 1>>(rate), s.alongTime(Value<K>), tolerance, "Phi_t");
 }
 
 } // namespace checks
@@ -289,8 +282,8 @@ void CheckConstraint(const Make &make = {}, unsigned seed = 1, double tolerance 
     ExpectClose(H, dLoad, tolerance, "curvature");
     checks::ExpectMasked<K>(J, "gradient");
     checks::ExpectUncurved<K>(H);
-    checks::CompareWithAutomatic(s, lambda);
-    checks::CheckTimeDerivatives(s);
+    if constexpr (!K::own_units) checks::CompareWithAutomatic(s, lambda);
+    checks::CheckTimeDerivative(s);
   }
 }
 

@@ -3,7 +3,7 @@
   negative y, and spheres, ellipsoids and boxes are discs, ellipses and rectangles.
 */
 #include "scene/kernels/contact.h"
-#include "requirements.h"
+#include "contact_requirements.h"
 #include <limits>
 
 namespace hhtdae
@@ -11,21 +11,6 @@ namespace hhtdae
 
 namespace
 {
-
-/* size: of the smaller of the two shapes */
-ContactLawData CheckedLaw(ElementBuilder &e, const ContactLaw &law, double size)
-{
-  RequirePositive(e, "stiffness", law.stiffness);
-  RequireNotNegative(e, "damping", law.damping);
-  RequireNotNegative(e, "friction coefficient", law.friction);
-  RequirePositive(e, "slip velocity", law.slip_velocity);
-  e.require(std::isfinite(law.exponent) && law.exponent >= 1,
-            "exponent is " + Show(law.exponent) + ", must be 1 or more (Hertz: 1.5)");
-  ContactLawData d;
-  static_cast<ContactLaw &>(d) = law;
-  d.onset                      = 1e-4 * size; /* far less than a penetration that matters to a body of this size */
-  return d;
-}
 
 ElementBuilder Entry(Scene &scene, const std::string &name, const char *type, Marker i, Marker j)
 {

@@ -91,12 +91,7 @@ template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> 
   {
     Moves::curvature(d, f, -lambda[0], H);
   }
-  static void time(const Data &d, const Frame<double> *, double t, double *first, double *second)
-  {
-    const TimeFunction::Value v = d.function(t);
-    first[0]                    = v.f1;
-    second[0]                   = v.f2;
-  }
+  static void time(const Data &d, const Frame<double> *, double t, double *rate) { rate[0] = d.function(t).f1; }
 };
 
 struct DrivenAngle : DrivenDisplacement<DrivenAngle, TurnAboutZ> {

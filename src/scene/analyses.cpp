@@ -1,0 +1,186 @@
+/*
+  Positions that meet the constraints and motions of a time, by Newton's method on the scene's own matrix with rates of zero,
+
+    (F_u + s F_u'') d = (0, Phi),   s large: the smallest d in the metric of the masses,
+
+  cut short where bodies would go far. Velocities, accelerations and multipliers are those of a consistent start from there.
+*/
+#include "hhtdae/analyses.h"
+#include "guard.h"
+#include "still.h"
+#include <algorithm>
+#include <vector>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr double heavy = 1099511627776.; /* 2^40: masses against stiffnesses */
+constexpr int    most_iterations = 100, most_cuts = 6;
+constexpr double still = 1e-13; /* parts of the scene's size, radians: a move that is rounding */
+
+struct Assembling : StillSystem {
+  using StillSystem::StillSystem;
+  std::vector<unsigned char> role; /* of own unknowns */
+  double                     misfit = INFINITY;
+
+  /* all entries but those of one role to zero */
+  PetscErrorCode keep(TSHHT3Role r, Vec x) const
+  {
+    double *y;
+    PetscFunctionBegin;
+    PetscCall(VecGetArray(x, &y));
+    for (PetscInt i = 0; i < R.n; i++)
+      if (role[i] != r) y[i] = 0;
+    PetscCall(VecRestoreArray(x, &y));
+    PetscFunctionReturn(0);
+  }
+  /* misfit at u, its rows in F */
+  PetscErrorCode look(Vec u)
+  {
+    Unbalanced at;
+    PetscFunctionBegin;
+    PetscCall(residual(u));
+    PetscCall(keep(TSHHT3_HOLONOMIC, F));
+    PetscCall(measure(F, at));
+    misfit = std::isfinite(at.misfit) ? at.misfit : INFINITY;
+    PetscFunctionReturn(0);
+  }
+  PetscErrorCode direction(double *part)
+  {
+    KSPConvergedReason reason;
+    PetscFunctionBegin;
+    *part = INFINITY;
+    PetscCall(Jacobian(R, t, U, zero, zero, 0, heavy, J));
+    PetscCall(KSPSolve(ksp, F, d));
+    PetscCall(KSPGetConvergedReason(ksp, &reason));
+    if (reason < 0) PetscFunctionReturn(0);
+    PetscCall(keep(TSHHT3_COORDINATE, d));
+    PetscCall(reach(d, part));
+    PetscFunctionReturn(0);
+  }
+};
+
+/* As far along d as the misfit falls */
+PetscErrorCode Advance(Assembling &E, double factor)
+{
+  const double before = E.misfit;
+  PetscFunctionBegin;
+  for (int cut = 0; cut <= most_cuts; cut++, factor /= 2) {
+    PetscCall(VecWAXPY(E.next, -factor, E.d, E.U));
+    PetscCall(E.look(E.next));
+    if (E.misfit < before) break;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Positions(Assembling &E, Vec rates)
+{
+  double part = INFINITY;
+  PetscFunctionBegin;
+  PetscCall(E.create("scene_assembly_"));
+  PetscCall(RolesOf(E.R, E.role));
+  PetscCall(VecCopy(rates, E.V));
+  PetscCall(E.look(E.U));
+  for (int it = 0; it < most_iterations && E.misfit > 0; it++) {
+    const double before = E.misfit;
+    PetscCall(E.direction(&part));
+    if (!std::isfinite(part) || part * largest_turn <= still) break;
+    PetscCall(Advance(E, std::min(1.0, 1 / part)));
+    PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, part * largest_turn));
+    if (!(E.misfit < before)) {
+      E.misfit = before;
+      break;
+    }
+    PetscCall(VecCopy(E.next, E.U));
+    PetscCall(Remember(E.R, E.U, E.zero));
+    PetscCall(RenewAxes(E.R, E.U, E.V));
+  }
+  PetscCheck(E.misfit <= E.R.scene.start.tolerance * E.size, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
+             "the scene cannot be assembled at t = %g: constraints or motions are violated by %g.\nTake smaller steps in time, or start nearer to where they are met", E.t,
+             E.misfit);
+  PetscFunctionReturn(0);
+}
+
+/* The consistent state nearest to where ts is, with the axes of its angles */
+PetscErrorCode Complete(TS ts, Runtime &R)
+{
+  TS        copy;
+  PetscReal t;
+  Vec       U, V, A;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecDuplicate(U, &A));
+  PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, &copy));
+  PetscCall(TSHHT3EvaluateAt(copy, t, U, V, A));
+  PetscCall(VecCopy(RunOf(copy)->axes, R.axes));
+  PetscCall(UseAxes(R));
+  PetscCall(VecDestroy(&A));
+  PetscCall(TSDestroy(&copy));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R)
+{
+  Vec U, V;
+  PetscFunctionBegin;
+  Assembling E(R, t);
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecDuplicate(U, &E.U));
+  PetscCall(VecCopy(U, E.U));
+  PetscCall(Positions(E, V));
+  PetscCall(VecCopy(E.U, U));
+  PetscCall(VecCopy(E.V, V));
+  PetscCall(TSSetTime(ts, t));
+  PetscCall(Complete(ts, R));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode AssembleAt(TS ts, PetscReal t)
+{
+  Runtime  *R;
+  PetscReal before;
+  Vec       now[3], kept[3];
+  PetscFunctionBegin;
+  PetscCall(NotBegun(ts, "AssembleAt()", &R));
+  PetscCall(TSGetTime(ts, &before));
+  PetscCall(TS2GetSolution(ts, &now[0], &now[1]));
+  now[2] = R->axes;
+  for (int k = 0; k < 3; k++) {
+    PetscCall(VecDuplicate(now[k], &kept[k]));
+    PetscCall(VecCopy(now[k], kept[k]));
+  }
+  const PetscErrorCode failed = Guarded([&] { return Assembled(ts, t, *R); });
+  if (failed) {
+    for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));
+    PetscCall(UseAxes(*R));
+    PetscCall(TSSetTime(ts, before));
+  }
+  for (Vec &x : kept) PetscCall(VecDestroy(&x));
+  PetscCall(failed);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Kinematics(TS ts, PetscReal t)
+{
+  Runtime *R;
+  PetscInt velocities;
+  PetscFunctionBegin;
+  PetscCall(NotBegun(ts, "Kinematics()", &R));
+  const PetscInt freedoms = R->scene.started.degreesOfFreedom();
+  PetscCheck(freedoms <= 0 && R->scene.extensions.empty(), R->scene.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "Kinematics(): motions and joints leave %d degrees of freedom, must leave none; give more motions, or take AssembleAt(), StaticEquilibrium() or a run in time",
+             (int)freedoms);
+  PetscCall(ISGetSize(R->roles[TSHHT3_NONHOLONOMIC], &velocities));
+  PetscCheck(!velocities, R->scene.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "Kinematics(): %d constraints or motions of velocities do not say where bodies are; give motions of displacements, or take a run in time", (int)velocities);
+  PetscCall(AssembleAt(ts, t));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,28 @@
+/* What contacts and stops ask of their law */
+#ifndef HHTDAE_SCENE_FORCES_CONTACT_REQUIREMENTS_H
+#define HHTDAE_SCENE_FORCES_CONTACT_REQUIREMENTS_H
+
+#include "requirements.h"
+#include "scene/kernels/contact_law.h"
+
+namespace hhtdae
+{
+
+/* size: of the smaller of two shapes, of a travel */
+inline ContactLawData CheckedLaw(ElementBuilder &e, const ContactLaw &law, double size)
+{
+  RequirePositive(e, "stiffness", law.stiffness);
+  RequireNotNegative(e, "damping", law.damping);
+  RequireNotNegative(e, "friction coefficient", law.friction);
+  RequirePositive(e, "slip velocity", law.slip_velocity);
+  e.require(std::isfinite(law.exponent) && law.exponent >= 1,
+            "exponent is " + Show(law.exponent) + ", must be 1 or more (Hertz: 1.5)");
+  ContactLawData d;
+  static_cast<ContactLaw &>(d) = law;
+  d.onset                      = 1e-4 * size; /* far less than a penetration that matters to a body of this size */
+  return d;
+}
+
+} // namespace hhtdae
+
+#endif

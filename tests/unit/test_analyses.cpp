@@ -1,0 +1,277 @@
+/* Static equilibrium, assembly and kinematics as calls on a run, against closed forms and against runs in time. */
+#include "hhtdae/analyses.h"
+#include "hhtdae/helpers.h"
+#include "hhtdae/linearize.h"
+#include "hhtdae/query.h"
+#include "scene_start.h"
+#include <cmath>
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+/* A TS that goes with the test */
+struct OwnTS {
+  TS ts = nullptr;
+  OwnTS() = default;
+  explicit OwnTS(Scene &s) { must(s.createTS(&ts)); }
+  ~OwnTS() { TSDestroy(&ts); }
+  OwnTS(const OwnTS &) = delete;
+  double time() const
+  {
+    PetscReal t;
+    must(TSGetTime(ts, &t));
+    return t;
+  }
+};
+
+/* A rod of 1 m on a pin at its end, pulled to one side by a force that grows with time, with a torsional spring */
+struct Lever {
+  Scene   scene{PETSC_COMM_SELF};
+  Body    arm;
+  Marker  i, j, tip;
+  Element axle, push;
+
+  explicit Lever(double stiffness = 0)
+  {
+    arm  = scene.add("arm", rod({0, 0, 0}, {0, -1, 0}));
+    i    = scene.markerAt(arm, Vector3::Zero());
+    j    = scene.marker(scene.ground());
+    tip  = scene.markerAt(arm, {0, -1, 0});
+    axle = scene.add("axle", Revolute{i, j});
+    UserForce f;
+    f.i     = tip;
+    f.force = {Expression(Measure::time()), Expression{{}, [](const Real *) { return Real(0); }}, Expression{{}, [](const Real *) { return Real(0); }}};
+    push    = scene.add("push", f);
+    if (stiffness > 0) scene.add("spring", TorsionalSpringDamper{i, j, stiffness});
+    scene.gravity({0, -10, 0});
+  }
+};
+
+} // namespace
+
+/* tan(angle) = force over half of the weight; reactions balance the loads; nothing of it moves the scene or other runs */
+TEST(Analyses, QuasiStaticLever)
+{
+  Lever    l;
+  OwnTS      run(l.scene), other(l.scene);
+  Snapshot now;
+  for (double t : {0., 1., 3., 40., -5., 0.}) {
+    must(StaticEquilibrium(run.ts, t));
+    Motion m;
+    Load   pin;
+    must(now.take(run.ts));
+    EXPECT_EQ(now.time(), t);
+    must(now.motion(l.tip, &m));
+    EXPECT_NEAR(m.position(0), std::sin(std::atan(t / 5)), 1e-9) << t;
+    must(now.load(l.axle, l.i, &pin));
+    EXPECT_LT((pin.force - Vector3(-t, 10, 0)).norm(), 1e-6) << pin.force.transpose();
+    EXPECT_LT(m.velocity.norm() + m.acceleration.norm(), 1e-6);
+  }
+  Motion m;
+  must(now.take(other.ts));
+  must(now.motion(l.tip, &m));
+  EXPECT_NEAR(m.position(0), 0, 1e-12);
+}
+
+/* Round and round: the spring's angle is counted on the way, and the run goes on from there at rest */
+TEST(Analyses, TurnsAreCountedOnTheWay)
+{
+  Scene     s(PETSC_COMM_SELF);
+  RigidBody b;
+  const Body   wheel = s.add("wheel", b);
+  const Marker i = s.marker(wheel), j = s.marker(s.ground());
+  UserScalarForce torque{i, j, Expression(Measure::time())};
+  torque.rotational = true;
+  s.add("axle", Revolute{i, j});
+  s.add("spring", TorsionalSpringDamper{i, j, 2, 0, 0, 0});
+  s.add("torque", torque);
+  s.channel("angle", Measure::angle(i, j));
+  OwnTS run(s);
+  for (int k = 1; k <= 10; k++) must(StaticEquilibrium(run.ts, 4. * k));
+  must(TSSetMaxTime(run.ts, 40.01));
+  must(s.solve(run.ts));
+  std::vector<double> now;
+  must(s.sample(run.ts, 40.01, now));
+  EXPECT_NEAR(now[0], 20, 1e-4);
+  EXPECT_NEAR(run.time(), 40.01, 1e-12);
+}
+
+/* A stone that nothing holds has no equilibrium */
+TEST(Analyses, WhatFailsLeavesTheRunWhereItWas)
+{
+  Scene     s(PETSC_COMM_SELF);
+  PointMass p;
+  p.position = {0.3, 0.2, 0.1};
+  const Body b = s.add("stone", p);
+  const Marker i = s.marker(b);
+  s.gravity({0, 0, -10});
+  OwnTS run(s);
+  {
+    ErrorTrap error;
+    EXPECT_NE(StaticEquilibrium(run.ts, 2), 0);
+    EXPECT_TRUE(error.says("no static equilibrium found")) << error.message;
+  }
+  EXPECT_EQ(run.time(), 0);
+  Snapshot now;
+  Motion   m;
+  must(now.take(run.ts));
+  must(now.motion(i, &m));
+  EXPECT_EQ(m.position, Vector3(0.3, 0.2, 0.1));
+  EXPECT_NEAR(m.acceleration(2), -10, 1e-12) << "accelerations of the start";
+}
+
+/* Linearized about an equilibrium that a call has found: a pendulum held aside by t = 5 under gravity */
+TEST(Analyses, ModesAboutAnEquilibrium)
+{
+  Lever l;
+  OwnTS   run(l.scene);
+  must(StaticEquilibrium(run.ts, 5));
+  Linearization     about;
+  std::vector<Mode> modes;
+  must(about.take(run.ts));
+  must(about.modes(&modes));
+  ASSERT_EQ(modes.size(), 1u);
+  /* stiffness: weight/2 cos + force sin, with angle 45 degrees; inertia 1/3 */
+  EXPECT_NEAR(std::abs(modes[0].value), std::sqrt(3 * (5 * std::sqrt(0.5) + 5 * std::sqrt(0.5))), 1e-6);
+}
+
+namespace
+{
+
+/* The linkage of scene_start.h with its crank driven */
+struct Driven {
+  Scene   scene{PETSC_COMM_SELF};
+  Linkage linkage;
+  Marker  crank_pin, ground_pin, at_rocker;
+  Element drive;
+
+  explicit Driven(const TimeFunction &f)
+  {
+    linkage.build(scene);
+    const Matrix3 z = hhtest::axesAlong(Vector3(0, 0, 1));
+    crank_pin       = scene.markerAt(linkage.crank, linkage.A, z);
+    ground_pin      = scene.marker(scene.ground(), linkage.A, z);
+    at_rocker       = scene.markerAt(linkage.rocker, linkage.C);
+    drive           = scene.add("drive", RotationalMotion{crank_pin, ground_pin, f});
+    scene.start().assembly = Assembly::Project; /* it is described at rest */
+    scene.gravity({0, -9.81, 0});
+  }
+};
+
+} // namespace
+
+/* A four-bar through full turns of its crank, in few steps: positions by geometry, velocities and accelerations by differences of them,
+   the moment of the drive by the power of gravity and inertia; a run in time agrees */
+TEST(Analyses, KinematicsOfAFourBar)
+{
+  Driven     d(TimeFunction::polynomial({0, 2, 0.3}));
+  OwnTS        run(d.scene);
+  Snapshot   now;
+  const auto geometry = [&](double t, Vector3 *C) {
+    const Linkage l(1 + 2 * t + 0.3 * t * t);
+    *C = l.C;
+  };
+  for (double t : {0., 0.05, 0.4, 0.8, 1.3, 2.0, 3.1, 4.4}) {
+    Motion  m;
+    Vector3 C[5];
+    must(Kinematics(run.ts, t));
+    must(now.take(run.ts));
+    must(now.motion(d.at_rocker, &m));
+    const double h = 1e-3;
+    for (int k = 0; k < 5; k++) geometry(t + (k - 2) * h, &C[k]);
+    const Vector3 v = (C[0] - 8 * C[1] + 8 * C[3] - C[4]) / (12 * h), a = (-C[0] + 16 * C[1] - 30 * C[2] + 16 * C[3] - C[4]) / (12 * h * h);
+    EXPECT_LT((m.position - C[2]).norm(), 1e-10) << t;
+    EXPECT_LT((m.velocity - v).norm(), 1e-8 * (1 + v.norm())) << t;
+    EXPECT_LT((m.acceleration - a).norm(), 1e-6 * (1 + a.norm())) << t;
+  }
+  double moment[2];
+  must(now.value(Measure::jointMoment(d.drive, 2), &moment[0]));
+  Options opt("-ts_hhtdae_alpha -0.05");
+  OwnTS dynamic(d.scene);
+  must(TSSetMaxTime(dynamic.ts, 4.4));
+  must(TSSetTolerances(dynamic.ts, 1e-8, nullptr, 1e-8, nullptr));
+  must(TSSetFromOptions(dynamic.ts));
+  must(d.scene.solve(dynamic.ts));
+  must(now.take(dynamic.ts));
+  must(now.value(Measure::jointMoment(d.drive, 2), &moment[1]));
+  MEASURED("moment of the drive %.12g, of a run in time %.12g", moment[0], moment[1]);
+  EXPECT_NEAR(moment[0], moment[1], 1e-4 * std::abs(moment[0]));
+}
+
+/* Power of the drive = change of kinetic energy + work against gravity, from snapshots alone */
+TEST(Analyses, InverseDynamicsByThePower)
+{
+  Driven     d(TimeFunction::polynomial({0, 3}));
+  OwnTS        run(d.scene);
+  Snapshot   now;
+  const auto energy = [&](double t) {
+    double k, p;
+    must(Kinematics(run.ts, t));
+    must(now.take(run.ts));
+    must(now.energy(&k, &p));
+    return k + p;
+  };
+  const double h = 1e-3, t = 0.7;
+  double       E[5], moment;
+  for (int k = 0; k < 5; k++) E[k] = energy(t + (k - 2) * h);
+  energy(t);
+  must(now.value(Measure::jointMoment(d.drive, 2), &moment));
+  const double power = (E[0] - 8 * E[1] + 8 * E[3] - E[4]) / (12 * h);
+  EXPECT_NEAR(3 * moment, power, 1e-7 * std::abs(power));
+}
+
+TEST(Analyses, WhatIsNotKinematic)
+{
+  Lever l;
+  OwnTS   run(l.scene);
+  {
+    ErrorTrap error;
+    EXPECT_NE(Kinematics(run.ts, 1), 0);
+    EXPECT_TRUE(error.says("leave 1 degrees of freedom")) << error.message;
+  }
+  must(TSSetMaxTime(run.ts, 0.1));
+  must(l.scene.solve(run.ts));
+  {
+    ErrorTrap error;
+    EXPECT_NE(StaticEquilibrium(run.ts, 1), 0);
+    EXPECT_TRUE(error.says("StaticEquilibrium(): the run has begun")) << error.message;
+  }
+  OwnTS next;
+  must(l.scene.createTS(&next.ts, run.ts));
+  must(StaticEquilibrium(next.ts, 1)); /* but one that goes on from it can be moved */
+  Driven    d(TimeFunction::polynomial({0, 1}));
+  Scene     skate(PETSC_COMM_SELF);
+  RigidBody b;
+  const Body   body = skate.add("body", b);
+  const Marker i = skate.marker(body), j = skate.marker(skate.ground());
+  skate.add("slide", Translational{i, j});
+  skate.add("speed", TranslationalMotion{i, j, 1., MotionOf::Velocity});
+  skate.start().assembly = Assembly::Project;
+  OwnTS rate(skate);
+  ErrorTrap error;
+  EXPECT_NE(Kinematics(rate.ts, 1), 0);
+  EXPECT_TRUE(error.says("of velocities do not say where bodies are")) << error.message;
+}
+
+/* A loop whose row of the time has moved on from where the scene was described; velocities meet its rate */
+TEST(Analyses, AssemblyAtATime)
+{
+  Scene   s(PETSC_COMM_SELF);
+  Linkage l;
+  l.build(s);
+  const Marker B = s.markerAt(l.crank, l.B), C = s.markerAt(l.rocker, l.C);
+  s.add("lift", UserConstraint{{Expression{{Measure::displacement(B, 1), Measure::time()}, [](const Real *m) { return m[0] - sin(1 + m[1]); }}}});
+  s.start().assembly = Assembly::Project;
+  OwnTS run(s);
+  must(AssembleAt(run.ts, 0.3));
+  Snapshot now;
+  Motion   m;
+  must(now.take(run.ts));
+  must(now.motion(C, &m));
+  const Vector3 before = Linkage(1.3 - 1e-4).C, after = Linkage(1.3 + 1e-4).C;
+  EXPECT_LT((m.position - Linkage(1.3).C).norm(), 1e-10);
+  EXPECT_LT((m.velocity - (after - before) / 2e-4).norm(), 1e-7);
+}

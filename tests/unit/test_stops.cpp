@@ -1,0 +1,182 @@
+/* Stops, ropes and struts: derivatives, the law of their force, and runs against closed forms. */
+#include "force_checks.h"
+#include "hhtdae/query.h"
+#include "scene/kernels/stop.h"
+#include "scene/model.h"
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* at a coordinate s below, within or beyond the travel */
+StopData stop(Random &random, double s)
+{
+  StopData d{};
+  const int where = int(random(0, 2.999));
+  d.lower         = where == 0 ? s + random(.2, 1) : s - random(.2, 1);
+  d.upper         = d.lower + (where == 1 ? 3 : where == 2 ? 0.1 : 0.5);
+  d.law.stiffness = random(1, 3);
+  d.law.exponent  = random(0, 1) < .5 ? 1 : 1.5;
+  d.law.damping   = random(.05, .15);
+  d.law.onset     = 1e-4;
+  d.axis          = int(random(0, 2.999));
+  return d;
+}
+
+/* A mass that slides along x between stops at -1 and 1 */
+struct Slider {
+  Scene   scene{PETSC_COMM_SELF};
+  Body    body;
+  Marker  i, j;
+  Element stop;
+
+  explicit Slider(double speed, ContactLaw law)
+  {
+    RigidBody b;
+    b.mass     = 2;
+    b.velocity = {speed, 0, 0};
+    body       = scene.add("slider", b);
+    const Matrix3 along = Eigen::AngleAxisd(M_PI / 2, Vector3::UnitY()).toRotationMatrix(); /* z along x */
+    i = scene.marker(body, Vector3::Zero(), along);
+    j = scene.marker(scene.ground(), Vector3::Zero(), along);
+    scene.add("guide", Translational{i, j});
+    TranslationalStop s{i, j};
+    s.lower = -1;
+    s.upper = 1;
+    s.law   = law;
+    stop    = scene.add("stop", s);
+  }
+};
+
+} // namespace
+
+TEST(Stops, Derivatives)
+{
+  CheckForce<TurnStop>([](Random &random, Frame<double> *f) {
+    while (std::abs(f[0].R.col(0).dot(f[1].R.col(2))) > .9) f[0].R = random.rotation();
+    StopData d  = stop(random, PrincipalAngle<double>(f[0], f[1]) + 2 * kTurn);
+    d.memory[0] = PrincipalAngle<double>(f[0], f[1]) + 2 * kTurn;
+    return d;
+  });
+  CheckForce<AdvanceStop>([](Random &random, Frame<double> *f) {
+    StopData d = stop(random, 0);
+    const double s = Advance<double>(f[0], f[1], d.axis);
+    d.lower += s;
+    d.upper += s;
+    return d;
+  });
+  CheckForce<LengthStop>([](Random &random, Frame<double> *f) { return stop(random, (f[0].x - f[1].x).norm()); });
+}
+
+/* Thrown against a linear stop: half a period of the spring, and back at the same speed; energy is conserved on the way */
+TEST(Stops, ASliderBouncesBetweenTheEnds)
+{
+  ContactLaw law;
+  law.stiffness = 2e3;
+  law.exponent  = 1;
+  Slider s(3, law);
+  const double omega = std::sqrt(law.stiffness / 2), depth = 3 / omega, contact = M_PI / omega, period = 4. / 3 + 2 * contact;
+  SceneRun run(s.scene, 1.25 * period, tolerance(1e-8)); /* a quarter beyond a cycle: at the upper end, in the middle of its contact */
+  must(run.solve());
+  Snapshot now;
+  Motion   m;
+  double   force, kinetic, potential;
+  must(now.take(run.ts));
+  must(now.motion(s.body, &m));
+  must(now.value(Measure::force(s.stop, 0), &force));
+  must(now.energy(&kinetic, &potential));
+  EXPECT_NEAR(m.position(0), 1 + depth, 1e-4 * depth); /* the smooth onset shifts it by 1e-4 of the travel at most */
+  EXPECT_NEAR(force, -law.stiffness * depth, 1e-3 * law.stiffness * depth);
+  EXPECT_NEAR(kinetic + potential, 9, 1e-2); /* numerical damping takes 1.2e-3 */
+}
+
+/* A pendulum of 1 m in a cage of 0.3 rad, after more than a turn of counting: it stays in */
+TEST(Stops, AnArmStaysWithinItsAngles)
+{
+  Scene     s(PETSC_COMM_SELF);
+  RigidBody b;
+  b.position               = {0, -1, 0};
+  b.angular_velocity       = {0, 0, 4};
+  b.velocity               = {4, 0, 0};
+  const Body   arm         = s.add("arm", b);
+  const Marker i           = s.marker(arm, {0, 1, 0}), j = s.marker(s.ground());
+  RotationalStop stop{i, j};
+  stop.lower         = -0.5;
+  stop.upper         = 2 * M_PI + 0.3;
+  stop.law.stiffness = 1e5;
+  stop.law.damping   = 10; /* nothing comes back */
+  s.add("pin", Revolute{i, j});
+  s.add("stop", stop);
+  s.channel("angle", Measure::angle(i, j));
+  SceneRun run(s, 4, tolerance(1e-6));
+  must(run.solve());
+  std::vector<double> now;
+  must(s.sample(run.ts, 4, now));
+  EXPECT_GT(now[0], 2 * M_PI);
+  EXPECT_LT(now[0], 2 * M_PI + 0.31);
+}
+
+/* A mass falls 1 m in a rope of 0.5 m: the greatest tension by energy, and nothing while the rope is slack */
+TEST(Stops, ARopeHoldsAndIsSlack)
+{
+  Scene     s(PETSC_COMM_SELF);
+  PointMass p;
+  p.position = {0, 0, 0};
+  const Body   b = s.add("bag", p);
+  const Marker i = s.marker(b), j = s.marker(s.ground());
+  DistanceStop rope{i, j};
+  rope.upper         = 0.5;
+  rope.law.stiffness = 4e3;
+  rope.law.exponent  = 1;
+  const Element r = s.add("rope", rope);
+  s.gravity({0, 0, -9.81});
+  s.channel("tension", Measure::force(r, 0));
+  const double fall = std::sqrt(2 * 0.5 / 9.81), v = 9.81 * fall, omega = std::sqrt(4e3), sag = 9.81 / (omega * omega),
+               most = sag + std::hypot(sag, v / omega), lowest = fall + (M_PI / 2 + std::atan2(sag, v / omega)) / omega; /* time and depth of the lowest point */
+  SceneRun run(s, lowest, tolerance(1e-8));
+  double   at_half = -1;
+  must(TSSetMaxTime(run.ts, 0.5 * fall));
+  must(run.solve());
+  std::vector<double> now;
+  must(s.sample(run.ts, 0.5 * fall, now));
+  at_half = now[0];
+  must(TSSetMaxTime(run.ts, lowest));
+  must(run.solve());
+  must(s.sample(run.ts, lowest, now));
+  EXPECT_EQ(at_half, 0);
+  MEASURED("tension %.9g, by energy %.9g", now[0], 4e3 * most);
+  EXPECT_NEAR(now[0], 4e3 * most, 1e-3 * 4e3 * most);
+}
+
+TEST(Stops, Refuses)
+{
+  Slider     s(0, {});
+  const auto bad = [&](auto spec) {
+    std::string all;
+    s.scene.add("it", spec);
+    for (const std::string &e : DataOf(s.scene).errors) all += e + "\n";
+    DataOf(s.scene).errors.clear();
+    return all;
+  };
+  const auto says = [](const std::string &errors, const char *words) { EXPECT_NE(errors.find(words), std::string::npos) << "expected: " << words << "\ngot: " << errors; };
+  RotationalStop r{s.i, s.j};
+  says(bad(r), "neither lower nor upper is given");
+  r.lower = 1, r.upper = -1;
+  says(bad(r), "lower is 1 and upper -1");
+  r.lower = std::nan("");
+  says(bad(r), "must be numbers");
+  TranslationalStop t{s.i, s.j};
+  t.upper = 1;
+  t.axis  = 3;
+  says(bad(t), "axis is 3");
+  t.axis         = 2;
+  t.law.friction = 0.1;
+  says(bad(t), "a stop has none");
+  DistanceStop d{s.i, s.j};
+  says(bad(d), "neither lower nor upper is given");
+  d.lower = -1;
+  says(bad(d), "a distance is not negative");
+}
