@@ -39,7 +39,7 @@ enum class Space {
   Planar   /* 3: position of the centre of mass in the xy plane, angle about z; markers lie in that plane, their z axes along z */
 };
 
-struct RigidBody {
+struct RigidBody { /* without mass, or moments of inertia, where joints and motions determine what would have none */
   double  mass    = 1;
   Matrix3 inertia = Matrix3::Identity();  /* about the centre of mass, in body axes; planar: element (2,2) alone counts */
   Vector3 position = Vector3::Zero();     /* of the body's origin at the start, space axes */

@@ -57,7 +57,7 @@ private:
   {
     if (b.massless) return; /* the frame of an attachment follows its body */
     const std::string who = "body " + b.name;
-    require(std::isfinite(b.mass) && b.mass > 0, who, "mass is " + Text(b.mass) + ", must be positive");
+    require(std::isfinite(b.mass) && b.mass >= 0, who, "mass is " + Text(b.mass) + ", must be positive, or 0 where joints determine what it does");
     require(b.r.allFinite() && b.v.allFinite() && b.w.allFinite(), who,
             "position, velocity and angular velocity must be finite");
     if (b.point) {
@@ -70,8 +70,8 @@ private:
     if (off < angle_tolerance)
       require(b.A.determinant() > 0, who, "rotation is left-handed; its third column must be the first x the second");
     if (s_.planar)
-      require(std::isfinite(b.inertia(2, 2)) && b.inertia(2, 2) > 0, who,
-              "inertia(2,2) is " + Text(b.inertia(2, 2)) + ", must be positive");
+      require(std::isfinite(b.inertia(2, 2)) && b.inertia(2, 2) >= 0, who,
+              "inertia(2,2) is " + Text(b.inertia(2, 2)) + ", must be positive, or 0 where joints determine the angle");
     else
       inertia(b, who);
     inPlane(b, who);
@@ -94,9 +94,6 @@ private:
       require(false, who, values + ", must be positive");
       return;
     }
-    require(I(0) > 1e-12 * scale, who,
-            values + ": a turn about the first axis has no inertia; give a small moment (a thousandth of the others, "
-                     "say), or make it a PointMass");
     require(I(2) <= (I(0) + I(1)) * (1 + 1e-6), who,
             values + ": the largest exceeds the sum of the others, which no body has; check the units, and that they "
                      "are about the centre of mass");

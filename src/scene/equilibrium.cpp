@@ -61,7 +61,7 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   E.scale = at.force;
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
-    if (!b.massless) lightest = std::min(lightest, b.mass);
+    if (b.mass > 0 && !b.massless) lightest = std::min(lightest, b.mass);
   }
   if (lightest == INFINITY)
     for (const BodyData &b : s.bodies) lightest = std::min(lightest, b.light_mass);

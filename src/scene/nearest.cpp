@@ -28,11 +28,11 @@ Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
     M.diagonal() << Vector3::Constant(1 / b.light_mass), Vector3::Constant(1 / b.light_inertia);
     return M;
   }
-  M.topLeftCorner<3, 3>().diagonal().setConstant(1 / b.mass);
+  M.topLeftCorner<3, 3>().diagonal().setConstant(1 / (b.mass > 0 ? b.mass : b.light_mass));
   if (s.planar)
-    M(5, 5) = b.point ? 0 : 1 / b.inertia(2, 2);
+    M(5, 5) = b.point ? 0 : 1 / (b.inertia(2, 2) + b.light_inertia);
   else if (!b.point)
-    M.bottomRightCorner<3, 3>() = b.A * b.inertia.inverse() * b.A.transpose();
+    M.bottomRightCorner<3, 3>() = b.A * Matrix3(b.inertia + b.light_inertia * Matrix3::Identity()).inverse() * b.A.transpose();
   Eigen::MatrixXd W(d.size(), d.size());
   for (std::size_t i = 0; i < d.size(); i++)
     for (std::size_t j = 0; j < d.size(); j++) W(i, j) = M(d[i], d[j]);

@@ -204,8 +204,10 @@ PetscErrorCode Scene::setUp()
   PetscCallMPI(MPI_Comm_size(s.comm, &M.size));
   if (M.continues) s.start.time = M.begin;
   else PetscCall(Partition(s, M.size, M.number.owner));
+  FillLight(s);
   PetscCall(Assemble(M));
   PetscCall(DropRedundant(M));
+  PetscCall(CheckInertia(s));
   PetscCall(Number(M));
   PetscCall(WantTriangle(M));
   if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));

@@ -32,8 +32,8 @@ struct BodyData {
   Vector3     v, w;     /* at the start, space axes */
   std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
   PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: its flexible body */
-  bool        massless = false; /* such a frame; what assembly takes for its mass is a little of the body that carries it */
-  double      light_mass = 0, light_inertia = 0;
+  bool        massless = false; /* such a frame */
+  double      light_mass = 0, light_inertia = 0; /* what assembly takes, or adds, where there is no inertia: a little of that of others */
 };
 
 struct MarkerData {

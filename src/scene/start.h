@@ -91,6 +91,10 @@ PetscErrorCode Assemble(Model &M); /* reports or projects, as the policy says */
 /* ---- redundancy.cpp ---- */
 PetscErrorCode DropRedundant(Model &M);
 
+/* ---- inertia.cpp: what has no inertia ---- */
+void           FillLight(SceneData &s);
+PetscErrorCode CheckInertia(const SceneData &s); /* it follows from the constraints */
+
 /* ---- equilibrium.cpp: after Number(), with a layout of its own ---- */
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M);
 

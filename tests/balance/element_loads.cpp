@@ -46,7 +46,8 @@ bool ElementLoads::known(const SceneData &scene, const Specs &specs, PetscInt el
   if (Ends(e, "contact"))
     return specs.of<SpherePlane>(element) || specs.of<EllipsoidPlane>(element) || specs.of<TorusPlane>(element) ||
            specs.of<SphereSphere>(element) || specs.of<SphereBox>(element);
-  for (const char *type : {"spring-damper", "nonlinear spring", "torsional spring-damper", "nonlinear torsional spring",
+  if (Is(e, "translational stop")) return specs.of<TranslationalStop>(element);
+  for (const char *type : {"rotational stop", "distance stop", "spring-damper", "nonlinear spring", "torsional spring-damper", "nonlinear torsional spring",
                            "bushing", "beam", "joint friction", "user scalar force", "user scalar moment"})
     if (Is(e, type)) return true;
   return false;
@@ -187,13 +188,17 @@ void ElementLoads::add(PetscInt element, const Reading &r, std::vector<Load> &lo
     six(e, r, Is(e, "beam"), loads);
   else if (Is(e, "user scalar force"))
     along(e, -r.component[0], loads);
+  else if (Is(e, "distance stop"))
+    along(e, r.component[0], loads);
+  else if (Is(e, "translational stop"))
+    pair(e, at(e.i).x, r.component[0] * at(e.j).R.col(specs_.of<TranslationalStop>(element)->axis), Vector3::Zero(), loads);
   else if (Ends(e, "spring-damper") || Ends(e, "spring"))
     if (std::string(e.type).find("torsional") == std::string::npos)
       along(e, r.component[0], loads);
     else
       pair(e, at(e.i).x, Vector3::Zero(), r.component[0] * at(e.j).R.col(2), loads);
   else
-    pair(e, at(e.i).x, Vector3::Zero(), r.component[0] * at(e.j).R.col(2), loads); /* user scalar moment */
+    pair(e, at(e.i).x, Vector3::Zero(), r.component[0] * at(e.j).R.col(2), loads); /* user scalar moment, rotational stop */
 }
 
 } // namespace hhtest

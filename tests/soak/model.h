@@ -3,6 +3,8 @@
 #ifndef HHTDAE_SOAK_MODEL_H
 #define HHTDAE_SOAK_MODEL_H
 
+#include "model_choice.h"
+#include "model_extras.h"
 #include "model_loads.h"
 #include "model_machines.h"
 #include "model_switches.h"
@@ -28,9 +30,10 @@ struct Model {
 class Generator
 {
 public:
-  Generator(std::uint64_t seed, std::uint64_t number, bool small, bool switches, const std::vector<ReducedPart> &parts,
+  Generator(std::uint64_t seed, std::uint64_t number, const Choice &choice, const std::vector<ReducedPart> &parts,
             const Vector3 &push = Vector3::Zero())
-      : r(seed, number), later_(~seed, number), small_(small), switches_(switches), parts_(parts), push_(push)
+      : r(seed, number), later_(~seed, number), extra_(seed + 0x9e3779b97f4a7c15u, number), small_(choice.small), switches_(choice.switches), extras_(choice.extras),
+        parts_(parts), push_(push)
   {
   }
 
@@ -44,6 +47,7 @@ public:
     Loads    loads(b);
     Machines machines(b, parts_);
     populate(b, loads, machines);
+    addExtras(b);
     decorate(b, loads);
     if (b.speed > 0 || b.project) m.scene->start().assembly = Assembly::Project;
     observe(b, machines, loads, m);
@@ -63,8 +67,8 @@ public:
   }
 
 private:
-  Random r, later_; /* later_: of what was added to the models later, so that the rest stays as it was */
-  bool   small_, switches_;
+  Random r, later_, extra_; /* the latter two: of what was added to the models later, so that the rest stays as it was */
+  bool   small_, switches_, extras_;
   const std::vector<ReducedPart> &parts_;
   const Vector3 push_; /* a small change of gravity and places, in parts of them: the same model, disturbed */
 
@@ -168,6 +172,15 @@ private:
     look(Measure::potentialEnergy(), Observed::Energy);
   }
 
+  void addExtras(Builder &b)
+  {
+    if (!extras_) return;
+    std::swap(r, extra_);
+    Extras extras(b);
+    for (int k = r.integer(1, 4); k > 0; k--) extras.any();
+    std::swap(r, extra_);
+  }
+
   /* In two of five models, last, with random numbers of their own */
   void addSwitches(Builder &b, Model &m)
   {
@@ -192,7 +205,7 @@ private:
   /* by elements that take or give energy as such; springs with damping are known to the builder */
   static bool dissipates(const Scene &s)
   {
-    static const char *const takes[] = {"motion", "friction", "user", "beam", "contact", "nonlinear", "attachment"};
+    static const char *const takes[] = {"motion", "friction", "user", "beam", "contact", "stop", "nonlinear", "attachment"};
     for (const ElementData &e : DataOf(s).elements)
       for (const char *word : takes)
         if (std::strstr(e.type, word)) return true;

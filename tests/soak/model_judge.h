@@ -76,9 +76,9 @@ inline void SetText(char *to, std::size_t room, const std::string &s)
 class Judge
 {
 public:
-  Judge(std::uint64_t seed, long number, bool small, bool switches, bool again, bool laws, const std::vector<ReducedPart> &parts,
+  Judge(std::uint64_t seed, long number, const Choice &choice, bool again, bool laws, const std::vector<ReducedPart> &parts,
         bool options, Outcome *outcome)
-      : seed_(seed), small_(small), switches_(switches), again_(again), laws_(laws), options_(options), parts_(parts), o_(*outcome)
+      : seed_(seed), choice_(choice), again_(again), laws_(laws), options_(options), parts_(parts), o_(*outcome)
   {
     o_.number = number;
   }
@@ -108,7 +108,8 @@ private:
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
   std::uint64_t                             seed_;
-  bool                                      small_, switches_, again_, laws_, options_;
+  Choice                                    choice_;
+  bool                                      again_, laws_, options_;
   const std::vector<ReducedPart>           &parts_;
   Model                                     model_;
   Outcome                                  &o_;
@@ -120,7 +121,7 @@ private:
 
   Model build(const Vector3 &push = Vector3::Zero()) const
   {
-    return Generator(seed_, (std::uint64_t)o_.number, small_, switches_, parts_, push).make();
+    return Generator(seed_, (std::uint64_t)o_.number, choice_, parts_, push).make();
   }
 
   void fail(Verdict v, const std::string &why)
@@ -195,7 +196,7 @@ private:
 
   /* ---- references ---- */
 
-  double patience(double seconds) const { return small_ ? 0.12 * seconds : seconds; }
+  double patience(double seconds) const { return choice_.small ? 0.12 * seconds : seconds; }
 
   void refer()
   {

@@ -3,6 +3,7 @@
 #define HHTDAE_SOAK_MODEL_REPORT_H
 
 #include "bench/page.h"
+#include "model_choice.h"
 #include "model_pool.h"
 #include <algorithm>
 
@@ -15,8 +16,8 @@ using hhtbench::Text;
 class Report
 {
 public:
-  Report(long seed, bool small, bool switches, int planned)
-      : seed_(seed), small_(small), switches_(switches), planned_(planned)
+  Report(long seed, const Choice &choice, int planned)
+      : seed_(seed), choice_(choice), planned_(planned)
   {
   }
 
@@ -72,7 +73,7 @@ private:
     int models = 0, instances = 0;
   };
   long                       seed_;
-  bool                       small_, switches_;
+  Choice                     choice_;
   int                        planned_;
   std::vector<Outcome>       all_;
   std::map<std::string, Use> types_;
@@ -92,8 +93,7 @@ private:
 
   std::string command(const Outcome &o) const
   {
-    return Text("build/bin/models -seed %ld -first %ld -count 1%s%s", seed_, o.number, small_ ? " -small" : "",
-                switches_ ? "" : " -switches 0");
+    return Text("build/bin/models -seed %ld -first %ld -count 1%s", seed_, o.number, choice_.options().c_str());
   }
   std::string line(const Outcome &o) const
   {
@@ -244,7 +244,7 @@ private:
               "two references at 1e-6 and 1e-7 in units of 1e-6. Where this exceeds 1, the same is asked of a run at "
               "eps/100. Models that a change of gravity, of places of bodies and points by eps N / 2 moves as far "
               "(a third of the error at least) are asked no further from there.");
-    page.code(Text("build/bin/models -seed %ld -count %d%s", seed_, (int)all_.size(), small_ ? " -small" : ""));
+    page.code(Text("build/bin/models -seed %ld -count %d%s", seed_, (int)all_.size(), choice_.options().c_str()));
     page.table({"outcome", "models"}, counts());
     page.table({"distribution", "least", "10 %", "median", "90 %", "most"}, distributions());
     std::vector<Page::Row> failures, types;

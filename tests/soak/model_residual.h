@@ -19,6 +19,7 @@
 #include "balance/newton_euler.h"
 #include "hhtdae/hhtdae.h"
 #include "scene/runtime.h"
+#include "scene/start.h"
 
 namespace soak
 {
@@ -171,6 +172,24 @@ private:
       of_[b] = {left[0], G * left[1], most[0].norm(), G.norm() * most[1].norm(), noise[0].norm(), G.norm() * noise[1].norm()};
     }
     PetscCall(VecRestoreArrayRead(F, &f));
+    PetscCall(withoutInertia());
+    PetscFunctionReturn(0);
+  }
+  /* What has no inertia hands on what is left of the equations of its neighbours */
+  PetscErrorCode withoutInertia()
+  {
+    double force = 0, moment = 0;
+
+    PetscFunctionBegin;
+    for (const hhtest::BodyResidual &b : of_) {
+      force  = std::max(force, b.force_allowed);
+      moment = std::max(moment, b.moment_allowed);
+    }
+    for (std::size_t b = 0; b < of_.size(); b++)
+      if (!R_.scene.bodies[b].massless && R_.scene.bodies[b].mass == 0) {
+        of_[b].force_allowed  = force;
+        of_[b].moment_allowed = moment + force * hhtdae::SceneSize(R_.scene);
+      }
     PetscFunctionReturn(0);
   }
 };

@@ -3,6 +3,7 @@ static char help[] =
     "  -seed <1>: of the models; -first <0>, -count <2000>: which of them\n"
     "  -small: models of few bodies alone; -switches <true>: stiff elements that let go or take hold, in two of five "
     "models\n"
+    "  -extras <false>: stops, ropes, links without mass and joints by expressions in each model\n"
     "  -again <true>: each model is described and run a second time, a checkpoint written and gone on from\n"
     "  -laws <true>: every body is held to the laws of Newton and Euler\n"
     "  -jobs <2>: processes at a time; -deadline <120>: CPU seconds for one model with its references\n"
@@ -20,7 +21,7 @@ static PetscErrorCode Run(bool *passed)
 {
   PetscInt                 seed = 1, first = 0, count = 2000, jobs = 2;
   PetscReal                deadline = 120;
-  PetscBool                small = PETSC_FALSE, switches = PETSC_TRUE, again = PETSC_TRUE, laws = PETSC_TRUE;
+  PetscBool                small = PETSC_FALSE, switches = PETSC_TRUE, extras = PETSC_FALSE, again = PETSC_TRUE, laws = PETSC_TRUE;
   char                     output[PETSC_MAX_PATH_LEN] = "build/soak";
   std::vector<ReducedPart> parts;
 
@@ -32,6 +33,7 @@ static PetscErrorCode Run(bool *passed)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-deadline", &deadline, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-small", &small, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-switches", &switches, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-extras", &extras, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-again", &again, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-laws", &laws, nullptr));
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-output", output, sizeof output, nullptr));
@@ -42,12 +44,13 @@ static PetscErrorCode Run(bool *passed)
 #endif
   PetscCall(MakeParts(&parts));
 
-  const bool one = count == 1;
-  Pool       pool((int)count);
-  Report     report((long)seed, small, switches, (int)count);
+  const bool   one = count == 1;
+  Pool         pool((int)count);
+  const Choice choice{(bool)small, (bool)switches, (bool)extras};
+  Report       report((long)seed, choice, (int)count);
   PetscCall(
       pool.run((long)first, (int)jobs, deadline, !one,
-               [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, small, switches, again, laws, parts, one, o).run(); },
+               [&](Outcome *o) { Judge((std::uint64_t)seed, o->number, choice, again, laws, parts, one, o).run(); },
                [&](const Outcome &o, int done) { report.progress(o, done); }));
   for (int k = 0; k < pool.size(); k++) report.add(pool[k]);
   report.print();

@@ -1,0 +1,105 @@
+/*
+  Bodies and movements without inertia. The equations of motion have a solution where masses are positive on all movements that the
+  constraints allow: so what has no inertia has to follow from the constraints, Phi_q N of full column rank for the movements N
+  without inertia.
+*/
+#include "start.h"
+#include <Eigen/Eigenvalues>
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseQR>
+#include <algorithm>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr double none        = 1e-12; /* of the other moments of a body: no inertia */
+constexpr double light       = 1e-3;  /* what assembly takes in its place, of others */
+constexpr double independent = 1e-8;  /* columns of norm one */
+
+/* Axes of a body, as columns in body axes, about which turning has no inertia */
+Eigen::MatrixXd TurnsWithout(const SceneData &s, const BodyData &b)
+{
+  if (b.point) return Eigen::MatrixXd(3, 0);
+  if (s.planar) return b.inertia(2, 2) > 0 ? Eigen::MatrixXd(3, 0) : Eigen::MatrixXd(Vector3::UnitZ());
+  const Eigen::SelfAdjointEigenSolver<Matrix3> principal(b.inertia);
+  int                                          n = 0;
+  while (n < 3 && principal.eigenvalues()(n) <= none * principal.eigenvalues()(2)) n++;
+  return principal.eigenvectors().leftCols(n);
+}
+
+bool HasAll(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && TurnsWithout(s, b).cols() == 0); }
+
+/* Movements of a body that have no inertia, in its directions of motion */
+Eigen::MatrixXd Without(const SceneData &s, const BodyData &b)
+{
+  const std::vector<int> &d     = Directions(KindOf(s, b));
+  const Eigen::MatrixXd   turns = b.A * TurnsWithout(s, b);
+  const int               ways  = b.mass > 0 ? 0 : s.planar ? 2 : 3;
+  Eigen::MatrixXd         full  = Eigen::MatrixXd::Zero(6, ways + turns.cols()), N(d.size(), full.cols());
+  for (int k = 0; k < ways; k++) full(k, k) = 1;
+  full.bottomRightCorner(3, turns.cols()) = turns;
+  for (std::size_t i = 0; i < d.size(); i++) N.row((Eigen::Index)i) = full.row(d[i]);
+  return N;
+}
+
+} // namespace
+
+/* A little of the inertia of others, as the metric of assembly */
+void FillLight(SceneData &s)
+{
+  double lightest = INFINITY;
+  for (const BodyData &b : s.bodies)
+    if (b.mass > 0) lightest = std::min(lightest, b.mass);
+  for (BodyData &b : s.bodies) {
+    if (HasAll(s, b)) continue;
+    const double size = SceneSize(s);
+    b.light_mass      = std::isfinite(lightest) ? light * lightest : 1;
+    b.light_inertia   = std::max(light * b.inertia.norm(), light * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));
+  }
+}
+
+PetscErrorCode CheckInertia(const SceneData &s)
+{
+  std::vector<PetscInt>               first(s.bodies.size(), -1), of; /* columns of bodies, bodies of columns */
+  std::vector<Eigen::Triplet<double>> entries;
+  std::vector<Eigen::MatrixXd>        N(s.bodies.size());
+  PetscFunctionBegin;
+  for (std::size_t b = 0; b < s.bodies.size(); b++) {
+    if (HasAll(s, s.bodies[b])) continue;
+    N[b]     = Without(s, s.bodies[b]);
+    first[b] = (PetscInt)of.size();
+    of.insert(of.end(), N[b].cols(), (PetscInt)b);
+  }
+  if (of.empty()) PetscFunctionReturn(0);
+  int row = 0;
+  for (const RowBlock &block : DescribeAll(s, s.start.time, Hold::None)) {
+    for (std::size_t k = 0; k < block.body.size(); k++) {
+      const PetscInt b = block.body[k];
+      if (first[b] < 0) continue;
+      const Eigen::MatrixXd J = block.J.middleCols(block.column[k], N[b].rows()) * N[b];
+      for (int r = 0; r < block.rows; r++)
+        for (int c = 0; c < J.cols(); c++)
+          if (J(r, c) != 0) entries.emplace_back(row + r, (int)first[b] + c, J(r, c));
+    }
+    row += block.rows;
+  }
+  Eigen::SparseMatrix<double> A(std::max(row, (int)of.size()), (int)of.size());
+  A.setFromTriplets(entries.begin(), entries.end());
+  for (int c = 0; c < A.cols(); c++)
+    if (A.col(c).norm() > 0) A.col(c) /= A.col(c).norm();
+  A.makeCompressed();
+  Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
+  qr.setPivotThreshold(independent);
+  qr.compute(A);
+  if (qr.rank() == A.cols()) PetscFunctionReturn(0);
+  const BodyData &b = s.bodies[of[qr.colsPermutation().indices()(qr.rank())]];
+  SETERRQ(s.comm, PETSC_ERR_ARG_WRONG,
+          "body %s moves in a way that has no inertia and that no joint or motion determines (%d such movements in the scene): give it mass and moments of inertia, hold it by "
+          "joints, or make a body without moments a PointMass",
+          b.name.c_str(), (int)(A.cols() - qr.rank()));
+}
+
+} // namespace hhtdae

@@ -1,0 +1,76 @@
+/* Users' constraints, stops and analyses between bodies of several ranks are those of one. */
+#include "hhtdae/analyses.h"
+#include "hhtdae/query.h"
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A chain whose tips 2 and 7 move on a circle of their own, 4 on an ellipse with the time, 9 as fast along x as 0; stops and a rope */
+struct Chain : Rods {
+  Element circle, rope, stop;
+
+  explicit Chain(MPI_Comm comm) : Rods(10, comm)
+  {
+    circle = scene.add("circle", UserConstraint{{Expression{{Measure::displacement(tip[2], 1), Measure::displacement(tip[7], 1), Measure::displacement(tip[7], 0), Measure::time()},
+                                                            [](const Real *m) { return m[1] - 0.5 * m[0] - 0.01 * (m[2] * m[2] - 64) + 0.05 * sin(m[3]); }}}});
+    for (int i = 0; i < 10; i++) scene.add("", TorsionalSpringDamper{centre[i], i ? centre[i - 1] : scene.marker(scene.ground()), 300. + 10 * i, 5, 0});
+    DistanceStop d{tip[9], tip[0]};
+    d.upper = 9.0005;
+    d.law   = {1e4, 1};
+    rope    = scene.add("rope", d);
+    RotationalStop r{centre[1], centre[0]};
+    r.lower = -0.02;
+    r.upper = 0.5;
+    r.law   = {1e4, 1.5, 0.1};
+    stop    = scene.add("stop", r);
+  }
+  void ask(TS ts, std::vector<double> &all)
+  {
+    Snapshot now;
+    Motion   m;
+    Load     l;
+    must(now.take(ts));
+    for (int k : {2, 7, 9}) {
+      must(now.motion(tip[k], &m));
+      all.insert(all.end(), {m.position(0), m.position(1), m.velocity(0), m.velocity(1), m.acceleration(1)});
+    }
+    for (Element e : {circle, rope, stop}) {
+      must(now.load(e, e.id == rope.id ? tip[9] : e.id == stop.id ? centre[1] : tip[7], &l));
+      all.insert(all.end(), {l.force(0), l.force(1), l.moment(2)});
+    }
+  }
+};
+
+std::vector<double> answers(MPI_Comm comm)
+{
+  std::vector<double> all;
+  TS                  ts;
+  Chain               still(comm);
+  still.scene.start().assembly = Assembly::Project;
+  must(still.scene.createTS(&ts));
+  must(StaticEquilibrium(ts, 1));
+  still.ask(ts, all);
+  must(AssembleAt(ts, 1.5));
+  still.ask(ts, all);
+  must(TSDestroy(&ts));
+  Chain moving(comm);
+  moving.scene.add("fast", UserConstraint{{Expression{{Measure::velocity(moving.tip[9], 0), Measure::velocity(moving.tip[0], 0)}, [](const Real *m) { return m[0] - 2 * m[1]; }}}});
+  moving.scene.start().assembly = Assembly::Project;
+  SceneRun run(moving.scene, 0.2, tolerance(1e-8) + " -ts_adapt_type none -ts_dt 1e-3 ");
+  must(run.solve());
+  moving.ask(run.ts, all);
+  return all;
+}
+
+} // namespace
+
+TEST(AnalysesRanks, TheSameAnswers)
+{
+  const auto one = answers(PETSC_COMM_SELF), all = answers(PETSC_COMM_WORLD);
+  ASSERT_EQ(one.size(), all.size());
+  for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
+}
