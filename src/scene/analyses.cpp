@@ -118,6 +118,7 @@ PetscErrorCode Complete(TS ts, Runtime &R)
   PetscCall(TSHHT3EvaluateAt(copy, t, U, V, A));
   PetscCall(VecCopy(RunOf(copy)->axes, R.axes));
   PetscCall(UseAxes(R));
+  R.still = false;
   PetscCall(VecDestroy(&A));
   PetscCall(TSDestroy(&copy));
   PetscFunctionReturn(0);
@@ -127,19 +128,26 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R)
 {
   Vec U, V;
   PetscFunctionBegin;
-  Assembling E(R, t);
   PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(VecDuplicate(U, &E.U));
-  PetscCall(VecCopy(U, E.U));
-  PetscCall(Positions(E, V));
-  PetscCall(VecCopy(E.U, U));
-  PetscCall(VecCopy(E.V, V));
+  PetscCall(MeetConstraints(R, t, U, V));
   PetscCall(TSSetTime(ts, t));
   PetscCall(Complete(ts, R));
   PetscFunctionReturn(0);
 }
 
 } // namespace
+
+PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  Assembling E(R, t);
+  PetscCall(VecDuplicate(U, &E.U));
+  PetscCall(VecCopy(U, E.U));
+  PetscCall(Positions(E, V));
+  PetscCall(VecCopy(E.U, U));
+  PetscCall(VecCopy(E.V, V));
+  PetscFunctionReturn(0);
+}
 
 PetscErrorCode AssembleAt(TS ts, PetscReal t)
 {

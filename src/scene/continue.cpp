@@ -58,6 +58,7 @@ PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
   PetscCall(VecCopy(V, Y));
   PetscCall(VecCopy(from.axes, to.axes));
   PetscCall(UseAxes(to));
+  to.still = from.still;
   PetscFunctionReturn(0);
 }
 
@@ -89,6 +90,25 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscCall(TSSetMaxTime(*copy, t + 1));
   PetscCall(TSHHT3SetStart(*copy, start));
   PetscCall(TSStep(*copy));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy)
+{
+  PetscReal t;
+  Vec       U, V;
+  PetscFunctionBegin;
+  *copy = nullptr;
+  if (RunOf(ts)->still) {
+    PetscCall(TS2GetSolution(ts, &U, &V));
+    PetscCall(VecCopy(U, state[0]));
+    PetscCall(VecCopy(V, state[1]));
+    PetscCall(VecZeroEntries(state[2]));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, copy));
+  PetscCall(TSHHT3EvaluateAt(*copy, t, state[0], state[1], state[2]));
   PetscFunctionReturn(0);
 }
 

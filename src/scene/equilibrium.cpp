@@ -228,6 +228,19 @@ PetscErrorCode Find(Equilibrium &E)
   PetscFunctionReturn(0);
 }
 
+/* Motions may have taken bodies far from where they were: these go there first */
+PetscErrorCode FindAt(Equilibrium &E, Vec V)
+{
+  Vec rates;
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(V, &rates));
+  PetscCall(VecZeroEntries(rates));
+  PetscCall(MeetConstraints(E.R, E.t, E.U, rates));
+  PetscCall(VecDestroy(&rates));
+  PetscCall(Find(E));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
@@ -265,7 +278,7 @@ PetscErrorCode StaticEquilibrium(TS ts, PetscReal t)
   PetscCall(VecCopy(U, E.U));
   PetscCall(VecDuplicate(R->axes, &axes));
   PetscCall(VecCopy(R->axes, axes));
-  const PetscErrorCode failed = Guarded([&] { return Find(E); });
+  const PetscErrorCode failed = Guarded([&] { return FindAt(E, V); });
   if (failed) {
     PetscCall(VecCopy(axes, R->axes));
     PetscCall(UseAxes(*R));
@@ -273,6 +286,7 @@ PetscErrorCode StaticEquilibrium(TS ts, PetscReal t)
     PetscCall(VecCopy(E.U, U));
     PetscCall(VecZeroEntries(V));
     PetscCall(TSSetTime(ts, t));
+    R->still = true;
   }
   PetscCall(VecDestroy(&axes));
   PetscCall(failed);

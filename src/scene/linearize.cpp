@@ -148,15 +148,14 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
   PetscCheck(ours, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP, "Linearization::take(): only TS type hhtdae gives accelerations and multipliers");
   PetscCall(TSGetStepNumber(ts, &steps));
-  if (!steps) {
-    PetscCall(TSGetTime(ts, &t));
-    PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, &w.start));
-    ts  = w.start;
-    w.R = RunOf(ts);
-  }
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
-  PetscCall(TSHHT3EvaluateAt(ts, t, w.state[0], w.state[1], w.state[2]));
+  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, w.state[0], w.state[1], w.state[2]));
+  else {
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(StateOfStart(ts, w.state, &w.start));
+    if (w.start) w.R = RunOf(w.start);
+  }
   w.t    = t;
   w.size = SceneSize(w.R->scene);
   if (!(w.size > 0)) w.size = 1;

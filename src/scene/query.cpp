@@ -159,13 +159,13 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   Vec U, V;
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
-  TS start = nullptr;
-  if (!steps) {
+  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, W[0], W[1], W[2]));
+  else {
+    TS copy;
     PetscCall(TSGetTime(ts, &t));
-    PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, &start));
+    PetscCall(StateOfStart(ts, W, &copy));
+    PetscCall(TSDestroy(&copy));
   }
-  PetscCall(TSHHT3EvaluateAt(start ? start : ts, t, W[0], W[1], W[2]));
-  PetscCall(TSDestroy(&start));
   PetscCall(take(*w.R, t, W));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
   PetscFunctionReturn(0);

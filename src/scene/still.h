@@ -37,6 +37,9 @@ struct StillSystem {
   PetscErrorCode reach(Vec x, double *part) const; /* the largest move of a body, as a part of what one step may do; NaN: infinite */
 };
 
+/* analyses.cpp: positions to the nearest that meet constraints and motions at t; V: velocities, for the axes of angles */
+PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V);
+
 } // namespace hhtdae
 
 #endif

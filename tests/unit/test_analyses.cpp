@@ -123,6 +123,31 @@ TEST(Analyses, WhatFailsLeavesTheRunWhereItWas)
   EXPECT_NEAR(m.acceleration(2), -10, 1e-12) << "accelerations of the start";
 }
 
+/* What motions have moved by then is held still: a wagon that speeds up has a pendulum that hangs straight */
+TEST(Analyses, MotionsAreHeldStill)
+{
+  Scene     s(PETSC_COMM_SELF);
+  RigidBody b;
+  const Body   wagon = s.add("wagon", b), arm = s.add("arm", rod({0, 0, 0}, {0.6, -0.8, 0}));
+  const Marker i = s.marker(wagon), j = s.marker(s.ground()), tip = s.markerAt(arm, {0.6, -0.8, 0});
+  const Marker pin = s.markerAt(arm, Vector3::Zero());
+  s.add("rail", Translational{s.marker(wagon, Vector3::Zero(), hhtest::axesAlong(Vector3(1, 0, 0))), s.marker(s.ground(), Vector3::Zero(), hhtest::axesAlong(Vector3(1, 0, 0)))});
+  const Element drive = s.add("drive", TranslationalMotion{i, j, TimeFunction::polynomial({0, 0, 2}), MotionOf::Displacement, 0});
+  s.add("hinge", Revolute{pin, i});
+  s.gravity({0, -10, 0});
+  OwnTS    run(s);
+  Snapshot now;
+  Motion   m;
+  Load     l;
+  must(StaticEquilibrium(run.ts, 1.5));
+  must(now.take(run.ts));
+  must(now.motion(tip, &m));
+  EXPECT_LT((m.position - Vector3(4.5, -1, 0)).norm(), 1e-9);
+  EXPECT_EQ(m.acceleration.norm() + m.velocity.norm(), 0);
+  must(now.load(drive, i, &l));
+  EXPECT_NEAR(l.force(0), 0, 1e-9) << "no force makes anything faster";
+}
+
 /* Linearized about an equilibrium that a call has found: a pendulum held aside by t = 5 under gravity */
 TEST(Analyses, ModesAboutAnEquilibrium)
 {
