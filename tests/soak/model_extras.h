@@ -135,7 +135,7 @@ private:
   {
     const Pair     p = hung(b.axes());
     UserConstraint c;
-    const double   k = r.logarithmic(1e-2, 1e2);
+    const double   k = r.logarithmic(1e-2, 1);
     for (int row = 0; row < (b.planar ? 2 : 3); row++)
       c.rows.push_back({{Measure::displacement(p.i, row, p.j, p.j)}, [k, l = b.length](const Real *m) { return k * sin(m[0] / l); }});
     b.add(c);

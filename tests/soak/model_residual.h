@@ -186,7 +186,7 @@ private:
       moment = std::max(moment, b.moment_allowed);
     }
     for (std::size_t b = 0; b < of_.size(); b++)
-      if (!R_.scene.bodies[b].massless && R_.scene.bodies[b].mass == 0) {
+      if (R_.scene.bodies[b].mass == 0) {
         of_[b].force_allowed  = force;
         of_[b].moment_allowed = moment + force * hhtdae::SceneSize(R_.scene);
       }
