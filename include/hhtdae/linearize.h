@@ -43,12 +43,15 @@ struct BodyPart {
   double   share = 0;
 };
 
-/* A force and a moment in space axes on the body of a marker, at its origin, for an input of 1 */
+/* What an input of 1 is: a force and a moment in space axes on the body of a marker, at its origin; or what is added to the function of a
+   motion, displacement, velocity or acceleration as the motion is of: a shaken base */
 struct Excitation {
   Marker  at;
   Vector3 load = Vector3::Zero(), moment = Vector3::Zero();
+  Element driven = {};
   static Excitation force(Marker m, const Vector3 &f) { return {m, f, Vector3::Zero()}; }
   static Excitation torque(Marker m, const Vector3 &f) { return {m, Vector3::Zero(), f}; }
+  static Excitation motion(Element e) { return {{}, Vector3::Zero(), Vector3::Zero(), e}; }
 };
 
 /* z' = A z + B f, y = C z + D f; z: as many as there are degrees of freedom of positions and of velocities, and first-order states. Rows
@@ -81,7 +84,8 @@ public:
   /* The measure's complex amplitude where the input is cos(w t), for circular frequencies w in rad/s: Re(amplitude exp(i w t)). Sparse, one
      factorization of twice the unknowns for each of them; solver options have the prefix -scene_response_ */
   PetscErrorCode response(const Excitation &in, const Measure &out, const std::vector<double> &circular, std::vector<std::complex<double>> *amplitude) const;
-  /* Minimal coordinates: dense algebra as that of modes() */
+  /* Minimal coordinates: dense algebra as that of modes(). Of motions as inputs it takes those of accelerations: others would enter with
+     their derivatives. */
   PetscErrorCode stateSpace(const std::vector<Excitation> &in, const std::vector<Measure> &out, StateSpace *s) const;
 
   /* M, C, K above in MATAIJ, one row and column for each unknown of the scene; they belong to this object */

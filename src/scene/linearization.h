@@ -31,6 +31,7 @@ struct Linearization::Work {
   PetscErrorCode differentiate();
   PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double *x) const; /* how a measure changes */
   PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
+  PetscErrorCode drive(Element e, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
 };
 

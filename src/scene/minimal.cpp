@@ -173,6 +173,10 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
     PetscCall(w.load(in[f], &own));
     PetscCall(Gather(w, MPI_DOUBLE, own, all));
     for (PetscInt i = 0; i < n; i++) right(i, 2 * nq + ns + f) = all[i];
+    for (PetscInt i : both)
+      PetscCheck(all[i] == 0, w.comm(), PETSC_ERR_SUP,
+                 "Linearization::stateSpace(): input %d is a motion of a displacement or velocity, whose derivatives would be inputs, too: make it one of an acceleration, "
+                 "or ask response()", (int)f);
   }
   for (PetscInt i : m.holonomic) {
     W.row(i).setZero();

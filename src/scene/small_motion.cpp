@@ -81,12 +81,31 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
   PetscFunctionReturn(0);
 }
 
+/* The row of a motion is its function less what it drives; that of an acceleration is of a state, whose rate it is */
+PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) const
+{
+  const SceneData &s = R->scene;
+  PetscFunctionBegin;
+  PetscCheck(s.valid(e) && s.elements[e.id].kind == ElementData::Motion && !s.elements[e.id].parts.empty(), comm(), PETSC_ERR_ARG_WRONG,
+             "Linearization: the element of an excitation is not a motion of this scene");
+  const Part    &p     = s.elements[e.id].parts[0];
+  const bool     state = p.store->inputs() > 0;
+  PetscCheck(state || p.store->unknowns(p.index), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the motion %s was dropped as redundant and drives nothing", s.elements[e.id].name.c_str());
+  const PetscInt row = state ? R->number.state[p.store->input(p.index, 0).id] : p.store->start[p.index];
+  if (row >= R->start && row < R->start + R->n) (*b)[row - R->start] = state ? 1 : -1;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<double> *b) const
 {
   const SceneData &s = R->scene;
   Motion           m, centre;
   PetscFunctionBegin;
   b->assign(R->n, 0);
+  if (in.driven.id >= 0) {
+    PetscCall(drive(in.driven, b));
+    PetscFunctionReturn(0);
+  }
   PetscCheck(s.valid(in.at), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is not one of this scene");
   const PetscInt body = s.markers[in.at.id].body;
   PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");

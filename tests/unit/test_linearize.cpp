@@ -408,3 +408,49 @@ TEST(Linearize, ErrorsThatSayWhatToDo)
   EXPECT_NE(SlowestModes(small, 0, &modes), 0);
   EXPECT_TRUE(trap.says("must be positive")) << trap.message;
 }
+
+/* A table that is shaken along x, with a mass on spring and damper: x/y = (k + i w c)/(k - m w^2 + i w c), by motions of displacement, velocity and
+   acceleration; the force of the drive is what the masses need */
+TEST(Linearize, AShakenBase)
+{
+  const double               m = 2, k = 300, c = 5, table_mass = 3;
+  const std::vector<double>  at = {0.5, 5, 12, 13, 40};
+  for (MotionOf of : {MotionOf::Displacement, MotionOf::Velocity, MotionOf::Acceleration}) {
+    Scene        s(PETSC_COMM_SELF);
+    const Body   table = s.add("table", body(table_mass, {1, 1, 1})), mass = s.add("mass", body(m, {1, 1, 1}, {1, 0, 0}));
+    const Matrix3 along = Eigen::AngleAxisd(M_PI / 2, Vector3::UnitY()).toRotationMatrix();
+    const Marker i = s.marker(table, Vector3::Zero(), along), j = s.marker(s.ground(), Vector3::Zero(), along), top = s.marker(mass, Vector3::Zero(), along);
+    s.add("rail", Translational{i, j});
+    s.add("slide", Translational{top, s.markerAt(table, {1, 0, 0}, along)});
+    const Element drive = s.add("drive", TranslationalMotion{i, j, 0., of});
+    s.add("spring", SpringDamper{top, i, k, c});
+    TS ts;
+    must(s.createTS(&ts));
+    Linearization                     small;
+    std::vector<std::complex<double>> x, f;
+    must(small.take(ts));
+    must(small.response(Excitation::motion(drive), Measure::displacement(top, 0), at, &x));
+    must(small.response(Excitation::motion(drive), Measure::elementForce(drive, i, 0), at, &f));
+    for (std::size_t l = 0; l < at.size(); l++) {
+      const std::complex<double> s1(0, at[l]), stiff = k + s1 * c, y = of == MotionOf::Displacement ? 1 : of == MotionOf::Velocity ? 1. / s1 : 1. / (s1 * s1);
+      const std::complex<double> exact = y * stiff / (stiff + m * s1 * s1), force = s1 * s1 * (m * exact + table_mass * y);
+      EXPECT_LT(std::abs(x[l] - exact), 1e-8 * std::abs(exact)) << (int)of << " at " << at[l];
+      EXPECT_LT(std::abs(f[l] - force), 1e-8 * std::abs(force)) << (int)of << " at " << at[l];
+    }
+    StateSpace z;
+    if (of == MotionOf::Acceleration) {
+      must(small.stateSpace({Excitation::motion(drive)}, {Measure::displacement(top, 0)}, &z));
+      ASSERT_EQ(z.states, 4); /* positions of both, speeds of the mass and, as a state, of the table */
+      using Dense = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      const Dense A = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(z.A.data(), 4, 4).cast<std::complex<double>>();
+      const Dense B = Eigen::Map<Eigen::MatrixXd>(z.B.data(), 4, 1).cast<std::complex<double>>(), C = Eigen::Map<Eigen::MatrixXd>(z.C.data(), 1, 4).cast<std::complex<double>>();
+      const Dense y = C * (std::complex<double>(0, 12) * Dense::Identity(4, 4) - A).inverse() * B;
+      EXPECT_LT(std::abs(y(0, 0) + z.D[0] - x[2]), 1e-8 * std::abs(x[2]));
+    } else {
+      ErrorTrap trap;
+      EXPECT_NE(small.stateSpace({Excitation::motion(drive)}, {Measure::displacement(top, 0)}, &z), 0);
+      EXPECT_TRUE(trap.says("is a motion of a displacement or velocity")) << trap.message;
+    }
+    must(TSDestroy(&ts));
+  }
+}
