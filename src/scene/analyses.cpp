@@ -118,7 +118,7 @@ PetscErrorCode Complete(TS ts, Runtime &R)
   PetscCall(TSHHT3EvaluateAt(copy, t, U, V, A));
   PetscCall(VecCopy(RunOf(copy)->axes, R.axes));
   PetscCall(UseAxes(R));
-  R.still = false;
+  PetscCall(KeepStart(ts, A));
   PetscCall(VecDestroy(&A));
   PetscCall(TSDestroy(&copy));
   PetscFunctionReturn(0);

@@ -58,7 +58,6 @@ PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
   PetscCall(VecCopy(V, Y));
   PetscCall(VecCopy(from.axes, to.axes));
   PetscCall(UseAxes(to));
-  to.still = from.still;
   PetscFunctionReturn(0);
 }
 
@@ -93,20 +92,39 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode KeepStart(TS ts, Vec A)
+{
+  Runtime &R = *RunOf(ts);
+  Vec      now[3];
+  PetscFunctionBegin;
+  PetscCall(TS2GetSolution(ts, &now[0], &now[1]));
+  now[2] = A;
+  for (int k = 0; k < 3; k++) {
+    if (!R.start_state[k]) PetscCall(VecDuplicate(A, &R.start_state[k]));
+    PetscCall(VecCopy(now[k], R.start_state[k]));
+  }
+  PetscCall(TSGetTime(ts, &R.start_time));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy)
 {
+  Runtime  &R = *RunOf(ts);
+  PetscBool same[2] = {PETSC_FALSE, PETSC_FALSE};
   PetscReal t;
   Vec       U, V;
   PetscFunctionBegin;
   *copy = nullptr;
-  if (RunOf(ts)->still) {
-    PetscCall(TS2GetSolution(ts, &U, &V));
-    PetscCall(VecCopy(U, state[0]));
-    PetscCall(VecCopy(V, state[1]));
-    PetscCall(VecZeroEntries(state[2]));
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  if (R.start_state[2] && t == R.start_time) {
+    PetscCall(VecEqual(U, R.start_state[0], &same[0]));
+    PetscCall(VecEqual(V, R.start_state[1], &same[1]));
+  }
+  if (same[0] && same[1]) {
+    for (int k = 0; k < 3; k++) PetscCall(VecCopy(R.start_state[k], state[k]));
     PetscFunctionReturn(0);
   }
-  PetscCall(TSGetTime(ts, &t));
   PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, copy));
   PetscCall(TSHHT3EvaluateAt(*copy, t, state[0], state[1], state[2]));
   PetscFunctionReturn(0);

@@ -286,7 +286,7 @@ PetscErrorCode StaticEquilibrium(TS ts, PetscReal t)
     PetscCall(VecCopy(E.U, U));
     PetscCall(VecZeroEntries(V));
     PetscCall(TSSetTime(ts, t));
-    R->still = true;
+    PetscCall(KeepStart(ts, E.zero));
   }
   PetscCall(VecDestroy(&axes));
   PetscCall(failed);

@@ -165,6 +165,7 @@ Runtime::~Runtime()
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
   PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&axes));
   PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&rtol));
+  for (Vec &x : start_state) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&sf));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&axes_sf));
   if (unit != MPI_DATATYPE_NULL) MPI_Type_free(&unit);

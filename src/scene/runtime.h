@@ -47,7 +47,9 @@ struct Runtime {
   Vec       rtol    = nullptr; /* relative tolerances, none for angles */
   PetscReal rtol_of = -1;
   PetscSF axes_sf = nullptr; /* axes of others' bodies */
-  bool                still = false; /* not begun, in static equilibrium: multipliers are those, accelerations zero */
+  /* Not begun, but analyses have found accelerations, and multipliers, for this state: u, u', u'' at a time */
+  Vec       start_state[3] = {};
+  PetscReal start_time     = 0;
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
   std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
   std::vector<PetscInt> next_body;
@@ -121,6 +123,7 @@ PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
    multipliers of the start; the caller destroys it */
 PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R);
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy);
+PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, which has its multipliers */
 /* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has
    found them, null if none was needed */
 PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy);

@@ -148,6 +148,31 @@ TEST(Analyses, MotionsAreHeldStill)
   EXPECT_NEAR(l.force(0), 0, 1e-9) << "no force makes anything faster";
 }
 
+/* Answers are those of the state that there is: after it was changed by hand, those of the changed one */
+TEST(Analyses, AStateThatWasChangedByHand)
+{
+  Lever    l;
+  OwnTS    run(l.scene);
+  Snapshot now;
+  Motion   m;
+  Vec      U, V;
+  must(StaticEquilibrium(run.ts, 5));
+  must(TS2GetSolution(run.ts, &U, &V));
+  must(now.take(run.ts));
+  must(now.motion(l.tip, &m));
+  EXPECT_LT(m.acceleration.norm(), 1e-8);
+  must(TSSetTime(run.ts, 6)); /* a larger push */
+  must(now.take(run.ts));
+  must(now.motion(l.tip, &m));
+  const double larger = m.acceleration.norm();
+  EXPECT_NEAR(larger, std::sqrt(0.5) / (1. / 3), 1e-6) << "its moment over the inertia";
+  must(TSSetTime(run.ts, 5));
+  must(VecScale(U, 0.5)); /* another angle, and multipliers that are nobody's */
+  must(now.take(run.ts));
+  must(now.motion(l.tip, &m));
+  EXPECT_GT(m.acceleration.norm(), 0.1);
+}
+
 /* Linearized about an equilibrium that a call has found: a pendulum held aside by t = 5 under gravity */
 TEST(Analyses, ModesAboutAnEquilibrium)
 {
