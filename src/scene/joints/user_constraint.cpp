@@ -1,6 +1,7 @@
 /* Constraints that a user gives as expressions. */
 #include "scene/kernels/user_constraint.h"
 #include "scene/measures.h"
+#include "scene/motions/moving_pair.h"
 #include <algorithm>
 #include <cmath>
 
@@ -136,13 +137,6 @@ private:
     require(std::isfinite(value), " is " + Text(value) + " at the start, must be finite");
     require(std::isfinite(sum), " has no finite derivatives at the start; the distance of markers that coincide has none");
   }
-  static std::string Text(double x)
-  {
-    char s[32];
-    snprintf(s, sizeof s, "%g", x);
-    return s;
-  }
-
   template <int M> void put()
   {
     std::vector<Marker> padded = markers_;
