@@ -1,5 +1,6 @@
 /* The scene as its user describes it. */
 #include "extension.h"
+#include "guard.h"
 #include "journal.h"
 #include "start.h"
 #include <cmath>
@@ -188,32 +189,37 @@ Element ElementBuilder::done()
 
 /* ---- from description to work ---- */
 
+/* Constraints of the user's own are evaluated here, and may throw */
 PetscErrorCode Scene::setUp()
 {
   PetscFunctionBegin;
-  describeAnew();
-  Model     &M = *model_;
-  SceneData &s = M.scene;
-  if (M.compiled) PetscFunctionReturn(0);
-  s.start = start_;
-  PetscCall(TSHHT3Initialize());
-  PetscCall(DeclareSceneOptions());
-  PetscCall(ReadStartOptions(s));
-  PetscCall(CheckDescription(s));
-  PetscCallMPI(MPI_Comm_rank(s.comm, &M.rank));
-  PetscCallMPI(MPI_Comm_size(s.comm, &M.size));
-  if (M.continues) s.start.time = M.begin;
-  else PetscCall(Partition(s, M.size, M.number.owner));
-  FillLight(s);
-  PetscCall(Assemble(M));
-  PetscCall(DropRedundant(M));
-  PetscCall(CheckInertia(s));
-  PetscCall(Number(M));
-  PetscCall(WantTriangle(M));
-  if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
-  if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
-  s.start_given = start_;
-  s.fixed = M.compiled = true; /* not before everything is done: after an error setUp() starts anew */
+  PetscCall(Guarded([&]() -> PetscErrorCode {
+    PetscFunctionBegin;
+    describeAnew();
+    Model     &M = *model_;
+    SceneData &s = M.scene;
+    if (M.compiled) PetscFunctionReturn(0);
+    s.start = start_;
+    PetscCall(TSHHT3Initialize());
+    PetscCall(DeclareSceneOptions());
+    PetscCall(ReadStartOptions(s));
+    PetscCall(CheckDescription(s));
+    PetscCallMPI(MPI_Comm_rank(s.comm, &M.rank));
+    PetscCallMPI(MPI_Comm_size(s.comm, &M.size));
+    if (M.continues) s.start.time = M.begin;
+    else PetscCall(Partition(s, M.size, M.number.owner));
+    FillLight(s);
+    PetscCall(Assemble(M));
+    PetscCall(DropRedundant(M));
+    PetscCall(CheckInertia(s));
+    PetscCall(Number(M));
+    PetscCall(WantTriangle(M));
+    if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
+    if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
+    s.start_given = start_;
+    s.fixed = M.compiled = true; /* not before everything is done: after an error setUp() starts anew */
+    PetscFunctionReturn(0);
+  }));
   PetscFunctionReturn(0);
 }
 

@@ -118,7 +118,7 @@ PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
 PetscErrorCode Scene::createTS(TS *ts)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] { return setUp(); }));
+  PetscCall(setUp());
   PetscCall(CheckUnchanged(data(), start_));
   PetscCall(CreateRun(model_, ts));
   PetscFunctionReturn(0);

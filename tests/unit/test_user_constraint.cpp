@@ -270,6 +270,28 @@ TEST(UserConstraint, JacobianOfAScene)
   EXPECT_LT(any.jacobianError(20, 400), 1e-5);
 }
 
+/* What throws after the first look, in assembly or in a step, is an error with the name of the row */
+TEST(UserConstraint, WhatThrowsLater)
+{
+  for (int good : {3, 40}) {
+    Bead b;
+    int  calls = 0;
+    b.scene.add("moody", UserConstraint{{Expression{{Measure::velocity(b.at, 0)}, [&calls, good](const Real *m) -> Real {
+                                                      if (++calls > good) throw std::runtime_error("no more");
+                                                      return m[0];
+                                                    }}}});
+    ErrorTrap error;
+    TS        ts = nullptr;
+    PetscErrorCode failed = b.scene.setUp();
+    if (!failed) failed = b.scene.createTS(&ts);
+    if (!failed) failed = TSSetMaxTime(ts, 10);
+    if (!failed) failed = b.scene.solve(ts);
+    EXPECT_NE(failed, 0) << good;
+    EXPECT_TRUE(error.says("user constraint moody, row 1: no more")) << error.message;
+    TSDestroy(&ts);
+  }
+}
+
 TEST(UserConstraint, Refuses)
 {
   Bead       b;
