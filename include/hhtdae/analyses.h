@@ -9,7 +9,8 @@
       ...
 
   With other parameters, or from where a run has got to, the next one is made first: scene.createTS(&next, ts). All calls are collective.
-  After an error the run is where it was.
+  After an error the run is where it was. Options of the linear solvers have the prefixes -scene_assembly_ and, for the way downhill,
+  -scene_equilibrium_.
 */
 #ifndef HHTDAE_ANALYSES_H
 #define HHTDAE_ANALYSES_H
@@ -20,7 +21,7 @@ namespace hhtdae
 {
 
 /* To static equilibrium at time t, at rest: the one downhill from where the run is, or nearest to it. Motions hold where they are at t;
-   rates of first-order states are zero. Options of its linear solver have the prefix -scene_equilibrium_. */
+   rates of first-order states are zero. Motions of velocities and accelerations that are not zero then have none. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 
 /* To the nearest positions, and velocities, that meet all constraints and motions at time t, in the metric of the masses. fixed_start

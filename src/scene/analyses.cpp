@@ -1,5 +1,5 @@
 /*
-  Positions that meet the constraints and motions of a time, by Newton's method on the scene's own matrix with rates of zero,
+  Analyses that move a run which has not begun. Positions that meet the constraints and motions of a time, by Newton's method on the scene's own matrix with rates of zero,
 
     (F_u + s F_u'') d = (0, Phi),   s large: the smallest d in the metric of the masses,
 
@@ -76,13 +76,15 @@ PetscErrorCode Advance(Assembling &E, double factor)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Positions(Assembling &E, Vec rates)
+/* From U, V to the nearest positions that meet the constraints at t; velocities go along with the axes of angles */
+PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
 {
-  double part = INFINITY;
+  Assembling E(R, t);
+  double     part = INFINITY;
   PetscFunctionBegin;
-  PetscCall(E.create("scene_assembly_"));
+  PetscCall(E.create(U, "scene_assembly_"));
   PetscCall(RolesOf(E.R, E.role));
-  PetscCall(VecCopy(rates, E.V));
+  PetscCall(VecCopy(V, E.V));
   PetscCall(E.look(E.U));
   for (int it = 0; it < most_iterations && E.misfit > 0; it++) {
     const double before = E.misfit;
@@ -101,6 +103,8 @@ PetscErrorCode Positions(Assembling &E, Vec rates)
   PetscCheck(E.misfit <= E.R.scene.start.tolerance * E.size, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
              "the scene cannot be assembled at t = %g: constraints or motions are violated by %g.\nTake smaller steps in time, or start nearer to where they are met", E.t,
              E.misfit);
+  PetscCall(VecCopy(E.U, U));
+  PetscCall(VecCopy(E.V, V));
   PetscFunctionReturn(0);
 }
 
@@ -124,38 +128,36 @@ PetscErrorCode Complete(TS ts, Runtime &R)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R)
+PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
-  Vec U, V;
   PetscFunctionBegin;
-  PetscCall(TS2GetSolution(ts, &U, &V));
   PetscCall(MeetConstraints(R, t, U, V));
   PetscCall(TSSetTime(ts, t));
   PetscCall(Complete(ts, R));
   PetscFunctionReturn(0);
 }
 
-} // namespace
-
-PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
+/* Motions may have taken bodies far from where they were: these go there first */
+PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
+  PetscInt iterations;
   PetscFunctionBegin;
-  Assembling E(R, t);
-  PetscCall(VecDuplicate(U, &E.U));
-  PetscCall(VecCopy(U, E.U));
-  PetscCall(Positions(E, V));
-  PetscCall(VecCopy(E.U, U));
-  PetscCall(VecCopy(E.V, V));
+  PetscCall(VecZeroEntries(V));
+  PetscCall(MeetConstraints(R, t, U, V));
+  PetscCall(RelaxAt(R, t, U, &iterations));
+  PetscCall(TSSetTime(ts, t));
+  PetscCall(KeepStart(ts, V)); /* accelerations are zero as velocities are */
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode AssembleAt(TS ts, PetscReal t)
+/* Calls move(run, U, V), which takes ts to another state; after an error the run is where it was */
+template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move &move)
 {
   Runtime  *R;
   PetscReal before;
   Vec       now[3], kept[3];
   PetscFunctionBegin;
-  PetscCall(NotBegun(ts, "AssembleAt()", &R));
+  PetscCall(NotBegun(ts, call, &R));
   PetscCall(TSGetTime(ts, &before));
   PetscCall(TS2GetSolution(ts, &now[0], &now[1]));
   now[2] = R->axes;
@@ -163,7 +165,7 @@ PetscErrorCode AssembleAt(TS ts, PetscReal t)
     PetscCall(VecDuplicate(now[k], &kept[k]));
     PetscCall(VecCopy(now[k], kept[k]));
   }
-  const PetscErrorCode failed = Guarded([&] { return Assembled(ts, t, *R); });
+  const PetscErrorCode failed = Guarded([&] { return move(*R, now[0], now[1]); });
   if (failed) {
     for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));
     PetscCall(UseAxes(*R));
@@ -171,6 +173,22 @@ PetscErrorCode AssembleAt(TS ts, PetscReal t)
   }
   for (Vec &x : kept) PetscCall(VecDestroy(&x));
   PetscCall(failed);
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode StaticEquilibrium(TS ts, PetscReal t)
+{
+  PetscFunctionBegin;
+  PetscCall(MoveRun(ts, "StaticEquilibrium()", [&](Runtime &R, Vec U, Vec V) { return AtRest(ts, t, R, U, V); }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode AssembleAt(TS ts, PetscReal t)
+{
+  PetscFunctionBegin;
+  PetscCall(MoveRun(ts, "AssembleAt()", [&](Runtime &R, Vec U, Vec V) { return Assembled(ts, t, R, U, V); }));
   PetscFunctionReturn(0);
 }
 

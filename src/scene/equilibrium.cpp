@@ -10,9 +10,7 @@
   equilibrium, large ones are Newton's method; h grows as the unbalanced forces fall and shrinks where a step would go
   too far or has gone uphill.
 */
-#include "hhtdae/analyses.h"
 #include "extension.h"
-#include "guard.h"
 #include "start.h"
 #include "still.h"
 #include <algorithm>
@@ -211,85 +209,47 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
   PetscFunctionReturn(0);
 }
 
-/* From E.U there; the state that is left after an error is of no use */
-PetscErrorCode Find(Equilibrium &E)
+} // namespace
+
+/* U: where it begins and ends; of no use after an error */
+PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
 {
-  Unbalanced at;
-  bool       found = false;
+  Equilibrium E(R, t);
+  Unbalanced  at;
+  bool        found = false;
   PetscFunctionBegin;
-  PetscCall(E.create("scene_equilibrium_"));
-  PetscCall(VecDuplicate(E.U, &E.start));
+  PetscCall(E.create(U, "scene_equilibrium_"));
+  PetscCall(VecDuplicate(U, &E.start));
   PetscCall(Relax(E, &found, at));
-  PetscCheck(found, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
+  PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
              "constraints are violated by %g.\n"
              "Start nearer to it, or hold what is free to move for ever",
-             (int)E.iterations, at.force, E.R.scene.bodyName(at.body).c_str(), at.misfit);
+             (int)E.iterations, at.force, R.scene.bodyName(at.body).c_str(), at.misfit);
+  PetscCall(VecCopy(E.U, U));
+  *iterations = E.iterations;
   PetscFunctionReturn(0);
 }
-
-/* Motions may have taken bodies far from where they were: these go there first */
-PetscErrorCode FindAt(Equilibrium &E, Vec V)
-{
-  Vec rates;
-  PetscFunctionBegin;
-  PetscCall(VecDuplicate(V, &rates));
-  PetscCall(VecZeroEntries(rates));
-  PetscCall(MeetConstraints(E.R, E.t, E.U, rates));
-  PetscCall(VecDestroy(&rates));
-  PetscCall(Find(E));
-  PetscFunctionReturn(0);
-}
-
-} // namespace
 
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
 {
   SceneData              &s      = M->scene;
   const std::vector<Pose> before = Poses(s);
   Runtime                 R(M);
-  Equilibrium             E(R, s.start.time);
-  Vec                     V;
+  Vec                     U, V;
   PetscFunctionBegin;
   PetscCall(Layout(R));
   PetscCall(StoreTriangle(R));
-  PetscCall(VecCreate(s.comm, &E.U));
-  PetscCall(VecSetSizes(E.U, R.n, PETSC_DETERMINE));
-  PetscCall(VecSetType(E.U, VECSTANDARD));
-  PetscCall(VecDuplicate(E.U, &V));
-  PetscCall(InitialState(R, E.U, V));
-  PetscCall(VecDestroy(&V));
-  PetscCall(Find(E));
-  s.started.equilibrium_iterations = E.iterations;
-  PetscCall(WriteState(*M, R, E.U, nullptr));
+  PetscCall(VecCreate(s.comm, &U));
+  PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
+  PetscCall(VecSetType(U, VECSTANDARD));
+  PetscCall(VecDuplicate(U, &V));
+  PetscCall(InitialState(R, U, V));
+  PetscCall(RelaxAt(R, s.start.time, U, &s.started.equilibrium_iterations));
+  PetscCall(WriteState(*M, R, U, nullptr));
   PetscCall(ReportMoves(s, before, "equilibrium"));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode StaticEquilibrium(TS ts, PetscReal t)
-{
-  Runtime *R;
-  Vec      U, V, axes;
-  PetscFunctionBegin;
-  PetscCall(NotBegun(ts, "StaticEquilibrium()", &R));
-  Equilibrium E(*R, t);
-  PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(VecDuplicate(U, &E.U));
-  PetscCall(VecCopy(U, E.U));
-  PetscCall(VecDuplicate(R->axes, &axes));
-  PetscCall(VecCopy(R->axes, axes));
-  const PetscErrorCode failed = Guarded([&] { return FindAt(E, V); });
-  if (failed) {
-    PetscCall(VecCopy(axes, R->axes));
-    PetscCall(UseAxes(*R));
-  } else {
-    PetscCall(VecCopy(E.U, U));
-    PetscCall(VecZeroEntries(V));
-    PetscCall(TSSetTime(ts, t));
-    PetscCall(KeepStart(ts, E.zero));
-  }
-  PetscCall(VecDestroy(&axes));
-  PetscCall(failed);
+  PetscCall(VecDestroy(&V));
+  PetscCall(VecDestroy(&U));
   PetscFunctionReturn(0);
 }
 

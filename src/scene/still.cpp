@@ -31,11 +31,12 @@ PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
   PetscFunctionReturn(0);
 }
 
-/* The rest, for U */
-PetscErrorCode StillSystem::create(const char *prefix)
+PetscErrorCode StillSystem::create(Vec begin, const char *prefix)
 {
   PC pc;
   PetscFunctionBegin;
+  PetscCall(VecDuplicate(begin, &U));
+  PetscCall(VecCopy(begin, U));
   for (Vec *x : {&V, &A, &zero, &F, &d, &next}) PetscCall(VecDuplicate(U, x));
   PetscCall(VecSet(zero, 0));
   PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));

@@ -30,15 +30,15 @@ struct StillSystem {
   StillSystem(Runtime &r, double time);
   ~StillSystem();
   StillSystem(const StillSystem &) = delete;
-  PetscErrorCode create(const char *prefix);
+  PetscErrorCode create(Vec begin, const char *prefix); /* U is a copy of it */
   PetscErrorCode residual(Vec u) { return Residual(R, t, u, zero, zero, F); } /* at rest, into F */
   /* Only bodies' coordinates are compared with forces, only holonomic rows with lengths; what is left are definitions and states */
   PetscErrorCode measure(Vec f, Unbalanced &out) const;
   PetscErrorCode reach(Vec x, double *part) const; /* the largest move of a body, as a part of what one step may do; NaN: infinite */
 };
 
-/* analyses.cpp: positions to the nearest that meet constraints and motions at t; V: velocities, for the axes of angles */
-PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V);
+/* equilibrium.cpp: downhill from U to static equilibrium at t */
+PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations);
 
 } // namespace hhtdae
 

@@ -51,7 +51,7 @@ Real positions(const Real *m) { return sin(m[0]) * m[1] + m[2] * m[2] * m[3] + e
 
 UserRowData ofPositions(Random &random, Frame<double> *f)
 {
-  UserRowData d = row({reads(Measure::Angle, 0, 1, -1, 0, 0), reads(Measure::Displacement, 2, 3, 1, 1), reads(Measure::Distance, 0, 2), reads(Measure::Displacement, 1, -1, -1, 2),
+  UserRowData d = row({reads(Measure::Angle, 0, 1, -1, 0, 0), reads(Measure::Displacement, 2, 3, 2, 1), reads(Measure::Distance, 0, 2), reads(Measure::Displacement, 1, -1, -1, 2),
                        reads(Measure::Time, -1, -1)},
                       positions);
   angle(random, f, d);
@@ -62,7 +62,7 @@ Real velocities(const Real *m) { return m[0] * m[1] + sin(m[2]) * m[3] - m[4] * 
 
 UserRowData ofVelocities(Random &random, Frame<double> *f)
 {
-  UserRowData d = row({reads(Measure::Distance, 0, 3), reads(Measure::Velocity, 0, 1, 2, 1), reads(Measure::Angle, 0, 1, -1, 0, 0), reads(Measure::Rate, 2, 3),
+  UserRowData d = row({reads(Measure::Distance, 0, 3), reads(Measure::Velocity, 0, 1, 0, 1), reads(Measure::Angle, 0, 1, -1, 0, 0), reads(Measure::Rate, 2, 3),
                        reads(Measure::AngularVelocity, 1, -1, 3, 2), reads(Measure::Value, -1, -1, -1, 0, 0), reads(Measure::Velocity, 3, -1, -1, 0), reads(Measure::Time, -1, -1)},
                       velocities);
   angle(random, f, d);
