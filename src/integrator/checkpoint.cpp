@@ -211,7 +211,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.D[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
-  for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise}) PetscCall(TransferIfThere(ts, a, x));
+  for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -20,10 +20,6 @@
 namespace hht3
 {
 
-/* All motions are given: corrections of the positions, by which the iteration is judged, are rounding after the first one and say nothing of the
-   multipliers, the forces that the motions take. With a matrix of this step two corrections have them. */
-static bool NoMotionIsFree(const Integrator &I) { return I.constraints() > 0 && I.constraints() >= I.count[TSHHT3_COORDINATE]; }
-
 /* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
 PetscErrorCode Correct(TS ts, PetscBool *converged)
 {
@@ -31,7 +27,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   Corrector  &c = I.corrector;
 
   PetscFunctionBegin;
-  c.matrix.want = (PetscBool)(c.matrix.due(I.h, c) || NoMotionIsFree(I));
+  c.matrix.want = (PetscBool)c.matrix.due(I.h, c);
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)I.h, (double)c.matrix.h, (double)c.matrix.rate));
   PetscCall(Iterate(ts, converged));
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;

@@ -43,8 +43,12 @@ struct CorrectorState {
   PetscInt            met    = 0; /* times that corrections have turned back and met */
   PetscReal           e      = 0; /* last correction, in units of the tolerance */
   PetscReal           xi_max = 0; /* worst rate of this correction */
+  PetscReal           forces = 0; /* residual in the rows of driven coordinates, in units of the tolerance */
   SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
+
+/* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
+constexpr PetscReal of_rounding = 16;
 
 struct Corrector : CorrectorOptions, CorrectorState {
   PetscInt limit() const { return max_it + 2 * met; } /* of iterations; -snes_max_it ends them before */
@@ -60,6 +64,7 @@ struct VerificationState {
 /* Whether small corrections prove anything, verify.cpp */
 struct Verification : VerificationState {
   Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
+  Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
 };
 
 struct PredictorOptions {
@@ -315,6 +320,10 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 /* verify.cpp */
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
+/* driven.cpp */
+PetscErrorCode NoteDriven(TS ts);
+PetscErrorCode NoteForces(TS ts, Vec F);
+PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good);
 /* blame.cpp */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 /* estimate.cpp */

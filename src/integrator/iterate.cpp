@@ -203,6 +203,7 @@ static void BeginIteration(Integrator &I)
   Corrector &c = I.corrector;
   c.it = c.base = c.renewals = c.met = 0;
   c.e = c.xi_max = 0;
+  c.forces = 0;
   c.reason = SNES_CONVERGED_ITERATING;
   c.matrix.fresh  = PETSC_FALSE;
   c.wrong_jacobian = PETSC_FALSE;

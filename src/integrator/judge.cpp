@@ -36,9 +36,6 @@ constexpr PetscReal slow = 0.8;
 /* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
 constexpr PetscReal stagnant = 0.5;
 
-/* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
-constexpr PetscReal of_rounding = 16;
-
 /* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
 constexpr PetscInt max_renewals = 3;
 
@@ -236,6 +233,24 @@ PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces of driven coordinates are not among what has been judged so far; with an old matrix they may not converge */
+PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
+{
+  Integrator     &I      = Get(ts);
+  Corrector      &c      = I.corrector;
+  const PetscReal before = c.forces;
+  PetscBool       good;
+
+  PetscFunctionBegin;
+  PetscCall(ForcesOfDriven(ts, Tolerance(I), X, F, evaluated, &good));
+  if (good) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: forces of driven coordinates, %g of the tolerance after iteration %" PetscInt_FMT "\n", (double)c.forces, c.it));
+  c.reason = SNES_CONVERGED_ITERATING;
+  if (c.it >= c.limit()) PetscCall(Diverge(ts, "does not balance the forces of driven coordinates"));
+  else if (c.it - c.base >= 2 && c.forces >= c.slow_rate * before && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 /* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
@@ -248,12 +263,14 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
+  if (!*evaluated) PetscCall(NoteForces(ts, F));
   if (I.corrector.user_test) PetscCall(Measure(ts, e));
   else PetscCall(Judge(ts, e, X));
   if (I.corrector.reason > 0) {
     PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
     if (!proved) PetscCall(GoOnUnproved(ts));
     else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
+    if (I.corrector.reason > 0 && !I.corrector.rounding) PetscCall(AskForces(ts, X, F, evaluated));
   } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
     PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
     if (!I.corrector.reason) PetscFunctionReturn(PETSC_SUCCESS);

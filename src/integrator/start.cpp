@@ -286,6 +286,7 @@ PetscErrorCode Consistent(TS ts, PetscBool matrix_is_current, Vec rate)
     if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
+  PetscCall(NoteDriven(ts));
   PetscCall(Distribute(I));
   PetscCall(VecCopy(I.X, I.X0));
   PetscCall(VecCopy(I.X, I.predictor.D[0]));

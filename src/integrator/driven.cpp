@@ -1,0 +1,130 @@
+/*
+  Coordinates that the constraints alone move: parts whose motion is given.
+
+  The corrector is judged by corrections of the positions. Those of driven coordinates are over with the first one and say nothing of the
+  forces that drive them, which an old matrix gets wrong by what its directions have turned since. So where there are any, what the residual
+  has left in their rows is judged as if they were free: by the change of position that it would make in this step.
+
+  To see that takes a residual more, unless the one before the last correction was as good: so it is in the vehicle of the examples, which stands
+  on five posts whose directions do not turn, in 2,831 of 2,834 steps.
+*/
+#include "random.h"
+#include "verify.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal held         = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
+constexpr PetscReal least_forces = 1e-4; /* of the corrector's tolerance, where fixed steps make it smaller: forces have rounding, StiffStart.StrongDampingStopsAtOnce */
+
+/* The residual in the rows of driven coordinates, in units of the tolerance, above what is known of its rounding */
+PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
+{
+  PetscReal sum[4];
+
+  PetscFunctionBegin;
+  PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal driven, PetscReal f) { local[0] += PetscSqr(driven * PetscMax(0, PetscAbsReal(f) * s.answer - of_rounding * s.rounding)); },
+                    Read(Get(ts).verify.driven), Read(F)));
+  *left = PetscSqrtReal(sum[0] / Get(ts).norm_size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1 for coordinates that do not answer a force of random signs in all rows of motion, by the factored matrix at hand, 0 for the other unknowns */
+PetscErrorCode Unmoved(TS ts, Vec unmoved)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscInt      first;
+  PetscBool     solved;
+  Vec           force;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(unmoved, &force));
+  PetscCall(VecGetOwnershipRange(force, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &f) { f = IsCoordinate(I, i) ? RandomSign(first + i, 2) * m : 0; }, Read(v.inertia), Write(force)));
+  PetscCall(AnswerOf(ts, force, unmoved, &solved));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &a) { a = solved && IsCoordinate(I, i) && PetscRealPart(m) > 0 && PetscAbsScalar(a) < held; }, Read(v.inertia), Write(unmoved)));
+  PetscCall(VecDestroy(&force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where none is driven there is no vector */
+PetscErrorCode CountDriven(TS ts, PetscReal *all)
+{
+  PetscScalar sum;
+
+  PetscFunctionBegin;
+  PetscCall(VecSum(Get(ts).verify.driven, &sum));
+  *all = PetscRealPart(sum);
+  if (*all < 0.5) PetscCall(VecDestroy(&Get(ts).verify.driven));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Which coordinates may be driven, by the factored matrix of the start */
+PetscErrorCode NoteDriven(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscReal   all;
+
+  PetscFunctionBegin;
+  PetscCall(VecDestroy(&I.verify.driven));
+  if (!I.constraints() || !I.verify.inertia) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(I.X, &I.verify.driven));
+  PetscCall(Unmoved(ts, I.verify.driven));
+  PetscCall(CountDriven(ts, &all));
+  if (all > 0) PetscCall(PetscInfo(ts, "start: %g coordinates may be driven, their forces are judged by the residual\n", (double)all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* F: the residual that the correction to be judged answers. A new matrix tells which coordinates are free after all: a pendulum that hung
+   straight down at the start, Driven.FreeAfterAll. */
+PetscErrorCode NoteForces(TS ts, Vec F)
+{
+  Integrator      &I = Get(ts);
+  const Corrector &c = I.corrector;
+  PetscReal        all;
+  Vec              unmoved;
+
+  PetscFunctionBegin;
+  if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c.matrix.fresh && c.it - c.base == 1) {
+    PetscCall(VecDuplicate(F, &unmoved));
+    PetscCall(Unmoved(ts, unmoved));
+    PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
+    PetscCall(VecDestroy(&unmoved));
+    PetscCall(CountDriven(ts, &all));
+    if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(InDriven(ts, F, &I.corrector.forces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a correction that would be the last: whether forces of driven coordinates are as good as accelerations of free ones, at `tolerance`.
+   F holds the residual at X if `evaluated`, which it then is. */
+PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good)
+{
+  Integrator     &I      = Get(ts);
+  Corrector      &c      = I.corrector;
+  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_forces * CorrectorTolerance(I));
+
+  PetscFunctionBegin;
+  *good = (PetscBool)(!I.verify.driven || before <= tol);
+  if (*good) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
+  *evaluated = PETSC_TRUE;
+  PetscCall(InDriven(ts, F, &c.forces));
+  *good = (PetscBool)(c.forces <= tol);
+  if (*good || c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c.forces < followed * before) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MeasureRounding(ts, X, F, I.verify.noise)); /* FullBodyDynamics.CantileverSwingsAtItsFrequency */
+  PetscCall(InDriven(ts, F, &c.forces));
+  *good = (PetscBool)(c.forces <= tol);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
