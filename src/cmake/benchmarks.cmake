@@ -16,6 +16,7 @@ else()
   set(ida_found TRUE)
 endif()
 
+# The target "bench" compiles them; of all the others only the random models are part of the tests.
 add_custom_target(bench)
 file(GLOB bench_sources CONFIGURE_DEPENDS tests/bench/*.cpp tests/soak/*.cpp)
 foreach(source IN LISTS bench_sources)
@@ -31,7 +32,13 @@ foreach(source IN LISTS bench_sources)
   else()
     hhtdae_program(${name} ${source})
   endif()
+  if(NOT TARGET ${name}) # without SLEPc
+    continue()
+  endif()
   add_dependencies(bench ${name})
+  if(NOT name STREQUAL models)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL TRUE)
+  endif()
   # The benchmarks reach into src/ to time and compare single parts of the integrator.
   target_include_directories(${name} PRIVATE src tests)
 

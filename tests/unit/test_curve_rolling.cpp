@@ -1,4 +1,5 @@
 /* Kernels of rolling, of the knife edge and of the point on a curve */
+#include "hhtdae/helpers.h"
 #include "kernel_checks.h"
 #include "scene/kernels/curve.h"
 #include "scene/kernels/primitives.h"
@@ -84,7 +85,7 @@ TEST(Rolling, DiscInACircle)
   const Vec3<double> contact(R, 0, 0), inward(-1, 0, 0), up(0, 0, 1);
   const Vec3<double> center = contact + r * (std::cos(lean) * up + std::sin(lean) * inward);
   const Vec3<double> axis   = std::cos(lean) * inward - std::sin(lean) * up; /* normal to the disc, which holds y */
-  OnGround           s(0, Eigen::Quaterniond::FromTwoVectors(up, axis).toRotationMatrix());
+  OnGround           s(0, axesAlong(axis));
   double             phi, psi[2];
   s.f[0].x = center;
   DiscOnPlane::value<double>(data, s.f, 0, &phi);

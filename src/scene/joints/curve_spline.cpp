@@ -73,6 +73,13 @@ std::string Number(std::size_t k) { return std::to_string(k); }
 
 constexpr int kParts = 4; /* nodes of the normal per piece of the path */
 
+/* The normal m of the unit tangent a, by the smallest turn that takes a into the unit tangent b; where the path turns back it is one of both */
+Vec3<double> CarryNormal(const Vec3<double> &a, const Vec3<double> &b, const Vec3<double> &m)
+{
+  const double c = 1 + a.dot(b);
+  return c > 1e-12 ? Vec3<double>(m - b.dot(m) / c * (a + b)) : m;
+}
+
 } // namespace
 
 VectorSpline::VectorSpline(std::vector<double> knots, const Points &y, bool periodic)
@@ -160,7 +167,7 @@ void Curve::transportNormal(bool closed)
     if (m.empty())
       m.push_back(t[0].unitOrthogonal());
     else
-      m.push_back(Eigen::Quaterniond::FromTwoVectors(t[t.size() - 2], t.back()) * m.back());
+      m.push_back(CarryNormal(t[t.size() - 2], t.back(), m.back()));
   }
   if (closed) {
     const double angle = std::atan2(m.back().cross(m[0]).dot(t[0]), m.back().dot(m[0]));
