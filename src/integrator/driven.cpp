@@ -77,7 +77,18 @@ PetscErrorCode NoteDriven(TS ts)
   PetscCall(VecDuplicate(I.X, &I.verify.driven));
   PetscCall(Unmoved(ts, I.verify.driven));
   PetscCall(CountDriven(ts, &all));
-  if (all > 0) PetscCall(PetscInfo(ts, "start: %g coordinates may be driven, their forces are judged by the residual\n", (double)all));
+  if (all > 0) PetscCall(PetscInfo(ts, "start: %" PetscInt_FMT " coordinates may be driven, their forces are judged by the residual\n", (PetscInt)(all + 0.5)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ViewDriven(TS ts, PetscViewer viewer)
+{
+  PetscScalar all;
+
+  PetscFunctionBegin;
+  if (!Get(ts).verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecSum(Get(ts).verify.driven, &all));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "forces of %" PetscInt_FMT " coordinates whose motion is given are judged by the residual\n", (PetscInt)(PetscRealPart(all) + 0.5)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -259,6 +259,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.slow_rate, (double)c.hold));
   PetscCall(ViewClaims(ts, viewer));
+  PetscCall(ViewDriven(ts, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));
   if (ts->setupcalled) PetscCall(ViewRoles(ts, viewer));
   if (I.linear_chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));

@@ -323,6 +323,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
 /* driven.cpp */
 PetscErrorCode NoteDriven(TS ts);
 PetscErrorCode NoteForces(TS ts, Vec F);
+PetscErrorCode ViewDriven(TS ts, PetscViewer viewer);
 PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good);
 /* blame.cpp */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);

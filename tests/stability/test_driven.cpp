@@ -83,6 +83,9 @@ TEST(Driven, ForcesOfGivenMotions)
         for (int k = 0; k < 3; k++) widen(unsolved, std::abs(f[(size_t)k])), widen(loads, std::abs(u[(size_t)k + 3]));
       };
       must(run.solve());
+      Printed out;
+      must(TSView(run.ts, PETSC_VIEWER_STDOUT_SELF));
+      EXPECT_TRUE(out.says("forces of 3 coordinates whose motion is given")) << out.text();
       const TSHHT3Statistics s = run.statistics();
       MEASURED("%s %s: %.1e of the loads unsolved; %d steps, %d iterations, %d factorizations", p.name.c_str(), options, unsolved / loads, (int)s.steps,
                (int)s.newton, (int)s.factorizations);
