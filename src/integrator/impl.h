@@ -322,7 +322,7 @@ PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
 /* driven.cpp */
 PetscErrorCode NoteDriven(TS ts);
-PetscErrorCode NoteForces(TS ts, Vec F);
+PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated);
 PetscErrorCode ViewDriven(TS ts, PetscViewer viewer);
 PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good);
 /* blame.cpp */

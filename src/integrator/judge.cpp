@@ -263,7 +263,7 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
-  if (!*evaluated) PetscCall(NoteForces(ts, F));
+  PetscCall(NoteForces(ts, F, *evaluated));
   if (I.corrector.user_test) PetscCall(Measure(ts, e));
   else PetscCall(Judge(ts, e, X));
   if (I.corrector.reason > 0) {

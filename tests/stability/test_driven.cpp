@@ -71,7 +71,7 @@ struct Carriage : Problem {
 TEST(Driven, ForcesOfGivenMotions)
 {
   for (bool pendulum : {false, true})
-    for (const char *options : {"", "-ts_hhtdae_corrector_tolerance 1e-9", "-ts_adapt_type none -ts_dt 1e-2", "-snes_lag_jacobian 1"}) {
+    for (const char *options : {"", "-ts_hhtdae_corrector_tolerance 1e-9", "-ts_adapt_type none -ts_dt 1e-2", "-snes_lag_jacobian 1", "-snes_linesearch_type basic"}) {
       const Carriage p(pendulum);
       Simulation     run(p, tolerance(1e-4) + options);
       double         unsolved = 0., loads = 0.;
