@@ -17,7 +17,8 @@
   multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
   (h fell to 1e-6). A c that the user has set stands.
 
-  A last correction that proves nothing (verify.cpp), turns back (between.cpp) or is followed by another one goes on.
+  A last correction that proves nothing (verify.cpp), turns back (between.cpp), is followed by another one or leaves forces of what is driven
+  (driven.cpp) goes on.
 */
 #include "impl.h"
 

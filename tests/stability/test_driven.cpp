@@ -89,7 +89,7 @@ TEST(Driven, ForcesOfGivenMotions)
       const TSHHT3Statistics s = run.statistics();
       MEASURED("%s %s: %.1e of the loads unsolved; %d steps, %d iterations, %d factorizations", p.name.c_str(), options, unsolved / loads, (int)s.steps,
                (int)s.newton, (int)s.factorizations);
-      EXPECT_LT(unsolved, 1e-5 * loads) << p.name << " " << options;
+      EXPECT_LT(unsolved, 1e-9 * loads) << p.name << " " << options;
     }
 }
 
