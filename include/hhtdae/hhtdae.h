@@ -93,6 +93,11 @@ typedef PetscErrorCode (*TSHHT3ChangeMap)(TS ts, PetscReal t, Vec U, Vec V, Vec 
 typedef PetscErrorCode (*TSHHT3ChangeCommit)(TS ts, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetCoordinateChange(TS, TSHHT3ChangeTest, TSHHT3ChangeMap, TSHHT3ChangeCommit, void *);
 
+/* Local rotation vectors: attitudes in U become those that they count from, or back to those before */
+typedef PetscErrorCode (*TSHHT3Refer)(TS ts, Vec U, void *ctx);
+typedef PetscErrorCode (*TSHHT3ReferBack)(TS ts, void *ctx);
+PETSC_EXTERN PetscErrorCode TSHHT3SetRotations(TS, IS, TSHHT3Refer, TSHHT3ReferBack, void *);
+
 /* The longest step from a state (U, U', U'') that the application allows */
 typedef PetscErrorCode (*TSHHT3StepLimit)(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStepLimit(TS, TSHHT3StepLimit, void *);

@@ -27,10 +27,9 @@ struct Hermite {
   }
 };
 
-void At(const Integrator &I, PetscReal x, PetscReal h, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[],
+void At(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[],
         PetscScalar *u, PetscScalar *v, PetscScalar *a)
 {
-  const Hermite   H(x, h);
   const PetscReal z = 1 - x;
   for (PetscInt i = 0; i < n; i++) {
     const PetscScalar u0 = s0[0][i], v0 = s0[1][i], a0 = s0[2][i], u1 = s1[0][i], v1 = s1[1][i], a1 = s1[2][i];
@@ -39,6 +38,15 @@ void At(const Integrator &I, PetscReal x, PetscReal h, PetscInt n, const PetscSc
     if (v) v[i] = r == TSHHT3_COORDINATE ? H(v0, a0, v1, a1) : z * v0 + x * v1;
     if (a) a[i] = z * a0 + x * a1;
   }
+}
+
+/* After At() */
+void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[], PetscScalar *u)
+{
+  std::vector<PetscScalar> v((std::size_t)n);
+  for (PetscInt first : I.rotations.at)
+    for (PetscInt i = first; i < first + 3; i++) v[(std::size_t)i] = H(s0[1][i], s0[2][i], s1[1][i], s1[2][i]);
+  InterpolateCommutators(I, x, H.y1, s0[1], s1[1], v.data(), u);
 }
 
 } // namespace
@@ -66,7 +74,9 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(VecGetArrayRead(end[k], &s1[k]));
     if (out[k]) PetscCall(VecGetArrayWrite(out[k], &o[k]));
   }
-  At(I, x, I.h, n, s0, s1, o[0], o[1], o[2]);
+  const Hermite H(x, I.h);
+  At(I, x, H, n, s0, s1, o[0], o[1], o[2]);
+  if (o[0] && !I.rotations.at.empty()) AtRotations(I, x, H, n, s0, s1, o[0]);
   for (int k = 0; k < 3; k++) {
     if (out[k]) PetscCall(VecRestoreArrayWrite(out[k], &o[k]));
     PetscCall(VecRestoreArrayRead(end[k], &s1[k]));

@@ -97,6 +97,7 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(DuplicateAll(ts));
   PetscCall(SetUpJacobian(ts));
   PetscCall(SetUpRoles(ts));
+  PetscCall(SetUpRotations(ts));
   PetscCall(AllocateForRoles(ts));
   PetscCall(SetUpSolvers(ts));
   I.auto_h = (PetscBool)(ts->time_step == unset_step);
@@ -149,6 +150,7 @@ PetscErrorCode Destroy(TS ts)
   if (ts->max_snes_failures == HHT3_UNLIMITED && Get(ts).failures_unlimited) ts->max_snes_failures = 1;
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
   PetscCall(VecDestroy(&Get(ts).checkpoint_vec));
+  PetscCall(ISDestroy(&Get(ts).rotations.is));
   delete static_cast<Integrator *>(ts->data);
   ts->data = NULL;
   PetscCall(ComposeSetters(ts, false));

@@ -98,6 +98,15 @@ struct Change : ChangeState {
   void              *ctx    = nullptr;
 };
 
+/* rotations.cpp */
+struct Rotations {
+  IS                    is    = nullptr;
+  TSHHT3Refer           refer = nullptr;
+  TSHHT3ReferBack       back  = nullptr;
+  void                 *ctx   = nullptr;
+  std::vector<PetscInt> at; /* local indices of first components */
+};
+
 /* limit.cpp */
 struct StepLimit {
   TSHHT3StepLimit limit = nullptr;
@@ -210,6 +219,7 @@ struct Integrator : StepState {
 
   Change    change;
   StepLimit limit;
+  Rotations rotations;
   Hooks     hooks;
   PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
   PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */
@@ -370,6 +380,16 @@ PetscErrorCode StepAfterChange(TS ts);
 PetscErrorCode MatrixAfterChange(TS ts);
 PetscErrorCode CommitChange(TS ts);
 PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap map, TSHHT3ChangeCommit commit, void *ctx);
+/* setters.cpp */
+PetscErrorCode NotAfterSetUp(TS ts, const char *what);
+/* rotations.cpp */
+PetscErrorCode SetUpRotations(TS ts);
+PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
+void           InterpolateCommutators(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
+PetscErrorCode ReferToState(TS ts);
+PetscErrorCode ReferTo(TS ts, Vec U, Vec *before);
+PetscErrorCode ReferBack(TS ts, Vec U, Vec *before);
+PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferBack back, void *ctx);
 /* limit.cpp */
 PetscErrorCode ApplyStepLimit(TS ts);
 PetscErrorCode SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx);

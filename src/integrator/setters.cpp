@@ -6,15 +6,15 @@
 namespace hht3
 {
 
-namespace
-{
-
 PetscErrorCode NotAfterSetUp(TS ts, const char *what)
 {
   PetscFunctionBegin;
   PetscCheck(!ts->setupcalled, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "%s must be set before TSSetUp() or TSSolve(); TSReset() allows it again", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+namespace
+{
 
 PetscErrorCode SetForm(TS ts, TSHHT3Form form)
 {
@@ -164,6 +164,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(CheckpointLoad);
   HHT3_COMPOSE(SetCheckpointVec);
   HHT3_COMPOSE(SetCoordinateChange);
+  HHT3_COMPOSE(SetRotations);
   HHT3_COMPOSE(SetStepLimit);
 #undef HHT3_COMPOSE
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -240,9 +240,11 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   Integrator &I = Get(ts);
   Consistent  c;
   const char *why;
+  Vec         before = NULL;
 
   PetscFunctionBegin;
   PetscCall(OfTheRun(ts, t, U, V, &c));
+  if (h == 0) PetscCall(ReferTo(ts, c.U, &before));
   c.h        = h;
   c.begin[0] = I.base[0];
   c.begin[1] = I.base[1];
@@ -251,13 +253,14 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   if (I.constraints()) {
     c.gamma = I.gamma;
     PetscCall(TimeScale(ts, &c.T));
-    PetscCall(ConstraintDerivatives(ts, t, U, V, c.T, NULL, c.gamma));
+    PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
   for (Vec *v : {&c.F, &c.d}) PetscCall(VecDuplicate(I.X, v));
   PetscCall(SolveConsistent(ts, c, have_matrix, ok, &why));
   for (Vec *v : {&c.F, &c.d}) PetscCall(VecDestroy(v));
   if (!have_matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
+  PetscCall(ReferBack(ts, c.U, &before));
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
   ts->ksp_its += c.ksp_its;
@@ -370,8 +373,13 @@ PetscErrorCode Start(TS ts)
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &v) { if (!IsDifferential(RoleOf(I, i))) v = 0; }, Write(I.V0)));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
+  PetscCall(ReferToState(ts));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(CheckInitialState(ts, &current));
+  if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
+    PetscCall(ReferToState(ts));
+    current = PETSC_FALSE;
+  }
   PetscCall(StartFromState(ts, current));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

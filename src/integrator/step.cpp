@@ -110,6 +110,7 @@ PetscErrorCode Begin(TS ts)
   } else if (I.have_step && !ts->steprollback) {
     PetscCall(Commit(ts));
     if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
+    PetscCall(ReferToState(ts));
   }
   I.have_step = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
