@@ -8,17 +8,25 @@
 namespace hhtest
 {
 
+constexpr hhtdae::Rotations all_rotations[] = {hhtdae::Rotations::Local, hhtdae::Rotations::Euler313};
+
 /* On one rank; the scene has been set up */
 class AnyState
 {
   std::unique_ptr<hhtdae::Runtime> run_;
+  static hhtdae::Scene            &with(hhtdae::Scene &s, hhtdae::Rotations r)
+  {
+    s.start().rotations = r;
+    return s;
+  }
 
 public:
   hhtdae::Runtime &R;
   double           t = 0.3;
   Vec              U = nullptr, V = nullptr, A = nullptr, F = nullptr;
 
-  AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4) : run_(layOut(s)), R(*run_)
+  AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4, hhtdae::Rotations rotations = hhtdae::Rotations::Local)
+      : run_(layOut(with(s, rotations))), R(*run_)
   {
     must(MatCreateVecs(R.J, &U, &F));
     must(VecDuplicate(U, &V));
@@ -54,7 +62,9 @@ public:
     const PetscInt row = R.number.variable[v.id];
     return get(U, row) - residual()[row];
   }
-  /* along the motion: du = u' d + u'' d^2/2, du' = u'' d */
+  /* local rotation vectors count from here: du/dt = u' and du'/dt = u'' */
+  void refer() { must(hhtdae::RenewAxes(R, U, V)); }
+  /* along the motion, from the reference: du = u' d + u'' d^2/2, du' = u'' d */
   void advance(double d)
   {
     must(VecAXPY(U, d, V));

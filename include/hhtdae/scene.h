@@ -35,7 +35,7 @@ namespace hhtdae
 {
 
 enum class Space {
-  Spatial, /* rigid bodies have 6 coordinates: position of the centre of mass, 3-1-3 Euler angles */
+  Spatial, /* rigid bodies have 6 coordinates: position of the centre of mass, rotation, see Rotations */
   Planar   /* 3: position of the centre of mass in the xy plane, angle about z; markers lie in that plane, their z axes along z */
 };
 
@@ -89,6 +89,10 @@ enum class Redundant {
   Refuse, /* are an error */
   Keep    /* are not looked for */
 };
+enum class Rotations {
+  Local,   /* of bodies in space: a rotation vector from the attitude at the last accepted step, and the angular velocity; TSHHT3 alone */
+  Euler313 /* Euler angles, as the method's authors took them */
+};
 struct StartPolicy {
   Assembly  assembly    = Assembly::Report;  /* -scene_assemble off,report,project */
   double    tolerance   = 1e-6;              /* -scene_assemble_tol: of misfits, times the scene's size for lengths; radians */
@@ -96,6 +100,7 @@ struct StartPolicy {
   bool      equilibrium = false;             /* -scene_equilibrium: the run starts at rest in static equilibrium */
   bool      view        = false;             /* -scene_view: prints what the start has done */
   double    time        = 0;                 /* -scene_start_time: of the initial values */
+  Rotations rotations   = Rotations::Local;  /* -scene_rotations local,euler313 */
 };
 
 struct SceneData; /* src/scene/scene_data.h */

@@ -68,7 +68,7 @@ public:
     for (const Instance &e : all) {
       const BodyMotion &b = frame(ev.bodies, e.marker);
       const Vector3     l = load(ev, e);
-      const Matrix3     G = b.euler.G(), S = X(b.A * e.arm), turn = S * G;
+      const Matrix3     G = b.G, S = X(b.A * e.arm), turn = S * G;
       for (double sign : {1., -1.}) {
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
@@ -152,7 +152,7 @@ public:
     for (const Instance &e : all) {
       const BodyMotion &b = frame(ev.bodies, e.marker);
       const Vector3     l = force(ev, e), m = moment(ev, e), c = b.A * e.c;
-      const Matrix3     G = b.euler.G();
+      const Matrix3     G = b.G;
       Matrix3           turn = Matrix3::Zero(), second = -X(l) * X(c);
       Six               B;
       load(ev, e);

@@ -243,7 +243,7 @@ private:
       D << top, bottom;
       return D;
     };
-    const Matrix3 O = s.J.middleCols<3>(3), G = b.euler.G(), zero = Matrix3::Zero(), one = Matrix3::Identity();
+    const Matrix3 O = s.J.middleCols<3>(3), G = b.G, zero = Matrix3::Zero(), one = Matrix3::Identity();
     const int     m = ev.bodies.modes(e.body);
     add(ev, slot, rows(-one, zero), 3);
     add(ev, slot, rows(Cross<double>(s.e.x - b.r) * G, O * G), 3);
@@ -252,7 +252,7 @@ private:
     byModes(on.rotation(e.place), O * Jl, 3);
     add(ev, slot, wide_, m);
     add(ev, slot, rows(one, zero), 3);
-    add(ev, slot, rows(zero, s.J.rightCols<3>() * i.euler.G()), 3);
+    add(ev, slot, rows(zero, s.J.rightCols<3>() * i.G), 3);
   }
 
   /* d(Phi_q^T lambda)/dq, but for what the bodies themselves add. Blocks of modes and of modes with the body's angles are made for
@@ -264,7 +264,7 @@ private:
     Matrix<12, 12>      H;
     Orient::curvature(Empty(), frames, 0, s.lambda + 3, H);
     const Matrix3 Hee = H.block<3, 3>(3, 3), Hei = H.block<3, 3>(3, 9), Hie = H.block<3, 3>(9, 3), Hii = H.block<3, 3>(9, 9);
-    const Matrix3 G = b.euler.G(), Gi = i.euler.G(), F = Cross<double>(s.f), S = Cross<double>(s.e.x - b.r), Jl = b.A * s.turn.J();
+    const Matrix3 G = b.G, Gi = i.G, F = Cross<double>(s.f), S = Cross<double>(s.e.x - b.r), Jl = b.A * s.turn.J();
     const Vector3 n = b.A.transpose() * s.m;
     const int     m = ev.bodies.modes(e.body);
     ev.sink.add(*slot++, Matrix3(G.transpose() * (Hee + F * S) * G), 3, 3);

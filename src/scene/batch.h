@@ -75,7 +75,7 @@ inline void Batch::resolve(const Pattern &p, bool again)
 
 /* ---- groups of coordinates of a marker's body ---- */
 
-inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || HasEulerAngles(k)) && group == 1; }
+inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || TurnsInSpace(k)) && group == 1; }
 inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
 
 /* An entry of the derivative that pairs x or theta of a row marker with x or theta of a column marker reaches groups (g, h) of

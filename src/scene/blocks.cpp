@@ -7,11 +7,8 @@ Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, P
               const Six *V)
 {
   Six right = Six::Zero(), both = Six::Zero();
-  if (V) {
-    ev.bodies.columns(column, at_column, Six(A + ev.sv * *V), right);
-    ev.bodies.convectiveColumns(column, at_column, ev.v, *V, right);
-  } else
-    ev.bodies.columns(column, at_column, A, right);
+  ev.bodies.columns(column, at_column, A, right);
+  if (V) ev.bodies.velocityColumns(column, at_column, ev.v, ev.sv, *V, right);
   ev.bodies.columns(row, at_row, Six(right.transpose()), both);
   return both.transpose();
 }
@@ -23,7 +20,7 @@ void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const V
   const Vector3  s = at.x - B.now[b].r;
   if (k == BodyKind::Planar) H(2, 2) -= f(0) * s(0) + f(1) * s(1);
   if (k != BodyKind::Rigid) return;
-  const Matrix3 G = B.now[b].euler.G(), L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
+  const Matrix3 G = B.now[b].G, L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
   H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
 }
 

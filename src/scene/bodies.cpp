@@ -19,12 +19,17 @@ void Bodies::move(const double *u, const double *v)
     case BodyKind::Rigid:
       b.r = Vector3(q[0], q[1], q[2]);
       b.v = Vector3(p[0], p[1], p[2]);
-      {
-        Matrix3 A;
-        EulerFrame(q + 3, A, b.euler);
+      if (local) {
+        LocalFrame(Vector3(q[3], q[4], q[5]), k.C, b.A, b.G);
+        b.w = Vector3(p[3], p[4], p[5]);
+      } else {
+        Matrix3   A;
+        EulerAxes e;
+        EulerFrame(q + 3, A, e);
         b.A.noalias() = A * k.C;
+        b.G           = e.G();
+        b.w           = AngularVelocity(e, Vector3(p[3], p[4], p[5]));
       }
-      b.w = AngularVelocity(b.euler, Vector3(p[3], p[4], p[5]));
       break;
     case BodyKind::Planar: {
       const double c = std::cos(q[2]), s = std::sin(q[2]);
@@ -49,9 +54,11 @@ Vector3 Bodies::angularAcceleration(PetscInt b, const double *v, const double *a
 {
   const LocalBody &k = body[b];
   if (k.kind == BodyKind::Planar) return {0, 0, a[k.first + 2]};
-  if (!HasEulerAngles(k.kind)) return Vector3::Zero();
+  if (!TurnsInSpace(k.kind)) return Vector3::Zero();
   const double *acc = a + k.first + 3, *rate = v + k.first + 3;
-  return AngularVelocity(now[b].euler, Vector3(acc[0], acc[1], acc[2])) + Convective(now[b].euler, Vector3(rate[0], rate[1], rate[2]), now[b].w);
+  if (local) return {acc[0], acc[1], acc[2]};
+  const EulerAxes e(now[b].G);
+  return AngularVelocity(e, Vector3(acc[0], acc[1], acc[2])) + Convective(e, Vector3(rate[0], rate[1], rate[2]), now[b].w);
 }
 
 /* ---- flexible bodies ---- */
@@ -62,9 +69,8 @@ ModalMotion Bodies::modalMotion(PetscInt i, const double *u, const double *v, co
   const BodyMotion                       &b = now[i];
   const int                               m = modes(i);
   static const double                     none[6] = {0, 0, 0, 0, 0, 0};
-  const double                           *acc = a ? a + k.first : none, *rate = v + k.first + 3;
-  const Vector3                           p(rate[0], rate[1], rate[2]);
-  const Vector3                           alpha = AngularVelocity(b.euler, Vector3(acc[3], acc[4], acc[5])) + Convective(b.euler, p, b.w);
+  const double                           *acc = a ? a + k.first : none;
+  const Vector3                           alpha = angularAcceleration(i, v, acc - k.first);
   const double                           *q = u + k.first + 6, *r = v + k.first + 6;
   return {b.A, b.w, alpha, Vector3(acc[0], acc[1], acc[2]) - gravity, {q, m}, {r, m}, {a ? acc + 6 : r, m}};
 }
@@ -78,25 +84,29 @@ void Bodies::modalResidual(PetscInt i, const double *u, const double *v, const d
   p.dynamics->force(modalMotion(i, u, v, a), f, n, h);
   n -= b.m;
   for (int c = 0; c < 3; c++) row[c] = f(c) - b.f(c);
-  row[3] = n(2);
-  row[4] = b.euler.g2.dot(n);
-  row[5] = b.euler.g3.dot(n);
+  Eigen::Map<Vector3>(row + 3).noalias() = b.G.transpose() * n;
   h -= p.load;
 }
 
-/* How w and alpha change with the Euler angles and their rates: sv dw/deps' + dw/deps, and so on */
-struct AngularGradient {
+/* How attitude, w and alpha change with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
+struct Bodies::AngularGradient {
   Matrix3 G, w, alpha;
 };
 
-static AngularGradient ByAngles(const BodyMotion &b, const Vector3 &rate, const Vector3 &acc, double sv, double sa)
+Bodies::AngularGradient Bodies::byAngles(PetscInt i, const double *v, const double *a, double sv, double sa) const
 {
-  const EulerAxes &e = b.euler;
-  const Vector3    c = Convective(e, rate, b.w), gacc = AngularVelocity(e, acc), p = e.p();
-  AngularGradient  g;
-  Matrix3          alpha_r;
-  g.G     = e.G();
-  g.w     = RateGradient(e, rate, b.w) + sv * g.G;
+  const BodyMotion                &b = now[i];
+  const Eigen::Map<const Vector3> rate(v + body[i].first + 3), acc(a + body[i].first + 3);
+  AngularGradient                  g;
+  Matrix3                          alpha_r;
+  g.G = b.G;
+  g.w = angularVelocityGradient(b, rate.data(), sv);
+  if (local) {
+    g.alpha = sa * Matrix3::Identity();
+    return g;
+  }
+  const EulerAxes e(b.G);
+  const Vector3   c = Convective(e, rate, b.w), gacc = AngularVelocity(e, acc), p = e.p();
   g.alpha = RateGradient(e, acc, gacc);
   g.alpha.col(0) += CrossZ(c);
   g.alpha.col(1) += rate(0) * rate(2) * CrossZ(p) - rate(1) * rate(2) * e.g3;
@@ -105,6 +115,13 @@ static AngularGradient ByAngles(const BodyMotion &b, const Vector3 &rate, const 
   alpha_r.col(2) = rate(0) * CrossZ(e.g3) + rate(1) * p;
   g.alpha += sv * alpha_r + sa * g.G;
   return g;
+}
+
+Matrix3 Bodies::momentGradient(PetscInt i, const double *u, const Vector3 &m) const
+{
+  if (!local) return MomentGradient(EulerAxes(now[i].G), m);
+  const double *x = u + body[i].first + 3;
+  return LocalMomentGradient(Vector3(x[0], x[1], x[2]), m);
 }
 
 void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const double *a, double sv, double sa)
@@ -118,8 +135,7 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   auto             &B = p.block;
   B.setZero(padded, padded);
   p.dynamics->gradient(modalMotion(i, u, v, a), sv, sa, p.outer, D, &B.coeffRef(0, 0) + 6 * (std::ptrdiff_t)padded + 6, padded);
-  const AngularGradient g = ByAngles(b, Vector3(v[k.first + 3], v[k.first + 4], v[k.first + 5]),
-                                     Vector3(a[k.first + 3], a[k.first + 4], a[k.first + 5]), sv, sa);
+  const AngularGradient g = byAngles(i, v, a, sv, sa);
   const auto by_angles = [&](const auto &X) {
     return X.template middleCols<3>(3).lazyProduct(g.G) + X.template middleCols<3>(6).lazyProduct(g.w) + X.template rightCols<3>().lazyProduct(g.alpha);
   };
@@ -127,7 +143,7 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   R.leftCols<3>()    = sa * D.rigid.leftCols<3>();
   R.rightCols<3>()   = by_angles(D.rigid);
   R.bottomRows<3>()  = Matrix<3, 6>(g.G.transpose() * R.bottomRows<3>());
-  R.bottomRightCorner<3, 3>() += MomentGradient(b.euler, D.n - b.m);
+  R.bottomRightCorner<3, 3>() += momentGradient(i, u, D.n - b.m);
   B.topLeftCorner<6, 6>() = R;
   if (p.turned.rows()) D.rigid_modal.rightCols<3>() += p.turned;
   B.block(0, 6, 3, m)     = D.rigid_modal.leftCols<3>().transpose();
@@ -135,12 +151,6 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   B.block(6, 0, m, 3)     = sa * D.modal_rigid.leftCols<3>();
   B.block(6, 3, m, 3)     = by_angles(D.modal_rigid);
   if (p.turned.rows()) B.block(6, 3, m, 3) += p.turned.lazyProduct(g.G);
-}
-
-void Bodies::setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J)
-{
-  body[b].C = C;
-  body[b].J = C * J * C.transpose();
 }
 
 void Bodies::residual(const double *u, const double *v, const double *a, double *F)
@@ -158,19 +168,14 @@ void Bodies::residual(const double *u, const double *v, const double *a, double 
     for (int c = 0; c < directions; c++) row[c] = k.mass * (acc[c] - gravity(c)) - b.f(c);
     if (k.kind == BodyKind::Planar) row[2] = k.J(2, 2) * acc[2] - b.m(2);
     if (k.kind != BodyKind::Rigid) continue;
-    const double *p = v + k.first + 3;
-    /* in the axes of the Euler angles, where the inertia is constant */
-    const Vector3 alpha = AngularVelocity(b.euler, Vector3(acc[3], acc[4], acc[5])) + Convective(b.euler, Vector3(p[0], p[1], p[2]), b.w);
-    const Matrix3 A = b.A * k.C.transpose();
-    const Vector3 wl = A.transpose() * b.w, al = A.transpose() * alpha;
-    const Vector3 N = A * (k.J * al + wl.cross(k.J * wl)) - b.m;
-    row[3]          = N(2);
-    row[4]          = b.euler.g2.dot(N);
-    row[5]          = b.euler.g3.dot(N);
+    /* in body axes, where the inertia is constant */
+    const Vector3 wl = b.A.transpose() * b.w, al = b.A.transpose() * angularAcceleration(i, v, a);
+    const Vector3 N = b.A * (k.J * al + wl.cross(k.J * wl)) - b.m;
+    Eigen::Map<Vector3>(row + 3).noalias() = b.G.transpose() * N;
   }
 }
 
-void Bodies::jacobian(PetscInt i, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const
+void Bodies::jacobian(PetscInt i, const double *u, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const
 {
   const LocalBody  &k = body[i];
   const BodyMotion &b = now[i];
@@ -178,18 +183,16 @@ void Bodies::jacobian(PetscInt i, const double *v, const double *a, double sv, d
   for (int c = 0; c < 3; c++) B(c, c) = sa * k.mass;
   if (k.kind == BodyKind::Planar) B(2, 2) = sa * k.J(2, 2);
   if (k.kind != BodyKind::Rigid) return;
-  const Eigen::Map<const Vector3> rate(v + k.first + 3), acc(a + k.first + 3);
-  const EulerAxes                &e = b.euler;
-  const AngularGradient           g = ByAngles(b, rate, acc, sv, sa);
-  const Vector3 alpha = AngularVelocity(e, acc) + Convective(e, rate, b.w);
-  const Matrix3 A  = b.A * k.C.transpose(), I = A * k.J * A.transpose();
+  const AngularGradient g     = byAngles(i, v, a, sv, sa);
+  const Vector3         alpha = angularAcceleration(i, v, a);
+  const Matrix3         I     = b.A * k.J * b.A.transpose();
   const Matrix3 Xw = Cross<double>(b.w), XIw = Cross<double>(I * b.w);
   const Vector3 N  = I * alpha + b.w.cross(I * b.w);
   const Matrix3 Ntheta = I * Cross<double>(alpha) - Cross<double>(I * alpha) + Xw * (I * Xw - XIw);
   const Matrix3 Nw     = Xw * I - XIw;
   const Matrix3 D = Ntheta * g.G + Nw * g.w + I * g.alpha;
   B.block<3, 3>(3, 3).noalias() = g.G.transpose() * D;
-  B.block<3, 3>(3, 3) += MomentGradient(e, N - b.m);
+  B.block<3, 3>(3, 3) += momentGradient(i, u, N - b.m);
 }
 
 } // namespace hhtdae

@@ -3,13 +3,15 @@
   motion, the loads that the elements put on them, and the change from marker perturbations to generalized coordinates.
 
   The residual of a body is its inertia less the load, written in space axes and taken to the coordinates at the end:
-  rows of r: m r'' - f;  rows of the Euler angles: G^T (N - m), N = I w' + w x I w, I = A J A^T (moments about the centre of mass).
+  rows of r: m r'' - f;  rows of the rotation: G^T (N - m), N = I w' + w x I w, I = A J A^T (moments about the centre of mass), with
+  dA = [G dU] A for rotational coordinates U, see rotation.h.
 */
 #ifndef HHTDAE_SCENE_BODIES_H
 #define HHTDAE_SCENE_BODIES_H
 
 #include "euler.h"
 #include "frames.h"
+#include "rotation.h"
 #include "modal_dynamics.h"
 #include <petscsys.h>
 #include <memory>
@@ -27,9 +29,9 @@ inline int Coordinates(BodyKind k)
   constexpr int n[] = {0, 3, 6, 3, 2, 6};
   return n[(int)k];
 }
-inline bool HasEulerAngles(BodyKind k) { return k == BodyKind::Rigid || k == BodyKind::Flexible; }
+inline bool TurnsInSpace(BodyKind k) { return k == BodyKind::Rigid || k == BodyKind::Flexible; }
 /* Coordinates come in groups whose rows of the matrix have the same columns */
-inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : HasEulerAngles(k) || k == BodyKind::Planar ? 2 : 1; }
+inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : TurnsInSpace(k) || k == BodyKind::Planar ? 2 : 1; }
 /* group 0: position, group 1: rotation */
 inline int GroupSize(BodyKind k, int group)
 {
@@ -47,15 +49,15 @@ struct LocalBody {
   PetscInt id    = -1; /* in the scene */
   PetscInt modal = -1; /* of a flexible body: its place in Bodies::modal */
   double   mass  = 0;
-  Matrix3  J;          /* inertia in the axes of the Euler angles; planar: J(2,2) */
-  Matrix3  C;          /* body axes to the axes of the Euler angles */
+  Matrix3  J;          /* inertia in body axes; planar: J(2,2) */
+  Matrix3  C;          /* A = exp([x]) C, or body axes to the axes of the Euler angles */
 };
 
 /* present motion and load */
 struct BodyMotion {
   Vector3   r, v, w;
   Matrix3   A;
-  EulerAxes euler; /* rigid bodies in space alone */
+  Matrix3   G;     /* of bodies that turn in space */
   Vector3   f, m;  /* load: force, moment about the centre of mass */
 };
 
@@ -86,11 +88,11 @@ public:
   std::vector<ModalPart>   modal;
   PetscInt                 own = 0;
   long                     moves = 0; /* so far */
+  bool                     local = false; /* rotations are local vectors, not Euler angles */
   Vector3                  gravity = Vector3::Zero();
 
   /* motion of all bodies from their coordinates and rates; clears the loads */
   void move(const double *u, const double *v);
-  void setAxes(PetscInt b, const Matrix3 &C, const Matrix3 &J);
   int  modes(PetscInt b) const { return body[b].modal < 0 ? 0 : modal[body[b].modal].dynamics->modes(); }
   int  coordinates(PetscInt b) const { return Coordinates(body[b].kind) + modes(b); }
 
@@ -137,43 +139,68 @@ public:
       return 3;
     }
     case BodyKind::Flexible: /* at its floating frame */
-    case BodyKind::Rigid: {
-      /* dx = dr + dtheta x s, dtheta = G deps: column c of the angles is J_theta g_c + J_x (g_c x s) */
-      const Vector3 s = f.x - b.r;
-      out.template leftCols<3>() = J.template leftCols<3>();
-      out.col(3)                 = J.col(5) - s(1) * J.col(0) + s(0) * J.col(1);
-      out.col(4).noalias() = J.template rightCols<3>() * b.euler.g2 + J.template leftCols<3>() * b.euler.g2.cross(s);
-      out.col(5).noalias() = J.template rightCols<3>() * b.euler.g3 + J.template leftCols<3>() * b.euler.g3.cross(s);
+    case BodyKind::Rigid: /* dx = dr + dtheta x s, dtheta = G dU */
+      out.template leftCols<3>()            = J.template leftCols<3>();
+      out.template rightCols<3>().noalias() = About(J, Vector3(f.x - b.r)) * b.G;
       return 6;
-    }
     }
     return 0;
   }
-  /* the change of velocities with coordinates at constant rates: J, columns (v, w) of marker m, adds to out */
-  template <class In, class Out> void convectiveColumns(PetscInt m, const Frame<double> &f, const double *v, const In &J, Out &out) const
+  /* J, columns (v, w) of marker m: adds its change with coordinates and, times sv, with their velocities, to out */
+  template <class In, class Out> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const In &J, Out &out) const
   {
     const LocalBody  &k = body[marker[m].body];
     const BodyMotion &b = now[marker[m].body];
     const Vector3     s = f.x - b.r;
-    if (k.kind == BodyKind::Planar) out.col(2) += J.template leftCols<3>() * b.w.cross(CrossZ(s));
-    if (k.kind != BodyKind::Rigid) return;
-    const Eigen::Map<const Vector3> rate(v + k.first + 3);
-    const Matrix3                   W = RateGradient(b.euler, rate, b.w), G = b.euler.G();
-    for (int c = 0; c < 3; c++) {
-      const Vector3 dw = W.col(c);
-      out.col(3 + c) += J.template leftCols<3>() * (dw.cross(s) + b.w.cross(G.col(c).cross(s))) + J.template rightCols<3>() * dw;
+    switch (k.kind) {
+    case BodyKind::Ground:
+      return;
+    case BodyKind::PlanarPoint:
+      out.template leftCols<2>() += sv * J.template leftCols<2>();
+      return;
+    case BodyKind::Point:
+      out.template leftCols<3>() += sv * J.template leftCols<3>();
+      return;
+    case BodyKind::Planar:
+      out.template leftCols<2>() += sv * J.template leftCols<2>();
+      out.col(2) += sv * (J.col(5) - s(1) * J.col(0) + s(0) * J.col(1)) + J.template leftCols<3>() * b.w.cross(CrossZ(s));
+      return;
+    case BodyKind::Flexible:
+    case BodyKind::Rigid: { /* dv = dv_r + dw x s + w x (dtheta x s) */
+      const Matrix3 turned = Cross<double>(b.w) * Cross<double>(s) * b.G;
+      out.template leftCols<3>() += sv * J.template leftCols<3>();
+      out.template rightCols<3>() += About(J, s) * angularVelocityGradient(b, v + k.first + 3, sv) - J.template leftCols<3>() * turned;
     }
+    }
+  }
+  /* dw/dU + sv dw/dU' */
+  Matrix3 angularVelocityGradient(const BodyMotion &b, const double *rate, double sv) const
+  {
+    if (local) return sv * Matrix3::Identity();
+    return RateGradient(EulerAxes(b.G), Vector3(rate[0], rate[1], rate[2]), b.w) + sv * b.G;
   }
 
   /* ---- own bodies' rows ---- */
   void residual(const double *u, const double *v, const double *a, double *F);
   /* adds sv dF/dv + sa dF/da + dF/du of body b to B (coordinates x coordinates, row major of leading dimension 6) */
-  void jacobian(PetscInt b, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const;
+  void jacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const;
   /* the same of a flexible body, all its coordinates: ModalPart::block */
   void modalJacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa);
   ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* without a: q'' is not used */
 
 private:
+  /* what a turn does through a marker at s from the centre of mass: J_theta - J_x [s] */
+  template <class In> static Matrix<In::RowsAtCompileTime, 3> About(const In &J, const Vector3 &s)
+  {
+    Matrix<In::RowsAtCompileTime, 3> R;
+    R.col(0) = J.col(3) - s(2) * J.col(1) + s(1) * J.col(2);
+    R.col(1) = J.col(4) - s(0) * J.col(2) + s(2) * J.col(0);
+    R.col(2) = J.col(5) - s(1) * J.col(0) + s(0) * J.col(1);
+    return R;
+  }
+  struct AngularGradient;
+  AngularGradient byAngles(PetscInt b, const double *v, const double *a, double sv, double sa) const;
+  Matrix3         momentGradient(PetscInt b, const double *u, const Vector3 &m) const; /* d(G^T m)/dU for fixed m */
   void modalResidual(PetscInt b, const double *u, const double *v, const double *a, double *row);
 };
 

@@ -184,11 +184,11 @@ private:
       if (!Groups(b.kind)) continue;
       Matrix<R, 6>     T, own; /* columns of lambda are T^T, rows of Phi are S */
       Matrix<R, 6>    &S = K::holonomic ? T : own;
-      const int        n = ev.bodies.columns(e.marker[k], f[k], J.template middleCols<6>(6 * k), T);
+      const int        n = ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(J.template middleCols<6>(6 * k)), T);
       if constexpr (!K::holonomic) {
         S.leftCols(n).setZero();
-        ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k) + ev.sv * J.template middleCols<6>(6 * k)), S);
-        ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, J.template middleCols<6>(6 * k), S);
+        ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k)), S);
+        ev.bodies.velocityColumns(e.marker[k], f[k], ev.v, ev.sv, Matrix<R, 6>(J.template middleCols<6>(6 * k)), S);
       }
       if (rows < R)
         for (int c = 0; c < n; c++)

@@ -11,6 +11,8 @@ namespace hhtdae
 /* Columns of G: the axes of phi', theta', psi' in space. The first is the space z axis. */
 struct EulerAxes {
   Vector3 g2, g3;
+  EulerAxes() = default;
+  explicit EulerAxes(const Matrix3 &G) : g2(G.col(1)), g3(G.col(2)) {}
   Matrix3 G() const
   {
     Matrix3 m;

@@ -85,7 +85,7 @@ void BodyBlocks(Runtime &R, const Evaluation &e)
       ModalBlocks(R, b, e, slot);
       continue;
     }
-    R.bodies.jacobian(b, e.v, e.a, e.sv, e.sa, B);
+    R.bodies.jacobian(b, e.u, e.v, e.a, e.sv, e.sa, B);
     for (int g = 0; g < Groups(kind); g++) {
       const int size = GroupSize(kind, g), at = GroupOffset(kind, g);
       e.sink.add(*slot++, B.block(at, at, size, size), size, size);

@@ -307,8 +307,8 @@ private:
         J.row(r) = -DerivativeRow<6>(c[r], 6 * k);
         if constexpr (K::damped) V.row(r) = -DerivativeRow<6>(c[r], n + 6 * k);
       }
-      ev.bodies.columns(e.marker[k], f[k], Matrix<C, 6>(J + ev.sv * V), out);
-      if constexpr (K::damped) ev.bodies.convectiveColumns(e.marker[k], f[k], ev.v, V, out);
+      ev.bodies.columns(e.marker[k], f[k], J, out);
+      if constexpr (K::damped) ev.bodies.velocityColumns(e.marker[k], f[k], ev.v, ev.sv, V, out);
       for (int g = 0; g < Groups(b.kind); g++)
         if (Base::uses(b.kind, g, k))
           ev.sink.add(*slot++, out.middleCols(GroupOffset(b.kind, g), GroupSize(b.kind, g)), C, GroupSize(b.kind, g));

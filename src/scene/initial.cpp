@@ -20,14 +20,17 @@ void Start(const Runtime &R, const LocalBody &k, double *u, double *v)
     u[2] = std::atan2(b.A(1, 0), b.A(0, 0));
     v[2] = b.w(2);
   }
-  if (!HasEulerAngles(k.kind)) return;
-  const Vector3 eps = EulerAngles(b.A * k.C.transpose());
-  Matrix3       A;
-  EulerAxes     e;
-  EulerFrame(eps.data(), A, e);
-  const Vector3 rate = EulerRates(e, b.w);
+  if (!TurnsInSpace(k.kind)) return;
+  Vector3 angles = Vector3::Zero(), rate = b.w; /* local: the reference is the initial attitude */
+  if (!R.bodies.local) {
+    Matrix3   A;
+    EulerAxes e;
+    angles = EulerAngles(b.A * k.C.transpose());
+    EulerFrame(angles.data(), A, e);
+    rate = EulerRates(e, b.w);
+  }
   for (int i = 0; i < 3; i++) {
-    u[n - 3 + i] = eps(i);
+    u[n - 3 + i] = angles(i);
     v[n - 3 + i] = rate(i);
   }
   if (!b.flexible) return;

@@ -80,7 +80,7 @@ void Add(Digest &d, const StoreBase &s)
 Digest MakeDigest(const SceneData &s)
 {
   Digest d;
-  d.whole(s.planar);
+  d.whole(s.planar + 2 * (int)s.start.rotations);
   d.numbers(s.gravity);
   for (const BodyData &b : s.bodies) Add(d, b);
   for (const MarkerData &m : s.markers) {

@@ -190,12 +190,12 @@ void MakeBodies(Runtime &R, const std::vector<PetscInt> &other)
   still.v.setZero();
   still.w.setZero();
   still.A.setIdentity();
-  still.euler.g2.setZero();
-  still.euler.g3.setZero();
+  still.G.setZero();
   still.f.setZero();
   still.m.setZero();
   B.now.assign(B.body.size(), still);
   B.gravity = R.scene.gravity;
+  B.local   = R.scene.start.rotations == Rotations::Local;
 }
 
 void SortUnique(std::vector<PetscInt> &x)

@@ -18,7 +18,7 @@ struct Linearization::Work {
   double                     t = 0, size = 1; /* of the scene */
   Vec                        state[3] = {};   /* u, u', u'' */
   Mat                        M = nullptr, C = nullptr, K = nullptr;
-  Mat                        turn[3] = {}; /* T of du = T x, T', T'': rates of Euler angles from those in space axes */
+  Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
   std::vector<unsigned char> role;         /* of own unknowns */
   mutable Snapshot           moved;
 

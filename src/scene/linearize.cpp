@@ -1,13 +1,17 @@
 /*
   The equations of small motions about a state of a run.
 
-  The scene's matrix F_u + sv F_u' + sa F_u'' has the coordinates of the run, Euler angles among them. Where a body spins, these change their
-  meaning with time. So du = T(t) x takes displacements and rotations in space axes, T = G^-1 for the angles:
+  The scene's matrix F_u + sv F_v + sa F_a, of the derivatives by u and its velocities and accelerations, has the coordinates of the run,
+  rotations among them. Where a body spins, these change their meaning with time. So x are displacements and rotations in space axes, and
 
-    du' = T x' + T' x,    du'' = T x'' + 2 T' x' + T'' x
-    M = T^T F_u'' T,    C = T^T (F_u' T + 2 F_u'' T'),    K = T^T (F_u T + F_u' T' + F_u'' T'')
+    du = T_00 x,    dv = T_11 x' + T_10 x,    da = T_22 x'' + T_21 x' + T_20 x
+    M = T_00^T F_a T_22,    C = T_00^T (F_v T_11 + F_a T_21),    K = T_00^T (F_u T_00 + F_v T_10 + F_a T_20)
 
-  T^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
+  For Euler angles T_00 = G^-1 =: T, and the others are its derivatives, T_11 = T_22 = T, T_10 = T', T_21 = 2 T', T_20 = T''. Of local
+  rotation vectors v and a are the angular velocity w and acceleration: exp([x]) A turns with w + x' + x cross w, so that T_00 = G^-1,
+  T_11 = T_22 = 1, T_10 = T_21 = -[w], T_20 = -[w'].
+
+  T_00^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
 */
 #include "euler.h"
 #include "linearization.h"
@@ -38,7 +42,7 @@ PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv,
 }
 
 /* T = G^-1, T', T''. G = [z g2 g3] turns about z with phi, and g3 about g2 with theta: d g3/d theta = p, dp/d theta = -g3 */
-void AngleRates(const double *angle, const double *rate, const double *second, Matrix3 T[3])
+void AngleRates(const double *angle, const double *rate, const double *second, Matrix3 T[3][3])
 {
   const double phi = rate[0], theta = rate[1];
   Matrix3      A, G1, G2;
@@ -47,9 +51,20 @@ void AngleRates(const double *angle, const double *rate, const double *second, M
   const Vector3 zero = Vector3::Zero(), p = e.p(), z2 = CrossZ(e.g2), z3 = CrossZ(e.g3);
   G1 << zero, phi * z2, phi * z3 + theta * p;
   G2 << zero, second[0] * z2 + phi * phi * CrossZ(z2), second[0] * z3 + phi * phi * CrossZ(z3) + 2 * phi * theta * CrossZ(p) + second[1] * p - theta * theta * e.g3;
-  T[0] = e.G().inverse();
-  T[1] = -T[0] * G1 * T[0];
-  T[2] = -T[0] * (G2 * T[0] + 2 * G1 * T[1]);
+  T[0][0] = T[1][1] = T[2][2] = e.G().inverse();
+  T[1][0]                     = -T[0][0] * G1 * T[0][0];
+  T[2][1]                     = 2 * T[1][0];
+  T[2][0]                     = -T[0][0] * (G2 * T[0][0] + 2 * G1 * T[1][0]);
+}
+
+void LocalRates(const double *x, const double *w, const double *alpha, Matrix3 T[3][3])
+{
+  Matrix3 A, G;
+  LocalFrame(Vector3(x[0], x[1], x[2]), Matrix3::Identity(), A, G);
+  T[0][0]           = G.inverse();
+  T[1][1] = T[2][2] = Matrix3::Identity();
+  T[1][0] = T[2][1] = -Cross<double>(Vector3(w[0], w[1], w[2]));
+  T[2][0]           = -Cross<double>(Vector3(alpha[0], alpha[1], alpha[2]));
 }
 
 PetscErrorCode MakeTurns(Linearization::Work &w)
@@ -57,27 +72,30 @@ PetscErrorCode MakeTurns(Linearization::Work &w)
   Runtime      &R = *w.R;
   const double *s[3];
   PetscFunctionBegin;
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecGetArrayRead(w.state[k], &s[k]));
-    PetscCall(MatCreateAIJ(w.comm(), R.n, R.n, PETSC_DETERMINE, PETSC_DETERMINE, 3, nullptr, 0, nullptr, &w.turn[k]));
-    for (PetscInt i = R.start; i < R.start + R.n; i++) PetscCall(MatSetValue(w.turn[k], i, i, k == 0, INSERT_VALUES));
-  }
+  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(w.state[k], &s[k]));
+  for (int k = 0; k < 3; k++)
+    for (int l = 0; l <= k; l++) {
+      PetscCall(MatCreateAIJ(w.comm(), R.n, R.n, PETSC_DETERMINE, PETSC_DETERMINE, 3, nullptr, 0, nullptr, &w.turn[k][l]));
+      for (PetscInt i = R.start; i < R.start + R.n; i++) PetscCall(MatSetValue(w.turn[k][l], i, i, k == l, INSERT_VALUES));
+    }
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &body = R.bodies.body[b];
-    if (!HasEulerAngles(body.kind)) continue;
+    if (!TurnsInSpace(body.kind)) continue;
     const PetscInt at = body.first + 3, rows[3] = {R.start + at, R.start + at + 1, R.start + at + 2};
-    Matrix3        T[3];
-    AngleRates(s[0] + at, s[1] + at, s[2] + at, T);
-    for (int k = 0; k < 3; k++) {
-      const Matrix3 by_rows = T[k].transpose();
-      PetscCall(MatSetValues(w.turn[k], 3, rows, 3, rows, by_rows.data(), INSERT_VALUES));
+    Matrix3        T[3][3];
+    (R.bodies.local ? LocalRates : AngleRates)(s[0] + at, s[1] + at, s[2] + at, T);
+    for (int k = 0; k < 3; k++)
+      for (int l = 0; l <= k; l++) {
+        const Matrix3 by_rows = T[k][l].transpose();
+        PetscCall(MatSetValues(w.turn[k][l], 3, rows, 3, rows, by_rows.data(), INSERT_VALUES));
+      }
+  }
+  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(w.state[k], &s[k]));
+  for (int k = 0; k < 3; k++)
+    for (int l = 0; l <= k; l++) {
+      PetscCall(MatAssemblyBegin(w.turn[k][l], MAT_FINAL_ASSEMBLY));
+      PetscCall(MatAssemblyEnd(w.turn[k][l], MAT_FINAL_ASSEMBLY));
     }
-  }
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecRestoreArrayRead(w.state[k], &s[k]));
-    PetscCall(MatAssemblyBegin(w.turn[k], MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(w.turn[k], MAT_FINAL_ASSEMBLY));
-  }
   PetscFunctionReturn(0);
 }
 
@@ -98,7 +116,9 @@ void Linearization::Work::clear()
 {
   PetscCallAbort(PETSC_COMM_SELF, TSDestroy(&start));
   for (Vec &x : state) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
-  for (Mat *x : {&M, &C, &K, &turn[0], &turn[1], &turn[2]}) PetscCallAbort(PETSC_COMM_SELF, MatDestroy(x));
+  for (Mat *x : {&M, &C, &K}) PetscCallAbort(PETSC_COMM_SELF, MatDestroy(x));
+  for (auto &row : turn)
+    for (Mat &x : row) PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&x));
 }
 
 PetscErrorCode Linearization::Work::check(const char *call) const
@@ -116,15 +136,15 @@ PetscErrorCode Linearization::Work::differentiate()
   PetscCall(DerivativeMatrix(*R, t, state, apart, 0, F[0], &F[1]));
   PetscCall(DerivativeMatrix(*R, t, state, 0, apart, F[0], &F[2]));
   PetscCall(MakeTurns(*this));
-  PetscCall(MatMatMult(F[2], turn[0], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &M));
-  PetscCall(MatMatMult(F[1], turn[0], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
-  PetscCall(AddProduct(C, 2, F[2], turn[1]));
-  PetscCall(MatMatMult(F[0], turn[0], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &K));
-  PetscCall(AddProduct(K, 1, F[1], turn[1]));
-  PetscCall(AddProduct(K, 1, F[2], turn[2]));
+  PetscCall(MatMatMult(F[2], turn[2][2], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &M));
+  PetscCall(MatMatMult(F[1], turn[1][1], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
+  PetscCall(AddProduct(C, 1, F[2], turn[2][1]));
+  PetscCall(MatMatMult(F[0], turn[0][0], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &K));
+  PetscCall(AddProduct(K, 1, F[1], turn[1][0]));
+  PetscCall(AddProduct(K, 1, F[2], turn[2][0]));
   for (Mat *x : {&M, &C, &K}) {
     Mat product;
-    PetscCall(MatTransposeMatMult(turn[0], *x, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+    PetscCall(MatTransposeMatMult(turn[0][0], *x, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
     PetscCall(MatDestroy(x));
     *x = product;
   }

@@ -29,20 +29,34 @@ MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerat
   m.a.setZero();
   m.alpha.setZero();
   if (accelerations && l.kind != BodyKind::Ground) {
-    const double *a = e.a + l.first, *v = e.v + l.first;
+    const double *a = e.a + l.first;
     for (int i = 0; i < (PlanarScene(l.kind) ? 2 : 3); i++) m.a(i) = a[i];
     if (l.kind == BodyKind::Planar) m.alpha(2) = a[2];
-    if (l.kind == BodyKind::Rigid)
-      m.alpha =
-          AngularVelocity(b.euler, Vector3(a[3], a[4], a[5])) + Convective(b.euler, Vector3(v[3], v[4], v[5]), b.w);
+    if (l.kind == BodyKind::Rigid) m.alpha = e.bodies.angularAcceleration(k.body, e.v, e.a);
   }
   Attach<double>(b.r, b.A * k.s, m);
   return m;
 }
 
-/* The same from coordinates, rates and accelerations that are duals; formulas of euler.h and bodies.cpp */
+/* The same from coordinates, velocities and accelerations that are duals: dA = [G dq] A */
+template <class T> void LocalMotion(const BodyMotion &b, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
+{
+  Vec3<T> turn;
+  for (int i = 0; i < 3; i++) {
+    m.w.w(i)   = p[i];
+    m.alpha(i) = s[i];
+    turn(i)    = T(0);
+    for (int c = 0; c < 3; c++) turn(i) = turn(i) + T(b.G(i, c)) * (q[c] - T(Plain(q[c])));
+  }
+  for (int j = 0; j < 3; j++) {
+    const Vec3<T> x(T(b.A(0, j)), T(b.A(1, j)), T(b.A(2, j)));
+    A.col(j) = x + turn.cross(x);
+  }
+}
+
+/* of Euler angles; formulas of euler.h and bodies.cpp */
 template <class T>
-void RigidMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
+void EulerMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
 {
   using std::cos;
   using std::sin;
@@ -98,7 +112,8 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
     m.w.v(i) = p[i];
     m.a(i)   = s[i];
   }
-  if (l.kind == BodyKind::Rigid) RigidMotion<T>(l, q + 3, p + 3, s + 3, A, m);
+  if (l.kind == BodyKind::Rigid && e.bodies.local) LocalMotion<T>(e.bodies.now[k.body], q + 3, p + 3, s + 3, A, m);
+  if (l.kind == BodyKind::Rigid && !e.bodies.local) EulerMotion<T>(l, q + 3, p + 3, s + 3, A, m);
   if (l.kind == BodyKind::Planar) PlanarMotion<T>(q[2], p[2], s[2], A, m);
   m.f.R             = A * Constant<T>(k.R);
   const Vec3<T> arm = A * Constant<T>(k.s);

@@ -13,7 +13,7 @@ PetscErrorCode DeclareSceneOptions()
                                       "scene_redundant",
                                       "scene_equilibrium",
                                       "scene_view",
-                                      "scene_start_time",
+                                      "scene_start_time", "scene_rotations",
                                       "scene_output",
                                       "scene_csv",
                                       "scene_dt",

@@ -7,9 +7,10 @@ namespace hhtdae
 PetscErrorCode ReadStartOptions(SceneData &s)
 {
   static const char *const assemblies[] = {"off", "report", "project"}, *const redundants[] = {"drop", "refuse",
-                                                                                               "keep"};
+                                                                                               "keep"},
+                    *const rotations[] = {"local", "euler313"};
   StartPolicy &p        = s.start;
-  PetscInt     assembly = (PetscInt)p.assembly, redundant = (PetscInt)p.redundant;
+  PetscInt     assembly = (PetscInt)p.assembly, redundant = (PetscInt)p.redundant, rotation = (PetscInt)p.rotations;
   PetscReal    tolerance = p.tolerance, time = p.time;
   PetscBool    equilibrium = (PetscBool)p.equilibrium, view = (PetscBool)p.view;
   PetscFunctionBegin;
@@ -26,6 +27,8 @@ PetscErrorCode ReadStartOptions(SceneData &s)
       PetscOptionsBool("-scene_view", "Print what the start has done", "StartPolicy::view", view, &view, nullptr));
   PetscCall(
       PetscOptionsReal("-scene_start_time", "Time of the initial values", "StartPolicy::time", time, &time, nullptr));
+  PetscCall(PetscOptionsEList("-scene_rotations", "Coordinates of rotations in space", "StartPolicy::rotations", rotations,
+                              2, rotations[rotation], &rotation, nullptr));
   PetscOptionsEnd();
   PetscCheck(tolerance > 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_assemble_tol is %g, must be positive",
              (double)tolerance);
@@ -35,6 +38,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   p.equilibrium = equilibrium;
   p.view        = view;
   p.time        = time;
+  p.rotations   = (Rotations)rotation;
   PetscFunctionReturn(0);
 }
 

@@ -1,11 +1,13 @@
 /*
-  A body whose theta comes near 0 or pi gets new axes: its Euler angles then belong to another frame fixed in the body, in which it
-  is far from the singularity. The integrator carries angles, rates, accelerations and their history over,
-  TSHHT3SetCoordinateChange(). The same call before each step tells that the state has been accepted, and angles that are counted
-  over full turns remember where they are.
+  What rotational coordinates refer to. Local rotation vectors count from the attitude at the last accepted step: the integrator tells where
+  that is, TSHHT3SetRotations().
 
-  Axes and remembered angles are in one vector, Runtime::axes, which checkpoints keep: a quaternion per own rigid body, then the
-  memories of the elements.
+  Of Euler angles, a body whose theta comes near 0 or pi gets new axes: they then belong to another frame fixed in the body, in which it
+  is far from the singularity. The integrator carries angles, rates, accelerations and their history over, TSHHT3SetCoordinateChange(). The
+  same call before each step tells that the state has been accepted, and angles that are counted over full turns remember where they are.
+
+  References and remembered angles are in one vector, Runtime::axes, which checkpoints keep: the quaternion of LocalBody::C per own rigid
+  body, then the memories of the elements.
 */
 #include "runtime.h"
 
@@ -15,7 +17,7 @@ namespace hhtdae
 namespace
 {
 
-bool HasAxes(const LocalBody &k) { return HasEulerAngles(k.kind); }
+bool HasAxes(const LocalBody &k) { return TurnsInSpace(k.kind); }
 
 PetscInt Memories(const Runtime &R)
 {
@@ -33,9 +35,8 @@ void CopyMemories(Runtime &R, double *x, bool in)
   }
 }
 
-void Store(const Matrix3 &C, double *x)
+void Store(const Eigen::Quaterniond &q, double *x)
 {
-  const Eigen::Quaterniond q(C);
   x[0] = q.w();
   x[1] = q.x();
   x[2] = q.y();
@@ -85,7 +86,7 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   R.next_body.clear();
   R.next_axes.clear();
   R.changing = false;
-  if (!R.turns) PetscFunctionReturn(0);
+  if (!R.turns || R.bodies.local) PetscFunctionReturn(0);
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
@@ -188,7 +189,7 @@ PetscErrorCode Commit(TS ts, void *ctx)
   PetscFunctionBegin;
   PetscCall(VecGetArray(R.axes, &x));
   for (std::size_t i = 0; i < R.next_body.size(); i++) {
-    Store(R.next_axes[i], x + 4 * R.next_body[i]);
+    Store(Eigen::Quaterniond(R.next_axes[i]), x + 4 * R.next_body[i]);
     PetscCall(PetscInfo(ts, "new axes for the Euler angles of %s\n", R.scene.bodyName(R.bodies.body[R.next_body[i]].id).c_str()));
   }
   PetscCall(VecRestoreArray(R.axes, &x));
@@ -199,6 +200,78 @@ PetscErrorCode Commit(TS ts, void *ctx)
   PetscCall(UseAxes(R));
   if (!R.changing) PetscCall(Resume(R, ts));
   R.changing = false;
+  PetscFunctionReturn(0);
+}
+
+/* Others' bodies refer to what their owners say */
+PetscErrorCode ExchangeReferences(Runtime &R, const double *own)
+{
+  std::vector<double> other(4 * (R.bodies.body.size() - R.bodies.own));
+  PetscFunctionBegin;
+  if (R.size > 1) {
+    MPI_Datatype quaternion;
+    PetscCallMPI(MPI_Type_contiguous(4, MPI_DOUBLE, &quaternion));
+    PetscCallMPI(MPI_Type_commit(&quaternion));
+    PetscCall(PetscSFBcastBegin(R.axes_sf, quaternion, own, other.data(), MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(R.axes_sf, quaternion, own, other.data(), MPI_REPLACE));
+    PetscCallMPI(MPI_Type_free(&quaternion));
+  }
+  for (PetscInt b = 0; b + 1 < (PetscInt)R.bodies.body.size(); b++)
+    if (HasAxes(R.bodies.body[b])) R.bodies.body[b].C = Load(b < R.bodies.own ? own + 4 * b : other.data() + 4 * (b - R.bodies.own));
+  PetscFunctionReturn(0);
+}
+
+/* Local rotation vectors count from where U is */
+PetscErrorCode Refer(Runtime &R, Vec U)
+{
+  double *u, *x;
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(VecGetArray(R.axes, &x));
+  R.reference_before.assign(x, x + 4 * R.bodies.own);
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (!HasAxes(k)) continue;
+    double *turn = u + k.first + 3, *q = x + 4 * b;
+    Store((LocalTurn(Vector3(turn[0], turn[1], turn[2])) * Eigen::Quaterniond(q[0], q[1], q[2], q[3])).normalized(), q);
+    std::fill(turn, turn + 3, 0.0);
+  }
+  PetscCall(ExchangeReferences(R, x));
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscCall(VecRestoreArray(U, &u));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReferTo(TS, Vec U, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Refer(*static_cast<Runtime *>(ctx), U));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReferBack(TS, void *ctx)
+{
+  Runtime &R = *static_cast<Runtime *>(ctx);
+  double  *x;
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(R.axes, &x));
+  std::copy(R.reference_before.begin(), R.reference_before.end(), x);
+  PetscCall(ExchangeReferences(R, x));
+  PetscCall(VecRestoreArray(R.axes, &x));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode RotationVectors(Runtime &R, TS ts, IS *is)
+{
+  Vec                   U;
+  PetscInt              first;
+  std::vector<PetscInt> at;
+  PetscFunctionBegin;
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecGetOwnershipRange(U, &first, nullptr));
+  for (PetscInt b = 0; b < R.bodies.own; b++)
+    if (HasAxes(R.bodies.body[b])) at.push_back(first + R.bodies.body[b].first + 3);
+  PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)at.size(), at.data(), PETSC_COPY_VALUES, is));
   PetscFunctionReturn(0);
 }
 
@@ -230,6 +303,7 @@ PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V)
 {
   Vec A;
   PetscFunctionBegin;
+  if (R.turns && R.bodies.local) PetscCall(Refer(R, U));
   PetscCall(ChooseNext(R, U, V));
   if (!R.changing) PetscFunctionReturn(0);
   PetscCall(VecDuplicate(U, &A));
@@ -268,7 +342,9 @@ PetscErrorCode MakeAxes(Runtime &R)
   PetscCall(VecGetArray(R.axes, &x));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const BodyData &d = R.scene.bodies[R.bodies.body[b].id];
-    Store(HasAxes(R.bodies.body[b]) ? ChooseAxes(d.A, d.w) : Matrix3(Matrix3::Identity()), x + 4 * b);
+    Matrix3         C = Matrix3::Identity();
+    if (HasAxes(R.bodies.body[b])) C = R.bodies.local ? d.A : ChooseAxes(d.A, d.w);
+    Store(Eigen::Quaterniond(C), x + 4 * b);
   }
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscCall(KeepMemories(R));
@@ -279,22 +355,10 @@ PetscErrorCode MakeAxes(Runtime &R)
 /* Axes and memories as the vector has them */
 PetscErrorCode UseAxes(Runtime &R)
 {
-  double             *x;
-  std::vector<double> other(4 * R.bodies.body.size());
+  double *x;
   PetscFunctionBegin;
   PetscCall(VecGetArray(R.axes, &x));
-  if (R.size > 1) {
-    MPI_Datatype quaternion;
-    PetscCallMPI(MPI_Type_contiguous(4, MPI_DOUBLE, &quaternion));
-    PetscCallMPI(MPI_Type_commit(&quaternion));
-    PetscCall(PetscSFBcastBegin(R.axes_sf, quaternion, x, other.data(), MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(R.axes_sf, quaternion, x, other.data(), MPI_REPLACE));
-    PetscCallMPI(MPI_Type_free(&quaternion));
-  }
-  for (PetscInt b = 0; b + 1 < (PetscInt)R.bodies.body.size(); b++) {
-    const LocalBody &k = R.bodies.body[b];
-    if (HasAxes(k)) R.bodies.setAxes(b, Load(b < R.bodies.own ? x + 4 * b : other.data() + 4 * (b - R.bodies.own)), R.scene.bodies[k.id].inertia);
-  }
+  PetscCall(ExchangeReferences(R, x));
   CopyMemories(R, x + 4 * R.bodies.own, true);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscFunctionReturn(0);
@@ -317,7 +381,7 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
     if (k.kind == BodyKind::Planar) x[k.first + 2] = 0;
-    if (HasEulerAngles(k.kind)) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
+    if (TurnsInSpace(k.kind)) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
   }
   PetscCall(VecRestoreArray(R.rtol, &x));
   R.rtol_of = rtol;
@@ -328,7 +392,12 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 PetscErrorCode AttachReframing(Runtime &R, TS ts)
 {
   PetscFunctionBegin;
-  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns ? Map : nullptr, Commit, &R));
+  const bool local = R.turns && R.bodies.local;
+  IS         is    = nullptr;
+  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns && !local ? Map : nullptr, Commit, &R));
+  if (local) PetscCall(RotationVectors(R, ts, &is));
+  PetscCall(TSHHT3SetRotations(ts, is, local ? ReferTo : nullptr, local ? ReferBack : nullptr, &R));
+  PetscCall(ISDestroy(&is));
   PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
   PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", Prepare));
   PetscFunctionReturn(0);

@@ -14,7 +14,6 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
   PetscCall(VecDuplicate(state[0], &in));
   for (int k = 0; k < 3; k++) PetscCall(VecSet(d[k], 0));
   for (int k = 0; k < 3; k++) {
-    constexpr double binomial[3][3] = {{1, 0, 0}, {1, 1, 0}, {1, 2, 1}};
     double          *y;
     PetscCall(VecGetArrayWrite(in, &y));
     std::copy(x[k].begin(), x[k].end(), y);
@@ -24,8 +23,8 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
     for (int order = k; order < 3; order++) {
       Vec product;
       PetscCall(VecDuplicate(in, &product));
-      PetscCall(MatMult(turn[order - k], in, product));
-      PetscCall(VecAXPY(d[order], binomial[order][k], product));
+      PetscCall(MatMult(turn[order][k], in, product));
+      PetscCall(VecAXPY(d[order], 1, product));
       PetscCall(VecDestroy(&product));
     }
   }
@@ -121,7 +120,7 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
   double          *row      = b->data() + k.first;
   for (int c = 0; c < position; c++) row[c] = in.load(c);
   if (k.kind == BodyKind::Planar) row[2] = moment(2);
-  else if (HasEulerAngles(k.kind)) std::copy(moment.data(), moment.data() + 3, row + 3);
+  else if (TurnsInSpace(k.kind)) std::copy(moment.data(), moment.data() + 3, row + 3);
   PetscFunctionReturn(0);
 }
 
@@ -202,7 +201,7 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   PetscCall(VecDestroy(&y));
   if (mine) {
     const BodyKind kind     = R.bodies.body[local].kind;
-    const int      position = GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : HasEulerAngles(kind) ? 3 : 0;
+    const int      position = GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : TurnsInSpace(kind) ? 3 : 0;
     for (int c = 0; c < position; c++) motion[0](c) = m.shape[first + c];
     for (int c = 0; c < rotations; c++) motion[1](rotations == 1 ? 2 : c) = m.shape[first + position + c];
   }

@@ -32,7 +32,7 @@ std::string Breaks(const SceneData &s)
 {
   for (const BodyData &b : s.bodies) {
     if (b.flexible) return "the flexible body " + b.name + " turns with its frame";
-    if (HasEulerAngles(KindOf(s, b)) && !(b.massless && b.mass == 0 && b.inertia.isZero(0))) return "the body " + b.name + " turns in space";
+    if (TurnsInSpace(KindOf(s, b)) && !(b.massless && b.mass == 0 && b.inertia.isZero(0))) return "the body " + b.name + " turns in space";
   }
   if (!s.states.empty()) return "state " + s.states[0].name;
   if (!s.variables.empty()) return "variable " + s.variables[0].name;

@@ -9,9 +9,24 @@ namespace hhtdae
 namespace
 {
 
-PetscErrorCode I2Function(TS, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
+/* Velocities of local rotations are not the derivatives of what TSHHT3 alone counts anew in every step */
+PetscErrorCode CheckType(TS ts, Runtime &R)
+{
+  PetscBool ours;
+  TSType    type;
+  PetscFunctionBegin;
+  if (R.type_checked || !R.turns || !R.bodies.local) PetscFunctionReturn(0);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
+  PetscCall(TSGetType(ts, &type));
+  PetscCheck(ours, R.scene.comm, PETSC_ERR_ARG_INCOMP, "The scene has bodies that turn in space, whose local rotation vectors TS type %s cannot follow: use Euler angles, -scene_rotations euler313", type);
+  R.type_checked = true;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode I2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
   PetscFunctionBegin;
+  PetscCall(CheckType(ts, *static_cast<Runtime *>(ctx)));
   PetscCall(Guarded([&] { return Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F); }));
   PetscFunctionReturn(0);
 }

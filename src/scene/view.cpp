@@ -19,7 +19,7 @@ Contents Count(const SceneData &s)
 {
   Contents c;
   for (const BodyData &b : s.bodies) {
-    c.turning |= HasEulerAngles(KindOf(s, b));
+    c.turning |= TurnsInSpace(KindOf(s, b));
     c.flexible |= (bool)b.flexible;
     if (b.flexible) c.modes += b.flexible->model->modes();
   }
@@ -60,7 +60,7 @@ PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
   without(c.velocities, "velocity terms of forces");
   without(c.curved, "second derivatives of constraints");
   without(c.flexible, "flexible bodies");
-  without(c.turning, "Euler angles and gyroscopic terms");
+  without(c.turning, "rotations in space and gyroscopic terms");
   if (R) {
     without(R->remembers, "angles over full turns");
     without(R->uses_acceleration, "accelerations in definitions");
@@ -71,7 +71,8 @@ PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "  unknowns: %d, of these %d multipliers, %d force states, %d variables, %d states\n",
                                    (int)M.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
-  if (R && R->turns) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->reframed));
+  if (c.turning) PetscCall(PetscViewerASCIIPrintf(viewer, "  rotations: %s\n", s.start.rotations == Rotations::Local ? "local rotation vectors" : "Euler angles"));
+  if (R && R->turns && !R->bodies.local) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->reframed));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  matrix: %s\n", M.wants_triangle ? "one triangle" : ("all of it, " + M.full_because).c_str()));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);

@@ -33,7 +33,7 @@ inline PetscErrorCode WatchAttitudes(TS, PetscInt, PetscReal, Vec U, void *ctx)
     const hhtdae::LocalBody &k = w.R.bodies.body[b];
     hhtdae::Matrix3          A;
     hhtdae::EulerAxes        e;
-    if (!hhtdae::HasEulerAngles(k.kind)) continue;
+    if (!hhtdae::TurnsInSpace(k.kind)) continue;
     hhtdae::EulerFrame(u + k.first + 3, A, e);
     w.path[b].push_back((A * k.C).row(2).transpose());
   }
@@ -65,14 +65,13 @@ inline double ChooseAxes(const Attitudes &path, double *quaternion)
   return std::sqrt(1. - worst * worst);
 }
 
-/* The same attitude and angular velocity with other axes */
-inline void ToAxes(const hhtdae::Matrix3 &from, const hhtdae::Matrix3 &to, double *eps, double *rate)
+/* An attitude and an angular velocity as Euler angles of these axes and their rates */
+inline void ToAxes(const hhtdae::BodyMotion &b, const hhtdae::Matrix3 &axes, double *eps, double *rate)
 {
-  hhtdae::Matrix3   A;
-  hhtdae::EulerAxes e;
-  hhtdae::EulerFrame(eps, A, e);
-  const hhtdae::Vector3 w      = hhtdae::AngularVelocity(e, hhtdae::Vector3(rate[0], rate[1], rate[2]));
-  const hhtdae::Vector3 angles = hhtdae::EulerAngles(A * from * to.transpose());
+  hhtdae::Matrix3       A;
+  hhtdae::EulerAxes     e;
+  const hhtdae::Vector3 w      = b.w;
+  const hhtdae::Vector3 angles = hhtdae::EulerAngles(b.A * axes.transpose());
   hhtdae::EulerFrame(angles.data(), A, e);
   const hhtdae::Vector3 rates = hhtdae::EulerRates(e, w);
   for (int i = 0; i < 3; i++) {

@@ -10,9 +10,9 @@
 
   A scene remembers angles over full turns, from accepted step to accepted step. Other integrators do not tell when they
   accept one: here the last state before the time goes on counts as accepted. initial() puts the memory back to the
-  start. One thing another integrator cannot follow: the new axes that a body gets when its Euler angles come near their
-  singularity. fitAxes() turns the axes of all bodies so that they stay away from it for the whole run, and checkAxes()
-  refuses scenes in which that cannot be; hhtdae may change axes all the same, and toStart() brings its results back.
+  start. Local rotation vectors are another thing that they cannot follow, so the problem has Euler angles; and new axes that a body gets when
+  these come near their singularity. fitAxes() turns the axes of all bodies so that they stay away from it for the whole run, and checkAxes()
+  refuses scenes in which that cannot be; hhtdae runs with what coordinates it likes, and toStart() brings its results to these angles.
 */
 #ifndef HHTDAE_BENCH_SCENE_PROBLEM_H
 #define HHTDAE_BENCH_SCENE_PROBLEM_H
@@ -66,11 +66,20 @@ public:
     PetscCall(scene_->createTS(ts));
     hhtdae::Runtime &R = *hhtdae::RunOf(*ts);
     latest_            = &R;
-    PetscCall(useAxes(R));
+    if (!R.bodies.local) PetscCall(useAxes(R));
     PetscCall(TS2GetSolution(*ts, &U, &V));
     PetscCall(hhtdae::InitialState(R, U, V));
     PetscCall(TSSetMaxTime(*ts, t1));
     PetscCall(TSSetMaxSteps(*ts, 100000000));
+    PetscFunctionReturn(0);
+  }
+  /* The same with the problem's angles, for who evaluates its residual or integrates with another type */
+  PetscErrorCode createEulerTS(TS *ts) const
+  {
+    const WithEulerAngles with(*scene_);
+    PetscFunctionBegin;
+    PetscCall(createTS(ts));
+    PetscCheck(!latest_->bodies.local, PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP, "Scene %s: other integrators cannot follow -scene_rotations local", name.c_str());
     PetscFunctionReturn(0);
   }
 
@@ -109,16 +118,16 @@ public:
   }
   static constexpr double singular() { return 0.1; }
 
-  /* Coordinates and rates as hhtdae has them after changes of axes in the run of the latest TS, into the axes of the start; angles on
-     the turn next to near */
+  /* Coordinates and velocities as hhtdae has them in the run of the latest TS, into angles about the axes of the start; on the turn next to near */
   void toStart(double *u, double *v, const double *near) const
   {
-    const hhtdae::Bodies &B = latest_->bodies;
+    hhtdae::Bodies &B = latest_->bodies;
+    B.move(u, v);
     for (PetscInt b = 0; b < B.own; b++) {
       const hhtdae::LocalBody &k = B.body[b];
-      if (!hhtdae::HasEulerAngles(k.kind)) continue;
+      if (!hhtdae::TurnsInSpace(k.kind)) continue;
       const hhtdae::Matrix3 C = axes(b);
-      if ((C - k.C).cwiseAbs().maxCoeff() > 1e-14) ToAxes(k.C, C, u + k.first + 3, v + k.first + 3);
+      if (B.local || (C - k.C).cwiseAbs().maxCoeff() > 1e-14) ToAxes(B.now[b], C, u + k.first + 3, v + k.first + 3);
       for (PetscInt i = k.first + 3; i < k.first + 6; i++)
         if (std::isfinite(near[i])) u[i] += 2. * PETSC_PI * std::round((near[i] - u[i]) / (2. * PETSC_PI));
     }
@@ -233,8 +242,17 @@ private:
   std::vector<double>            u0_, v0_, axes_; /* the start; axes and memories there */
   std::vector<State>             states_;
   mutable State                  last_;                                    /* evaluated */
-  mutable const hhtdae::Runtime *latest_          = nullptr;               /* of the TS made last */
+  mutable hhtdae::Runtime       *latest_          = nullptr;               /* of the TS made last */
   std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
+
+  /* Runs that are made while it lives have Euler angles */
+  struct WithEulerAngles {
+    hhtdae::Rotations &rotations;
+    hhtdae::Rotations  before;
+    explicit WithEulerAngles(hhtdae::Scene &s) : rotations(s.start().rotations), before(rotations) { rotations = hhtdae::Rotations::Euler313; }
+    ~WithEulerAngles() { rotations = before; }
+    WithEulerAngles(const WithEulerAngles &) = delete;
+  };
 
   SceneProblem() = default;
 
@@ -246,7 +264,7 @@ private:
     TS                ts;
 
     PetscFunctionBegin;
-    PetscCall(createTS(&ts));
+    PetscCall(createEulerTS(&ts));
     AttitudeWatch watch = {*hhtdae::RunOf(ts), path};
     path.assign(watch.R.bodies.own, {});
     PetscCall(TSSetTolerances(ts, eps, nullptr, eps, nullptr));
@@ -291,6 +309,7 @@ private:
     scene_ = build(PETSC_COMM_SELF);
     PetscCheck(scene_ && DataOf(*scene_).comm == PETSC_COMM_SELF, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
                "Scene %s: build it on the communicator that is passed, which is PETSC_COMM_SELF", name.c_str());
+    const WithEulerAngles with(*scene_);
     PetscCall(scene_->createTS(&ts_));
     PetscCall(TSGetTime(ts_, &t0));
     t1 = end;
@@ -365,7 +384,7 @@ private:
 
     PetscFunctionBegin;
     states_.clear();
-    PetscCall(createTS(&ts));
+    PetscCall(createEulerTS(&ts));
     PetscCall(TS2GetSolution(ts, &U, &V));
     PetscCall(copy(U, u0_));
     PetscCall(copy(V, v0_));
@@ -402,7 +421,7 @@ private:
     TSConvergedReason reason;
 
     PetscFunctionBegin;
-    PetscCall(createTS(&ts));
+    PetscCall(createEulerTS(&ts));
     PetscCall(remember(*hhtdae::RunOf(ts)));
     PetscCall(TSHHT3SetCoordinateChange(ts, nullptr, nullptr, nullptr, nullptr));
     PetscCall(TSHHT3SetStart(ts, TSHHT3_START_OFF));

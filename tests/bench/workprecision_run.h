@@ -177,7 +177,7 @@ struct Case {
   std::string                                                                    name;
   std::function<PetscErrorCode(std::unique_ptr<Problem> *, Origin *)>            make;
   std::function<void(const Problem &, double, const double *, double *)>         phiT     = nullptr;
-  std::function<PetscErrorCode(const Problem &, TS *)>                           createTS = nullptr;
+  std::function<PetscErrorCode(const Problem &, bool hhtdae, TS *)>              createTS = nullptr;
   std::function<void(const Problem &, const double *u, const double *v)>         accept   = nullptr;
   std::function<void(const Problem &, double *u, double *v, const double *near)> toStart  = nullptr;
   bool                                                                           scene    = false;

@@ -24,7 +24,7 @@ inline Case SceneCallbacks()
 {
   Case c;
   c.scene    = true;
-  c.createTS = [](const Problem &q, TS *ts) { return AsScene(q).createTS(ts); };
+  c.createTS = [](const Problem &q, bool hhtdae, TS *ts) { return hhtdae ? AsScene(q).createTS(ts) : AsScene(q).createEulerTS(ts); };
   c.accept   = [](const Problem &q, const double *u, const double *v) { AsScene(q).accept(u, v); };
   c.toStart  = [](const Problem &q, double *u, double *v, const double *near) { AsScene(q).toStart(u, v, near); };
   c.phiT     = [](const Problem &q, double t, const double *, double *f) { AsScene(q).phiT(t, f); };

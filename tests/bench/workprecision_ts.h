@@ -284,7 +284,7 @@ inline PetscErrorCode CreateNativeTS(TSRun &r)
   Mat J, P;
 
   PetscFunctionBegin;
-  PetscCall(r.which.createTS(r.problem, &r.ts));
+  PetscCall(r.which.createTS(r.problem, r.settings.stepper == Stepper::HHT, &r.ts));
   PetscCall(TSGetI2Function(r.ts, &F, &r.function, &r.functionContext));
   PetscCall(TSGetI2Jacobian(r.ts, &J, &P, &r.jacobian, &r.jacobianContext));
   PetscCall(TSSetI2Function(r.ts, F, NativeFunction, &r));

@@ -173,7 +173,7 @@ void mixed(Scene &scene)
                                 Expression{{Measure::value(s)}, [](const Real *m) -> Real { return m[0] * -2.; }}});
 }
 
-/* Bodies that turn over on springs between them: new axes of angles on one rank, which others read */
+/* Bodies that turn over on springs between them: new references, or axes of Euler angles, on one rank, which others read */
 void turning(Scene &scene)
 {
   Marker last = scene.marker(scene.ground());
@@ -212,8 +212,14 @@ TEST(SceneRanks, Mixed) { compare("mixed scene", Space::Spatial, mixed, 0.2, 400
 
 TEST(SceneRanks, BodiesTurningOver)
 {
-  const End e = compare("bodies turning over", Space::Spatial, turning, 2.4, 160);
-  EXPECT_GT(e.s.changes, 0);
+  for (Rotations rotations : {Rotations::Local, Rotations::Euler313}) {
+    const auto with = [=](Scene &s) {
+      s.start().rotations = rotations;
+      turning(s);
+    };
+    const End e = compare(rotations == Rotations::Local ? "bodies turning over" : "the same in Euler angles", Space::Spatial, with, 2.4, 160);
+    EXPECT_EQ(e.s.changes > 0, rotations == Rotations::Euler313);
+  }
 }
 
 /* With the step chosen by its error the sequence may differ by rounding: the same to the tolerance, and the same axes

@@ -35,7 +35,7 @@ struct Leg : hhtex::Problem {
     t1   = p.t1;
     role = p.role;
     for (const LocalBody &b : runtime().bodies.body)
-      if (HasEulerAngles(b.kind)) angles.push_back(b.first + 3);
+      if (TurnsInSpace(b.kind)) angles.push_back(b.first + 3);
   }
   Runtime &runtime() const { return p.run(); }
 
@@ -73,7 +73,7 @@ struct Leg : hhtex::Problem {
     Bodies &B = runtime().bodies;
     for (PetscInt b = 0; b < (PetscInt)B.body.size(); b++) {
       const LocalBody k = B.body[b];
-      if (!HasEulerAngles(k.kind)) continue;
+      if (!TurnsInSpace(k.kind)) continue;
       double   *eps = &u0[k.first + 3], *rate = &v0[k.first + 3], *acc = &a0[k.first + 3];
       Matrix3   A;
       EulerAxes e;
@@ -89,7 +89,7 @@ struct Leg : hhtex::Problem {
         rate[i] = y(i);
         acc[i]  = z(i);
       }
-      B.setAxes(b, C, runtime().scene.bodies[k.id].inertia);
+      B.body[b].C = C;
     }
   }
 };

@@ -167,8 +167,8 @@ private:
           most[g](to) += missing_[(std::size_t)i];
           noise[g](to) = rounding_[(std::size_t)i];
         }
-      hhtdae::Matrix3 G = hhtdae::Matrix3::Identity(); /* the rows of the Euler angles are G^T times the moment */
-      if (hhtdae::HasEulerAngles(body.kind)) G = R_.bodies.now[(std::size_t)local].euler.G().inverse().transpose().eval();
+      hhtdae::Matrix3 G = hhtdae::Matrix3::Identity(); /* rotational rows are G^T times the moment */
+      if (hhtdae::TurnsInSpace(body.kind)) G = R_.bodies.now[(std::size_t)local].G.inverse().transpose().eval();
       of_[b] = {left[0], G * left[1], most[0].norm(), G.norm() * most[1].norm(), noise[0].norm(), G.norm() * noise[1].norm()};
     }
     PetscCall(VecRestoreArrayRead(F, &f));

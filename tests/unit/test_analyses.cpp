@@ -167,7 +167,7 @@ TEST(Analyses, AStateThatWasChangedByHand)
   const double larger = m.acceleration.norm();
   EXPECT_NEAR(larger, std::sqrt(0.5) / (1. / 3), 1e-6) << "its moment over the inertia";
   must(TSSetTime(run.ts, 5));
-  must(VecScale(U, 0.5)); /* another angle, and multipliers that are nobody's */
+  must(VecShift(U, 0.1)); /* another angle and place, and multipliers that are nobody's */
   must(now.take(run.ts));
   must(now.motion(l.tip, &m));
   EXPECT_GT(m.acceleration.norm(), 0.1);

@@ -55,13 +55,24 @@ double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt fi
   const int    m = (int)c.shape.cols();
   const double d = 1e-4;
   const Array  q = whole(s.U), v = whole(s.V), a = whole(s.A);
+  const auto   turned = [](const Vector3 &x) -> Matrix3 { return x.norm() > 0 ? Eigen::AngleAxisd(x.norm(), x.normalized()).toRotationMatrix() : Matrix3(Matrix3::Identity()); };
   const auto   place = [&](std::size_t p, double t, double by) {
-    Array x(6 + m);
-    for (int i = 0; i < 6 + m; i++) x[i] = q[first + i] + t * v[first + i] + 0.5 * t * t * a[first + i];
-    x[k] += by;
-    Matrix3   A;
-    EulerAxes e;
-    EulerFrame(x.data() + 3, A, e);
+    Array x(6 + m), along(6 + m);
+    for (int i = 0; i < 6 + m; i++) {
+      along[i] = t * v[first + i] + 0.5 * t * t * a[first + i];
+      x[i]     = q[first + i] + along[i];
+    }
+    Matrix3 A;
+    if (s.R.bodies.local) { /* x is a rotation vector, v an angular velocity */
+      Vector3 turn(q[first + 3], q[first + 4], q[first + 5]);
+      if (k >= 3 && k < 6) turn(k - 3) += by;
+      A = turned(Vector3(along[3], along[4], along[5])) * turned(turn);
+      if (k < 3 || k >= 6) x[k] += by;
+    } else {
+      x[k] += by;
+      EulerAxes e;
+      EulerFrame(x.data() + 3, A, e);
+    }
     return c.place(p, Vector3(x[0], x[1], x[2]), A * C, Eigen::Map<const Eigen::VectorXd>(x.data() + 6, m));
   };
   double sum = 0;
@@ -78,14 +89,15 @@ double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt fi
 /* Free body, all mass terms: every row is the sum over the particles */
 TEST(FlexibleScene, EquationsAreSumsOverParticles)
 {
-  for (bool free : {true, false}) {
+  for (bool free : {true, false})
+    for (Rotations rotations : all_rotations) {
     const ModalCloud c(7, 4, 3, free);
     Scene            scene(PETSC_COMM_WORLD);
     const Vector3    g(0.3, 1, -9.81);
     scene.gravity(g);
     scene.add("cloud", flexible(c));
     must(scene.setUp());
-    AnyState     s(scene, 5);
+    AnyState     s(scene, 5, 0.4, rotations);
     const Array  f = s.residual(), q = whole(s.U), v = whole(s.V);
     const Matrix3 C = s.R.bodies.body[0].C;
     ASSERT_EQ((PetscInt)f.size(), 10);
@@ -105,11 +117,12 @@ TEST(FlexibleScene, JacobianAgainstDifferences)
   for (ModalMass mass : {ModalMass::Full, ModalMass::Partial, ModalMass::Constant}) {
     const ModalCloud c(9, 5, 11, true);
     Arm              arm(flexible(c, mass));
-    for (unsigned seed : {1, 2, 3}) {
-      AnyState s(arm.scene, seed, 0.3);
-      EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5) << "mass matrix " << (int)mass;
-      EXPECT_LT(s.jacobianError(0, 0), 1e-5);
-    }
+    for (unsigned seed : {1, 2, 3})
+      for (Rotations rotations : all_rotations) {
+        AnyState s(arm.scene, seed, 0.3, rotations);
+        EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5) << "mass matrix " << (int)mass;
+        EXPECT_LT(s.jacobianError(0, 0), 1e-5);
+      }
   }
 }
 

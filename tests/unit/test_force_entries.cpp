@@ -176,7 +176,7 @@ namespace
 {
 
 struct Motion {
-  Matrix<6, 1> q, v; /* centre of mass, Euler angles */
+  Matrix<6, 1> q, v; /* of the centre of mass and rotation */
 };
 
 /* A body beside the ground, thrown and spinning, held by one element; where it is at t = 0.4 */
@@ -229,7 +229,7 @@ template <class Spec> void ExpectSameAsState(Spec s)
   ASSERT_EQ(Throw(SpringDamper{}, &unloaded), 0);
   EXPECT_LT((eliminated.q - carried.q).norm(), 1e-5);
   EXPECT_LT((eliminated.v - carried.v).norm(), 1e-4);
-  EXPECT_GT((eliminated.q - unloaded.q).norm(), 1e-2);
+  EXPECT_GT((eliminated.v - unloaded.v).norm(), 1e-2);
 }
 
 } // namespace

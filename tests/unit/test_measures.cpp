@@ -89,11 +89,12 @@ double worstJacobian(Scene &s)
 {
   double worst = 0;
   must(s.setUp());
-  for (unsigned seed : {1, 2, 3}) {
-    AnyState state(s, seed);
-    widen(worst, state.jacobianError(.7, 1.3));
-    widen(worst, state.jacobianError(0, 0));
-  }
+  for (unsigned seed : {1, 2, 3})
+    for (Rotations rotations : all_rotations) {
+      AnyState state(s, seed, 0.4, rotations);
+      widen(worst, state.jacobianError(.7, 1.3));
+      widen(worst, state.jacobianError(0, 0));
+    }
   MEASURED("Jacobian against differences: %.1e", worst);
   return worst;
 }
@@ -267,10 +268,12 @@ TEST_P(Both, RatesOfMeasures)
   double       worst = 0;
   for (std::size_t k = 0; k < x.size(); k++) {
     AnyState     state(m.scene, 7);
+    state.refer();
     const double rate = state.definition(dx[k]);
     state.advance(d);
     const double after = state.definition(x[k]);
     AnyState     back(m.scene, 7);
+    back.refer();
     back.advance(-d);
     const double before = back.definition(x[k]), difference = (after - before) / (2 * d);
     widen(worst, std::abs(difference - rate) / std::max(1., std::abs(rate)));

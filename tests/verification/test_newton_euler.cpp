@@ -89,7 +89,7 @@ Judged judge(Scene &scene, const Specs &specs, double end, const std::string &op
   SceneRun  run(scene, end, options);
   must(TSMonitorSet(run.ts, Watch, &w, nullptr));
   must(run.solve());
-  EXPECT_GT(w.result.steps, 5);
+  EXPECT_GT(w.result.steps, 1); /* a ball that rolls evenly needs two */
   return w.result;
 }
 

@@ -28,10 +28,9 @@ void AddBody(const LocalBody &k, const BodyMotion &b, const Vector3 &gravity, Ba
     s.angular(2) += k.J(2, 2) * b.w(2);
   }
   if (k.kind != BodyKind::Rigid) return;
-  const Matrix3 A = b.A * k.C.transpose(); /* axes of the Euler angles, in which J is given */
-  const Vector3 w = A.transpose() * b.w, h = k.J * w;
+  const Vector3 w = b.A.transpose() * b.w, h = k.J * w;
   s.kinetic += 0.5 * w.dot(h);
-  s.angular += A * h;
+  s.angular += b.A * h;
 }
 
 } // namespace

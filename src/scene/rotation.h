@@ -1,0 +1,79 @@
+/*
+  How a body's attitude depends on its three rotational coordinates: dA = [G dU] A, G the matrix of 3-1-3 Euler angles (euler.h) or, by
+  default, the tangent of a local rotation vector.
+
+  A local rotation vector x turns the body from a reference attitude C, A = exp([x]) C, about axes of space. The reference is the attitude
+  at the last accepted state, so that x is the rotation in the present step and stays far from the singularity at a full turn. Velocities and
+  accelerations that belong to it are the angular velocity w and its derivative, which do not depend on the reference: with x = 0 at the
+  beginning of a step, Newmark's relations are those of the generalized-alpha method on the rotation group (Bruels, Cardona, Arnold 2012,
+  with w in axes of space). The rows of a body's moments are multiplied by G^T in both cases, as those of generalized forces.
+
+    exp([x]) = 1 + S1 [x] + S2 [x]^2,    G = 1 + S2 [x] + S3 [x]^2,    w = G x',    S_m(z) = sum (-z)^k/(2k+m)!,  z = |x|^2
+
+  are Stumpff's functions: S1 = sin a/a, S2 = (1 - cos a)/a^2, ..., with dS_m/dz = (m S_{m+2} - S_{m+1})/2 and S_m = 1/m! - z S_{m+2}.
+*/
+#ifndef HHTDAE_SCENE_ROTATION_H
+#define HHTDAE_SCENE_ROTATION_H
+
+#include "frames.h"
+
+namespace hhtdae
+{
+
+/* S1 to S5 at z, to rounding */
+struct Stumpff {
+  double s[6];
+  explicit Stumpff(double z)
+  {
+    if (z > 1) {
+      const double a = std::sqrt(z);
+      s[1]           = std::sin(a) / a;
+      s[2]           = (1 - std::cos(a)) / z;
+      for (int m = 3; m < 6; m++) s[m] = (1. / (m == 3 ? 1 : m == 4 ? 2 : 6) - s[m - 2]) / z;
+      return;
+    }
+    s[5] = series(z, 5);
+    s[4] = series(z, 4);
+    for (int m = 3; m > 0; m--) s[m] = 1. / (m == 3 ? 6 : m) - z * s[m + 2];
+  }
+
+private:
+  static double series(double z, int m)
+  {
+    double s = 1;
+    for (int k = 7; k > 0; k--) s = 1 - z * s / ((2 * k + m) * (2 * k + m - 1));
+    return s / (m == 5 ? 120 : 24);
+  }
+};
+
+inline void LocalFrame(const Vector3 &x, const Matrix3 &C, Matrix3 &A, Matrix3 &G)
+{
+  const double  z = x.squaredNorm();
+  const Stumpff f(z);
+  const Matrix3 X = Cross<double>(x), X2 = x * x.transpose() - z * Matrix3::Identity();
+  A.noalias() = (Matrix3::Identity() + f.s[1] * X + f.s[2] * X2) * C;
+  G           = Matrix3::Identity() + f.s[2] * X + f.s[3] * X2;
+}
+
+/* d(G^T m)/dx for fixed m */
+inline Matrix3 LocalMomentGradient(const Vector3 &x, const Vector3 &m)
+{
+  const double  z = x.squaredNorm(), along = x.dot(m);
+  const Stumpff f(z);
+  const double  d2 = 2 * f.s[4] - f.s[3], d3 = 3 * f.s[5] - f.s[4]; /* 2 dS2/dz, 2 dS3/dz */
+  return f.s[2] * Cross<double>(m) + f.s[3] * (along * Matrix3::Identity() + x * m.transpose() - 2 * m * x.transpose()) +
+         (d3 * (along * x - z * m) - d2 * x.cross(m)) * x.transpose();
+}
+
+/* The unit quaternion of exp([x]) */
+inline Eigen::Quaterniond LocalTurn(const Vector3 &x)
+{
+  const double  z = 0.25 * x.squaredNorm();
+  const Stumpff f(z);
+  const Vector3 v = 0.5 * f.s[1] * x;
+  return {1 - z * f.s[2], v(0), v(1), v(2)};
+}
+
+} // namespace hhtdae
+
+#endif

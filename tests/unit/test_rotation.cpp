@@ -1,0 +1,229 @@
+/* Local rotation vectors: their kinematics, and an application of its own that has them */
+#include "hhtdae/scene.h"
+#include "scene/rotation.h"
+#include "support.h"
+
+#include <random>
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+Matrix3 exponential(const Vector3 &x)
+{
+  const double a = x.norm();
+  return a > 0 ? Eigen::AngleAxisd(a, x / a).toRotationMatrix() : Matrix3(Matrix3::Identity());
+}
+
+/* In all directions, up to where they are singular; both ways to Stumpff's functions meet at 1 */
+std::vector<Vector3> vectors()
+{
+  std::vector<Vector3>             all;
+  std::mt19937                     random(3);
+  std::normal_distribution<double> any;
+  for (double a : {0., 1e-12, 1e-4, 0.3, 0.9999999, 1.0000001, 2., 3., 5.9}) all.push_back(a * Vector3(any(random), any(random), any(random)).normalized());
+  return all;
+}
+
+} // namespace
+
+TEST(Rotation, AttitudeAndTangent)
+{
+  const Matrix3 C = exponential({0.3, -1, 2});
+  const double  d = 1e-5;
+  for (const Vector3 &x : vectors()) {
+    Matrix3 A, G, up, down, unused;
+    LocalFrame(x, C, A, G);
+    EXPECT_LT((A - exponential(x) * C).norm(), 4e-15) << x.norm();
+    EXPECT_LT((LocalTurn(x).toRotationMatrix() * C - A).norm(), 4e-15) << x.norm();
+    for (int k = 0; k < 3; k++) {
+      LocalFrame(x + d * Vector3::Unit(k), C, up, unused);
+      LocalFrame(x - d * Vector3::Unit(k), C, down, unused);
+      EXPECT_LT(((up - down) / (2 * d) - Cross<double>(Vector3(G.col(k))) * A).norm(), 1e-9) << x.norm();
+    }
+  }
+}
+
+TEST(Rotation, GradientOfMoments)
+{
+  const Vector3 m(0.4, -3, 1.5);
+  const double  d = 1e-5;
+  for (const Vector3 &x : vectors())
+    for (int k = 0; k < 3; k++) {
+      Matrix3 A, up, down;
+      LocalFrame(x + d * Vector3::Unit(k), Matrix3::Identity(), A, up);
+      LocalFrame(x - d * Vector3::Unit(k), Matrix3::Identity(), A, down);
+      EXPECT_LT(((up - down).transpose() * m / (2 * d) - LocalMomentGradient(x, m).col(k)).norm(), 1e-9) << x.norm();
+    }
+}
+
+/* ---- with PETSc's interface alone ---- */
+
+namespace
+{
+
+/* A free body with two equal moments of inertia. With L its angular momentum, fixed in space, and s its spin about the third axis,
+   w = L/J1 + (1 - J3/J1) s e3, so that A = exp([L] t/J1) A0 exp([e3] (1 - J3/J1) s t). */
+struct FreeBody {
+  const Vector3 J{2, 2, 3}, spin{1, 0.5, 4}; /* body axes, at the start those of space */
+  Matrix3       C = Matrix3::Identity(), before;
+
+  Matrix3 exact(double t) const
+  {
+    const Vector3 L = J.asDiagonal() * spin;
+    return exponential(t / J(0) * L) * exponential((1 - J(2) / J(0)) * spin(2) * t * Vector3::UnitZ());
+  }
+  Matrix3 attitude(Vec U) const
+  {
+    const Array x = whole(U);
+    return exponential(Vector3(x[0], x[1], x[2])) * C;
+  }
+
+  static PetscErrorCode residual(TS, PetscReal, Vec U, Vec V, Vec W, Vec F, void *ctx)
+  {
+    const auto        &b = *static_cast<FreeBody *>(ctx);
+    const PetscScalar *u, *v, *w;
+    PetscScalar       *f;
+    Matrix3            A, G;
+    PetscFunctionBeginUser;
+    PetscCall(VecGetArrayRead(U, &u));
+    PetscCall(VecGetArrayRead(V, &v));
+    PetscCall(VecGetArrayRead(W, &w));
+    PetscCall(VecGetArrayWrite(F, &f));
+    const Vector3 x(u[0], u[1], u[2]), rate(v[0], v[1], v[2]), alpha(w[0], w[1], w[2]);
+    LocalFrame(x, b.C, A, G);
+    const Matrix3 I             = A * b.J.asDiagonal() * A.transpose();
+    Eigen::Map<Vector3>(f, 3)   = G.transpose() * (I * alpha + rate.cross(I * rate));
+    PetscCall(VecRestoreArrayWrite(F, &f));
+    PetscCall(VecRestoreArrayRead(W, &w));
+    PetscCall(VecRestoreArrayRead(V, &v));
+    PetscCall(VecRestoreArrayRead(U, &u));
+    PetscFunctionReturn(0);
+  }
+  static PetscErrorCode refer(TS, Vec U, void *ctx)
+  {
+    auto &b = *static_cast<FreeBody *>(ctx);
+    PetscFunctionBeginUser;
+    b.before = b.C;
+    b.C      = b.attitude(U);
+    PetscCall(VecZeroEntries(U));
+    PetscFunctionReturn(0);
+  }
+  static PetscErrorCode back(TS, void *ctx)
+  {
+    auto &b = *static_cast<FreeBody *>(ctx);
+    PetscFunctionBeginUser;
+    b.C = b.before;
+    PetscFunctionReturn(0);
+  }
+};
+
+struct BodyRun {
+  FreeBody body;
+  TS       ts;
+  Vec      U, V, F;
+  double   largest = 0; /* error at the ends of steps and between them */
+
+  explicit BodyRun(const std::string &options)
+  {
+    IS             is;
+    const PetscInt first = 0;
+    must(VecCreateSeq(PETSC_COMM_SELF, 3, &U));
+    must(VecDuplicate(U, &V));
+    must(VecDuplicate(U, &F));
+    for (int k = 0; k < 3; k++) must(VecSetValue(V, k, body.spin(k), INSERT_VALUES));
+    must(VecAssemblyBegin(V));
+    must(VecAssemblyEnd(V));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetType(ts, TSHHT3));
+    must(TSSetI2Function(ts, F, FreeBody::residual, &body));
+    must(TS2SetSolution(ts, U, V));
+    must(ISCreateGeneral(PETSC_COMM_SELF, 1, &first, PETSC_COPY_VALUES, &is));
+    must(TSHHT3SetRotations(ts, is, FreeBody::refer, FreeBody::back, &body));
+    must(ISDestroy(&is));
+    must(TSSetMaxTime(ts, 2));
+    must(TSSetMaxSteps(ts, 1000000));
+    must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+    must(TSMonitorSet(ts, watch, this, nullptr));
+    Options in(options);
+    must(TSSetFromOptions(ts));
+  }
+  ~BodyRun()
+  {
+    TSDestroy(&ts);
+    for (Vec *v : {&U, &V, &F}) VecDestroy(v);
+  }
+  BodyRun(const BodyRun &) = delete;
+
+  static PetscErrorCode watch(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
+  {
+    auto &r = *static_cast<BodyRun *>(ctx);
+    PetscFunctionBeginUser;
+    widen(r.largest, (r.body.attitude(U) - r.body.exact(t)).norm());
+    if (step == 0) PetscFunctionReturn(0);
+    PetscReal last;
+    Vec       between;
+    PetscCall(VecDuplicate(U, &between));
+    PetscCall(TSGetPrevTime(ts, &last));
+    const PetscReal middle = last + 0.4 * (t - last);
+    PetscCall(TSHHT3Interpolate(ts, middle, between, nullptr, nullptr));
+    widen(r.largest, (r.body.attitude(between) - r.body.exact(middle)).norm());
+    PetscCall(VecDestroy(&between));
+    PetscFunctionReturn(0);
+  }
+  double error()
+  {
+    must(TSSolve(ts, nullptr));
+    return largest;
+  }
+};
+
+double errorOf(const std::string &options) { return BodyRun(options).error(); }
+
+std::string constant(double h) { return "-ts_adapt_type none -ts_dt " + std::to_string(h); }
+
+} // namespace
+
+TEST(Rotation, SecondOrderThroughPETSc)
+{
+  for (const char *form : {" -ts_hhtdae_alpha -0.05 ", " -ts_hhtdae_alpha -0.3 ", " -ts_hhtdae_radius 0.5 "}) {
+    const double a = errorOf(form + constant(4e-3)), b = errorOf(form + constant(2e-3)), order = std::log2(a / b);
+    MEASURED("free body,%s: errors of the attitude %.2e, %.2e: order %.2f", form, a, b, order);
+    EXPECT_NEAR(order, 2, 0.1) << form;
+    EXPECT_LT(b, 2e-3);
+    const double c = errorOf(form + tolerance(1e-6)), d = errorOf(form + tolerance(1e-9));
+    MEASURED("chosen steps: %.2e at 1e-6, %.2e at 1e-9", c, d);
+    EXPECT_LT(d, c / 50) << form; /* h goes with the cube root, the error with its square */
+  }
+  const double a = errorOf(" -ts_hhtdae_form paper " + constant(2e-3)), b = errorOf(" -ts_hhtdae_form paper " + constant(1e-3));
+  EXPECT_NEAR(std::log2(a / b), 1, 0.15);
+}
+
+TEST(Rotation, WhatIsRefused)
+{
+  TS  ts;
+  IS  is;
+  Vec U, V, F;
+  FreeBody       body;
+  ErrorTrap      trap;
+  const PetscInt second = 1;
+  must(ISCreateGeneral(PETSC_COMM_SELF, 1, &second, PETSC_COPY_VALUES, &is));
+  must(VecCreateSeq(PETSC_COMM_SELF, 3, &U));
+  must(VecDuplicate(U, &V));
+  must(VecDuplicate(U, &F));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, F, FreeBody::residual, &body));
+  must(TS2SetSolution(ts, U, V));
+  EXPECT_NE(TSHHT3SetRotations(ts, is, FreeBody::refer, nullptr, &body), 0);
+  EXPECT_TRUE(trap.says("TSHHT3SetRotations() needs an index set and both functions, or none of them")) << trap.message;
+  EXPECT_NE(TSHHT3SetRotations(ts, nullptr, FreeBody::refer, FreeBody::back, &body), 0);
+  must(TSHHT3SetRotations(ts, is, FreeBody::refer, FreeBody::back, &body));
+  EXPECT_NE(TSSetUp(ts), 0);
+  EXPECT_TRUE(trap.says("rotation vector at 1, but this rank's unknowns are 0 to 2")) << trap.message;
+  must(ISDestroy(&is));
+  must(TSDestroy(&ts));
+  for (Vec *v : {&U, &V, &F}) must(VecDestroy(v));
+}
