@@ -2,6 +2,7 @@
 #ifndef HHTDAE_TESTS_SCENE_JACOBIAN_H
 #define HHTDAE_TESTS_SCENE_JACOBIAN_H
 
+#include "euler_run.h"
 #include "scene_run.h"
 #include <random>
 
@@ -14,11 +15,6 @@ constexpr hhtdae::Rotations all_rotations[] = {hhtdae::Rotations::Local, hhtdae:
 class AnyState
 {
   std::unique_ptr<hhtdae::Runtime> run_;
-  static hhtdae::Scene            &with(hhtdae::Scene &s, hhtdae::Rotations r)
-  {
-    s.start().rotations = r;
-    return s;
-  }
 
 public:
   hhtdae::Runtime &R;
@@ -26,8 +22,9 @@ public:
   Vec              U = nullptr, V = nullptr, A = nullptr, F = nullptr;
 
   AnyState(hhtdae::Scene &s, unsigned seed, double spread = 0.4, hhtdae::Rotations rotations = hhtdae::Rotations::Local)
-      : run_(layOut(with(s, rotations))), R(*run_)
+      : run_(layOut(s)), R(*run_)
   {
+    if (rotations == hhtdae::Rotations::Euler313) must(UseEulerAngles(R));
     must(MatCreateVecs(R.J, &U, &F));
     must(VecDuplicate(U, &V));
     must(VecDuplicate(U, &A));

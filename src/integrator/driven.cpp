@@ -32,6 +32,18 @@ PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A body that turns about any axis is not driven about those that happen to be across it */
+PetscErrorCode WholeRotations(const Integrator &I, Vec unmoved)
+{
+  PetscScalar *x;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(unmoved, &x));
+  for (PetscInt i : I.rotations.at) std::fill_n(x + i, 3, x[i] * x[i + 1] * x[i + 2]);
+  PetscCall(VecRestoreArray(unmoved, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* 1 for coordinates that do not answer a force of random signs in all rows of motion, by the factored matrix at hand, 0 for the other unknowns */
 PetscErrorCode Unmoved(TS ts, Vec unmoved)
 {
@@ -47,6 +59,7 @@ PetscErrorCode Unmoved(TS ts, Vec unmoved)
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &f) { f = IsCoordinate(I, i) ? RandomSign(first + i, 2) * m : 0; }, Read(v.inertia), Write(force)));
   PetscCall(AnswerOf(ts, force, unmoved, &solved));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &a) { a = solved && IsCoordinate(I, i) && PetscRealPart(m) > 0 && PetscAbsScalar(a) < held; }, Read(v.inertia), Write(unmoved)));
+  PetscCall(WholeRotations(I, unmoved));
   PetscCall(VecDestroy(&force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,6 +22,7 @@
 #include "scene/output/channels.h"
 #include "scene/runtime.h"
 #include "scene_axes.h"
+#include "../euler_run.h"
 
 #include <algorithm>
 #include <cmath>
@@ -66,20 +67,26 @@ public:
     PetscCall(scene_->createTS(ts));
     hhtdae::Runtime &R = *hhtdae::RunOf(*ts);
     latest_            = &R;
-    if (!R.bodies.local) PetscCall(useAxes(R));
+    if (!R.bodies.local && !axes_.empty()) PetscCall(useAxes(R));
     PetscCall(TS2GetSolution(*ts, &U, &V));
     PetscCall(hhtdae::InitialState(R, U, V));
     PetscCall(TSSetMaxTime(*ts, t1));
     PetscCall(TSSetMaxSteps(*ts, 100000000));
     PetscFunctionReturn(0);
   }
-  /* The same with the problem's angles, for who evaluates its residual or integrates with another type */
-  PetscErrorCode createEulerTS(TS *ts) const
+  /* The same with Euler angles: the problem's, for who evaluates its residual or integrates with another type, or about axes that the scene chooses */
+  PetscErrorCode createEulerTS(TS *ts, bool problems = true) const
   {
-    const WithEulerAngles with(*scene_);
+    Vec U, V;
+
     PetscFunctionBegin;
     PetscCall(createTS(ts));
-    PetscCheck(!latest_->bodies.local, PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP, "Scene %s: other integrators cannot follow -scene_rotations local", name.c_str());
+    if (!latest_->bodies.local) PetscFunctionReturn(0);
+    PetscCall(hhtest::UseEulerAngles(*latest_));
+    PetscCall(hhtdae::AttachReframing(*latest_, *ts));
+    if (problems && !axes_.empty()) PetscCall(useAxes(*latest_));
+    PetscCall(TS2GetSolution(*ts, &U, &V));
+    PetscCall(hhtdae::InitialState(*latest_, U, V));
     PetscFunctionReturn(0);
   }
 
@@ -245,15 +252,6 @@ private:
   mutable hhtdae::Runtime       *latest_          = nullptr;               /* of the TS made last */
   std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
 
-  /* Runs that are made while it lives have Euler angles */
-  struct WithEulerAngles {
-    hhtdae::Rotations &rotations;
-    hhtdae::Rotations  before;
-    explicit WithEulerAngles(hhtdae::Scene &s) : rotations(s.start().rotations), before(rotations) { rotations = hhtdae::Rotations::Euler313; }
-    ~WithEulerAngles() { rotations = before; }
-    WithEulerAngles(const WithEulerAngles &) = delete;
-  };
-
   SceneProblem() = default;
 
   /* hhtdae from start to end; the attitudes of all bodies with Euler angles on the way */
@@ -309,10 +307,9 @@ private:
     scene_ = build(PETSC_COMM_SELF);
     PetscCheck(scene_ && DataOf(*scene_).comm == PETSC_COMM_SELF, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
                "Scene %s: build it on the communicator that is passed, which is PETSC_COMM_SELF", name.c_str());
-    const WithEulerAngles with(*scene_);
-    PetscCall(scene_->createTS(&ts_));
-    PetscCall(TSGetTime(ts_, &t0));
     t1 = end;
+    PetscCall(createEulerTS(&ts_));
+    PetscCall(TSGetTime(ts_, &t0));
     PetscCall(TSGetSolution(ts_, &U));
     PetscCall(VecGetSize(U, &n));
     PetscCall(copy(run().axes, axes_));

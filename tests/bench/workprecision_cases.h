@@ -151,6 +151,9 @@ inline std::vector<Solver> allSolvers()
       makeHHT("paper-0.3", "hhtdae, paper's form, {/Symbol a} = -0.3", true, form(paper, -.3)),
       makeHHT("paper-0.1", "hhtdae, paper's form, {/Symbol a} = -0.1", false, form(paper, -.1)),
   };
+  TSSettings euler;
+  euler.euler = true;
+  list.push_back(makeTS("euler313", "hhtdae, scenes with Euler angles", false, euler));
   addForeign(list);
   return list;
 }

@@ -97,7 +97,7 @@ inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
   fprintf(f, "problem,solver,eps,error_q,error_v,error_lambda,time,adapter,steps,rejected,newton,residuals,jacobians,"
              "factorizations,failure\n");
   for (size_t i = 0; i < r.cases.size(); i++)
-    for (size_t s = 0; s < r.solvers.size(); s++)
+    for (size_t s = 0; s < r.curve[i].size(); s++) /* none where there is no reference */
       for (size_t k = 0; k < r.curve[i][s].runs.size(); k++) {
         const Run &run = r.curve[i][s].runs[k];
         fprintf(f, "%s,\"%s\",%.3e", r.cases[i].name.c_str(), r.solvers[s].name.c_str(), r.curve[i][s].eps[k]);

@@ -170,6 +170,9 @@ struct Origin {
   double      ida[3] = {}, hht[3] = {};  /* differences that say so */
 };
 
+/* Rotations of a scene: local vectors, Euler angles about axes that it chooses, or those of the problem, which others integrate */
+enum class SceneAngles { None, Own, Problems };
+
 /* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
    entry per unknown. A scene has a TS of its own, for PETSc's second-order integrators, wants to know of accepted
    steps, and may give results in other coordinates than those of the start. */
@@ -177,7 +180,7 @@ struct Case {
   std::string                                                                    name;
   std::function<PetscErrorCode(std::unique_ptr<Problem> *, Origin *)>            make;
   std::function<void(const Problem &, double, const double *, double *)>         phiT     = nullptr;
-  std::function<PetscErrorCode(const Problem &, bool hhtdae, TS *)>              createTS = nullptr;
+  std::function<PetscErrorCode(const Problem &, SceneAngles, TS *)>              createTS = nullptr;
   std::function<void(const Problem &, const double *u, const double *v)>         accept   = nullptr;
   std::function<void(const Problem &, double *u, double *v, const double *near)> toStart  = nullptr;
   bool                                                                           scene    = false;

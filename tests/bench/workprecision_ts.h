@@ -19,6 +19,7 @@ struct TSSettings {
   Stepper                           stepper = Stepper::HHT;
   std::function<PetscErrorCode(TS)> configure;                            /* after TSSetType() */
   FirstOrder::Form                  form  = FirstOrder::Form::Stabilized; /* BDF */
+  bool                              euler = false; /* hhtdae on scenes: Euler angles, about the axes that the scene chooses, in place of local rotation vectors */
   bool                              fixed = false; /* ALPHA2: constant steps, about 0.1 eps^0.4 of the run */
 };
 
@@ -284,7 +285,7 @@ inline PetscErrorCode CreateNativeTS(TSRun &r)
   Mat J, P;
 
   PetscFunctionBegin;
-  PetscCall(r.which.createTS(r.problem, r.settings.stepper == Stepper::HHT, &r.ts));
+  PetscCall(r.which.createTS(r.problem, r.settings.stepper != Stepper::HHT ? SceneAngles::Problems : r.settings.euler ? SceneAngles::Own : SceneAngles::None, &r.ts));
   PetscCall(TSGetI2Function(r.ts, &F, &r.function, &r.functionContext));
   PetscCall(TSGetI2Jacobian(r.ts, &J, &P, &r.jacobian, &r.jacobianContext));
   PetscCall(TSSetI2Function(r.ts, F, NativeFunction, &r));
