@@ -90,8 +90,9 @@ enum class Redundant {
   Keep    /* are not looked for */
 };
 enum class Rotations {
-  Local,   /* of bodies in space: a rotation vector from the attitude at the last accepted step, and the angular velocity; TSHHT3 alone */
-  Euler313 /* Euler angles, as the method's authors took them */
+  Local,   /* of bodies in space: U has a rotation vector from the attitude at the last accepted step, V the angular velocity, both in axes of
+              space (TSHHT3SetRotations()); for TSHHT3 alone. Attitudes are what Snapshot and measures tell. */
+  Euler313 /* 3-1-3 angles and their rates, as the method's authors took them; for any TS type while no body gets new axes */
 };
 struct StartPolicy {
   Assembly  assembly    = Assembly::Report;  /* -scene_assemble off,report,project */

@@ -73,9 +73,9 @@ public:
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
       }
-      ev.sink.add(*slot++, turn, 3, 3);
+      ev.sink.add(*slot++, Matrix3(turn * ev.bodies.inStep(b)), 3, 3);
       ev.sink.add(*slot++, Matrix3(turn.transpose()), 3, 3);
-      ev.sink.add(*slot++, Matrix3(-G.transpose() * X(l) * turn), 3, 3);
+      ev.sink.add(*slot++, Matrix3(-G.transpose() * X(l) * turn * ev.bodies.inStep(b)), 3, 3);
     }
   }
 
@@ -162,13 +162,16 @@ public:
         second += e.w[i] * X(y.cross(m)) * X(d);
         B << e.w[i] * Matrix3::Identity(), e.w[i] * X(d);
         both(B, 6, 3);
-        both(Matrix3(-e.w[i] * G.transpose() * X(d) * X(m)), 3, 3);
+        const Matrix3 by_node = -e.w[i] * G.transpose() * X(d) * X(m);
+        ev.sink.add(*slot++, by_node, 3, 3);
+        ev.sink.add(*slot++, Matrix3(by_node.transpose() * ev.bodies.inStep(b)), 3, 3);
       }
       B << -Matrix3::Identity(), Matrix3::Zero();
       both(B, 6, 3);
       B << X(c) * G, turn * G;
-      both(B, 6, 3);
-      ev.sink.add(*slot++, Matrix3(G.transpose() * second * G), 3, 3);
+      ev.sink.add(*slot++, Six(B * ev.bodies.inStep(b)), 6, 3);
+      ev.sink.add(*slot++, B.transpose(), 3, 6);
+      ev.sink.add(*slot++, Matrix3(G.transpose() * second * G * ev.bodies.inStep(b)), 3, 3);
     }
   }
 

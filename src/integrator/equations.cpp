@@ -227,6 +227,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.matrix, ts, 0, 0, 0));
   PetscCall(StageVectors(ts, X));
+  I.rotations.factor = I.h * I.h / 12;
   PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P));
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
@@ -235,6 +236,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
     if (J != P) PetscCall(ScaleMatrix(I, s, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
   }
+  I.rotations.factor = 0;
   PetscCall(NoteClaims(ts, X, P));
   I.corrector.matrix.made(I.h);
   I.stat.factorizations++;

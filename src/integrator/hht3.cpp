@@ -264,6 +264,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   PetscCall(ViewDriven(ts, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));
   if (ts->setupcalled) PetscCall(ViewRoles(ts, viewer));
+  PetscCall(ViewRotations(ts, viewer));
   if (I.linear_chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));
   const TSHHT3Statistics &s = I.stat;
   if (s.steps) {

@@ -104,7 +104,8 @@ struct Rotations {
   TSHHT3Refer           refer = nullptr;
   TSHHT3ReferBack       back  = nullptr;
   void                 *ctx   = nullptr;
-  std::vector<PetscInt> at; /* local indices of first components */
+  std::vector<PetscInt> at;         /* local indices of first components */
+  PetscReal             factor = 0; /* h^2/12 while the matrix of a step is made */
 };
 
 /* limit.cpp */
@@ -384,6 +385,8 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
 /* rotations.cpp */
 PetscErrorCode SetUpRotations(TS ts);
+PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor);
+PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
 void           InterpolateCommutators(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 PetscErrorCode ReferToState(TS ts);

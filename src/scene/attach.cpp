@@ -224,6 +224,11 @@ private:
     ev.sink.add(*slot++, D, (int)D.rows(), size);
     ev.sink.add(*slot++, D.transpose(), size, (int)D.rows());
   }
+  template <class Block> static void addTurn(Evaluation &ev, const Slot *&slot, const BodyMotion &b, const Block &D)
+  {
+    ev.sink.add(*slot++, Block(D * ev.bodies.inStep(b)), (int)D.rows(), 3);
+    ev.sink.add(*slot++, D.transpose(), 3, (int)D.rows());
+  }
 
   /* rows of wide_ from `first` on: D times the shapes */
   template <class Shapes> void byModes(const Shapes &x, const Matrix3 &D, int first)
@@ -246,13 +251,13 @@ private:
     const Matrix3 O = s.J.middleCols<3>(3), G = b.G, zero = Matrix3::Zero(), one = Matrix3::Identity();
     const int     m = ev.bodies.modes(e.body);
     add(ev, slot, rows(-one, zero), 3);
-    add(ev, slot, rows(Cross<double>(s.e.x - b.r) * G, O * G), 3);
+    addTurn(ev, slot, b, rows(Cross<double>(s.e.x - b.r) * G, O * G));
     wide_.resize(rows_of_attachment, m);
     byModes(on.translation(e.place), -b.A, 0);
     byModes(on.rotation(e.place), O * Jl, 3);
     add(ev, slot, wide_, m);
     add(ev, slot, rows(one, zero), 3);
-    add(ev, slot, rows(zero, s.J.rightCols<3>() * i.G), 3);
+    addTurn(ev, slot, i, rows(zero, s.J.rightCols<3>() * i.G));
   }
 
   /* d(Phi_q^T lambda)/dq, but for what the bodies themselves add. Blocks of modes and of modes with the body's angles are made for
@@ -267,13 +272,15 @@ private:
     const Matrix3 G = b.G, Gi = i.G, F = Cross<double>(s.f), S = Cross<double>(s.e.x - b.r), Jl = b.A * s.turn.J();
     const Vector3 n = b.A.transpose() * s.m;
     const int     m = ev.bodies.modes(e.body);
-    ev.sink.add(*slot++, Matrix3(G.transpose() * (Hee + F * S) * G), 3, 3);
-    ev.sink.add(*slot++, Matrix3(G.transpose() * Hei * Gi), 3, 3);
-    ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hie * G), 3, 3);
-    ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hii * Gi), 3, 3);
+    const Matrix3 Gb = G * ev.bodies.inStep(b), Gf = Gi * ev.bodies.inStep(i);
+    ev.sink.add(*slot++, Matrix3(G.transpose() * (Hee + F * S) * Gb), 3, 3);
+    ev.sink.add(*slot++, Matrix3(G.transpose() * Hei * Gf), 3, 3);
+    ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hie * Gb), 3, 3);
+    ev.sink.add(*slot++, Matrix3(Gi.transpose() * Hii * Gf), 3, 3);
     if (s.lambda[3] != 0 || s.lambda[4] != 0 || s.lambda[5] != 0) { /* springs at the point itself leave no moment */
       tall_ = on.rotation(e.place).topRows(m).lazyProduct(Matrix3((Gi.transpose() * Hie * Jl).transpose()));
       ev.sink.add(slot[0], tall_.transpose(), 3, m);
+      tall_ *= ev.bodies.inStep(i);
       ev.sink.add(slot[1], tall_, m, 3);
     }
     slot += 2;

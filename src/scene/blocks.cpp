@@ -8,6 +8,7 @@ Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, P
 {
   Six right = Six::Zero(), both = Six::Zero();
   ev.bodies.columns(column, at_column, A, right);
+  ev.bodies.inStep(column, right);
   if (V) ev.bodies.velocityColumns(column, at_column, ev.v, ev.sv, *V, right);
   ev.bodies.columns(row, at_row, Six(right.transpose()), both);
   return both.transpose();
@@ -21,7 +22,7 @@ void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const V
   if (k == BodyKind::Planar) H(2, 2) -= f(0) * s(0) + f(1) * s(1);
   if (k != BodyKind::Rigid) return;
   const Matrix3 G = B.now[b].G, L = s * f.transpose() - f.dot(s) * Matrix3::Identity(); /* [f][s] = s f^T - (f.s) 1 */
-  H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G;
+  H.bottomRightCorner<3, 3>().noalias() += G.transpose() * L * G * B.inStep(B.now[b]);
 }
 
 void AddBlock(const Sink &sink, const Slot &slot, const Six &D, BodyKind row, int g, BodyKind column, int h)

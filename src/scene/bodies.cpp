@@ -88,7 +88,7 @@ void Bodies::modalResidual(PetscInt i, const double *u, const double *v, const d
   h -= p.load;
 }
 
-/* How attitude, w and alpha change with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
+/* How attitude, w and alpha change in a step with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
 struct Bodies::AngularGradient {
   Matrix3 G, w, alpha;
 };
@@ -99,7 +99,7 @@ Bodies::AngularGradient Bodies::byAngles(PetscInt i, const double *v, const doub
   const Eigen::Map<const Vector3> rate(v + body[i].first + 3), acc(a + body[i].first + 3);
   AngularGradient                  g;
   Matrix3                          alpha_r;
-  g.G = b.G;
+  g.G = b.G * inStep(b);
   g.w = angularVelocityGradient(b, rate.data(), sv);
   if (local) {
     g.alpha = sa * Matrix3::Identity();
@@ -121,7 +121,7 @@ Matrix3 Bodies::momentGradient(PetscInt i, const double *u, const Vector3 &m) co
 {
   if (!local) return MomentGradient(EulerAxes(now[i].G), m);
   const double *x = u + body[i].first + 3;
-  return LocalMomentGradient(Vector3(x[0], x[1], x[2]), m);
+  return LocalMomentGradient(Vector3(x[0], x[1], x[2]), m) * inStep(now[i]);
 }
 
 void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const double *a, double sv, double sa)
@@ -142,12 +142,12 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   Matrix<6, 6> R;
   R.leftCols<3>()    = sa * D.rigid.leftCols<3>();
   R.rightCols<3>()   = by_angles(D.rigid);
-  R.bottomRows<3>()  = Matrix<3, 6>(g.G.transpose() * R.bottomRows<3>());
+  R.bottomRows<3>()  = Matrix<3, 6>(b.G.transpose() * R.bottomRows<3>());
   R.bottomRightCorner<3, 3>() += momentGradient(i, u, D.n - b.m);
   B.topLeftCorner<6, 6>() = R;
   if (p.turned.rows()) D.rigid_modal.rightCols<3>() += p.turned;
   B.block(0, 6, 3, m)     = D.rigid_modal.leftCols<3>().transpose();
-  B.block(3, 6, 3, m)     = D.rigid_modal.rightCols<3>().lazyProduct(g.G).transpose();
+  B.block(3, 6, 3, m)     = D.rigid_modal.rightCols<3>().lazyProduct(b.G).transpose();
   B.block(6, 0, m, 3)     = sa * D.modal_rigid.leftCols<3>();
   B.block(6, 3, m, 3)     = by_angles(D.modal_rigid);
   if (p.turned.rows()) B.block(6, 3, m, 3) += p.turned.lazyProduct(g.G);
@@ -191,7 +191,7 @@ void Bodies::jacobian(PetscInt i, const double *u, const double *v, const double
   const Matrix3 Ntheta = I * Cross<double>(alpha) - Cross<double>(I * alpha) + Xw * (I * Xw - XIw);
   const Matrix3 Nw     = Xw * I - XIw;
   const Matrix3 D = Ntheta * g.G + Nw * g.w + I * g.alpha;
-  B.block<3, 3>(3, 3).noalias() = g.G.transpose() * D;
+  B.block<3, 3>(3, 3).noalias() = b.G.transpose() * D;
   B.block<3, 3>(3, 3) += momentGradient(i, u, N - b.m);
 }
 

@@ -89,6 +89,7 @@ public:
   PetscInt                 own = 0;
   long                     moves = 0; /* so far */
   bool                     local = false; /* rotations are local vectors, not Euler angles */
+  double                   commutator = 0; /* sv h^2/12 in the matrix of a step */
   Vector3                  gravity = Vector3::Zero();
 
   /* motion of all bodies from their coordinates and rates; clears the loads */
@@ -146,6 +147,16 @@ public:
     }
     return 0;
   }
+  /* dU of a rotation vector in the step, by that of Newmark's relations: it has a term in the angular velocity, TSHHT3GetRotationFactor(). Derivatives
+     of the residual by U are to be multiplied by it, rows of moments are not. */
+  Matrix3 inStep(const BodyMotion &b) const { return Matrix3::Identity() - commutator * Cross<double>(b.w); }
+  /* the same for what columns() has made */
+  template <class Out> void inStep(PetscInt m, Out &out) const
+  {
+    if (commutator == 0 || !TurnsInSpace(body[marker[m].body].kind)) return;
+    const Matrix<Out::RowsAtCompileTime, 3> by_turn = out.template rightCols<3>();
+    out.template rightCols<3>().noalias()           = by_turn * inStep(now[marker[m].body]);
+  }
   /* J, columns (v, w) of marker m: adds its change with coordinates and, times sv, with their velocities, to out */
   template <class In, class Out> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const In &J, Out &out) const
   {
@@ -167,7 +178,7 @@ public:
       return;
     case BodyKind::Flexible:
     case BodyKind::Rigid: { /* dv = dv_r + dw x s + w x (dtheta x s) */
-      const Matrix3 turned = Cross<double>(b.w) * Cross<double>(s) * b.G;
+      const Matrix3 turned = Cross<double>(b.w) * Cross<double>(s) * b.G * inStep(b);
       out.template leftCols<3>() += sv * J.template leftCols<3>();
       out.template rightCols<3>() += About(J, s) * angularVelocityGradient(b, v + k.first + 3, sv) - J.template leftCols<3>() * turned;
     }
@@ -200,7 +211,7 @@ private:
   }
   struct AngularGradient;
   AngularGradient byAngles(PetscInt b, const double *v, const double *a, double sv, double sa) const;
-  Matrix3         momentGradient(PetscInt b, const double *u, const Vector3 &m) const; /* d(G^T m)/dU for fixed m */
+  Matrix3         momentGradient(PetscInt b, const double *u, const Vector3 &m) const; /* d(G^T m)/dU for fixed m, in a step */
   void modalResidual(PetscInt b, const double *u, const double *v, const double *a, double *row);
 };
 

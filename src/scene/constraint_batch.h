@@ -182,19 +182,22 @@ private:
     for (int k = 0; k < M; k++) {
       const LocalBody &b = bodyOf(ev.bodies, e, k);
       if (!Groups(b.kind)) continue;
-      Matrix<R, 6>     T, own; /* columns of lambda are T^T, rows of Phi are S */
-      Matrix<R, 6>    &S = K::holonomic ? T : own;
+      Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
       const int        n = ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(J.template middleCols<6>(6 * k)), T);
-      if constexpr (!K::holonomic) {
+      if constexpr (K::holonomic) {
+        S.leftCols(n) = T.leftCols(n);
+        ev.bodies.inStep(e.marker[k], S);
+      } else {
         S.leftCols(n).setZero();
         ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k)), S);
+        ev.bodies.inStep(e.marker[k], S);
         ev.bodies.velocityColumns(e.marker[k], f[k], ev.v, ev.sv, Matrix<R, 6>(J.template middleCols<6>(6 * k)), S);
       }
       if (rows < R)
         for (int c = 0; c < n; c++)
           for (int r = 0; r < rows; r++) {
             T(r, c) = T(active[r], c);
-            if (!K::holonomic) S(r, c) = S(active[r], c);
+            S(r, c) = S(active[r], c);
           }
       for (int g = 0; g < Groups(b.kind); g++) {
         if (!uses(b.kind, g, k)) continue;

@@ -308,6 +308,7 @@ private:
         if constexpr (K::damped) V.row(r) = -DerivativeRow<6>(c[r], n + 6 * k);
       }
       ev.bodies.columns(e.marker[k], f[k], J, out);
+      ev.bodies.inStep(e.marker[k], out);
       if constexpr (K::damped) ev.bodies.velocityColumns(e.marker[k], f[k], ev.v, ev.sv, V, out);
       for (int g = 0; g < Groups(b.kind); g++)
         if (Base::uses(b.kind, g, k))

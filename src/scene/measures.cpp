@@ -39,14 +39,15 @@ MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerat
 }
 
 /* The same from coordinates, velocities and accelerations that are duals: dA = [G dq] A */
-template <class T> void LocalMotion(const BodyMotion &b, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
+template <class T> void LocalMotion(const Bodies &bodies, const BodyMotion &b, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
 {
-  Vec3<T> turn;
+  const Matrix3 G = b.G * bodies.inStep(b);
+  Vec3<T>       turn;
   for (int i = 0; i < 3; i++) {
     m.w.w(i)   = p[i];
     m.alpha(i) = s[i];
     turn(i)    = T(0);
-    for (int c = 0; c < 3; c++) turn(i) = turn(i) + T(b.G(i, c)) * (q[c] - T(Plain(q[c])));
+    for (int c = 0; c < 3; c++) turn(i) = turn(i) + T(G(i, c)) * (q[c] - T(Plain(q[c])));
   }
   for (int j = 0; j < 3; j++) {
     const Vec3<T> x(T(b.A(0, j)), T(b.A(1, j)), T(b.A(2, j)));
@@ -112,7 +113,7 @@ template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt mark
     m.w.v(i) = p[i];
     m.a(i)   = s[i];
   }
-  if (l.kind == BodyKind::Rigid && e.bodies.local) LocalMotion<T>(e.bodies.now[k.body], q + 3, p + 3, s + 3, A, m);
+  if (l.kind == BodyKind::Rigid && e.bodies.local) LocalMotion<T>(e.bodies, e.bodies.now[k.body], q + 3, p + 3, s + 3, A, m);
   if (l.kind == BodyKind::Rigid && !e.bodies.local) EulerMotion<T>(l, q + 3, p + 3, s + 3, A, m);
   if (l.kind == BodyKind::Planar) PlanarMotion<T>(q[2], p[2], s[2], A, m);
   m.f.R             = A * Constant<T>(k.R);
@@ -163,6 +164,7 @@ void AddMarker(const Evaluation &e, PetscInt marker, const Matrix<1, 6> &J, int 
   if (at < 0) return;
   Matrix<1, 6> by = Matrix<1, 6>::Zero();
   const int    n  = e.bodies.columns(marker, e.bodies.frame(marker), J, by);
+  e.bodies.inStep(marker, by);
   for (int c = 0; c < n; c++) row[at + c] += by(c);
 }
 

@@ -10,16 +10,15 @@ namespace
 {
 
 /* Velocities of local rotations are not the derivatives of what TSHHT3 alone counts anew in every step */
-PetscErrorCode CheckType(TS ts, Runtime &R)
+PetscErrorCode CheckType(TS ts, const Runtime &R)
 {
   PetscBool ours;
   TSType    type;
   PetscFunctionBegin;
-  if (R.type_checked || !R.turns || !R.bodies.local) PetscFunctionReturn(0);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
+  if (!R.turns || !R.bodies.local) PetscFunctionReturn(0);
   PetscCall(TSGetType(ts, &type));
+  PetscCall(PetscStrcmp(type, TSHHT3, &ours));
   PetscCheck(ours, R.scene.comm, PETSC_ERR_ARG_INCOMP, "The scene has bodies that turn in space, whose local rotation vectors TS type %s cannot follow: use Euler angles, -scene_rotations euler313", type);
-  R.type_checked = true;
   PetscFunctionReturn(0);
 }
 
@@ -31,10 +30,15 @@ PetscErrorCode I2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode I2Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *ctx)
+PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *ctx)
 {
+  Runtime  &R = *static_cast<Runtime *>(ctx);
+  PetscReal factor = 0;
   PetscFunctionBegin;
-  PetscCall(Guarded([&] { return Jacobian(*static_cast<Runtime *>(ctx), t, U, V, A, sv, sa, P); }));
+  if (R.turns && R.bodies.local && !R.triangle) PetscCall(TSHHT3GetRotationFactor(ts, &factor)); /* which is not symmetric */
+  R.bodies.commutator = sv * factor;
+  PetscCall(Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); }));
+  R.bodies.commutator = 0;
   if (J != P) {
     PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));

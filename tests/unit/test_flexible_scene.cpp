@@ -120,7 +120,7 @@ TEST(FlexibleScene, JacobianAgainstDifferences)
     for (unsigned seed : {1, 2, 3})
       for (Rotations rotations : all_rotations) {
         AnyState s(arm.scene, seed, 0.3, rotations);
-        EXPECT_LT(s.jacobianError(2.7, 13.), 1e-5) << "mass matrix " << (int)mass;
+        EXPECT_LT(s.jacobianError(2.7, 13., rotations == Rotations::Local ? .2 : 0), 1e-5) << "mass matrix " << (int)mass;
         EXPECT_LT(s.jacobianError(0, 0), 1e-5);
       }
   }

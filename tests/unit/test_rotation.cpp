@@ -227,3 +227,66 @@ TEST(Rotation, WhatIsRefused)
   must(TSDestroy(&ts));
   for (Vec *v : {&U, &V, &F}) must(VecDestroy(v));
 }
+
+/* ---- of scenes ---- */
+
+namespace
+{
+
+struct Thrown {
+  Scene scene{PETSC_COMM_SELF};
+  TS    ts = nullptr;
+  explicit Thrown(const std::string &options)
+  {
+    RigidBody b;
+    b.inertia          = Vector3(1, 2, 2.5).asDiagonal();
+    b.angular_velocity = {1, -0.5, 2};
+    scene.channel("x", Measure::displacement(scene.marker(scene.add("stone", b), {1, 0, 0}), 0));
+    Options in(options);
+    must(scene.createTS(&ts));
+    must(TSSetMaxTime(ts, 0.5));
+    must(TSSetTimeStep(ts, 1e-3));
+    must(TSSetErrorIfStepFails(ts, PETSC_FALSE));
+    must(TSSetFromOptions(ts));
+  }
+  ~Thrown() { TSDestroy(&ts); }
+  Thrown(const Thrown &) = delete;
+  std::string view() const
+  {
+    Printed printed;
+    must(TSView(ts, PETSC_VIEWER_STDOUT_SELF));
+    return printed.text();
+  }
+};
+
+} // namespace
+
+TEST(Rotation, OptionsOfScenes)
+{
+  double x[2];
+  for (bool euler : {false, true}) {
+    Thrown t(tolerance(1e-8) + (euler ? "-scene_rotations euler313" : ""));
+    Array  values;
+    must(t.scene.solve(t.ts));
+    must(t.scene.sample(t.ts, 0.5, values));
+    x[euler] = values[0];
+    EXPECT_EQ(t.view().find("local rotation vectors: 1") == std::string::npos, euler) << t.view();
+  }
+  EXPECT_NEAR(x[0], x[1], 1e-4);
+  EXPECT_NE(x[0], x[1]);
+}
+
+/* Who does not count rotations anew in every step takes Euler angles */
+TEST(Rotation, OtherTypesNeedEulerAngles)
+{
+  for (bool euler : {false, true}) {
+    Thrown t(std::string("-ts_type alpha2 ") + (euler ? "-scene_rotations euler313" : ""));
+    if (euler) {
+      EXPECT_EQ(TSSolve(t.ts, nullptr), 0);
+      continue;
+    }
+    ErrorTrap trap;
+    EXPECT_NE(TSSolve(t.ts, nullptr), 0);
+    EXPECT_TRUE(trap.says("whose local rotation vectors TS type alpha2 cannot follow: use Euler angles, -scene_rotations euler313")) << trap.message;
+  }
+}
