@@ -193,8 +193,8 @@ PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferB
   Notes:
   Velocities of such coordinates are angular velocities in axes of space, accelerations their derivatives; neither depends on the reference.
   With T(x) such that dA = [T dx] A, rows of their equations of motion and columns of constraints have to belong to dx, as with any other
-  coordinates: moments and rotational reactions are multiplied by the transpose of T. The singularity of T at a full turn is out of the way where
-  `TSHHT3SetStepLimit()` keeps steps below it.
+  coordinates: moments and rotational reactions are multiplied by the transpose of T. T is singular at a full turn: a step
+  that makes one fails and is made shorter.
 
   Both functions are called collectively, `refer` with every accepted state at the beginning of the step that starts from it, and with states at
   which accelerations and multipliers are solved for; of these `back` comes next. What the reference is belongs into the vector of
@@ -207,7 +207,7 @@ PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferB
 
   Monitors see U about the reference of the last step.
 
-.seealso: `TSHHT3`, `TSHHT3GetRotationFactor()`, `TSHHT3SetCoordinateChange()`, `TSHHT3SetCheckpointVec()`, `TSHHT3SetStepLimit()`
+.seealso: `TSHHT3`, `TSHHT3GetRotationFactor()`, `TSHHT3SetCoordinateChange()`, `TSHHT3SetCheckpointVec()`
 @*/
 PetscErrorCode TSHHT3SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferBack back, void *ctx)
 {

@@ -290,3 +290,31 @@ TEST(Rotation, OtherTypesNeedEulerAngles)
     EXPECT_TRUE(trap.says("whose local rotation vectors TS type alpha2 cannot follow: use Euler angles, -scene_rotations euler313")) << trap.message;
   }
 }
+
+/* A rotor that makes a full turn in a step, where rotation vectors are singular: the step is cut */
+TEST(Rotation, FullTurnInAStep)
+{
+  const double spin = 200 * PETSC_PI;
+  for (const char *steps : {"-ts_adapt_type none -ts_dt 1e-2", "-ts_dt 1e-2 -ts_adapt_dt_max 1e-2 -ts_rtol 1e-2 -ts_atol 1e-2"}) {
+    Scene            scene(PETSC_COMM_SELF);
+    RigidBody        b;
+    TS               ts;
+    Array            x;
+    TSHHT3Statistics s;
+    b.angular_velocity = {0, 0, spin};
+    const Body rotor   = scene.add("rotor", b);
+    scene.add("bearing", Revolute{scene.marker(rotor), scene.marker(scene.ground())});
+    for (int c = 0; c < 2; c++) scene.channel("", Measure::displacement(scene.marker(rotor, {1, 0, 0}), c));
+    must(scene.createTS(&ts));
+    must(TSSetMaxTime(ts, 0.1025));
+    Options in(steps);
+    must(TSSetFromOptions(ts));
+    must(scene.solve(ts));
+    must(scene.sample(ts, 0.1025, x));
+    must(TSHHT3GetStatistics(ts, &s));
+    MEASURED("%s: %d steps, %d failed corrections, x = %.9f, y = %.9f", steps, (int)s.steps, (int)s.corrector_fails, x[0], x[1]);
+    EXPECT_NEAR(x[0], 0, 1e-6);
+    EXPECT_NEAR(x[1], 1, 1e-6);
+    must(TSDestroy(&ts));
+  }
+}
