@@ -109,7 +109,7 @@ static PetscErrorCode FirstWeights(TS ts, PetscInt n, const Raise &all)
   PetscReal   local[2] = {0, 0}, global[2];
 
   PetscFunctionBegin;
-  for (PetscInt i : I.rotations.at) std::fill_n(all.y + i, 3, 1); /* a turn is rounded as the attitude is, FlexibleDynamics.WithoutModesIsTheRigidBody */
+  for (PetscInt i : I.rotations.at) std::fill_n(all.y + i, 3, 1); /* a turn is rounded as the attitude is */
   for (PetscInt i = 0; i < n; i++) {
     if (!IsDifferential(RoleOf(I, i))) {
       all.y[i] = PETSC_MAX_REAL;

@@ -233,11 +233,11 @@ TEST(LieGroup, ErrorsOfScenesAtTheSameSteps)
     const char *name;
     double      mass;
     Top         top;
-    double      end, h;
+    double      end, h, allowed; /* of the reference's error */
   } const cases[] = {
-      {"heavy top", 15, {{0.234375 + 15, 0.46875, 0.234375 + 15}, {0, 1, 0}, {0, 0, -15 * g}, {0, 150, -4.61538}}, 2, 5e-4},
-      {"tumbling top", 1, {{0.1, 0.45, 0.55}, {0.5, 0, 0}, {0, 0, -g}, {0.4, 4, 0.4}}, 4, 2e-3},
-      {"satellite that tumbles", 1, {{1, 2, 3}, {0, 0, 0}, {0, 0, 0}, {0.02, 1, 0.01}}, 30, 1e-2},
+      {"heavy top", 15, {{0.234375 + 15, 0.46875, 0.234375 + 15}, {0, 1, 0}, {0, 0, -15 * g}, {0, 150, -4.61538}}, 2, 5e-4, 1. / 300}, /* without the second term of Magnus' series 1/70 */
+      {"tumbling top", 1, {{0.1, 0.45, 0.55}, {0.5, 0, 0}, {0, 0, -g}, {0.4, 4, 0.4}}, 4, 2e-3, 1.2},
+      {"satellite that tumbles", 1, {{1, 2, 3}, {0, 0, 0}, {0, 0, 0}, {0.02, 1, 0.01}}, 30, 1e-2, 1.2},
   };
   for (const auto &c : cases) {
     Exact         exact(c.top, 0.1 / c.top.spin.norm());
@@ -253,7 +253,7 @@ TEST(LieGroup, ErrorsOfScenesAtTheSameSteps)
       const double euler = errorOfScene(c.top, c.mass, exact, point, c.end, c.h / 2, alpha, Rotations::Euler313);
       MEASURED("%s, alpha %g, h = %g: error %.2e, of order %.2f; reference %.2e, of order %.2f, in body axes %.2e; Euler angles %.2e", c.name, alpha, c.h / 2,
                ours[1], std::log2(ours[0] / ours[1]), reference[1], std::log2(reference[0] / reference[1]), in_body[1], euler);
-      EXPECT_LT(ours[1], 1.2 * reference[1]) << c.name;
+      EXPECT_LT(ours[1], c.allowed * reference[1]) << c.name;
       EXPECT_LT(ours[1], euler / 4) << c.name;
       EXPECT_GT(std::log2(ours[0] / ours[1]), 1.9) << c.name;
     }
