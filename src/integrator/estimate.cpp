@@ -261,6 +261,7 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   if (I.status != TS_STEP_PENDING) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(events.estimate, ts, 0, 0, 0));
   PetscCall(CoordinateErrors(I, type, &acc));
+  PetscCall(AddRotationErrors(I, type, &acc));
   PetscCall(AddStateErrors(I, type, &acc));
   PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
   I.wlte_pending = *wlte;

@@ -385,6 +385,7 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
 /* rotations.cpp */
 PetscErrorCode SetUpRotations(TS ts);
+PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result);
 PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor);
 PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);

@@ -341,3 +341,38 @@ TEST(Rotation, FullTurnInAStep)
     must(TSDestroy(&ts));
   }
 }
+
+/* As of a ball that rolls along a parabola: w = w0 + a t, so that the axis turns and accelerations do not change */
+TEST(Rotation, AxisThatTurnsEvenly)
+{
+  Scene          scene(PETSC_COMM_SELF);
+  RigidBody      b;
+  TS             ts;
+  Array          values;
+  const double   end = 2;
+  const Vector3  w0(2, 0, 1), a(0, 6, 0);
+  Matrix3        exact = Matrix3::Identity();
+  UserForce      load;
+  b.angular_velocity = w0;
+  b.inertia          = Matrix3::Identity();
+  const Body ball    = scene.add("ball", b);
+  load.i             = scene.marker(ball);
+  for (int c = 0; c < 3; c++) load.moment.push_back(Expression{{}, [=](const Real *) -> Real { return a(c); }});
+  scene.add("torque", load);
+  for (int k = 0; k < 3; k++)
+    for (int c = 0; c < 3; c++) scene.channel("", Measure::displacement(scene.marker(ball, Vector3::Unit(k)), c));
+  must(scene.createTS(&ts));
+  must(TSSetMaxTime(ts, end));
+  Options in(tolerance(1e-5));
+  must(TSSetFromOptions(ts));
+  must(scene.solve(ts));
+  must(scene.sample(ts, end, values));
+  const int steps = 400000; /* midpoint rule */
+  for (int n = 0; n < steps; n++) exact = exponential(end / steps * (w0 + a * ((n + 0.5) * end / steps))) * exact;
+  const double error = (Eigen::Map<const Matrix3>(values.data()) - exact).norm();
+  PetscInt     taken;
+  must(TSGetStepNumber(ts, &taken));
+  MEASURED("%d steps, error of the attitude %.1e", (int)taken, error);
+  EXPECT_LT(error, 1e-3);
+  must(TSDestroy(&ts));
+}
