@@ -1,6 +1,6 @@
 /*
   What a joint, a motion or a force is to the assembly: a kernel, a struct of static functions of marker frames in space axes.
-  The assembly turns marker perturbations into generalized coordinates, so that a kernel knows nothing of Euler angles, planar
+  The assembly turns marker perturbations into generalized coordinates, so that a kernel knows nothing of rotation vectors, Euler angles, planar
   bodies or modes. Kernels are compiled into loops over all their instances (batch.h); nothing is virtual inside such a loop.
 
   A holonomic constraint Phi(frames, t) = 0

@@ -113,7 +113,7 @@ PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 {
   PetscFunctionBegin;
   PetscCheck(t >= R.accepted, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "the TS starts again at t = %g, but its axes of Euler angles and its unwound angles are those of t = %g: take a new TS from "
+             "the TS starts again at t = %g, but what its rotations count from and its unwound angles are those of t = %g: take a new TS from "
              "Scene::createTS() for another run, or TSHHT3CheckpointLoad() to go back",
              (double)t, (double)R.accepted);
   R.accepted = t;

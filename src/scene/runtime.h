@@ -82,7 +82,7 @@ inline Runtime       *RunOf(TS ts)
 PetscErrorCode Layout(Runtime &R);
 const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element);
 PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* of own unknowns */
-/* initial.cpp: state of the description, with the axes of the Euler angles chosen by it */
+/* initial.cpp: state of the description, with what rotations count from chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
