@@ -376,3 +376,31 @@ TEST(Rotation, AxisThatTurnsEvenly)
   EXPECT_LT(error, 1e-3);
   must(TSDestroy(&ts));
 }
+
+/* Between the ends of a step constraints are differentiated about the attitude there: the point that a joint holds has no acceleration */
+TEST(Rotation, SamplesWithinAStep)
+{
+  Scene     scene(PETSC_COMM_SELF);
+  RigidBody b;
+  TS        ts;
+  Array     values;
+  b.mass             = 15;
+  b.inertia          = Vector3(0.234375, 0.46875, 0.234375).asDiagonal();
+  b.center           = {0, 1, 0};
+  b.angular_velocity = {0, 150, -4.61538};
+  b.velocity         = b.angular_velocity.cross(b.center);
+  const Marker pivot = scene.marker(scene.add("top", b));
+  scene.gravity({0, 0, -9.81});
+  scene.add("pivot", Spherical{pivot, scene.marker(scene.ground())});
+  for (int c = 0; c < 3; c++) scene.channel("", Measure::acceleration(pivot, c));
+  must(scene.createTS(&ts));
+  must(TSSetMaxTime(ts, 0.02));
+  Options in(constant(2e-3));
+  must(TSSetFromOptions(ts));
+  must(scene.solve(ts));
+  must(scene.sample(ts, 0.0192, values));
+  const double a = Eigen::Map<const Vector3>(values.data()).norm();
+  MEASURED("acceleration of the pivot %.1e m/s^2 of %.0f", a, 150 * 4.6);
+  EXPECT_LT(a, 0.1);
+  must(TSDestroy(&ts));
+}
