@@ -221,7 +221,8 @@ PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferB
   Velocities of such coordinates are angular velocities in axes of space, accelerations their derivatives; neither depends on the reference.
   With T(x) such that dA = [T dx] A, rows of their equations of motion and columns of constraints have to belong to dx, as with any other
   coordinates: moments and rotational reactions are multiplied by the transpose of T. T is singular at a full turn: a step
-  that makes one fails and is made shorter.
+  that makes one fails and is made shorter. Far below it the series needs more terms: `TSHHT3SetStepLimit()` should keep the rotation of a step
+  within a radian.
 
   Both functions are called collectively, `refer` with every accepted state at the beginning of the step that starts from it, and with states at
   which accelerations and multipliers are solved for; of these `back` comes next. What the reference is belongs into the vector of

@@ -4,7 +4,7 @@
 
   A local rotation vector x turns the body from a reference attitude C, A = exp([x]) C, about axes of space. The reference is the attitude
   at the last accepted state, so that x is the rotation in the present step: singular where that makes a full turn, which fails and is made
-  shorter. Velocities and accelerations that belong to it are the angular velocity w and its derivative, which do not depend on the
+  shorter; steps of variable length stay far below (step_limit.cpp). Velocities and accelerations that belong to it are the angular velocity w and its derivative, which do not depend on the
   reference: with x = 0 at the beginning of a step, Newmark's relations are those of the generalized-alpha method on the rotation group, see
   src/integrator/rotations.cpp. The rows of a body's moments are multiplied by G^T in both cases, as those of generalized forces.
 

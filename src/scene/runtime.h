@@ -51,6 +51,7 @@ struct Runtime {
   Vec       start_state[3] = {};
   PetscReal start_time     = 0;
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
+  bool                  steps_limited = false; /* some element says how long a step may be */
   std::vector<double>   reference_before; /* of local rotations, own bodies: quaternions */
   std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
   std::vector<PetscInt> next_body;
