@@ -41,12 +41,13 @@ void At(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const Pe
 }
 
 /* After At() */
-void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[], PetscScalar *u)
+void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, const PetscScalar *const s0[], const PetscScalar *const s1[], PetscScalar *u)
 {
-  std::vector<PetscScalar> v((std::size_t)n);
-  for (PetscInt first : I.rotations.at)
-    for (PetscInt i = first; i < first + 3; i++) v[(std::size_t)i] = H(s0[1][i], s0[2][i], s1[1][i], s1[2][i]);
-  InterpolateCommutators(I, x, H.y1, s0[1], s1[1], v.data(), u);
+  for (PetscInt i : I.rotations.at) {
+    PetscScalar v[3];
+    for (int k = 0; k < 3; k++) v[k] = H(s0[1][i + k], s0[2][i + k], s1[1][i + k], s1[2][i + k]);
+    InterpolateCommutator(I, x, H.y1, s0[1] + i, s1[1] + i, v, u + i);
+  }
 }
 
 } // namespace
@@ -76,7 +77,7 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   }
   const Hermite H(x, I.h);
   At(I, x, H, n, s0, s1, o[0], o[1], o[2]);
-  if (o[0] && !I.rotations.at.empty()) AtRotations(I, x, H, n, s0, s1, o[0]);
+  if (o[0]) AtRotations(I, x, H, s0, s1, o[0]);
   for (int k = 0; k < 3; k++) {
     if (out[k]) PetscCall(VecRestoreArrayWrite(out[k], &o[k]));
     PetscCall(VecRestoreArrayRead(end[k], &s1[k]));

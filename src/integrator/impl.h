@@ -389,7 +389,7 @@ PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *
 PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor);
 PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
-void           InterpolateCommutators(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
+void           InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 PetscErrorCode ReferToState(TS ts);
 PetscErrorCode ReferTo(TS ts, Vec U, Vec *before);
 PetscErrorCode ReferBack(TS ts, Vec U, Vec *before);

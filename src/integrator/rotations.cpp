@@ -88,15 +88,14 @@ PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U at the fraction x of the step, from a polynomial with the value part * U1 at its end, whose slopes are w: V is that at x */
-void InterpolateCommutators(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u)
+/* A rotation vector u at the fraction x of the step, where w is v: from a polynomial whose slopes are w at both ends, but which took `part` of the
+   commutator in U1 along */
+void InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u)
 {
-  for (PetscInt i : I.rotations.at) {
-    PetscScalar whole[3], now[3];
-    Commutator(I.h, v0 + i, v1 + i, whole);
-    Commutator(x * I.h, v0 + i, v + i, now);
-    for (int k = 0; k < 3; k++) u[i + k] += now[k] - part * whole[k];
-  }
+  PetscScalar whole[3], now[3];
+  Commutator(I.h, v0, v1, whole);
+  Commutator(x * I.h, v0, v, now);
+  for (int k = 0; k < 3; k++) u[k] += now[k] - part * whole[k];
 }
 
 /* Where the axis turns and angular accelerations stay, as those of a ball that rolls along a curve, (26) finds no error. That of the series is its next term,
