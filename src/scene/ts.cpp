@@ -37,8 +37,9 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
   PetscFunctionBegin;
   if (R.turns && R.bodies.local && !R.triangle) PetscCall(TSHHT3GetRotationFactor(ts, &factor)); /* which is not symmetric */
   R.bodies.commutator = sv * factor;
-  PetscCall(Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); }));
-  R.bodies.commutator = 0;
+  const PetscErrorCode failed = Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); });
+  R.bodies.commutator         = 0;
+  PetscCall(failed);
   if (J != P) {
     PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
