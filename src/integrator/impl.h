@@ -363,7 +363,7 @@ PetscErrorCode Repair(TS ts);
 PetscErrorCode TinyStep(TS ts, PetscBool *ok);
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
 /* settle.cpp */
-PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau);
+PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
 /* project.cpp */
 PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current);
 PetscErrorCode ProjectVelocities(TS ts);

@@ -21,6 +21,7 @@ namespace
 
 constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
 constexpr PetscReal noticeable = 1e-6; /* part of the velocities, at rest of the tolerance: what is left of a transient grows with h in the first steps */
+constexpr PetscReal damped     = 0.5;  /* part of its accelerations that this step leaves of a transient: an eleventh. Of rounding it leaves all. */
 constexpr PetscReal against    = 0.5;  /* cosine of the angle between what accelerations are and what they lose */
 
 /* The time constant |q''|/|q'''| of what may be a transient: within a tenth of the step accelerations change by more than they are. 0: none.
@@ -53,22 +54,26 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
 
 } // namespace
 
-/* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0, V0 is
-   what a transient would leave (or as it was, if that could not be found), and the rest is to be made anew. */
-PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau)
+/* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0 and an implicit
+   step of that kind damps its accelerations, V0 is what this step `leaves`, and the rest is to be made anew. Else all is as it was. */
+PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves)
 {
-  Integrator &I  = Get(ts);
-  PetscBool   ok = PETSC_FALSE;
+  Integrator &I = Get(ts);
+  PetscReal   before, after;
 
   PetscFunctionBegin;
-  *tau = 0;
+  *leaves = PETSC_FALSE;
   PetscCall(TimeConstant(ts, h, rate, tau));
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal euler = constants * *tau;
   /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, PETSC_FALSE, &ok));
-  if (ok) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &v) { if (IsCoordinate(I, i)) v += euler * x; }, Read(I.X), Write(I.V0)));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, PETSC_FALSE, leaves));
+  PetscCall(VecNorm(I.A0, NORM_2, &before));
+  PetscCall(VecNorm(I.A1, NORM_2, &after));
+  if (after >= damped * before) *leaves = PETSC_FALSE;
+  if (*leaves) PetscCall(VecAXPY(I.V0, euler, I.A1));
+  else PetscCall(VecCopy(I.X0, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

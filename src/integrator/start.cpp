@@ -305,7 +305,7 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
   const PetscReal given  = ts->time_step;
   const PetscBool auto_h = I.auto_h;
   PetscReal       before, after, tau;
-  bool            gone = true;
+  PetscBool       gone = PETSC_TRUE;
   Vec             V;
 
   PetscFunctionBegin;
@@ -315,19 +315,21 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
   for (int k = 0; gone && k < max_transients; k++) {
     PetscCall(VecCopy(I.V0, V));
     PetscCall(VecNorm(I.A0, NORM_2, &before));
-    PetscCall(SettleTransient(ts, ts->time_step, rate, &tau));
+    PetscCall(SettleTransient(ts, ts->time_step, rate, &tau, &gone));
     if (tau <= 0) break;
-    ts->time_step = given;
-    I.auto_h      = auto_h;
-    PetscCall(Consistent(ts, PETSC_FALSE, rate));
-    PetscCall(VecNorm(I.A0, NORM_2, &after));
-    gone = after < 0.5 * before;
-    if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
-    else {
-      PetscCall(VecCopy(V, I.V0));
+    if (gone) {
+      ts->time_step = given;
+      I.auto_h      = auto_h;
       PetscCall(Consistent(ts, PETSC_FALSE, rate));
+      PetscCall(VecNorm(I.A0, NORM_2, &after));
+      gone = (PetscBool)(after < 0.5 * before);
+      if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
+      else {
+        PetscCall(VecCopy(V, I.V0));
+        PetscCall(Consistent(ts, PETSC_FALSE, rate));
+      }
+      PetscCall(ChooseFirstStep(ts, rate));
     }
-    PetscCall(ChooseFirstStep(ts, rate));
     if (!gone && k) PetscCall(VecZeroEntries(rate)); /* those of what rounding leaves of the transient */
   }
   PetscCall(VecDestroy(&V));
