@@ -67,7 +67,7 @@ PetscErrorCode Residual(TS ts, Consistent &c)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (c.T > 0 && c.its) PetscCall(ConstraintDerivatives(ts, c.t, c.U, c.V, c.T, NULL, c.gamma));
+  if (c.T > 0 && c.its) PetscCall(ConstraintDerivatives(ts, c.t, c.U, c.V, c.T, true, NULL, c.gamma));
   PetscCall(EvaluateResidual(ts, c.t, c.U, c.V, c.A, c.F));
   if (c.gamma) PetscCall(ConstraintRows(I, c));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -133,6 +133,15 @@ struct Hooks {
 constexpr PetscReal petsc_step = 0.1;
 constexpr PetscReal unset_step = petsc_step * (1 - PETSC_MACHINE_EPSILON);
 
+/* Second derivatives of the constraints in time, gamma of (6c): to be made; to be made where they were a moment ago, by the same differences; made */
+enum class Gamma { New, Near, Made };
+
+/* What a consistent solve finds: its matrix, and gamma */
+struct Prepared {
+  bool  matrix = false;
+  Gamma gamma  = Gamma::New;
+};
+
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
 enum class Bend { None, Rates, Velocities };
 
@@ -204,6 +213,7 @@ struct Integrator : StepState {
   Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
+  std::vector<signed char> levels[2]; /* of differences in time that were the best ones of each row, differentiate.cpp */
 
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;
@@ -353,10 +363,10 @@ PetscErrorCode Predict(TS ts, Vec X);
 PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok);
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok);
 PetscErrorCode NameRedundant(TS ts);
 PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V);
-PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current);
+PetscErrorCode StartFromState(TS ts, Prepared have);
 PetscErrorCode Start(TS ts);
 /* repair.cpp */
 PetscErrorCode Repair(TS ts);
@@ -365,10 +375,11 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
 /* settle.cpp */
 PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
 /* project.cpp */
-PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current);
-PetscErrorCode ProjectVelocities(TS ts);
-PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Vec first, Vec second);
+PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
+PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared);
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
+/* differentiate.cpp */
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second);
 /* misfit.cpp */
 PetscErrorCode AdaptVelocities(TS ts);
 PetscErrorCode StartMisfit(TS ts, Vec rate);

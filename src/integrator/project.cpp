@@ -5,9 +5,7 @@
 
     [M Phi_q^T; Phi_q 0] [dq; mu] = [0; Phi],      the same with dq', Phi_q q' + Phi_t (and Psi) for the velocities,
 
-  which has the units of q and so can be held against the tolerances. Time derivatives of the constraints come from
-  one-sided differences of the application's residual along q_0 + tau q'_0: exact in q'' by construction, blind to what
-  happened before t_0 (a motion may start there), and each row takes the step tau at which it is most accurate.
+  which has the units of q and so can be held against the tolerances. Time derivatives: differentiate.cpp.
 */
 #include "entries.h"
 #include "impl.h"
@@ -17,25 +15,6 @@ namespace hht3
 
 namespace
 {
-
-constexpr int       levels = 9, points = 6;
-constexpr PetscReal first_weights[points]  = {-25. / 12, 4, -3, 4. / 3, -1. / 4, 0};
-constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -13, 61. / 12, -10. / 12};
-
-/* For each row, the value at the tau where it changed least from one tau to the next */
-struct Refined {
-  std::vector<PetscReal> last, best, change;
-  explicit Refined(PetscInt n) : last(n, 0), best(n, 0), change(n, PETSC_MAX_REAL) {}
-  void take(PetscInt i, int level, PetscReal value)
-  {
-    const PetscReal d = PetscAbsReal(value - last[i]);
-    if (level > 0 && d < change[i]) { /* false for NaN */
-      change[i] = d;
-      best[i]   = value;
-    }
-    last[i] = value;
-  }
-};
 
 /* Copies the rows of holonomic constraints of F into R and clears the others */
 PetscErrorCode HolonomicRows(const Integrator &I, Vec F, Vec R)
@@ -149,19 +128,26 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckVelocities(TS ts, PetscBool project, PetscReal *e, PetscInt *row, PetscReal *value)
+/* Leaves gamma of the given velocities */
+PetscErrorCode CheckVelocities(TS ts, bool project, PetscReal *e, PetscInt *row, PetscReal *value)
 {
   Integrator &I = Get(ts);
   PetscReal   T;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, T, I.work, NULL));
+  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, T, false, I.work, I.gamma));
   PetscCall(SolveStart(ts, I.work, I.X));
   PetscCall(Distance(ts, I.X, T, e));
   PetscCall(WorstRow(ts, I.work, row, value));
   if (project) PetscCall(Move(I, I.V0, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After CheckVelocities(), which may have moved V0. The rows of velocity-level constraints may depend on it. */
+Prepared PreparedBy(const Integrator &I, bool moved)
+{
+  return {!I.count[TSHHT3_NONHOLONOMIC] || !moved, moved ? Gamma::Near : Gamma::Made};
 }
 
 } // namespace
@@ -186,92 +172,38 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of
-   holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. */
-PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Vec first, Vec second)
+/* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
+PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
 {
-  Integrator        &I = Get(ts);
-  Vec                Ut, F, zero;
-  PetscInt           n;
+  Integrator &I       = Get(ts);
+  const bool  project = I.start_policy == TSHHT3_START_PROJECT;
+  PetscReal   e, value;
+  PetscInt    row;
+  PetscBool   matrix;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(VecDuplicate(U, &Ut));
-  PetscCall(VecDuplicate(U, &F));
-  PetscCall(VecDuplicate(U, &zero));
-  PetscCall(VecZeroEntries(zero));
-  std::vector<PetscReal> f0(n), s1(n), s2(n);
-  Refined                d1(n), d2(n);
-  for (int level = 0; level < levels; level++) {
-    const PetscReal tau = 0.1 * T * PetscPowRealInt(0.25, level);
-    for (int j = 0; j < points; j++) {
-      if (j > 0 || level == 0) {
-        PetscCall(VecWAXPY(Ut, j * tau, V, U));
-        PetscCall(EvaluateResidual(ts, t + j * tau, Ut, V, zero, F));
-      }
-      PetscCall(ForEntries(
-        [&](PetscInt i, PetscScalar f) {
-          if (j == 0 && level == 0) f0[i] = PetscRealPart(f);
-          const PetscReal x = j ? PetscRealPart(f) : f0[i];
-          s1[i]             = (j ? s1[i] : 0) + first_weights[j] * x;
-          s2[i]             = (j ? s2[i] : 0) + second_weights[j] * x;
-        },
-        Read(F)));
-    }
-    for (PetscInt i = 0; i < n; i++) {
-      if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau);
-      d2.take(i, level, s2[i] / (tau * tau));
-    }
-  }
-  for (int order = 1; order <= 2; order++) {
-    Vec out = order == 1 ? first : second;
-    if (!out) continue;
-    PetscCall(ForEntries(
-      [&](PetscInt i, PetscScalar &g) {
-        g = 0;
-        if (!IsConstraint(I, i)) return;
-        if (I.role[i] == TSHHT3_HOLONOMIC) g = order == 1 ? d1.best[i] : d2.best[i];
-        else g = order == 1 ? f0[i] : d1.best[i];
-      },
-      Write(out)));
-  }
-  PetscCall(VecDestroy(&zero));
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&Ut));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Measures, reports and by choice mends U0, V0. *matrix_is_current: the start's matrix has been made at the final U0. */
-PetscErrorCode CheckInitialState(TS ts, PetscBool *matrix_is_current)
-{
-  Integrator     &I       = Get(ts);
-  const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
-  PetscReal       e, value;
-  PetscInt        row;
-
-  PetscFunctionBegin;
-  *matrix_is_current = PETSC_FALSE;
+  *prepared = {};
   if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(CheckPositions(ts, matrix_is_current));
-  if (!*matrix_is_current) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+  PetscCall(CheckPositions(ts, &matrix));
+  if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
   PetscCall(CheckVelocities(ts, project, &e, &row, &value));
-  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, project));
-  /* the rows of velocity-level constraints may depend on q' */
-  *matrix_is_current = (PetscBool)(!I.count[TSHHT3_NONHOLONOMIC] || !project);
+  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
+  *prepared = PreparedBy(I, project);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V0 to the nearest velocities that the constraints allow; makes the start's matrix at U0 */
-PetscErrorCode ProjectVelocities(TS ts)
+/* V0 to the nearest velocities that the constraints allow */
+PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared)
 {
-  PetscReal e, value;
-  PetscInt  row;
+  Integrator &I = Get(ts);
+  PetscReal   e, value;
+  PetscInt    row;
 
   PetscFunctionBegin;
-  PetscCall(StartMatrix(ts, ts->ptime, Get(ts).U0, Get(ts).V0));
-  PetscCall(CheckVelocities(ts, PETSC_TRUE, &e, &row, &value));
+  PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+  PetscCall(CheckVelocities(ts, true, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
+  *prepared = PreparedBy(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,6 +12,7 @@ namespace hht3
 PetscErrorCode Repair(TS ts)
 {
   Integrator &I = Get(ts);
+  Prepared    have;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
@@ -25,8 +26,8 @@ PetscErrorCode Repair(TS ts)
     }
     I.repaired = PETSC_TRUE;
   }
-  PetscCall(ProjectVelocities(ts));
-  PetscCall(StartFromState(ts, (PetscBool)!I.count[TSHHT3_NONHOLONOMIC]));
+  PetscCall(ProjectVelocities(ts, &have));
+  PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -71,7 +72,7 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
   PetscCall(VecDuplicate(I.U0, &V));
   PetscCall(Advance(I, I.h, U, V));
   PetscCall(VecCopy(I.predictor.D[0], I.X));
-  PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, PETSC_FALSE, ok));
+  PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, {}, ok));
   if (*ok) {
     /* the start has differentiated the constraints at times around t1: it need not have seen their values there */
     PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, U));

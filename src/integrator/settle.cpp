@@ -68,7 +68,7 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, Pet
   const PetscReal euler = constants * *tau;
   /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, PETSC_FALSE, leaves));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, {false, Gamma::Near}, leaves));
   PetscCall(VecNorm(I.A0, NORM_2, &before));
   PetscCall(VecNorm(I.A1, NORM_2, &after));
   if (after >= damped * before) *leaves = PETSC_FALSE;

@@ -58,7 +58,7 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(VecDuplicate(I.X, &V));
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, PETSC_FALSE, &ok));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {false, Gamma::Near}, &ok));
   PetscCall(VecZeroEntries(rate));
   if (ok) {
     PetscCall(VecWAXPY(rate, -1, X0, I.X));
@@ -235,7 +235,7 @@ PetscErrorCode NameRedundant(TS ts)
 }
 
 /* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, PetscBool have_matrix, PetscBool *ok)
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok)
 {
   Integrator &I = Get(ts);
   Consistent  c;
@@ -253,13 +253,13 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   if (I.constraints()) {
     c.gamma = I.gamma;
     PetscCall(TimeScale(ts, &c.T));
-    PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, NULL, c.gamma));
+    if (have.gamma != Gamma::Made) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, have.gamma == Gamma::Near, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
   for (Vec *v : {&c.F, &c.d}) PetscCall(VecDuplicate(I.X, v));
-  PetscCall(SolveConsistent(ts, c, have_matrix, ok, &why));
+  PetscCall(SolveConsistent(ts, c, have.matrix, ok, &why));
   for (Vec *v : {&c.F, &c.d}) PetscCall(VecDestroy(v));
-  if (!have_matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
+  if (!have.matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
   PetscCall(ReferBack(ts, c.U, &before));
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
@@ -277,14 +277,14 @@ namespace
 constexpr int max_transients = 30; /* one within the other; each time a tenth of one is left */
 
 /* Accelerations, multipliers and their rates from U0, V0 */
-PetscErrorCode Consistent(TS ts, PetscBool matrix_is_current, Vec rate)
+PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscBool   ok;
 
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = IsDifferential(RoleOf(I, i)) ? 0 : u; }, Read(I.U0), Write(I.X)));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, matrix_is_current, &ok));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
     if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
@@ -299,7 +299,7 @@ PetscErrorCode Consistent(TS ts, PetscBool matrix_is_current, Vec rate)
 
 /* A consistent start from U0, V0, and the first step. Transients that are over long before its end are taken out of V0, one after the other, as
    long as that takes their accelerations away. */
-PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
+PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
 {
   Integrator     &I      = Get(ts);
   const PetscReal given  = ts->time_step;
@@ -309,7 +309,7 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
   Vec             V;
 
   PetscFunctionBegin;
-  PetscCall(Consistent(ts, matrix_is_current, rate));
+  PetscCall(Consistent(ts, have, rate));
   PetscCall(ChooseFirstStep(ts, rate));
   PetscCall(VecDuplicate(I.V0, &V));
   for (int k = 0; gone && k < max_transients; k++) {
@@ -320,13 +320,13 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
     if (gone) {
       ts->time_step = given;
       I.auto_h      = auto_h;
-      PetscCall(Consistent(ts, PETSC_FALSE, rate));
+      PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
       PetscCall(VecNorm(I.A0, NORM_2, &after));
       gone = (PetscBool)(after < 0.5 * before);
       if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
       else {
         PetscCall(VecCopy(V, I.V0));
-        PetscCall(Consistent(ts, PETSC_FALSE, rate));
+        PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
       }
       PetscCall(ChooseFirstStep(ts, rate));
     }
@@ -339,14 +339,14 @@ PetscErrorCode ConsistentStart(TS ts, PetscBool matrix_is_current, Vec rate)
 } // namespace
 
 /* Everything of t_n from U0, V0: the common part of a start and of a repair */
-PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
+PetscErrorCode StartFromState(TS ts, Prepared have)
 {
   Integrator &I = Get(ts);
   Vec         rate;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(I.X, &rate));
-  PetscCall(ConsistentStart(ts, matrix_is_current, rate));
+  PetscCall(ConsistentStart(ts, have, rate));
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(MakeHistory(ts, rate));
@@ -362,7 +362,7 @@ PetscErrorCode StartFromState(TS ts, PetscBool matrix_is_current)
 PetscErrorCode Start(TS ts)
 {
   Integrator &I = Get(ts);
-  PetscBool   current;
+  Prepared    have;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
@@ -377,12 +377,12 @@ PetscErrorCode Start(TS ts)
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
   PetscCall(UpdateWeights(ts, I.U0));
-  PetscCall(CheckInitialState(ts, &current));
+  PetscCall(CheckInitialState(ts, &have));
   if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
     PetscCall(ReferToState(ts));
-    current = PETSC_FALSE;
+    have = {};
   }
-  PetscCall(StartFromState(ts, current));
+  PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
