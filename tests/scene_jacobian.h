@@ -70,25 +70,27 @@ public:
     t += d;
   }
 
-  /* u of the body whose rotation coordinate c is turns by w x e_c times this */
+  /* u of the body whose rotation coordinate c is turns by w0 x e_c times this */
   void turn(PetscInt c, double by)
   {
     if (by == 0) return;
     for (PetscInt b = 0; b < R.bodies.own; b++) {
       const PetscInt first = R.bodies.body[b].first + 3, k = c - first;
       if (!hhtdae::TurnsInSpace(R.bodies.body[b].kind) || k < 0 || k > 2) continue;
-      add(U, first + (k + 1) % 3, by * get(V, first + (k + 2) % 3));
-      add(U, first + (k + 2) % 3, -by * get(V, first + (k + 1) % 3));
+      const hhtdae::Vector3 &w0 = R.bodies.now[b].w0;
+      add(U, first + (k + 1) % 3, by * w0((k + 2) % 3));
+      add(U, first + (k + 2) % 3, -by * w0((k + 1) % 3));
     }
   }
   /* largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to the entry or to one. factor:
-     TSHHT3GetRotationFactor(), du of a rotation vector is (1 - factor sv [w]) du */
+     TSHHT3GetRotationFactor(), du of a rotation vector is (1 - factor sv [w0]) du, with any w0 */
   double jacobianError(double sv, double sa, double factor = 0)
   {
     const double d     = 1e-6;
     double       worst = 0;
     Mat          J;
     must(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
+    for (std::size_t b = 0; b < R.bodies.now.size(); b++) R.bodies.now[b].w0 = hhtdae::Vector3(1. + (double)b, -2., 0.5);
     R.bodies.commutator = sv * factor;
     must(hhtdae::Jacobian(R, t, U, V, A, sv, sa, J));
     R.bodies.commutator = 0;

@@ -97,7 +97,7 @@ PETSC_EXTERN PetscErrorCode TSHHT3SetCoordinateChange(TS, TSHHT3ChangeTest, TSHH
 typedef PetscErrorCode (*TSHHT3Refer)(TS ts, Vec U, void *ctx);
 typedef PetscErrorCode (*TSHHT3ReferBack)(TS ts, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetRotations(TS, IS, TSHHT3Refer, TSHHT3ReferBack, void *);
-PETSC_EXTERN PetscErrorCode TSHHT3GetRotationFactor(TS, PetscReal *);
+PETSC_EXTERN PetscErrorCode TSHHT3GetRotationFactor(TS, PetscReal *, Vec *);
 
 /* The longest step from a state (U, U', U'') that the application allows */
 typedef PetscErrorCode (*TSHHT3StepLimit)(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx);

@@ -397,7 +397,7 @@ PetscErrorCode NotAfterSetUp(TS ts, const char *what);
 /* rotations.cpp */
 PetscErrorCode SetUpRotations(TS ts);
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result);
-PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor);
+PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor, Vec *begin);
 PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
 void           InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);

@@ -165,10 +165,13 @@ PetscErrorCode ReferBack(TS ts, Vec U, Vec *before)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor)
+PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor, Vec *begin)
 {
+  const Integrator &I = Get(ts);
+
   PetscFunctionBegin;
-  *factor = Get(ts).rotations.factor;
+  *factor = I.rotations.factor;
+  if (begin) *begin = *factor > 0 ? I.V0 : NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -252,23 +255,24 @@ PetscErrorCode TSHHT3SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3
   Input Parameter:
 . ts - the `TS` context
 
-  Output Parameter:
-. factor - h^2/12, 0 where the matrix is not that of a step
+  Output Parameters:
++ factor - h^2/12, 0 where the matrix is not that of a step
+- begin  - the velocities at the beginning of the step, `NULL` where there is none; a borrowed vector
 
   Level: advanced
 
   Note:
   To be called by the function of `TSSetI2Jacobian()`, if at all. With s the first of its shifts, the derivatives by a rotation vector U
-  stand for (1 - factor s [w]) dU, where [w] dU is the cross product with the angular velocity: those of the residual by U, not those by U' and U'',
-  are to be multiplied by that matrix from the right. Without it corrections of stiff forces and constraints across the axis of w converge at the
+  stand for (1 - factor s [w]) dU, where [w] dU is the cross product with the angular velocity w of `begin`: those of the residual by U, not those by
+  U' and U'', are to be multiplied by that matrix from the right. Without it corrections of stiff forces and constraints across the axis of w converge at the
   rate 0.16 h |w|.
 
 .seealso: `TSHHT3`, `TSHHT3SetRotations()`
 @*/
-PetscErrorCode TSHHT3GetRotationFactor(TS ts, PetscReal *factor)
+PetscErrorCode TSHHT3GetRotationFactor(TS ts, PetscReal *factor, Vec *begin)
 {
   PetscFunctionBegin;
   PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
-  PetscUseMethod(ts, "TSHHT3GetRotationFactor_C", (TS, PetscReal *), (ts, factor));
+  PetscUseMethod(ts, "TSHHT3GetRotationFactor_C", (TS, PetscReal *, Vec *), (ts, factor, begin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

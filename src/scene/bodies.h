@@ -58,6 +58,7 @@ struct BodyMotion {
   Vector3   r, v, w;
   Matrix3   A;
   Matrix3   G;     /* of bodies that turn in space */
+  Vector3   w0;    /* of these, where the matrix of a step is made: w at its beginning */
   Vector3   f, m;  /* load: force, moment about the centre of mass */
 };
 
@@ -147,9 +148,9 @@ public:
     }
     return 0;
   }
-  /* dU of a rotation vector in the step, by that of Newmark's relations: it has a term in the angular velocity, TSHHT3GetRotationFactor(). Derivatives
+  /* dU of a rotation vector in the step, by that of Newmark's relations: it has a term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives
      of the residual by U are to be multiplied by it, rows of moments are not. */
-  Matrix3 inStep(const BodyMotion &b) const { return Matrix3::Identity() - commutator * Cross<double>(b.w); }
+  Matrix3 inStep(const BodyMotion &b) const { return commutator == 0 ? Matrix3(Matrix3::Identity()) : Matrix3(Matrix3::Identity() - commutator * Cross<double>(b.w0)); }
   /* the same for what columns() has made */
   template <class Out> void inStep(PetscInt m, Out &out) const
   {

@@ -27,6 +27,21 @@ PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const do
   PetscFunctionReturn(0);
 }
 
+/* V: at the beginning of the step whose matrix is to be made */
+PetscErrorCode NoteBeginning(Runtime &R, Vec V)
+{
+  const double *v, *local[3];
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(LocalState(R, v, v, v, local));
+  for (std::size_t b = 0; b < R.bodies.body.size(); b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (TurnsInSpace(k.kind)) R.bodies.now[b].w0 = Eigen::Map<const Vector3>(local[1] + k.first + 3);
+  }
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3])
 {
   const bool apart = R.size > 1 && !R.uses_acceleration;

@@ -86,6 +86,7 @@ PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* o
 /* initial.cpp: state of the description, with what rotations count from chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
 /* evaluate.cpp */
+PetscErrorCode NoteBeginning(Runtime &R, Vec V);
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
 /* with accelerations even where no element reads them, which the exchange then leaves out; room: for those of others */
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3]);

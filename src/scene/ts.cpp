@@ -34,8 +34,10 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
 {
   Runtime  &R = *static_cast<Runtime *>(ctx);
   PetscReal factor = 0;
+  Vec       begin;
   PetscFunctionBegin;
-  if (R.turns && R.bodies.local && !R.triangle) PetscCall(TSHHT3GetRotationFactor(ts, &factor)); /* which is not symmetric */
+  if (R.turns && R.bodies.local && !R.triangle) PetscCall(TSHHT3GetRotationFactor(ts, &factor, &begin)); /* which is not symmetric */
+  if (factor > 0) PetscCall(NoteBeginning(R, begin));
   R.bodies.commutator = sv * factor;
   const PetscErrorCode failed = Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); });
   R.bodies.commutator         = 0;

@@ -314,6 +314,66 @@ TEST(Rotation, OtherTypesNeedEulerAngles)
   }
 }
 
+/* The matrix of a step in which the spin changes by more than it was, against differences of what SNES solves: rotations depend on the angular
+   velocities at both ends */
+TEST(Rotation, MatrixOfAStepThatChangesTheSpin)
+{
+  const double d = 1e-4;
+  Scene        scene(PETSC_COMM_SELF);
+  RigidBody    b;
+  Bushing      mount;
+  TS           ts;
+  SNES         snes;
+  Mat          P;
+  Vec          X, up, down;
+  double       worst = 0, largest;
+  b.inertia               = Vector3(1, 2, 2.5).asDiagonal();
+  b.angular_velocity      = {1, -0.5, 2};
+  mount.i                 = scene.marker(scene.add("stone", b), {0.1, 0.2, 0});
+  mount.j                 = scene.marker(scene.ground());
+  mount.stiffness         = {4e3, 1e3, 2e3};
+  mount.torsional_damping = {300, 20, 100};
+  scene.add("mount", mount);
+  must(scene.createTS(&ts));
+  Options in("-ts_adapt_type none -ts_dt 0.05 -ts_max_steps 1 -ts_hhtdae_alpha -0.1");
+  must(TSSetFromOptions(ts));
+  must(scene.solve(ts));
+  must(TSGetSNES(ts, &snes));
+  must(SNESGetSolution(snes, &X));
+  must(SNESGetJacobian(snes, nullptr, &P, nullptr, nullptr));
+  must(VecDuplicate(X, &up));
+  must(VecDuplicate(X, &down));
+  for (PetscInt i = 3; i < 6; i++) must(VecSetValue(X, i, 200. * (double)(i - 2), ADD_VALUES)); /* an iterate */
+  must(VecAssemblyBegin(X));
+  must(VecAssemblyEnd(X));
+  must(SNESSetLagJacobian(snes, 1));
+  must(SNESComputeJacobian(snes, X, P, P));
+  must(MatNorm(P, NORM_FROBENIUS, &largest));
+  const auto residual = [&](PetscInt c, double by, Vec F) {
+    must(VecSetValue(X, c, by, ADD_VALUES));
+    must(VecAssemblyBegin(X));
+    must(VecAssemblyEnd(X));
+    must(SNESComputeFunction(snes, X, F));
+  };
+  for (PetscInt c = 0; c < 6; c++) {
+    residual(c, d, up);
+    residual(c, -2 * d, down);
+    must(VecSetValue(X, c, d, ADD_VALUES));
+    must(VecAXPY(up, -1, down));
+    const Array difference = whole(up);
+    for (PetscInt r = 0; r < 6; r++) {
+      double entry;
+      must(MatGetValue(P, r, c, &entry));
+      widen(worst, std::abs(entry - difference[(std::size_t)r] / (2 * d)));
+    }
+  }
+  MEASURED("largest difference %g of %g", worst, largest);
+  EXPECT_LT(worst, 1e-6 * largest);
+  must(VecDestroy(&down));
+  must(VecDestroy(&up));
+  must(TSDestroy(&ts));
+}
+
 /* A rotor that makes a full turn in a step, where rotation vectors are singular: the step is cut */
 TEST(Rotation, FullTurnInAStep)
 {
