@@ -102,6 +102,7 @@ struct StartPolicy {
   bool      view        = false;             /* -scene_view: prints what the start has done */
   double    time        = 0;                 /* -scene_start_time: of the initial values */
   Rotations rotations   = Rotations::Local;  /* -scene_rotations local,euler313 */
+  double    angle_tol   = 0;                 /* -scene_angle_tol: of the error test for the rotations of bodies, radians; 0: -ts_atol */
 };
 
 struct SceneData; /* src/scene/scene_data.h */

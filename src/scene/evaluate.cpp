@@ -179,7 +179,7 @@ Runtime::~Runtime()
   for (IS &is : roles) PetscCallAbort(PETSC_COMM_SELF, ISDestroy(&is));
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
   PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&axes));
-  PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&rtol));
+  for (Vec &x : tolerance) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
   for (Vec &x : start_state) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&sf));
   PetscCallAbort(PETSC_COMM_SELF, PetscSFDestroy(&axes_sf));

@@ -14,6 +14,7 @@ PetscErrorCode DeclareSceneOptions()
                                       "scene_equilibrium",
                                       "scene_view",
                                       "scene_start_time", "scene_rotations",
+                                      "scene_angle_tol",
                                       "scene_output",
                                       "scene_csv",
                                       "scene_dt",

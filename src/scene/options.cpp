@@ -11,7 +11,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
                     *const rotations[] = {"local", "euler313"};
   StartPolicy &p        = s.start;
   PetscInt     assembly = (PetscInt)p.assembly, redundant = (PetscInt)p.redundant, rotation = (PetscInt)p.rotations;
-  PetscReal    tolerance = p.tolerance, time = p.time;
+  PetscReal    tolerance = p.tolerance, time = p.time, angle_tol = p.angle_tol;
   PetscBool    equilibrium = (PetscBool)p.equilibrium, view = (PetscBool)p.view;
   PetscFunctionBegin;
   PetscOptionsBegin(s.comm, nullptr, "Start of a multibody scene", "Scene");
@@ -29,9 +29,12 @@ PetscErrorCode ReadStartOptions(SceneData &s)
       PetscOptionsReal("-scene_start_time", "Time of the initial values", "StartPolicy::time", time, &time, nullptr));
   PetscCall(PetscOptionsEList("-scene_rotations", "Coordinates of rotations in space", "StartPolicy::rotations", rotations,
                               2, rotations[rotation], &rotation, nullptr));
+  PetscCall(PetscOptionsReal("-scene_angle_tol", "Tolerance of the rotations of bodies, radians; 0: -ts_atol", "StartPolicy::angle_tol",
+                             angle_tol, &angle_tol, nullptr));
   PetscOptionsEnd();
   PetscCheck(tolerance > 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_assemble_tol is %g, must be positive",
              (double)tolerance);
+  PetscCheck(angle_tol >= 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_angle_tol is %g, must be positive, or 0 for that of -ts_atol", (double)angle_tol);
   p.assembly    = (Assembly)assembly;
   p.redundant   = (Redundant)redundant;
   p.tolerance   = tolerance;
@@ -39,6 +42,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   p.view        = view;
   p.time        = time;
   p.rotations   = (Rotations)rotation;
+  p.angle_tol   = angle_tol;
   PetscFunctionReturn(0);
 }
 

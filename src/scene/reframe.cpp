@@ -364,28 +364,37 @@ PetscErrorCode UseAxes(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Angles are measured against atol alone: their values depend on the axes and grow with every turn, while an error of an angle
-   does not. */
+static PetscErrorCode ToleranceOfAngles(const Runtime &R, Vec U, double whole, double angles, Vec *tolerance)
+{
+  double *x;
+  PetscFunctionBegin;
+  if (!*tolerance) PetscCall(VecDuplicate(U, tolerance));
+  PetscCall(VecSet(*tolerance, whole));
+  PetscCall(VecGetArray(*tolerance, &x));
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k = R.bodies.body[b];
+    if (k.kind == BodyKind::Planar) x[k.first + 2] = angles;
+    if (TurnsInSpace(k.kind)) std::fill(x + k.first + 3, x + k.first + 6, angles);
+  }
+  PetscCall(VecRestoreArray(*tolerance, &x));
+  PetscFunctionReturn(0);
+}
+
+/* Angles are measured against atol alone, or a tolerance of their own: their values depend on the axes and grow with every turn, while an error of an
+   angle does not. */
 PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 {
   PetscReal atol, rtol;
   Vec       vatol, vrtol, U;
-  double   *x;
   PetscFunctionBegin;
   PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
-  if (vatol || (vrtol && vrtol != R.rtol) || (vrtol && R.rtol_of == rtol)) PetscFunctionReturn(0); /* the user's own, or done */
+  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) PetscFunctionReturn(0); /* the user's own */
+  if (vrtol && R.tolerance_of[0] == atol && R.tolerance_of[1] == rtol) PetscFunctionReturn(0);
   PetscCall(TSGetSolution(ts, &U));
-  if (!R.rtol) PetscCall(VecDuplicate(U, &R.rtol));
-  PetscCall(VecSet(R.rtol, rtol));
-  PetscCall(VecGetArray(R.rtol, &x));
-  for (PetscInt b = 0; b < R.bodies.own; b++) {
-    const LocalBody &k = R.bodies.body[b];
-    if (k.kind == BodyKind::Planar) x[k.first + 2] = 0;
-    if (TurnsInSpace(k.kind)) std::fill(x + k.first + 3, x + k.first + 6, 0.0);
-  }
-  PetscCall(VecRestoreArray(R.rtol, &x));
-  R.rtol_of = rtol;
-  PetscCall(TSSetTolerances(ts, atol, nullptr, rtol, R.rtol));
+  const double whole[2] = {atol, rtol}, angles[2] = {R.scene.start.angle_tol, 0};
+  for (int k = angles[0] > 0 ? 0 : 1; k < 2; k++) PetscCall(ToleranceOfAngles(R, U, whole[k], angles[k], &R.tolerance[k]));
+  std::copy(whole, whole + 2, R.tolerance_of);
+  PetscCall(TSSetTolerances(ts, atol, R.tolerance[0], rtol, R.tolerance[1]));
   PetscFunctionReturn(0);
 }
 

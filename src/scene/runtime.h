@@ -44,8 +44,8 @@ struct Runtime {
   Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
   bool changing = false; /* between the test that asked for other axes and their commit */
   bool turns = false, remembers = false; /* on any rank: rigid bodies in space, elements with memory */
-  Vec       rtol    = nullptr; /* relative tolerances, none for angles */
-  PetscReal rtol_of = -1;
+  Vec       tolerance[2] = {}; /* absolute and relative: angles have their own, and none; those of all others, below */
+  PetscReal tolerance_of[2] = {-1, -1};
   PetscSF axes_sf = nullptr; /* axes of others' bodies */
   /* Not begun, but analyses have found accelerations, and multipliers, for this state: u, u', u'' at a time */
   Vec       start_state[3] = {};

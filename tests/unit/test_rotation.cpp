@@ -299,6 +299,34 @@ TEST(Rotation, OptionsOfScenes)
   EXPECT_NE(x[0], x[1]);
 }
 
+/* With a tolerance of their own rotations take longer or shorter steps, and places those that their own asks for; planar bodies, too */
+TEST(Rotation, ToleranceOfTheirOwn)
+{
+  for (bool planar : {false, true}) {
+    PetscInt steps[3];
+    for (int k = 0; k < 3; k++) {
+      Scene            scene(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
+      RigidBody        b;
+      TS               ts;
+      TSHHT3Statistics s;
+      b.inertia        = Vector3(1, 2, 2.5).asDiagonal();
+      const Body stone = scene.add("stone", b);
+      scene.add("mount", Bushing{scene.marker(stone), scene.marker(scene.ground()), {0, 0, 0}, {500, 500, 500}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, -20}});
+      Options in(tolerance(1e-4) + (k == 1 ? "-scene_angle_tol 1e-7" : k == 2 ? "-scene_angle_tol 1e-2" : ""));
+      must(scene.createTS(&ts));
+      must(TSSetMaxTime(ts, 2));
+      must(TSSetFromOptions(ts));
+      must(scene.solve(ts));
+      must(TSHHT3GetStatistics(ts, &s));
+      steps[k] = s.steps;
+      must(TSDestroy(&ts));
+    }
+    MEASURED("%s: %d steps, %d with a tolerance of 1e-7, %d with one of 0.01", planar ? "planar" : "spatial", (int)steps[0], (int)steps[1], (int)steps[2]);
+    EXPECT_GT(steps[1], 5 * steps[0]); /* the local error is of third order */
+    EXPECT_LT(steps[2], 0.5 * steps[0]);
+  }
+}
+
 /* Who does not count rotations anew in every step takes Euler angles */
 TEST(Rotation, OtherTypesNeedEulerAngles)
 {

@@ -173,6 +173,10 @@ TEST(SceneCheck, OptionsOfTheStart)
   EXPECT_EQ(DataOf(s).start.time, 2);
   Scene other(PETSC_COMM_SELF);
   other.add("arm", RigidBody());
-  Options bad("-scene_assemble_tol -1");
-  SAYS(complaint(other), "-scene_assemble_tol is -1");
+  {
+    Options bad("-scene_assemble_tol -1");
+    SAYS(complaint(other), "-scene_assemble_tol is -1");
+  }
+  Options bad("-scene_angle_tol -1");
+  SAYS(complaint(other), "-scene_angle_tol is -1");
 }
