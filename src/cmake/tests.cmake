@@ -1,4 +1,4 @@
-# Everything that ctest runs. Four GoogleTest programs, then scripts which use the library from the outside.
+# Everything that ctest runs. GoogleTest programs, of which those named by a room of src/ link no more than that, then scripts which use the library from the outside.
 find_package(GTest)
 if(NOT GTest_FOUND)
   message(STATUS "GoogleTest not found: only the integration tests are built (Debian: libgtest-dev)")
@@ -44,16 +44,19 @@ function(hhtdae_test_program folder)
 endfunction()
 
 include(GoogleTest)
-set(unit_timeout 120)
+set(rooms integrator linear scene flexible)
+foreach(room IN LISTS rooms)
+  set(${room}_timeout 120)
+endforeach()
 set(verification_timeout 300)
 set(stability_timeout 600)
 set(parallel_timeout 600)
 if(HHTDAE_SANITIZE)
-  foreach(folder unit verification stability parallel)
+  foreach(folder IN LISTS rooms ITEMS verification stability parallel)
     math(EXPR ${folder}_timeout "5 * ${${folder}_timeout}")
   endforeach()
 endif()
-foreach(folder unit verification stability)
+foreach(folder IN LISTS rooms ITEMS verification stability)
   hhtdae_test_program(${folder})
   if(${folder}_found)
     gtest_discover_tests(${folder}_tests TEST_PREFIX ${folder}. TEST_LIST ${folder}_list NO_PRETTY_VALUES

@@ -1,7 +1,7 @@
 /* The solver type "klupair": which pivots it plans, what it solves, when it keeps its pivots, what it does without */
-#include "../../src/linear/klupair.h"
-#include "../../src/linear/klupair_matching.h"
-#include "../bench/linear_matrices.h"
+#include "linear/klupair.h"
+#include "linear/klupair_matching.h"
+#include "bench/linear_matrices.h"
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>

@@ -26,7 +26,7 @@ std::string Reference(const std::string &file)
   return std::string(HHTDAE_REFERENCE_DIR) + "/" + file;
 #else
   const std::string source = __FILE__;
-  return source.substr(0, source.rfind("/tests/unit/")) + "/../shared/reference/" + file;
+  return source.substr(0, source.rfind("/tests/flexible/")) + "/../shared/reference/" + file;
 #endif
 }
 

@@ -1,6 +1,6 @@
 /* MUMPS with our ordering: solutions, options, singular matrices, many right-hand sides */
-#include "../../src/linear/linear.h"
-#include "../bench/linear_matrices.h"
+#include "linear/linear.h"
+#include "bench/linear_matrices.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
 #include <petsc/private/matimpl.h>

@@ -1,6 +1,6 @@
 /* Which solver KSP gets: by the matrix, by options, by the program */
-#include "../../src/linear/linear.h"
-#include "../bench/linear_matrices.h"
+#include "linear/linear.h"
+#include "bench/linear_matrices.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
 #include <vector>

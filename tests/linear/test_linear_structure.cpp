@@ -1,7 +1,7 @@
 /* What is read off a matrix: orderings and their work, symmetry, the names of redundant constraints */
-#include "../../src/linear/graph.h"
-#include "../../src/linear/linear.h"
-#include "../bench/linear_matrices.h"
+#include "linear/graph.h"
+#include "linear/linear.h"
+#include "bench/linear_matrices.h"
 #include <gtest/gtest.h>
 #include <cmath>
 #include <hhtdae/hhtdae.h>
