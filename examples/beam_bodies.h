@@ -38,10 +38,10 @@ inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &m
   PetscFunctionReturn(0);
 }
 
-/* Craig and Bampton's modes: those of the attachments, and normal modes. Of several parts one after the other, each is
+/* Craig and Bampton's modes: those of the attachments, and normal modes; with geometric stiffening or without. Of several parts one after the other, each is
    a body with modes of its own, from the model of one part. */
 inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &part, double length, int parts,
-                                   PetscInt modes, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average)
+                                   PetscInt modes, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average, bool stiffening = false)
 {
   hhtdae::Reduction   reduction;
   hhtdae::ReducedBody reduced;
@@ -49,6 +49,7 @@ inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &
   reduction.attachments = BeamAttachments(parts > 1 ? hhtdae::Tie::Rigid : tip);
   reduction.modes       = modes;
   reduction.all_nodes   = false;
+  reduction.stiffening  = stiffening;
   PetscCall(hhtdae::Reduce(part, reduction, &reduced));
   hhtdae::FlexibleBody body;
   body.model = std::make_shared<hhtdae::ModalBody>(reduced.modal);

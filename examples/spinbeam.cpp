@@ -3,13 +3,11 @@ static char help[] =
     "force stiffens it, and in steady rotation it is straight again and 0.514 mm longer. Deflection of the tip as the "
     "hub\n"
     "sees it, against a linear beam with centrifugal stiffening in 8 modes, and a picture.\n"
-    "  -body <all>: full (all finite elements, displacements at large), modal (one body in modal coordinates), parts "
-    "(a\n"
-    "      chain of modal bodies), beam (two-node beams between rigid pieces), all\n"
-    "  One modal body goes wrong here, as it must: its displacement is linear in its modes, so that it is not "
-    "shortened by\n"
-    "  bending and the centrifugal force stiffens it only as far as its frame turns with the bending. It follows the\n"
-    "  others as long as the hub is slow, then bends too far. More modes do not help; more bodies do.\n"
+    "  -body <all>: full (all finite elements, displacements at large), modal (one body in modal coordinates), stiffened (the same with geometric\n"
+    "      stiffening), parts (a chain of modal bodies), beam (two-node beams between rigid pieces), all\n"
+    "  One modal body goes wrong here, as it must: its displacement is linear in its modes, so that it is not shortened by bending and the\n"
+    "  centrifugal force stiffens it only as far as its frame turns with the bending. It follows the others as long as the hub is slow, then bends\n"
+    "  too far. More modes do not help; more bodies do, and geometric stiffening does at the cost of one.\n"
     "  -end <20>: s\n"
     "  -elements <20>: along the beam, for full and modal;  -tetrahedra: in place of bricks of 20 nodes\n"
     "  -pieces <40>: of the body of beams\n"
@@ -76,6 +74,8 @@ static PetscErrorCode AddBody(const std::string &kind, const Settings &s, const 
     PetscCall(AddFullBeam(scene, model, FeLaw::Large, fe, ends));
   else if (kind == "modal")
     PetscCall(AddModalBeam(scene, model, s.arm.length, 1, s.modes, ends));
+  else if (kind == "stiffened")
+    PetscCall(AddModalBeam(scene, model, s.arm.length, 1, s.modes, ends, Tie::Average, true));
   else if (kind == "parts") {
     hhtex::SolidBeam part = s.arm;
     part.length /= (double)s.parts;
@@ -221,12 +221,12 @@ static PetscErrorCode Spin(void)
   s.arm.n[0] = (int)elements;
   if (tetrahedra) s.arm.element = hhtex::BeamElement::Tetrahedron10;
   const std::string which = body;
-  PetscCheck(which == "all" || which == "full" || which == "modal" || which == "parts" || which == "beam",
-             PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-body %s: must be full, modal, parts, beam or all", body);
+  PetscCheck(which == "all" || which == "full" || which == "modal" || which == "stiffened" || which == "parts" || which == "beam",
+             PETSC_COMM_WORLD, PETSC_ERR_ARG_WRONG, "-body %s: must be full, modal, stiffened, parts, beam or all", body);
 
   FeModel model(PETSC_COMM_WORLD);
   if (which != "beam") PetscCall(ReadSolidBeam(s.arm, &model));
-  for (const char *kind : {"full", "modal", "parts", "beam"})
+  for (const char *kind : {"full", "modal", "stiffened", "parts", "beam"})
     if (which == "all" || which == kind) {
       curves.emplace_back();
       PetscCall(Run(kind, s, model, &curves.back()));

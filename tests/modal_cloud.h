@@ -33,6 +33,19 @@ struct ModalCloud {
     makeBody(modes, random);
   }
 
+  /* Random stiffening by angular velocity and by loads on the attachments */
+  void stiffen(unsigned seed)
+  {
+    std::mt19937                           random(seed);
+    std::uniform_real_distribution<double> any(-1, 1);
+    const auto                             symmetric = [&](Eigen::MatrixXd &B) {
+      B = Eigen::MatrixXd::NullaryExpr(body.modes(), body.modes(), [&] { return any(random); });
+      B = 0.1 * (B + B.transpose()).eval();
+    };
+    for (auto &B : body.stiffening) symmetric(B);
+    for (auto &a : body.attachments)
+      for (auto &B : a.stiffening) symmetric(B);
+  }
   /* y^T m z over all particles, y and z stacked */
   double product(const Eigen::VectorXd &y, const Eigen::VectorXd &z) const
   {

@@ -106,6 +106,7 @@ struct Reduction {
   double   max_frequency = 0;      /* of normal modes, cycles per unit of time; 0: no bound */
   double   keep_below    = 0;      /* modes of the reduced pair that are kept; 0: all */
   std::vector<PetscInt> keep;      /* modes of the reduced pair, by number from 0; empty: all */
+  bool     stiffening = false;     /* geometric stiffening by loads on attachments and by angular velocity; needs elements and an attachment */
   bool     all_nodes = true;       /* the modes at all nodes are kept (for stress, pictures) */
   bool     progress  = false;      /* printed by rank 0 */
 };

@@ -23,6 +23,9 @@ struct ModalAttachment {
   std::string                               name;
   Vector3                                   position = Vector3::Zero(); /* undeformed, axes and origin of the FE model */
   Eigen::Matrix<double, 3, Eigen::Dynamic>  translation, rotation;      /* 3 x modes: of the point, per unit of each mode */
+  /* Geometric stiffening, symmetric, modes x modes, empty: not known. What a unit force along x, y, z of the body, or moment about them, adds to the
+     stiffness; to second order the point moves by translation eta - (eta^T stiffening eta)/2. */
+  std::array<Eigen::MatrixXd, 6> stiffening;
 };
 
 struct ModalBody {
@@ -38,6 +41,9 @@ struct ModalBody {
   /* quadratic[p](k, l) = int phi_k,c phi_l,d dm for (c, d) = xx, yy, zz, xy, yz, zx; empty: not known, then the mass matrix can be
      Partial or Constant only. The sum of the first three is the identity. */
   std::array<Eigen::MatrixXd, 6> quadratic;
+
+  /* The same for the angular velocity: w_c w_d adds stiffening[p] for (c, d) = xx, yy, zz, and twice it for xy, yz, zx; ModalMass::Full alone */
+  std::array<Eigen::MatrixXd, 6> stiffening;
 
   std::vector<ModalAttachment> attachments;
 

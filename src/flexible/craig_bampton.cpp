@@ -1,6 +1,5 @@
 /* The Craig-Bampton space put together: constraint modes and, behind them, fixed-interface normal modes. */
 #include "craig_bampton.h"
-#include "interior.h"
 
 namespace hhtdae
 {
@@ -37,8 +36,7 @@ static PetscErrorCode AddNormalModes(const FeModel &model, const Interior &in, c
   PetscFunctionReturn(0);
 }
 
-/* Forces at the free dofs; averages are held, so their rows are zero */
-static MatrixXd InteriorRows(const Interior &in, const MatrixXd &force)
+MatrixXd InteriorRows(const Interior &in, const MatrixXd &force)
 {
   MatrixXd rows = MatrixXd::Zero(in.rows, force.cols());
   for (std::size_t i = 0; i < in.dof.size(); i++) rows.row(i) = force.row(in.dof[i]);

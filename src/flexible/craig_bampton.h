@@ -10,6 +10,7 @@
 #define HHTDAE_FLEXIBLE_CRAIG_BAMPTON_H
 
 #include "diagnose.h"
+#include "interior.h"
 #include "modes.h"
 
 namespace hhtdae
@@ -30,6 +31,9 @@ PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &
                                  const BodyScales &scales, ReductionSpace *space);
 PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                              const BodyScales &scales, ReductionSpace *space);
+
+/* Forces at own dofs as right-hand sides of the interior problem; averages are held, so their rows are zero */
+MatrixXd InteriorRows(const Interior &in, const MatrixXd &force);
 
 /* ---- normal_modes.cpp ---- */
 

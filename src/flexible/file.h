@@ -4,7 +4,7 @@
 
     attributes of /
       format         text "hhtdae reduced body"
-      version        int64, 2; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|
+      version        int64, 3; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|, version 2 no stiffening
       program        text: what wrote the file
       source, method, units, name   text: provenance; name is the body's
       fe_nodes       int64: nodes of the finite-element model
@@ -18,6 +18,7 @@
       first          float64 {n, 3}
       moment         float64 {3, n, 3}      component of X, mode, component of phi
       quadratic      float64 {6, n, n}      xx yy zz xy yz zx; absent if not known
+      stiffening     float64 {6, n, n}      by angular velocities, likewise
     /modes           absent if not known
       frequency      float64 {n}            cycles per unit of time
       residual       float64 {n}            in the norm of the stiffness, ReducedMode of hhtdae/flexible.h; negative:
@@ -27,6 +28,7 @@
       position       float64 {a, 3}
       translation    float64 {a, n, 3}
       rotation       float64 {a, n, 3}
+      stiffening     float64 {a, 6, n, n}   by forces and moments; absent if /modal/stiffening is
     /nodes           absent if the nodes are not kept
       coordinates    float64 {N, 3}
       label          int64 {N}
@@ -56,6 +58,7 @@
 
 #include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -69,7 +72,7 @@ namespace bodyfile
 {
 
 constexpr const char *format_name    = "hhtdae reduced body";
-constexpr int64_t     format_version = 2;
+constexpr int64_t     format_version = 3;
 constexpr const char *program_name   = "hhtdae 0.1.0";
 constexpr hsize_t     block_entries  = 1 << 22; /* of one part that is sent to be written */
 
@@ -258,7 +261,8 @@ const char *const every_dataset[] = {"/modal/mass",           "/modal/center",  
                                      "/attachments/name",     "/attachments/position", "/attachments/translation",
                                      "/attachments/rotation", "/nodes/coordinates",    "/nodes/label",
                                      "/nodes/shape",          "/elements/type",        "/elements/material",
-                                     "/elements/node",        "/stress/node",          "/stress/values"};
+                                     "/elements/node",        "/stress/node",          "/stress/values",
+                                     "/modal/stiffening",     "/attachments/stiffening"};
 
 /* A dataset cut along one dimension: all of the first (1 if there is none), own of the middle one, all of the last */
 struct Cut {
@@ -285,8 +289,10 @@ inline std::string NotFinite(const ModalBody &m)
   for (const auto &c : m.moment) good = good && c.allFinite();
   for (const auto &q : m.quadratic) good = good && q.allFinite();
   if (!good) return "inertia invariants";
+  const auto finite = [](const std::array<Eigen::MatrixXd, 6> &all) { return std::all_of(all.begin(), all.end(), [](const Eigen::MatrixXd &B) { return B.allFinite(); }); };
+  if (!finite(m.stiffening)) return "stiffening";
   for (const auto &a : m.attachments)
-    if (!a.position.allFinite() || !a.translation.allFinite() || !a.rotation.allFinite()) return "attachment " + a.name;
+    if (!a.position.allFinite() || !a.translation.allFinite() || !a.rotation.allFinite() || !finite(a.stiffening)) return "attachment " + a.name;
   return "";
 }
 

@@ -235,6 +235,20 @@ void GetAttachments(Reader *in, hsize_t n, ModalBody *m)
   }
 }
 
+/* Symmetric, so that the order of rows and columns does not matter */
+void GetStiffening(Reader *in, hsize_t n, ModalBody *m)
+{
+  if (!in->has("/modal/stiffening") || !in->error.empty()) return;
+  const hsize_t a   = m->attachments.size();
+  const auto    own = in->get<double>("/modal/stiffening", {6, n, n}), loads = in->get<double>("/attachments/stiffening", {a, 6, n, n});
+  if (!in->error.empty()) return;
+  const auto fill = [&](const std::vector<double> &from, hsize_t begin, std::array<Eigen::MatrixXd, 6> *to) {
+    for (hsize_t p = 0; p < 6; p++) (*to)[p] = Eigen::Map<const Eigen::MatrixXd>(from.data() + (begin + p) * n * n, (Eigen::Index)n, (Eigen::Index)n);
+  };
+  fill(own, 0, &m->stiffening);
+  for (hsize_t i = 0; i < a; i++) fill(loads, 6 * i, &m->attachments[i].stiffening);
+}
+
 void GetModal(Reader *in, ModalBody *m)
 {
   const Dims modes = in->dims<double>("/modal/omega");
@@ -246,6 +260,7 @@ void GetModal(Reader *in, ModalBody *m)
   std::vector<double> quadratic;
   if (in->has("/modal/quadratic")) quadratic = in->get<double>("/modal/quadratic", {6, n, n});
   GetAttachments(in, n, m);
+  GetStiffening(in, n, m);
   if (!in->error.empty()) return;
   m->name    = in->head.name;
   m->mass    = mass[0];

@@ -219,7 +219,13 @@ std::string Inconsistent(const ModalBody &m)
   for (const auto &q : m.quadratic)
     if ((q.size() || m.quadratic[0].size()) && (q.rows() != n || q.cols() != n))
       return "quadratic invariants of another size than the modes";
+  const bool stiffened = m.stiffening[0].size() > 0;
+  const auto square    = [&](const std::array<Eigen::MatrixXd, 6> &all) {
+    return std::all_of(all.begin(), all.end(), [&](const Eigen::MatrixXd &B) { return stiffened ? B.rows() == n && B.cols() == n : B.size() == 0; });
+  };
+  if (!square(m.stiffening)) return "stiffening of another size than the modes";
   for (const auto &a : m.attachments) {
+    if (!square(a.stiffening)) return "stiffening of attachment " + a.name + " of another size than the modes, or without that by angular velocities";
     if (a.translation.cols() != n || a.rotation.cols() != n)
       return "modes of attachment " + a.name + " are not as many as the body's";
     if (a.name.find('\0') != std::string::npos) return "a name with a zero inside";
@@ -246,6 +252,14 @@ void PutModal(Writer *out, const ModalBody &m)
     std::vector<double> quadratic;
     for (const auto &q : m.quadratic) append(&quadratic, Flat(q.transpose()));
     out->put("/modal/quadratic", {6, n, n}, quadratic);
+  }
+  if (m.stiffening[0].size()) {
+    std::vector<double> own, loads;
+    for (const auto &B : m.stiffening) append(&own, Flat(B));
+    for (const auto &at : m.attachments)
+      for (const auto &B : at.stiffening) append(&loads, Flat(B));
+    out->put("/modal/stiffening", {6, n, n}, own);
+    out->put("/attachments/stiffening", {a, 6, n, n}, loads);
   }
   for (const auto &at : m.attachments) {
     names.insert(names.end(), at.name.begin(), at.name.end());

@@ -43,6 +43,11 @@ std::string Impossible(const ModalBody &m)
   for (const ModalAttachment &a : m.attachments)
     if (a.name.empty() || !names.insert(a.name).second)
       return a.name.empty() ? "an attachment without a name" : "two attachments of the name " + a.name;
+  bool symmetric = true;
+  for (const auto &B : m.stiffening) symmetric = symmetric && Symmetric(B);
+  for (const ModalAttachment &a : m.attachments)
+    for (const auto &B : a.stiffening) symmetric = symmetric && Symmetric(B);
+  if (!symmetric) return "geometric stiffening that is not symmetric";
   return ImpossibleInvariants(m);
 }
 

@@ -6,6 +6,7 @@
 */
 #include "craig_bampton.h"
 #include "invariants.h"
+#include "stiffening.h"
 #include <algorithm>
 #include <cmath>
 #include <slepcsys.h>
@@ -239,6 +240,7 @@ PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedB
   PetscCall(FillAttachments(model, tied, space.x, space.motion, &body->modal));
   PetscCall(CheckMeanAxes(model, scales, body->modal));
   PetscCall(phase.end(std::to_string(body->modal.modes()) + " modes"));
+  if (reduction.stiffening) PetscCall(ComputeStiffening(model, tied, scales, reduction, space.x, &body->modal));
 
   body->comm     = model.comm;
   body->source   = model.source;

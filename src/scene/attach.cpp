@@ -29,6 +29,17 @@ Matrix3 SmallTurn::momentGradient(const Vector3 &n) const
          b * (phi.dot(n) * Matrix3::Identity() + phi * n.transpose() - 2 * n * phi.transpose());
 }
 
+AttachedPoint::AttachedPoint(const ModalAttachment &a, const Eigen::Ref<const Eigen::VectorXd> &eta) : by_modes(6, a.translation.cols())
+{
+  by_modes << a.translation, a.rotation;
+  motion = by_modes * eta;
+  for (int c = 0; c < 6 && a.stiffening[0].size(); c++) {
+    const Eigen::VectorXd bend = a.stiffening[c] * eta;
+    motion(c) -= 0.5 * eta.dot(bend);
+    by_modes.row(c) -= bend.transpose();
+  }
+}
+
 namespace
 {
 
@@ -51,9 +62,10 @@ void Value(const Frame<double> &e, const Frame<double> &i, double *phi)
 /* All attachments of one flexible body: products with their modes are made for all of them at once */
 struct Carrier {
   PetscInt        body = -1, count = 0;
-  Eigen::MatrixXd shapes;       /* padded modes x 6 count: translations of all attachments, then rotations, transposed */
+  Eigen::MatrixXd rest, shapes; /* padded modes x 6 count: derivatives of translations of all attachments, then rotations; at rest, if that differs */
   Eigen::VectorXd motion, load; /* of all points, in the same order: from the modes, and on the modes */
-  Eigen::VectorXd modes;        /* padded scratch */
+  Eigen::VectorXd modes, bend;  /* padded scratch */
+  std::vector<const Eigen::MatrixXd *> stiffening; /* of each column, null: none; empty: of all */
 
   auto   translation(PetscInt k) { return shapes.middleCols<3>(3 * k); }
   auto   rotation(PetscInt k) { return shapes.middleCols<3>(3 * (count + k)); }
@@ -98,7 +110,10 @@ public:
       c.translation(e.place).topRows(m) = e.attachment->translation.transpose();
       c.rotation(e.place).topRows(m)    = e.attachment->rotation.transpose();
       if (c.body < bodies->own) bodies->modal[bodies->body[c.body].modal].outer.left = c.rotations();
+      if (e.attachment->stiffening[0].size()) addStiffening(e, c);
     }
+    for (Carrier &c : carriers)
+      if (!c.stiffening.empty()) c.rest = c.shapes;
   }
 
   void pattern(Pattern &p) override
@@ -145,6 +160,8 @@ public:
       curvatureBlocks(ev, e, s, c, slot);
     }
     turn(ev.bodies);
+    for (const Carrier &c : carriers)
+      if (c.body < ev.bodies.own && !c.stiffening.empty()) stiffen(c, ev.bodies.modal[ev.bodies.body[c.body].modal]);
   }
 
 private:
@@ -173,6 +190,35 @@ private:
     }
   };
 
+  static void addStiffening(const Instance &e, Carrier &c)
+  {
+    c.stiffening.resize(6 * c.count);
+    for (int k = 0; k < 3; k++) {
+      c.stiffening[3 * e.place + k]             = &e.attachment->stiffening[k];
+      c.stiffening[3 * (c.count + e.place) + k] = &e.attachment->stiffening[3 + k];
+    }
+  }
+
+  /* d(shapes load)/deta for the load that has been found */
+  static void stiffen(const Carrier &c, ModalPart &p)
+  {
+    p.stiffening.setZero(p.dynamics->modes(), p.dynamics->modes());
+    for (std::size_t k = 0; k < c.stiffening.size(); k++)
+      if (c.stiffening[k]) p.stiffening -= c.load(k) * *c.stiffening[k];
+    p.outer.left = c.shapes.rightCols(3 * c.count);
+  }
+
+  /* Motions less (eta^T B eta)/2, and their derivatives; c.modes holds eta */
+  static void bend(Carrier &c, int m)
+  {
+    for (std::size_t k = 0; k < c.stiffening.size(); k++) {
+      if (!c.stiffening[k]) continue;
+      c.bend.noalias() = *c.stiffening[k] * c.modes.head(m);
+      c.motion(k) -= 0.5 * c.bend.dot(c.modes.head(m));
+      c.shapes.col(k).head(m) = c.rest.col(k).head(m) - c.bend;
+    }
+  }
+
   void size(Carrier &c)
   {
     c.shapes.setZero(ModalProducts::padded(bodies->modes(c.body)), 6 * c.count);
@@ -188,7 +234,9 @@ private:
       const int m     = ev.bodies.modes(c.body);
       c.modes.head(m) = Eigen::Map<const Eigen::VectorXd>(ev.u + ev.bodies.body[c.body].first + 6, m);
       c.modes.tail(c.modes.size() - m).setZero();
-      ModalProducts::transposedTimes((int)c.shapes.rows(), (int)c.shapes.cols(), c.shapes.data(), c.modes.data(), c.motion.data());
+      const Eigen::MatrixXd &at_rest = c.stiffening.empty() ? c.shapes : c.rest;
+      ModalProducts::transposedTimes((int)at_rest.rows(), (int)at_rest.cols(), at_rest.data(), c.modes.data(), c.motion.data());
+      if (!c.stiffening.empty()) bend(c, m);
     }
   }
 
@@ -338,8 +386,9 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
   const BodyData        &b = s.bodies[m.body], &c = s.bodies[s.markers[all[e].marker[1]].body];
   const ModalAttachment &a = b.flexible->model->attachments[c.attachment];
   const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), (Eigen::Index)b.flexible->deformation.size());
-  const SmallTurn        turn(a.rotation * eta);
-  const Frame<double>    f[2] = {Deformed(b.r, b.A, m.s, a.translation * eta, turn), {c.r, c.A}};
+  const AttachedPoint    point(a, eta);
+  const SmallTurn        turn(point.motion.tail<3>());
+  const Frame<double>    f[2] = {Deformed(b.r, b.A, m.s, point.motion.head<3>(), turn), {c.r, c.A}};
   Matrix<3, 12>          J;
   rows.name   = "attachment";
   rows.length = true;
@@ -352,7 +401,7 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
   rows.J.block<3, 12>(3, 0) = J;
   rows.J.block<3, 3>(0, 3) = Cross<double>(f[0].x - b.r - b.A * m.s); /* the marker moves, undeformed, by dr + theta x s */
   rows.modal.resize(6, a.translation.cols());
-  rows.modal << -b.A * a.translation, (J.middleCols<3>(3) * b.A * turn.J()) * a.rotation;
+  rows.modal << -b.A * point.by_modes.topRows<3>(), (J.middleCols<3>(3) * b.A * turn.J()) * point.by_modes.bottomRows<3>();
 }
 
 std::unique_ptr<Probe> AttachStore::probe(Localizer &l, PetscInt e) const

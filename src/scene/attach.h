@@ -4,7 +4,8 @@
 
     x_i - x_e = 0,  axes of i parallel to those of e,   x_e = r + A (s + Psi_x eta),  R_e = A exp([Psi_theta eta])
 
-  so that joints, forces and contacts see a rigid body, and modes stay what one constraint kernel knows.
+  and where geometric stiffening is known, less (eta^T B eta)/2 with a B for each of the six: what loads on the attachment do to the stiffness, since
+  they are the derivatives of the point's motion. So joints, forces and contacts see a rigid body, and modes stay what one constraint kernel knows.
 */
 #ifndef HHTDAE_SCENE_ATTACH_H
 #define HHTDAE_SCENE_ATTACH_H
@@ -26,6 +27,14 @@ struct SmallTurn {
 
 private:
   Matrix3 square() const { return phi * phi.transpose() - phi.squaredNorm() * Matrix3::Identity(); }
+};
+
+/* Six motions of the point in body axes, translation and rotation vector, and their derivatives by the modes */
+struct AttachedPoint {
+  Eigen::Matrix<double, 6, 1>              motion;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> by_modes;
+
+  AttachedPoint(const ModalAttachment &a, const Eigen::Ref<const Eigen::VectorXd> &eta);
 };
 
 class AttachStore : public StoreBase

@@ -135,6 +135,7 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   auto             &B = p.block;
   B.setZero(padded, padded);
   p.dynamics->gradient(modalMotion(i, u, v, a), sv, sa, p.outer, D, &B.coeffRef(0, 0) + 6 * (std::ptrdiff_t)padded + 6, padded);
+  if (p.stiffening.rows()) B.block(6, 6, m, m) += p.stiffening;
   const AngularGradient g = byAngles(i, v, a, sv, sa);
   const auto by_angles = [&](const auto &X) {
     return X.template middleCols<3>(3).lazyProduct(g.G) + X.template middleCols<3>(6).lazyProduct(g.w) + X.template rightCols<3>().lazyProduct(g.alpha);

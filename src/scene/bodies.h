@@ -69,7 +69,7 @@ struct LocalMarker {
 };
 
 /* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix. What all attachments together
-   add to the matrix is in `outer`, modes by modes, and `turned`, the derivative of the moment on the body by the modes, transposed. */
+   add to the matrix is in `outer` and `stiffening`, modes by modes, and `turned`, the derivative of the moment on the body by the modes, transposed. */
 struct ModalPart {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::unique_ptr<ModalDynamics>           dynamics;
@@ -77,6 +77,7 @@ struct ModalPart {
   ModalGradient                            gradient;
   RowMajor                                 block; /* coordinates x coordinates, and behind them the padding of the modes */
   ModalOuter                               outer;
+  Eigen::MatrixXd                          stiffening; /* no rows: no attachment has any */
   Eigen::Matrix<double, Eigen::Dynamic, 3> turned;
 };
 

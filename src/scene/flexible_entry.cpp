@@ -27,8 +27,12 @@ bool SameColumns(const ModalBody &m)
   const PetscInt n = m.modes();
   bool           same = m.first.cols() == n;
   for (const auto &x : m.moment) same = same && x.cols() == n;
+  const auto square = [n](const std::array<Eigen::MatrixXd, 6> &all) {
+    return std::all_of(all.begin(), all.end(), [&](const Eigen::MatrixXd &x) { return x.rows() == all[0].rows() && x.cols() == x.rows() && (x.rows() == n || !x.size()); });
+  };
   for (const auto &x : m.quadratic) same = same && ((x.rows() == n && x.cols() == n) || x.size() == 0);
-  for (const ModalAttachment &a : m.attachments) same = same && a.translation.cols() == n && a.rotation.cols() == n;
+  same = same && square(m.stiffening);
+  for (const ModalAttachment &a : m.attachments) same = same && a.translation.cols() == n && a.rotation.cols() == n && square(a.stiffening);
   return same;
 }
 
@@ -36,8 +40,11 @@ bool Finite(const ModalBody &m)
 {
   bool good = m.omega.allFinite() && m.first.allFinite() && m.moments.allFinite() && m.center.allFinite();
   for (const auto &x : m.moment) good = good && x.allFinite();
-  for (const auto &x : m.quadratic) good = good && x.allFinite();
-  for (const ModalAttachment &a : m.attachments) good = good && a.position.allFinite() && a.translation.allFinite() && a.rotation.allFinite();
+  for (std::size_t p = 0; p < 6; p++) good = good && m.quadratic[p].allFinite() && m.stiffening[p].allFinite();
+  for (const ModalAttachment &a : m.attachments) {
+    good = good && a.position.allFinite() && a.translation.allFinite() && a.rotation.allFinite();
+    for (const auto &x : a.stiffening) good = good && x.allFinite();
+  }
   return good;
 }
 
@@ -143,8 +150,9 @@ Body Scene::addFrame(Body body, PetscInt a)
   const ModalAttachment &x = b.flexible->model->attachments[a];
   const PetscInt         n = b.flexible->model->modes();
   const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), n), rate(b.flexible->deformation_rate.data(), n);
-  const Vector3   place = x.position - b.center, arm = place + x.translation * eta;
-  const SmallTurn turn(x.rotation * eta);
+  const AttachedPoint point(x, eta);
+  const Vector3   place = x.position - b.center, arm = place + point.motion.head<3>();
+  const SmallTurn turn(point.motion.tail<3>());
   BodyData        f;
   f.name        = b.name + "." + x.name;
   f.mass        = 0;
@@ -152,8 +160,8 @@ Body Scene::addFrame(Body body, PetscInt a)
   f.center      = Vector3::Zero();
   f.A           = b.A * turn.rotation();
   f.r           = b.r + b.A * arm;
-  f.v           = b.v + b.w.cross(b.A * arm) + b.A * (x.translation * rate);
-  f.w           = b.w + b.A * (turn.J() * (x.rotation * rate));
+  f.v           = b.v + b.w.cross(b.A * arm) + b.A * (point.by_modes.topRows<3>() * rate);
+  f.w           = b.w + b.A * (turn.J() * (point.by_modes.bottomRows<3>() * rate));
   f.fixed_start = b.fixed_start;
   f.massless      = true;
   f.light_mass    = 1e-3 * b.mass;

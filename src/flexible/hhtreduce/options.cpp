@@ -45,6 +45,7 @@ const char *const help =
     "  -max_frequency <f>       of normal modes, cycles per unit of time; without -modes: all below it\n"
     "  -keep_below <f>          modes of the reduced body that are kept, by frequency\n"
     "  -keep <0,1,5-9>          the same by number from 0\n"
+    "  -stiffening              geometric stiffening by loads on the attachments and by angular velocity\n"
     "  -stress                  stress modes too, for stress over time and pictures\n"
     "  -no_shapes               the file is for scenes alone: no nodes, no pictures\n"
     "\n"
@@ -66,14 +67,16 @@ const char *const help =
     "  -traceback               errors with PETSc's trace of calls\n"
     "All options of PETSc and SLEPc are alive (-log_view, -options_left ...); -help with a task lists them.\n"
     "\n"
-    "Layout of the file (HDF5, little-endian, format \"hhtdae reduced body\" version 2; n modes, a attachments, N "
+    "Layout of the file (HDF5, little-endian, format \"hhtdae reduced body\" version 3; n modes, a attachments, N "
     "nodes, S nodes with stress)\n"
     "  attributes of /: format, version, program, source, method, units, name, fe_nodes, elastic_scale, checksum\n"
-    "  /modal        mass {1}, center {3}, moments {3,3}, omega {n}, first {n,3}, moment {3,n,3}, quadratic {6,n,n}\n"
+    "  /modal        mass {1}, center {3}, moments {3,3}, omega {n}, first {n,3}, moment {3,n,3}, quadratic {6,n,n},\n"
+    "                stiffening {6,n,n}\n"
     "  /modes        frequency {n}, residual {n}: eta, in the norm of the full model's stiffness; omega^2 is within eta of "
     "one of its eigenvalues,\n"
     "                relative to it, and about eta^2 too high (version 1 had residuals of forces, read as not known: negative)\n"
-    "  /attachments  name (each ends with a zero), position {a,3}, translation {a,n,3}, rotation {a,n,3}\n"
+    "  /attachments  name (each ends with a zero), position {a,3}, translation {a,n,3}, rotation {a,n,3},\n"
+    "                stiffening {a,6,n,n}\n"
     "  /nodes        coordinates {N,3}, label {N}, shape {n,N,3}\n"
     "  /elements     type {E}, material {E}, node\n"
     "  /stress       node {S}, values {n,S,6}: xx yy zz xy yz zx\n"
@@ -86,7 +89,7 @@ const std::vector<std::string> with_value = {
     "mesh",   "material", "calculix", "stiffness",     "mass",       "nodes", "sets",
     "attach", "modes",    "method",   "max_frequency", "keep_below", "keep",  "o",
     "units",  "name",     "vtu",      "mode",          "scale",      "body",  "body_info"};
-const std::vector<std::string> without_value = {"stress", "no_shapes", "quiet", "traceback"};
+const std::vector<std::string> without_value = {"stress", "stiffening", "no_shapes", "quiet", "traceback"};
 
 bool IsOption(const std::string &word)
 {
@@ -236,6 +239,7 @@ PetscErrorCode ReadModelOptions(Task *t)
   PetscCall(Text("-name", &t->name));
   PetscCall(Text("-o", &t->output));
   PetscCall(Flag("-stress", &t->stress));
+  PetscCall(Flag("-stiffening", &t->reduction.stiffening));
   PetscCall(Flag("-quiet", &t->quiet));
   const int doors = !t->mesh.empty() + !t->calculix.empty() + (!t->stiffness.empty() || !t->mass.empty());
   if (!doors) PetscFunctionReturn(0);
@@ -259,6 +263,8 @@ PetscErrorCode ReadModelOptions(Task *t)
              "-stress needs the nodes, which -no_shapes leaves out");
   PetscCheck(!t->stress || t->stiffness.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-stress needs elements: with -mesh or -calculix");
+  PetscCheck(!t->reduction.stiffening || t->stiffness.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-stiffening needs elements: with -mesh or -calculix");
   t->reduction.progress = !t->quiet;
   if (t->name.empty()) t->name = Stem(t->output);
   PetscFunctionReturn(0);

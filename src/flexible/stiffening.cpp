@@ -1,0 +1,200 @@
+/* Geometric stiffening of a body in modal coordinates; see stiffening.h. */
+#include "stiffening.h"
+#include "flexible/assembly.h"
+#include "flexible/element.h"
+#include "flexible/exchange.h"
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr PetscInt together   = 12; /* loads at a time */
+constexpr int      velocities = 6;  /* products of angular velocities: xx, yy, zz, xy, yz, zx */
+
+PetscErrorCode CheckInput(const FeModel &model, const std::vector<Tied> &tied)
+{
+  long long   elements = (long long)model.elements.size(), all;
+  std::string problem;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(&elements, &all, 1, MPI_LONG_LONG, MPI_SUM, model.comm));
+  PetscCheck(all, model.comm, PETSC_ERR_ARG_WRONG,
+             "geometric stiffening needs elements, and the model from \"%s\" has matrices alone; read it from a mesh (FeModel::readMesh)", model.source.c_str());
+  PetscCheck(!tied.empty(), model.comm, PETSC_ERR_ARG_WRONG, "geometric stiffening needs an attachment: nothing else holds the body while its loads are found");
+  for (const FeElement &e : model.elements)
+    if (e.material < 0 || e.material >= (PetscInt)model.materials.size())
+      problem = "an element has material " + std::to_string(e.material) + " of " + std::to_string(model.materials.size());
+  PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
+  PetscFunctionReturn(0);
+}
+
+/* Centrifugal forces at own dofs, M (tr(S) - S) X with S = (e_c e_d^T + e_d e_c^T)/2 */
+PetscErrorCode CentrifugalForces(const FeModel &model, const BodyScales &scales, MatrixXd *f)
+{
+  MatrixXd field(3 * model.own, velocities);
+
+  PetscFunctionBegin;
+  for (int p = 0; p < velocities; p++) {
+    const int c = p % 3, d = p < 3 ? c : (c + 1) % 3;
+    Matrix3   S = Matrix3::Zero();
+    S(c, d) += 0.5;
+    S(d, c) += 0.5;
+    const Matrix3 outward = S.trace() * Matrix3::Identity() - S;
+    for (PetscInt i = 0; i < model.own; i++) field.col(p).segment<3>(3 * i) = outward * (NodePosition(model, i) - scales.center);
+  }
+  PetscCall(Multiply(model.M, field, f));
+  PetscFunctionReturn(0);
+}
+
+/* Rigid motions of the attachments, orthonormal in M as scales.rigid is */
+MatrixXd RigidOfAttachments(const std::vector<Tied> &tied, const BodyScales &scales)
+{
+  MatrixXd motion(6 * tied.size(), 6);
+  for (std::size_t a = 0; a < tied.size(); a++)
+    motion.middleRows<6>(6 * a) << RigidMotion(tied[a].position, scales.center) * scales.frame, scales.frame.bottomRows<3>();
+  return motion;
+}
+
+/* u with K u = f for the stiffness of the attachments, singular by six rigid motions */
+MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
+{
+  VectorXd unit(K.rows()); /* translations and rotations alike */
+  for (Eigen::Index i = 0; i < K.rows(); i++) unit(i) = i % 6 < 3 ? 1 : 1 / length;
+  const MatrixXd                                 A = unit.asDiagonal() * (0.5 * (K + K.transpose())) * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> modes(A);
+  const Eigen::Index                             n = K.rows() - 6;
+  if (n <= 0) return MatrixXd::Zero(f.rows(), f.cols());
+  const auto V = modes.eigenvectors().rightCols(n);
+  return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.eigenvalues().tail(n).replicate(1, f.cols())));
+}
+
+/* Displacements at own dofs, one column a load: products of angular velocities, then six of each attachment */
+PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, MatrixXd *u)
+{
+  const PetscInt n = 6 * (PetscInt)tied.size();
+  Interior       in;
+  ScopedSolver   solver;
+  MatrixXd       centrifugal, modes(3 * model.own, n), product, K, rigid, part, x;
+  MatrixXd       f = MatrixXd::Zero(3 * model.own, velocities + n), held = MatrixXd::Zero(n, velocities + n);
+
+  PetscFunctionBegin;
+  PetscCall(CreateInterior(model, tied, scales, &in));
+  PetscCall(FactorInterior(model, in, scales, &solver.ksp));
+  PetscCall(ConstraintModes(model, tied, in, solver.ksp, &modes));
+  PetscCall(Multiply(model.K, modes, &product));
+  PetscCall(LocalProduct(modes, product, &K));
+  PetscCall(SumOverRanks(model.comm, &K));
+
+  PetscCall(CentrifugalForces(model, scales, &centrifugal));
+  f.leftCols(velocities) = centrifugal;
+  held.rightCols(n).setIdentity();
+  PetscCall(LocalProduct(scales.rigid, f, &part)); /* what rigid accelerations balance */
+  PetscCall(SumOverRanks(model.comm, &part));
+  part += RigidOfAttachments(tied, scales).transpose() * held;
+  PetscCall(Multiply(model.M, scales.rigid, &rigid));
+  f -= rigid * part;
+
+  PetscCall(LocalProduct(modes, f, &part));
+  PetscCall(SumOverRanks(model.comm, &part));
+  *u = modes * SolveFree(K, held + part, scales.length);
+  PetscCall(SolveBlock(solver.ksp, InteriorRows(in, f), &x));
+  for (std::size_t i = 0; i < in.dof.size(); i++) u->row(in.dof[i]) += x.row((Eigen::Index)i);
+  PetscFunctionReturn(0);
+}
+
+/* Values at the nodes of this rank's elements, whoever owns them: `width` columns of x for each node */
+PetscErrorCode Bring(const FeModel &model, const ElementNodes &nodes, const Eigen::Ref<const MatrixXd> &x, std::vector<double> *here)
+{
+  const PetscInt      width = (PetscInt)x.cols();
+  std::vector<double> own(3 * width * model.own + 1);
+
+  PetscFunctionBegin;
+  here->resize(3 * width * nodes.global.size() + 1);
+  for (PetscInt i = 0; i < model.own; i++)
+    for (PetscInt k = 0; k < width; k++)
+      for (int c = 0; c < 3; c++) own[3 * (i * width + k) + c] = x(3 * i + c, k);
+  PetscCall(nodes.bring((int)(3 * width), own.data(), here->data()));
+  PetscFunctionReturn(0);
+}
+
+/* sigma grad phi_k : grad phi_l over the element at the points of its stiffness, for each load */
+template <class Shape>
+double AddElement(const FeModel &model, const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes,
+                  PetscInt m, const std::vector<double> &u, PetscInt loads, std::vector<MatrixXd> *sum)
+{
+  using Rule           = typename Shape::StiffnessRule;
+  constexpr int n      = Shape::nodes;
+  const auto   &points = fe::Table<Shape, Rule>::get().points;
+  const fe::Lame lame(model.materials[e.material]);
+  double         least = std::numeric_limits<double>::infinity();
+  PetscInt       place[n];
+  fe::NodeVectors<Shape> x, v;
+  MatrixXd               shape[3], gradient(9, m), stressed(9, m);
+  for (int i = 0; i < n; i++) {
+    place[i] = nodes.place(e.node[i]);
+    x.col(i) = Eigen::Map<const Vector3>(&X[3 * place[i]]);
+  }
+  for (int c = 0; c < 3; c++) {
+    shape[c].resize(n, m);
+    for (int i = 0; i < n; i++)
+      for (PetscInt k = 0; k < m; k++) shape[c](i, k) = modes[3 * (place[i] * m + k) + c];
+  }
+  for (int q = 0; q < Rule::count; q++) {
+    fe::Gradients<n> G;
+    const double     det = fe::SpatialGradients<Shape, Rule>(x, q, G);
+    fe::Lower(least, det);
+    for (int c = 0; c < 3; c++) gradient.middleRows<3>(3 * c).noalias() = G * shape[c];
+    for (PetscInt l = 0; l < loads; l++) {
+      for (int i = 0; i < n; i++) v.col(i) = Eigen::Map<const Vector3>(&u[3 * (place[i] * loads + l)]);
+      const Matrix3 D = v * G.transpose(), strain = 0.5 * (D + D.transpose());
+      const Matrix3 stress = det * points.weight[q] * (lame.lambda * strain.trace() * Matrix3::Identity() + 2 * lame.mu * strain);
+      for (int c = 0; c < 3; c++) stressed.middleRows<3>(3 * c).noalias() = stress * gradient.middleRows<3>(3 * c);
+      (*sum)[l].noalias() += gradient.transpose() * stressed;
+    }
+  }
+  return least * fe::InverseExtent<Shape>(x);
+}
+
+} // namespace
+
+PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, const Reduction &reduction,
+                                 const MatrixXd &x, ModalBody *body)
+{
+  const PetscInt      m = (PetscInt)x.cols(), loads = velocities + 6 * (PetscInt)tied.size();
+  ElementNodes        nodes;
+  MatrixXd            u, all(m, m * loads);
+  std::vector<double> X, modes, some;
+  std::string         problem;
+  Phase               phase(model.comm, reduction.progress);
+
+  PetscFunctionBegin;
+  PetscCall(phase.begin("stiffening"));
+  PetscCall(CheckInput(model, tied));
+  PetscCall(Displacements(model, tied, scales, &u));
+  PetscCall(nodes.setUp(model));
+  X.resize(3 * nodes.global.size() + 1);
+  PetscCall(nodes.bring(3, model.coordinates.data(), X.data()));
+  PetscCall(Bring(model, nodes, x, &modes));
+  for (PetscInt from = 0; from < loads; from += together) {
+    const PetscInt        count = std::min(together, loads - from);
+    std::vector<MatrixXd> sum(count, MatrixXd::Zero(m, m));
+    PetscCall(Bring(model, nodes, u.middleCols(from, count), &some));
+    for (const FeElement &e : model.elements) {
+      const double least = fe::WithShape(e.type, [&](auto shape) { return AddElement<decltype(shape)>(model, e, nodes, X, modes, m, some, count, &sum); });
+      if (!(least > fe::degenerate)) problem = "geometric stiffening: an element has no volume or is turned inside out";
+    }
+    for (PetscInt l = 0; l < count; l++) all.middleCols(m * (from + l), m) = 0.5 * (sum[l] + sum[l].transpose());
+  }
+  PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
+  PetscCall(SumOverRanks(model.comm, &all));
+  for (int p = 0; p < 6; p++) body->stiffening[p] = all.middleCols(m * p, m);
+  for (std::size_t a = 0; a < tied.size(); a++)
+    for (int c = 0; c < 6; c++) body->attachments[a].stiffening[c] = all.middleCols(m * (velocities + 6 * (PetscInt)a + c), m);
+  PetscCall(phase.end(std::to_string(loads) + " loads"));
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae
