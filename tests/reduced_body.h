@@ -68,8 +68,11 @@ private:
     for (int p = 0; p < 6; p++) m.quadratic[(std::size_t)p] = Numbers(n, n, 6 + p);
     for (std::size_t p = 0; p < 2; p++) m.quadratic[p] = (m.quadratic[p] + m.quadratic[p].transpose()).eval();
     m.quadratic[2] = Eigen::MatrixXd::Identity(n, n) - m.quadratic[0] - m.quadratic[1];
+    const auto symmetric = [n](double seed) { return Eigen::MatrixXd(Numbers(n, n, seed) + Numbers(n, n, seed).transpose()); };
+    for (int p = 0; p < 6; p++) m.stiffening[(std::size_t)p] = symmetric(50 + p);
     for (const char *name : {"hub", "tip of the row"}) {
       ModalAttachment a;
+      for (int p = 0; p < 6; p++) a.stiffening[(std::size_t)p] = symmetric(60 + p + 10 * (double)m.attachments.size());
       a.name        = name;
       a.position    = Numbers(3, 1, 20 + (double)a.name.size());
       a.translation = Numbers(3, n, 30 + (double)a.name.size());
@@ -142,8 +145,12 @@ inline bool Same(const ModalBody &a, const ModalBody &b)
   for (std::size_t p = 0; p < 6; p++)
     same = same && a.quadratic[p].rows() == b.quadratic[p].rows() && a.quadratic[p].cols() == b.quadratic[p].cols() &&
            a.quadratic[p] == b.quadratic[p];
+  const auto alike = [](const std::array<Eigen::MatrixXd, 6> &x, const std::array<Eigen::MatrixXd, 6> &y) {
+    return std::equal(x.begin(), x.end(), y.begin(), [](const Eigen::MatrixXd &B, const Eigen::MatrixXd &C) { return B.rows() == C.rows() && B.cols() == C.cols() && B == C; });
+  };
+  same = same && alike(a.stiffening, b.stiffening);
   for (std::size_t i = 0; same && i < a.attachments.size(); i++)
-    same = a.attachments[i].name == b.attachments[i].name && a.attachments[i].position == b.attachments[i].position &&
+    same = alike(a.attachments[i].stiffening, b.attachments[i].stiffening) && a.attachments[i].name == b.attachments[i].name && a.attachments[i].position == b.attachments[i].position &&
            a.attachments[i].translation == b.attachments[i].translation &&
            a.attachments[i].rotation == b.attachments[i].rotation;
   return same;

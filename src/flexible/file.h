@@ -28,7 +28,7 @@
       position       float64 {a, 3}
       translation    float64 {a, n, 3}
       rotation       float64 {a, n, 3}
-      stiffening     float64 {a, 6, n, n}   by forces and moments; absent if /modal/stiffening is
+      stiffening     float64 {6 a, n, n}    by forces and moments; absent if /modal/stiffening is
     /nodes           absent if the nodes are not kept
       coordinates    float64 {N, 3}
       label          int64 {N}

@@ -240,7 +240,7 @@ void GetStiffening(Reader *in, hsize_t n, ModalBody *m)
 {
   if (!in->has("/modal/stiffening") || !in->error.empty()) return;
   const hsize_t a   = m->attachments.size();
-  const auto    own = in->get<double>("/modal/stiffening", {6, n, n}), loads = in->get<double>("/attachments/stiffening", {a, 6, n, n});
+  const auto    own = in->get<double>("/modal/stiffening", {6, n, n}), loads = in->get<double>("/attachments/stiffening", {6 * a, n, n});
   if (!in->error.empty()) return;
   const auto fill = [&](const std::vector<double> &from, hsize_t begin, std::array<Eigen::MatrixXd, 6> *to) {
     for (hsize_t p = 0; p < 6; p++) (*to)[p] = Eigen::Map<const Eigen::MatrixXd>(from.data() + (begin + p) * n * n, (Eigen::Index)n, (Eigen::Index)n);

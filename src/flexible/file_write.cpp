@@ -259,7 +259,7 @@ void PutModal(Writer *out, const ModalBody &m)
     for (const auto &at : m.attachments)
       for (const auto &B : at.stiffening) append(&loads, Flat(B));
     out->put("/modal/stiffening", {6, n, n}, own);
-    out->put("/attachments/stiffening", {a, 6, n, n}, loads);
+    out->put("/attachments/stiffening", {6 * a, n, n}, loads);
   }
   for (const auto &at : m.attachments) {
     names.insert(names.end(), at.name.begin(), at.name.end());

@@ -71,8 +71,26 @@ MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
   return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.eigenvalues().tail(n).replicate(1, f.cols())));
 }
 
-/* Displacements at own dofs, one column a load: products of angular velocities, then six of each attachment */
-PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, MatrixXd *u)
+/* T of Sum t (phi x (phi x d))/2 = phi^T T phi/2 for forces t that nodes at d from the point of an attachment get from it */
+PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, const MatrixXd &t, MatrixXd *ties)
+{
+  PetscFunctionBegin;
+  ties->setZero(3 * (Eigen::Index)tied.size(), 3 * t.cols());
+  for (std::size_t a = 0; a < tied.size(); a++)
+    for (PetscInt i : tied[a].node) {
+      const Vector3 d = NodePosition(model, i) - tied[a].position;
+      for (Eigen::Index l = 0; l < t.cols(); l++) {
+        const Vector3 force = t.col(l).segment<3>(3 * i);
+        ties->block<3, 3>(3 * (Eigen::Index)a, 3 * l) += 0.5 * (force * d.transpose() + d * force.transpose()) - force.dot(d) * Matrix3::Identity();
+      }
+    }
+  PetscCall(SumOverRanks(model.comm, ties));
+  PetscFunctionReturn(0);
+}
+
+/* Displacements at own dofs, one column a load: products of angular velocities, then six of each attachment; and what the ties' forces make of rotations:
+   rows 3 a .. 3 a + 2 and columns 3 l .. 3 l + 2 of `ties` have T of attachment a under load l */
+PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, MatrixXd *u, MatrixXd *ties)
 {
   const PetscInt n = 6 * (PetscInt)tied.size();
   Interior       in;
@@ -102,6 +120,8 @@ PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied
   *u = modes * SolveFree(K, held + part, scales.length);
   PetscCall(SolveBlock(solver.ksp, InteriorRows(in, f), &x));
   for (std::size_t i = 0; i < in.dof.size(); i++) u->row(in.dof[i]) += x.row((Eigen::Index)i);
+  PetscCall(Multiply(model.K, *u, &product));
+  PetscCall(TieForces(model, tied, product - f, ties));
   PetscFunctionReturn(0);
 }
 
@@ -165,7 +185,7 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
 {
   const PetscInt      m = (PetscInt)x.cols(), loads = velocities + 6 * (PetscInt)tied.size();
   ElementNodes        nodes;
-  MatrixXd            u, all(m, m * loads);
+  MatrixXd            u, ties, all(m, m * loads);
   std::vector<double> X, modes, some;
   std::string         problem;
   Phase               phase(model.comm, reduction.progress);
@@ -173,7 +193,7 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
   PetscFunctionBegin;
   PetscCall(phase.begin("stiffening"));
   PetscCall(CheckInput(model, tied));
-  PetscCall(Displacements(model, tied, scales, &u));
+  PetscCall(Displacements(model, tied, scales, &u, &ties));
   PetscCall(nodes.setUp(model));
   X.resize(3 * nodes.global.size() + 1);
   PetscCall(nodes.bring(3, model.coordinates.data(), X.data()));
@@ -190,6 +210,11 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
   }
   PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
   PetscCall(SumOverRanks(model.comm, &all));
+  for (std::size_t a = 0; a < tied.size(); a++)
+    for (PetscInt l = 0; l < loads; l++) {
+      const Eigen::Matrix<double, 3, Eigen::Dynamic> &phi = body->attachments[a].rotation;
+      all.middleCols(m * l, m) += phi.transpose() * ties.block<3, 3>(3 * (Eigen::Index)a, 3 * l) * phi;
+    }
   for (int p = 0; p < 6; p++) body->stiffening[p] = all.middleCols(m * p, m);
   for (std::size_t a = 0; a < tied.size(); a++)
     for (int c = 0; c < 6; c++) body->attachments[a].stiffening[c] = all.middleCols(m * (velocities + 6 * (PetscInt)a + c), m);

@@ -70,6 +70,20 @@ TEST(ReductionErrors, NoMatrices)
   EXPECT_SAYS(failure(empty, Reduction()), "read a mesh or matrices first");
 }
 
+/* Geometric stiffening is made of the stress in elements, while something holds the body */
+TEST(ReductionErrors, Stiffening)
+{
+  Made      m(bar());
+  Reduction r  = both();
+  r.stiffening = true;
+  r.attachments.clear();
+  EXPECT_SAYS(failure(m.model, r), "geometric stiffening needs an attachment");
+  r = both();
+  r.stiffening = true;
+  m.model.elements.clear();
+  EXPECT_SAYS(failure(m.model, r), "geometric stiffening needs elements");
+}
+
 TEST(ReductionErrors, MassOfANode)
 {
   Made none(bar());

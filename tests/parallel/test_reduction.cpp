@@ -62,29 +62,33 @@ void compare(const char *name, const Box &box, const Reduction &r)
   ASSERT_EQ(a.modal.modes(), s.modal.modes());
   ASSERT_GT(a.modal.modes(), 0);
   const double omega     = (a.modal.omega - s.modal.omega).cwiseQuotient(s.modal.omega).cwiseAbs().maxCoeff();
-  double       quadratic = 0, moment = 0, motion = 0;
+  double       quadratic = 0, moment = 0, motion = 0, stiffening = 0;
   for (int p = 0; p < 6; p++)
     quadratic = std::max(quadratic, (a.modal.quadratic[p] - s.modal.quadratic[p]).cwiseAbs().maxCoeff());
   for (int c = 0; c < 3; c++) moment = std::max(moment, off(a.modal.moment[c], s.modal.moment[c]));
   for (std::size_t k = 0; k < r.attachments.size(); k++) {
     motion = std::max(motion, off(a.modal.attachments[k].translation, s.modal.attachments[k].translation));
     motion = std::max(motion, off(a.modal.attachments[k].rotation, s.modal.attachments[k].rotation));
+    for (int c = 0; c < 6; c++) stiffening = std::max(stiffening, off(a.modal.attachments[k].stiffening[c], s.modal.attachments[k].stiffening[c]));
   }
+  for (int p = 0; p < 6; p++) stiffening = std::max(stiffening, off(a.modal.stiffening[p], s.modal.stiffening[p]));
+  EXPECT_EQ(s.modal.stiffening[0].size() > 0, r.stiffening);
   int rank, size;
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
   const double shape = shapeOff(a, s);
   if (rank == 0)
-    MEASURED("%-28s %d ranks, %d modes: omega %.1e, quadratic %.1e, moment %.1e, attachments %.1e, shape %.1e", name,
-             size, (int)a.modal.modes(), omega, quadratic, moment, motion, shape);
+    MEASURED("%-28s %d ranks, %d modes: omega %.1e, quadratic %.1e, moment %.1e, attachments %.1e, shape %.1e, stiffening %.1e", name,
+             size, (int)a.modal.modes(), omega, quadratic, moment, motion, shape, stiffening);
   EXPECT_LT(omega, 1e-10);
   EXPECT_LT(quadratic, 1e-6);
   EXPECT_LT(moment, 1e-6);
   EXPECT_LT(motion, 1e-6);
   EXPECT_LT(shape, 1e-6);
+  EXPECT_LT(stiffening, 1e-6);
   /* the same to the last bit on all ranks */
   double first = a.modal.omega[0], least, most;
-  first += a.modal.quadratic[3].sum() + a.modal.attachments.size() + a.modal.moment[1].sum() + a.mode[0].residual;
+  first += a.modal.quadratic[3].sum() + a.modal.attachments.size() + a.modal.moment[1].sum() + a.mode[0].residual + a.modal.stiffening[4].sum();
   MPI_Allreduce(&first, &least, 1, MPI_DOUBLE, MPI_MIN, PETSC_COMM_WORLD);
   MPI_Allreduce(&first, &most, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
   EXPECT_EQ(least, most);
@@ -114,7 +118,9 @@ TEST(ReductionRanks, Average)
 }
 TEST(ReductionRanks, Mixed)
 {
-  compare("rigid and average", bar(false), reductionOf(Tie::Rigid, Tie::Average, Method::CraigBampton));
+  Reduction r  = reductionOf(Tie::Rigid, Tie::Average, Method::CraigBampton);
+  r.stiffening = true;
+  compare("rigid and average", bar(false), r);
 }
 TEST(ReductionRanks, Static) { compare("static", bar(false), reductionOf(Tie::Average, Tie::Rigid, Method::Static)); }
 TEST(ReductionRanks, FreeFree)

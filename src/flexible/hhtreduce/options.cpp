@@ -76,7 +76,7 @@ const char *const help =
     "one of its eigenvalues,\n"
     "                relative to it, and about eta^2 too high (version 1 had residuals of forces, read as not known: negative)\n"
     "  /attachments  name (each ends with a zero), position {a,3}, translation {a,n,3}, rotation {a,n,3},\n"
-    "                stiffening {a,6,n,n}\n"
+    "                stiffening {6a,n,n}\n"
     "  /nodes        coordinates {N,3}, label {N}, shape {n,N,3}\n"
     "  /elements     type {E}, material {E}, node\n"
     "  /stress       node {S}, values {n,S,6}: xx yy zz xy yz zx\n"
