@@ -185,9 +185,9 @@ static PetscErrorCode Plot(const std::vector<Curve> &curves, const std::string &
                "set yrange [-0.8:0.1]\nset grid\nset key bottom right\nplot '-' w p pt 7 lc 'black' title 'linear with "
                "stiffening'",
                file.c_str());
-  const char *colours[] = {"#c00000", "#0050c0", "#008040", "#a060c0"};
+  const char *colours[] = {"#c00000", "#0050c0", "#008040", "#a060c0", "#e08000"};
   for (std::size_t k = 0; k < curves.size(); k++)
-    std::fprintf(g, ", '-' w l lw 2 dt %d lc '%s' title '%s'", (int)k + 1, colours[k % 4], curves[k].name.c_str());
+    std::fprintf(g, ", '-' w l lw 2 dt %d lc '%s' title '%s'", (int)k + 1, colours[k % 5], curves[k].name.c_str());
   std::fprintf(g, "\n");
   for (const Point &p : reference) std::fprintf(g, "%g %g\n", p.t, p.y);
   std::fprintf(g, "e\n");

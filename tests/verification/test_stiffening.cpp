@@ -6,6 +6,7 @@
 #include "scene_output.h"
 #include "scene_watch.h"
 #include "spinbeam_model.h"
+#include <Eigen/Eigenvalues>
 
 using namespace hhtest;
 
@@ -119,4 +120,60 @@ TEST(Stiffening, SpinUp)
   must(run.solve());
   MEASURED("largest difference %.2e m of 0.574", worst);
   EXPECT_LT(worst, 3e-3);
+}
+
+/* Frequency of bending out of the plane of rotation, which it raises (Southwell): w^2 of a cantilever of EI = m = L = 1 at the speed by Ritz' method with
+   powers of x, to 10 digits; 6.4495 at a speed of 5 (Wright and others, J. Appl. Mech. 49, 1982) */
+static double flapping(double speed)
+{
+  constexpr int                    n = 8;
+  Eigen::Matrix<double, n, n>      K, M;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      const double p = i + 2, q = j + 2;
+      M(i, j) = 1 / (p + q + 1);
+      K(i, j) = p * (p - 1) * q * (q - 1) / (p + q - 3) + speed * speed / 2 * p * q * (1 / (p + q - 1) - 1 / (p + q + 1));
+    }
+  return std::sqrt(Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix<double, n, n>>(K, M).eigenvalues()(0));
+}
+
+/* Of the free vibration that a push across has left, by its passages through zero */
+static double measured(bool stiffened)
+{
+  FeModel         model(PETSC_COMM_SELF);
+  Scene           scene(PETSC_COMM_SELF);
+  hhtex::BeamEnds ends;
+  UserForce       push;
+  double          before = 0, first = 0, last = 0;
+  int             passages = 0;
+  must(ReadSolidBeam(hhtex::SpinningArm(), &model));
+  must(AddModalBeam(scene, model, 10, 1, 8, &ends, Tie::Average, stiffened));
+  hhtex::SpinUp(scene, ends);
+  push.i = scene.marker(ends.tip);
+  for (double f : {0., 0., 1.})
+    push.force.push_back(Expression({Measure::time()}, [f](const Real *t) -> Real { return exp((t[0] - 17.) * (17. - t[0]) * 40.) * f; }));
+  scene.add("push", push);
+  scene.channel("across", Measure::displacement(push.i, 2));
+  SceneRun     run(scene, 28, tolerance(1e-6));
+  hhtex::Watch watch(scene, 0.01, [&](double t, const std::vector<double> &x) {
+    if (t > 18 && before * x[2] < 0) {
+      last = t - 0.01 * x[2] / (x[2] - before);
+      if (!passages++) first = last;
+    }
+    before = x[2];
+  });
+  must(watch.attach(run.ts));
+  must(run.solve());
+  return PETSC_PI * (passages - 1) / (last - first);
+}
+
+TEST(Stiffening, SouthwellsFrequencies)
+{
+  const double unit = std::sqrt(1.4e4 / 1.2) / 100, exact = flapping(hhtex::spin_speed / unit) * unit; /* sqrt(EI/m)/L^2, 1/s */
+  EXPECT_NEAR(flapping(0), 3.5160, 1e-4);
+  EXPECT_NEAR(flapping(5), 6.4495, 1e-4);
+  const double with = measured(true), without = measured(false);
+  MEASURED("%.4f rad/s, of a beam %.4f, without stiffening %.4f", with, exact, without);
+  EXPECT_NEAR(with, exact, 5e-3 * exact);
+  EXPECT_GT(std::abs(without - exact), 0.05 * exact);
 }
