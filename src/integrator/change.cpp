@@ -23,9 +23,9 @@ namespace hht3
 namespace
 {
 
-/* Predicted errors of the first step in new coordinates above this, in units of the tolerance, call for a shorter one;
-   and the least part of h that is left, above what Repair() takes for a fall */
-constexpr PetscReal aim = 0.9, least_cut = 0.2;
+/* A predicted error of the first step in new coordinates above the tolerance calls for a shorter one: the least part of h that is left, above
+   what Repair() takes for a fall */
+constexpr PetscReal least_cut = 0.2;
 
 PetscErrorCode WantsChange(TS ts, PetscBool *wanted)
 {
@@ -119,7 +119,7 @@ PetscErrorCode StepAfterChange(TS ts)
   I.status                  = TS_STEP_PENDING;
   PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
   I.status = status;
-  if (!(e > aim)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(e > 1)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal next =
       PetscMax(I.h * PetscMax(least_cut, 0.9 * PetscPowReal(e, (PetscReal)-1 / 3)), PetscMin(ts->adapt->dt_min, I.h));
   PetscCall(PetscInfo(ts, "h = %g would miss the tolerance %g times in the new coordinates, %g\n", (double)I.h,

@@ -111,6 +111,23 @@ TEST(EvaluateAt, OrderBetweenSteps)
 }
 
 /* Every sample satisfies the equations of motion, states and definitions, whatever the problem; and both ends are the step's own */
+/* Differences of the constraints over a step far shorter than the motion's time scale would be rounding */
+TEST(EvaluateAt, WithinAShortStep)
+{
+  const Pendulum p;
+  Simulation     run(p, fixedSteps(1e-7));
+  Sample         x(run.U);
+  Array          e[3] = {Array(p.n), Array(p.n), Array(p.n)};
+  double         worst = 0.;
+  for (int k = 0; k < 5; k++) must(run.step());
+  must(TSHHT3EvaluateAt(run.ts, run.t() - 0.5e-7, x.U, x.V, x.A));
+  p.reference(run.t() - 0.5e-7, e[0].data(), e[1].data(), e[2].data());
+  const auto y = x.values();
+  for (PetscInt i = 0; i < p.n; i++) widen(worst, p.role[i] == TSHHT3_COORDINATE ? std::abs(y[2][i] - e[2][i]) : std::abs(y[0][i] - e[0][i]));
+  MEASURED("largest error of accelerations and multipliers %.1e", worst);
+  EXPECT_LT(worst, 1e-4);
+}
+
 TEST(EvaluateAt, EquationsHold)
 {
   for (const Factory &f : allProblems())
