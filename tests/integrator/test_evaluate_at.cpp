@@ -114,7 +114,7 @@ TEST(EvaluateAt, OrderBetweenSteps)
 /* Differences of the constraints over a step far shorter than the motion's time scale would be rounding */
 TEST(EvaluateAt, WithinAShortStep)
 {
-  const Pendulum p;
+  const Pendulum p(-60., 1., 1.);
   Simulation     run(p, fixedSteps(1e-7));
   Sample         x(run.U);
   Array          e[3] = {Array(p.n), Array(p.n), Array(p.n)};
