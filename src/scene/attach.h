@@ -4,8 +4,8 @@
 
     x_i - x_e = 0,  axes of i parallel to those of e,   x_e = r + A (s + Psi_x eta),  R_e = A exp([Psi_theta eta])
 
-  and where geometric stiffening is known, less (eta^T B eta)/2 with a B for each of the six: what loads on the attachment do to the stiffness, since
-  they are the derivatives of the point's motion. So joints, forces and contacts see a rigid body, and modes stay what one constraint kernel knows.
+  With geometric stiffening each of the six motions Psi eta loses (eta^T B eta)/2, B its own: a force or moment F along it then adds F B to the
+  stiffness of the modes, as the derivative of its work. So joints, forces and contacts see a rigid body, and modes stay what one constraint kernel knows.
 */
 #ifndef HHTDAE_SCENE_ATTACH_H
 #define HHTDAE_SCENE_ATTACH_H

@@ -78,13 +78,10 @@ TEST(FlexibleDynamics, WithoutModesIsTheRigidBody)
   for (int k = 0; k < 3; k++) EXPECT_NEAR(x[0][k], x[1][k], 1e-10);
 }
 
-/* Free flight with spin and vibration, with geometric stiffening and without: error of energy and momentum goes with the square of the step */
-TEST(FlexibleDynamics, EnergyAndMomentumOfAFreeBody)
+/* Free flight with spin and vibration: error of energy and momentum goes with the square of the step */
+static void flyFreely(const ModalCloud &c)
 {
-  for (bool stiffened : {false, true}) {
-  ModalCloud c(9, 4, 5);
-  double     drift[2][2];
-  if (stiffened) c.stiffen(4);
+  double drift[2][2];
   for (int k = 0; k < 2; k++) {
     Scene        scene(PETSC_COMM_SELF);
     FlexibleBody b     = cloudBody(c);
@@ -109,7 +106,14 @@ TEST(FlexibleDynamics, EnergyAndMomentumOfAFreeBody)
     EXPECT_LT(drift[1][q], 1e-3);
     EXPECT_LT(drift[1][q], 0.35 * drift[0][q]);
   }
-  }
+}
+
+TEST(FlexibleDynamics, EnergyAndMomentumOfAFreeBody)
+{
+  ModalCloud c(9, 4, 5);
+  flyFreely(c);
+  c.stiffen(4);
+  flyFreely(c);
 }
 
 /* Falling without spin strains nothing; a spin does, by the centrifugal load */
