@@ -20,7 +20,8 @@ Array runChain(MPI_Comm comm)
     const std::string name = "link" + std::to_string(k);
     Marker            from, to;
     if (k % 2 == 0) {
-      const ModalCloud c(7, 3, 10 + k);
+      ModalCloud c(7, 3, 10 + k);
+      if (k % 4 == 0) c.stiffen(k + 1);
       FlexibleBody     b;
       b.model    = std::make_shared<ModalBody>(c.body);
       b.position = at - c.X[0];
