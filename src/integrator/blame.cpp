@@ -17,11 +17,11 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
 {
   Verification &v = Get(ts).verify;
   PetscReal     sum[4];
-  Vec           Y, change;
+  WorkVec       Y, change;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(dX, &Y));
-  PetscCall(VecDuplicate(dX, &change));
+  PetscCall(Y.like(dX));
+  PetscCall(change.like(dX));
   PetscCall(VecWAXPY(Y, -way, dX, v.where));
   PetscCall(SNESComputeFunction(ts->snes, Y, change));
   PetscCall(VecAYPX(change, -1, F_where));
@@ -36,8 +36,6 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
       local[2] += way * model * model;
     },
     Read(F), Read(v.model), Read(change)));
-  PetscCall(VecDestroy(&change));
-  PetscCall(VecDestroy(&Y));
   *answer = sum[2] != 0 ? PetscAbsReal(sum[1] / sum[2]) : -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -50,17 +48,15 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
 {
   Verification &v = Get(ts).verify;
   PetscReal     answer[2];
-  Vec           F_where, forces;
+  WorkVec       F_where, forces;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(dX, &F_where));
-  PetscCall(VecDuplicate(dX, &forces));
+  PetscCall(F_where.like(dX));
+  PetscCall(forces.like(dX));
   PetscCall(VecCopy(v.work, forces));
   PetscCall(PassDefinitionsOn(ts, forces));
   PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));
   for (int k = 0; k < 2; k++) PetscCall(Answer(ts, k ? -0.25 : 0.25, dX, F, F_where, forces, &answer[k]));
-  PetscCall(VecDestroy(&forces));
-  PetscCall(VecDestroy(&F_where));
   *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < hopeless && answer[1] >= 0 && answer[1] < hopeless);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

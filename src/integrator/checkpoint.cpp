@@ -228,15 +228,14 @@ PetscErrorCode Probe(TS ts, Vec F)
 {
   Integrator            &I     = Get(ts);
   const TSHHT3Statistics saved = I.stat;
-  Vec                    A;
+  WorkVec                A;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(I.A1, &A));
+  PetscCall(A.like(I.A1));
   PetscCall(VecCopy(I.A1, A));
   PetscCall(VecScale(A, 2));
   PetscCall(VecShift(A, 1));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, F));
-  PetscCall(VecDestroy(&A));
   I.stat = saved;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -289,21 +288,21 @@ PetscErrorCode Gather(TS ts, Archive &a)
   Identity          id;
   std::string       options;
   std::vector<char> words;
-  Vec               probe;
+  WorkVec           probe;
 
   PetscFunctionBegin;
   PetscCall(Identify(ts, &id));
   PetscCall(OptionsInWords(ts, &options));
   words.assign(options.begin(), options.end());
-  PetscCall(VecDuplicate(ts->vec_sol, &probe));
+  PetscCall(probe.like(ts->vec_sol));
   PetscCall(Probe(ts, probe));
   a.plain(id);
   a.list(words);
   TransferStructs(ts, a);
   PetscCall(TransferVectors(ts, a));
-  PetscCall(TransferVec(ts, a, &probe));
+  Vec of_it = probe;
+  PetscCall(TransferVec(ts, a, &of_it));
   PetscCall(SaveMatrix(ts, a));
-  PetscCall(VecDestroy(&probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -327,7 +326,7 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
   Identity          id;
   std::vector<char> words;
-  Vec               was, is;
+  WorkVec           was, is;
   bool              good;
 
   PetscFunctionBegin;
@@ -339,10 +338,11 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   TransferStructs(ts, a);
   PetscCall(Everywhere(ts, a.good, &good));
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
-  PetscCall(VecDuplicate(ts->vec_sol, &was));
-  PetscCall(VecDuplicate(ts->vec_sol, &is));
+  PetscCall(was.like(ts->vec_sol));
+  PetscCall(is.like(ts->vec_sol));
   PetscCall(TransferVectors(ts, a));
-  PetscCall(TransferVec(ts, a, &was));
+  Vec of_file = was;
+  PetscCall(TransferVec(ts, a, &of_file));
   PetscCall(Everywhere(ts, a.good && HasItsVectors(I), &good));
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
   PetscCall(CheckFinite(ts, file));
@@ -353,8 +353,6 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCall(Probe(ts, is));
   PetscCall(CheckProbe(ts, file, was, is));
   PetscCall(LoadMatrix(ts, a));
-  PetscCall(VecDestroy(&is));
-  PetscCall(VecDestroy(&was));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

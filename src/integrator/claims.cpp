@@ -90,11 +90,11 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
   Integrator &I = Get(ts);
-  Vec         near;
+  WorkVec     near;
   PetscInt    first;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(X, &near));
+  PetscCall(near.like(X));
   PetscCall(VecCopy(X, near));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x += rounding_of_sums * RandomSign(first + i, 1) * PetscAbsScalar(x); }, Write(near)));
@@ -111,7 +111,6 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
   PetscCall(SNESComputeFunction(ts->snes, near, noise));
   PetscCall(VecAXPY(noise, -1, F));
   PetscCall(VecAbs(noise));
-  PetscCall(VecDestroy(&near));
   PetscCall(StageVectors(ts, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -132,10 +131,10 @@ static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
 static PetscErrorCode MeasureInertia(TS ts)
 {
   Integrator &I = Get(ts);
-  Vec         Z, A, F, change;
+  WorkVec     Z, A, F, change;
 
   PetscFunctionBegin;
-  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDuplicate(I.X, v));
+  for (WorkVec *v : {&Z, &A, &F, &change}) PetscCall(v->like(I.X));
   PetscCall(ProbingAccelerations(ts, Z));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
   PetscCall(VecWAXPY(A, 1, Z, I.A1));
@@ -148,7 +147,6 @@ static PetscErrorCode MeasureInertia(TS ts)
       if (PetscAbsScalar(f) > PetscRealPart(noise)) m = now;
     },
     Read(Z), Read(change), Read(I.verify.noise), Write(I.verify.inertia)));
-  for (Vec *v : {&Z, &A, &F, &change}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

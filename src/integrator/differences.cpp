@@ -38,7 +38,7 @@ PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
 /* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
 PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
 {
-  Vec                x[3], F0, F;
+  WorkVec            x[3], F0, F;
   PetscInt           N, n, start, end;
   const PetscScalar *a, *b;
 
@@ -46,9 +46,9 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetLocalSize(ts->vec_sol, &n));
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
-  for (Vec &v : x) PetscCall(VecDuplicate(ts->vec_sol, &v));
-  PetscCall(VecDuplicate(ts->vec_sol, &F0));
-  PetscCall(VecDuplicate(ts->vec_sol, &F));
+  for (WorkVec &v : x) PetscCall(v.like(ts->vec_sol));
+  PetscCall(F0.like(ts->vec_sol));
+  PetscCall(F.like(ts->vec_sol));
   PetscCall(VecCopy(ts->vec_sol, x[0]));
   PetscCall(VecCopy(ts->vec_dot, x[1]));
   PetscCall(VecSet(x[2], 0.1));
@@ -79,9 +79,6 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
       PetscCall(VecRestoreArrayRead(F0, &a));
     }
   }
-  for (Vec &v : x) PetscCall(VecDestroy(&v));
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&F0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

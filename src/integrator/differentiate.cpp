@@ -63,16 +63,16 @@ PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, 
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second)
 {
   Integrator            &I = Get(ts);
-  Vec                    Ut, F, zero;
+  WorkVec                Ut, F, zero;
   PetscInt               n;
   bool                   used[levels];
   std::vector<PetscReal> f0, s1, s2;
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(VecDuplicate(U, &Ut));
-  PetscCall(VecDuplicate(U, &F));
-  PetscCall(VecDuplicate(U, &zero));
+  PetscCall(Ut.like(U));
+  PetscCall(F.like(U));
+  PetscCall(zero.like(U));
   PetscCall(VecZeroEntries(zero));
   for (bool &u : used) u = true;
   if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
@@ -116,9 +116,6 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
       },
       Write(out)));
   }
-  PetscCall(VecDestroy(&zero));
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&Ut));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -51,16 +51,15 @@ PetscErrorCode Unmoved(TS ts, Vec unmoved)
   Verification &v = I.verify;
   PetscInt      first;
   PetscBool     solved;
-  Vec           force;
+  WorkVec       force;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(unmoved, &force));
+  PetscCall(force.like(unmoved));
   PetscCall(VecGetOwnershipRange(force, &first, NULL));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &f) { f = IsCoordinate(I, i) ? RandomSign(first + i, 2) * m : 0; }, Read(v.inertia), Write(force)));
   PetscCall(AnswerOf(ts, force, unmoved, &solved));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &a) { a = solved && IsCoordinate(I, i) && PetscRealPart(m) > 0 && PetscAbsScalar(a) < held; }, Read(v.inertia), Write(unmoved)));
   PetscCall(WholeRotations(I, unmoved));
-  PetscCall(VecDestroy(&force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,15 +109,14 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   Integrator      &I = Get(ts);
   const Corrector &c = I.corrector;
   PetscInt         all = 0;
-  Vec              unmoved;
+  WorkVec          unmoved;
 
   PetscFunctionBegin;
   if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.matrix.fresh && c.it - c.base == 1) {
-    PetscCall(VecDuplicate(F, &unmoved));
+    PetscCall(unmoved.like(F));
     PetscCall(Unmoved(ts, unmoved));
     PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
-    PetscCall(VecDestroy(&unmoved));
     PetscCall(CountDriven(I, &all));
     if (!all) PetscCall(VecDestroy(&I.verify.driven));
   }

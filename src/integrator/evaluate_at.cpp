@@ -173,17 +173,17 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   Integrator            &I     = Get(ts);
   const TSHHT3Statistics saved = I.stat;
   const char            *why;
-  Vec                    before;
+  WorkVec                    before;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
   S.at.t    = t;
   S.at.tiny = 1e-28 * I.h; /* as in the start */
   PetscCall(GuessUnknowns(I, S.at));
-  PetscCall(ReferTo(ts, S.at.U, &before));
+  PetscCall(ReferTo(ts, S.at.U, before));
   if (S.at.gamma) PetscCall(ConstraintTerms(ts, S.at));
   PetscCall(SolveConsistent(ts, S.at, false, ok, &why));
-  PetscCall(ReferBack(ts, S.at.U, &before));
+  PetscCall(ReferBack(ts, S.at.U, before));
   I.stat = saved;
   if (!*ok) S.t1 = PETSC_NINFINITY; /* a factor that failed may keep its error */
   if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));

@@ -226,11 +226,11 @@ PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
 {
   Integrator     &I = Get(ts);
   const PetscReal d = 0.01 * m.unit;
-  Vec             jerk;
+  WorkVec         jerk;
 
   PetscFunctionBegin;
   if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
-  PetscCall(VecDuplicate(I.U0, &jerk));
+  PetscCall(jerk.like(I.U0));
   PetscCall(VecZeroEntries(I.bend));
   PetscCall(VecZeroEntries(jerk));
   for (int sign = -1; sign <= 1; sign += 2) {
@@ -246,7 +246,6 @@ PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
     PetscCall(Apply(ts, map, 0));
     PetscCall(VecAXPY(I.bend, -sign / (2 * m.unit), map.now[2]));
   }
-  PetscCall(VecDestroy(&jerk));
   PetscScalar *b;
   PetscCall(VecGetArray(I.bend, &b));
   for (size_t i = 0; i < map.changed.size(); i++)

@@ -2,6 +2,7 @@
 #ifndef HHTDAE_IMPL_H
 #define HHTDAE_IMPL_H
 
+#include "work_vec.h"
 #include "compat.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
@@ -402,8 +403,8 @@ PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
 void           InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 PetscErrorCode ReferToState(TS ts);
-PetscErrorCode ReferTo(TS ts, Vec U, Vec *before);
-PetscErrorCode ReferBack(TS ts, Vec U, Vec *before);
+PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before);
+PetscErrorCode ReferBack(TS ts, Vec U, const WorkVec &before);
 PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferBack back, void *ctx);
 /* limit.cpp */
 PetscErrorCode ApplyStepLimit(TS ts);

@@ -63,13 +63,13 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 PetscErrorCode TinyStep(TS ts, PetscBool *ok)
 {
   Integrator &I = Get(ts);
-  Vec         U, V;
+  WorkVec     U, V;
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "step of %g is below what rounding of q allows the corrector: Taylor series\n", (double)I.h));
   I.stat.tiny_steps++;
-  PetscCall(VecDuplicate(I.U0, &U));
-  PetscCall(VecDuplicate(I.U0, &V));
+  PetscCall(U.like(I.U0));
+  PetscCall(V.like(I.U0));
   PetscCall(Advance(I, I.h, U, V));
   PetscCall(VecCopy(I.predictor.D[0], I.X));
   PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, {}, ok));
@@ -78,8 +78,6 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
     PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, U));
     PetscCall(CheckNumbers(ts, I.t1, {U, I.U1, I.V1, I.A1}, ok));
   }
-  PetscCall(VecDestroy(&V));
-  PetscCall(VecDestroy(&U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -140,28 +140,26 @@ PetscErrorCode ReferToState(TS ts)
 }
 
 /* U is the reference until ReferBack() gives it back its entries. Constraints are differentiated there. */
-PetscErrorCode ReferTo(TS ts, Vec U, Vec *before)
+PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  *before = NULL;
   if (!I.rotations.refer) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(U, before));
-  PetscCall(VecCopy(U, *before));
+  PetscCall(before.like(U));
+  PetscCall(VecCopy(U, before));
   PetscCall((*I.rotations.refer)(ts, U, I.rotations.ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode ReferBack(TS ts, Vec U, Vec *before)
+PetscErrorCode ReferBack(TS ts, Vec U, const WorkVec &before)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (!*before) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!before) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall((*I.rotations.back)(ts, I.rotations.ctx));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar b, PetscScalar &u) { if (IsCoordinate(I, i)) u = b; }, Read(*before), Write(U)));
-  PetscCall(VecDestroy(before));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar b, PetscScalar &u) { if (IsCoordinate(I, i)) u = b; }, Read(before), Write(U)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,7 +33,7 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   const PetscReal old = I.h;
   PetscReal       v, a, j;
   PetscScalar     aj, aa;
-  Vec             weighted;
+  WorkVec         weighted;
 
   PetscFunctionBegin;
   I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
@@ -43,11 +43,10 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   I.h  = old;
   *tau = a > 0 && h * j > constants * a && h * h * j > noticeable * (v > 0 ? v : 1 / h) ? a / j : 0;
   if (*tau <= 0 || v > 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(I.A0, &weighted));
+  PetscCall(weighted.like(I.A0));
   PetscCall(WeightCorrection(I, I.A0, weighted));
   PetscCall(VecDot(I.A0, weighted, &aa));
   PetscCall(VecDot(rate, weighted, &aj));
-  PetscCall(VecDestroy(&weighted));
   if (*tau * -PetscRealPart(aj) < against * PetscRealPart(aa)) *tau = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

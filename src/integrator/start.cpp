@@ -48,14 +48,14 @@ PetscErrorCode Rates(TS ts, Vec rate)
   Integrator &I = Get(ts);
   PetscReal   T;
   PetscBool   ok;
-  Vec         X0, U, V;
+  WorkVec     X0, U, V;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
   const PetscReal d = 1e-5 * T;
-  PetscCall(VecDuplicate(I.X, &X0));
-  PetscCall(VecDuplicate(I.X, &U));
-  PetscCall(VecDuplicate(I.X, &V));
+  PetscCall(X0.like(I.X));
+  PetscCall(U.like(I.X));
+  PetscCall(V.like(I.X));
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
   PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {false, Gamma::Near}, &ok));
@@ -65,9 +65,6 @@ PetscErrorCode Rates(TS ts, Vec rate)
     PetscCall(VecScale(rate, 1 / d));
   } else PetscCall(PetscInfo(ts, "start: no consistent accelerations at t_0 + %g, the start goes without q'''\n", (double)d));
   PetscCall(VecCopy(X0, I.X));
-  PetscCall(VecDestroy(&V));
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&X0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -240,11 +237,11 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   Integrator &I = Get(ts);
   Consistent  c;
   const char *why;
-  Vec         before = NULL;
+  WorkVec     before, F, d;
 
   PetscFunctionBegin;
   PetscCall(OfTheRun(ts, t, U, V, &c));
-  if (h == 0) PetscCall(ReferTo(ts, c.U, &before));
+  if (h == 0) PetscCall(ReferTo(ts, c.U, before));
   c.h        = h;
   c.begin[0] = I.base[0];
   c.begin[1] = I.base[1];
@@ -256,11 +253,13 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
     if (have.gamma != Gamma::Made) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, have.gamma == Gamma::Near, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
-  for (Vec *v : {&c.F, &c.d}) PetscCall(VecDuplicate(I.X, v));
+  PetscCall(F.like(I.X));
+  PetscCall(d.like(I.X));
+  c.F = F;
+  c.d = d;
   PetscCall(SolveConsistent(ts, c, have.matrix, ok, &why));
-  for (Vec *v : {&c.F, &c.d}) PetscCall(VecDestroy(v));
   if (!have.matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
-  PetscCall(ReferBack(ts, c.U, &before));
+  PetscCall(ReferBack(ts, c.U, before));
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
   ts->ksp_its += c.ksp_its;
@@ -306,12 +305,12 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
   const PetscBool auto_h = I.auto_h;
   PetscReal       before, after, tau;
   PetscBool       gone = PETSC_TRUE;
-  Vec             V;
+  WorkVec         V;
 
   PetscFunctionBegin;
   PetscCall(Consistent(ts, have, rate));
   PetscCall(ChooseFirstStep(ts, rate));
-  PetscCall(VecDuplicate(I.V0, &V));
+  PetscCall(V.like(I.V0));
   for (int k = 0; gone && k < max_transients; k++) {
     PetscCall(VecCopy(I.V0, V));
     PetscCall(VecNorm(I.A0, NORM_2, &before));
@@ -332,7 +331,6 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
     }
     if (!gone && k) PetscCall(VecZeroEntries(rate)); /* those of what rounding leaves of the transient */
   }
-  PetscCall(VecDestroy(&V));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -342,15 +340,14 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
 PetscErrorCode StartFromState(TS ts, Prepared have)
 {
   Integrator &I = Get(ts);
-  Vec         rate;
+  WorkVec     rate;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(I.X, &rate));
+  PetscCall(rate.like(I.X));
   PetscCall(ConsistentStart(ts, have, rate));
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(MakeHistory(ts, rate));
-  PetscCall(VecDestroy(&rate));
   if (I.F0) {
     PetscCall(VecZeroEntries(I.A1));
     PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));

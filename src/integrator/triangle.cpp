@@ -68,14 +68,13 @@ PetscErrorCode CheckTriangle(TS ts)
 /* D A D with the scalings of the present h */
 PetscErrorCode ScaleTriangle(Integrator &I, Mat A)
 {
-  Vec D;
+  WorkVec D;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(I.row, &D));
+  PetscCall(D.like(I.row));
   PetscCall(VecPointwiseMult(D, I.row, I.col));
   PetscCall(VecSqrtAbs(D));
   PetscCall(MatDiagonalScale(A, D, D));
-  PetscCall(VecDestroy(&D));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -61,19 +61,17 @@ PetscReal Drift(const Integrator &I, PetscReal E, PetscReal T) { return E * Pets
 PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
 {
   Integrator &I = Get(ts);
-  Vec         only, product;
+  WorkVec     only, product;
   Mat         P;
 
   PetscFunctionBegin;
   if (!HasDefinitions(I)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(VecDuplicate(R, &only));
-  PetscCall(VecDuplicate(R, &product));
+  PetscCall(only.like(R));
+  PetscCall(product.like(R));
   PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, only));
   PetscCall(MatMult(P, only, product));
   PetscCall(VecAXPY(R, -1, product));
-  PetscCall(VecDestroy(&product));
-  PetscCall(VecDestroy(&only));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,13 +107,13 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal
   Integrator &I     = Get(ts);
   const bool  known = I.corrector.matrix.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
   PetscReal   sum[4];
-  Vec         now = F;
+  WorkVec     passed;
 
   PetscFunctionBegin;
   if (HasDefinitions(I)) {
-    PetscCall(VecDuplicate(F, &now));
-    PetscCall(VecCopy(F, now));
-    PetscCall(PassDefinitionsOn(ts, now));
+    PetscCall(passed.like(F));
+    PetscCall(VecCopy(F, passed));
+    PetscCall(PassDefinitionsOn(ts, passed));
   }
   PetscCall(SumRows(
     ts, sum,
@@ -128,8 +126,7 @@ PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal
       local[1] += is * was;
       local[2] += was * was;
     },
-    Read(now), Read(I.verify.model), Read(I.verify.work)));
-  if (now != F) PetscCall(VecDestroy(&now));
+    Read(passed ? (Vec)passed : F), Read(I.verify.model), Read(I.verify.work)));
   *left = PetscSqrtReal(sum[0] / I.norm_size);
   *stay = PetscSqrtReal(sum[3] / I.norm_size);
   *part = sum[2] > 0 ? sum[1] / sum[2] : 0;
