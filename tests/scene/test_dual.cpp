@@ -45,6 +45,9 @@ template <class F> void ExpectDerivatives(const char *name, F f, std::initialize
   }
 }
 
+/* The first derivative of a number of which it may be that none is known: a constant has no place for any */
+double slope(const Real &x) { return x.derivatives().size() ? x.derivatives()(0) : 0.; }
+
 /* f(x, y): gradient and mixed second derivatives */
 template <class F> void ExpectGradient(const char *name, F f, double x, double y)
 {
@@ -70,9 +73,9 @@ template <class F> void ExpectGradient(const char *name, F f, double x, double y
   /* one argument a plain number */
   EXPECT_NEAR(f(First(x, 0), y).derivatives()(0), f1[0], near(f1[0]));
   EXPECT_NEAR(f(x, First(y, 1)).derivatives()(1), f1[1], near(f1[1]));
-  EXPECT_NEAR(f(Real(x, 1, 0), y).derivatives()(0), f1[0], near(f1[0]));
-  EXPECT_NEAR(f(x, Real(y, 1, 0)).derivatives()(0), f1[1], near(f1[1]));
-  EXPECT_NEAR(f(Real(x, 1, 0), Real(y)).derivatives()(0), f1[0], near(f1[0]));
+  EXPECT_NEAR(slope(f(Real(x, 1, 0), y)), f1[0], near(f1[0]));
+  EXPECT_NEAR(slope(f(x, Real(y, 1, 0))), f1[1], near(f1[1]));
+  EXPECT_NEAR(slope(f(Real(x, 1, 0), Real(y))), f1[0], near(f1[0]));
 }
 
 using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cbrt, std::cos, std::cosh, std::exp, std::fabs, std::hypot, std::log,
