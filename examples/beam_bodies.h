@@ -38,8 +38,8 @@ inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &m
   PetscFunctionReturn(0);
 }
 
-/* Craig and Bampton's modes: those of the attachments, and normal modes; with geometric stiffening or without. Of several parts one after the other, each is
-   a body with modes of its own, from the model of one part. */
+/* Craig and Bampton's modes: those of the attachments, and normal modes; with geometric stiffening or without. Of
+   several parts one after the other, each is a body with modes of its own, from the model of one part. */
 inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &part, double length, int parts,
                                    PetscInt modes, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average, bool stiffening = false)
 {

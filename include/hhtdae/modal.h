@@ -42,7 +42,7 @@ struct ModalBody {
      Partial or Constant only. The sum of the first three is the identity. */
   std::array<Eigen::MatrixXd, 6> quadratic;
 
-  /* The same for the angular velocity: w_c w_d adds stiffening[p] for (c, d) = xx, yy, zz, and twice it for xy, yz, zx; ModalMass::Full alone */
+  /* The same for the angular velocity: w_c w_d adds stiffening[p] for (c, d) = xx, yy, zz, and twice it for xy, yz, zx; not with ModalMass::Constant */
   std::array<Eigen::MatrixXd, 6> stiffening;
 
   std::vector<ModalAttachment> attachments;

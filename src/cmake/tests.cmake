@@ -1,4 +1,5 @@
-# Everything that ctest runs. GoogleTest programs, of which those named by a room of src/ link no more than that, then scripts which use the library from the outside.
+# Everything that ctest runs. GoogleTest programs, of which those named by a room of src/ link no more than that, then scripts
+# which use the library from the outside.
 find_package(GTest)
 if(NOT GTest_FOUND)
   message(STATUS "GoogleTest not found: only the integration tests are built (Debian: libgtest-dev)")

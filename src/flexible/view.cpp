@@ -65,6 +65,7 @@ PetscErrorCode ViewMass(PetscViewer viewer, const ModalBody &m)
   PetscCall(PetscViewerASCIIPrintf(viewer, "  invariants quadratic in the modes: %s\n",
                                    m.quadratic[0].size() || !m.modes() ? "yes"
                                                                        : "no (mass matrix partial or constant only)"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  geometric stiffening: %s\n", m.stiffening[0].size() ? "yes" : "no"));
   PetscFunctionReturn(0);
 }
 

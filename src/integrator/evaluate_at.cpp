@@ -173,7 +173,7 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   Integrator            &I     = Get(ts);
   const TSHHT3Statistics saved = I.stat;
   const char            *why;
-  WorkVec                    before;
+  WorkVec                before;
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));

@@ -2,11 +2,11 @@
 #ifndef HHTDAE_IMPL_H
 #define HHTDAE_IMPL_H
 
-#include "work_vec.h"
 #include "compat.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
 #include "policy.h"
+#include "work_vec.h"
 #include <initializer_list>
 #include <vector>
 

@@ -21,13 +21,18 @@ Eigen::Matrix<double, 9, 1> ByColumns(const Matrix3 &L)
 /* the vector a with a_i = M_(i+1, i+2) - M_(i+2, i+1): of int y z^T it makes int y x z */
 Vector3 Axial(const Matrix3 &M) { return {M(1, 2) - M(2, 1), M(2, 0) - M(0, 2), M(0, 1) - M(1, 0)}; }
 
+bool Stiffened(const ModalBody &body) { return body.stiffening[0].size() > 0; }
+
 /* Moments of inertia less K_cd = eta^T C_cd eta, C the body's stiffening by w_c w_d, are those of int y y^T + K - tr(K)/2: so the invariants
    quadratic in the modes take it along. It is symmetric and stays out of the mass matrix' part between modes. */
-ModalProducts Products(const ModalBody &body)
+ModalProducts Products(const ModalBody &body, bool full)
 {
-  const int m = (int)body.modes();
-  if (!body.stiffening[0].size()) return {m, &body.quadratic};
-  std::array<Eigen::MatrixXd, 6> N = body.quadratic;
+  const int                      m = (int)body.modes();
+  std::array<Eigen::MatrixXd, 6> N;
+  if (!Stiffened(body)) return {m, &body.quadratic};
+  for (std::size_t p = 0; p < 6; p++)
+    if (full) N[p] = body.quadratic[p];
+    else N[p].setZero(m, m);
   const Eigen::MatrixXd half = 0.5 * (body.stiffening[0] + body.stiffening[1] + body.stiffening[2]);
   for (std::size_t p = 0; p < 6; p++) N[p] += body.stiffening[p];
   for (std::size_t p = 0; p < 3; p++) N[p] -= half;
@@ -40,8 +45,8 @@ Matrix3 Inertia(const Matrix3 &I2) { return I2.trace() * Matrix3::Identity() - I
 
 ModalDynamics::ModalDynamics(std::shared_ptr<const ModalBody> body, ModalMass mass, const Eigen::VectorXd &damping)
     : body_(std::move(body)), m_((int)body_->modes()), linear_(mass != ModalMass::Constant && m_ > 0),
-      quadratic_(mass == ModalMass::Full && m_ > 0), damping_(damping), stiffness_(body_->omega.cwiseAbs2()),
-      products_(quadratic_ ? Products(*body_) : ModalProducts(m_, nullptr)), first_(body_->first.transpose())
+      quadratic_(m_ > 0 && (mass == ModalMass::Full || (mass == ModalMass::Partial && Stiffened(*body_)))), damping_(damping), stiffness_(body_->omega.cwiseAbs2()),
+      products_(quadratic_ ? Products(*body_, mass == ModalMass::Full) : ModalProducts(m_, nullptr)), first_(body_->first.transpose())
 {
   for (Columns *x : {&moment_, &b_, &rate_}) x->setZero(m_, 9);
   for (Vectors3 *x : {&skew_rate_, &skew_acc_}) x->setZero(m_, 3);

@@ -315,7 +315,7 @@ TEST(ReducedFile, View)
   Printed  printed;
   must(made.body.view(nullptr));
   for (const char *part :
-       {"row of bricks", "by hand", "m, kg, s", "mass 7.5", "tip of the row", "modes: 4", "4 bricks with 8 nodes",
+       {"row of bricks", "by hand", "m, kg, s", "mass 7.5", "geometric stiffening: yes", "tip of the row", "modes: 4", "4 bricks with 8 nodes",
         "1 tetrahedra with 4 nodes", "24 nodes with shapes, 16 of them with stress modes"})
     EXPECT_TRUE(printed.says(part)) << part << "\n" << printed.text();
 }

@@ -54,12 +54,12 @@ def reduction(folder):
     body = os.path.join(folder, "bar.h5")
     base = ["-mesh", os.path.join(folder, "bar.msh"), "-material", "2.1e11,0.3,7850", "-attach", "hub,end:tip:average@1.0,0.05,0.025",
             "-modes", "6", "-units", "m, kg, s"]
-    said = run([PROGRAM, *base, "-stress", "-o", body])
+    said = run([PROGRAM, *base, "-stress", "-stiffening", "-o", body])
     check("reduced in" in said and "set hub: 4 nodes" in said, "no progress and table in\n" + said)
     frequencies = table(said)
     check(len(frequencies) == 12, "6 normal modes and 12 of attachments are 12 without rigid ones: %s" % frequencies)
     info = run([PROGRAM, "-info", body])
-    for part in ("checksum: good", "mass 39.25,", "m, kg, s", "attachment end at (1, 0.05, 0.025)", "28 nodes with shapes, 28 of them with stress modes",
+    for part in ("checksum: good", "mass 39.25,", "m, kg, s", "geometric stiffening: yes", "attachment end at (1, 0.05, 0.025)", "28 nodes with shapes, 28 of them with stress modes",
                  "6 bricks with 8 nodes", "bar.msh"):
         check(part in info, "%r is not in\n%s" % (part, info))
     check(table(info) == frequencies, "the file's table is another one")

@@ -114,10 +114,10 @@ TEST(FlexibleScene, EquationsAreSumsOverParticles)
 
 TEST(FlexibleScene, JacobianAgainstDifferences)
 {
-  int stiffened = 0;
-  for (ModalMass mass : {ModalMass::Full, ModalMass::Partial, ModalMass::Constant, ModalMass::Full}) {
-    ModalCloud c(9, 5, 11, true);
-    if (mass == ModalMass::Full && stiffened++) c.stiffen(3);
+  for (int k = 0; k < 6; k++) {
+    const ModalMass mass = (ModalMass)(k % 3);
+    ModalCloud      c(9, 5, 11, true);
+    if (k > 2) c.stiffen(3);
     Arm              arm(flexible(c, mass));
     for (unsigned seed : {1, 2, 3})
       for (Rotations rotations : all_rotations) {

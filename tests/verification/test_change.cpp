@@ -181,7 +181,8 @@ TEST(Change, ErrorControl)
    differences of the predictor, and as many iterations afterwards */
 TEST(Change, HistoryAsIfAlwaysInTheNewFrame)
 {
-  for (bool pivot : {false, true})
+  for (bool pivot : {false, true}) {
+    PetscInt all[2] = {0, 0}; /* the iterations of one run may happen to be some more or less */
     for (const char *o :
          {"-ts_hhtdae_alpha -0.3", "-ts_hhtdae_radius 0.2", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.3"}) {
       const std::string options =
@@ -222,8 +223,10 @@ TEST(Change, HistoryAsIfAlwaysInTheNewFrame)
                pivot ? "pivot" : "free", worst[0], worst[1], worst[2], worst[3], worst[4], worst[5], worst[6], worst[7],
                (int)after[0], (int)after[1]);
       EXPECT_EQ(degree[0], degree[1]);
-      EXPECT_LE(after[0], 1.3 * after[1] + 2.);
+      for (int k = 0; k < 2; k++) all[k] += after[k];
     }
+    EXPECT_LE(all[0], 1.15 * all[1] + 2.);
+  }
 }
 
 /* A change that changes nothing gives the same bits */
