@@ -41,6 +41,14 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* X of a state before its accelerations are known: what is algebraic stands in U */
+PetscErrorCode GuessUnknowns(Integrator &I, Vec U)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = IsDifferential(RoleOf(I, i)) ? 0 : u; }, Read(U), Write(I.X)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
    Leaves X as it was. */
 PetscErrorCode Rates(TS ts, Vec rate)
@@ -172,18 +180,17 @@ PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X may be what a failed correction has left: multipliers that are not numbers would be part of the matrix */
+/* With the multipliers of U: a failed correction may have left others in X, of any size, which would stand in the matrix beside the inertia
+   (Failures.MultipliersOfAFailedCorrection) */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
 {
   Integrator &I = Get(ts);
   Consistent  c;
   const char *why;
-  PetscReal   norm;
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(VecNorm(I.X, NORM_2, &norm));
-  if (PetscIsInfOrNanReal(norm)) PetscCall(VecCopy(I.X0, I.X));
+  PetscCall(GuessUnknowns(I, U));
   PetscCall(OfTheRun(ts, t, U, V, &c));
   PetscCall(TakeUnknowns(I, c));
   PetscCall(ConsistentMatrix(ts, c, &ok, &why));
@@ -282,7 +289,7 @@ PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = IsDifferential(RoleOf(I, i)) ? 0 : u; }, Read(I.U0), Write(I.X)));
+  PetscCall(GuessUnknowns(I, I.U0));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
     if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
