@@ -22,6 +22,10 @@ static const double GROWTH = 100;
 /* Pivots as planned are good enough where no entry grows more than so (the reciprocal) */
 static const double PLANNED_GROWTH = 0.01;
 
+/* Entries that have grown so much (the reciprocal) have half the digits of the matrix at best: then the largest pivots
+   are taken, whatever was planned. KluPair.PivotsAsPlannedThatLetEntriesGrow; scenes stay above 1e-6. */
+static const double LEAST_GROWTH = 1e-8;
+
 static KluPair *Data(Mat F) { return static_cast<KluPair *>(F->data); }
 
 /* ---- rows of the matrix ---- */
@@ -193,19 +197,35 @@ static PetscErrorCode FactorAsPlanned(Mat F, const LinearRows &rows, bool *good)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode FactorWithPivoting(const LinearRows &rows, KluPair *k)
+/* Planned pivots that are at least so large a part of their column stay */
+static PetscErrorCode FactorWithTolerance(const LinearRows &rows, KluPair *k, double tolerance)
 {
+  const double given = k->common.tol;
+
   PetscFunctionBegin;
   KLU(free_numeric)(&k->numeric, &k->common);
-  NotePivots(rows, k);
-  k->panels.reset();
-  k->panels_looked = k->panels_used = false;
-  k->numeric                        = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
+  k->common.tol = tolerance;
+  k->numeric    = KLU(factor)(Start(rows), Col(rows), Val(rows), k->symbolic, &k->common);
+  k->common.tol = given;
   ++k->factorizations;
   if (!k->numeric) PetscFunctionReturn(0);
   KLU(sort)(k->symbolic, k->numeric, &k->common);
   KLU(flops)(k->symbolic, k->numeric, &k->common);
   k->growth = ReciprocalGrowth(rows, k);
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode FactorWithPivoting(Mat F, const LinearRows &rows, KluPair *k)
+{
+  PetscFunctionBegin;
+  NotePivots(rows, k);
+  k->panels.reset();
+  k->panels_looked = k->panels_used = false;
+  PetscCall(FactorWithTolerance(rows, k, k->common.tol));
+  if (!k->numeric || k->growth >= LEAST_GROWTH) PetscFunctionReturn(0);
+  PetscCall(PetscInfo(F, "Pivots found with tolerance %g let entries grow (reciprocal %g): the largest are taken\n",
+                      k->common.tol, k->growth));
+  PetscCall(FactorWithTolerance(rows, k, 1));
   PetscFunctionReturn(0);
 }
 
@@ -223,7 +243,7 @@ static PetscErrorCode PlanAnew(Mat F, Mat A, const LinearRows &rows)
   PetscCall(PetscInfo(F, "%g entries in L and U, %g were foreseen: the pivots are planned anew\n", entries,
                       2 * k->work.factor));
   PetscCall(Analyse(A, rows, k));
-  PetscCall(FactorWithPivoting(rows, k));
+  PetscCall(FactorWithPivoting(F, rows, k));
   /* where a new plan does not help, it is not tried again for the same fill */
   if (k->numeric) k->tolerated = PetscMax(k->tolerated, 1.5 * ((double)k->numeric->lnz + (double)k->numeric->unz));
   PetscFunctionReturn(0);
@@ -273,7 +293,7 @@ static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   k->old_pivots = good;
   if (!good) PetscCall(FactorAsPlanned(F, rows, &good));
   if (!good) {
-    PetscCall(FactorWithPivoting(rows, k));
+    PetscCall(FactorWithPivoting(F, rows, k));
     PetscCall(PlanAnew(F, A, rows));
   }
   PetscCall(KluPairRestoreRows(A, &rows));
@@ -315,7 +335,7 @@ static PetscErrorCode RepeatPivots(Mat F, const LinearRows &rows, Pivots pivots,
   *good = pivots == Pivots::None;
   if (pivots == Pivots::Planned) PetscCall(FactorAsPlanned(F, rows, good));
   if (pivots != Pivots::Found) PetscFunctionReturn(0);
-  PetscCall(FactorWithPivoting(rows, k));
+  PetscCall(FactorWithPivoting(F, rows, k));
   *good = k->numeric != NULL;
   if (!*good || !panels) PetscFunctionReturn(0);
   k->panels = std::make_shared<KluPanels>();

@@ -430,6 +430,25 @@ TEST_F(KluPair, GivesUpBadPivots)
   }
 }
 
+/* Every pivot as planned is a 900th of its column, which the pivot tolerance lets pass, and entries grow by that factor from one to the next. The
+   matrix itself is well conditioned. */
+TEST_F(KluPair, PivotsAsPlannedThatLetEntriesGrow)
+{
+  for (bool rows : {false, true}) {
+    Entries e;
+    e.n = 14;
+    for (PetscInt i = 0; i < e.n; ++i) {
+      e.add(i, i, 1.0);
+      if (i + 1 < e.n) rows ? e.add(i, i + 1, -900.0) : e.add(i + 1, i, -900.0);
+      if (i + 1 < e.n) rows ? e.add(e.n - 1, i, 1.0) : e.add(i, e.n - 1, 1.0);
+    }
+    factor(e);
+    EXPECT_EQ(error(), MAT_FACTOR_NOERROR);
+    EXPECT_LT(residual(), 1e-10) << rows;
+    EXPECT_LT(residual(true), 1e-10) << rows;
+  }
+}
+
 /* Two and two unknowns, and one coupled to all. Without diagonals the large entries of the last one would be the
    pivots, and its row would fill the factors; paired anew, the others do among themselves. */
 TEST_F(KluPair, PlansAnewWhenTheFillGrows)
