@@ -2,10 +2,12 @@
 #ifndef HHTDAE_LINEAR_KLUPAIR_DATA_H
 #define HHTDAE_LINEAR_KLUPAIR_DATA_H
 
+#include "archive.h"
 #include "graph.h"
 #include "klupair_matching.h"
 #include <klu.h>
 #include <memory>
+#include <petsc/private/matimpl.h>
 
 #if defined(PETSC_USE_64BIT_INDICES)
 typedef SuiteSparse_long KluInt;
@@ -64,6 +66,8 @@ struct KluPair : KluPairState {
   bool factored() const { return numeric || panels_used; }
 };
 
+inline KluPair *KluPairOf(Mat F) { return static_cast<KluPair *>(F->data); }
+
 inline KluInt *KluIndices(const PetscInt *i) { return reinterpret_cast<KluInt *>(const_cast<PetscInt *>(i)); }
 
 /* Rows of a SEQAIJ matrix, to be given back before its values change */
@@ -72,5 +76,11 @@ PetscErrorCode KluPairRestoreRows(Mat A, LinearRows *rows);
 
 /* Pivots, ordering and KLU's analysis for the pattern and values of A */
 PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k);
+
+/* klupair_factor.cpp: the same, with the values kept and what was known of others forgotten; MatLUFactorNumeric(); and what a checkpoint needs */
+PetscErrorCode KluPairAnalyseValues(Mat A, const LinearRows &rows, KluPair *k);
+PetscErrorCode KluPairFactorNumeric(Mat F, Mat A, const MatFactorInfo *);
+PetscErrorCode KluPairSaveState(Mat F, Archive *archive);
+PetscErrorCode KluPairLoadState(Mat F, Mat A, Archive *archive, PetscBool *same);
 
 #endif
