@@ -78,6 +78,9 @@ PetscErrorCode CreateSolver(MPI_Comm comm, KSP *ksp);
 PetscErrorCode Factor(KSP ksp, Mat A, PetscBool *singular, PetscInt *negative);
 /* A X = F for a block of right-hand sides */
 PetscErrorCode SolveBlock(KSP ksp, const MatrixXd &F, MatrixXd *X);
+/* K - lambda M, a new matrix */
+PetscErrorCode Shifted(const Pencil &pencil, double lambda, Mat *S);
+
 /* Modes below lambda without the rigid ones by an inertia count; -1: not known */
 PetscErrorCode CountBelow(const Pencil &pencil, double lambda, PetscInt *count);
 

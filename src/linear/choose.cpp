@@ -7,44 +7,9 @@
 
 /*
   KLU works column by column in scalar loops; MUMPS works on dense fronts with BLAS, at a cost per call and per front.
-  The number of unknowns says little: what counts is the work, and how much of it there is per entry of the factor.
-  Measured with tests/bench/linear_crossover.cpp (Debian 12, OpenBLAS, one core; work of L D L^T in AMD order; times in
-  ms for one factorization and three solves):
-
-      family, size              n     nz(L)     work  work/nz     KLU   MUMPS LU   MUMPS LDL^T
-      planar chain, 10         50   1.6e+02  5.4e+02      3.3    0.007      0.28          0.28
-      20 modes, 1000 bodies 25000   3.7e+05  6.7e+06       18      31         71            47
-      10 bodies, 40 modes     450   1.1e+04  3.5e+05       31     0.47       1.0          0.66
-      1 body, 160 modes       165   1.4e+04  1.5e+06      110     1.3        1.2          0.77
-      10 bodies, 80 modes     850   3.8e+04  2.2e+06       58     6.3        6.9           1.8
-      block, 4^3 bricks       450   2.6e+04  2.3e+06       88     1.1        1.5           1.0
-      plate, 12 x 12 bricks  1092   7.2e+04  6.1e+06       86     8.2        7.4           6.3
-      10 bodies, 120 modes   1250   8.1e+04  6.9e+06       85      14         14           7.8
-      1 body, 320 modes       325   5.3e+04  1.2e+07      217      17        8.5           6.7
-      plate, 16 x 16 bricks  1836   1.4e+05  1.4e+07       99      23         15           8.3
-      block, 6^3 bricks      1176   1.2e+05  1.9e+07      155      23        9.0           7.3
-      plate, 24 x 24 bricks  3900   3.8e+05  5.1e+07      136      82         32            22
-      block, 8^3 bricks      2430   4.6e+05  1.5e+08      318     131         32            23
-      block, 16^3 bricks    15606   1.0e+07  1.4e+10     1373   20154        728           516
-
-  So MUMPS begins at about 2.5e6 operations with LDL^T and 7e6 with LU, where there are at least 40 per entry. With the
-  reference BLAS in place of OpenBLAS it is 5e6 and 2e7, and MUMPS takes three times as long on large blocks.
-
-  KLU is the package "klupair", which keeps its pivots from one matrix to the next; the table was made with PETSc's
-  "klu", which does not. It takes half the time of the table on chains and two thirds to three quarters up to some 20
-  operations per entry. Above that it goes by dense panels once its pivots are kept (klupair_panels.h). Factorizations
-  after the first one, each with three solves, and the first one, in ms of processor time:
-
-      family, size              n     work   klupair    first   MUMPS LU   MUMPS LDL^T
-      10 bodies, 120 modes   1250  6.9e+06       1.6       12         14           7.8
-      1 body, 320 modes       325  1.2e+07       1.2       11        8.5           6.7
-      plate, 16 x 16 bricks  1836  1.4e+07       2.3       18         15           8.3
-      plate, 24 x 24 bricks  3900  5.1e+07       8.4       69         32            22
-      block, 8^3 bricks      2430  1.5e+08        10       77         32            23
-      block, 12^3 bricks     7098  1.9e+09        82     1560        300           210
-
-  A run needs dozens of factorizations. MUMPS begins where a few of them do not make up for the first one, and for those
-  that follow when pivots are given up. PETSc's "klu" has no panels.
+  The number of unknowns says little: what counts is the work, and how much of it there is per entry of the factor. A run
+  needs dozens of factorizations, the first of which is klupair's dearest. The measurements are in README.md, made by
+  tests/bench/linear_crossover.cpp. PETSc's "klu", without klupair's panels, leaves the field earlier.
 */
 #if defined(HHTDAE_HAVE_KLU)
 static const double LARGE_SYMMETRIC = 6e7, LARGE_UNSYMMETRIC = 1e8;
@@ -56,21 +21,7 @@ static const double LARGE_PER_ENTRY = 40;
 /*
   Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.
   Both are weighed by operations on one rank, in units of KLU's, of one factorization and three solves: dense ones cost a
-  fifth of them, those of MUMPS' fronts a quarter, and where fronts are small MUMPS takes its time per unknown. Measured with
-  two ranks on two cores that others used, too (milliseconds; "MUMPS" is the better of LU and L D L^T):
-
-      family, size                  n   interface     work   kluparts   MUMPS
-      chain in space, 10000    110000           5   4.4e+06        41     590
-      rings of eight, 10000    113750          25   7.8e+06       114     940
-      20 modes, 1000 bodies     25000           2   3.4e+06        16     140
-      10 bodies, 80 modes        8500           2   1.1e+07        50     118
-      net of rods, 30 x 30      23940         174   4.7e+06        51     158
-      net of rods, 20 x 300    158400         117   7.0e+07       434    1190
-      net of rods, 60 x 60      96480         354   5.4e+07       624     538
-      net of rods, 100 x 100   268800         594   3.5e+08      5581    1828
-      bar, 200 x 4 x 4 bricks   15150          75   6.3e+07       295     225
-      plate, 24 x 24 bricks      3900         219   1.3e+07       124      45
-      block, 8^3 bricks          2430         450   8.9e+06       162      39
+  fifth of them, those of MUMPS' fronts a quarter, and where fronts are small MUMPS takes its time per unknown (README.md).
 */
 static const double DENSE_OPERATION = 0.2, MUMPS_UNKNOWN = 6500, MUMPS_OPERATION = 0.25;
 

@@ -83,6 +83,19 @@ struct KluParts : KluPartsState {
   std::vector<PetscScalar>  work, top, top_local; /* interior; interface; of it `local` */
 };
 
+inline KluParts *PartsOf(Mat F) { return static_cast<KluParts *>(F->data); }
+
+/* ---- kluparts.cpp ---- */
+
+/* Interface, interiors, and what is known of their patterns */
+PetscErrorCode PartsAnalyse(Mat F, Mat A, KluParts *p);
+
+/* ---- kluparts_factor.cpp ---- */
+
+PetscErrorCode PartsFactorNumeric(Mat F, Mat A, const MatFactorInfo *);
+PetscErrorCode PartsSaveState(Mat F, Archive *archive);
+PetscErrorCode PartsLoadState(Mat F, Mat A, Archive *archive, PetscBool *same);
+
 /* ---- kluparts_interface.cpp ---- */
 
 /* Entries between ranks, in all */
