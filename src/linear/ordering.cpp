@@ -1,3 +1,4 @@
+#include "constraint.h"
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
 #include "klupair.h"
@@ -34,5 +35,6 @@ PetscErrorCode LinearRegister(void)
   PetscCall(LinearRegisterMumpsND());
   PetscCall(LinearRegisterKLUPair());
   PetscCall(LinearRegisterKLUParts());
+  PetscCall(LinearRegisterConstraint());
   PetscFunctionReturn(0);
 }

@@ -1,4 +1,5 @@
 /* The scene as a problem of PETSc's TS. */
+#include "extension.h"
 #include "guard.h"
 #include "runtime.h"
 #include "start.h"
@@ -126,6 +127,22 @@ PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
   PetscFunctionReturn(0);
 }
 
+/* For iterative solvers, -pc_type hhtconstraint */
+PetscErrorCode TellNodes(const Runtime &R, TS ts)
+{
+  std::vector<PetscInt> rows;
+  IS                    nodes;
+  PetscFunctionBegin;
+  if (R.scene.extensions.empty()) PetscFunctionReturn(0);
+  for (const auto &x : R.scene.extensions)
+    for (PetscInt i = 0; i < x->coordinates(); i++) rows.push_back(x->start[R.rank] + i);
+  PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &nodes));
+  PetscCall(ISSetBlockSize(nodes, 3));
+  PetscCall(TSHHT3SetNodes(ts, nodes));
+  PetscCall(ISDestroy(&nodes));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
@@ -166,6 +183,7 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
   PetscCall(TSSetType(*ts, TSHHT3));
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
   PetscCall(TSSetI2Jacobian(*ts, R.J, R.J, I2Jacobian, &R));
+  PetscCall(TellNodes(R, *ts));
   PetscCall(TSSetTime(*ts, R.scene.start.time));
   PetscCall(TS2SetSolution(*ts, U, V));
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));

@@ -1,0 +1,24 @@
+/*
+  The preconditioner "hhtconstraint" for [A B^T; B 0] with finite elements in A, on any number of ranks:
+
+    P = [D B^T; B 0],    D = A without the couplings between different nodes of finite-element bodies
+
+  What is not a node, as rigid bodies, modes and multipliers, stays whole, with everything that couples it to nodes. P is factored; where
+  few unknowns are not nodes that costs as many operations as there are nodes. Each solve with P satisfies the constraints exactly, so that
+  conjugate gradients, which begin at P^-1 b, move along them from then on and do not meet the indefiniteness of the whole matrix (Gould,
+  Hribar, Nocedal, SIAM J. Sci. Comput. 23, 2001, 1376-1395, algorithm 6.2). Without multipliers D alone is block Jacobi.
+*/
+#ifndef HHTDAE_LINEAR_CONSTRAINT_H
+#define HHTDAE_LINEAR_CONSTRAINT_H
+
+#include <petscpc.h>
+
+#define PCHHTCONSTRAINT "hhtconstraint"
+
+/* On a matrix, by PetscObjectCompose(): an IS of its rank's unknowns that belong to nodes, of as many at a time as the block size of the IS.
+   Where there is none, consecutive rows with a diagonal entry and the same pattern are a node. */
+#define LINEAR_NODES "hhtdae_nodes"
+
+PetscErrorCode LinearRegisterConstraint(void);
+
+#endif
