@@ -37,7 +37,7 @@ PetscErrorCode CheckMemory(TS ts, PC pc, Mat P, PCFailedReason failed)
   PetscCall(MatGetSize(P, &n, NULL));
   PetscCall(PCFactorGetMatSolverType(pc, &package));
   PetscCheck(!numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_MEM,
-             "There is not enough memory to factor the Newton matrix of %" PetscInt_FMT " rows by %s at t = %g: more ranks, or an iterative solver (-ksp_type cg -pc_type hhtconstraint -ksp_rtol 1e-2)", n,
+             "There is not enough memory to factor the Newton matrix of %" PetscInt_FMT " rows by %s at t = %g: more ranks, or an iterative solver (-ksp_type cg -pc_type hhtconstraint -ksp_rtol 0.1)", n,
              package ? package : "the preconditioner", (double)Get(ts).t1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
