@@ -1,0 +1,96 @@
+/* What the sources of the Python module share: PETSc's objects and small arrays in and out, errors as Python exceptions. */
+#ifndef HHTDAE_PYTHON_BIND_H
+#define HHTDAE_PYTHON_BIND_H
+
+#include "hhtdae/types.h"
+#include <petscts.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <string>
+#include <vector>
+
+namespace hhtdae
+{
+namespace python
+{
+
+namespace py = pybind11;
+
+/* An error of PETSc becomes hhtdae.Error with the message of its origin. An exception that a Python function has left behind goes on. */
+void Check(PetscErrorCode code);
+
+/* petsc4py's objects: borrowed, and new ones which share ownership */
+TS         ToTS(py::handle x);
+Vec        ToVec(py::handle x);
+Mat        ToMat(py::handle x);
+IS         ToIS(py::handle x);
+MPI_Comm   ToComm(py::handle x);
+py::object FromTS(TS x);
+py::object FromVec(Vec x);
+py::object FromMat(Mat x);
+py::object FromIS(IS x);
+
+/* Arrays of one or two dimensions; `what` is named where the shape is wrong */
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+Array           ToArray(py::handle x, const std::string &what);
+Vector3         ToVector(py::handle x, const std::string &what);
+Matrix3         ToMatrix(py::handle x, const std::string &what);
+Eigen::VectorXd ToEigen(py::handle x, const std::string &what);
+py::array       FromDoubles(const double *x, std::vector<py::ssize_t> shape);
+template <class M> py::array FromMatrix(const M &x)
+{
+  const Eigen::Matrix<typename M::Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = x;
+  return FromDoubles(rows.data(), {(py::ssize_t)rows.rows(), (py::ssize_t)rows.cols()});
+}
+inline py::array FromVector(const Vector3 &x) { return FromDoubles(x.data(), {3}); }
+
+/* Calls a Python function from inside of PETSc: an exception is kept for Check(), which makes it the cause of hhtdae.Error, and goes
+   on as a std::runtime_error with its text. */
+py::object Call(py::handle f, const py::tuple &arguments);
+/* The same at the border to C: an error of PETSc */
+template <class F> PetscErrorCode Guarded(F f)
+{
+  py::gil_scoped_acquire gil;
+  PetscFunctionBegin;
+  try {
+    PetscCall(f());
+  } catch (const std::exception &e) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "A Python function has failed: %s", e.what());
+  }
+  PetscFunctionReturn(0);
+}
+
+/* An exception of a signal's handler, Ctrl-C as a rule, as an error of PETSc */
+PetscErrorCode CheckSignals();
+
+/* What PETSC_VERSION changes: how a container's contents are destroyed */
+template <class T> PetscErrorCode OwnedBy(PetscObject owner, const char name[], T *contents)
+{
+  PetscContainer box;
+  PetscFunctionBegin;
+  PetscCall(PetscContainerCreate(PetscObjectComm(owner), &box));
+  PetscCall(PetscContainerSetPointer(box, contents));
+#if PETSC_VERSION_LT(3, 23, 0)
+  PetscCall(PetscContainerSetUserDestroy(box, [](void *x) -> PetscErrorCode { return delete static_cast<T *>(x), PetscErrorCode(0); }));
+#else
+  PetscCall(PetscContainerSetCtxDestroy(box, [](void **x) -> PetscErrorCode { return delete static_cast<T *>(*x), PETSC_SUCCESS; }));
+#endif
+  PetscCall(PetscObjectCompose(owner, name, (PetscObject)box));
+  PetscCall(PetscContainerDestroy(&box));
+  PetscFunctionReturn(0);
+}
+
+/* The parts of the module */
+void BindIntegrator(py::module_ &m);
+void BindCallbacks(py::module_ &m);
+void BindFunctions(py::module_ &m);
+void BindScene(py::module_ &m);
+void BindRecorder(py::module_ &m);
+void BindQuery(py::module_ &m);
+void BindLinearize(py::module_ &m);
+void BindMechanism(py::module_ &m);
+
+} // namespace python
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,86 @@
+/* Functions of the integrator that call the application's: longest step, change of coordinates. The TS owns the Python functions. */
+#include "bind.h"
+#include "hhtdae/hhtdae.h"
+
+namespace hhtdae
+{
+namespace python
+{
+
+namespace
+{
+
+/* Python functions that belong to a TS */
+struct Functions {
+  std::vector<py::object> f;
+  ~Functions()
+  {
+    if (!Py_IsInitialized()) {
+      for (py::object &x : f) x.release();
+      return;
+    }
+    py::gil_scoped_acquire gil;
+    f.clear();
+  }
+};
+
+PetscErrorCode LongestStep(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    *h = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), t, FromVec(U), FromVec(V), FromVec(A))).cast<double>();
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    *change = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), t, FromVec(U), FromVec(V))).cast<bool>() ? PETSC_TRUE : PETSC_FALSE;
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Map(TS ts, PetscReal t, Vec U, Vec V, Vec A, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    py::object u = FromVec(U), v = V ? FromVec(V) : py::none(), a = A ? FromVec(A) : py::none();
+    Call(static_cast<Functions *>(ctx)->f[1], py::make_tuple(FromTS(ts), t, u, v, a));
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Commit(TS ts, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    const py::object &f = static_cast<Functions *>(ctx)->f[2];
+    if (!f.is_none()) Call(f, py::make_tuple(FromTS(ts)));
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+void BindCallbacks(py::module_ &m)
+{
+  m.def("set_step_limit", [](py::object ts, py::object f) {
+    auto *own = new Functions{{f}};
+    Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python step limit", own));
+    Check(TSHHT3SetStepLimit(ToTS(ts), LongestStep, own));
+  });
+  m.def("set_coordinate_change", [](py::object ts, py::object test, py::object map, py::object commit) {
+    auto *own = new Functions{{test, map, commit}};
+    Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python coordinates", own));
+    Check(TSHHT3SetCoordinateChange(ToTS(ts), Test, Map, Commit, own));
+  });
+}
+
+} // namespace python
+} // namespace hhtdae

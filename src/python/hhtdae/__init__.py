@@ -1,0 +1,55 @@
+"""Multibody dynamics on PETSc: index-3 differential-algebraic equations by the Hilber-Hughes-Taylor method.
+
+Three doors, the same engine:
+
+- ``ts.setType("hhtdae")`` on petsc4py's TS, with `hhtdae.integrator` for the method's own settings and results;
+- `solve_mechanism` for equations of motion that one has written oneself, in the manner of scipy.integrate.solve_ivp;
+- `Scene` for mechanisms in their own terms, with `hhtdae.flexible` for flexible bodies from finite-element models.
+
+>>> import hhtdae
+>>> scene = hhtdae.Scene(gravity=(0, -9.81, 0))
+>>> rod = scene.add("rod", hhtdae.RigidBody(mass=1, position=(0.5, 0, 0)))
+>>> pin = scene.connect("pin", hhtdae.Revolute, rod, scene.ground, point=(0, 0, 0))
+>>> scene.channel("angle", hhtdae.angle(rod.marker(), scene.ground.marker()), "rad")
+>>> run = scene.solve(2.0, tolerance=1e-6)
+>>> run["angle"][-1]
+
+PETSc is initialized by petsc4py. For options of the command line, before anything else::
+
+    import sys, petsc4py
+    petsc4py.init(sys.argv)
+    import hhtdae
+
+Formulas of measures and parameters (`hhtdae.expressions`, `hhtdae.measures`) are evaluated in C++, see there.
+"""
+
+from petsc4py import PETSc as _PETSc  # initializes MPI and PETSc, and ends them after all that is below
+
+from . import _core
+
+_core.initialize()
+
+from . import bodies, elements, expressions, integrator, measures, mechanism, query, run, scene
+from ._errors import Error
+from .bodies import *
+from .elements import *
+from .expressions import *
+from .integrator import Statistics, statistics
+from .measures import *
+from .mechanism import MechanismResult, solve_mechanism
+from .query import *
+from .run import Run
+from .scene import *
+
+__all__ = ["Error", "MechanismResult", "Run", "Statistics", "flexible", "integrator", "solve_mechanism", "statistics"]
+for _module in (bodies, elements, expressions, measures, query, scene):
+    __all__ += _module.__all__
+
+
+def __getattr__(name):
+    # Flexible bodies bring SLEPc with them: only for those who ask.
+    if name == "flexible":
+        import importlib
+
+        return importlib.import_module(".flexible", __name__)
+    raise AttributeError("module 'hhtdae' has no attribute %r" % name)

@@ -1,0 +1,206 @@
+"""Bodies, moments of inertia, axes, shapes."""
+
+from dataclasses import dataclass, field
+from typing import Any, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .elements import Number, Spec, Vector
+
+__all__ = ["FlexibleBody", "PointMass", "RigidBody", "Shape", "axes_along", "composed", "inertia", "rotation"]
+
+
+def _identity():
+    return field(default_factory=lambda: np.eye(3))
+
+
+@dataclass(eq=False)
+class RigidBody(Spec):
+    """A rigid body at the start.
+
+    Parameters
+    ----------
+    mass : float
+    inertia : (3, 3)
+        About the centre of mass, in body axes; three numbers are its diagonal. Planar scenes: element [2, 2] alone counts.
+    position : (3,)
+        Of the body's origin, space axes.
+    rotation : (3, 3)
+        Body axes as columns.
+    velocity, angular_velocity : (3,)
+        Of the centre of mass, space axes; radians per unit of time.
+    center : (3,)
+        Of mass, in body axes from the body's origin.
+    fixed_start : bool
+        The assembly phase leaves pose and velocities as given.
+    """
+    mass: Number = 1.
+    inertia: Any = _identity()
+    position: Vector = (0., 0., 0.)
+    rotation: Any = _identity()
+    velocity: Vector = (0., 0., 0.)
+    angular_velocity: Vector = (0., 0., 0.)
+    center: Vector = (0., 0., 0.)
+    fixed_start: bool = False
+
+    def _fields(self, converted):
+        out = super()._fields(converted)
+        if np.ndim(out["inertia"]) == 1:
+            out["inertia"] = np.diag(out["inertia"])
+        return out
+
+
+@dataclass(eq=False)
+class PointMass(Spec):
+    """A point mass at the start: three coordinates (planar scenes: two), no rotation."""
+    mass: Number = 1.
+    position: Vector = (0., 0., 0.)
+    velocity: Vector = (0., 0., 0.)
+    fixed_start: bool = False
+
+
+@dataclass(eq=False)
+class FlexibleBody(Spec):
+    """A body in modal coordinates, its floating frame at the start; joints and forces take hold of its attachments.
+
+    Parameters
+    ----------
+    model : ModalBody
+        From `hhtdae.flexible`: ``reduced.modal()`` or ``load_modal_body(file)``.
+    position, rotation : (3,), (3, 3)
+        Of the origin and axes (columns) of the FE model, space axes.
+    velocity, angular_velocity : (3,)
+        Of the undeformed centre of mass, space axes.
+    mass : str
+        "full", "partial" (without the terms quadratic in the modes) or "constant" (of the undeformed body).
+    damping : float or sequence of (frequency, ratio)
+        Ratio of critical, of all modes or by bands up to a frequency in cycles per unit of time.
+    ratios : (modes,), optional
+        The same, mode by mode.
+    deformation, deformation_rate : (modes,), optional
+        Modal coordinates at the start.
+    """
+    model: Any
+    position: Vector = (0., 0., 0.)
+    rotation: Any = _identity()
+    velocity: Vector = (0., 0., 0.)
+    angular_velocity: Vector = (0., 0., 0.)
+    mass: str = "full"
+    damping: Any = ()
+    ratios: Optional[Sequence[float]] = None
+    deformation: Optional[Sequence[float]] = None
+    deformation_rate: Optional[Sequence[float]] = None
+    fixed_start: bool = False
+
+    def _fields(self, converted):
+        if self.mass not in ("full", "partial", "constant"):
+            raise ValueError("mass is %r, must be 'full', 'partial' or 'constant'" % (self.mass,))
+        out = super()._fields(converted)
+        if np.ndim(out["damping"]) == 0:
+            out["damping"] = [(np.inf, float(out["damping"]))] if out["damping"] else []
+        return out
+
+
+@dataclass(eq=False)
+class Shape:
+    """What a body looks like in animations: made by `Shape.box`, `Shape.cylinder` and `Shape.sphere`."""
+    kind: str
+    size: Tuple[float, float, float]
+    position: Vector = (0., 0., 0.)
+    axes: Any = _identity()
+
+    @classmethod
+    def box(cls, half, position=(0., 0., 0.), axes=None):
+        """A box by half of its edges."""
+        return cls("box", tuple(half), position, np.eye(3) if axes is None else axes)
+
+    @classmethod
+    def cylinder(cls, radius, length, position=(0., 0., 0.), axes=None):
+        """A cylinder along z."""
+        return cls("cylinder", (radius, radius, 0.5 * length), position, np.eye(3) if axes is None else axes)
+
+    @classmethod
+    def sphere(cls, radius, position=(0., 0., 0.)):
+        """A sphere."""
+        return cls("sphere", (radius, radius, radius), position)
+
+
+def axes_along(z, x=None):
+    """Right-handed orthonormal axes, as columns, whose z axis is along a direction of any length, and x as near to `x` as can be."""
+    z = np.asarray(z, dtype=float)
+    z = z / np.linalg.norm(z)
+    given = np.zeros(3) if x is None else np.asarray(x, dtype=float)
+    p = given - z.dot(given) * z
+    if not np.linalg.norm(p) > 1e-8 * np.linalg.norm(given):
+        p = np.zeros(3)
+        p[np.argmin(np.abs(z))] = 1.
+        p -= z.dot(p) * z
+    p /= np.linalg.norm(p)
+    return np.column_stack([p, np.cross(z, p), z])
+
+
+def rotation(axis, angle):
+    """The matrix of a rotation about an axis of any length, by an angle in radians."""
+    a = np.asarray(axis, dtype=float)
+    a = a / np.linalg.norm(a)
+    K = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+class inertia:
+    """Moments of inertia of homogeneous bodies about their centre of mass, in their own axes: 3 x 3 matrices."""
+
+    @staticmethod
+    def box(mass, edges):
+        """Full edges along x, y, z."""
+        s = np.square(np.asarray(edges, dtype=float))
+        return mass / 12 * np.diag([s[1] + s[2], s[2] + s[0], s[0] + s[1]])
+
+    @staticmethod
+    def tube(mass, outer, inner, length):
+        """About z, hollow from radius `inner` to `outer`."""
+        r2 = outer * outer + inner * inner
+        side = mass * (r2 / 4 + length * length / 12)
+        return np.diag([side, side, mass * r2 / 2])
+
+    @staticmethod
+    def cylinder(mass, radius, length):
+        """About z."""
+        return inertia.tube(mass, radius, 0., length)
+
+    @staticmethod
+    def disc(mass, radius):
+        """A thin disc about z."""
+        return inertia.tube(mass, radius, 0., 0.)
+
+    @staticmethod
+    def ellipsoid(mass, radii):
+        """Radii along x, y, z."""
+        s = np.square(np.asarray(radii, dtype=float))
+        return mass / 5 * np.diag([s[1] + s[2], s[2] + s[0], s[0] + s[1]])
+
+    @staticmethod
+    def sphere(mass, radius):
+        """A full sphere."""
+        return inertia.ellipsoid(mass, (radius, radius, radius))
+
+    @staticmethod
+    def about(J, mass, d):
+        """From the centre of mass to a point at d from it, Steiner's parallel axes."""
+        d = np.asarray(d, dtype=float)
+        return np.asarray(J) + mass * (d.dot(d) * np.eye(3) - np.outer(d, d))
+
+    @staticmethod
+    def turned(J, R):
+        """Of a part whose axes are the columns of R, in the axes that R is given in."""
+        return np.asarray(R) @ np.asarray(J) @ np.asarray(R).T
+
+
+def composed(parts):
+    """A `RigidBody` of several, in the axes in which their positions and rotations are given, its origin there."""
+    fields = [p._fields({}) for p in parts]
+    mass = sum(f["mass"] for f in fields)
+    centers = [np.asarray(f["position"]) + np.asarray(f["rotation"]) @ np.asarray(f["center"]) for f in fields]
+    center = sum(f["mass"] * c for f, c in zip(fields, centers)) / mass
+    J = sum(inertia.about(inertia.turned(f["inertia"], f["rotation"]), f["mass"], c - center) for f, c in zip(fields, centers))
+    return RigidBody(mass=mass, inertia=J, center=center)

@@ -1,0 +1,498 @@
+"""Formulas: numbers that are known when a run evaluates them.
+
+Measures of the state, parameters and their combinations are expressions. They are built by ordinary operators and by the functions of this
+module (or numpy's), once; a run evaluates them, with exact derivatives, in C++ without calling Python::
+
+    power = hhtdae.force(motor, 0) * hhtdae.angular_velocity(shaft, "z")
+    law = lambda l, v: 100 * (l - 1)**3 + 2 * v          # called once, with two expressions
+
+A formula cannot ask ``if`` of a value that is not known yet: ``where(x > 0, a, b)`` chooses in every evaluation, ``minimum`` and ``maximum``
+likewise. What cannot be written as a formula can be a ``callback``, at the cost of a call of Python in every evaluation.
+"""
+
+import numbers
+
+import numpy as np
+
+from . import _core
+
+__all__ = ["Expression", "Parameter", "TimeFunction", "abs_", "arccos", "arcsin", "arctan", "arctan2", "callback", "cbrt", "cos", "cosh", "exp",
+           "harmonic", "hypot", "log", "log10", "logical_and", "logical_not", "logical_or", "maximum", "minimum", "polynomial", "sin", "sinh", "spline",
+           "sqrt", "step", "step5", "tan", "tanh", "time_values", "where"]
+
+
+class Expression:
+    """A formula that is evaluated by a run; made by operators and functions from measures, parameters and numbers."""
+
+    __slots__ = ("op", "operands", "value", "__weakref__")
+    __array_priority__ = 1000
+
+    def __init__(self, op, operands=(), value=None):
+        self.op, self.operands, self.value = op, tuple(operands), value
+
+    __hash__ = object.__hash__
+
+    def __add__(self, other): return _add(self, other)
+    def __radd__(self, other): return _add(other, self)
+    def __sub__(self, other): return _add(self, _negate(_expression(other)))
+    def __rsub__(self, other): return _add(other, _negate(self))
+    def __mul__(self, other): return _multiply(self, other)
+    def __rmul__(self, other): return _multiply(other, self)
+    def __truediv__(self, other): return _divide(self, other)
+    def __rtruediv__(self, other): return _divide(other, self)
+    def __pow__(self, other): return _power(self, other)
+    def __rpow__(self, other): return _power(other, self)
+    def __neg__(self): return _negate(self)
+    def __pos__(self): return self
+    def __abs__(self): return _unary("abs", self)
+    def __lt__(self, other): return _node("less", self, other)
+    def __le__(self, other): return _node("less_equal", self, other)
+    def __gt__(self, other): return _node("less", other, self)
+    def __ge__(self, other): return _node("less_equal", other, self)
+    def __eq__(self, other): return _node("equal", self, other)
+    def __ne__(self, other): return _node("logical_not", _node("equal", self, other))
+    def __and__(self, other): return _node("logical_and", self, other)
+    def __or__(self, other): return _node("logical_or", self, other)
+    def __invert__(self): return _node("logical_not", self)
+
+    def __bool__(self):
+        raise TypeError("the value of this formula is known in a run only, 'if', 'and', 'or', min() and max() cannot ask for it: use hhtdae.where(), "
+                        "&, |, minimum() and maximum(), or a hhtdae.callback()")
+
+    def __float__(self):
+        if any(n.op in ("argument", "measure", "function") for n in _ordered([self])):
+            raise TypeError("the value of this formula is known in a run only; functions of `math` take numbers: use those of hhtdae or numpy, "
+                            "or a hhtdae.callback()")
+        return float(compile_tape([self], {}, [])(np.empty(0))[0])
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+        function = _UFUNCS.get(ufunc.__name__)
+        if method != "__call__" or function is None or options:
+            raise TypeError("numpy's %s is not available in formulas of hhtdae: use another function, or a hhtdae.callback()" % ufunc.__name__)
+        if not any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
+            return function(*[x[()] if isinstance(x, np.ndarray) else x for x in inputs])
+        boxed = []
+        for x in inputs:
+            box = np.empty((), dtype=object)
+            box[()] = x
+            boxed.append(x.astype(object) if isinstance(x, np.ndarray) else box)
+        return np.frompyfunc(function, len(inputs), 1)(*boxed)
+
+    # numpy calls these for arrays of expressions.
+    def sin(self): return _unary("sin", self)
+    def cos(self): return _unary("cos", self)
+    def tan(self): return _unary("tan", self)
+    def arcsin(self): return _unary("asin", self)
+    def arccos(self): return _unary("acos", self)
+    def arctan(self): return _unary("atan", self)
+    def arctan2(self, x): return _node("atan2", self, x)
+    def sinh(self): return _unary("sinh", self)
+    def cosh(self): return _unary("cosh", self)
+    def tanh(self): return _unary("tanh", self)
+    def exp(self): return _unary("exp", self)
+    def log(self): return _unary("log", self)
+    def log10(self): return _unary("log10", self)
+    def sqrt(self): return _unary("sqrt", self)
+    def cbrt(self): return _unary("cbrt", self)
+    def hypot(self, y): return _node("hypot", self, y)
+    def conjugate(self): return self
+
+    def __repr__(self):
+        return "<formula of %d operations>" % len(_ordered([self]))
+
+
+class Parameter(Expression):
+    """A number of a scene's description that has a name and may be another one in the next run, see `Scene.parameter`.
+
+    Formulas of it, ``2 * stiffness``, may stand for any number of the description.
+    """
+
+    __slots__ = ("name", "_scene")
+
+    def __init__(self, scene, name, core):
+        super().__init__("parameter", (), core)
+        self.name, self._scene = name, scene
+
+    def get(self):
+        """Its present value."""
+        return self.value.value
+
+    def set(self, value):
+        """Gives it another value, for runs made from now on and, in formulas of the state, at once. Collective."""
+        self._scene.set(**{self.name: value})
+
+    def __repr__(self):
+        return "<parameter %s = %.12g>" % (self.name, self.get())
+
+
+class TimeFunction:
+    """A function of one number with its first two derivatives: of time in motions, or a table in formulas, ``f(expression)``.
+
+    ``f(x)`` is its value at a number or at all numbers of an array; ``f.derivatives(x)`` is (f, f', f'').
+    """
+
+    __slots__ = ("_core", "_keep")
+
+    def __init__(self, core, keep=()):
+        self._core, self._keep = core, tuple(keep)
+
+    def __call__(self, x):
+        if isinstance(x, Expression):
+            return Expression("table", (x,), self)
+        if np.ndim(x):
+            return np.array([self._core(float(y))[0] for y in np.ravel(x)]).reshape(np.shape(x))
+        return self._core(float(x))[0]
+
+    def derivatives(self, x):
+        """(f, f', f'') at the number x."""
+        return self._core(float(x))
+
+
+class _Callback:
+    __slots__ = ("function", "gradient")
+
+    def __init__(self, function, gradient):
+        self.function, self.gradient = function, gradient
+
+
+# ---- construction, with what is known of 0 and 1 ----
+
+def _expression(x):
+    if isinstance(x, Expression):
+        return x
+    if isinstance(x, np.ndarray) and x.ndim == 0:
+        return _expression(x[()])
+    if isinstance(x, (numbers.Real, np.bool_)):
+        return Expression("constant", (), float(x))
+    raise TypeError("%r is no number and no formula" % (x,))
+
+
+def _constant(x):
+    return x.value if isinstance(x, Expression) and x.op == "constant" else None
+
+
+def _arrays(function, *x):
+    """The function element by element where an operand is an array; NotImplemented's work for mixed operands"""
+    return np.frompyfunc(function, len(x), 1)(*[y if isinstance(y, np.ndarray) else np.array(y, dtype=object) for y in x])
+
+
+def _node(op, *operands):
+    if any(isinstance(x, np.ndarray) and x.ndim for x in operands):
+        return _arrays(lambda *x: _node(op, *x), *operands)
+    nodes = [_expression(x) for x in operands]
+    result = Expression(op, nodes)
+    if all(n.op == "constant" for n in nodes):
+        return _expression(float(result))
+    return result
+
+
+def _unary(op, x):
+    return _node(op, x)
+
+
+def _add(a, b):
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _arrays(_add, a, b)
+    a, b = _expression(a), _expression(b)
+    if _constant(a) == 0:
+        return b
+    if _constant(b) == 0:
+        return a
+    if b.op == "negate":
+        return _node("subtract", a, b.operands[0])
+    return _node("add", a, b)
+
+
+def _negate(a):
+    if a.op == "negate":
+        return a.operands[0]
+    return _node("negate", a)
+
+
+def _multiply(a, b):
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _arrays(_multiply, a, b)
+    a, b = _expression(a), _expression(b)
+    for x, y in ((a, b), (b, a)):
+        if _constant(x) == 0:
+            return x
+        if _constant(x) == 1:
+            return y
+    return _node("multiply", a, b)
+
+
+def _divide(a, b):
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _arrays(_divide, a, b)
+    a, b = _expression(a), _expression(b)
+    if _constant(b) == 1 or (_constant(a) == 0 and _constant(b) is None):
+        return a
+    return _node("divide", a, b)
+
+
+def _power(a, b):
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return _arrays(_power, a, b)
+    a, b = _expression(a), _expression(b)
+    p = _constant(b)
+    if p == 1:
+        return a
+    if p == 2:
+        return _multiply(a, a)
+    return _node("power", a, b)
+
+
+_UFUNCS = {"add": _add, "subtract": lambda a, b: _add(a, _negate(_expression(b))), "multiply": _multiply, "divide": _divide, "true_divide": _divide,
+           "power": _power, "negative": lambda a: _negate(_expression(a)), "positive": lambda a: a, "square": lambda a: _multiply(a, a),
+           "reciprocal": lambda a: _divide(1., a), "absolute": lambda a: _unary("abs", a), "fabs": lambda a: _unary("abs", a),
+           "arcsin": lambda a: _unary("asin", a), "arccos": lambda a: _unary("acos", a), "arctan": lambda a: _unary("atan", a),
+           "arctan2": lambda a, b: _node("atan2", a, b), "hypot": lambda a, b: _node("hypot", a, b), "minimum": lambda a, b: _node("minimum", a, b),
+           "maximum": lambda a, b: _node("maximum", a, b), "less": lambda a, b: _node("less", a, b), "greater": lambda a, b: _node("less", b, a),
+           "less_equal": lambda a, b: _node("less_equal", a, b), "greater_equal": lambda a, b: _node("less_equal", b, a),
+           "equal": lambda a, b: _node("equal", a, b), "not_equal": lambda a, b: _node("logical_not", _node("equal", a, b)),
+           "logical_and": lambda a, b: _node("logical_and", a, b), "logical_or": lambda a, b: _node("logical_or", a, b),
+           "logical_not": lambda a: _node("logical_not", a)}
+for _name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt", "cbrt"):
+    _UFUNCS[_name] = lambda a, _op=_name: _unary(_op, a)
+
+
+def _public(op, text, names=("x",)):
+    def function(*x):
+        if len(x) != len(names):
+            raise TypeError("%s() takes %d arguments" % (function.__name__, len(names)))
+        y = _node(op, *x)
+        return _constant(y) if isinstance(y, Expression) and not any(isinstance(z, Expression) for z in x) else y
+    function.__doc__ = text + " of formulas, numbers or arrays of them."
+    return function
+
+
+sin, cos, tan = _public("sin", "Sine"), _public("cos", "Cosine"), _public("tan", "Tangent")
+arcsin, arccos, arctan = _public("asin", "Inverse sine"), _public("acos", "Inverse cosine"), _public("atan", "Inverse tangent")
+arctan2 = _public("atan2", "Angle of the point (x, y), arguments y, x,", ("y", "x"))
+sinh, cosh, tanh = _public("sinh", "Hyperbolic sine"), _public("cosh", "Hyperbolic cosine"), _public("tanh", "Hyperbolic tangent")
+exp, log, log10 = _public("exp", "Exponential"), _public("log", "Natural logarithm"), _public("log10", "Logarithm to base 10")
+sqrt, cbrt, abs_ = _public("sqrt", "Square root"), _public("cbrt", "Cube root"), _public("abs", "Absolute value")
+hypot = _public("hypot", "Length of (x, y)", ("x", "y"))
+minimum, maximum = _public("minimum", "The lesser", ("x", "y")), _public("maximum", "The greater", ("x", "y"))
+logical_and, logical_or = _public("logical_and", "Both", ("x", "y")), _public("logical_or", "One or both", ("x", "y"))
+logical_not = _public("logical_not", "The contrary")
+for _name in ("sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp log log10 sqrt cbrt abs_ hypot minimum maximum logical_and logical_or "
+              "logical_not").split():
+    globals()[_name].__name__ = globals()[_name].__qualname__ = _name
+
+
+def where(condition, a, b):
+    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated."""
+    if not isinstance(condition, Expression):
+        return a if condition else b
+    return _node("where", condition, a, b)
+
+
+def _step(x, x0, h0, x1, h1, shape):
+    if not isinstance(x, Expression):
+        x = _expression(x)
+    for p, q in ((x0, x1),):
+        if not isinstance(p, Expression) and not isinstance(q, Expression) and not q > p:
+            raise ValueError("a step from x = %g to x = %g must end after it begins" % (p, q))
+    s = (x - x0) / (x1 - x0)
+    return where(s <= 0, h0, where(s >= 1, h1, h0 + (h1 - h0) * shape(s)))
+
+
+def step(x, x0, h0, x1, h1):
+    """From h0 where x <= x0 to h1 where x >= x1 by a cubic, as STEP is known; its second derivative jumps at both ends."""
+    return _step(x, x0, h0, x1, h1, lambda s: s * s * (3 - 2 * s))
+
+
+def step5(x, x0, h0, x1, h1):
+    """From h0 where x <= x0 to h1 where x >= x1 by a quintic, as STEP5 is known: twice continuously differentiable."""
+    return _step(x, x0, h0, x1, h1, lambda s: s * s * s * (10 + s * (6 * s - 15)))
+
+
+def callback(function, *arguments, gradient=None):
+    """A formula that calls a Python function in every evaluation.
+
+    Parameters
+    ----------
+    function : callable
+        Takes as many numbers as there are `arguments`, returns a number. It should be smooth, and must depend on its arguments alone.
+    *arguments : Expression
+        What it is called with.
+    gradient : callable, optional
+        The derivatives by the arguments, as many numbers. Without it they are central differences: two calls for each argument in every
+        evaluation of the Jacobian.
+
+    A call costs about a microsecond and what the function does; a formula of the same operations costs some ten nanoseconds each.
+    """
+    if not callable(function):
+        raise TypeError("callback: %r cannot be called" % (function,))
+    return Expression("function", [_expression(x) for x in arguments], _Callback(function, gradient))
+
+
+# ---- functions of one number ----
+
+def polynomial(coefficients):
+    """c0 + c1 t + c2 t^2 + ... as a `TimeFunction`."""
+    return TimeFunction(_core.TimeFunction.polynomial(np.asarray(coefficients, dtype=float)))
+
+
+def harmonic(amplitude, omega, phase=0., offset=0.):
+    """offset + amplitude sin(omega t + phase) as a `TimeFunction`; omega in radians per unit of time."""
+    return TimeFunction(_core.TimeFunction.harmonic(amplitude, omega, phase, offset))
+
+
+def spline(x, y):
+    """Natural cubic spline through the points (x, y), x increasing, continued linearly, as a `TimeFunction`: a motion that was measured, or the
+    characteristic of a damper, ``spline(v, F)(hhtdae.rate(i, j))``."""
+    return TimeFunction(_core.TimeFunction.spline(np.asarray(x, dtype=float), np.asarray(y, dtype=float)))
+
+
+def time_values(function):
+    """A `TimeFunction` from a Python function of a number that returns (f, f', f''); called at every evaluation."""
+    return TimeFunction(_core.TimeFunction.values(function), [function])
+
+
+def time_function(x, keep):
+    """The library's function of time of a number, a `TimeFunction`, a formula of time or a Python function of t that can be traced."""
+    if isinstance(x, TimeFunction):
+        keep.append(x)
+        return x._core
+    if callable(x) and not isinstance(x, Expression):
+        y = trace(x, 1, "a function of time")
+        return compile_tape([y], {}, keep, 1).time_function()
+    x = _expression(x)
+    leaves = {n.key(): n for n in _ordered([x]) if n.op == "measure"}
+    if not leaves and not any(n.op == "parameter" for n in _ordered([x])):
+        return _core.TimeFunction(float(x))
+    if any(n.value[0] != "time" for n in leaves.values()):
+        raise TypeError("a function of time can be a formula of hhtdae.time() and of parameters, not of other measures")
+    return compile_tape([x], {key: 0 for key in leaves}, keep, 1).time_function()
+
+
+# ---- tracing and compiling ----
+
+def trace(function, count, what):
+    """Calls a Python function once with `count` formulas, and returns the formula it gives."""
+    try:
+        y = function(*[Expression("argument", (), k) for k in range(count)])
+    except TypeError as error:
+        raise TypeError("%s cannot be traced: %s" % (what, error)) from error
+    return _expression(y)
+
+
+def _ordered(roots):
+    """All nodes below the roots, operands before those that use them"""
+    done, order, stack = set(), [], [(r, False) for r in reversed(roots)]
+    while stack:
+        node, ready = stack.pop()
+        if id(node) in done:
+            continue
+        if ready:
+            done.add(id(node))
+            order.append(node)
+        else:
+            stack.append((node, True))
+            stack.extend((x, False) for x in node.operands if id(x) not in done)
+    return order
+
+
+def compile_tape(roots, leaves, keep, arguments=None):
+    """The tape of formulas. `leaves`: number of the argument of each measure, by key(); nodes `argument` have theirs. `keep` gets what has to
+    outlive the tape."""
+    codes = _core.operations
+    operations, constants, parameters, tables, functions = [], [], [], [], []
+    register, known = {}, {}
+    for n in _ordered(roots):
+        operands = tuple(register[id(x)] for x in n.operands)
+        key = (n.op, operands, n.key() if n.op == "measure" else n.value if n.op in ("constant", "argument") else id(n.value))
+        if key in known and n.op != "function":
+            register[id(n)] = known[key]
+            continue
+        op, index = n.op, 0
+        a, b, c = (operands + (0, 0, 0))[:3] if n.op != "function" else (0, 0, 0)
+        if op == "constant":
+            c, _ = len(constants), constants.append(n.value)
+        elif op == "argument":
+            c = n.value
+        elif op == "measure":
+            op, c = "argument", leaves[n.key()]
+        elif op == "parameter":
+            c, _ = len(parameters), parameters.append(n.value)
+        elif op in ("table", "table_rate"):
+            c, _ = len(tables), tables.append(n.value._core)
+            keep.append(n.value)
+        elif op == "function":
+            c, _ = len(functions), functions.append((n.value.function, n.value.gradient, list(operands)))
+            keep.append(n.value)
+        register[id(n)] = known[key] = len(operations)
+        operations.append((codes[op][0], a, b, c))
+    count = arguments if arguments is not None else 1 + max(leaves.values(), default=-1)
+    return _core.Tape(operations, constants, parameters, tables, functions, [register[id(r)] for r in roots], count)
+
+
+# ---- derivatives ----
+
+def _chain(n, x):
+    """Derivatives of a node by its operands"""
+    op, one = n.op, _expression(1.)
+    a = x[0]
+    if op in ("add", "subtract"):
+        return one, (one if op == "add" else _expression(-1.))
+    if op == "multiply":
+        return x[1], a
+    if op == "divide":
+        return 1. / x[1], -n / x[1]
+    if op == "negate":
+        return (_expression(-1.),)
+    if op == "power":
+        by_base = x[1] * _power(a, x[1] - 1.)
+        return by_base, (_expression(0.) if _constant(x[1]) is not None else n * _unary("log", a))
+    if op == "atan2":
+        square = a * a + x[1] * x[1]
+        return x[1] / square, -a / square
+    if op == "hypot":
+        return where(n <= 0, 0., a / n), where(n <= 0, 0., x[1] / n)
+    if op in ("minimum", "maximum"):
+        second = _node("less", x[1], a) if op == "minimum" else _node("less", a, x[1])
+        return where(second, 0., 1.), where(second, 1., 0.)
+    if op == "table":
+        return (Expression("table_rate", (a,), n.value),)
+    rules = {"sin": lambda: cos(a), "cos": lambda: -sin(a), "tan": lambda: 1. + n * n, "asin": lambda: 1. / sqrt(1. - a * a),
+             "acos": lambda: -1. / sqrt(1. - a * a), "atan": lambda: 1. / (1. + a * a), "sinh": lambda: cosh(a), "cosh": lambda: sinh(a),
+             "tanh": lambda: 1. - n * n, "exp": lambda: n, "log": lambda: 1. / a, "log10": lambda: 0.43429448190325182765 / a,
+             "sqrt": lambda: 0.5 / n, "cbrt": lambda: 1. / (3. * n * n), "abs": lambda: where(a < 0, -1., where(a <= 0, 0., 1.))}
+    if op in rules:
+        return (rules[op](),)
+    raise TypeError("a formula with '%s' has no derivative here" % op)
+
+
+def differentiate(roots, arguments):
+    """The derivatives of formulas by arguments, by number: a dictionary {(root, argument): formula} of those that are not zero"""
+    order = _ordered(roots)
+    depends = {}
+    for n in order:
+        depends[id(n)] = {n.value} if n.op == "argument" else set().union(*[depends[id(x)] for x in n.operands]) if n.operands else set()
+    factors, result = {}, {}
+    constant = ("less", "less_equal", "equal", "logical_and", "logical_or", "logical_not")
+    for k in arguments:
+        d = {}
+        for n in order:
+            if k not in depends[id(n)] or n.op in constant:
+                continue
+            if n.op == "argument":
+                d[id(n)] = _expression(1.)
+                continue
+            if n.op == "where":
+                branches = [d.get(id(x), _expression(0.)) for x in n.operands[1:]]
+                d[id(n)] = where(n.operands[0], *branches)
+                continue
+            if id(n) not in factors:
+                factors[id(n)] = _chain(n, n.operands)
+            total = _expression(0.)
+            for f, x in zip(factors[id(n)], n.operands):
+                if id(x) in d:
+                    total = total + f * d[id(x)]
+            d[id(n)] = total
+        for r, root in enumerate(roots):
+            if id(root) in d and _constant(d[id(root)]) != 0:
+                result[r, k] = d[id(root)]
+    return result

@@ -1,0 +1,339 @@
+"""Flexible bodies from linear finite-element models: reduction, stress, and whole models in a scene.
+
+>>> model = flexible.FeModel.from_mesh("frame.msh", {"steel": flexible.Material(2.1e11, 0.3, 7850)})
+>>> body = flexible.reduce(model, [flexible.Attachment("hub", "hub nodes"), flexible.Attachment("tip", tie="average")], modes=20)
+>>> frame = scene.add("frame", hhtdae.FlexibleBody(body.modal(), damping=0.01))
+>>> scene.add("pin", hhtdae.Fixed(frame.attachment("hub").marker(), scene.ground.marker()))
+
+Arrays are those of this rank where a model is distributed. All functions that read, reduce or write are collective.
+"""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, List, NamedTuple, Optional, Sequence, Union
+
+import numpy as np
+from petsc4py import PETSc
+
+from . import _core
+from . import _flexible
+from .scene import Body
+
+__all__ = ["Attachment", "FeModel", "FullBody", "FullFeBody", "HotSpot", "HotSpots", "Material", "ReducedBody", "load_modal_body", "reduce"]
+
+ModalBody = _core.ModalBody
+
+
+class Material(NamedTuple):
+    """Isotropic, linear elastic: Young's modulus, Poisson's ratio, density."""
+    young: float
+    poisson: float
+    density: float
+
+
+@dataclass
+class Attachment:
+    """Where joints and forces take hold of an FE model.
+
+    Parameters
+    ----------
+    name : str
+    set : str
+        Set of nodes; default: the one of the attachment's name.
+    tie : {"rigid", "average"}
+        The nodes follow the point as a rigid body (RBE2), or the point their weighted mean motion (RBE3).
+    position : (3,), optional
+        Default: the centroid of the nodes.
+    weights : sequence of float, optional
+        Of an average, in the order of the nodes' global numbers; default: equal.
+    """
+    name: str
+    set: str = ""
+    tie: str = "rigid"
+    position: Optional[Sequence[float]] = None
+    weights: Optional[Sequence[float]] = None
+
+    def _fields(self):
+        if self.tie not in ("rigid", "average"):
+            raise ValueError("attachment %s: tie is %r, must be 'rigid' or 'average'" % (self.name, self.tie))
+        return asdict(self)
+
+
+class Elements(NamedTuple):
+    """Of a mesh: types (list of str), material (n,), nodes (n, 20) by global number from 0 on, padded with -1; the order of nodes is Gmsh's."""
+    types: List[str]
+    material: np.ndarray
+    nodes: np.ndarray
+
+    def cells(self):
+        """{type: (count, nodes of a cell)}: what meshio takes, whose names are tetra, tetra10, hexahedron, hexahedron20"""
+        count = {"tetrahedron4": ("tetra", 4), "tetrahedron10": ("tetra10", 10), "brick8": ("hexahedron", 8), "brick20": ("hexahedron20", 20)}
+        types = np.array(self.types)
+        return {count[t][0]: self.nodes[types == t][:, :count[t][1]] for t in dict.fromkeys(self.types)}
+
+
+def _comm(comm):
+    return PETSc.COMM_WORLD if comm is None else PETSc.Comm(comm)
+
+
+class FeModel:
+    """A linear finite-element model, three translations a node: made by `from_mesh`, `from_calculix`, `from_files` or `from_matrices`.
+
+    Attributes
+    ----------
+    nodes, own, first : int
+        Nodes of all ranks; this rank has `own` of them from number `first` on.
+    coordinates : (own, 3)
+    label : (own,)
+        Numbers of the nodes in the mesh or the other program.
+    sets : dict of str to array
+        Own nodes of named sets, by global number.
+    elements : Elements
+    K, M : petsc4py.PETSc.Mat
+        Stiffness, free of supports, and mass.
+    """
+
+    def __init__(self, comm=None):
+        self.comm = _comm(comm)
+        self._core = _flexible.FeModel(self.comm)
+
+    @classmethod
+    def from_mesh(cls, file, materials, comm=None):
+        """A Gmsh mesh of tetrahedra or bricks; materials, `Material` or triples, by the name of physical volumes, "" for all others."""
+        model = cls(comm)
+        model._core.read_mesh(str(file), {name: tuple(m) for name, m in ({"": materials} if isinstance(materials, tuple) else materials).items()})
+        return model
+
+    @classmethod
+    def from_calculix(cls, stem, comm=None):
+        """Stored matrices of CalculiX: stem.sti, stem.mas, stem.dof, and the input deck stem.inp."""
+        model = cls(comm)
+        model._core.read_calculix(str(stem))
+        return model
+
+    @classmethod
+    def from_files(cls, stiffness, mass, nodes="", sets="", comm=None):
+        """Matrix Market files, or PETSc binary, of K and M without supports; nodes: "label x y z" a line; sets: "name label label ..."."""
+        model = cls(comm)
+        model._core.read_matrices(str(stiffness), str(mass), str(nodes), str(sets))
+        return model
+
+    @classmethod
+    def from_matrices(cls, K, M, coordinates, comm=None):
+        """Matrices in memory, petsc4py's or scipy.sparse ones (on one rank), with both triangles; coordinates (own nodes, 3)."""
+        model = cls(PETSc.COMM_SELF if comm is None and not isinstance(K, PETSc.Mat) else K.getComm() if comm is None else comm)
+        model._core.set_matrices(_matrix(K, model.comm), _matrix(M, model.comm), np.asarray(coordinates, dtype=float).reshape(-1))
+        return model
+
+    def add_set(self, name, nodes):
+        """A named set of own nodes, by global number from 0 on."""
+        self._core.add_set(name, [int(n) for n in nodes])
+        return self
+
+    def select(self, where):
+        """Global numbers of own nodes where where(x, y, z), a function of arrays, is true."""
+        x = self.coordinates
+        return self.first + np.flatnonzero(where(x[:, 0], x[:, 1], x[:, 2]))
+
+    nodes = property(lambda self: self._core.nodes)
+    own = property(lambda self: self._core.own)
+    first = property(lambda self: self._core.first)
+    coordinates = property(lambda self: self._core.coordinates)
+    label = property(lambda self: self._core.label)
+    sets = property(lambda self: self._core.sets)
+    elements = property(lambda self: Elements(*self._core.elements))
+    K = property(lambda self: self._core.K)
+    M = property(lambda self: self._core.M)
+
+
+def _matrix(A, comm):
+    if isinstance(A, PETSc.Mat):
+        return A
+    A = A.tocsr()
+    mat = PETSc.Mat().createAIJ(A.shape, csr=(A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data.astype(float)), comm=comm)
+    mat.assemble()
+    return mat
+
+
+class ReducedBody:
+    """A body in modal coordinates, made by `reduce` or `ReducedBody.load`.
+
+    Attributes
+    ----------
+    frequencies : (modes,)
+        Of the modes, cycles per unit of time.
+    residuals : (modes,)
+        A bound of each frequency's error, relative: there is an eigenvalue l of the full model with abs(omega^2 - l) <= residual l; negative: not known.
+    coordinates : (own nodes, 3); label : (own nodes,); elements : Elements
+    shape : (own nodes, 3, modes)
+        The modes at the nodes, if they were kept.
+    stress : (nodes with stress, 6, modes), and stress_nodes
+        Stress modes, components xx, yy, zz, xy, yz, zx, if they were asked for.
+    """
+
+    def __init__(self, core=None):
+        self._core = core if core is not None else _flexible.ReducedBody()
+
+    @classmethod
+    def load(cls, file, comm=None):
+        """Reads a file of `save`."""
+        body = cls()
+        body._core.load(_comm(comm), str(file))
+        return body
+
+    def save(self, file):
+        """Writes the body into a file in HDF5."""
+        self._core.save(str(file))
+
+    def modal(self):
+        """What a scene takes: the `model` of a `hhtdae.FlexibleBody`."""
+        return self._core.modal()
+
+    frequencies = property(lambda self: self._core.frequencies())
+    residuals = property(lambda self: self._core.residuals())
+    source = property(lambda self: self._core.source)
+    method = property(lambda self: self._core.method)
+    coordinates = property(lambda self: self._core.coordinates)
+    label = property(lambda self: self._core.label)
+    elements = property(lambda self: Elements(*self._core.elements))
+    stress_nodes = property(lambda self: self._core.stress_nodes)
+
+    @property
+    def shape(self):
+        x = self._core.shape
+        return x.reshape(len(x) // 3, 3, x.shape[1])
+
+    @property
+    def stress(self):
+        x = self._core.stress
+        return x.reshape(len(x) // 6, 6, x.shape[1])
+
+    def add_stress_modes(self, model):
+        """Stress modes at all nodes, from the model that was reduced; returns the body."""
+        _flexible.add_stress_modes(model._core, self._core)
+        return self
+
+    def von_mises(self, eta):
+        """von Mises stress at the nodes with stress modes, for modal coordinates (modes,)."""
+        return self._core.von_mises(eta)
+
+    def write_field(self, eta, file, origin=(0., 0., 0.), axes=None):
+        """Displacement, and stress where it is known, as a .vtu file for ParaView, moved by the pose of the FE model's axes."""
+        self._core.write_field(eta, str(file), origin, np.eye(3) if axes is None else axes)
+
+    def to_meshio(self, eta=None):
+        """A meshio.Mesh of the own nodes, with the displacement for modal coordinates. On one rank."""
+        import meshio
+
+        data = {} if eta is None else {"displacement": self.shape @ np.asarray(eta, dtype=float)}
+        return meshio.Mesh(self.coordinates, list(self.elements.cells().items()), point_data=data)
+
+
+def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] = 20, max_frequency=0., keep_below=0., keep: Sequence[int] = (),
+           stiffening=False, stress=False, all_nodes=True, progress=False):
+    """Reduces an FE model to a body in modal coordinates.
+
+    Parameters
+    ----------
+    model : FeModel
+    attachments : sequence of Attachment
+    method : {"craig_bampton", "free_free", "static"}
+        Constraint modes and fixed-interface normal modes; normal modes of the unsupported body; constraint modes alone (Guyan).
+    modes : int or None
+        Normal modes, at most; None with `max_frequency`: all below it.
+    max_frequency : float
+        Of normal modes, cycles per unit of time; 0: no bound.
+    keep_below : float
+        Modes of the reduced pair that are kept, by frequency; 0: all.
+    keep : sequence of int
+        Modes of the reduced pair that are kept, by number from 0 on; empty: all.
+    stiffening : bool
+        Geometric stiffening by loads on attachments and by angular velocity.
+    stress : bool
+        Stress modes as well.
+    all_nodes : bool
+        The modes at all nodes are kept, for stress and pictures.
+
+    Returns
+    -------
+    ReducedBody
+    """
+    if method not in ("craig_bampton", "free_free", "static"):
+        raise ValueError("method is %r, must be 'craig_bampton', 'free_free' or 'static'" % (method,))
+    core = _flexible.reduce(model._core, dict(attachments=[a._fields() for a in attachments], method=method, modes=modes, max_frequency=max_frequency,
+                                              keep_below=keep_below, keep=list(keep), stiffening=stiffening, all_nodes=all_nodes, progress=progress))
+    body = ReducedBody(core)
+    return body.add_stress_modes(model) if stress else body
+
+
+def load_modal_body(file, comm=None):
+    """Only what a scene takes of a file of a reduced body."""
+    return _flexible.load_modal_body(_comm(comm), str(file))
+
+
+class HotSpot(NamedTuple):
+    """A node's label, position (3,), largest von Mises stress, and its time."""
+    label: int
+    position: np.ndarray
+    stress: float
+    time: float
+
+
+class HotSpots:
+    """Follows the largest von Mises stress of every node through a run.
+
+    >>> spots = HotSpots(body)
+    >>> run.on_step(lambda run: spots.add(run.time, run.snapshot().modes(frame)))
+    >>> spots.highest(3)
+    """
+
+    def __init__(self, body):
+        self._body, self._core = body, _flexible.HotSpots(body._core)
+
+    def add(self, time, eta):
+        """Notes the stress for modal coordinates at a time."""
+        self._core.add(time, eta)
+
+    def highest(self, count=5, distance=0.):
+        """The highest, no two nearer to each other than a distance: a list of `HotSpot`. Collective."""
+        return [HotSpot(*s) for s in self._core.highest(count, distance)]
+
+
+@dataclass(eq=False)
+class FullBody:
+    """An FE model as a body of a scene, 3 coordinates a node, at the start.
+
+    law : "large" (St. Venant-Kirchhoff material, total Lagrangian) or "small" (about the position at the start)
+    mass_damping, stiffness_damping : C = a M + b K; with "large" b must be 0
+    """
+    law: str = "large"
+    position: Sequence[float] = (0., 0., 0.)
+    rotation: Any = field(default_factory=lambda: np.eye(3))
+    velocity: Sequence[float] = (0., 0., 0.)
+    angular_velocity: Sequence[float] = (0., 0., 0.)
+    mass_damping: float = 0.
+    stiffness_damping: float = 0.
+    attachments: Sequence[Attachment] = ()
+
+
+class FullFeBody:
+    """A whole FE model in a scene; call it on all ranks in the same order as the scene's other parts."""
+
+    def __init__(self, scene, name, model, body=FullBody()):
+        if body.law not in ("small", "large"):
+            raise ValueError("%s: law is %r, must be 'small' or 'large'" % (name, body.law))
+        self._scene, self._model, self._core, self.name = scene, model, _flexible.FullFeBody(), name
+        fields = dict(vars(body), attachments=[a._fields() for a in body.attachments])
+        self._core.add(scene._core, name, model._core, fields)
+        scene._keep.append(model)
+
+    def attachment(self, name):
+        """The frame of an attachment: a body for markers."""
+        return Body(self._scene, self._core.attachment(name), "%s.%s" % (self.name, name))
+
+    def positions(self, run, time=None):
+        """Positions of own nodes at a time within the last step, (own, 3), space axes."""
+        return self._core.positions(run._open(), run.time if time is None else time)
+
+    def write_field(self, run, file, time=None):
+        """Displacements as a .vtu file."""
+        self._core.write_field(run._open(), run.time if time is None else time, str(file))

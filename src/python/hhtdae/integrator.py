@@ -1,0 +1,146 @@
+"""The integrator on petsc4py's TS: settings and results of ``ts.setType("hhtdae")``.
+
+After ``import hhtdae`` the type is known to petsc4py. The problem is given by ``ts.setI2Function`` and ``ts.setI2Jacobian``; initial values by
+``ts.setSolution2(u, v)``. What a function here sets, options of the command line set as well (`-ts_hhtdae_...`), and win.
+"""
+
+from dataclasses import dataclass
+
+from . import _core
+
+__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "interpolate",
+           "set_alpha", "set_checkpoint_vec", "set_coordinate_change", "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse",
+           "set_role", "set_start", "set_step_limit", "statistics"]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Cumulative counters of a run."""
+    steps: int            #: accepted steps
+    rejected: int         #: steps rejected by the error test
+    newton: int           #: corrector iterations
+    residuals: int        #: evaluations of the residual
+    jacobians: int        #: evaluations of the Jacobian
+    factorizations: int   #: set-ups of the preconditioner with a new matrix
+    solves: int           #: linear solves
+    time: float           #: wall-clock seconds from the first step to the end
+    cpu: float            #: CPU seconds of this process over the same span
+    corrector_fails: int  #: corrections that did not converge
+    retries: int          #: of these, repeated at the same h with a new matrix
+    restarts: int         #: consistent starts: the first one, events, restarts
+    changes: int          #: changes of coordinates
+    tiny_steps: int       #: steps shorter than rounding allows the corrector
+    h_min: float          #: smallest accepted step
+    h_max: float          #: largest accepted step
+
+
+def set_form(ts, form):
+    """How the inertia forces are averaged over a step: "paper", equation (9a) of Negrut et al., or "second_order", second order always."""
+    _core.set_form(ts, form)
+
+
+def get_form(ts):
+    """The form, "paper" or "second_order"."""
+    return _core.get_form(ts)
+
+
+def set_alpha(ts, alpha):
+    """Numerical damping of the HHT method, -1/3 (most) to 0 (none)."""
+    _core.set_alpha(ts, alpha)
+
+
+def get_alpha(ts):
+    """Numerical damping alpha."""
+    return _core.get_alpha(ts)
+
+
+def set_radius(ts, radius):
+    """The generalized-alpha method of a spectral radius at infinity, 0 to 1, in place of HHT."""
+    _core.set_radius(ts, radius)
+
+
+def set_corrector_tolerance(ts, factor):
+    """The corrector's error as a part of the tolerance of a step."""
+    _core.set_corrector_tolerance(ts, factor)
+
+
+def set_predictor_degree(ts, degree):
+    """Degree of the predictor's polynomial."""
+    _core.set_predictor_degree(ts, degree)
+
+
+def set_reuse(ts, ratio, rate, hold):
+    """When the Newton matrix is made anew: factor by which h may differ, rate of convergence, growth of h that is not taken."""
+    _core.set_reuse(ts, ratio, rate, hold)
+
+
+def set_role(ts, role, unknowns):
+    """Says what unknowns are; without it roles are read off the derivatives of the residual.
+
+    Parameters
+    ----------
+    role : {"coordinate", "state", "holonomic", "nonholonomic", "variable", "force"}
+    unknowns : petsc4py.PETSc.IS or sequence of int
+        Global numbers, those of this rank.
+    """
+    from petsc4py import PETSc
+
+    if not isinstance(unknowns, PETSc.IS):
+        unknowns = PETSc.IS().createGeneral(list(unknowns), comm=ts.getComm())
+    _core.set_is(ts, role, unknowns)
+
+
+def get_role(ts, role):
+    """The index set of a role."""
+    return _core.get_is(ts, role)
+
+
+def set_start(ts, start):
+    """About initial values that violate the constraints: "off", "report", or "project" to the nearest consistent ones."""
+    _core.set_start(ts, start)
+
+
+def set_step_limit(ts, function):
+    """The longest step from a state that the application allows: function(ts, t, u, v, a) returns it."""
+    _core.set_step_limit(ts, function)
+
+
+def set_coordinate_change(ts, test, map, commit=None):
+    """New generalized coordinates in the course of a run: test(ts, t, u, v) returns whether, map(ts, t, u, v, a) changes the vectors in place, commit(ts)
+    is told that it is done."""
+    _core.set_coordinate_change(ts, test, map, commit)
+
+
+def get_acceleration(ts):
+    """The accelerations at the end of the last step, a vector that belongs to the TS."""
+    return _core.get_acceleration(ts)
+
+
+def interpolate(ts, t):
+    """(u, v, a) at a time of the last step, by the method's own polynomial: new vectors."""
+    return _core.interpolate(ts, t)
+
+
+def evaluate_at(ts, t):
+    """(u, v, a) at a time of the last step, accelerations and multipliers those of the equations there: new vectors."""
+    return _core.evaluate_at(ts, t)
+
+
+def statistics(ts):
+    """`Statistics` of the run so far."""
+    return Statistics(**_core.statistics(ts))
+
+
+def checkpoint_save(ts, file):
+    """Writes all that a run is into a file. Collective."""
+    _core.checkpoint_save(ts, str(file))
+
+
+def checkpoint_load(ts, file):
+    """Goes on from such a file. Collective."""
+    _core.checkpoint_load(ts, str(file))
+
+
+def set_checkpoint_vec(ts, vec):
+    """A vector of the application's that belongs to checkpoints, or None."""
+    _core.set_checkpoint_vec(ts, vec)

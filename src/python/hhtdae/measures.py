@@ -1,0 +1,144 @@
+"""What can be read off the state: arguments of formulas, channels, and values of a snapshot.
+
+Components are 0, 1, 2 or "x", "y", "z" of the marker `frame`; without one, of space axes.
+"""
+
+from .expressions import Expression
+
+__all__ = ["Measure", "acceleration", "angle", "angular_acceleration", "angular_velocity", "displacement", "distance", "element_force", "element_moment",
+           "force", "joint_force", "joint_moment", "kinetic_energy", "modal", "multiplier", "potential_energy", "rate", "time", "value", "velocity"]
+
+
+class Measure(Expression):
+    """A scalar that can be read off the state of a scene."""
+
+    __slots__ = ()
+
+    def __init__(self, kind, i=None, j=None, frame=None, component=0, target=None):
+        super().__init__("measure", (), (kind, i, j, frame, _component(component), target))
+
+    def key(self):
+        return tuple((x._number, x._id) if hasattr(x, "_id") else x for x in self.value)
+
+    def __repr__(self):
+        return "<measure %s>" % self.value[0]
+
+
+def _component(c):
+    if c in (0, 1, 2):
+        return c
+    if isinstance(c, str) and c in "xyz" and len(c) == 1:
+        return "xyz".index(c)
+    if isinstance(c, int) and c >= 0:
+        return c
+    raise ValueError("component is %r, must be 0, 1, 2 or 'x', 'y', 'z'" % (c,))
+
+
+def time():
+    """Time."""
+    return Measure("time")
+
+
+def displacement(i, component, j=None, frame=None):
+    """Component of the position of marker i from marker j (default: the space origin), length."""
+    return Measure("displacement", i, j, frame, component)
+
+
+def distance(i, j):
+    """Distance of the origins of two markers, length."""
+    return Measure("distance", i, j)
+
+
+def velocity(i, component, j=None, frame=None):
+    """Component of the velocity of marker i relative to j, the time derivative taken in space."""
+    return Measure("velocity", i, j, frame, component)
+
+
+def rate(i, j):
+    """Time derivative of the distance of two markers."""
+    return Measure("rate", i, j)
+
+
+def acceleration(i, component, j=None, frame=None):
+    """Component of the acceleration of marker i relative to j."""
+    return Measure("acceleration", i, j, frame, component)
+
+
+def angle(i, j):
+    """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, full turns are counted from there."""
+    return Measure("angle", i, j)
+
+
+def angular_velocity(i, component, j=None, frame=None):
+    """Component of the angular velocity of marker i relative to j, radians per unit of time."""
+    return Measure("angular_velocity", i, j, frame, component)
+
+
+def angular_acceleration(i, component, j=None, frame=None):
+    """Component of the angular acceleration of marker i relative to j."""
+    return Measure("angular_acceleration", i, j, frame, component)
+
+
+def multiplier(joint, row):
+    """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment."""
+    return Measure("multiplier", component=row, target=joint)
+
+
+def joint_force(joint, component, frame=None):
+    """Force of a joint or motion on the body of its marker i, in `frame` (default: its marker j)."""
+    return Measure("joint_force", frame=frame, component=component, target=joint)
+
+
+def joint_moment(joint, component, frame=None):
+    """Moment of a joint or motion on the body of its marker i, about that marker's origin, in `frame` (default: its marker j)."""
+    return Measure("joint_moment", frame=frame, component=component, target=joint)
+
+
+def force(element, component=0):
+    """Component of a force element as its class says: tension, moment, force in some axes."""
+    return Measure("force", component=component, target=element)
+
+
+def element_force(element, on, component, frame=None):
+    """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone."""
+    return Measure("element_force", on, None, frame, component, element)
+
+
+def element_moment(element, on, component, frame=None):
+    """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone."""
+    return Measure("element_moment", on, None, frame, component, element)
+
+
+def value(x):
+    """Value of a user-defined variable or of a first-order state."""
+    return Measure(x._measure, target=x)
+
+
+def modal(body, mode):
+    """Modal coordinate of a flexible body, modes from 0 on."""
+    return Measure("modal", component=mode, target=body)
+
+
+def kinetic_energy():
+    """Kinetic energy of the whole scene; for channels and snapshots alone."""
+    return Measure("kinetic_energy")
+
+
+def potential_energy():
+    """Potential energy of the whole scene; for channels and snapshots alone."""
+    return Measure("potential_energy")
+
+
+def description(x, keep):
+    """What the C++ part takes of a formula: its measures, and a tape of them; None instead of a tape for a measure alone"""
+    from .expressions import _expression, _ordered, compile_tape
+
+    x = _expression(x)
+    if isinstance(x, Measure):
+        return [x.value], None
+    leaves = {}
+    for n in _ordered([x]):
+        if n.op == "measure":
+            leaves.setdefault(n.key(), n)
+    numbers = {key: k for k, key in enumerate(leaves)}
+    return [n.value for n in leaves.values()], compile_tape([x], numbers, keep, len(leaves))

@@ -1,0 +1,375 @@
+"""Equations of motion that one has written oneself, solved by one call in the manner of scipy.integrate.solve_ivp."""
+
+import numpy as np
+from petsc4py import PETSc
+
+from . import _core, integrator
+from .expressions import Expression, _expression, compile_tape, differentiate
+from .run import temporary_options
+
+__all__ = ["MechanismResult", "solve_mechanism"]
+
+
+class DenseOutput:
+    """The solution between the ends of its steps: q, v at any time, by the quintic or cubic that positions, velocities and accelerations at both ends
+    determine. Call it with a time or an array of times: it returns q, (n,) or (n, times)."""
+
+    def __init__(self, t, q, v, a):
+        self.t, self.q, self.v, self.a = t, q, v, a
+
+    def _polynomials(self, t):
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        if np.any(t < self.t[0]) or np.any(t > self.t[-1]):
+            raise ValueError("the solution is known from t = %g to %g" % (self.t[0], self.t[-1]))
+        if len(self.t) == 1:
+            return t, np.zeros(len(t), dtype=int), np.zeros(len(t)), np.ones(len(t))
+        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        h = self.t[k + 1] - self.t[k]
+        return t, k, (t - self.t[k]) / h, h
+
+    def __call__(self, t):
+        x, k, s, h = self._polynomials(t)
+        n = np.minimum(k + 1, len(self.t) - 1)
+        dq = self.q[:, n] - self.q[:, k]
+        c = s * s * (3 - 2 * s)
+        q = self.q[:, k] + c * dq + h * s * (1 - s) * ((1 - s) * self.v[:, k] - s * self.v[:, n])
+        return q if np.ndim(t) else q[:, 0]
+
+    def velocity(self, t):
+        """Velocities, of the same shape: the derivative of the positions."""
+        x, k, s, h = self._polynomials(t)
+        n = np.minimum(k + 1, len(self.t) - 1)
+        dq = self.q[:, n] - self.q[:, k]
+        v = 6 * s * (1 - s) * dq / h + (1 - s) * (1 - 3 * s) * self.v[:, k] + s * (3 * s - 2) * self.v[:, n]
+        return v if np.ndim(t) else v[:, 0]
+
+
+class MechanismResult(dict):
+    """What `solve_mechanism` returns; entries are attributes as well.
+
+    t : (k,); q, v, a : (n, k); multipliers : (m, k)
+    sol : DenseOutput or None
+    t_events, q_events : lists with an array for each event, or None
+    status : 0 the end was reached, 1 a terminal event came, -1 the run failed
+    success : bool; message : str
+    statistics : Statistics
+    """
+
+    def __getattr__(self, name):
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    def __repr__(self):
+        return "\n".join("%12s: %r" % (k, x if not isinstance(x, np.ndarray) else "array of shape %s" % (x.shape,)) for k, x in self.items())
+
+
+def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None, constraint_jacobian=None, rtol=1e-6, atol=1e-6, t_eval=None,
+                    dense_output=False, events=None, max_step=np.inf, first_step=None, args=(), trace=False, start="project", options=None):
+    """Integrates M(q) q'' + Phi_q(t, q)^T lambda = Q(t, q, q'), Phi(t, q) = 0, an index-3 system, as it stands.
+
+    Parameters
+    ----------
+    residual : callable
+        residual(t, q, v, a, *args) returns M a - Q without the forces of the constraints, (n,); linear in a.
+    t_span : (float, float)
+        Begin and end, begin < end.
+    q0, v0 : (n,)
+        Positions and velocities at the begin.
+    constraints : callable, optional
+        constraints(t, q, *args) returns Phi, (m,). Its multipliers are forces: Phi_q^T lambda acts on the left side.
+    jacobian : callable, optional
+        jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central differences, 6 n + 1 calls of
+        `residual` for each Newton matrix.
+    constraint_jacobian : callable, optional
+        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences.
+    rtol, atol : float
+        Tolerance of the positions' error in every step. The global error is larger: of order two the method takes steps as tol^(1/3), and errors go as tol^(2/3).
+    t_eval : sequence of float, optional
+        Times of the output, increasing; default: the ends of steps. Accelerations and multipliers there solve the equations of motion.
+    dense_output : bool
+        `sol`, a function of time.
+    events : callable or list of them, optional
+        event(t, q, v, *args) returns a number whose zeros are sought; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
+    max_step, first_step : float, optional
+        Longest step, and the first one; the first is found otherwise.
+    args : tuple
+        Further arguments of all functions.
+    trace : bool
+        The residual and the constraints are called once, with formulas, and run in C++ with exact derivatives, some ten times faster: for functions that
+        consist of operators, numpy's elementary functions, array products and `hhtdae.where`, and depend on their arguments alone. Functions
+        that cannot be traced raise TypeError.
+    start : {"project", "report", "off"}
+        About initial values that violate the constraints: moved to the nearest consistent ones; an error; nothing.
+    options : dict, optional
+        PETSc's options without the dash; those of the command line win.
+
+    Returns
+    -------
+    MechanismResult
+
+    Examples
+    --------
+    A pendulum, x^2 + y^2 = 1:
+
+    >>> def residual(t, q, v, a):
+    ...     return [a[0], a[1] + 9.81]
+    >>> def rod(t, q):
+    ...     return [q[0]**2 + q[1]**2 - 1]
+    >>> solution = hhtdae.solve_mechanism(residual, (0, 2), [1, 0], [0, 0], constraints=rod)
+    >>> solution.q[:, -1]
+    """
+    problem = _Problem(residual, t_span, q0, v0, constraints, jacobian, constraint_jacobian, args)
+    with temporary_options(options):
+        ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
+        output = _Output(problem, t_eval, dense_output, events)
+        output.attach(ts)
+        ts.setFromOptions()
+        try:
+            status, message = _solve(ts, problem, output)
+            return output.result(ts, status, message)
+        finally:
+            ts.destroy()
+
+
+class _Problem:
+    """The user's functions with their sizes, checked"""
+
+    def __init__(self, residual, t_span, q0, v0, constraints, jacobian, constraint_jacobian, args):
+        self.t0, self.t1 = map(float, t_span)
+        self.q0, self.v0 = (np.array(x, dtype=float).reshape(-1) for x in (q0, v0))
+        self.n, self.args = len(self.q0), tuple(args)
+        if not self.t1 > self.t0:
+            raise ValueError("t_span is (%g, %g): its end must come after its begin" % (self.t0, self.t1))
+        if len(self.v0) != self.n:
+            raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
+        self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
+        self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
+        self.size = self.n + self.m
+        self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))
+
+    def _shaped(self, x, shape, what):
+        x = np.asarray(x, dtype=float)
+        if x.size != np.prod(shape, dtype=int):
+            raise ValueError("%s has the shape %s, must be %s" % (what, x.shape, shape))
+        return x.reshape(shape)
+
+    def residual(self, t, q, v, a):
+        return self._shaped(self._residual(t, q, v, a, *self.args), (self.n,), "what residual() returns")
+
+    def constraints(self, t, q):
+        return self._shaped(self._constraints(t, q, *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
+
+    def gradient(self, t, q):
+        if not self.m:
+            return np.empty((0, self.n))
+        if self._gradient is not None:
+            return self._shaped(self._gradient(t, q, *self.args), (self.m, self.n), "what constraint_jacobian() returns")
+        return _differences(lambda x: self.constraints(t, x), q, self.m)
+
+    def forces(self, t, q, v, a, multipliers):
+        f = self.residual(t, q, v, a)
+        return f + self.gradient(t, q).T @ multipliers if self.m else f
+
+    def matrices(self, t, q, v, a, multipliers):
+        """Derivatives of the residual with the constraints' forces, by q, v, a"""
+        if self._jacobian is None:
+            return (_differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n), _differences(lambda x: self.residual(t, q, x, a), v, self.n),
+                    _differences(lambda x: self.residual(t, q, v, x), a, self.n))
+        K, C, M = (self._shaped(x, (self.n, self.n), "a matrix that jacobian() returns") for x in self._jacobian(t, q, v, a, *self.args))
+        if self.m:
+            K = K + _differences(lambda x: self.gradient(t, x).T @ multipliers, q, self.n)
+        return K, C, M
+
+
+def _differences(f, x, rows):
+    """Central differences over 6e-6 of each number, or of 1"""
+    J, x = np.empty((rows, len(x))), np.array(x, dtype=float)
+    for k, at in enumerate(x.copy()):
+        h = 6e-6 * max(1., abs(at))
+        x[k] = at + h
+        up = f(x)
+        x[k] = at - h
+        J[:, k] = (up - f(x)) / (2 * h)
+        x[k] = at
+    return J
+
+
+# ---- the TS ----
+
+def _create(p, rtol, atol, max_step, first_step, start, trace):
+    ts = PETSc.TS().create(comm=PETSc.COMM_SELF)
+    ts.setType("hhtdae")
+    keep = []
+    (_trace if trace else _call)(ts, p, keep)
+    ts.setAttr("hhtdae", keep)
+    u, v = (PETSc.Vec().createSeq(p.size) for _ in range(2))
+    u.array[:p.n], v.array[:p.n] = p.q0, p.v0
+    ts.setSolution2(u, v)
+    ts.setTime(p.t0)
+    ts.setMaxTime(p.t1)
+    ts.setMaxSteps(2**31 - 1)
+    ts.setExactFinalTime(PETSc.TS.ExactFinalTime.MATCHSTEP)
+    ts.setTolerances(rtol=rtol, atol=atol)
+    if first_step is not None:
+        ts.setTimeStep(first_step)
+    if np.isfinite(max_step):
+        _core.set_max_step(ts, max_step)
+    integrator.set_role(ts, "coordinate", range(p.n))
+    integrator.set_role(ts, "holonomic", range(p.n, p.size))
+    integrator.set_start(ts, start)
+    return ts
+
+
+def _call(ts, p, keep):
+    """Equations that call Python"""
+    n, rows = p.n, np.arange(p.size, dtype=PETSc.IntType)
+
+    def residual(ts, t, u, v, a, f):
+        q, out = u.array_r, f.array
+        out[:n] = p.forces(t, q[:n].copy(), v.array_r[:n].copy(), a.array_r[:n].copy(), q[n:])
+        out[n:] = p.constraints(t, q[:n].copy())
+
+    def jacobian(ts, t, u, v, a, shift_v, shift_a, J, P):
+        q, w, b, multipliers = u.array_r[:n].copy(), v.array_r[:n].copy(), a.array_r[:n].copy(), u.array_r[n:].copy()
+        K, C, M = p.matrices(t, q, w, b, multipliers)
+        full, G = np.zeros((p.size, p.size)), p.gradient(t, q)
+        full[:n, :n], full[:n, n:], full[n:, :n] = K + shift_v * C + shift_a * M, G.T, G
+        P.setValues(rows, rows, full)
+        P.assemble()
+        if J != P:
+            J.assemble()
+        return True
+
+    J = PETSc.Mat().createAIJ([p.size, p.size], nnz=p.size, comm=PETSc.COMM_SELF)
+    J.setValues(rows, rows, np.zeros((p.size, p.size)))
+    J.assemble()
+    ts.setI2Function(residual, J.createVecLeft())
+    ts.setI2Jacobian(jacobian, J)
+
+
+def _traced(f, what, *arguments):
+    try:
+        result = f(*arguments)
+        return [_expression(x) for x in np.ravel(np.asarray(result, dtype=object))]
+    except (TypeError, AttributeError, ValueError) as error:
+        raise TypeError("trace=True: %s cannot be traced: %s" % (what, error)) from error
+
+
+def _trace(ts, p, keep):
+    """Equations that run in C++: the residual with Phi_q^T lambda, and the entries of the three matrices that are not zero"""
+    size, n = p.size, p.n
+    leaf = [Expression("argument", (), k) for k in range(1 + 3 * size)]
+    q, multipliers, v, a = leaf[1:1 + n], leaf[1 + n:1 + size], leaf[1 + size:1 + size + n], leaf[1 + 2 * size:1 + 2 * size + n]
+    box = lambda x: np.array(x + [None], dtype=object)[:-1]
+    f = _traced(p._residual, "residual()", leaf[0], box(q), box(v), box(a), *p.args)
+    if len(f) != n:
+        raise ValueError("what residual() returns has %d numbers, must have %d" % (len(f), n))
+    if p.m:
+        phi = _traced(p._constraints, "constraints()", leaf[0], box(q), *p.args)
+        for (row, column), d in differentiate(phi, range(1, 1 + n)).items():
+            f[column - 1] = f[column - 1] + d * multipliers[row]
+        f += phi
+    entries = [[], [], []]
+    for (row, k), d in differentiate(f, range(1, 1 + 3 * size)).items():
+        entries[(k - 1) // size].append((row, (k - 1) % size, d))
+    matrices = [d for block in entries for _, _, d in block]
+    _core.set_equations(ts, size, compile_tape(f, {}, keep, 1 + 3 * size), compile_tape(matrices, {}, keep, 1 + 3 * size),
+                        [[r for r, _, _ in block] for block in entries], [[c for _, c, _ in block] for block in entries])
+
+
+def _solve(ts, p, output):
+    try:
+        ts.solve(ts.getSolution2()[0])
+    except PETSc.Error as error:
+        if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
+            raise
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), _reason(ts))
+    if output.stopped is not None:
+        return 1, "a terminal event came at t = %.6g" % output.stopped
+    if ts.getConvergedReason() < 0:
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), _reason(ts))
+    return 0, "the end of the interval was reached"
+
+
+def _reason(ts):
+    reason = ts.getConvergedReason()
+    names = {k: name for name, k in vars(PETSc.TS.ConvergedReason).items() if isinstance(k, int)}
+    return names.get(reason, str(reason)).lower().replace("_", " ")
+
+
+# ---- output ----
+
+class _Output:
+    """What the steps leave behind"""
+
+    def __init__(self, problem, t_eval, dense, events):
+        self.p, self.dense, self.stopped = problem, dense, None
+        self.wanted = None if t_eval is None else np.array(t_eval, dtype=float).reshape(-1)
+        if self.wanted is not None and len(self.wanted) and (np.any(np.diff(self.wanted) <= 0) or self.wanted[0] < problem.t0 or self.wanted[-1] > problem.t1):
+            raise ValueError("t_eval must increase, within t_span")
+        self.events = [] if events is None else [events] if callable(events) else list(events)
+        self.next, self.rows, self.ends = 0, [], []
+        self.found = [([], []) for _ in self.events]
+
+    def attach(self, ts):
+        ts.setMonitor(self.monitor)
+        if self.events:
+            ts.setEventHandler([int(getattr(e, "direction", 0)) for e in self.events], [bool(getattr(e, "terminal", False)) for e in self.events],
+                               self.indicators, self.post)
+
+    def monitor(self, ts, step, t, u):
+        if step <= 0:
+            return
+        if not self.ends:
+            self.add(ts, ts.getPrevTime(), True)
+        if t > self.ends[-1][0]:
+            self.add(ts, t, True)
+
+    def add(self, ts, t, end):
+        if self.wanted is None or self.dense:
+            self.ends.append((t,) + self.state(ts, t))
+        else:
+            self.ends.append((t,))
+        if self.wanted is not None:
+            while self.next < len(self.wanted) and self.wanted[self.next] <= t:
+                at = self.wanted[self.next]
+                self.rows.append((at,) + self.state(ts, at))
+                self.next += 1
+
+    def state(self, ts, t):
+        u, v, a = integrator.evaluate_at(ts, t)
+        n = self.p.n
+        x = u.array[:n].copy(), v.array[:n].copy(), a.array[:n].copy(), u.array[n:].copy()
+        for y in (u, v, a):
+            y.destroy()
+        return x
+
+    def indicators(self, ts, t, u, values):
+        n = self.p.n
+        _, v = ts.getSolution2()
+        q = u.array_r[:n].copy()
+        for k, e in enumerate(self.events):
+            values[k] = e(t, q, v.array_r[:n].copy(), *self.p.args)
+
+    def post(self, ts, which, t, u, forward):
+        n = self.p.n
+        for k in which:
+            self.found[k][0].append(t)
+            self.found[k][1].append(u.array_r[:n].copy())
+            if getattr(self.events[k], "terminal", False):
+                self.stopped = t
+
+    def result(self, ts, status, message):
+        rows = self.rows if self.wanted is not None else self.ends
+        columns = lambda k, size, of: np.array([r[k] for r in of]).reshape(len(of), size).T
+        p = self.p
+        t = np.array([r[0] for r in rows])
+        sol = None
+        if self.dense and self.ends:
+            sol = DenseOutput(np.array([r[0] for r in self.ends]), columns(1, p.n, self.ends), columns(2, p.n, self.ends), columns(3, p.n, self.ends))
+        return MechanismResult(t=t, q=columns(1, p.n, rows), v=columns(2, p.n, rows), a=columns(3, p.n, rows), multipliers=columns(4, p.m, rows), sol=sol,
+                               t_events=[np.array(x) for x, _ in self.found] if self.events else None,
+                               q_events=[np.array(x).reshape(-1, p.n) for _, x in self.found] if self.events else None,
+                               status=status, success=status >= 0, message=message, statistics=integrator.statistics(ts))

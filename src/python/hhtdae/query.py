@@ -1,0 +1,222 @@
+"""What a run is doing: snapshots, and small motions about its state."""
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from . import _core
+from .expressions import _expression, _ordered, compile_tape
+from .measures import Measure
+
+__all__ = ["BodyPart", "Excitation", "Linearization", "Load", "Mode", "Motion", "Snapshot", "StateSpace"]
+
+Mode = _core.Mode
+
+
+@dataclass(eq=False)
+class Motion:
+    """Of a marker or body, everything in the axes asked for.
+
+    position, velocity, acceleration : (3,)
+    axes : (3, 3), its axes as columns
+    angular_velocity, angular_acceleration : (3,), radians
+    """
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    axes: np.ndarray
+    angular_velocity: np.ndarray
+    angular_acceleration: np.ndarray
+
+    def euler(self):
+        """3-1-3 angles phi, theta, psi: axes = Rz(phi) Rx(theta) Rz(psi), radians."""
+        return _core.euler(self.axes)
+
+    def bryant(self):
+        """1-2-3 angles a, b, c: axes = Rx(a) Ry(b) Rz(c), radians."""
+        return _core.bryant(self.axes)
+
+
+@dataclass(eq=False)
+class Load:
+    """Force (3,) and moment (3,) of an element on a body."""
+    force: np.ndarray
+    moment: np.ndarray
+
+
+class Snapshot:
+    """The state of a run at a time of its last step, made by `Run.snapshot`: answers questions that nobody has asked for beforehand.
+
+    Accelerations and multipliers are those that belong to positions and velocities at that time: at no cost at the end of a step, at about that of a
+    factorization in between. All calls are collective.
+    """
+
+    def __init__(self, run, time=None):
+        self._core = _core.Snapshot()
+        self._run = run
+        self.take(time)
+
+    def take(self, time=None):
+        """Takes another time (default: the end of the last step)."""
+        self._core.take(self._run._open(), time)
+        return self
+
+    @property
+    def time(self):
+        return self._core.time()
+
+    def motion(self, of, axes=None):
+        """`Motion` of a marker, seen from space, in the axes of another one (default: space); or of a body: its centre of mass and axes."""
+        from .scene import Marker
+
+        if isinstance(of, Marker):
+            return Motion(**self._core.marker(of, axes))
+        if axes is not None:
+            raise TypeError("the motion of a body is told in space axes; ask for that of a marker")
+        return Motion(**self._core.body(of))
+
+    def relative_motion(self, marker, to):
+        """`Motion` of a marker that somebody on another one sees, in the axes of that one."""
+        return Motion(**self._core.relative(marker, to))
+
+    def load(self, element, on, axes=None):
+        """`Load`: what a joint, motion or force does to the body of the marker `on`, its moment about that marker's origin, in the axes of another marker
+        (default: space)."""
+        return Load(*self._core.load(element, on, axes))
+
+    def modes(self, body):
+        """Modal coordinates of a flexible body, (modes,)."""
+        return self._core.modes(body)
+
+    def value(self, formula):
+        """A measure, or a formula of measures."""
+        x = _expression(formula)
+        leaves = {}
+        for n in _ordered([x]):
+            if n.op == "measure":
+                leaves.setdefault(n.key(), n)
+        values = [self._core.value(m.value) for m in leaves.values()]
+        if isinstance(x, Measure):
+            return values[0]
+        keep = []
+        tape = compile_tape([x], {key: k for k, key in enumerate(leaves)}, keep, len(leaves))
+        return float(tape(np.array(values, dtype=float))[0])
+
+    def energy(self):
+        """Kinetic and potential energy of the scene."""
+        return self._core.energy()
+
+    def close(self):
+        """Frees its memory."""
+        self._core.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+
+@dataclass(eq=False)
+class BodyPart:
+    """A body's part in a mode: complex amplitudes of its centre of mass and rotation in space axes, and its share of the kinetic energy."""
+    displacement: np.ndarray
+    rotation: np.ndarray
+    share: float
+
+
+@dataclass(eq=False)
+class StateSpace:
+    """z' = A z + B f, y = C z + D f in minimal coordinates; unpacks as A, B, C, D, which is what scipy.signal.StateSpace takes."""
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+
+    def __iter__(self):
+        return iter((self.A, self.B, self.C, self.D))
+
+
+@dataclass(eq=False)
+class Excitation:
+    """What an input of 1 is: made by `force`, `torque` or `motion`."""
+    at: object = None
+    load: Tuple[float, float, float] = (0., 0., 0.)
+    moment: Tuple[float, float, float] = (0., 0., 0.)
+    driven: object = None
+
+    @classmethod
+    def force(cls, marker, vector):
+        """A force (3,) in space axes at a marker's origin."""
+        return cls(marker, vector)
+
+    @classmethod
+    def torque(cls, marker, vector):
+        """A moment (3,) in space axes on a marker's body."""
+        return cls(marker, moment=vector)
+
+    @classmethod
+    def motion(cls, element):
+        """What is added to the function of a motion: a shaken base."""
+        return cls(driven=element)
+
+    def _tuple(self):
+        return self.at, self.load, self.moment, self.driven
+
+
+class Linearization:
+    """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective."""
+
+    def __init__(self, run, time=None):
+        self._core = _core.Linearization()
+        self._core.take(run._open(), time)
+
+    def modes(self, count=None, shift=1.):
+        """Natural modes, a list of `Mode` by increasing abs(value): all by dense algebra, for scenes of up to 1000 unknowns; or the `count` slowest by
+        SLEPc, looked for about the real number `shift` (1/s)."""
+        if count is None:
+            return self._core.modes()
+        from . import flexible
+
+        return flexible._flexible.slowest_modes(self._core, count, shift)
+
+    def part(self, mode, body):
+        """`BodyPart` of a body in a mode."""
+        return BodyPart(*self._core.part(mode, body))
+
+    def value(self, mode, measure):
+        """What a measure does in a mode, complex, with the scale of the mode's shape."""
+        return self._core.value(mode, _measure(measure))
+
+    def response(self, excitation, measure, omega):
+        """Complex amplitudes of a measure where the input is cos(omega t), for each circular frequency of `omega` (rad per unit of time)."""
+        return self._core.response(excitation._tuple(), _measure(measure), np.atleast_1d(np.asarray(omega, dtype=float)))
+
+    def state_space(self, inputs, outputs):
+        """`StateSpace` in minimal coordinates between lists of excitations and measures."""
+        return StateSpace(*self._core.state_space([e._tuple() for e in inputs], [_measure(m) for m in outputs]))
+
+    def operators(self):
+        """M, C, K as petsc4py matrices, a row and column for each unknown of the scene."""
+        return self._core.operators()
+
+    def animate(self, mode, prefix, amplitude, frames=24):
+        """A period of a mode for ParaView: prefix.pvd and a file for each frame."""
+        self._core.animate(mode, prefix, amplitude, frames)
+
+    def close(self):
+        """Frees its memory."""
+        self._core.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+
+def _measure(m):
+    if not isinstance(m, Measure):
+        raise TypeError("%r is no measure; a formula may be made of the results for its measures" % (m,))
+    return m.value

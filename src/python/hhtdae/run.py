@@ -1,0 +1,217 @@
+"""Runs of a scene: everything that changes."""
+
+from contextlib import contextmanager
+
+import numpy as np
+from petsc4py import PETSc
+
+from . import _core, integrator
+from .expressions import Expression
+from .query import Linearization, Snapshot
+
+__all__ = ["Run"]
+
+
+@contextmanager
+def temporary_options(given):
+    """PETSc's options while something is done; what the user has set already stays"""
+    database, own = PETSc.Options(), []
+    try:
+        for name, value in (given or {}).items():
+            name = name.lstrip("-")
+            if not database.hasName(name):
+                database.setValue(name, value)
+                own.append(name)
+        yield
+    finally:
+        for name in own:
+            database.delValue(name)
+
+
+class Run:
+    """A run of a scene, made by `Scene.run` or `Scene.solve`.
+
+    It is a PETSc time stepper, `ts`, with all of petsc4py: ``run.ts.getSNES().getKSP()``. Channels are arrays by name: ``run["tip"]`` at
+    the times ``run.times``. Runs are independent of each other, and outlive changes of their scene. As a context manager the run is closed at the
+    end of the block, which frees its memory.
+
+    Attributes
+    ----------
+    ts : petsc4py.PETSc.TS
+    scene : Scene
+    """
+
+    def __init__(self, scene, tolerance=None, sample=0., after=None, options=None):
+        self.scene, self.ts, self._recorder = scene, None, None
+        self._options = dict(options or {})
+        with temporary_options(self._options):
+            self.ts = scene._core.create_ts(after._open() if after is not None else None)
+            self.ts.setAttr("hhtdae", scene._keep)
+            if tolerance is not None:
+                self.ts.setTolerances(rtol=tolerance, atol=tolerance)
+            self.ts.setMaxSteps(2**31 - 1)
+            if sample is not None and scene._channels:
+                self._recorder = _core.Recorder(scene._core, float(sample))
+                self._recorder.attach(self.ts)
+            else:
+                _core.attach_signals(self.ts)
+            self.ts.setFromOptions()
+        self._names = [name for name, _ in scene._channels]
+
+    def _open(self):
+        if self.ts is None:
+            raise ValueError("the run has been closed")
+        return self.ts
+
+    def solve(self, until):
+        """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
+        ts = self._open()
+        if not until >= ts.getTime():
+            raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
+        ts.setMaxTime(until)
+        with temporary_options(self._options):
+            self.scene._core.solve(ts)
+        return self
+
+    def step_by(self, dt, until):
+        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them.
+
+        >>> for t in run.step_by(0.01, until=5):
+        ...     torque.set(-gain * run.snapshot().value(error))
+        """
+        begin = self._open().getTime()
+        count = int(np.ceil((until - begin) / dt * (1 - 1e-12)))
+        for k in range(1, count + 1):
+            self.solve(until if k == count else begin + k * dt)
+            yield self.time
+
+    def restart(self):
+        """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
+        self._open().restartStep()
+
+    def on_step(self, function):
+        """Calls function(run) after every step."""
+        def monitor(ts, step, t, u):
+            if step > 0:
+                function(self)
+        self._open().setMonitor(monitor)
+
+    # ---- analyses of a run that has not begun ----
+
+    def equilibrium(self, time=None):
+        """Moves the run to static equilibrium at a time, at rest; returns the run. Collective."""
+        _core.static_equilibrium(self._open(), self.time if time is None else time)
+        return self
+
+    def assemble(self, time=None):
+        """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run."""
+        _core.assemble_at(self._open(), self.time if time is None else time)
+        return self
+
+    def kinematics(self, time=None):
+        """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run."""
+        _core.kinematics(self._open(), self.time if time is None else time)
+        return self
+
+    # ---- results ----
+
+    @property
+    def time(self):
+        """Where the run is."""
+        return self._open().getTime()
+
+    @property
+    def steps(self):
+        """Accepted steps."""
+        return self._open().getStepNumber()
+
+    @property
+    def statistics(self):
+        """Counts of the run, see `hhtdae.Statistics`."""
+        return integrator.statistics(self._open())
+
+    @property
+    def times(self):
+        """Times of the samples, (n,)."""
+        return self._recorder.times if self._recorder else np.empty(0)
+
+    @property
+    def values(self):
+        """All samples, (n, channels)."""
+        return self._recorder.values if self._recorder else np.empty((0, len(self._names)))
+
+    @property
+    def channels(self):
+        """All channels by name, with "time"."""
+        values = self.values
+        return {"time": self.times, **{name: values[:, k].copy() for k, name in enumerate(self._names)}}
+
+    def __getitem__(self, name):
+        if name not in self._names:
+            raise KeyError("no channel is called %r; there are %s" % (name, ", ".join(self._names) or "none"))
+        return self.values[:, self._names.index(name)].copy()
+
+    def sample(self, time=None):
+        """Values of all channels at a time of the last step (default: its end), by name."""
+        x = self.scene._core.sample(self._open(), self.time if time is None else time)
+        return dict(zip(self._names, x))
+
+    def frame(self):
+        """The channels as a pandas data frame over time."""
+        import pandas
+
+        return pandas.DataFrame(self.values, columns=self._names, index=pandas.Index(self.times, name="time"))
+
+    def plot(self, *names, axes=None):
+        """Channels over time by matplotlib, all if none are named; returns the axes, one for each unit."""
+        import matplotlib.pyplot as plt
+
+        chosen = [(n, u) for n, u in self.scene._channels if not names or n in names]
+        unknown = set(names) - {n for n, _ in chosen}
+        if unknown:
+            raise KeyError("no channel is called %s" % ", ".join(sorted(unknown)))
+        units = list(dict.fromkeys(u for _, u in chosen))
+        if axes is None:
+            _, axes = plt.subplots(max(1, len(units)), 1, sharex=True, squeeze=False)
+        axes = np.ravel(axes)
+        for name, unit in chosen:
+            axes[units.index(unit)].plot(self.times, self[name], label=name)
+        for a, unit in zip(axes, units):
+            a.set_ylabel(unit)
+            a.legend()
+        axes[-1].set_xlabel("time")
+        return axes
+
+    def snapshot(self, time=None):
+        """What the run is doing at a time of its last step, see `Snapshot`. Collective."""
+        return Snapshot(self, time)
+
+    def linearize(self, time=None):
+        """Small motions about the state at a time of the last step, see `Linearization`. Collective."""
+        return Linearization(self, time)
+
+    # ---- the rest ----
+
+    def save(self, file):
+        """Writes a checkpoint, with which the run can be resumed bit for bit. Collective."""
+        integrator.checkpoint_save(self._open(), file)
+
+    def load(self, file):
+        """Goes on from a checkpoint of a run of the same scene. Collective."""
+        integrator.checkpoint_load(self._open(), file)
+        return self
+
+    def close(self):
+        """Frees what PETSc has for the run; its samples stay."""
+        if self.ts is not None:
+            self.ts.destroy()
+            self.ts = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+    def __repr__(self):
+        return "<closed run>" if self.ts is None else "<run at t = %.6g, %d steps, %d samples>" % (self.time, self.steps, len(self.times))

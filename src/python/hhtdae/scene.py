@@ -1,0 +1,304 @@
+"""Multibody scenes: the description, of which runs are made."""
+
+import numpy as np
+from petsc4py import PETSc
+
+from . import _core
+from .bodies import FlexibleBody, PointMass, RigidBody, axes_along
+from .elements import Spec, has_formula, plain
+from .expressions import Expression, Parameter
+from .measures import Measure, description
+from .run import Run
+
+__all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
+
+
+class _Handle:
+    """Refers to a part of a scene"""
+
+    __slots__ = ("_id", "_number", "_scene", "name")
+
+    def __init__(self, scene, ids, name):
+        self._id, self._number = ids
+        self._scene, self.name = scene, name
+
+    def __repr__(self):
+        return "<%s %s>" % (type(self).__name__, self.name)
+
+
+class Body(_Handle):
+    """A body of a scene, the ground, or the frame of an attachment."""
+
+    __slots__ = ()
+
+    def marker(self, position=(0., 0., 0.), axes=None, name=""):
+        """A marker on the body; position and axes (columns) in body axes from the body's origin; of the ground in space axes."""
+        return self._scene._marker(self, position, axes, name, False)
+
+    def marker_at(self, position, axes=None, name=""):
+        """The same, given where it is at the start, in space axes."""
+        return self._scene._marker(self, position, axes, name, True)
+
+    def attachment(self, name):
+        """The frame of an attachment of a flexible body: a body for markers and shapes. It costs 12 unknowns where it is asked for."""
+        return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
+
+    def shape(self, shape):
+        """Draws the body in animations."""
+        self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes)
+        return self
+
+
+class Marker(_Handle):
+    """A point with axes on a body."""
+    __slots__ = ()
+
+
+class Element(_Handle):
+    """A joint, motion or force."""
+    __slots__ = ()
+
+
+class Variable(_Handle):
+    """A user-defined variable."""
+    __slots__ = ()
+    _measure = "variable"
+
+
+class State(_Handle):
+    """A first-order state."""
+    __slots__ = ()
+    _measure = "state"
+
+
+class Scene:
+    """A multibody scene: bodies, markers, joints, motions, forces.
+
+    Units are the user's own, but consistent; angles are in radians. What is wrong with a scene is reported by name, all of it at once, when its first
+    run is made. Under MPI every rank describes the same scene in the same order.
+
+    Parameters
+    ----------
+    gravity : (3,), optional
+        Acceleration of gravity, space axes; formulas of parameters have to be given by `set_gravity`.
+    planar : bool
+        Bodies move in the xy plane: 3 coordinates, position and angle about z.
+    comm : petsc4py or mpi4py communicator
+        Default: the world's.
+
+    Examples
+    --------
+    >>> scene = hhtdae.Scene(gravity=(0, -9.81, 0))
+    >>> arm = scene.add("arm", hhtdae.RigidBody(mass=2, inertia=hhtdae.inertia.box(2, (1, .1, .1)), position=(0.5, 0, 0)))
+    >>> pin = scene.add("pin", hhtdae.Revolute(arm.marker((-0.5, 0, 0)), scene.ground.marker()))
+    >>> scene.channel("tip", hhtdae.displacement(arm.marker((0.5, 0, 0)), "y"), "m")
+    >>> run = scene.solve(2.0, tolerance=1e-6)
+    >>> run["tip"]
+    """
+
+    def __init__(self, gravity=None, planar=False, comm=None):
+        self.comm = PETSc.COMM_WORLD if comm is None else PETSc.Comm(comm)
+        self._core = _core.Scene(self.comm, bool(planar))
+        self._keep = [self.comm]  # what the C++ part refers to and does not own: callbacks and functions that describe
+        self._channels = []
+        self._parameters = {}
+        self._states = 0
+        self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
+        self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False)
+        self.ground = Body(self, self._core.ground(), "ground")
+        if gravity is not None:
+            self.set_gravity(gravity)
+
+    # ---- description ----
+
+    def parameter(self, name, value):
+        """A number that may be another one in the next run. Parameters come before everything else. Returns a `Parameter`, which stands for a
+        number anywhere in the description."""
+        self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
+        return p
+
+    def set(self, **values):
+        """Gives parameters other values, for runs made from now on; runs that were made before keep what they had. Collective."""
+        for name, value in values.items():
+            self._core.set(name, float(value))
+
+    def set_gravity(self, acceleration):
+        """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
+        self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
+
+    def add(self, name, what):
+        """Adds a body, joint, motion or force.
+
+        Parameters
+        ----------
+        name : str
+            For messages and results; an empty one becomes "body 7", "Revolute 3".
+        what : RigidBody, PointMass, FlexibleBody, one of the elements, or a function without arguments that returns one
+            A function is called again whenever parameters have changed. One of an element may return None: the element has its place, and nothing
+            acts. Numbers that are formulas of parameters need no function.
+
+        Returns
+        -------
+        Body or Element
+        """
+        if isinstance(what, Spec):
+            converted = what._convert(self._keep)
+            given = self._later(lambda: what._fields(converted)) if what._described() else what._fields(converted)
+            self._keep.append((what, converted))
+            return self._enter(name, type(what), given)
+        if not callable(what):
+            raise TypeError("Scene.add(%r): %r is no body, joint, motion or force" % (name, what))
+        first = what()
+        if first is None:
+            raise TypeError("Scene.add(%r): the function must return a body or an element at first, then its kind is known" % name)
+        return self._enter(name, type(first), self._later(lambda: self._fields_of(what(), type(first), name)))
+
+    def _fields_of(self, what, kind, name):
+        if what is None and not issubclass(kind, (RigidBody, PointMass, FlexibleBody)):
+            return None
+        if type(what) is not kind:
+            raise TypeError("%s must be a %s again, is %r" % (name, kind.__name__, what))
+        keep = []
+        converted = what._convert(keep)
+        self._keep.append(keep)
+        return what._fields(converted)
+
+    def _enter(self, name, kind, given):
+        for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
+            if issubclass(kind, body):
+                return Body(self, enter(name, given), name)
+        return Element(self, self._core.element(kind.__name__, name, given), name)
+
+    def _later(self, function):
+        self._keep.append(function)
+        return function
+
+    def _marker(self, body, position, axes, name, at):
+        place = lambda: (plain(position), np.eye(3) if axes is None else plain(axes))
+        given = self._later(place) if has_formula(position) or has_formula(axes) else place()
+        return Marker(self, self._core.marker(body, given, name, at), name or "on " + body.name)
+
+    def rigid_body(self, name, **fields):
+        """The same as ``add(name, RigidBody(**fields))``."""
+        return self.add(name, RigidBody(**fields))
+
+    def point_mass(self, name, **fields):
+        """The same as ``add(name, PointMass(**fields))``."""
+        return self.add(name, PointMass(**fields))
+
+    def connect(self, name, joint, i, j, point, axis=(0., 0., 1.), **fields):
+        """A joint of bodies i and j at a point of space, with markers on both, z along an axis of space: for all joints that two markers alike describe.
+
+        >>> scene.connect("pin", hhtdae.Revolute, arm, scene.ground, (0, 0, 0), axis=(0, 0, 1))
+        """
+        axes = axes_along(axis)
+        return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
+
+    def variable(self, name, definition, initial=0.):
+        """A user-defined variable: an unknown V = formula."""
+        return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
+
+    def state(self, name, rate, initial):
+        """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
+        if callable(rate) and not isinstance(rate, Expression):
+            own = State(self, (self._states, self.ground._number), name)
+            rate = rate(Measure("state", target=own))
+        self._states += 1
+        return State(self, self._core.state(name, description(rate, self._keep), initial), name)
+
+    def channel(self, name, value, unit=""):
+        """A result that runs record: a measure, or a formula of some."""
+        self._core.channel(name, description(value, self._keep), unit)
+        self._channels.append((name, unit))
+
+    def line(self, *markers):
+        """A line through markers in animations, a spring for example."""
+        self._core.line(list(markers))
+
+    def start(self, **policy):
+        """How runs start; options of the command line come after it.
+
+        Parameters
+        ----------
+        assembly : {"report", "off", "project"}
+            About initial values that violate the constraints: an error that names the elements; nothing; move bodies and velocities.
+        tolerance : float
+            Of misfits, times the scene's size for lengths; radians.
+        redundant : {"drop", "refuse", "keep"}
+            About constraints that say the same thing twice.
+        equilibrium : bool
+            The run starts at rest in static equilibrium.
+        view : bool
+            Prints what the start has done.
+        time : float
+            Of the initial values.
+        rotations : {"local", "euler313"}
+            Coordinates of the rotations of bodies in space.
+        angle_tol : float
+            Of the error test for rotations, radians; 0: the TS's absolute tolerance.
+        """
+        self._choose(self._start, policy, "start", assembly=("report", "off", "project"), redundant=("drop", "refuse", "keep"), rotations=("local", "euler313"))
+        self._core.start(*[self._start[k] for k in ("assembly", "redundant", "rotations", "equilibrium", "view", "tolerance", "time", "angle_tol")])
+
+    def output(self, **settings):
+        """Files of results, beside what runs keep in memory.
+
+        Parameters
+        ----------
+        file, csv : str
+            Channels in HDF5, and as a table.
+        dt : float
+            Between samples; 0: the end of every step.
+        animation : str
+            Prefix of the animation's files for ParaView.
+        animation_dt : float
+            Between frames; 0: every step.
+        balance : bool or str
+            Energy and momentum at every step: printed, or into a file.
+        """
+        self._choose(self._output, settings, "output")
+        self._core.output(*[self._output[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
+
+    @staticmethod
+    def _choose(present, given, what, **choices):
+        for name, value in given.items():
+            if name not in present:
+                raise TypeError("%s(): %r is not known, there are %s" % (what, name, ", ".join(present)))
+            if name in choices and value not in choices[name]:
+                raise ValueError("%s(): %s is %r, must be one of %s" % (what, name, value, ", ".join(choices[name])))
+            present[name] = value
+
+    @property
+    def channels(self):
+        """Names and units of the channels, in their order."""
+        return list(self._channels)
+
+    # ---- runs ----
+
+    def set_up(self):
+        """Checks and assembles the scene; the first run does it otherwise. Collective."""
+        self._core.set_up()
+
+    def run(self, tolerance=None, sample=0., after=None, options=None):
+        """A run that has not begun: see `Run`. Collective.
+
+        Parameters
+        ----------
+        tolerance : float, optional
+            Of the error of positions in every step, relative and absolute (PETSc's default: 1e-4).
+        sample : float or None
+            Time between samples of the channels; 0: the end of every step, which costs nothing; None: nothing is recorded.
+        after : Run, optional
+            The run goes on where that one is, with parameters as they are now.
+        options : dict, optional
+            PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``; those of the command line win.
+        """
+        return Run(self, tolerance, sample, after, options)
+
+    def solve(self, until, tolerance=None, sample=0., options=None):
+        """A run from the start to the time `until`: ``scene.run(...).solve(until)``."""
+        return self.run(tolerance, sample, None, options).solve(until)
+
+    def view(self, file=""):
+        """Prints what the scene has, or writes it into a file."""
+        self._core.view(file)

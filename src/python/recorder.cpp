@@ -1,0 +1,76 @@
+#include "recorder.h"
+
+namespace hhtdae
+{
+namespace python
+{
+
+namespace
+{
+
+using RecorderPointer = std::shared_ptr<Recorder>;
+
+PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSignals());
+  PetscCall((*static_cast<RecorderPointer *>(ctx))->look(ts, step, t));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Destroy(void **ctx)
+{
+  PetscFunctionBegin;
+  delete static_cast<RecorderPointer *>(*ctx);
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode Recorder::add(TS ts, PetscReal t)
+{
+  PetscFunctionBegin;
+  PetscCall(scene_->sample(ts, t, one_));
+  times_.push_back(t);
+  values_.insert(values_.end(), one_.begin(), one_.end());
+  PetscFunctionReturn(0);
+}
+
+/* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. Times that lie within
+   rounding of the end of a step are that end, where a sample costs nothing. A run that is solved in parts is not sampled twice where they meet. */
+PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
+{
+  PetscReal begin;
+  PetscFunctionBegin;
+  if (step <= 0) PetscFunctionReturn(0);
+  PetscCall(TSGetPrevTime(ts, &begin));
+  if (times_.empty()) {
+    PetscCall(add(ts, begin));
+    if (dt_ > 0) next_ = (PetscInt)std::floor(begin / dt_ * (1 + 1e-12)) + 1;
+  }
+  if (dt_ <= 0) {
+    if (t > times_.back()) PetscCall(add(ts, t));
+    PetscFunctionReturn(0);
+  }
+  const double close = 1e-12 * std::max(std::abs(t), dt_);
+  for (; next_ * dt_ <= t + close; next_++) PetscCall(add(ts, next_ * dt_ >= t - close ? t : next_ * dt_));
+  PetscFunctionReturn(0);
+}
+
+void BindRecorder(py::module_ &m)
+{
+  py::class_<Recorder, RecorderPointer>(m, "Recorder")
+    .def(py::init([](std::shared_ptr<Scene> scene, double dt) { return std::make_shared<Recorder>(std::move(scene), dt); }))
+    .def("attach", [](RecorderPointer r, py::object ts) { Check(TSMonitorSet(ToTS(ts), Monitor, new RecorderPointer(std::move(r)), Destroy)); })
+    .def_property_readonly("times", [](const Recorder &r) { return FromDoubles(r.times().data(), {(py::ssize_t)r.times().size()}); })
+    .def_property_readonly("values", [](const Recorder &r) {
+      const py::ssize_t n = (py::ssize_t)r.times().size();
+      return FromDoubles(r.values().data(), {n, n ? (py::ssize_t)r.values().size() / n : 0});
+    });
+  m.def("attach_signals", [](py::object ts) {
+    Check(TSMonitorSet(ToTS(ts), [](TS, PetscInt, PetscReal, Vec, void *) { return CheckSignals(); }, nullptr, nullptr));
+  });
+}
+
+} // namespace python
+} // namespace hhtdae

@@ -1,0 +1,35 @@
+/* Channels of a run in memory, as a monitor of its TS. */
+#ifndef HHTDAE_PYTHON_RECORDER_H
+#define HHTDAE_PYTHON_RECORDER_H
+
+#include "bind.h"
+#include "hhtdae/scene.h"
+#include <memory>
+
+namespace hhtdae
+{
+namespace python
+{
+
+class Recorder
+{
+public:
+  Recorder(std::shared_ptr<Scene> scene, double dt) : scene_(std::move(scene)), dt_(dt) {}
+
+  PetscErrorCode              look(TS ts, PetscInt step, PetscReal t);
+  const std::vector<double>  &times() const { return times_; }
+  const std::vector<double>  &values() const { return values_; } /* all channels of a time behind one another */
+
+private:
+  std::shared_ptr<Scene> scene_;
+  double                 dt_; /* 0: ends of steps */
+  std::vector<double>    times_, values_, one_;
+  PetscInt               next_  = 0; /* multiple of dt */
+
+  PetscErrorCode add(TS ts, PetscReal t);
+};
+
+} // namespace python
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,172 @@
+#include "tape.h"
+#include "bind.h"
+#include <cfloat>
+#include <cmath>
+
+namespace hhtdae
+{
+namespace python
+{
+
+namespace
+{
+
+using Number = TimeFunction::Number;
+
+/* The value of a table, or its derivative, at x */
+double At(const TimeFunction &f, double x, bool rate)
+{
+  const TimeFunction::Value y = f(x);
+  return rate ? y.f1 : y.f;
+}
+Real At(const TimeFunction &f, const Real &x, bool rate)
+{
+  const TimeFunction::Value y = f(x.value());
+  return rate ? chain(x, y.f1, y.f2) : chain(x, y.f, y.f1);
+}
+Number At(const TimeFunction &f, const Number &x, bool rate)
+{
+  if (rate) throw std::runtime_error("the derivative of a table is no function of time here");
+  const TimeFunction::Value y = f(x.value().value());
+  return chain(x, chain(x.value(), y.f, y.f1), chain(x.value(), y.f1, y.f2));
+}
+
+py::tuple Pack(const std::vector<double> &x)
+{
+  py::tuple t(x.size());
+  for (std::size_t k = 0; k < x.size(); k++) t[k] = x[k];
+  return t;
+}
+
+double ValueOf(const Tape::Function &f, const std::vector<double> &x)
+{
+  py::gil_scoped_acquire gil;
+  try {
+    return Call(f.value, Pack(x)).cast<double>();
+  } catch (const py::cast_error &) {
+    throw std::runtime_error("the Python function did not return a number");
+  }
+}
+
+/* By the user's function, else by central differences, whose error is about 1e-10 of the function */
+std::vector<double> GradientOf(const Tape::Function &f, std::vector<double> x)
+{
+  py::gil_scoped_acquire gil;
+  std::vector<double>    g(x.size());
+  if (f.gradient != Py_None) {
+    const Array a = ToArray(Call(f.gradient, Pack(x)), "the gradient that a Python function returned");
+    if (a.size() != (py::ssize_t)g.size())
+      throw std::runtime_error("the gradient has " + std::to_string(a.size()) + " numbers for " + std::to_string(g.size()) + " arguments");
+    std::copy(a.data(), a.data() + g.size(), g.begin());
+    return g;
+  }
+  for (std::size_t k = 0; k < x.size(); k++) {
+    const double at = x[k], h = std::cbrt(DBL_EPSILON) * std::max(1.0, std::abs(at));
+    x[k]            = at + h;
+    const double up = ValueOf(f, x);
+    x[k]            = at - h;
+    g[k]            = (up - ValueOf(f, x)) / (2 * h);
+    x[k]            = at;
+  }
+  return g;
+}
+
+double Apply(const Tape::Function &f, const std::vector<double> &x)
+{
+  std::vector<double> v;
+  for (int k : f.operands) v.push_back(x[k]);
+  return ValueOf(f, v);
+}
+Real Apply(const Tape::Function &f, const std::vector<Real> &x)
+{
+  std::vector<double> v;
+  bool                constant = true;
+  for (int k : f.operands) {
+    v.push_back(x[k].value());
+    constant = constant && x[k].derivatives().size() == 0;
+  }
+  Real y(ValueOf(f, v));
+  if (constant) return y;
+  const std::vector<double> g = GradientOf(f, v);
+  for (std::size_t k = 0; k < v.size(); k++) y += (x[f.operands[k]] - v[k]) * g[k];
+  return y;
+}
+Number Apply(const Tape::Function &, const std::vector<Number> &)
+{
+  throw std::runtime_error("a Python function in a function of time has no derivatives: give them with hhtdae.time_values()");
+}
+
+} // namespace
+
+/* Every operation is evaluated, both branches of `where` too: it selects, so that what the other branch is does not matter. */
+template <class N> void Tape::run(const N *u, std::vector<N> &x) const
+{
+  using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cbrt, std::cos, std::cosh, std::exp, std::hypot, std::log, std::log10, std::max,
+    std::min, std::pow, std::sin, std::sinh, std::sqrt, std::tan, std::tanh;
+  if (x.size() < operations.size()) x.resize(operations.size());
+  for (std::size_t k = 0; k < operations.size(); k++) {
+    const Operation &o = operations[k];
+    const N         &a = x[o.a], &b = x[o.b];
+    switch (o.code) {
+    case op_constant: x[k] = N(constants[o.c]); break;
+    case op_argument: x[k] = u[o.c]; break;
+    case op_parameter: x[k] = N(parameters[o.c].value()); break;
+    case op_add: x[k] = a + b; break;
+    case op_subtract: x[k] = a - b; break;
+    case op_multiply: x[k] = a * b; break;
+    case op_divide: x[k] = a / b; break;
+    case op_negate: x[k] = -a; break;
+    case op_power: x[k] = operations[o.b].code == op_constant ? N(pow(a, constants[operations[o.b].c])) : N(pow(a, b)); break;
+    case op_sin: x[k] = sin(a); break;
+    case op_cos: x[k] = cos(a); break;
+    case op_tan: x[k] = tan(a); break;
+    case op_asin: x[k] = asin(a); break;
+    case op_acos: x[k] = acos(a); break;
+    case op_atan: x[k] = atan(a); break;
+    case op_atan2: x[k] = atan2(a, b); break;
+    case op_sinh: x[k] = sinh(a); break;
+    case op_cosh: x[k] = cosh(a); break;
+    case op_tanh: x[k] = tanh(a); break;
+    case op_exp: x[k] = exp(a); break;
+    case op_log: x[k] = log(a); break;
+    case op_log10: x[k] = log10(a); break;
+    case op_sqrt: x[k] = sqrt(a); break;
+    case op_cbrt: x[k] = cbrt(a); break;
+    case op_hypot: x[k] = hypot(a, b); break;
+    case op_abs: x[k] = abs(a); break;
+    case op_minimum: x[k] = N(min(a, b)); break;
+    case op_maximum: x[k] = N(max(a, b)); break;
+    case op_less: x[k] = N(Plain(a) < Plain(b) ? 1. : 0.); break;
+    case op_less_equal: x[k] = N(Plain(a) <= Plain(b) ? 1. : 0.); break;
+    case op_equal: x[k] = N(Plain(a) == Plain(b) ? 1. : 0.); break;
+    case op_logical_and: x[k] = N(Plain(a) != 0 && Plain(b) != 0 ? 1. : 0.); break;
+    case op_logical_or: x[k] = N(Plain(a) != 0 || Plain(b) != 0 ? 1. : 0.); break;
+    case op_logical_not: x[k] = N(Plain(a) == 0 ? 1. : 0.); break;
+    case op_where: x[k] = Plain(a) != 0 ? b : x[o.c]; break;
+    case op_table: x[k] = At(tables[o.c], a, false); break;
+    case op_table_rate: x[k] = At(tables[o.c], a, true); break;
+    case op_function: x[k] = Apply(functions[o.c], x); break;
+    }
+  }
+}
+
+void Tape::evaluate(const double *u, double *out) const
+{
+  run(u, plain_);
+  for (std::size_t k = 0; k < outputs.size(); k++) out[k] = plain_[outputs[k]];
+}
+
+Real Tape::operator()(const Real *u) const
+{
+  run(u, real_);
+  return real_[outputs[0]];
+}
+
+Number Tape::operator()(const Number &t) const
+{
+  run(&t, time_);
+  return time_[outputs[0]];
+}
+
+} // namespace python
+} // namespace hhtdae
