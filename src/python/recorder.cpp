@@ -43,7 +43,9 @@ PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
   PetscReal begin;
   PetscFunctionBegin;
   if (step <= 0) PetscFunctionReturn(0);
-  PetscCall(TSGetPrevTime(ts, &begin));
+  if (resumed_) begin = t;
+  else PetscCall(TSGetPrevTime(ts, &begin));
+  resumed_ = false;
   if (times_.empty()) {
     PetscCall(add(ts, begin));
     if (dt_ > 0) next_ = (PetscInt)std::floor(begin / dt_ * (1 + 1e-12)) + 1;
@@ -62,6 +64,7 @@ void BindRecorder(py::module_ &m)
   py::class_<Recorder, RecorderPointer>(m, "Recorder")
     .def(py::init([](std::shared_ptr<Scene> scene, double dt) { return std::make_shared<Recorder>(std::move(scene), dt); }))
     .def("attach", [](RecorderPointer r, py::object ts) { Check(TSMonitorSet(ToTS(ts), Monitor, new RecorderPointer(std::move(r)), Destroy)); })
+    .def("resume", &Recorder::resume)
     .def_property_readonly("times", [](const Recorder &r) { return FromDoubles(r.times().data(), {(py::ssize_t)r.times().size()}); })
     .def_property_readonly("values", [](const Recorder &r) {
       const py::ssize_t n = (py::ssize_t)r.times().size();

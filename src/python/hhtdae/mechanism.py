@@ -5,43 +5,34 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .expressions import Expression, _expression, compile_tape, differentiate
-from .run import temporary_options
+from .run import collect_garbage, temporary_options
 
 __all__ = ["MechanismResult", "solve_mechanism"]
 
 
 class DenseOutput:
-    """The solution between the ends of its steps: q, v at any time, by the quintic or cubic that positions, velocities and accelerations at both ends
-    determine. Call it with a time or an array of times: it returns q, (n,) or (n, times)."""
+    """The solution between the ends of its steps. Called with a time or an array of times it returns the positions, (n,) or (n, times): cubics
+    through positions and velocities at the ends of a step; `velocity` the velocities, cubics through velocities and accelerations."""
 
     def __init__(self, t, q, v, a):
         self.t, self.q, self.v, self.a = t, q, v, a
 
-    def _polynomials(self, t):
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        if np.any(t < self.t[0]) or np.any(t > self.t[-1]):
+    def _cubic(self, t, x, rate):
+        at = np.atleast_1d(np.asarray(t, dtype=float))
+        if np.any(at < self.t[0]) or np.any(at > self.t[-1]):
             raise ValueError("the solution is known from t = %g to %g" % (self.t[0], self.t[-1]))
-        if len(self.t) == 1:
-            return t, np.zeros(len(t), dtype=int), np.zeros(len(t)), np.ones(len(t))
-        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        k = np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, len(self.t) - 2)
         h = self.t[k + 1] - self.t[k]
-        return t, k, (t - self.t[k]) / h, h
+        s = (at - self.t[k]) / h
+        y = (1 - s)**2 * ((1 + 2 * s) * x[:, k] + s * h * rate[:, k]) + s * s * ((3 - 2 * s) * x[:, k + 1] - (1 - s) * h * rate[:, k + 1])
+        return y if np.ndim(t) else y[:, 0]
 
     def __call__(self, t):
-        x, k, s, h = self._polynomials(t)
-        n = np.minimum(k + 1, len(self.t) - 1)
-        dq = self.q[:, n] - self.q[:, k]
-        c = s * s * (3 - 2 * s)
-        q = self.q[:, k] + c * dq + h * s * (1 - s) * ((1 - s) * self.v[:, k] - s * self.v[:, n])
-        return q if np.ndim(t) else q[:, 0]
+        return self._cubic(t, self.q, self.v)
 
     def velocity(self, t):
-        """Velocities, of the same shape: the derivative of the positions."""
-        x, k, s, h = self._polynomials(t)
-        n = np.minimum(k + 1, len(self.t) - 1)
-        dq = self.q[:, n] - self.q[:, k]
-        v = 6 * s * (1 - s) * dq / h + (1 - s) * (1 - 3 * s) * self.v[:, k] + s * (3 * s - 2) * self.v[:, n]
-        return v if np.ndim(t) else v[:, 0]
+        """Velocities at a time or times, of the same shape."""
+        return self._cubic(t, self.v, self.a)
 
 
 class MechanismResult(dict):
@@ -121,6 +112,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None
     >>> solution.q[:, -1]
     """
     problem = _Problem(residual, t_span, q0, v0, constraints, jacobian, constraint_jacobian, args)
+    collect_garbage(PETSc.COMM_SELF)
     with temporary_options(options):
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
         output = _Output(problem, t_eval, dense_output, events)
@@ -367,7 +359,7 @@ class _Output:
         p = self.p
         t = np.array([r[0] for r in rows])
         sol = None
-        if self.dense and self.ends:
+        if self.dense and len(self.ends) > 1:
             sol = DenseOutput(np.array([r[0] for r in self.ends]), columns(1, p.n, self.ends), columns(2, p.n, self.ends), columns(3, p.n, self.ends))
         return MechanismResult(t=t, q=columns(1, p.n, rows), v=columns(2, p.n, rows), a=columns(3, p.n, rows), multipliers=columns(4, p.m, rows), sol=sol,
                                t_events=[np.array(x) for x, _ in self.found] if self.events else None,

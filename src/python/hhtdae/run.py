@@ -28,12 +28,19 @@ def temporary_options(given):
             database.delValue(name)
 
 
+def collect_garbage(comm):
+    """Destroys PETSc's objects of a communicator that Python has dropped: petsc4py keeps them until all ranks ask for it, since Python's
+    garbage collector does not come on all ranks at once. Collective."""
+    if hasattr(PETSc, "garbage_cleanup"):
+        PETSc.garbage_cleanup(comm)
+
+
 class Run:
     """A run of a scene, made by `Scene.run` or `Scene.solve`.
 
     It is a PETSc time stepper, `ts`, with all of petsc4py: ``run.ts.getSNES().getKSP()``. Channels are arrays by name: ``run["tip"]`` at
     the times ``run.times``. Runs are independent of each other, and outlive changes of their scene. As a context manager the run is closed at the
-    end of the block, which frees its memory.
+    end of the block, which frees its memory; that of a run which is dropped is freed when the next one is made.
 
     Attributes
     ----------
@@ -44,6 +51,7 @@ class Run:
     def __init__(self, scene, tolerance=None, sample=0., after=None, options=None):
         self.scene, self.ts, self._recorder = scene, None, None
         self._options = dict(options or {})
+        collect_garbage(scene.comm)
         with temporary_options(self._options):
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
             self.ts.setAttr("hhtdae", scene._keep)
@@ -197,8 +205,10 @@ class Run:
         integrator.checkpoint_save(self._open(), file)
 
     def load(self, file):
-        """Goes on from a checkpoint of a run of the same scene. Collective."""
+        """The next `solve` goes on from a checkpoint of a run of the same scene; returns the run. Collective."""
         integrator.checkpoint_load(self._open(), file)
+        if self._recorder:
+            self._recorder.resume()
         return self
 
     def close(self):

@@ -300,5 +300,6 @@ class Scene:
         return self.run(tolerance, sample, None, options).solve(until)
 
     def view(self, file=""):
-        """Prints what the scene has, or writes it into a file."""
+        """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""
+        self._core.set_up()
         self._core.view(file)

@@ -1,0 +1,123 @@
+"""Formulas: values and derivatives of every operation against numpy and against differences, what cannot be traced, compiled sharing."""
+
+import itertools
+import math
+import unittest
+
+import numpy as np
+
+import hhtdae as h
+from hhtdae import _core
+from hhtdae.expressions import compile_tape, differentiate, time_function, trace
+
+ONE = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "arcsin": np.arcsin, "arccos": np.arccos, "arctan": np.arctan, "sinh": np.sinh, "cosh": np.cosh,
+       "tanh": np.tanh, "exp": np.exp, "log": np.log, "log10": np.log10, "sqrt": np.sqrt, "cbrt": np.cbrt, "abs_": np.abs}
+TWO = {"arctan2": np.arctan2, "hypot": np.hypot, "minimum": np.minimum, "maximum": np.maximum}
+TABLE = ([-1., 0., 0.5, 2.], [0.3, -0.2, 0.4, 1.])
+# In each of them x and y are between 0.1 and 0.9, where all are smooth but where they are meant not to be.
+MIXED = {
+    "rational": (lambda x, y: (x + 2 * y) / (3 - x * y) - 1 / x, None),
+    "powers": (lambda x, y: x**3 + y**2 + x**y + 2**x + x**-1.5, None),
+    "signs": (lambda x, y: -x + (+y) - abs(x - 2) * (1 - y), None),
+    "where": (lambda x, y: h.where(x < y, x * x, y * x), lambda x, y: np.where(x < y, x * x, y * x)),
+    "both": (lambda x, y: h.where((x < 0.5) & (y >= 0.3), x, h.where(~(x > 2) | (y == 7), 2 * y, 0.)),
+             lambda x, y: x if x < 0.5 and y >= 0.3 else 2 * y),
+    "step": (lambda x, y: h.step(x, 0., 1., y + 1, 3.), lambda x, y: 1 + 2 * (x / (y + 1))**2 * (3 - 2 * x / (y + 1))),
+    "step5": (lambda x, y: h.step5(x, 0., 1., 1., y), lambda x, y: 1 + (y - 1) * x**3 * (10 - 15 * x + 6 * x * x)),
+    "table": (lambda x, y: h.spline(*TABLE)(x - y) * x, lambda x, y: h.spline(*TABLE)(x - y) * x),
+    "callback": (lambda x, y: h.callback(lambda u, v: math.sin(u) * v, x, y * y), lambda x, y: math.sin(x) * y * y),
+    "callback with gradient": (lambda x, y: h.callback(lambda u, v: math.sin(u) * v, x, y * y, gradient=lambda u, v: (math.cos(u) * v, math.sin(u))),
+                               lambda x, y: math.sin(x) * y * y),
+}
+
+
+def cases():
+    for name, f in ONE.items():
+        yield name, (lambda x, y, name=name: getattr(h, name)(x * y)), (lambda x, y, f=f: f(x * y))
+    for name, f in TWO.items():
+        yield name, (lambda x, y, name=name: getattr(h, name)(x, 2 * y)), (lambda x, y, f=f: f(x, 2 * y))
+    for name, (f, plain) in MIXED.items():
+        yield name, f, plain or f
+
+
+class Operations(unittest.TestCase):
+    def test_values_and_derivatives(self):
+        """Forward differentiation in C++, symbolic differentiation, and differences agree"""
+        for (name, f, plain), point in itertools.product(cases(), ((0.31, 0.72), (0.62, 0.23))):
+            keep = []
+            formula = trace(f, 2, name)
+            tape = compile_tape([formula], {}, keep, 2)
+            x = np.array(point)
+            value, gradient = tape.differentiate(x)
+            self.assertAlmostEqual(value, float(plain(*x)), delta=1e-14 * (1 + abs(value)), msg=name)
+            self.assertAlmostEqual(tape(x)[0], value, delta=1e-14 * (1 + abs(value)), msg=name)
+            for k in range(2):
+                e = np.eye(2)[k] * 1e-5
+                slope = (plain(*(x + e)) - plain(*(x - e))) / 2e-5
+                self.assertAlmostEqual(gradient[k], slope, delta=2e-8 * (1 + abs(slope)), msg=name)
+            if "callback" in name:
+                continue
+            d = differentiate([formula], [0, 1])
+            symbolic = [compile_tape([d[0, k]], {}, keep, 2)(x)[0] if (0, k) in d else 0. for k in range(2)]
+            np.testing.assert_allclose(symbolic, gradient, rtol=1e-12, atol=1e-13, err_msg=name)
+
+    def test_time_derivatives(self):
+        """First and second derivatives of traced functions of time"""
+        for f in (lambda t: np.sin(3 * t) * t, lambda t: h.step5(t, 0., 1., 2., 3.), lambda t: h.spline(*TABLE)(t * t), lambda t: h.where(t > 0.5, t**3, t),
+                  lambda t: h.exp(-t) / (1 + t), h.harmonic(2., 3., 0.1, 0.2), h.polynomial([1, 2, 3]), h.time()**2):
+            g = time_function(f, [])
+            for t in (0.3, 0.8):
+                y, d = g(t), 1e-4
+                self.assertAlmostEqual(y[1], (g(t + d)[0] - g(t - d)[0]) / (2 * d), delta=2e-6)
+                self.assertAlmostEqual(y[2], (g(t + d)[1] - g(t - d)[1]) / (2 * d), delta=2e-6)
+
+    def test_numpy(self):
+        """numpy's functions, mixed arrays, matrix products"""
+        def f(x, y):
+            v = np.array([x, y])
+            M = np.array([[2., 1.], [0.5, 3.]])
+            return v @ (M @ v) + np.sum(np.sin(v)) + np.dot(M[0], v) * x - np.float64(2) * np.arctan2(x, y)
+
+        tape = compile_tape([trace(f, 2, "f")], {}, [], 2)
+        self.assertAlmostEqual(tape(np.array([0.3, 0.4]))[0], f(0.3, 0.4), delta=1e-15)
+
+    def test_sharing_and_constants(self):
+        """What is written twice is evaluated once; what is known is computed at once"""
+        f = trace(lambda x, y: h.sin(x * y) + 2 * h.sin(x * y) + 0 * y + (h.cos(0.) - 1), 2, "f")
+        self.assertLessEqual(len(compile_tape([f], {}, [], 2)), 7)
+        self.assertEqual(h.sin(0.5), math.sin(0.5))
+        np.testing.assert_allclose(np.asarray(h.sqrt(np.array([1., 4.])), dtype=float), [1, 2])
+
+    def test_all_operations_are_known(self):
+        """Each operation of the C++ part is one that some formula above uses"""
+        used = set()
+        for _, f, _ in cases():
+            from hhtdae.expressions import _ordered
+            used |= {n.op for n in _ordered([trace(f, 2, "f")])}
+        beside = {"parameter", "table_rate"}
+        self.assertEqual(set(_core.operations) - used - beside, set())
+
+
+class Mistakes(unittest.TestCase):
+    def test_what_cannot_be_traced_says_what_to_do(self):
+        for f, word in ((lambda x: 1 if x > 0 else 2, "where"), (lambda x: math.sin(x), "math"), (lambda x: max(x, 1), "maximum"),
+                        (lambda x: "three", "no number"), (lambda x: np.floor(x), "floor")):
+            with self.assertRaises(TypeError) as caught:
+                trace(f, 1, "the law")
+            self.assertIn(word, str(caught.exception))
+
+    def test_functions_of_time(self):
+        with self.assertRaisesRegex(ValueError, "must increase"):
+            h.spline([0, 0], [1, 2])
+        with self.assertRaisesRegex(ValueError, "must end after it begins"):
+            h.step(h.time(), 1., 0., 1., 2.)
+        scene = h.Scene()
+        b = scene.add("b", h.PointMass())
+        with self.assertRaisesRegex(TypeError, "not of other measures"):
+            time_function(h.displacement(b.marker(), 0), [])
+        with self.assertRaisesRegex(ValueError, "component"):
+            h.displacement(b.marker(), "w")
+
+
+if __name__ == "__main__":
+    unittest.main()

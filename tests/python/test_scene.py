@@ -1,0 +1,326 @@
+"""Scenes: every kind of element with the defaults of C++, bodies, parameters, runs, channels, queries, analyses, small motions, messages."""
+
+import math
+import os
+import tempfile
+import unittest
+
+import numpy as np
+
+import hhtdae as h
+from hhtdae import _core, elements
+
+
+def pendulum(tip=(1., 0., 0.), **fields):
+    scene = h.Scene(gravity=(0, -9.81, 0))
+    rod = scene.add("rod", h.RigidBody(mass=2., inertia=h.inertia.box(2., (1, .1, .1)), position=(0.5, 0, 0), **fields))
+    pin = scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0))
+    return scene, rod, pin
+
+
+class Elements(unittest.TestCase):
+    def test_python_and_cpp_have_the_same_kinds_fields_and_defaults(self):
+        kinds = _core.kinds()
+        self.assertEqual(set(kinds), set(elements.ELEMENTS))
+        for name, defaults in kinds.items():
+            given = {}
+            for f in elements.fields(getattr(h, name)):
+                plain = f.default if f.default is not elements.field().default else f.default_factory() if callable(f.default_factory) else None
+                given[f.name] = plain._fields({}) if isinstance(plain, elements.Spec) else plain
+            self.assertEqual(set(given), set(defaults), name)
+            for field, value in defaults.items():
+                if value is None or given[field] is None:
+                    self.assertIsNone(given[field], "%s.%s" % (name, field))
+                elif isinstance(value, dict):
+                    self.assertEqual(given[field], value, "%s.%s" % (name, field))
+                else:
+                    np.testing.assert_array_equal(given[field], value, "%s.%s" % (name, field))
+
+    def test_every_kind_enters_a_scene(self):
+        """What C++ refuses of it is told by the error of set_up, in which no kind is unknown and no field misread"""
+        scene = h.Scene()
+        a, b, c = (scene.add(n, h.RigidBody(position=p)) for n, p in zip("abc", ((0, 0, 0), (1, 0, 0), (2, 0, 0))))
+        i, j = b.marker(), a.marker()
+        k = c.marker()
+        pin = scene.add("hinge", h.Revolute(i, j))
+        special = {
+            "Coupler": lambda: h.Coupler([h.Term(i, j), h.Term(k, i, rotation=False, factor=2.)]), "Gear": lambda: h.Gear(i, j, k, i, ratio=2.),
+            "RackAndPinion": lambda: h.RackAndPinion(i, j, k, i), "GearMesh": lambda: h.GearMesh(i, j, k, j, a.marker()),
+            "RackMesh": lambda: h.RackMesh(i, j, k, j, a.marker()), "PointOnCurve": lambda: h.PointOnCurve(i, j, [(0, 0, 0), (1, 0, 0), (2, 1, 0)]),
+            "UserConstraint": lambda: h.UserConstraint([h.displacement(i, 0) - 1]), "RotationalMotion": lambda: h.RotationalMotion(i, j, lambda t: t * t),
+            "TranslationalMotion": lambda: h.TranslationalMotion(i, j, h.harmonic(1, 2), of="velocity", axis=0),
+            "NonlinearSpring": lambda: h.NonlinearSpring(i, j, lambda l, v: l - 1 + v), "JointFriction": lambda: h.JointFriction(pin, 0.1, radius=0.1),
+            "NonlinearTorsionalSpring": lambda: h.NonlinearTorsionalSpring(i, j, lambda p, w: -h.sin(p)),
+            "UserForce": lambda: h.UserForce(i, force=[1, 2, h.time()]), "UserScalarForce": lambda: h.UserScalarForce(i, j, h.sin(h.time()))}
+        for count, name in enumerate(elements.ELEMENTS):
+            e = scene.add("my " + name, special.get(name, lambda: getattr(h, name)(i, j))())
+            self.assertEqual(e._id, pin._id + 1 + count)
+        with self.assertRaises(h.Error):
+            scene.set_up()  # so much at once is no mechanism
+
+    def test_view(self):
+        scene, rod, pin = pendulum()
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "view")
+            scene.view(file)
+            with open(file) as text:
+                self.assertRegex(text.read(), "1 degrees? of freedom")
+
+    def test_wrong_fields(self):
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        for spec, kind, text in ((h.SpringDamper(i, j, stiffness="hard"), TypeError, "SpringDamper s: stiffness must be a number, is 'hard'"),
+                                 (h.Bushing(i, j, stiffness=(1, 2)), ValueError, "stiffness must be three numbers"),
+                                 (h.Revolute(i, "ground"), TypeError, "j is 'ground', which is not of a scene"),
+                                 (h.RotationalMotion(i, j, 0., of="jerk"), ValueError, "must be 'displacement'"),
+                                 (h.NonlinearSpring(i, j, lambda l, v: 1 if l > 1 else 0), TypeError, "hhtdae.where"),
+                                 (42, TypeError, "no body, joint")):
+            with self.assertRaisesRegex(kind, text):
+                scene.add("s", spec)
+
+
+class Runs(unittest.TestCase):
+    def test_pendulum(self):
+        """Energy, channels, sampling, statistics, the closed form of small swings"""
+        scene, rod, pin = pendulum()
+        tip = rod.marker((0.5, 0, 0))
+        scene.channel("angle", h.angle(rod.marker(), scene.ground.marker()), "rad")
+        scene.channel("energy", h.kinetic_energy() + h.potential_energy(), "J")
+        scene.channel("height", h.displacement(tip, "y"), "m")
+        run = scene.solve(1., tolerance=1e-8)
+        self.assertEqual(len(run.times), run.steps + 1)
+        self.assertEqual(run.statistics.steps, run.steps)
+        self.assertEqual((run.times[0], run.times[-1]), (0., 1.))
+        self.assertLess(np.ptp(run["energy"]), 2e-4)
+        np.testing.assert_allclose(run["height"], np.sin(run["angle"]), atol=1e-9)
+        self.assertEqual(set(run.channels), {"time", "angle", "energy", "height"})
+        even = scene.solve(1., tolerance=1e-8, sample=0.1)
+        np.testing.assert_allclose(even.times, np.arange(11) / 10, atol=1e-12)
+        np.testing.assert_allclose(even["angle"], np.interp(even.times, run.times, run["angle"]), atol=2e-4)
+        with self.assertRaisesRegex(KeyError, "angle, energy, height"):
+            run["angel"]
+        self.assertAlmostEqual(run.sample()["angle"], run["angle"][-1])
+        self.assertEqual(len(scene.solve(0.1, sample=None).times), 0)
+
+    def test_parts_and_copies(self):
+        """A run in parts, one that goes on from another, a checkpoint"""
+        scene, rod, pin = pendulum()
+        scene.channel("angle", h.angle(rod.marker(), scene.ground.marker()), "rad")
+        whole = scene.solve(1., tolerance=1e-8)
+        parts = scene.run(tolerance=1e-8)
+        times = list(parts.step_by(0.3, until=1.))
+        np.testing.assert_allclose(times, [0.3, 0.6, 0.9, 1.])
+        self.assertTrue(np.all(np.diff(parts.times) > 0))
+        self.assertAlmostEqual(parts["angle"][-1], whole["angle"][-1], delta=2e-6)
+        self.assertEqual(parts.statistics.restarts, 1)
+        half = scene.solve(0.5, tolerance=1e-8)
+        on = scene.run(tolerance=1e-8, after=half).solve(1.)
+        self.assertAlmostEqual(on["angle"][-1], whole["angle"][-1], delta=2e-5)
+        self.assertEqual(on.times[0], 0.5)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "half")
+            half.save(file)
+            again = scene.run(tolerance=1e-8).load(file)
+            a, b = again.solve(1.), half.solve(1.)
+            self.assertEqual(again.times[0], 0.5)
+            self.assertEqual(a["angle"][-1], b["angle"][-1])
+        with self.assertRaisesRegex(ValueError, "cannot go back"):
+            whole.solve(0.5)
+
+    def test_parameters(self):
+        """Formulas of parameters in bodies, markers, elements and gravity; functions that describe; elements that may be missing"""
+        scene = h.Scene()
+        k, m, g, there = (scene.parameter(n, x) for n, x in (("k", 100.), ("m", 2.), ("g", 9.81), ("there", 1.)))
+        scene.set_gravity((0, 0, -g))
+        b = scene.add("b", h.PointMass(mass=2 * m, position=(0, 0, 0.1 * k / 100)))
+        anchor = scene.ground.marker((0, 0, 0.01 * k))
+        scene.add("spring", h.SpringDamper(b.marker(), anchor, stiffness=k, length=0.))
+        guard = scene.ground.marker((0.5, 0, 0))
+        on = b.marker()
+        scene.add("extra", lambda: h.SpringDamper(on, guard, stiffness=k.get(), length=0.) if there.get() else None)
+        for stiffness, mass, gravity, extra in ((100., 2., 9.81, 1), (400., 3., 1.6, 0), (100., 2., 9.81, 1)):
+            scene.set(k=stiffness, m=mass, g=gravity, there=extra)
+            with scene.run().equilibrium() as run:
+                z, x = (run.snapshot().motion(b).position[i] for i in (2, 0))
+            if extra:
+                self.assertAlmostEqual(z, 0.5 * 0.01 * stiffness - 2 * mass * gravity / (2 * stiffness), delta=1e-9)
+                self.assertAlmostEqual(x, 0.25, delta=1e-9)
+            else:
+                self.assertAlmostEqual(z, 0.01 * stiffness - 2 * mass * gravity / stiffness, delta=1e-9)
+        self.assertEqual(k.get(), 100.)
+        k.set(50)
+        self.assertEqual(k.get(), 50.)
+        with self.assertRaisesRegex(h.Error, "there is no parameter wheel"):
+            scene.set(wheel=1)
+
+    def test_states_variables_and_callbacks(self):
+        """x' = -3 x with a variable y = x^2, and a force that pulls a mass by a Python function as by a formula"""
+        finals = []
+        for force in (lambda u, v: -20 * h.sin(u) - v, lambda u, v: h.callback(lambda a, b: -20 * math.sin(a) - b, u, v)):
+            scene = h.Scene()
+            x = scene.state("x", lambda own: -3 * own, 2.)
+            y = scene.variable("y", h.value(x)**2)
+            b = scene.add("b", h.PointMass(position=(0.5, 0, 0)))
+            m = b.marker()
+            scene.add("pull", h.UserForce(m, force=[force(h.displacement(m, 0), h.velocity(m, 0)), 0, 0]))
+            scene.channel("y", h.value(y))
+            scene.channel("x", h.displacement(m, 0))
+            run = scene.solve(1., tolerance=1e-8)
+            self.assertAlmostEqual(run["y"][-1], 4 * math.exp(-6), delta=1e-6)
+            finals.append((run["x"][-1], run.steps))
+        self.assertAlmostEqual(finals[0][0], finals[1][0], delta=1e-8)
+        self.assertEqual(finals[0][1], finals[1][1])
+
+    def test_options_and_output(self):
+        scene, rod, pin = pendulum()
+        scene.channel("angle", h.angle(rod.marker(), scene.ground.marker()), "rad")
+        run = scene.run(options={"ts_adapt_type": "none", "ts_dt": 0.01}).solve(0.2)
+        self.assertEqual(run.steps, 20)
+        self.assertEqual(run.ts.getType(), "hhtdae")
+        self.assertTrue(run.ts.getSNES().getKSP().getPC().getType())
+        steps = []
+        with scene.run() as run, tempfile.TemporaryDirectory() as folder:
+            run.on_step(lambda r: steps.append(r.time))
+            scene.output(csv=os.path.join(folder, "x.csv"), dt=0.05)
+            run.solve(0.2)
+            scene.output(csv="")
+            table = np.loadtxt(os.path.join(folder, "x.csv"), delimiter=",", skiprows=1)
+            np.testing.assert_allclose(table[:, 0], [0, 0.05, 0.1, 0.15, 0.2], atol=1e-12)
+            self.assertAlmostEqual(table[-1, 1], run["angle"][-1], delta=1e-9)
+            self.assertEqual(len(steps), run.steps)
+        self.assertEqual(repr(run), "<closed run>")
+        with self.assertRaisesRegex(ValueError, "closed"):
+            run.solve(1.)
+        with self.assertRaisesRegex(TypeError, "there are file, csv"):
+            scene.output(table="x")
+        with self.assertRaisesRegex(ValueError, "must be one of report"):
+            scene.start(assembly="maybe")
+
+
+class Questions(unittest.TestCase):
+    def test_snapshot(self):
+        """A rod that swings: accelerations, reactions by Newton's law, energies, formulas, angles"""
+        scene, rod, pin = pendulum()
+        tip, foot = rod.marker((0.5, 0, 0), name="tip"), scene.ground.marker()
+        run = scene.solve(0.7, tolerance=1e-8)
+        with run.snapshot(0.7 - 0.4 * run.ts.getTimeStep()) as now:
+            self.assertLess(now.time, 0.7)
+            x, c = now.motion(tip), now.motion(rod)
+            w = x.angular_velocity[2]
+            np.testing.assert_allclose(x.velocity, np.cross(x.angular_velocity, x.position), atol=2e-5)
+            np.testing.assert_allclose(x.acceleration, np.cross(x.angular_acceleration, x.position) - w * w * x.position, atol=1e-5)
+            np.testing.assert_allclose(now.load(pin, tip).force, 2. * (c.acceleration + [0, 9.81, 0]), atol=1e-6)
+            kinetic, potential = now.energy()
+            self.assertAlmostEqual(kinetic, 0.5 * (2. * c.velocity @ c.velocity + h.inertia.box(2., (1, .1, .1))[2, 2] * w * w), delta=1e-9)
+            self.assertAlmostEqual(now.value(h.displacement(tip, 0)**2 + h.displacement(tip, 1)**2), 1., delta=1e-9)
+            self.assertAlmostEqual(now.value(h.kinetic_energy()), kinetic)
+            angle = now.value(h.angle(tip, foot))
+            np.testing.assert_allclose(x.axes, h.rotation((0, 0, 1), angle), atol=1e-9)
+            np.testing.assert_allclose(x.bryant(), [0, 0, angle], atol=1e-9)
+            np.testing.assert_allclose(h.rotation((0, 0, 1), x.euler()[0]), x.axes, atol=1e-9)
+            relative = now.relative_motion(foot, tip)
+            np.testing.assert_allclose(relative.position, [-1, 0, 0], atol=1e-9)
+            np.testing.assert_allclose(now.motion(foot, axes=tip).axes, x.axes.T, atol=1e-9)
+        with self.assertRaisesRegex(ValueError, "closed"):
+            now.energy()
+
+    def test_kinematics_and_equilibrium(self):
+        """A rod that a motion turns: the torque of inverse dynamics; a rod on a torsional spring: its angle at rest"""
+        scene, rod, pin = pendulum()
+        i, j = rod.marker((-0.5, 0, 0)), scene.ground.marker()
+        drive = scene.add("drive", h.RotationalMotion(i, j, lambda t: 0.5 * t**2))
+        scene.start(assembly="project")
+        run = scene.run().kinematics(1.)
+        now = run.snapshot()
+        J = h.inertia.box(2., (1, .1, .1))[2, 2] + 2 * 0.25
+        self.assertAlmostEqual(now.load(drive, i).moment[2], J * 1. + 2 * 9.81 * 0.5 * math.cos(0.5), delta=1e-6)
+        self.assertAlmostEqual(now.motion(i).angular_velocity[2], 1., delta=1e-9)
+        scene, rod, pin = pendulum()
+        scene.add("spring", h.TorsionalSpringDamper(rod.marker(), scene.ground.marker(), stiffness=30.))
+        now = scene.run().equilibrium().snapshot()
+        axes = now.motion(rod).axes
+        p = math.atan2(axes[1, 0], axes[0, 0])
+        self.assertAlmostEqual(-30. * p, 2 * 9.81 * 0.5 * math.cos(p), delta=1e-8)
+
+    def test_linearization(self):
+        """A mass on a damped spring: mode, frequency response, minimal coordinates, operators"""
+        scene = h.Scene()
+        b = scene.add("b", h.RigidBody(mass=2.))
+        m, g = b.marker(), scene.ground.marker()
+        scene.add("guide", h.Translational(m, g))
+        k, c = 50., 3.
+        top = scene.ground.marker((0, 0, 1))
+        scene.add("spring", h.SpringDamper(m, top, stiffness=k, damping=c))
+        small = scene.run().linearize()
+        modes = small.modes()
+        self.assertEqual(len(modes), 1)
+        self.assertAlmostEqual(modes[0].frequency, math.sqrt(k / 2) / (2 * math.pi), delta=1e-9)
+        self.assertAlmostEqual(modes[0].damping_ratio, c / (2 * math.sqrt(2 * k)), delta=1e-9)
+        self.assertIn("Hz", repr(modes[0]))
+        part = small.part(modes[0], b)
+        self.assertAlmostEqual(abs(part.displacement[2]), 1., delta=1e-9)
+        self.assertAlmostEqual(part.share, 1., delta=1e-9)
+        self.assertAlmostEqual(abs(small.value(modes[0], h.displacement(m, 2))), 1., delta=1e-9)
+        w = np.array([1., 5., 20.])
+        push = h.Excitation.force(m, (0, 0, 1))
+        np.testing.assert_allclose(small.response(push, h.displacement(m, 2), w), 1 / (k - 2 * w**2 + 1j * w * c), rtol=1e-9)
+        A, B, C, D = small.state_space([push], [h.displacement(m, 2)])
+        self.assertEqual((A.shape, B.shape, C.shape, D.shape), ((2, 2), (2, 1), (1, 2), (1, 1)))
+        for x in w:
+            H = (C @ np.linalg.solve(1j * x * np.eye(2) - A, B) + D)[0, 0]
+            self.assertAlmostEqual(H, 1 / (k - 2 * x**2 + 1j * x * c), delta=1e-9)
+        M, _, K = small.operators()
+        self.assertEqual(M.getSize(), K.getSize())
+        small.close()
+        self.assertGreater(K.norm(), 1.)  # a copy, which stays
+
+
+class Mistakes(unittest.TestCase):
+    def test_all_that_is_wrong_is_told(self):
+        scene = h.Scene()
+        b = scene.add("beam", h.RigidBody(mass=-1., inertia=(1, 1, 5)))
+        scene.add("loop", h.Revolute(b.marker(), b.marker()))
+        with self.assertRaises(h.Error) as caught:
+            scene.run()
+        text = str(caught.exception)
+        for word in ("body beam: mass is -1", "principal moments", "loop"):
+            self.assertIn(word, text)
+        self.assertTrue(caught.exception.trace)
+        self.assertGreater(caught.exception.ierr, 0)
+
+    def test_foreign_handles(self):
+        one, other = h.Scene(), h.Scene()
+        a, b = one.add("a", h.PointMass()), other.add("b", h.PointMass())
+        one.add("spring", h.SpringDamper(a.marker(), b.marker(), stiffness=1.))
+        with self.assertRaisesRegex(h.Error, "not a marker of this scene"):
+            one.run()
+
+    def test_exceptions_of_callbacks(self):
+        scene = h.Scene()
+        b = scene.add("b", h.PointMass())
+        m = b.marker()
+
+        def law(x):
+            raise LookupError("no such table")
+        scene.add("pull", h.UserForce(m, force=[h.callback(law, h.displacement(m, 0)), 0, 0]))
+        with self.assertRaisesRegex(h.Error, "pull.*LookupError: no such table") as caught:
+            scene.solve(1.)
+        self.assertIsInstance(caught.exception.__cause__, LookupError)
+
+    def test_exceptions_of_monitors_and_interrupts(self):
+        scene, rod, pin = pendulum()
+        run = scene.run()
+        run.on_step(lambda r: 1 / 0)
+        with self.assertRaises(ZeroDivisionError):
+            run.solve(1.)
+        import signal
+        import threading
+
+        run = scene.run(options={"ts_adapt_type": "none", "ts_dt": 1e-6})
+        threading.Timer(0.2, lambda: signal.raise_signal(signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            run.solve(1e3)
+
+
+if __name__ == "__main__":
+    unittest.main()
