@@ -1,0 +1,144 @@
+"""Flexible bodies: mesh and matrices, reduction against beam theory, files, stress, bodies in scenes, whole models."""
+
+import os
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+import hhtdae as h
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "examples", "python"))
+from beam_mesh import beam_mesh, clamped_free
+
+try:
+    from hhtdae import flexible
+except ImportError as error:
+    print("skipped: the package was built without SLEPc:", error)
+    raise SystemExit(0)
+
+L, D, E, NU, RHO = 1., 0.05, 2e11, 0., 8000.
+STEEL = flexible.Material(E, NU, RHO)
+MASS = RHO * L * D * D
+
+
+class Beam(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.model = flexible.FeModel.from_mesh(beam_mesh(os.path.join(cls.folder.name, "beam.msh"), L, D, D), STEEL)
+        cls.body = flexible.reduce(cls.model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6, stress=True)
+
+    def test_model(self):
+        m = self.model
+        self.assertEqual((m.nodes, m.own, m.first), (128, 128, 0))
+        self.assertEqual(m.coordinates.shape, (128, 3))
+        self.assertLessEqual({"root", "tip"}, set(m.sets))
+        np.testing.assert_array_equal(m.select(lambda x, y, z: x < 1e-9), m.sets["root"])
+        self.assertEqual(m.K.getSize(), (384, 384))
+        x = m.M.createVecRight()
+        x.array = np.tile([1., 0, 0], m.nodes)
+        self.assertAlmostEqual(x.dot(m.M * x), MASS, delta=1e-9 * MASS)
+        cells = m.elements.cells()
+        self.assertEqual({k: v.shape for k, v in cells.items()}, {"hexahedron20": (10, 20)})
+
+    def test_reduction(self):
+        """Mass, centre, inertia of a bar; the first mode of the body clamped in a scene against beam theory"""
+        modal = self.body.modal()
+        self.assertAlmostEqual(modal.mass, MASS, delta=1e-9 * MASS)
+        np.testing.assert_allclose(modal.center, [0.5, 0, 0], atol=1e-9)
+        self.assertAlmostEqual(modal.inertia[2, 2], MASS * (L**2 + D**2) / 12, delta=1e-6)
+        np.testing.assert_allclose(modal.omega, 2 * np.pi * self.body.frequencies, rtol=1e-12)
+        self.assertEqual(self.body.shape.shape, (128, 3, len(modal.omega)))
+        np.testing.assert_allclose(modal.attachments["tip"], [1, 0, 0], atol=1e-9)
+        self.assertLess(self.body.residuals[0], 0.1)  # that of a free beam, among modes fixed at its ends
+        scene = h.Scene()
+        b = scene.add("beam", h.FlexibleBody(modal))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        small = scene.run().linearize()
+        first = small.modes()[0]
+        self.assertAlmostEqual(first.frequency, clamped_free(L, D, D, E, RHO), delta=0.01 * first.frequency)
+        slow = small.modes(2, shift=500.)
+        self.assertAlmostEqual(slow[0].frequency, first.frequency, delta=1e-6 * first.frequency)
+        with self.assertRaisesRegex(h.Error, "attachment"):
+            scene = h.Scene()
+            b = scene.add("beam", h.FlexibleBody(modal))
+            scene.connect("pin", h.Fixed, b, scene.ground, (0, 0, 0))
+            scene.run()
+
+    def test_deflection_and_stress(self):
+        """A force at the tip: F L^3 / (3 E I) and, half way, the stress of the outer fibre; fields and files"""
+        scene = h.Scene()
+        b = scene.add("beam", h.FlexibleBody(self.body.modal(), damping=0.02))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        tip = b.attachment("tip").marker()
+        scene.add("load", h.UserForce(tip, force=[0, 0, -1000.]))
+        now = scene.run().equilibrium().snapshot()
+        I = D**4 / 12
+        self.assertAlmostEqual(now.motion(tip).position[2], -1000 * L**3 / (3 * E * I), delta=0.01 * 1000 * L**3 / (3 * E * I))
+        eta = now.modes(b)
+        stress = self.body.von_mises(eta)
+        x = self.body.coordinates[self.body.stress_nodes]
+        middle = np.flatnonzero((abs(x[:, 0] - 0.5) < 1e-9) & (abs(abs(x[:, 2]) - D / 2) < 1e-9))
+        np.testing.assert_allclose(stress[middle], 1000 * 0.5 * (D / 2) / I, rtol=0.02)
+        self.assertEqual(self.body.stress.shape[1:], (6, len(eta)))
+        xx = self.body.stress[middle] @ eta
+        np.testing.assert_allclose(abs(xx[:, 0]), stress[middle], rtol=0.02)
+        spots = flexible.HotSpots(self.body)
+        spots.add(0., 0 * eta)
+        spots.add(1., eta)
+        highest = spots.highest(2, 0.1)
+        self.assertEqual(highest[0].time, 1.)
+        self.assertAlmostEqual(highest[0].stress, stress.max(), delta=1e-6 * stress.max())
+        self.assertGreater(np.linalg.norm(highest[0].position - highest[1].position), 0.1 * (1 - 1e-9))
+        file = os.path.join(self.folder.name, "field.vtu")
+        self.body.write_field(eta, file, origin=(1, 0, 0))
+        self.assertGreater(os.path.getsize(file), 1000)
+
+    def test_files(self):
+        file = os.path.join(self.folder.name, "beam.h5")
+        try:
+            self.body.save(file)
+        except h.Error as error:
+            self.skipTest(str(error))
+        again = flexible.ReducedBody.load(file)
+        np.testing.assert_array_equal(again.frequencies, self.body.frequencies)
+        np.testing.assert_array_equal(again.shape, self.body.shape)
+        np.testing.assert_array_equal(flexible.load_modal_body(file).omega, self.body.modal().omega)
+        with self.assertRaises(h.Error):
+            flexible.ReducedBody.load(file + " that is not there")
+
+    def test_matrices_in_memory(self):
+        """K and M as scipy has them: the same body"""
+        try:
+            import scipy.sparse
+        except ImportError:
+            self.skipTest("no scipy")
+        K, M = (scipy.sparse.csr_matrix(A.getValuesCSR()[::-1], shape=A.getSize()) for A in (self.model.K, self.model.M))
+        model = flexible.FeModel.from_matrices(K, M, self.model.coordinates)
+        model.add_set("root", self.model.sets["root"]).add_set("tip", self.model.sets["tip"])
+        body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6)
+        np.testing.assert_allclose(body.frequencies, self.body.frequencies, rtol=1e-7)
+
+    def test_whole_model(self):
+        """A free beam that falls: each node by g t^2 / 2"""
+        scene = h.Scene(gravity=(0, 0, -9.81))
+        whole = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law="small", attachments=[flexible.Attachment("tip")]))
+        scene.channel("z", h.displacement(whole.attachment("tip").marker(), 2))
+        run = scene.solve(0.01, tolerance=1e-6)
+        np.testing.assert_allclose(whole.positions(run)[:, 2] - self.model.coordinates[:, 2], -0.5 * 9.81 * 0.01**2, atol=1e-8)
+        self.assertAlmostEqual(run["z"][-1], -0.5 * 9.81 * 0.01**2, delta=1e-8)
+
+    def test_mistakes(self):
+        for call, kind, text in ((lambda: flexible.reduce(self.model, [], method="guess"), ValueError, "craig_bampton"),
+                                 (lambda: flexible.reduce(self.model, [flexible.Attachment("hub")]), h.Error, "hub"),
+                                 (lambda: flexible.Attachment("tip", tie="glue")._fields(), ValueError, "rigid"),
+                                 (lambda: flexible.FeModel.from_mesh("no such.msh", STEEL), h.Error, "no such.msh")):
+            with self.assertRaisesRegex(kind, text):
+                call()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,75 @@
+"""mpiexec -n 1, 2, 3 python3: the example of a chain and a script with channels, snapshots and modes tell the same as on one rank."""
+
+import os
+import re
+import subprocess
+import sys
+import unittest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+MPIEXEC = os.environ.get("HHTDAE_MPIEXEC", "mpiexec -n").split()
+
+SCRIPT = """
+import numpy as np
+import hhtdae as h
+from mpi4py import MPI
+
+scene = h.Scene(gravity=(0, -9.81, 0), comm=MPI.COMM_WORLD)
+before, k = scene.ground, scene.parameter("k", 3.)
+for n in range(6):
+    link = scene.rigid_body("link %d" % n, inertia=h.inertia.box(1, (1, .1, .1)), position=(n + 0.5, 0, 0))
+    pin = scene.connect("pin %d" % n, h.Revolute, link, before, (n, 0, 0))
+    i, j = link.marker((-0.5, 0, 0)), before.marker((n, 0, 0) if n == 0 else (0.5, 0, 0))
+    scene.add("spring %d" % n, h.TorsionalSpringDamper(i, j, stiffness=20 * k))
+    before = link
+tip = link.marker((0.5, 0, 0))
+scene.channel("x", h.displacement(tip, 0) * k)
+scene.channel("y", h.displacement(tip, 1))
+run = scene.solve(0.3, tolerance=1e-6, sample=0.1)
+now = run.snapshot()
+small = scene.run().equilibrium().linearize()
+frequency = small.modes()[0].frequency
+rank_values = MPI.COMM_WORLD.allgather((run.values.tolist(), now.motion(tip).position.tolist(), frequency))
+assert all(v == rank_values[0] for v in rank_values), rank_values
+try:
+    h.Scene().set(nothing=1)
+    raise SystemExit(3)
+except h.Error:
+    pass
+run.close()
+if MPI.COMM_WORLD.rank == 0:
+    print("result", MPI.COMM_WORLD.size, run["x"][-1], run["y"][-1], frequency)
+"""
+
+
+def ranks(count, *arguments):
+    done = subprocess.run(MPIEXEC + [str(count), sys.executable, "-B", *arguments], capture_output=True, text=True, timeout=120)
+    if done.returncode:
+        raise AssertionError("exit status %d\n%s\n%s" % (done.returncode, done.stdout, done.stderr))
+    return done.stdout
+
+
+class Ranks(unittest.TestCase):
+    def test_script(self):
+        results = []
+        for count in (1, 2, 3):
+            words = re.search("result (.*)", ranks(count, "-c", SCRIPT)).group(1).split()
+            self.assertEqual(int(words[0]), count)
+            results.append([float(w) for w in words[1:]])
+        for other in results[1:]:
+            for a, b in zip(results[0], other):
+                self.assertAlmostEqual(a, b, delta=1e-7 * (1 + abs(a)))
+
+    def test_chain(self):
+        text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "24")
+        found, exact = re.search(r"2 ranks: the end hangs (\S+) m .* exact (\S+) m", text).groups()
+        self.assertAlmostEqual(float(found), float(exact), delta=1e-8)
+
+
+if __name__ == "__main__":
+    try:
+        import mpi4py
+    except ImportError:
+        print("skipped: no mpi4py")
+        raise SystemExit(0)
+    unittest.main()
