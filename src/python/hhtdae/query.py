@@ -64,6 +64,7 @@ class Snapshot:
 
     @property
     def time(self):
+        """Its time."""
         return self._core.time()
 
     def motion(self, of, axes=None):

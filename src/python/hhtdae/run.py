@@ -1,6 +1,7 @@
 """Runs of a scene: everything that changes."""
 
 from contextlib import contextmanager
+from typing import Any, Callable, Dict, Iterator
 
 import numpy as np
 from petsc4py import PETSc
@@ -71,7 +72,7 @@ class Run:
             raise ValueError("the run has been closed")
         return self.ts
 
-    def solve(self, until):
+    def solve(self, until: float) -> "Run":
         """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
         ts = self._open()
         if not until >= ts.getTime():
@@ -81,7 +82,7 @@ class Run:
             self.scene._core.solve(ts)
         return self
 
-    def step_by(self, dt, until):
+    def step_by(self, dt: float, until: float) -> Iterator[float]:
         """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them.
 
         >>> for t in run.step_by(0.01, until=5):
@@ -93,11 +94,11 @@ class Run:
             self.solve(until if k == count else begin + k * dt)
             yield self.time
 
-    def restart(self):
+    def restart(self) -> None:
         """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
         self._open().restartStep()
 
-    def on_step(self, function):
+    def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step."""
         def monitor(ts, step, t, u):
             if step > 0:
@@ -106,17 +107,17 @@ class Run:
 
     # ---- analyses of a run that has not begun ----
 
-    def equilibrium(self, time=None):
+    def equilibrium(self, time: Any = None) -> "Run":
         """Moves the run to static equilibrium at a time, at rest; returns the run. Collective."""
         _core.static_equilibrium(self._open(), self.time if time is None else time)
         return self
 
-    def assemble(self, time=None):
+    def assemble(self, time: Any = None) -> "Run":
         """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run."""
         _core.assemble_at(self._open(), self.time if time is None else time)
         return self
 
-    def kinematics(self, time=None):
+    def kinematics(self, time: Any = None) -> "Run":
         """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run."""
         _core.kinematics(self._open(), self.time if time is None else time)
         return self
@@ -124,42 +125,42 @@ class Run:
     # ---- results ----
 
     @property
-    def time(self):
+    def time(self) -> float:
         """Where the run is."""
         return self._open().getTime()
 
     @property
-    def steps(self):
+    def steps(self) -> int:
         """Accepted steps."""
         return self._open().getStepNumber()
 
     @property
-    def statistics(self):
+    def statistics(self) -> integrator.Statistics:
         """Counts of the run, see `hhtdae.Statistics`."""
         return integrator.statistics(self._open())
 
     @property
-    def times(self):
+    def times(self) -> np.ndarray:
         """Times of the samples, (n,)."""
         return self._recorder.times if self._recorder else np.empty(0)
 
     @property
-    def values(self):
+    def values(self) -> np.ndarray:
         """All samples, (n, channels)."""
         return self._recorder.values if self._recorder else np.empty((0, len(self._names)))
 
     @property
-    def channels(self):
+    def channels(self) -> Dict[str, np.ndarray]:
         """All channels by name, with "time"."""
         values = self.values
         return {"time": self.times, **{name: values[:, k].copy() for k, name in enumerate(self._names)}}
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._names:
             raise KeyError("no channel is called %r; there are %s" % (name, ", ".join(self._names) or "none"))
         return self.values[:, self._names.index(name)].copy()
 
-    def sample(self, time=None):
+    def sample(self, time: Any = None) -> Dict[str, float]:
         """Values of all channels at a time of the last step (default: its end), by name."""
         x = self.scene._core.sample(self._open(), self.time if time is None else time)
         return dict(zip(self._names, x))
@@ -170,7 +171,7 @@ class Run:
 
         return pandas.DataFrame(self.values, columns=self._names, index=pandas.Index(self.times, name="time"))
 
-    def plot(self, *names, axes=None):
+    def plot(self, *names: str, axes: Any = None) -> np.ndarray:
         """Channels over time by matplotlib, all if none are named; returns the axes, one for each unit."""
         import matplotlib.pyplot as plt
 
@@ -190,28 +191,28 @@ class Run:
         axes[-1].set_xlabel("time")
         return axes
 
-    def snapshot(self, time=None):
+    def snapshot(self, time: Any = None) -> Snapshot:
         """What the run is doing at a time of its last step, see `Snapshot`. Collective."""
         return Snapshot(self, time)
 
-    def linearize(self, time=None):
+    def linearize(self, time: Any = None) -> Linearization:
         """Small motions about the state at a time of the last step, see `Linearization`. Collective."""
         return Linearization(self, time)
 
     # ---- the rest ----
 
-    def save(self, file):
+    def save(self, file: str) -> None:
         """Writes a checkpoint, with which the run can be resumed bit for bit. Collective."""
         integrator.checkpoint_save(self._open(), file)
 
-    def load(self, file):
+    def load(self, file: str) -> "Run":
         """The next `solve` goes on from a checkpoint of a run of the same scene; returns the run. Collective."""
         integrator.checkpoint_load(self._open(), file)
         if self._recorder:
             self._recorder.resume()
         return self
 
-    def close(self):
+    def close(self) -> None:
         """Frees what PETSc has for the run; its samples stay."""
         if self.ts is not None:
             self.ts.destroy()

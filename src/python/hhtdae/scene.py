@@ -1,11 +1,13 @@
 """Multibody scenes: the description, of which runs are made."""
 
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type, Union
+
 import numpy as np
 from petsc4py import PETSc
 
 from . import _core
-from .bodies import FlexibleBody, PointMass, RigidBody, axes_along
-from .elements import Spec, has_formula, plain
+from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
+from .elements import Formula, Spec, has_formula, plain
 from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
@@ -31,19 +33,19 @@ class Body(_Handle):
 
     __slots__ = ()
 
-    def marker(self, position=(0., 0., 0.), axes=None, name=""):
+    def marker(self, position: Sequence[float] = (0., 0., 0.), axes: Any = None, name: str = "") -> "Marker":
         """A marker on the body; position and axes (columns) in body axes from the body's origin; of the ground in space axes."""
         return self._scene._marker(self, position, axes, name, False)
 
-    def marker_at(self, position, axes=None, name=""):
+    def marker_at(self, position: Sequence[float], axes: Any = None, name: str = "") -> "Marker":
         """The same, given where it is at the start, in space axes."""
         return self._scene._marker(self, position, axes, name, True)
 
-    def attachment(self, name):
+    def attachment(self, name: str) -> "Body":
         """The frame of an attachment of a flexible body: a body for markers and shapes. It costs 12 unknowns where it is asked for."""
         return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
 
-    def shape(self, shape):
+    def shape(self, shape: Shape) -> "Body":
         """Draws the body in animations."""
         self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes)
         return self
@@ -96,7 +98,7 @@ class Scene:
     >>> run["tip"]
     """
 
-    def __init__(self, gravity=None, planar=False, comm=None):
+    def __init__(self, gravity: Optional[Sequence[float]] = None, planar: bool = False, comm: Any = None) -> None:
         self.comm = PETSc.COMM_WORLD if comm is None else PETSc.Comm(comm)
         self._core = _core.Scene(self.comm, bool(planar))
         self._keep = [self.comm]  # what the C++ part refers to and does not own: callbacks and functions that describe
@@ -111,22 +113,22 @@ class Scene:
 
     # ---- description ----
 
-    def parameter(self, name, value):
+    def parameter(self, name: str, value: float) -> Parameter:
         """A number that may be another one in the next run. Parameters come before everything else. Returns a `Parameter`, which stands for a
         number anywhere in the description."""
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
         return p
 
-    def set(self, **values):
+    def set(self, **values: float) -> None:
         """Gives parameters other values, for runs made from now on; runs that were made before keep what they had. Collective."""
         for name, value in values.items():
             self._core.set(name, float(value))
 
-    def set_gravity(self, acceleration):
+    def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
         self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
 
-    def add(self, name, what):
+    def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
         """Adds a body, joint, motion or force.
 
         Parameters
@@ -178,15 +180,15 @@ class Scene:
         given = self._later(place) if has_formula(position) or has_formula(axes) else place()
         return Marker(self, self._core.marker(body, given, name, at), name or "on " + body.name)
 
-    def rigid_body(self, name, **fields):
+    def rigid_body(self, name: str, **fields: Any) -> Body:
         """The same as ``add(name, RigidBody(**fields))``."""
         return self.add(name, RigidBody(**fields))
 
-    def point_mass(self, name, **fields):
+    def point_mass(self, name: str, **fields: Any) -> Body:
         """The same as ``add(name, PointMass(**fields))``."""
         return self.add(name, PointMass(**fields))
 
-    def connect(self, name, joint, i, j, point, axis=(0., 0., 1.), **fields):
+    def connect(self, name: str, joint: Type[Spec], i: Body, j: Body, point: Sequence[float], axis: Sequence[float] = (0., 0., 1.), **fields: Any) -> Element:
         """A joint of bodies i and j at a point of space, with markers on both, z along an axis of space: for all joints that two markers alike describe.
 
         >>> scene.connect("pin", hhtdae.Revolute, arm, scene.ground, (0, 0, 0), axis=(0, 0, 1))
@@ -194,11 +196,11 @@ class Scene:
         axes = axes_along(axis)
         return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
 
-    def variable(self, name, definition, initial=0.):
+    def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula."""
         return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
 
-    def state(self, name, rate, initial):
+    def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
@@ -206,12 +208,12 @@ class Scene:
         self._states += 1
         return State(self, self._core.state(name, description(rate, self._keep), initial), name)
 
-    def channel(self, name, value, unit=""):
+    def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
         self._core.channel(name, description(value, self._keep), unit)
         self._channels.append((name, unit))
 
-    def line(self, *markers):
+    def line(self, *markers: Marker) -> None:
         """A line through markers in animations, a spring for example."""
         self._core.line(list(markers))
 
@@ -269,17 +271,18 @@ class Scene:
             present[name] = value
 
     @property
-    def channels(self):
+    def channels(self) -> List[Tuple[str, str]]:
         """Names and units of the channels, in their order."""
         return list(self._channels)
 
     # ---- runs ----
 
-    def set_up(self):
+    def set_up(self) -> None:
         """Checks and assembles the scene; the first run does it otherwise. Collective."""
         self._core.set_up()
 
-    def run(self, tolerance=None, sample=0., after=None, options=None):
+    def run(self, tolerance: Optional[float] = None, sample: Optional[float] = 0., after: Optional[Run] = None,
+            options: Optional[Dict[str, Any]] = None) -> Run:
         """A run that has not begun: see `Run`. Collective.
 
         Parameters
@@ -295,11 +298,11 @@ class Scene:
         """
         return Run(self, tolerance, sample, after, options)
 
-    def solve(self, until, tolerance=None, sample=0., options=None):
+    def solve(self, until: float, tolerance: Optional[float] = None, sample: Optional[float] = 0., options: Optional[Dict[str, Any]] = None) -> Run:
         """A run from the start to the time `until`: ``scene.run(...).solve(until)``."""
         return self.run(tolerance, sample, None, options).solve(until)
 
-    def view(self, file=""):
+    def view(self, file: str = "") -> None:
         """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""
         self._core.set_up()
         self._core.view(file)
