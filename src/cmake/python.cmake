@@ -64,6 +64,9 @@ function(hhtdae_python_module name library)
   target_include_directories(python_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src/python)
   target_compile_options(python_${name} PRIVATE -O1 -g1 -fno-math-errno)
   target_link_libraries(python_${name} PRIVATE ${library})
+  if(HHTDAE_PRECOMPILE)
+    target_precompile_headers(python_${name} PRIVATE ${HHTDAE_PRECOMPILED} <pybind11/pybind11.h> <pybind11/numpy.h>)
+  endif()
   set_target_properties(python_${name} PROPERTIES OUTPUT_NAME ${name} PREFIX "" SUFFIX "${python_suffix}" CXX_VISIBILITY_PRESET hidden
                         LIBRARY_OUTPUT_DIRECTORY ${package_build} INSTALL_RPATH "$ORIGIN/${from_package}")
   install(TARGETS python_${name} LIBRARY DESTINATION ${HHTDAE_PYTHON_DIR}/hhtdae)
@@ -75,9 +78,10 @@ file(GLOB python_sources CONFIGURE_DEPENDS src/python/*.cpp)
 list(FILTER python_sources EXCLUDE REGEX "flexible\\.cpp$")
 hhtdae_python_module(_core hhtscene ${python_sources})
 # Loops over numbers take the time that functions traced from Python take in a run.
-set_source_files_properties(src/python/tape.cpp PROPERTIES COMPILE_OPTIONS -O2)
+set_source_files_properties(src/python/tape.cpp PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 if(TARGET hhtflexible)
   hhtdae_python_module(_flexible hhtflexible src/python/flexible.cpp src/python/bind.cpp)
+  set_target_properties(python__flexible PROPERTIES DISABLE_PRECOMPILE_HEADERS ON) # more than two sources would gain
 endif()
 
 file(GLOB python_files CONFIGURE_DEPENDS src/python/hhtdae/*.py src/python/hhtdae/*.pyi src/python/hhtdae/py.typed)
