@@ -43,6 +43,10 @@ class Beam(unittest.TestCase):
         self.assertAlmostEqual(x.dot(m.M * x), MASS, delta=1e-9 * MASS)
         cells = m.elements.cells()
         self.assertEqual({k: v.shape for k, v in cells.items()}, {"hexahedron20": (10, 20)})
+        edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]  # VTK's order
+        for cell in cells["hexahedron20"]:
+            for k, (p, q) in enumerate(edges):
+                np.testing.assert_allclose(m.coordinates[cell[8 + k]], (m.coordinates[cell[p]] + m.coordinates[cell[q]]) / 2, atol=1e-12)
 
     def test_reduction(self):
         """Mass, centre, inertia of a bar; the first mode of the body clamped in a scene against beam theory"""

@@ -127,6 +127,75 @@ class Runs(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "cannot go back"):
             whole.solve(0.5)
 
+    def test_events(self):
+        """A stone that falls through 0.5 m, and one that a switch at 0.75 m makes weightless"""
+        def stone():
+            scene = h.Scene()
+            g = scene.parameter("g", 9.81)
+            b = scene.add("stone", h.PointMass(position=(0, 0, 1)))
+            m = b.marker()
+            scene.add("weight", h.UserForce(m, force=[0, 0, -g]))
+            z = h.displacement(m, 2)
+            scene.channel("z", z)
+            return scene, g, z
+        scene, g, z = stone()
+        run, seen = scene.run(tolerance=1e-7), []
+        run.event(z - 0.75, action=lambda r: seen.append(r.time), direction=-1)
+        run.event(z - 0.5, terminal=True)
+        run.event(z - 0.8, action=lambda r: seen.append(-1.), direction=1)
+        run.solve(1.)
+        self.assertEqual(len(seen), 1)
+        self.assertAlmostEqual(seen[0], np.sqrt(2 * 0.25 / 9.81), delta=1e-6)
+        self.assertAlmostEqual(run.time, np.sqrt(1 / 9.81), delta=1e-6)
+        scene, g, z = stone()
+        run = scene.run(tolerance=1e-7)
+
+        run.event(z - 0.75, action=lambda r: g.set(0))
+        run.solve(0.5)
+        fall = np.sqrt(2 * 0.25 / 9.81)
+        self.assertAlmostEqual(run["z"][-1], 0.75 - 9.81 * fall * (0.5 - fall), delta=1e-5)
+        self.assertTrue(np.all(np.diff(run.times) > 0))
+        self.assertTrue(np.any(abs(run.times - fall) < 1e-6))
+
+    def test_bounces(self):
+        """A ball that an action throws back with 0.8 of its velocity; samples at multiples of a time"""
+        scene = h.Scene(gravity=(0, 0, -10.))
+        b = scene.add("ball", h.PointMass(position=(0, 0, 1.25)))
+        z = h.displacement(b.marker(), 2)
+        scene.channel("z", z)
+        run, times = scene.run(tolerance=1e-8, sample=0.1), []
+
+        def bounce(r):
+            times.append(r.time)
+            _, v = r.ts.getSolution2()
+            v.scale(-0.8)
+        run.event(z, action=bounce, direction=-1)
+        run.solve(2.5)
+        np.testing.assert_allclose(times, [0.5, 1.3, 1.94, 2.452], atol=1e-5)  # 0.5 s up to the floor, then 2 v / g
+        np.testing.assert_allclose(run.times, np.arange(26) / 10, atol=1e-12)
+        self.assertAlmostEqual(run["z"][9], 4 * 0.4 - 5 * 0.4**2, delta=1e-5)
+        self.assertGreater(run["z"].min(), -1e-9)
+
+    def test_motions_with_parameters(self):
+        """What a function of time takes of parameters changes from run to run"""
+        scene = h.Scene()
+        a, w = scene.parameter("a", 1.), scene.parameter("w", 2.)
+        m = scene.add("b", h.RigidBody()).marker()
+        scene.add("guide", h.Translational(m, scene.ground.marker()))
+        scene.add("drive", h.TranslationalMotion(m, scene.ground.marker(), h.harmonic(2 * a, w, offset=0.5)))
+        scene.start(assembly="project")
+        for amplitude, omega in ((1., 2.), (0.3, 5.)):
+            scene.set(a=amplitude, w=omega)
+            now = scene.run().kinematics(0.4).snapshot()
+            self.assertAlmostEqual(now.motion(m).position[2], 0.5 + 2 * amplitude * np.sin(omega * 0.4), delta=1e-9)
+            self.assertAlmostEqual(now.motion(m).velocity[2], 2 * amplitude * omega * np.cos(omega * 0.4), delta=1e-7)
+        p = h.polynomial([a, 2 * a, 3.])
+        self.assertAlmostEqual(float(p(h.sqrt(a * a))), 0.3 + 0.6 * 0.3 + 3 * 0.09)
+        with self.assertRaisesRegex(TypeError, "points of a spline are numbers"):
+            h.spline([0, 1], [a, 2])
+        with self.assertRaisesRegex(TypeError, "initial value must be a number"):
+            scene.state("x", 1., a)
+
     def test_parameters(self):
         """Formulas of parameters in bodies, markers, elements and gravity; functions that describe; elements that may be missing"""
         scene = h.Scene()

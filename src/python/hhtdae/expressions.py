@@ -331,18 +331,32 @@ def callback(function, *arguments, gradient=None):
 # ---- functions of one number ----
 
 def polynomial(coefficients):
-    """c0 + c1 t + c2 t^2 + ... as a `TimeFunction`."""
+    """c0 + c1 t + c2 t^2 + ... as a `TimeFunction`; with formulas of parameters among the coefficients as a function that is traced."""
+    if any(isinstance(c, Expression) for c in coefficients):
+        terms = list(coefficients)
+
+        def horner(t):
+            y = terms[-1]
+            for c in reversed(terms[:-1]):
+                y = y * t + c
+            return y
+        return horner
     return TimeFunction(_core.TimeFunction.polynomial(np.asarray(coefficients, dtype=float)))
 
 
 def harmonic(amplitude, omega, phase=0., offset=0.):
-    """offset + amplitude sin(omega t + phase) as a `TimeFunction`; omega in radians per unit of time."""
+    """offset + amplitude sin(omega t + phase) as a `TimeFunction`; omega in radians per unit of time. With formulas of parameters as a function that is
+    traced."""
+    if any(isinstance(x, Expression) for x in (amplitude, omega, phase, offset)):
+        return lambda t: offset + amplitude * sin(omega * t + phase)
     return TimeFunction(_core.TimeFunction.harmonic(amplitude, omega, phase, offset))
 
 
 def spline(x, y):
     """Natural cubic spline through the points (x, y), x increasing, continued linearly, as a `TimeFunction`: a motion that was measured, or the
     characteristic of a damper, ``spline(v, F)(hhtdae.rate(i, j))``."""
+    if any(isinstance(z, Expression) for z in (*np.ravel(np.asarray(x, dtype=object)), *np.ravel(np.asarray(y, dtype=object)))):
+        raise TypeError("the points of a spline are numbers; multiply its value by a formula, or describe the element by a function, see Scene.add()")
     return TimeFunction(_core.TimeFunction.spline(np.asarray(x, dtype=float), np.asarray(y, dtype=float)))
 
 

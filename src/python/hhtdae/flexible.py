@@ -65,10 +65,12 @@ class Elements(NamedTuple):
     nodes: np.ndarray
 
     def cells(self):
-        """{type: (count, nodes of a cell)}: what meshio takes, whose names are tetra, tetra10, hexahedron, hexahedron20"""
-        count = {"tetrahedron4": ("tetra", 4), "tetrahedron10": ("tetra10", 10), "brick8": ("hexahedron", 8), "brick20": ("hexahedron20", 20)}
+        """{name: nodes of cells, (n, nodes of a cell)} with the names and the order of nodes of meshio and VTK: tetra, tetra10, hexahedron,
+        hexahedron20"""
+        order = {"tetrahedron4": ("tetra", range(4)), "tetrahedron10": ("tetra10", [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]), "brick8": ("hexahedron", range(8)),
+                 "brick20": ("hexahedron20", [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15])}
         types = np.array(self.types)
-        return {count[t][0]: self.nodes[types == t][:, :count[t][1]] for t in dict.fromkeys(self.types)}
+        return {order[t][0]: self.nodes[types == t][:, list(order[t][1])] for t in dict.fromkeys(self.types)}
 
 
 def _comm(comm):

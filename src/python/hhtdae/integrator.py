@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from . import _core
 
-__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "interpolate",
+__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "interpolate", "move_back",
            "set_alpha", "set_checkpoint_vec", "set_coordinate_change", "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse",
            "set_role", "set_start", "set_step_limit", "statistics"]
 
@@ -119,6 +119,18 @@ def get_acceleration(ts):
 def interpolate(ts, t):
     """(u, v, a) at a time of the last step, by the method's own polynomial: new vectors."""
     return _core.interpolate(ts, t)
+
+
+def move_back(ts, t):
+    """Sets the state of the TS back to a time of its last step; the next step begins anew from there."""
+    u, v, a = interpolate(ts, t)
+    U, V = ts.getSolution2()
+    u.copy(U)
+    v.copy(V)
+    ts.setTime(t)
+    ts.restartStep()
+    for x in (u, v, a):
+        x.destroy()
 
 
 def evaluate_at(ts, t):

@@ -4,6 +4,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from .events import Signs
 from .expressions import Expression, _expression, compile_tape, differentiate
 from .run import collect_garbage, temporary_options
 
@@ -308,18 +309,44 @@ class _Output:
     def attach(self, ts):
         ts.setMonitor(self.monitor)
         if self.events:
-            ts.setEventHandler([int(getattr(e, "direction", 0)) for e in self.events], [bool(getattr(e, "terminal", False)) for e in self.events],
-                               self.indicators, self.post)
+            self.signs = Signs([getattr(e, "direction", 0) for e in self.events])
+            self.signs.begin(self.p.t0, [e(self.p.t0, self.p.q0, self.p.v0, *self.p.args) for e in self.events])
+            ts.setPostStep(self.look)
+
+    def look(self, ts):
+        """After a step: passages are found on the method's own polynomials; the first terminal one ends the run"""
+        for t, k in self.signs.passed(ts.getTime(), self.event_values(ts, ts.getTime()), lambda k, t: self.event_values(ts, t, k)):
+            self.found[k][0].append(t)
+            self.found[k][1].append(self.positions(ts, t)[0])
+            if getattr(self.events[k], "terminal", False):
+                self.stopped = t
+                ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+                return
+
+    def event_values(self, ts, t, only=None):
+        q, v = self.positions(ts, t)
+        chosen = self.events if only is None else [self.events[only]]
+        values = [float(e(t, q, v, *self.p.args)) for e in chosen]
+        return values if only is None else values[0]
+
+    def positions(self, ts, t):
+        u, v, a = integrator.interpolate(ts, t)
+        x = u.array[:self.p.n].copy(), v.array[:self.p.n].copy()
+        for y in (u, v, a):
+            y.destroy()
+        return x
 
     def monitor(self, ts, step, t, u):
         if step <= 0:
             return
         if not self.ends:
-            self.add(ts, ts.getPrevTime(), True)
+            self.add(ts, ts.getPrevTime())
+        if self.stopped is not None:
+            t = self.stopped
         if t > self.ends[-1][0]:
-            self.add(ts, t, True)
+            self.add(ts, t)
 
-    def add(self, ts, t, end):
+    def add(self, ts, t):
         if self.wanted is None or self.dense:
             self.ends.append((t,) + self.state(ts, t))
         else:
@@ -337,21 +364,6 @@ class _Output:
         for y in (u, v, a):
             y.destroy()
         return x
-
-    def indicators(self, ts, t, u, values):
-        n = self.p.n
-        _, v = ts.getSolution2()
-        q = u.array_r[:n].copy()
-        for k, e in enumerate(self.events):
-            values[k] = e(t, q, v.array_r[:n].copy(), *self.p.args)
-
-    def post(self, ts, which, t, u, forward):
-        n = self.p.n
-        for k in which:
-            self.found[k][0].append(t)
-            self.found[k][1].append(u.array_r[:n].copy())
-            if getattr(self.events[k], "terminal", False):
-                self.stopped = t
 
     def result(self, ts, status, message):
         rows = self.rows if self.wanted is not None else self.ends

@@ -52,10 +52,11 @@ class Snapshot:
     factorization in between. All calls are collective.
     """
 
-    def __init__(self, run, time=None):
+    def __init__(self, run, time=None, later=False):
         self._core = _core.Snapshot()
         self._run = run
-        self.take(time)
+        if not later:
+            self.take(time)
 
     def take(self, time=None):
         """Takes another time (default: the end of the last step)."""

@@ -7,6 +7,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from .events import Signs
 from .expressions import Expression
 from .query import Linearization, Snapshot
 
@@ -51,7 +52,7 @@ class Run:
 
     def __init__(self, scene, tolerance=None, sample=0., after=None, options=None):
         self.scene, self.ts, self._recorder = scene, None, None
-        self._options = dict(options or {})
+        self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
         collect_garbage(scene.comm)
         with temporary_options(self._options):
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
@@ -79,7 +80,10 @@ class Run:
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
         ts.setMaxTime(until)
         with temporary_options(self._options):
-            self.scene._core.solve(ts)
+            if self._events:
+                self._solve_with_events(ts)
+            else:
+                self.scene._core.solve(ts)
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
@@ -93,6 +97,58 @@ class Run:
         for k in range(1, count + 1):
             self.solve(until if k == count else begin + k * dt)
             yield self.time
+
+    def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
+        """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew.
+
+        Parameters
+        ----------
+        formula : Expression
+            A measure, or a formula of measures.
+        action : callable, optional
+            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``.
+        terminal : bool
+            The run ends there.
+        direction : {0, 1, -1}
+            Passages of both kinds, upwards, or downwards alone.
+        """
+        self._events.append((formula, action, terminal))
+        self._signs = Signs((self._signs.directions if self._signs else []) + [direction])
+        if len(self._events) == 1:
+            self._now = Snapshot(self, later=True)
+            self._open().setPostStep(self._look)
+
+    def _event_values(self, time=None):
+        self._now.take(time)
+        return [self._now.value(formula) for formula, _, _ in self._events]
+
+    def _look(self, ts):
+        """After a step: a passage ends TSSolve()"""
+        values = self._event_values()
+        self._passed = self._signs.passed(ts.getTime(), values, lambda k, t: self._event_values(t)[k])
+        if self._passed:
+            ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
+
+    def _solve_with_events(self, ts):
+        """A step in which something passes zero is taken back to the first passage, as the final time of a run by interpolation would be"""
+        if self._signs.time is None:
+            self._signs.begin(ts.getTime(), self._event_values())
+        while True:
+            self._passed = []
+            self.scene._core.solve(ts)
+            if not self._passed:
+                return
+            time = self._passed[0][0]
+            here = [k for t, k in self._passed if t == time]
+            if self._recorder:
+                self._recorder.cut(ts, time)
+            integrator.move_back(ts, time)
+            self._signs.begin(time, self._event_values(), here)
+            for k in here:
+                if self._events[k][1] is not None:
+                    self._events[k][1](self)
+            if any(self._events[k][2] for k in here):
+                return
 
     def restart(self) -> None:
         """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""

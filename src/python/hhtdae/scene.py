@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from . import _core
 from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
-from .elements import Formula, Spec, has_formula, plain
+from .elements import ELEMENTS, Formula, Spec, has_formula, plain
 from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
@@ -71,6 +71,11 @@ class State(_Handle):
     """A first-order state."""
     __slots__ = ()
     _measure = "state"
+
+
+def _number(initial, who):
+    if isinstance(initial, Expression):
+        raise TypeError("%s: its initial value must be a number, not a formula" % who)
 
 
 class Scene:
@@ -169,7 +174,10 @@ class Scene:
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
                 return Body(self, enter(name, given), name)
-        return Element(self, self._core.element(kind.__name__, name, given), name)
+        known = next((c.__name__ for c in kind.__mro__ if c.__name__ in ELEMENTS), None)
+        if known is None:
+            raise TypeError("Scene.add(%r): a %s is no body, joint, motion or force" % (name, kind.__name__))
+        return Element(self, self._core.element(known, name, given), name)
 
     def _later(self, function):
         self._keep.append(function)
@@ -198,10 +206,12 @@ class Scene:
 
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula."""
+        _number(initial, "variable " + name)
         return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
+        _number(initial, "state " + name)
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
