@@ -4,8 +4,6 @@ The contact law k d^(3/2) has no losses here: the deepest penetration is that wh
 weight, and every rebound reaches the height of the start.
 """
 
-import numpy as np
-
 import hhtdae
 
 

@@ -10,7 +10,6 @@ import tempfile
 import numpy as np
 from beam_mesh import beam_mesh
 
-import hhtdae
 
 
 def main():

@@ -5,6 +5,9 @@ option(HHTDAE_WITH_PYTHON "Build the Python package where Python, pybind11 and p
 if(NOT HHTDAE_WITH_PYTHON)
   return()
 endif()
+if(HHTDAE_SANITIZE) # an interpreter without the sanitizer inside cannot load it
+  return()
+endif()
 
 # What the build needs to know of an interpreter, a line for each; nothing if it has no petsc4py for this PETSc
 pkg_get_variable(petsc_prefix PETSc prefix)

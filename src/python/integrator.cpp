@@ -30,7 +30,8 @@ py::dict Statistics(py::object ts)
   using py::literals::operator""_a;
   return py::dict("steps"_a = s.steps, "rejected"_a = s.rejected, "newton"_a = s.newton, "residuals"_a = s.residuals, "jacobians"_a = s.jacobians,
                   "factorizations"_a = s.factorizations, "solves"_a = s.solves, "time"_a = s.time, "cpu"_a = s.cpu, "corrector_fails"_a = s.corrector_fails,
-                  "retries"_a = s.retries, "restarts"_a = s.restarts, "changes"_a = s.changes, "tiny_steps"_a = s.tiny_steps, "h_min"_a = s.h_min, "h_max"_a = s.h_max);
+                  "retries"_a = s.retries, "restarts"_a = s.restarts, "changes"_a = s.changes, "tiny_steps"_a = s.tiny_steps,
+                  "h_min"_a = s.h_min, "h_max"_a = s.h_max);
 }
 
 /* (U, U', U'') at time t as new vectors, by one of two functions */

@@ -110,7 +110,9 @@ void BindLinearize(py::module_ &m)
     .def("response", Response)
     .def("state_space", States)
     .def("operators", Operators)
-    .def("animate", [](Linearized &l, const Mode &mode, const std::string &prefix, double amplitude, int frames) { Check(l.get().animate(mode, prefix, amplitude, frames)); });
+    .def("animate", [](Linearized &l, const Mode &mode, const std::string &prefix, double amplitude, int frames) {
+      Check(l.get().animate(mode, prefix, amplitude, frames));
+    });
 }
 
 } // namespace python

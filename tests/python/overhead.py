@@ -15,7 +15,6 @@ N, END = 10, 5
 def chain():
     import petsc4py
     petsc4py.init(["overhead"])
-    import numpy as np
     import hhtdae as h
 
     scene = h.Scene(gravity=(0, -9.81, 0))

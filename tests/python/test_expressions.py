@@ -8,7 +8,7 @@ import numpy as np
 
 import hhtdae as h
 from hhtdae import _core
-from hhtdae.expressions import compile_tape, differentiate, time_function, trace
+from hhtdae.tracing import compile_tape, differentiate, ordered, time_function, trace
 
 ONE = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "arcsin": np.arcsin, "arccos": np.arccos, "arctan": np.arctan, "sinh": np.sinh, "cosh": np.cosh,
        "tanh": np.tanh, "exp": np.exp, "log": np.log, "log10": np.log10, "sqrt": np.sqrt, "cbrt": np.cbrt, "abs_": np.abs}
@@ -92,8 +92,7 @@ class Operations(unittest.TestCase):
         """Each operation of the C++ part is one that some formula above uses"""
         used = set()
         for _, f, _ in cases():
-            from hhtdae.expressions import _ordered
-            used |= {n.op for n in _ordered([trace(f, 2, "f")])}
+            used |= {n.op for n in ordered([trace(f, 2, "f")])}
         beside = {"parameter", "table_rate"}
         self.assertEqual(set(_core.operations) - used - beside, set())
 

@@ -10,8 +10,9 @@ from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from .expressions import Expression, TimeFunction, compile_tape, time_function, trace
+from .expressions import Expression, TimeFunction
 from .measures import description
+from .tracing import compile_tape, time_function, trace
 
 Number = Union[float, Expression]
 Vector = Sequence[float]

@@ -9,7 +9,7 @@ Arrays are those of this rank where a model is distributed. All functions that r
 """
 
 from dataclasses import asdict, dataclass, field
-from typing import Any, List, NamedTuple, Optional, Sequence, Union
+from typing import Any, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 from petsc4py import PETSc

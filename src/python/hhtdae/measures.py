@@ -131,13 +131,14 @@ def potential_energy():
 
 def description(x, keep):
     """What the C++ part takes of a formula: its measures, and a tape of them; None instead of a tape for a measure alone"""
-    from .expressions import _expression, _ordered, compile_tape
+    from .expressions import _expression
+    from .tracing import compile_tape, ordered
 
     x = _expression(x)
     if isinstance(x, Measure):
         return [x.value], None
     leaves = {}
-    for n in _ordered([x]):
+    for n in ordered([x]):
         if n.op == "measure":
             leaves.setdefault(n.key(), n)
     numbers = {key: k for k, key in enumerate(leaves)}

@@ -5,8 +5,9 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .events import Signs
-from .expressions import Expression, _expression, compile_tape, differentiate
+from .expressions import Expression, _expression
 from .run import collect_garbage, temporary_options
+from .tracing import compile_tape, differentiate
 
 __all__ = ["MechanismResult", "solve_mechanism"]
 

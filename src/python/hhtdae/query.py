@@ -6,8 +6,9 @@ from typing import Tuple
 import numpy as np
 
 from . import _core
-from .expressions import _expression, _ordered, compile_tape
+from .expressions import _expression
 from .measures import Measure
+from .tracing import compile_tape, ordered
 
 __all__ = ["BodyPart", "Excitation", "Linearization", "Load", "Mode", "Motion", "Snapshot", "StateSpace"]
 
@@ -95,7 +96,7 @@ class Snapshot:
         """A measure, or a formula of measures."""
         x = _expression(formula)
         leaves = {}
-        for n in _ordered([x]):
+        for n in ordered([x]):
             if n.op == "measure":
                 leaves.setdefault(n.key(), n)
         values = [self._core.value(m.value) for m in leaves.values()]

@@ -8,7 +8,6 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .events import Signs
-from .expressions import Expression
 from .query import Linearization, Snapshot
 
 __all__ = ["Run"]

@@ -167,7 +167,8 @@ class Scene:
             raise TypeError("%s must be a %s again, is %r" % (name, kind.__name__, what))
         keep = []
         converted = what._convert(keep)
-        self._keep.append(keep)
+        if keep:
+            self._keep.append(keep)
         return what._fields(converted)
 
     def _enter(self, name, kind, given):
