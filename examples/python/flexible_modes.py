@@ -11,7 +11,6 @@ import numpy as np
 from beam_mesh import beam_mesh
 
 
-
 def main():
     from hhtdae import flexible
 

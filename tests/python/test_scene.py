@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 
 import hhtdae as h
-from hhtdae import _core, elements
+from hhtdae import _core, elements, spec
 
 
 def pendulum(tip=(1., 0., 0.), **fields):
@@ -24,9 +24,9 @@ class Elements(unittest.TestCase):
         self.assertEqual(set(kinds), set(elements.ELEMENTS))
         for name, defaults in kinds.items():
             given = {}
-            for f in elements.fields(getattr(h, name)):
-                plain = f.default if f.default is not elements.field().default else f.default_factory() if callable(f.default_factory) else None
-                given[f.name] = plain._fields({}) if isinstance(plain, elements.Spec) else plain
+            for f in spec.fields(getattr(h, name)):
+                plain = f.default if f.default is not spec.field().default else f.default_factory() if callable(f.default_factory) else None
+                given[f.name] = plain._fields({}) if isinstance(plain, spec.Spec) else plain
             self.assertEqual(set(given), set(defaults), name)
             for field, value in defaults.items():
                 if value is None or given[field] is None:

@@ -5,7 +5,7 @@ from typing import Any, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .elements import Number, Spec, Vector
+from .spec import Number, Spec, Vector
 
 __all__ = ["FlexibleBody", "PointMass", "RigidBody", "Shape", "axes_along", "composed", "inertia", "rotation"]
 

@@ -7,10 +7,11 @@ from petsc4py import PETSc
 
 from . import _core
 from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
-from .elements import ELEMENTS, Formula, Spec, has_formula, plain
+from .elements import ELEMENTS
 from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
+from .spec import Formula, Spec, has_formula, plain
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
 

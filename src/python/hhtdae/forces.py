@@ -1,0 +1,257 @@
+"""Forces: springs, bushings, beams, the user's own, contact, stops, friction."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from math import inf
+from typing import Any, Optional, Sequence
+
+from .measures import description
+from .spec import Formula, Law, Number, Spec, Vector, _Joint, _expressions, _law, _spec, _zero
+
+
+@_spec
+class SpringDamper(_Joint):
+    """Tension stiffness (l - length) + damping l' + preload along the line of the origins, l their distance. Component: the tension.
+
+    stiffness : force per length, not negative
+    damping : force per velocity, not negative
+    length : free length; negative: the distance at the start
+    preload : tension at the free length"""
+    stiffness: Number = 0.
+    damping: Number = 0.
+    length: Number = -1.
+    preload: Number = 0.
+    state: bool = False
+
+
+@_spec
+class NonlinearSpring(_Joint):
+    """Tension f(l, l') by a Python function of distance and rate, which is traced. Component: the tension.
+
+    tension : function of two formulas, ``lambda l, v: 100 * (l - 1)**3 + 2 * v``"""
+    tension: Law
+    state: bool = False
+    _functions = {"tension": _law}
+
+
+@_spec
+class TorsionalSpringDamper(_Joint):
+    """Moment preload - stiffness (a - angle) - damping a' on i's body about z_j, a the angle of i's x axis from j's. Component: the moment.
+
+    stiffness : moment per radian, not negative
+    damping : moment per angular velocity, not negative
+    angle : free angle, radians; full turns count
+    preload : moment at the free angle"""
+    stiffness: Number = 0.
+    damping: Number = 0.
+    angle: Number = 0.
+    preload: Number = 0.
+    state: bool = False
+
+
+@_spec
+class NonlinearTorsionalSpring(_Joint):
+    """Moment f(a, a') on i's body about z_j by a Python function of angle and rate, which is traced. Component: the moment.
+
+    moment : function of two formulas; a restoring one is negative, ``lambda a, w: -30 * hhtdae.sin(a)``"""
+    moment: Law
+    state: bool = False
+    _functions = {"moment": _law}
+
+
+@_spec
+class Bushing(_Joint):
+    """Six springs and dampers in j's axes: force f_0 - K d - C v, moment m_0 - K_t phi - C_t w on i's body about i's origin, for displacements d and
+    rotations phi of i in j. Components: force and moment on i in j's axes.
+
+    stiffness, torsional_stiffness : (3,), force per length, moment per radian, not negative
+    damping, torsional_damping : (3,), force per velocity, moment per angular velocity, not negative
+    force, moment : (3,), preload f_0, m_0"""
+    stiffness: Vector = _zero()
+    torsional_stiffness: Vector = _zero()
+    damping: Vector = _zero()
+    torsional_damping: Vector = _zero()
+    force: Vector = _zero()
+    moment: Vector = _zero()
+    state: bool = False
+
+
+@_spec
+class Beam(_Joint):
+    """Timoshenko beam without mass from j (x = 0) to i (x = length) along the markers' x axes; linear in its mean frame. Components: force and moment
+    on i in the mean frame. Planar scenes need E, area and Izz alone.
+
+    length : negative: the distance at the start
+    E, G : Young's modulus, shear modulus
+    area : of the cross section
+    Iyy, Izz : second moments of area, for bending in the xz and in the xy plane
+    J : torsion constant
+    shear_y, shear_z : shear areas; 0: no shear deformation
+    damping : of the stiffness, a time: C = damping K in the mean frame"""
+    length: Number = -1.
+    E: Number = 0.
+    G: Number = 0.
+    area: Number = 0.
+    Iyy: Number = 0.
+    Izz: Number = 0.
+    J: Number = 0.
+    shear_y: Number = 0.
+    shear_z: Number = 0.
+    damping: Number = 0.
+    state: bool = False
+
+
+@_spec
+class UserForce(Spec):
+    """Force and moment on i's body, formulas in the axes of a marker. Components: force, then moment.
+
+    force, moment : three formulas each, or None
+    frame : Marker, default: space axes
+    j may be None: no reaction"""
+    i: Any
+    j: Any = None
+    frame: Any = None
+    force: Optional[Sequence[Formula]] = None
+    moment: Optional[Sequence[Formula]] = None
+    state: bool = False
+    _functions = {"force": _expressions, "moment": _expressions}
+
+
+@_spec
+class UserScalarForce(_Joint):
+    """A force along the line from j to i, repulsive when positive, or a moment about z_j on i's body. Component: its value.
+
+    value : formula
+    rotational : bool, it is a moment"""
+    value: Formula
+    rotational: bool = False
+    state: bool = False
+    _functions = {"value": description}
+
+
+@_spec
+class ContactLaw(Spec):
+    """Smooth penalty stiffness d^exponent (1 + damping d'), never tensile, with regularized Coulomb friction.
+
+    stiffness : force per length^exponent; of stops of angles moment per radian^exponent
+    exponent : of the penetration d
+    damping : time per length
+    friction : Coulomb's coefficient
+    slip_velocity : of the regularization friction tanh(v / slip_velocity)"""
+    stiffness: Number = 1e5
+    exponent: Number = 1.5
+    damping: Number = 0.
+    friction: Number = 0.
+    slip_velocity: Number = 1e-3
+
+
+def _contact_law():
+    return field(default_factory=ContactLaw)
+
+
+@_spec
+class SpherePlane(_Joint):
+    """Contact of a sphere about i with the xy plane of j, outside z > 0. Components: the force on i's body, in j's axes.
+
+    radius : length"""
+    radius: Number = 1.
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class EllipsoidPlane(_Joint):
+    """Contact of an ellipsoid about i in its axes with the xy plane of j.
+
+    semiaxes : (3,), lengths"""
+    semiaxes: Vector = (1., 1., 1.)
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class TorusPlane(_Joint):
+    """Contact of a torus about z_i, a tire, with the xy plane of j.
+
+    radius : of the circle of centres
+    tube : radius of the tube"""
+    radius: Number = 1.
+    tube: Number = 0.1
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class SphereSphere(_Joint):
+    """Contact of two spheres.
+
+    radius_i, radius_j : lengths"""
+    radius_i: Number = 1.
+    radius_j: Number = 1.
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class SphereBox(_Joint):
+    """Contact of a sphere about i with a box about j in its axes.
+
+    radius : of the sphere
+    half : (3,), half of the box's edges"""
+    radius: Number = 1.
+    half: Vector = (1., 1., 1.)
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class RotationalStop(_Joint):
+    """Ends of the travel of the angle of i's x axis about z_j. Component: the moment on i's body.
+
+    lower, upper : radians, over full turns
+    law : in moment and radians, without friction"""
+    lower: Number = -inf
+    upper: Number = inf
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class TranslationalStop(_Joint):
+    """Ends of the travel of i along an axis of j. Component: the force on i's body.
+
+    lower, upper : lengths
+    axis : 0, 1 or 2
+    law : without friction"""
+    lower: Number = -inf
+    upper: Number = inf
+    law: ContactLaw = _contact_law()
+    axis: int = 2
+    state: bool = False
+
+
+@_spec
+class DistanceStop(_Joint):
+    """Ends of the distance of the origins; with upper alone a rope. Component: the tension.
+
+    lower, upper : lengths
+    law : without friction"""
+    lower: Number = 0.
+    upper: Number = inf
+    law: ContactLaw = _contact_law()
+    state: bool = False
+
+
+@_spec
+class JointFriction(Spec):
+    """Friction in a joint (Revolute, Translational, Cylindrical, Spherical) from its reaction N: moment mu r N or force mu N, regularized.
+
+    joint : Element
+    coefficient : mu
+    radius : r of the pin or ball; not used along a translation
+    slip_velocity : of the regularization"""
+    joint: Any
+    coefficient: Number = 0.
+    radius: Number = 0.
+    slip_velocity: Number = 1e-3
