@@ -156,8 +156,19 @@ void Tape::evaluate(const double *u, double *out) const
   for (std::size_t k = 0; k < outputs.size(); k++) out[k] = plain_[outputs[k]];
 }
 
+/* Residuals need no derivatives: plain numbers are an eighth of the memory that numbers with up to 16 derivatives move. */
 Real Tape::operator()(const Real *u) const
 {
+  double plain[Real::most];
+  bool   constant = true;
+  for (int k = 0; k < arguments; k++) {
+    plain[k] = u[k].value();
+    constant = constant && u[k].derivatives().size() == 0;
+  }
+  if (constant) {
+    run(plain, plain_);
+    return plain_[outputs[0]];
+  }
   run(u, real_);
   return real_[outputs[0]];
 }
