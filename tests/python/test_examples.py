@@ -3,6 +3,8 @@
 import contextlib
 import importlib
 import io
+import json
+import math
 import os
 import sys
 import unittest
@@ -64,6 +66,30 @@ def bounded(name):
 
 for _name in BOUNDS:
     setattr(Examples, "test_" + _name, bounded(_name))
+
+
+class Notebook(unittest.TestCase):
+    def test_crane(self):
+        """The notebook's cells, one after the other: the period of the rod with its box, and travels by it"""
+        try:
+            import matplotlib
+
+            matplotlib.use("Agg")
+        except ImportError:
+            pass
+        with open(os.path.join(EXAMPLES, "crane.ipynb")) as file:
+            cells = json.load(file)["cells"]
+        names = {}
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            for cell in cells:
+                if cell["cell_type"] == "code":
+                    exec("".join(cell["source"]), names)
+        J = hhtdae.inertia.box(500, (0.5, 0.5, 0.5))[1, 1] + 500 * 2.**2
+        self.assertAlmostEqual(names["period"], 2 * math.pi * math.sqrt(J / (500 * 9.81 * 2)), delta=1e-6)
+        left = names["left"]
+        self.assertLess(left[2.0], 0.2 * left[1.0])
+        self.assertAlmostEqual(names["now"].motion(names["trolley"]).position[0], 2., delta=1e-8)
+        self.assertIn("largest swing", printed.getvalue())
 
 
 class Picture(unittest.TestCase):

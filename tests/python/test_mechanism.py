@@ -96,6 +96,18 @@ class Pendulum(unittest.TestCase):
         self.assertEqual(s.status, 1)
         self.assertAlmostEqual(s.t[-1], period / 4, delta=1e-5)
 
+    def test_many_events_in_one_step(self):
+        """A stone, whose fall takes few steps: all heights are found, in order, each where it is; the first terminal one ends the run"""
+        heights = [0.9, 0.89, 0.5, 0.2, 0.1]
+        events = [(lambda t, q, v, z=z: q[0] - z) for z in heights]
+        events[3].terminal = True
+        s = h.solve_mechanism(lambda t, q, v, a: [a[0] + G], (0, 1), [1.], [0.], events=events)
+        for z, found in zip(heights[:4], s.t_events):
+            np.testing.assert_allclose(found, [math.sqrt(2 * (1 - z) / G)], rtol=1e-9)
+        self.assertEqual(len(s.t_events[4]), 0)
+        self.assertEqual(s.t[-1], s.t_events[3][0])
+        self.assertLess(s.statistics.steps, 30)
+
     def test_settings(self):
         s = pendulum(max_step=1e-3, first_step=1e-4, trace=True)
         self.assertLessEqual(s.statistics.h_max, 1e-3 * (1 + 1e-9))

@@ -176,6 +176,16 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(run["z"][9], 4 * 0.4 - 5 * 0.4**2, delta=1e-5)
         self.assertGreater(run["z"].min(), -1e-9)
 
+    def test_gravity_before_parameters(self):
+        """Gravity that is given with the scene stays when parameters change"""
+        scene = h.Scene(gravity=(0, 0, -10.))
+        m = scene.parameter("m", 2.)
+        b = scene.add("b", h.PointMass(mass=m))
+        scene.channel("z", h.displacement(b.marker(), 2))
+        for mass in (2., 3., 2.):
+            scene.set(m=mass)
+            self.assertAlmostEqual(scene.solve(1.)["z"][-1], -5., delta=1e-9)
+
     def test_motions_with_parameters(self):
         """What a function of time takes of parameters changes from run to run"""
         scene = h.Scene()

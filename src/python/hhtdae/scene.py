@@ -111,6 +111,7 @@ class Scene:
         self._channels = []
         self._parameters = {}
         self._states = 0
+        self._gravity = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False)
         self.ground = Body(self, self._core.ground(), "ground")
@@ -123,6 +124,8 @@ class Scene:
         """A number that may be another one in the next run. Parameters come before everything else. Returns a `Parameter`, which stands for a
         number anywhere in the description."""
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
+        if len(self._parameters) == 1 and self._gravity is not None:
+            self.set_gravity(self._gravity)  # what came before the first parameter is not described anew
         return p
 
     def set(self, **values: float) -> None:
@@ -132,6 +135,7 @@ class Scene:
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
+        self._gravity = acceleration
         self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
