@@ -93,7 +93,7 @@ void BindLinearize(py::module_ &m)
   py::class_<Linearized>(m, "Linearization")
     .def(py::init<>())
     .def("take", [](Linearized &l, py::object ts, py::object t) {
-      l.ts = ts;
+      l.ts = FromTS(ToTS(ts));
       Check(t.is_none() ? l.get().take(ToTS(ts)) : l.get().take(ToTS(ts), t.cast<double>()));
     })
     .def("close", [](Linearized &l) {

@@ -14,7 +14,7 @@ namespace python
 /* A linearization that can be emptied, before PETSc ends */
 struct Linearized {
   std::unique_ptr<Linearization> small = std::make_unique<Linearization>();
-  py::object                     ts;
+  py::object                     ts; /* a reference of its own to the run, which may be closed */
 
   Linearization &get()
   {

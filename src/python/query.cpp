@@ -14,7 +14,7 @@ namespace
 /* A snapshot that can be emptied, before PETSc ends */
 struct Held {
   std::unique_ptr<Snapshot> now = std::make_unique<Snapshot>();
-  py::object                ts; /* whose vectors it reads */
+  py::object                ts; /* a reference of its own to the run, which it reads, and which may be closed */
 
   Snapshot &get()
   {
@@ -34,7 +34,7 @@ py::dict Out(const Motion &x)
 void Take(Held &h, py::object ts, py::object t)
 {
   h.get();
-  h.ts = ts;
+  h.ts = FromTS(ToTS(ts));
   Check(t.is_none() ? h.now->take(ToTS(ts)) : h.now->take(ToTS(ts), t.cast<double>()));
 }
 

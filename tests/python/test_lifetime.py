@@ -70,6 +70,19 @@ class Keeping(unittest.TestCase):
         self.assertEqual(len(modes[0].shape), M.getSize()[0])
         ts.destroy()
 
+    def test_snapshot_of_a_closed_run(self):
+        """What a snapshot and a linearization read stays until they are gone"""
+        scene = oscillator()
+        with scene.run() as run:
+            now, small = run.solve(0.3).snapshot(), run.linearize()
+        for _ in range(3):
+            scene.run().solve(0.1)  # would take the memory
+        self.assertAlmostEqual(now.value(h.time()), 0.3)
+        self.assertGreater(now.energy()[0], 0)
+        self.assertEqual(len(small.modes()), 4)  # two along the springs, and the free direction twice
+        with self.assertRaisesRegex(ValueError, "closed"):
+            now.take()
+
     def test_scene_in_a_cycle_with_its_callback(self):
         """A scene that its own callback refers to is found by the garbage collector"""
         class Model:

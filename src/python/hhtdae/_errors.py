@@ -32,6 +32,9 @@ class Error(PETSc.Error):
         return Error, (self.ierr, self.message, self.trace)
 
 
+Error.__module__ = "hhtdae"
+
+
 def fail(code, text, specific, cause):
     """What the C++ part calls where PETSc has returned an error"""
     if isinstance(cause, (KeyboardInterrupt, SystemExit)):

@@ -15,7 +15,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core
-from . import _flexible
+
+try:
+    from . import _flexible
+except ImportError as error:
+    raise ImportError("flexible bodies are not there, hhtdae was built without SLEPc: %s" % error) from error
 from .scene import Body
 
 __all__ = ["Attachment", "FeModel", "FullBody", "FullFeBody", "HotSpot", "HotSpots", "Material", "ReducedBody", "load_modal_body", "reduce"]

@@ -77,6 +77,8 @@ class Run:
         ts = self._open()
         if not until >= ts.getTime():
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
+        if until == ts.getTime() and ts.getStepNumber() > 0:
+            return self
         ts.setMaxTime(until)
         with temporary_options(self._options):
             if self._events:

@@ -221,8 +221,9 @@ class Scene:
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
+        state = State(self, self._core.state(name, description(rate, self._keep), initial), name)
         self._states += 1
-        return State(self, self._core.state(name, description(rate, self._keep), initial), name)
+        return state
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
