@@ -1,4 +1,5 @@
-"""What Python costs a run: the chain of examples/chain.cpp and the same one from Python, in turn; counts and the median of the ratios of processor time.
+"""What Python costs a run: the chain of examples/chain.cpp and the same one from Python, in turn; counts and the median of the ratios of processor time. Then
+equations of motion that call Python beside the same ones traced.
 
 usage: overhead.py build/bin/chain [pairs], with the package's directory in PYTHONPATH
 """
@@ -34,6 +35,20 @@ def chain():
     print("tip: x=%.12g" % run["tip.x"][-1])
 
 
+def pendulum(pairs):
+    import time
+
+    import hhtdae as h
+
+    took = {False: [], True: []}
+    for _ in range(pairs):
+        for trace in took:
+            begun = time.process_time()
+            s = h.solve_mechanism(lambda t, q, v, a: [a[0], a[1] + 9.81], (0, 2), [1, 0], [0, 0], constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1], trace=trace)
+            took[trace].append(1e3 * (time.process_time() - begun))
+    print("pendulum by solve_mechanism, %d steps: %.1f ms calling Python, %.1f ms traced" % (s.statistics.steps, *map(statistics.median, took.values())))
+
+
 def counts(command):
     text = subprocess.run(command, capture_output=True, text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}).stdout
     words = dict(re.findall(r"(\w+)=(\S+)", text))
@@ -49,6 +64,7 @@ def main(program, pairs):
     print("C++    ", cpp, "x =", cpp_x)
     print("Python ", python, "x =", python_x)
     print("processor time of the steps, Python / C++: median %.3f, from %.3f to %.3f" % (statistics.median(ratios), min(ratios), max(ratios)))
+    pendulum(pairs)
 
 
 if __name__ == "__main__":

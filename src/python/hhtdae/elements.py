@@ -4,18 +4,15 @@ Marker i is on the body that is acted on, marker j on the one that takes the rea
 then the element is described anew for every run. `state=True` carries a force's components as unknowns of the equations.
 """
 
-from typing import Tuple
+from typing import List
 
 from . import forces, joints
-from .spec import Spec
+from .forces import *
+from .joints import *
 
+__all__: List[str] = []
+__all__ += joints.__all__
+__all__ += forces.__all__
 
-def _kinds(module):
-    return [name for name, x in vars(module).items() if isinstance(x, type) and issubclass(x, Spec) and x.__module__ == module.__name__
-            and not name.startswith("_")]
-
-
-ELEMENTS: Tuple[str, ...] = tuple(name for module in (joints, forces) for name in _kinds(module) if name not in ("Term", "ContactLaw"))
-__all__ = list(ELEMENTS) + ["ContactLaw", "Term"]
-for _module in (joints, forces):
-    globals().update({name: getattr(_module, name) for name in _kinds(_module)})
+#: Names of the classes that are elements, which is all but parts of elements
+ELEMENTS = tuple(name for name in __all__ if name not in ("Term", "ContactLaw"))

@@ -9,6 +9,10 @@ from typing import Any, Optional, Sequence
 from .measures import description
 from .spec import Formula, Law, Number, Spec, Vector, _Joint, _expressions, _law, _spec, _zero
 
+__all__ = ["SpringDamper", "NonlinearSpring", "TorsionalSpringDamper", "NonlinearTorsionalSpring", "Bushing", "Beam", "UserForce", "UserScalarForce",
+           "ContactLaw", "SpherePlane", "EllipsoidPlane", "TorusPlane", "SphereSphere", "SphereBox", "RotationalStop", "TranslationalStop",
+           "DistanceStop", "JointFriction"]
+
 
 @_spec
 class SpringDamper(_Joint):

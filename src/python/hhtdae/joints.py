@@ -8,6 +8,10 @@ from .expressions import Expression, TimeFunction
 from .spec import Formula, Number, Spec, _Joint, _expressions, _spec, plain
 from .tracing import time_function
 
+__all__ = ["Spherical", "Revolute", "Universal", "ConstantVelocity", "Translational", "Cylindrical", "Planar", "Fixed", "Screw", "Gear", "RackAndPinion",
+           "Term", "Coupler", "GearMesh", "RackMesh", "InLine", "InPlane", "ParallelAxes", "Perpendicular", "Orientation", "PointDistance",
+           "PointOnCurve", "RollingDisc", "RollingSphere", "KnifeEdge", "UserConstraint", "RotationalMotion", "TranslationalMotion"]
+
 # ---- joints; planar scenes: Revolute, Translational, Fixed ----
 
 @_spec

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, field, fields
 from typing import Any, Callable, Sequence, Union
 
@@ -77,6 +78,14 @@ def _expressions(many, keep):
     return [description(x, keep) for x in many]
 
 
+if sys.version_info >= (3, 11):
+    from typing import dataclass_transform
+else:
+    def dataclass_transform(**options):
+        return lambda decorator: decorator
+
+
+@dataclass_transform(eq_default=False)
 def _spec(cls):
     """A data class that is compared by identity, with what all elements share in its documentation"""
     cls = dataclass(eq=False)(cls)
