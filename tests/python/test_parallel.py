@@ -29,7 +29,21 @@ run = scene.solve(0.3, tolerance=1e-6, sample=0.1)
 now = run.snapshot()
 small = scene.run().equilibrium().linearize()
 frequency = small.modes()[0].frequency
-rank_values = MPI.COMM_WORLD.allgather((run.values.tolist(), now.motion(tip).position.tolist(), frequency))
+scene2 = h.Scene(gravity=(0, -9.81, 0))
+seen, before = [], scene2.ground
+for n in range(3):
+    link = scene2.rigid_body("", inertia=h.inertia.box(1, (1, .1, .1)), position=(n + 0.5, 0, 0))
+    scene2.connect("", h.Revolute, link, before, (n, 0, 0))
+    before = link
+m = link.marker((0.5, 0, 0))
+y = h.displacement(m, 1)
+scene2.add("drag", h.UserForce(m, force=[0, h.callback(lambda v: -0.5 * v, h.velocity(m, 1)), 0]))
+run2 = scene2.run(tolerance=1e-7)
+run2.event(y + 1, action=lambda r: seen.append(r.time), terminal=True)
+run2.solve(1.)
+assert len(seen) == 1 and abs(run2.snapshot().value(y) + 1) < 1e-8
+run2.close()
+rank_values = MPI.COMM_WORLD.allgather((run.values.tolist(), now.motion(tip).position.tolist(), frequency, seen))
 assert all(v == rank_values[0] for v in rank_values), rank_values
 try:
     h.Scene().set(nothing=1)
@@ -38,7 +52,7 @@ except h.Error:
     pass
 run.close()
 if MPI.COMM_WORLD.rank == 0:
-    print("result", MPI.COMM_WORLD.size, run["x"][-1], run["y"][-1], frequency)
+    print("result", MPI.COMM_WORLD.size, run["x"][-1], run["y"][-1], frequency, seen[0])
 """
 
 

@@ -157,6 +157,30 @@ class Runs(unittest.TestCase):
         self.assertTrue(np.all(np.diff(run.times) > 0))
         self.assertTrue(np.any(abs(run.times - fall) < 1e-6))
 
+    def test_events_of_a_top(self):
+        """Rotations in space go on through events in which nothing is done"""
+        def top():
+            scene = h.Scene(gravity=(0, 0, -9.81))
+            scene.start(assembly="project")
+            body = scene.add("top", h.RigidBody(0.5, np.diag([2e-3, 3e-3, 1e-3]), position=(0.1, 0.02, 0.3), angular_velocity=(3, 20, 7)))
+            scene.connect("tip", h.Spherical, body, scene.ground, (0.1, 0.02, 0.2))
+            at = body.marker((0.05, 0.02, 0.1))
+            for c in "xyz":
+                scene.channel(c, h.displacement(at, c))
+            scene.channel("turns", h.angle(at, scene.ground.marker()))
+            return scene, h.displacement(at, "z")
+        scene, z = top()
+        plain = scene.solve(1., tolerance=1e-7)
+        scene, z = top()
+        run, heights = scene.run(tolerance=1e-7), []
+        run.event(z - 0.29, action=lambda r: heights.append(r.snapshot().value(z)))
+        run.solve(1.)
+        self.assertEqual(len(heights), 4)
+        np.testing.assert_allclose(heights, 0.29, atol=1e-9)
+        for name in ("x", "y", "z", "turns"):
+            self.assertAlmostEqual(run[name][-1], plain[name][-1], delta=2e-5)  # their errors at this tolerance are 4e-5
+        self.assertEqual(run.statistics.restarts, 5)
+
     def test_bounces(self):
         """A ball that an action throws back with 0.8 of its velocity; samples at multiples of a time"""
         scene = h.Scene(gravity=(0, 0, -10.))

@@ -100,7 +100,8 @@ class Run:
             yield self.time
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
-        """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew.
+        """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew; velocities that joints
+        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise.
 
         Parameters
         ----------
@@ -144,6 +145,8 @@ class Run:
             if self._recorder:
                 self._recorder.cut(ts, time)
             integrator.move_back(ts, time)
+            if not PETSc.Options().hasName("ts_hhtdae_start"):
+                integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
             self._signs.begin(time, self._event_values(), here)
             for k in here:
                 if self._events[k][1] is not None:
