@@ -86,7 +86,7 @@ Measure ToMeasure(py::handle x)
   m.j         = ToHandle<Marker>(t[2], kind + ": marker j");
   m.frame     = ToHandle<Marker>(t[3], kind + ": frame");
   m.component = t[4].cast<int>();
-  const Element target = ToHandle<Element>(t[5], kind + ": element");
+  const Element target = ToHandle<Element>(t[5], kind + ": target", true); /* Python has looked at its kind */
   m.target             = target.id;
   m.scene              = target.scene;
   return m;

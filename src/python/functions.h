@@ -11,12 +11,19 @@ namespace hhtdae
 namespace python
 {
 
-/* Handles are objects with the attributes `_id` and `_number`; None is no handle. */
-template <class H> H ToHandle(py::handle x, const std::string &what)
+template <class H> const char *const kind_of = "";
+template <> inline const char *const kind_of<Body>    = "body";
+template <> inline const char *const kind_of<Marker>  = "marker";
+template <> inline const char *const kind_of<Element> = "element";
+
+/* Handles are objects with the attributes `_id`, `_number` and `_kind`; None is no handle. A body is no marker, though both have numbers. */
+template <class H> H ToHandle(py::handle x, const std::string &what, bool any_kind = false)
 {
   H h;
   if (x.is_none()) return h;
-  if (!py::hasattr(x, "_id") || !py::hasattr(x, "_number")) throw py::type_error(what + " is " + py::repr(x).cast<std::string>() + ", which is not of a scene");
+  const bool known = py::hasattr(x, "_id") && py::hasattr(x, "_number") && py::hasattr(x, "_kind");
+  if (!known || (!any_kind && x.attr("_kind").cast<std::string>() != kind_of<H>))
+    throw py::type_error(what + " must be a scene's " + kind_of<H> + ", is " + py::repr(x).cast<std::string>());
   h.id    = x.attr("_id").cast<PetscInt>();
   h.scene = x.attr("_number").cast<PetscInt>();
   return h;

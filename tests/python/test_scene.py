@@ -71,7 +71,7 @@ class Elements(unittest.TestCase):
         i, j = rod.marker(), scene.ground.marker()
         for spec, kind, text in ((h.SpringDamper(i, j, stiffness="hard"), TypeError, "SpringDamper s: stiffness must be a number, is 'hard'"),
                                  (h.Bushing(i, j, stiffness=(1, 2)), ValueError, "stiffness must be three numbers"),
-                                 (h.Revolute(i, "ground"), TypeError, "j is 'ground', which is not of a scene"),
+                                 (h.Revolute(i, "ground"), TypeError, "Revolute s: j must be a scene's marker, is 'ground'"),
                                  (h.RotationalMotion(i, j, 0., of="jerk"), ValueError, "must be 'displacement'"),
                                  (h.NonlinearSpring(i, j, lambda l, v: 1 if l > 1 else 0), TypeError, "hhtdae.where"),
                                  (42, TypeError, "no body, joint")):
@@ -397,6 +397,25 @@ class Mistakes(unittest.TestCase):
         one.add("spring", h.SpringDamper(a.marker(), b.marker(), stiffness=1.))
         with self.assertRaisesRegex(h.Error, "not a marker of this scene"):
             one.run()
+
+    def test_handles_of_another_kind(self):
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        x = scene.state("x", 1., 0.)
+        for call, text in ((lambda: scene.add("s", h.SpringDamper(rod, j)), "i must be a scene's marker, is <Body rod>"),
+                           (lambda: scene.add("s", h.JointFriction(i, 0.1)), "joint must be a scene's element, is <Marker on rod>"),
+                           (lambda: scene.channel("c", h.displacement(rod, 0)), "marker i must be a scene's marker"),
+                           (lambda: h.joint_force(rod, 0), "<Body rod> is no element of a scene"),
+                           (lambda: h.value(i), "is no variable and no state"), (lambda: h.modal(i, 0), "is no body"),
+                           (lambda: scene.line(rod), "must be a scene's marker")):
+            with self.assertRaisesRegex(TypeError, text):
+                call()
+        scene.channel("c", h.value(x))
+        now = scene.solve(0.1).snapshot()
+        with self.assertRaisesRegex(TypeError, "element must be a scene's element"):
+            now.load(rod, i)
+        with self.assertRaisesRegex(ValueError, "time between samples"):
+            scene.run(sample=-1)
 
     def test_exceptions_of_callbacks(self):
         scene = h.Scene()

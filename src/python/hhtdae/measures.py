@@ -24,6 +24,12 @@ class Measure(Expression):
         return "<measure %s>" % self.value[0]
 
 
+def _target(x, *kinds):
+    if getattr(x, "_kind", None) not in kinds:
+        raise TypeError("%r is no %s of a scene" % (x, " and no ".join(kinds)))
+    return x
+
+
 def _component(c):
     if c in (0, 1, 2):
         return c
@@ -81,42 +87,42 @@ def angular_acceleration(i, component, j=None, frame=None):
 
 def multiplier(joint, row):
     """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment."""
-    return Measure("multiplier", component=row, target=joint)
+    return Measure("multiplier", component=row, target=_target(joint, "element"))
 
 
 def joint_force(joint, component, frame=None):
     """Force of a joint or motion on the body of its marker i, in `frame` (default: its marker j)."""
-    return Measure("joint_force", frame=frame, component=component, target=joint)
+    return Measure("joint_force", frame=frame, component=component, target=_target(joint, "element"))
 
 
 def joint_moment(joint, component, frame=None):
     """Moment of a joint or motion on the body of its marker i, about that marker's origin, in `frame` (default: its marker j)."""
-    return Measure("joint_moment", frame=frame, component=component, target=joint)
+    return Measure("joint_moment", frame=frame, component=component, target=_target(joint, "element"))
 
 
 def force(element, component=0):
     """Component of a force element as its class says: tension, moment, force in some axes."""
-    return Measure("force", component=component, target=element)
+    return Measure("force", component=component, target=_target(element, "element"))
 
 
 def element_force(element, on, component, frame=None):
     """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone."""
-    return Measure("element_force", on, None, frame, component, element)
+    return Measure("element_force", on, None, frame, component, _target(element, "element"))
 
 
 def element_moment(element, on, component, frame=None):
     """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone."""
-    return Measure("element_moment", on, None, frame, component, element)
+    return Measure("element_moment", on, None, frame, component, _target(element, "element"))
 
 
 def value(x):
     """Value of a user-defined variable or of a first-order state."""
-    return Measure(x._measure, target=x)
+    return Measure(_target(x, "variable", "state")._kind, target=x)
 
 
 def modal(body, mode):
     """Modal coordinate of a flexible body, modes from 0 on."""
-    return Measure("modal", component=mode, target=body)
+    return Measure("modal", component=mode, target=_target(body, "body"))
 
 
 def kinetic_energy():

@@ -51,6 +51,8 @@ class Run:
 
     def __init__(self, scene, tolerance=None, sample=0., after=None, options=None):
         self.scene, self.ts, self._recorder = scene, None, None
+        if sample is not None and not sample >= 0:
+            raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
         collect_garbage(scene.comm)
         with temporary_options(self._options):

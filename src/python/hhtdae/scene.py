@@ -33,6 +33,7 @@ class Body(_Handle):
     """A body of a scene, the ground, or the frame of an attachment."""
 
     __slots__ = ()
+    _kind = "body"
 
     def marker(self, position: Sequence[float] = (0., 0., 0.), axes: Any = None, name: str = "") -> "Marker":
         """A marker on the body; position and axes (columns) in body axes from the body's origin; of the ground in space axes."""
@@ -55,23 +56,25 @@ class Body(_Handle):
 class Marker(_Handle):
     """A point with axes on a body."""
     __slots__ = ()
+    _kind = "marker"
 
 
 class Element(_Handle):
     """A joint, motion or force."""
     __slots__ = ()
+    _kind = "element"
 
 
 class Variable(_Handle):
     """A user-defined variable."""
     __slots__ = ()
-    _measure = "variable"
+    _kind = "variable"
 
 
 class State(_Handle):
     """A first-order state."""
     __slots__ = ()
-    _measure = "state"
+    _kind = "state"
 
 
 def _number(initial, who):
