@@ -209,6 +209,10 @@ class Runs(unittest.TestCase):
         for mass in (2., 3., 2.):
             scene.set(m=mass)
             self.assertAlmostEqual(scene.solve(1.)["z"][-1], -5., delta=1e-9)
+        other = h.Scene()
+        other.channel("t", h.time())
+        with self.assertRaisesRegex(ValueError, "parameter m came too late"):
+            other.parameter("m", 1.)
 
     def test_motions_with_parameters(self):
         """What a function of time takes of parameters changes from run to run"""

@@ -49,6 +49,7 @@ class Body(_Handle):
 
     def shape(self, shape: Shape) -> "Body":
         """Draws the body in animations."""
+        self._scene._begun = True
         self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes)
         return self
 
@@ -114,6 +115,7 @@ class Scene:
         self._channels = []
         self._parameters = {}
         self._states = 0
+        self._begun = False  # whether there is more than parameters
         self._gravity = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False)
@@ -126,6 +128,8 @@ class Scene:
     def parameter(self, name: str, value: float) -> Parameter:
         """A number that may be another one in the next run. Parameters come before everything else. Returns a `Parameter`, which stands for a
         number anywhere in the description."""
+        if self._begun:
+            raise ValueError("parameter %s came too late: parameters are made before everything else but gravity" % name)
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
         if len(self._parameters) == 1 and self._gravity is not None:
             self.set_gravity(self._gravity)  # what came before the first parameter is not described anew
@@ -180,6 +184,7 @@ class Scene:
         return what._fields(converted)
 
     def _enter(self, name, kind, given):
+        self._begun = True
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
                 return Body(self, enter(name, given), name)
@@ -193,6 +198,7 @@ class Scene:
         return function
 
     def _marker(self, body, position, axes, name, at):
+        self._begun = True
         place = lambda: (plain(position), np.eye(3) if axes is None else plain(axes))
         given = self._later(place) if has_formula(position) or has_formula(axes) else place()
         return Marker(self, self._core.marker(body, given, name, at), name or "on " + body.name)
@@ -216,11 +222,13 @@ class Scene:
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula."""
         _number(initial, "variable " + name)
+        self._begun = True
         return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
         _number(initial, "state " + name)
+        self._begun = True
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
@@ -230,6 +238,7 @@ class Scene:
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
+        self._begun = True
         self._core.channel(name, description(value, self._keep), unit)
         self._channels.append((name, unit))
 
