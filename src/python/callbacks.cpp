@@ -1,4 +1,4 @@
-/* Functions of the integrator that call the application's: longest step, change of coordinates. The TS owns the Python functions. */
+/* Functions of the integrator that call the application's: longest step, change of coordinates, rotations. The TS owns the Python functions. */
 #include "bind.h"
 #include "hhtdae/hhtdae.h"
 
@@ -66,6 +66,26 @@ PetscErrorCode Commit(TS ts, void *ctx)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode Refer(TS ts, Vec U, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), FromVec(U)));
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReferBack(TS ts, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    Call(static_cast<Functions *>(ctx)->f[1], py::make_tuple(FromTS(ts)));
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 void BindCallbacks(py::module_ &m)
@@ -79,6 +99,17 @@ void BindCallbacks(py::module_ &m)
     auto *own = new Functions{{test, map, commit}};
     Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python coordinates", own));
     Check(TSHHT3SetCoordinateChange(ToTS(ts), Test, Map, Commit, own));
+  });
+  m.def("set_rotations", [](py::object ts, py::object is, py::object refer, py::object back) {
+    auto *own = new Functions{{refer, back}};
+    Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python rotations", own));
+    Check(TSHHT3SetRotations(ToTS(ts), ToIS(is), Refer, ReferBack, own));
+  });
+  m.def("get_rotation_factor", [](py::object ts) {
+    PetscReal factor = 0;
+    Vec       begin  = nullptr;
+    Check(TSHHT3GetRotationFactor(ToTS(ts), &factor, &begin));
+    return py::make_tuple((double)factor, begin ? FromVec(begin) : py::none());
   });
 }
 

@@ -221,6 +221,49 @@ class OnTS(unittest.TestCase):
         ts.solve(u)
         self.assertAlmostEqual(u[0], 0.1 * math.cos(math.sqrt(100 / 3.)), delta=1e-5)
 
+    def test_rotations(self):
+        """A sphere that turns freely: its attitude after two turns and a bit, gathered by the functions that take references"""
+        def turn(x):
+            angle = np.linalg.norm(x)
+            return h.rotation(x, angle) if angle > 0 else np.eye(3)
+
+        now, before, factors = [np.eye(3)], [np.eye(3)], []
+
+        def refer(ts, u):
+            before[0] = now[0]
+            now[0] = turn(u.array_r) @ now[0]
+            u.set(0)
+
+        def back(ts):
+            now[0] = before[0]
+
+        def J(ts, t, u, v, a, sv, sa, J, P):
+            factors.append(integrator.get_rotation_factor(ts)[0])
+            P.zeroEntries()
+            P.shift(sa)
+            return True
+
+        A = PETSc.Mat().createAIJ([3, 3], nnz=1, comm=PETSc.COMM_SELF)
+        for k in range(3):
+            A.setValue(k, k, 0.)
+        A.assemble()
+        u, v = A.createVecRight(), A.createVecRight()
+        w = np.array([4., -7., 10.])
+        v.array = w
+        ts = PETSc.TS().create(comm=PETSc.COMM_SELF)
+        ts.setType("hhtdae")
+        ts.setI2Function(lambda ts, t, u, v, a, f: a.copy(f), u.duplicate())
+        ts.setI2Jacobian(J, A)
+        ts.setSolution2(u, v)
+        ts.setMaxTime(1.)
+        ts.setExactFinalTime(PETSc.TS.ExactFinalTime.MATCHSTEP)
+        integrator.set_rotations(ts, [0], refer, back)
+        integrator.set_step_limit(ts, lambda *state: 0.05)
+        ts.solve(u)
+        np.testing.assert_allclose(turn(ts.getSolution().array_r) @ now[0], turn(w), atol=1e-9)
+        self.assertGreaterEqual(ts.getStepNumber(), 20)
+        self.assertGreater(max(factors), 0)
+
     def test_wrong_values(self):
         ts, _ = self.make()
         with self.assertRaisesRegex(h.Error, "alpha"):

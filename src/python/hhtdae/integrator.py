@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from . import _core
 
-__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "interpolate", "move_back",
+__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "get_rotation_factor", "interpolate", "move_back",
            "set_alpha", "set_checkpoint_vec", "set_coordinate_change", "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse",
-           "set_role", "set_start", "set_step_limit", "statistics"]
+           "set_role", "set_rotations", "set_start", "set_step_limit", "statistics"]
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,31 @@ def set_coordinate_change(ts, test, map, commit=None):
     """New generalized coordinates in the course of a run: test(ts, t, u, v) returns whether, map(ts, t, u, v, a) changes the vectors in place, commit(ts)
     is told that it is done."""
     _core.set_coordinate_change(ts, test, map, commit)
+
+
+def set_rotations(ts, rotations, refer, back):
+    """Says which coordinates are local rotation vectors, which count from the attitude at the last accepted step; their velocities are angular velocities
+    in axes of space.
+
+    Parameters
+    ----------
+    rotations : petsc4py.PETSc.IS or sequence of int
+        The first of the three coordinates of each, on the rank that owns all three.
+    refer : callable
+        refer(ts, u): the attitudes of u become the reference, the rotation vectors in u zero.
+    back : callable
+        back(ts): takes the reference before the last call of `refer` again.
+    """
+    from petsc4py import PETSc
+
+    if not isinstance(rotations, PETSc.IS):
+        rotations = PETSc.IS().createGeneral(list(rotations), comm=ts.getComm())
+    _core.set_rotations(ts, rotations, refer, back)
+
+
+def get_rotation_factor(ts):
+    """(factor, begin): h^2 / 12 and the velocities at the beginning of the step whose matrix is asked for, 0 and None where there is none."""
+    return _core.get_rotation_factor(ts)
 
 
 def get_acceleration(ts):
