@@ -189,6 +189,10 @@ private:
 PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, const std::string &file, const Vector3 &origin = Vector3::Zero(),
                           const Matrix3 &axes = Matrix3::Identity());
 
+/* The surface of the mesh between the corners of its elements, for Scene::surface() and the page: on the first rank, empty on the others. With stress
+   if all of its nodes have stress modes. The body needs elements and modes at its nodes. Collective */
+PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface);
+
 /* ---- the whole model in a scene ---- */
 
 enum class FeLaw {

@@ -1,6 +1,6 @@
 /*
-  Results of a run: named channels sampled at a fixed rate into HDF5 and CSV files, an animation for ParaView, the balance of
-  energy and momentum. What is not asked for costs nothing.
+  Results of a run: named channels sampled at a fixed rate into HDF5 and CSV files, an animation for ParaView, a page
+  that shows the run in a browser, the balance of energy and momentum. What is not asked for costs nothing.
 
     scene.channel("tip.y", Measure::displacement(tip, 1), "m");
     scene.shape(arm, Shape::box({1, 0.05, 0.05}));
@@ -15,6 +15,9 @@
     -scene_rate <n>               the same as samples per unit of time
     -scene_animation <prefix>     prefix.pvd, which ParaView opens, and prefix_000000.vtp, ...
     -scene_animation_dt <dt>      time between frames; 0: every step
+    -scene_page <file.html>       one HTML file that any browser opens without a network: the run in three dimensions, with its channels
+    -scene_page_frames <500>      frames from the start to the final time; every step where the run has no final time
+    -scene_page_dt <dt>           time between frames, which wins over their number
     -scene_balance [file]         energy and momentum at every step, into a file or printed; largest drift at the end
 
   Samples between the ends of steps: positions and velocities are cubic in the step, TSHHT3Interpolate(). Where a channel needs
@@ -26,6 +29,7 @@
 
 #include "hhtdae/types.h"
 #include <string>
+#include <vector>
 
 namespace hhtdae
 {
@@ -56,12 +60,28 @@ struct Shape {
   }
 };
 
+/*
+  Surface of a flexible body for the page, which shows it deformed, and coloured by stress where there are stress modes. MakeSurface() in flexible.h
+  makes it from a reduced body. Modes are those of the body's ModalBody, in their order.
+*/
+struct Surface {
+  std::vector<double> point;       /* 3 per node: undeformed, axes and origin of the FE model */
+  std::vector<int>    triangle;    /* 3 nodes each, from 0, counter-clockwise seen from outside */
+  Eigen::MatrixXf     shape;       /* 3 rows per node x modes: displacement per unit of each mode */
+  Eigen::MatrixXf     stress;      /* 6 rows per node x modes, xx, yy, zz, xy, yz, zx; empty: not known */
+  std::string         stress_unit; /* "Pa"; a label */
+};
+
 struct OutputSettings {
   std::string file;             /* HDF5, channels */
   std::string csv;              /* table of channels */
   double      dt = 0;           /* between samples; 0: the end of every step */
   std::string animation;        /* prefix of its files */
   double      animation_dt = 0; /* between frames; 0: every step */
+  std::string page;             /* HTML file */
+  std::string page_title;       /* empty: the file's name */
+  double      page_dt = 0;      /* between its frames; 0: page_frames of them from the start to the final time, or every step if there is none */
+  PetscInt    page_frames = 500;
   bool        balance = false;  /* of energy and momentum, at every step */
   std::string balance_file;     /* empty: printed */
 };

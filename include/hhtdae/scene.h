@@ -225,6 +225,7 @@ public:
   Channel         channel(const std::string &name, const Expression &value, const std::string &unit = "");
   void            shape(Body body, const Shape &shape);
   void            line(const std::vector<Marker> &markers);
+  void            surface(Body flexible, std::shared_ptr<const Surface> surface); /* in the page; it may be none on all ranks but the first */
   OutputSettings &output() { return output_; }
 
   /* How the run starts; options come after it */

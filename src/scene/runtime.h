@@ -101,7 +101,7 @@ PetscErrorCode Remember(Runtime &R, Vec U, Vec V);
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
-constexpr PetscInt kept = 56;
+constexpr PetscInt kept = 72;
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
 PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read */
 /* step_limit.cpp: no step goes through a contact, or loses a turn of an angle */
@@ -112,7 +112,7 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
 PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
-constexpr PetscInt recorded = 52; /* numbers by which a recording goes on */
+constexpr PetscInt recorded = 68; /* numbers by which a recording goes on */
 PetscErrorCode     SaveOutput(Runtime &R, double *x);
 PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
 /* triangle.cpp: one triangle of the matrix, MATSBAIJ, where nothing breaks its symmetry */

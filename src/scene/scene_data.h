@@ -83,6 +83,11 @@ struct ShapeData {
   Shape    shape;
 };
 
+struct SurfaceData {
+  PetscInt                       body;    /* a flexible one */
+  std::shared_ptr<const Surface> surface; /* read on the first rank alone */
+};
+
 /* What the start-up work has found */
 struct StartResult {
   struct Row {
@@ -114,6 +119,7 @@ struct SceneData {
   Vector3                     gravity = Vector3::Zero();
   std::vector<ChannelData>    channels;
   std::vector<ShapeData>      shapes;
+  std::vector<SurfaceData>    surfaces;
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
   std::vector<std::string>    errors; /* found while the scene was described */
   StartPolicy                 start; /* of setUp(), with options */

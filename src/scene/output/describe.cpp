@@ -38,6 +38,18 @@ void Scene::shape(Body body, const Shape &shape)
   s.shapes.push_back({body.id, shape});
 }
 
+void Scene::surface(Body body, std::shared_ptr<const Surface> surface)
+{
+  if (recording()) record([=](Scene &s) { s.surface(body, surface); });
+  SceneData &s = data();
+  s.refuseLate("surface of a body");
+  if (!s.valid(body) || !s.bodies[body.id].flexible) {
+    s.errors.push_back("surface: its body is not a flexible one of this scene");
+    return;
+  }
+  s.surfaces.push_back({body.id, std::move(surface)});
+}
+
 void Scene::line(const std::vector<Marker> &markers)
 {
   if (recording()) record([=](Scene &s) { s.line(markers); });

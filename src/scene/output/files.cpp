@@ -2,6 +2,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -53,6 +54,39 @@ PetscErrorCode ShortenFile(const std::string &file, long end, bool *there)
              "%s is shorter than when the checkpoint was written, %ld bytes in place of %ld: the run cannot go on in it. Give it another name, or remove it", file.c_str(),
              (long)info.st_size, end);
   PetscCheck(truncate(file.c_str(), end) == 0, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot go on in %s: %s", file.c_str(), std::strerror(errno));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode WriteWhole(const std::string &file, const std::string &text)
+{
+  const std::string part = file + ".part";
+  struct stat       info;
+  PetscFunctionBegin;
+  const bool special = stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode); /* what is no regular file, /dev/null say, is written to */
+  const char *name   = special ? file.c_str() : part.c_str();
+  errno     = 0;
+  FILE *out = std::fopen(name, "w");
+  PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write into %s: %s", file.c_str(), std::strerror(errno));
+  const bool written = std::fwrite(text.data(), 1, text.size(), out) == text.size() && std::fflush(out) == 0 && (special || fsync(fileno(out)) == 0);
+  int        why     = errno;
+  const bool closed  = std::fclose(out) == 0;
+  if (written && !closed) why = errno;
+  const bool renamed = written && closed && (special || std::rename(name, file.c_str()) == 0);
+  if (written && closed && !renamed) why = errno;
+  if (!renamed && !special) (void)std::remove(name);
+  PetscCheck(renamed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "writing into %s failed: %s", file.c_str(), std::strerror(why));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SyncFile(const std::string &file)
+{
+  struct stat info;
+  PetscFunctionBegin;
+  const int  f    = open(file.c_str(), O_RDONLY);
+  const bool good = f >= 0 && fstat(f, &info) == 0 && (!S_ISREG(info.st_mode) || fsync(f) == 0);
+  const int  why  = errno;
+  if (f >= 0) close(f);
+  PetscCheck(good, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "writing into %s failed: %s", file.c_str(), std::strerror(why));
   PetscFunctionReturn(0);
 }
 

@@ -91,7 +91,7 @@ PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
 
 PetscErrorCode ReadOptions(TS ts, OutputSettings &o)
 {
-  PetscReal rate = 0, dt = o.dt, animation_dt = o.animation_dt;
+  PetscReal rate = 0, dt = o.dt, animation_dt = o.animation_dt, page_dt = o.page_dt;
   char      file[PETSC_MAX_PATH_LEN] = "";
   PetscBool   set;
   const char *prefix;
@@ -116,18 +116,37 @@ PetscErrorCode ReadOptions(TS ts, OutputSettings &o)
   PetscCall(PetscOptionsReal("-scene_animation_dt", "Time between frames, 0: every step", "Scene::output", animation_dt, &animation_dt, nullptr));
   PetscCall(name("-scene_balance", "Energy and momentum at every step; a file, or printed", o.balance_file));
   if (set) o.balance = true;
+  PetscCall(name("-scene_page", "HTML page that shows the run", o.page));
+  PetscCall(PetscOptionsReal("-scene_page_dt", "Time between the page's frames, 0: as -scene_page_frames says", "Scene::output", page_dt, &page_dt, nullptr));
+  PetscCall(PetscOptionsInt("-scene_page_frames", "Frames of the page from the start to the final time", "Scene::output", o.page_frames, &o.page_frames, nullptr));
   PetscOptionsEnd();
+  PetscCheck(page_dt >= 0 && o.page_frames > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "-scene_page_dt %g must not be negative, -scene_page_frames %d must be positive", (double)page_dt, (int)o.page_frames);
   PetscCheck(dt >= 0 && animation_dt >= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "times between samples (%g) and frames (%g) must not be negative", (double)dt, (double)animation_dt);
   o.dt           = dt;
   o.animation_dt = animation_dt;
+  o.page_dt      = page_dt;
+  PetscFunctionReturn(0);
+}
+
+/* A page has so many frames in the time to the end; a run without an end has one at every step. */
+PetscErrorCode SpreadFrames(TS ts, OutputSettings &o)
+{
+  PetscReal t, end;
+  PetscFunctionBegin;
+  if (o.page.empty() || o.page_dt > 0) PetscFunctionReturn(0);
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TSGetMaxTime(ts, &end));
+  if (end > t && end < PETSC_MAX_REAL / 2) o.page_dt = (end - t) / o.page_frames;
+  PetscCall(PetscInfo(ts, "scene: a frame of the page every %g\n", (double)o.page_dt));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode MakeTasks(Recorder &r, const OutputSettings &o)
 {
   PetscFunctionBegin;
-  for (auto make : {MakeTable, MakeAnimation, MakeBalanceSheet}) {
+  for (auto make : {MakeTable, MakeAnimation, MakeBalanceSheet, MakePage}) {
     std::unique_ptr<Task> task;
     PetscCall(make(r.R, o, task));
     if (task) r.tasks.push_back(std::move(task));
@@ -159,7 +178,7 @@ static PetscErrorCode CheckDistances(const Recorder &r, TS ts)
   const double latest = end < PETSC_MAX_REAL / 2 ? std::max(std::abs(t), std::abs(end)) : std::abs(t), least = 16 * PETSC_MACHINE_EPSILON * latest;
   for (const auto &task : r.tasks)
     PetscCheck(task->dt == 0 || (task->dt > least && std::isfinite(task->dt)), r.R.scene.comm, PETSC_ERR_ARG_OUTOFRANGE,
-               "-scene_dt, -scene_animation_dt: samples cannot be %g apart in a run to t = %g; at least %g, or 0 for every step", task->dt, latest, least);
+               "-scene_dt, -scene_animation_dt, -scene_page_dt: samples cannot be %g apart in a run to t = %g; at least %g, or 0 for every step", task->dt, latest, least);
   PetscFunctionReturn(0);
 }
 
@@ -185,6 +204,7 @@ PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
   }
   PetscCall(ReadOptions(ts, o));
   auto r = std::make_shared<Recorder>(R);
+  PetscCall(SpreadFrames(ts, o));
   PetscCall(MakeTasks(*r, o));
   if (r->tasks.empty()) PetscFunctionReturn(0);
   PetscBool dense;

@@ -28,7 +28,7 @@ public:
 };
 
 /* Numbers of a checkpoint for each task */
-constexpr int task_slots = 3, task_numbers = 15;
+constexpr int task_slots = 4, task_numbers = 15;
 static_assert(recorded >= 4 + task_slots * (task_numbers + 1), "room for all tasks");
 
 struct Recorder {
@@ -48,6 +48,7 @@ struct Recorder {
 PetscErrorCode MakeTable(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task);     /* table.cpp */
 PetscErrorCode MakeAnimation(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* animation.cpp */
 PetscErrorCode MakeBalanceSheet(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* balance.cpp */
+PetscErrorCode MakePage(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task);      /* page.cpp */
 
 } // namespace hhtdae
 

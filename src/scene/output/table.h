@@ -2,7 +2,7 @@
 #ifndef HHTDAE_SCENE_OUTPUT_TABLE_H
 #define HHTDAE_SCENE_OUTPUT_TABLE_H
 
-#include <petscsys.h>
+#include "scene/output/files.h"
 #include <string>
 #include <vector>
 
@@ -19,13 +19,10 @@ struct TableHead {
 };
 
 /* first: begins the file anew. *end: its length then. */
-PetscErrorCode AppendText(const std::string &file, bool first, const std::string &text, long *end);
 PetscErrorCode AppendCSV(const std::string &file, bool first, const TableHead &head, const Block &block, long *end);
 PetscErrorCode AppendHDF5(const std::string &file, bool first, const TableHead &head, const Block &block);
 
-/* Where a run goes on that was recorded up to so many bytes or rows: what was written later is dropped. *there: whether the file is; a
-   run may be resumed with another one, which then begins there. A file that is too short is an error. */
-PetscErrorCode ShortenFile(const std::string &file, long end, bool *there);
+/* ShortenFile() by rows */
 PetscErrorCode ShortenHDF5(const std::string &file, std::size_t rows, const TableHead &head, bool *there);
 
 } // namespace hhtdae

@@ -1,0 +1,124 @@
+/*
+  The surface of a reduced body's mesh, for the page of a scene: faces that belong to one element alone, as triangles between their corners. The
+  first rank has it whole; the others send it their elements and their nodes' rows.
+*/
+#include "flexible/exchange.h"
+#include "hhtdae/flexible.h"
+#include <algorithm>
+#include <array>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* Corners counter-clockwise from outside, the first again where there are three */
+constexpr int tetrahedron[4][4] = {{0, 2, 1, 0}, {0, 1, 3, 0}, {0, 3, 2, 0}, {1, 2, 3, 1}};
+constexpr int brick[6][4]       = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+
+struct Face {
+  std::array<PetscInt, 4> key, corner; /* key: the same for both elements at it */
+  bool                    operator<(const Face &f) const { return key < f.key; }
+};
+
+std::vector<Face> OuterFaces(const std::vector<FeElement> &elements)
+{
+  std::vector<Face> all, outer;
+  for (const FeElement &e : elements) {
+    const bool solid_of_six = e.type == ElementType::Brick8 || e.type == ElementType::Brick20;
+    for (int f = 0; f < (solid_of_six ? 6 : 4); f++) {
+      Face face;
+      for (int k = 0; k < 4; k++) face.corner[k] = e.node[solid_of_six ? brick[f][k] : tetrahedron[f][k]];
+      face.key = face.corner;
+      std::sort(face.key.begin(), face.key.begin() + (solid_of_six ? 4 : 3));
+      if (!solid_of_six) face.key[3] = -1;
+      all.push_back(face);
+    }
+  }
+  std::sort(all.begin(), all.end());
+  for (std::size_t k = 0; k < all.size();) {
+    std::size_t next = k + 1;
+    while (next < all.size() && all[next].key == all[k].key) next++;
+    if (next == k + 1) outer.push_back(all[k]);
+    k = next;
+  }
+  return outer;
+}
+
+/* Triangles by places in `node`, the sorted nodes of the surface */
+void Triangulate(const std::vector<Face> &faces, std::vector<PetscInt> *node, std::vector<int> *triangle)
+{
+  for (const Face &f : faces) node->insert(node->end(), f.corner.begin(), f.corner.end());
+  std::sort(node->begin(), node->end());
+  node->erase(std::unique(node->begin(), node->end()), node->end());
+  const auto place = [&](PetscInt n) { return (int)(std::lower_bound(node->begin(), node->end(), n) - node->begin()); };
+  for (const Face &f : faces) {
+    for (int k : {0, 1, 2}) triangle->push_back(place(f.corner[k]));
+    if (f.key[3] >= 0)
+      for (int k : {0, 2, 3}) triangle->push_back(place(f.corner[k]));
+  }
+}
+
+/* What the surface takes of this rank's nodes */
+struct Rows {
+  std::vector<double> point;
+  std::vector<float>  shape, stress;
+};
+
+Rows OwnRows(const ReducedBody &b, const std::vector<PetscInt> &node)
+{
+  Rows       r;
+  const auto begin = std::lower_bound(node.begin(), node.end(), b.first), end = std::lower_bound(node.begin(), node.end(), b.first + b.own);
+  for (auto n = begin; n != end; ++n) {
+    const PetscInt own = *n - b.first;
+    r.point.insert(r.point.end(), &b.coordinates[3 * (std::size_t)own], &b.coordinates[3 * (std::size_t)own] + 3);
+    for (int c = 0; c < 3; c++)
+      for (Eigen::Index k = 0; k < b.shape.cols(); k++) r.shape.push_back((float)b.shape(3 * own + c, k));
+    const auto at = std::lower_bound(b.stress.node.begin(), b.stress.node.end(), own);
+    if (at == b.stress.node.end() || *at != own) continue;
+    for (int c = 0; c < 6; c++)
+      for (Eigen::Index k = 0; k < b.stress.values.cols(); k++) r.stress.push_back((float)b.stress.values(6 * (at - b.stress.node.begin()) + c, k));
+  }
+  return r;
+}
+
+using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+} // namespace
+
+PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface)
+{
+  PetscMPIInt              rank;
+  std::vector<FeElement>   elements;
+  std::vector<std::size_t> of;
+  std::vector<PetscInt>    node;
+  std::vector<float>       shape, stress;
+  PetscInt64               count[2] = {body.own, (PetscInt64)body.elements.size()};
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(body.comm, &rank));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT64, MPI_SUM, body.comm));
+  std::string error;
+  if (!count[1]) error = "body " + body.modal.name + " has no elements: its surface is not known";
+  else if (!count[0] || body.coordinates.size() != 3 * (std::size_t)body.own || body.shape.rows() != 3 * body.own || body.shape.cols() != body.modal.modes())
+    error = "body " + body.modal.name + " has no modes at its nodes: it has to be reduced with all nodes for its surface to be shown";
+  PetscCall(Agree(body.comm, error, PETSC_ERR_ARG_INCOMP));
+  *surface = Surface();
+  PetscCall(GatherTo0(body.comm, body.elements.data(), body.elements.size(), &elements, &of));
+  if (!rank) Triangulate(OuterFaces(elements), &node, &surface->triangle);
+  PetscInt nodes = (PetscInt)node.size();
+  PetscCallMPI(MPI_Bcast(&nodes, 1, MPIU_INT, 0, body.comm));
+  node.resize(nodes);
+  PetscCallMPI(MPI_Bcast(node.data(), (PetscMPIInt)nodes, MPIU_INT, 0, body.comm));
+  const Rows own = OwnRows(body, node);
+  PetscCall(GatherTo0(body.comm, own.point.data(), own.point.size(), &surface->point, &of));
+  PetscCall(GatherTo0(body.comm, own.shape.data(), own.shape.size(), &shape, &of));
+  PetscCall(GatherTo0(body.comm, own.stress.data(), own.stress.size(), &stress, &of));
+  if (rank) PetscFunctionReturn(0);
+  const Eigen::Index modes = body.modal.modes();
+  surface->shape = Eigen::Map<const RowMajor>(shape.data(), 3 * nodes, modes);
+  if (!stress.empty() && stress.size() == (std::size_t)(6 * nodes * modes)) surface->stress = Eigen::Map<const RowMajor>(stress.data(), 6 * nodes, modes);
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

@@ -1,0 +1,15 @@
+/* Bytes as text, RFC 4648: in VTK's XML files and in pages. */
+#ifndef HHTDAE_SCENE_OUTPUT_BASE64_H
+#define HHTDAE_SCENE_OUTPUT_BASE64_H
+
+#include <cstddef>
+#include <string>
+
+namespace hhtdae
+{
+
+std::string Base64(const unsigned char *data, std::size_t n);
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,224 @@
+/*
+  -scene_page: one HTML file that shows the run in three dimensions. The page, the description of the scene and the surfaces of flexible bodies
+  are written at the first frame, beside and renamed when they are on the disk; blocks of frames are appended, so that the file is whole after
+  each of them and a run that is killed leaves what it had. Every rank packs what it owns of a frame, the first rank writes.
+*/
+#include "scene/output/channels.h"
+#include "scene/output/files.h"
+#include "scene/output/page_assets.h"
+#include "scene/output/page_description.h"
+#include "scene/output/page_frames.h"
+#include "scene/output/page_surface.h"
+#include "scene/output/recorder.h"
+#include "scene/output/table.h"
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr std::size_t pose_size = 7; /* position of the centre of mass, quaternion x, y, z, w */
+
+class Page : public Task
+{
+public:
+  Page(Runtime &R, const OutputSettings &o) : Task(o.page_dt), file_(o.page), title_(o.page_title)
+  {
+    const std::size_t slash = file_.find_last_of('/');
+    if (title_.empty()) title_ = slash == std::string::npos ? file_ : file_.substr(slash + 1);
+    from_equations = ChannelsFollowFromEquations(R);
+    placeAll(R);
+  }
+
+  PetscErrorCode begin(Runtime &R)
+  {
+    std::string fault;
+    PetscMPIInt wrong = 0;
+    PetscFunctionBegin;
+    if (R.rank == 0)
+      for (const SurfaceData &d : R.scene.surfaces) {
+        const BodyData &b = R.scene.bodies[d.body];
+        if (fault.empty()) fault = d.surface ? SurfaceFault(*d.surface, *b.flexible->model) : "the first rank has none";
+        if (!fault.empty() && !wrong++) fault = "surface of " + b.name + ": " + fault;
+      }
+    PetscCallMPI(MPI_Bcast(&wrong, 1, MPI_INT, 0, R.scene.comm));
+    PetscCheck(!wrong, R.scene.comm, PETSC_ERR_ARG_INCOMP, "%s", fault.c_str());
+    if (R.rank == 0) {
+      std::vector<std::size_t> nodes;
+      for (const SurfaceData &d : R.scene.surfaces)
+        if (HasStress(*d.surface)) nodes.push_back(d.surface->point.size() / 3);
+      frames_ = PageFrames(tracks_, R.scene.channels.size(), nodes);
+      stress_.resize(nodes.size());
+    }
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode record(Runtime &R, Evaluation &e) override
+  {
+    std::vector<double> frame;
+    PetscFunctionBegin;
+    PetscCall(gather(R, e, frame));
+    if (R.rank) PetscFunctionReturn(0);
+    if (!there_) PetscCall(writeHead(R.scene));
+    continueQuaternions(frame, R.scene.bodies.size());
+    std::size_t field = 0;
+    for (const SurfaceData &d : R.scene.surfaces)
+      if (HasStress(*d.surface)) SurfaceStress(*d.surface, &frame[modal_[d.body]], &stress_[field++]);
+    frames_.add(e.t, frame.data(), frame.data() + tracks_, stress_);
+    if (frames_.full()) PetscCall(writeFrames());
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode finish(Runtime &R) override
+  {
+    PetscFunctionBegin;
+    if (R.rank || !there_) PetscFunctionReturn(0);
+    PetscCall(writeFrames());
+    PetscCall(SyncFile(file_));
+    PetscFunctionReturn(0);
+  }
+
+  int slot() const override { return 3; }
+
+  PetscErrorCode save(Runtime &R, double *x) override
+  {
+    PetscFunctionBegin;
+    if (R.rank == 0) PetscCall(writeFrames());
+    x[0] = (double)end_;
+    x[1] = dt;
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode resume(Runtime &R, const double *x) override
+  {
+    PetscFunctionBegin;
+    end_ = (long)x[0];
+    dt   = x[1];
+    if (R.rank == 0 && end_) PetscCall(ShortenFile(file_, end_, &there_));
+    PetscFunctionReturn(0);
+  }
+
+private:
+  std::string                           file_, title_;
+  std::vector<std::vector<std::size_t>> place_; /* in a frame, of what every rank packs */
+  std::vector<std::size_t>              modal_; /* of the modal coordinates of every body in a frame */
+  std::size_t                           tracks_ = 0;
+  PageFrames                            frames_; /* this and the next two: on the first rank */
+  std::vector<std::vector<float>>       stress_;
+  std::vector<double>                   last_; /* quaternions of the last frame */
+  bool                                  there_ = false;
+  long                                  end_   = 0; /* bytes of the file */
+
+  static PetscMPIInt ownerOf(const Runtime &R, std::size_t body) { return R.number.owner.empty() ? 0 : R.number.owner[body]; }
+
+  /* A frame: poses of all bodies, modal coordinates of the flexible ones, channels */
+  void placeAll(const Runtime &R)
+  {
+    const std::vector<BodyData> &bodies = R.scene.bodies;
+    place_.resize(R.size);
+    const auto put = [&](PetscMPIInt rank, std::size_t n) {
+      for (std::size_t k = 0; k < n; k++) place_[rank].push_back(tracks_++);
+    };
+    for (std::size_t b = 0; b < bodies.size(); b++) put(ownerOf(R, b), pose_size);
+    for (std::size_t b = 0; b < bodies.size(); b++) {
+      modal_.push_back(tracks_);
+      if (bodies[b].flexible) put(ownerOf(R, b), (std::size_t)bodies[b].flexible->model->modes());
+    }
+    for (std::size_t c = 0; c < ChannelOwners(R).size(); c++) place_[ChannelOwners(R)[c]].push_back(tracks_ + c);
+  }
+
+  PetscErrorCode pack(const Runtime &R, const Evaluation &e, std::vector<double> &mine) const
+  {
+    PetscFunctionBegin;
+    for (std::size_t b = 0; b < R.scene.bodies.size(); b++) {
+      if (ownerOf(R, b) != R.rank) continue;
+      const BodyMotion        &m = R.bodies.now[R.local_body[b]];
+      const Eigen::Quaterniond q(m.A);
+      for (double x : {m.r(0), m.r(1), m.r(2), q.x(), q.y(), q.z(), q.w()}) mine.push_back(x);
+    }
+    for (std::size_t b = 0; b < R.scene.bodies.size(); b++) {
+      const BodyData &d = R.scene.bodies[b];
+      if (ownerOf(R, b) != R.rank || !d.flexible) continue;
+      const double *eta = e.u + R.bodies.body[R.local_body[b]].first + 6;
+      mine.insert(mine.end(), eta, eta + d.flexible->model->modes());
+    }
+    PetscCall(ChannelValues(R, e, mine));
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode gather(const Runtime &R, const Evaluation &e, std::vector<double> &frame) const
+  {
+    std::vector<double> mine, all;
+    std::vector<int>    count(R.size), start(R.size + 1, 0);
+    PetscFunctionBegin;
+    PetscCall(pack(R, e, mine));
+    for (PetscMPIInt r = 0; r < R.size; r++) {
+      count[r]     = (int)place_[r].size();
+      start[r + 1] = start[r] + count[r];
+    }
+    if (R.rank == 0) all.resize(start[R.size]);
+    PetscCallMPI(MPI_Gatherv(mine.data(), (int)mine.size(), MPI_DOUBLE, all.data(), count.data(), start.data(), MPI_DOUBLE, 0, R.scene.comm));
+    frame.resize(all.size());
+    const double *x = all.data();
+    if (R.rank == 0)
+      for (const auto &places : place_)
+        for (std::size_t k : places) frame[k] = *x++;
+    PetscFunctionReturn(0);
+  }
+
+  /* Of the two quaternions of a rotation the one nearer to that of the frame before: tracks without jumps compress better. */
+  void continueQuaternions(std::vector<double> &frame, std::size_t bodies)
+  {
+    last_.resize(4 * bodies, 0);
+    for (std::size_t b = 0; b < bodies; b++) {
+      Eigen::Map<Eigen::Vector4d> now(&frame[pose_size * b + 3]), last(&last_[4 * b]);
+      if (now.dot(last) < 0) now = -now;
+      last = now;
+    }
+  }
+
+  PetscErrorCode writeHead(const SceneData &s)
+  {
+    std::string head = PageHead(), element;
+    PetscFunctionBegin;
+    head += "<script id=\"scene\" type=\"application/json\">" + DescribePage(s, title_) + "</script>\n";
+    for (const SurfaceData &d : s.surfaces) {
+      PetscCall(PageElement(EncodeSurface(*d.surface, *s.bodies[d.body].flexible->model), "surface", &element));
+      head += element;
+    }
+    PetscCall(WriteWhole(file_, head));
+    end_   = (long)head.size();
+    there_ = true;
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode writeFrames()
+  {
+    std::string element;
+    PetscFunctionBegin;
+    if (!frames_.frames()) PetscFunctionReturn(0);
+    PetscCall(PageElement(frames_.encode(), "frames", &element));
+    PetscCall(AppendText(file_, false, element, &end_));
+    frames_.clear();
+    last_.clear();
+    PetscFunctionReturn(0);
+  }
+};
+
+} // namespace
+
+PetscErrorCode MakePage(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task)
+{
+  PetscFunctionBegin;
+  if (o.page.empty()) PetscFunctionReturn(0);
+  PetscCheck(!PageHead().empty(), R.scene.comm, PETSC_ERR_SUP, "cannot write the page %s: the library was built without %s", o.page.c_str(), PageLacks());
+  PetscCheck(R.scene.channels.size() == ChannelOwners(R).size(), R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
+             "channel %s came too late: the scene is fixed from createTS() or setUp() on", R.scene.channels.back().name.c_str());
+  auto page = std::make_unique<Page>(R, o);
+  PetscCall(page->begin(R));
+  task = std::move(page);
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

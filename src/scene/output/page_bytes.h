@@ -1,0 +1,64 @@
+/*
+  What a page holds as binary data: little-endian bytes, compressed by zlib and written in base64, each sequence in a script element of
+  its own that no browser runs.
+*/
+#ifndef HHTDAE_SCENE_OUTPUT_PAGE_BYTES_H
+#define HHTDAE_SCENE_OUTPUT_PAGE_BYTES_H
+
+#include <cstdint>
+#include <cstring>
+#include <petscsys.h>
+#include <string>
+#include <vector>
+
+namespace hhtdae
+{
+
+class PageBytes
+{
+public:
+  std::vector<unsigned char> all;
+
+  void u8(unsigned char x) { all.push_back(x); }
+  void u32(std::uint32_t x) { whole(x); }
+  void f32(float x)
+  {
+    std::uint32_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    whole(bits);
+  }
+  void f64(double x)
+  {
+    std::uint64_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    whole(bits);
+  }
+  /* Bytes of equal weight stand together: those of slowly varying numbers compress far better so. */
+  void planes(const std::vector<std::uint16_t> &x) { inPlanes(x); }
+  void planes(const std::vector<std::uint32_t> &x) { inPlanes(x); }
+
+private:
+  template <class T> void whole(T x)
+  {
+    for (std::size_t k = 0; k < sizeof x; k++) all.push_back((unsigned char)(x >> 8 * k));
+  }
+  template <class T> void inPlanes(const std::vector<T> &x)
+  {
+    for (std::size_t k = 0; k < sizeof(T); k++)
+      for (T v : x) all.push_back((unsigned char)(v >> 8 * k));
+  }
+};
+
+/* The element of the page; kind: "frames" */
+PetscErrorCode PageElement(const PageBytes &bytes, const std::string &kind, std::string *element);
+
+/* A difference as a whole number that is small where it is small in magnitude: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... */
+inline std::uint16_t ZigZag(std::uint16_t difference)
+{
+  const std::uint16_t negative = difference & 0x8000 ? 0xffff : 0;
+  return (std::uint16_t)((unsigned)difference << 1 ^ negative);
+}
+
+} // namespace hhtdae
+
+#endif

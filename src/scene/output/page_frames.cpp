@@ -1,0 +1,129 @@
+#include "scene/output/page_frames.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+constexpr std::size_t   most_frames = 128;     /* of a block: a page that is killed loses no more */
+constexpr std::size_t   most_bytes  = 8 << 20; /* of a block in memory */
+constexpr double        levels      = 65534;   /* codes 0 to 65534 */
+constexpr std::uint16_t missing     = 65535;
+
+struct Range {
+  double low = 0, step = 0;
+};
+
+/* Of the finite values */
+Range RangeOf(const std::vector<double> &x)
+{
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (double v : x)
+    if (std::isfinite(v)) {
+      low  = std::min(low, v);
+      high = std::max(high, v);
+    }
+  if (!(high >= low)) return {};
+  return {low, high / levels - low / levels}; /* the difference itself might overflow */
+}
+
+std::uint16_t Code(double x, const Range &r)
+{
+  if (!std::isfinite(x)) return missing;
+  return r.step > 0 ? (std::uint16_t)std::min(levels, std::round((x - r.low) / r.step)) : 0;
+}
+
+} // namespace
+
+void PageFrames::add(double time, const double *tracks, const double *channels, const std::vector<std::vector<float>> &fields)
+{
+  time_.push_back(time);
+  track_.insert(track_.end(), tracks, tracks + tracks_);
+  for (std::size_t c = 0; c < channels_; c++) channel_.push_back((float)channels[c]);
+  for (std::size_t f = 0; f < field_.size(); f++) field_[f].insert(field_[f].end(), fields[f].begin(), fields[f].end());
+}
+
+bool PageFrames::full() const
+{
+  std::size_t bytes = sizeof(double) * track_.size() + sizeof(float) * channel_.size();
+  for (const std::vector<float> &f : field_) bytes += sizeof(float) * f.size();
+  return time_.size() >= most_frames || bytes >= most_bytes;
+}
+
+void PageFrames::clear()
+{
+  time_.clear();
+  track_.clear();
+  channel_.clear();
+  for (std::vector<float> &f : field_) f.clear();
+}
+
+PageBytes PageFrames::encode() const
+{
+  PageBytes out;
+  out.u32((std::uint32_t)time_.size());
+  for (double t : time_) out.f64(t);
+  encodeTracks(out);
+  encodeChannels(out);
+  for (std::size_t f = 0; f < field_.size(); f++) encodeField(f, out);
+  return out;
+}
+
+void PageFrames::encodeTracks(PageBytes &out) const
+{
+  const std::size_t          n = time_.size();
+  std::vector<double>        track(n);
+  std::vector<std::uint16_t> code;
+  code.reserve(n * tracks_);
+  for (std::size_t k = 0; k < tracks_; k++) {
+    for (std::size_t i = 0; i < n; i++) track[i] = track_[i * tracks_ + k];
+    const Range r = RangeOf(track);
+    out.f64(r.low);
+    out.f64(r.step);
+    std::uint16_t before = 0;
+    for (double x : track) {
+      const std::uint16_t now = Code(x, r);
+      code.push_back(ZigZag((std::uint16_t)(now - before)));
+      before = now;
+    }
+  }
+  out.planes(code);
+}
+
+void PageFrames::encodeChannels(PageBytes &out) const
+{
+  std::vector<std::uint32_t> bits;
+  bits.reserve(channel_.size());
+  for (std::size_t c = 0; c < channels_; c++)
+    for (std::size_t i = 0; i < time_.size(); i++) {
+      std::uint32_t x;
+      std::memcpy(&x, &channel_[i * channels_ + c], sizeof x);
+      bits.push_back(x);
+    }
+  out.planes(bits);
+}
+
+void PageFrames::encodeField(std::size_t field, PageBytes &out) const
+{
+  const std::vector<float> &x = field_[field];
+  const std::size_t         n = time_.size(), nodes = nodes_[field];
+  float                     largest = 0;
+  for (float v : x)
+    if (std::isfinite(v)) largest = std::max(largest, v);
+  out.f32(largest);
+  for (std::size_t k = 0; k < nodes; k++) {
+    unsigned char before = 0;
+    for (std::size_t i = 0; i < n; i++) {
+      const float         v   = x[i * nodes + k];
+      const unsigned char now = largest > 0 && v > 0 ? (unsigned char)std::lround(255 * std::min(1.f, v / largest)) : 0;
+      out.u8((unsigned char)(now - before));
+      before = now;
+    }
+  }
+}
+
+} // namespace hhtdae

@@ -1,0 +1,31 @@
+/* Surfaces of flexible bodies in a page: what it holds of the mesh and its modes, and the stress at its nodes. */
+#ifndef HHTDAE_SCENE_OUTPUT_PAGE_SURFACE_H
+#define HHTDAE_SCENE_OUTPUT_PAGE_SURFACE_H
+
+#include "hhtdae/modal.h"
+#include "hhtdae/output.h"
+#include "scene/output/page_bytes.h"
+
+namespace hhtdae
+{
+
+/* What is wrong with it, empty if nothing */
+std::string SurfaceFault(const Surface &s, const ModalBody &m);
+
+/*
+    u32 nodes, triangles, modes
+    f32 coordinates from the undeformed centre of mass, in planes;  u32 nodes of the triangles, in planes
+    f32 step of every mode;  codes of each mode, its x, y, z one after the other: u16 in zigzag order, in planes; displacement = step * code
+
+  A force of given size deflects the body in mode k in proportion to 1/omega_k^2, so that the codes get coarser by that factor: displacements that
+  matter equally are kept equally well. The slowest mode has 8,191 levels to each side, none has less than 31.
+*/
+PageBytes EncodeSurface(const Surface &s, const ModalBody &m);
+
+/* von Mises stress at the nodes, for modal coordinates eta */
+inline bool HasStress(const Surface &s) { return s.stress.size() > 0; }
+void        SurfaceStress(const Surface &s, const double *eta, std::vector<float> *von_mises);
+
+} // namespace hhtdae
+
+#endif

@@ -1,0 +1,36 @@
+/* Numbers as people read them. */
+
+const superscript = n => String(n).replace(/[-0-9]/g, c => c === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[c]);
+
+function formatNumber(x, digits = 4) {
+  if (!Number.isFinite(x)) return '–';
+  if (x === 0) return '0';
+  const size = Math.abs(x);
+  if (size < 1e-3 || size >= 1e5) {
+    const [m, e] = x.toExponential(digits - 1).split('e');
+    return m.replace(/\.?0+$/, '').replace('-', '−') + '·10' + superscript(Number(e));
+  }
+  return x.toPrecision(digits).replace(/(\.[0-9]*?)0+$/, '$1').replace(/\.$/, '').replace('-', '−');
+}
+
+/* With a prefix where the unit takes one: "123 MPa" */
+function formatWithUnit(x, unit, digits = 4) {
+  if (/^(Pa|N|W|J|Hz)$/.test(unit) && Math.abs(x) >= 1e3) {
+    const power = Math.min(4, Math.floor(Math.log10(Math.abs(x)) / 3));
+    return formatNumber(x / 10 ** (3 * power), digits) + ' ' + ' kMGT'[power] + unit;
+  }
+  return formatNumber(x, digits) + (unit ? ' ' + unit : '');
+}
+
+/* Round distances for about `count` intervals: 1, 2 or 5 times a power of ten */
+function roundStep(range, count) {
+  const rough = range / count, power = 10 ** Math.floor(Math.log10(rough));
+  for (const m of [1, 2, 5, 10]) if (m * power >= rough) return m * power;
+}
+
+function ticks(low, high, count) {
+  const step = roundStep(high - low, count), list = [];
+  if (!(step > 0)) return [low];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) list.push(k * step);
+  return list;
+}

@@ -1,0 +1,119 @@
+/* A plot over time on a canvas, with a cursor at the time shown; dragging on it moves the time. */
+
+const seriesColours = ['#1f6feb', '#d9730d', '#2a9d5c'];
+
+class Plot {
+  /* series: [{name, value: array over the frames}]; scrub(t) is called when the cursor is moved */
+  constructor(time, title, unit, series, scrub) {
+    Object.assign(this, {time, title, unit, series});
+    this.element = document.createElement('figure');
+    this.element.className = 'plot';
+    this.element.innerHTML = '<figcaption><span class="name"></span><span class="value"></span></figcaption><div class="key"></div><canvas role="img"></canvas>';
+    this.element.querySelector('.name').textContent = title;
+    this.canvas = this.element.querySelector('canvas');
+    this.canvas.setAttribute('aria-label', title + ' over time' + (unit ? ' in ' + unit : ''));
+    this.measure();
+    const move = e => {
+      const box = this.canvas.getBoundingClientRect(), [t0, t1] = this.timeRange();
+      scrub(t0 + (t1 - t0) * Math.min(1, Math.max(0, (e.clientX - box.left - this.left) / (box.width - this.left - this.right))));
+    };
+    this.canvas.addEventListener('pointerdown', e => { this.canvas.setPointerCapture(e.pointerId); move(e); });
+    this.canvas.addEventListener('pointermove', e => { if (e.buttons) move(e); });
+  }
+
+  timeRange() { return [this.time[0], this.time[this.time.length - 1]]; }
+
+  /* Range of the values, a little wider than they are */
+  measure() {
+    let low = Infinity, high = -Infinity;
+    for (const s of this.series)
+      for (const x of s.value)
+        if (Number.isFinite(x)) {
+          if (x < low) low = x;
+          if (x > high) high = x;
+        }
+    if (low > high) [low, high] = [0, 1];
+    const size = Math.max(Math.abs(low), Math.abs(high)), margin = high - low > 1e-6 * size ? 0.06 * (high - low) : 0.1 * size || 1;
+    this.low = low - margin;
+    this.high = high + margin;
+  }
+
+  valueAt(s, k, part) { return part ? s.value[k] * (1 - part) + s.value[k + 1] * part : s.value[k]; }
+
+  draw(t, place) {
+    const ratio = window.devicePixelRatio || 1, width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!width || !height) return;
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
+      this.canvas.width = Math.round(width * ratio);
+      this.canvas.height = Math.round(height * ratio);
+    }
+    const g = this.canvas.getContext('2d'), style = getComputedStyle(document.documentElement), colour = name => style.getPropertyValue(name).trim();
+    g.setTransform(ratio, 0, 0, ratio, 0, 0);
+    g.clearRect(0, 0, width, height);
+    g.font = '11px system-ui, "Liberation Sans", sans-serif';
+    const marks = ticks(this.low, this.high, 4), labels = marks.map(x => formatNumber(Math.abs(x) < 1e-9 * (this.high - this.low) ? 0 : x, 4));
+    this.left = 8 + Math.max(...labels.map(l => g.measureText(l).width));
+    this.right = 8;
+    const top = 6, bottom = 18, [t0, t1] = this.timeRange();
+    const x = time => this.left + (width - this.left - this.right) * (t1 > t0 ? (time - t0) / (t1 - t0) : 0.5);
+    const y = value => top + (height - top - bottom) * (this.high - value) / (this.high - this.low);
+    g.lineWidth = 1;
+    g.strokeStyle = colour('--rule');
+    g.fillStyle = colour('--faint');
+    g.textAlign = 'right';
+    g.textBaseline = 'middle';
+    marks.forEach((m, i) => {
+      g.beginPath();
+      g.moveTo(this.left, Math.round(y(m)) + 0.5);
+      g.lineTo(width - this.right, Math.round(y(m)) + 0.5);
+      g.stroke();
+      g.fillText(labels[i], this.left - 4, y(m));
+    });
+    g.textBaseline = 'alphabetic';
+    for (const m of ticks(t0, t1, Math.max(2, Math.floor(width / 90)))) {
+      const label = formatNumber(Math.abs(m) < 1e-9 * (t1 - t0) ? 0 : m, 4), half = g.measureText(label).width / 2;
+      g.textAlign = 'center';
+      g.fillText(label, Math.min(width - half - 1, Math.max(half, x(m))), height - 4);
+    }
+    this.series.forEach((s, i) => {
+      g.strokeStyle = seriesColours[i % seriesColours.length];
+      g.lineWidth = 1.4;
+      g.beginPath();
+      let down = false;
+      for (let k = 0; k < this.time.length; k++) {
+        const on = Number.isFinite(s.value[k]);
+        if (on) g[down ? 'lineTo' : 'moveTo'](x(this.time[k]), y(s.value[k]));
+        down = on;
+      }
+      g.stroke();
+    });
+    this.drawCursor(g, t, place, x, y, top, height - bottom, colour('--ink'));
+  }
+
+  drawCursor(g, t, [k, part], x, y, top, bottom, ink) {
+    g.strokeStyle = ink;
+    g.lineWidth = 1;
+    g.beginPath();
+    g.moveTo(x(t), top);
+    g.lineTo(x(t), bottom);
+    g.stroke();
+    const now = this.series.map(s => this.valueAt(s, k, part));
+    now.forEach((v, i) => {
+      if (!Number.isFinite(v)) return;
+      g.fillStyle = seriesColours[i % seriesColours.length];
+      g.beginPath();
+      g.arc(x(t), y(v), 3, 0, 2 * Math.PI);
+      g.fill();
+    });
+    const value = this.element.querySelector('.value'), key = this.element.querySelector('.key');
+    if (this.series.length === 1) value.textContent = formatWithUnit(now[0], this.unit);
+    else {
+      value.textContent = this.unit;
+      while (key.children.length < now.length) key.append(document.createElement('span'));
+      now.forEach((v, i) => {
+        key.children[i].textContent = this.series[i].name + ' ' + formatNumber(v);
+        key.children[i].style.color = seriesColours[i % seriesColours.length];
+      });
+    }
+  }
+}

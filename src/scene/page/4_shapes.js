@@ -1,0 +1,45 @@
+/* Geometries of shapes, joints and springs. Lengths are the scene's; `size` is the extent of the scene at its first frame. */
+
+const bodyColours = ['#4e79a7', '#f28e2b', '#59a14f', '#b07aa1', '#e15759', '#3fa7a3', '#d4a72c', '#9c755f', '#e377a2', '#7f9b4a'];
+
+const zUp = geometry => geometry.rotateX(Math.PI / 2); /* three.js has the axes of cylinders along y */
+
+function shapeGeometry(shape, guess, reach) {
+  let [a, b, c] = shape.size;
+  if (guess) [a, b, c] = shape.size.map(x => Math.min(Math.max(x, 0.08 * reach), reach));
+  if (shape.kind === 'box') return new THREE.BoxBufferGeometry(2 * a, 2 * b, 2 * c);
+  if (shape.kind === 'cylinder') return zUp(new THREE.CylinderBufferGeometry(a, a, 2 * c, 40));
+  return new THREE.SphereBufferGeometry(1, 36, 24).scale(a, b, c);
+}
+
+/* A coil of length one along y */
+function coilGeometry(radius, length) {
+  const turns = 9, wire = 0.16 * radius;
+  class Coil extends THREE.Curve {
+    getPoint(s) {
+      const u = Math.min(1, Math.max(0, (s - 0.1) / 0.8)), r = radius * Math.min(1, 12 * Math.min(u, 1 - u)), a = 2 * Math.PI * turns * u;
+      return new THREE.Vector3(r * Math.cos(a), (s - 0.5) * length, r * Math.sin(a));
+    }
+  }
+  return new THREE.TubeBufferGeometry(new Coil(), 24 * turns, wire, 6).scale(1, 1 / length, 1);
+}
+
+/* What stands for a joint, z along the axis of its marker; null: nothing */
+function jointGeometry(type, s) {
+  if (/revolute|cylindrical|screw/.test(type)) return zUp(new THREE.CylinderBufferGeometry(0.75 * s, 0.75 * s, 2.6 * s, 24));
+  if (/spherical|universal|constant velocity/.test(type)) return new THREE.SphereBufferGeometry(s, 24, 16);
+  if (/translational/.test(type)) return new THREE.BoxBufferGeometry(1.3 * s, 1.3 * s, 3 * s);
+  return null;
+}
+
+/* Colours of stress from none to the largest */
+const stressStops = [[0, '#30408f'], [0.15, '#3f7fd6'], [0.32, '#35b6c9'], [0.5, '#58c865'], [0.68, '#d8d62f'], [0.84, '#f28a22'], [1, '#c5141d']];
+const stressTable = (() => {
+  const table = [], a = new THREE.Color();
+  for (let i = 0; i < 256; i++) {
+    const x = i / 255, k = Math.max(1, stressStops.findIndex(s => s[0] >= x)), [x0, c0] = stressStops[k - 1], [x1, c1] = stressStops[k];
+    a.set(c0).lerp(new THREE.Color(c1), (x - x0) / (x1 - x0));
+    table.push([a.r, a.g, a.b]);
+  }
+  return table;
+})();

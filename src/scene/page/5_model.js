@@ -1,0 +1,297 @@
+/* The scene in three dimensions: built once from the description, then moved to any time of the run. */
+
+class Model {
+  constructor(run) {
+    this.run = run;
+    this.scene3 = new THREE.Scene();
+    this.bodies = run.scene.bodies.map((body, k) => {
+      const group = new THREE.Group();
+      group.userData.body = k;
+      this.scene3.add(group);
+      return group;
+    });
+    this.ground = new THREE.Group();
+    this.scene3.add(this.ground);
+    this.symbols = []; /* of joints */
+    this.spans = [];   /* what stretches between two places: {a, b, mesh} */
+    this.first = run.frame.length ? run.frame.find(f => f.slice(0, 7 * this.bodies.length).every(Number.isFinite)) || run.frame[0] : null;
+    this.findOrigin();
+    this.size = this.extentAtStart();
+    this.addLights();
+    this.addBodies();
+    this.addLines();
+    this.addElements();
+    this.addSurfaces();
+    this.findBounds();
+  }
+
+  /* ---- places ---- */
+
+  /* Coordinates are shown from the first body: single precision, in which graphics work, would shake far from the origin. */
+  findOrigin() {
+    const b = this.bodies.length && this.first ? this.first : null;
+    this.origin = b ? [b[0], b[1], b[2]] : [0, 0, 0];
+    if (!this.origin.every(Number.isFinite) || Math.hypot(...this.origin) < 1e4) this.origin = [0, 0, 0];
+    this.ground.position.set(-this.origin[0], -this.origin[1], -this.origin[2]);
+  }
+
+  pose(tracks, body, position, rotation) {
+    if (body < 0) {
+      position.copy(this.ground.position);
+      rotation.set(0, 0, 0, 1);
+      return true;
+    }
+    const x = tracks, k = 7 * body;
+    position.set(x[k] - this.origin[0], x[k + 1] - this.origin[1], x[k + 2] - this.origin[2]);
+    rotation.set(x[k + 3], x[k + 4], x[k + 5], x[k + 6]);
+    return Number.isFinite(position.x + position.y + position.z + rotation.x + rotation.y + rotation.z + rotation.w);
+  }
+
+  pointAt(tracks, place, to = new THREE.Vector3()) {
+    const position = new THREE.Vector3(), rotation = new THREE.Quaternion();
+    this.pose(tracks, place[0], position, rotation);
+    return to.set(place[1], place[2], place[3]).applyQuaternion(rotation).add(position);
+  }
+
+  places() {
+    const list = [];
+    for (const e of this.run.scene.elements) for (const p of [e.i, e.j]) if (p) list.push(p);
+    for (const line of this.run.scene.lines) list.push(...line.filter(Boolean));
+    return list;
+  }
+
+  extentAtStart() {
+    if (!this.first) return 1;
+    const box = new THREE.Box3();
+    const add = p => { if (Number.isFinite(p.x + p.y + p.z)) box.expandByPoint(p); };
+    this.bodies.forEach((g, b) => add(this.pointAt(this.first, [b, 0, 0, 0])));
+    for (const p of this.places()) add(this.pointAt(this.first, p));
+    for (const body of this.run.scene.bodies) if (!body.guess) for (const s of body.shapes) for (const d of [-1, 1]) add(this.pointAt(this.first, [s.at[0], s.at[1] + d * s.size[0], s.at[2] + d * s.size[1], s.at[3] + d * s.size[2]]));
+    const size = box.isEmpty() ? 0 : box.getSize(new THREE.Vector3()).length();
+    return size > 0 ? size : 1;
+  }
+
+  /* ---- parts ---- */
+
+  addLights() {
+    const up = new THREE.Vector3(...this.run.scene.up);
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x8891a0, 0.75);
+    this.sky.position.copy(up);
+    this.sun = new THREE.DirectionalLight(0xffffff, 0.55);
+    this.scene3.add(this.sky, this.sun, this.sun.target);
+  }
+
+  material(colour, more = {}) { return new THREE.MeshPhongMaterial({color: colour, specular: 0x1c1c1c, shininess: 35, ...more}); }
+  colourOf(body) { return body < 0 ? '#8a94a3' : bodyColours[this.colourIndex[body] % bodyColours.length]; }
+
+  mesh(parent, geometry, material, place) {
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.castShadow = mesh.receiveShadow = true;
+    if (place) {
+      mesh.position.set(place[1], place[2], place[3]);
+      mesh.quaternion.set(place[4], place[5], place[6], place[7]);
+    }
+    parent.add(mesh);
+    return mesh;
+  }
+
+  /* The farthest marker from the centre of mass, by which shapes guessed from the inertia are kept in bounds */
+  reachOf(body) {
+    let reach = 0;
+    for (const p of this.places()) if (p[0] === body) reach = Math.max(reach, Math.hypot(p[1], p[2], p[3]));
+    return reach > 0 ? Math.max(reach, 0.02 * this.size) : 0.05 * this.size;
+  }
+
+  addBodies() {
+    let next = 0;
+    this.colourIndex = this.run.scene.bodies.map(b => b.carrier < 0 ? next++ : 0);
+    this.run.scene.bodies.forEach((b, k) => { if (b.carrier >= 0) this.colourIndex[k] = this.colourIndex[b.carrier]; });
+    this.materials = this.bodies.map((g, k) => this.material(this.colourOf(k)));
+    const edge = new THREE.LineBasicMaterial({color: 0x000000, transparent: true, opacity: 0.28});
+    const draw = (group, shapes, material, guess, reach) => {
+      for (const s of shapes) {
+        const mesh = this.mesh(group, shapeGeometry(s, guess, reach), material, s.at);
+        if (s.kind !== 'sphere') mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), edge));
+      }
+    };
+    this.run.scene.bodies.forEach((b, k) => {
+      const reach = this.reachOf(k);
+      draw(this.bodies[k], b.shapes, this.materials[k], b.guess, reach);
+      if (b.guess && b.carrier < 0) this.addBars(b, k, reach);
+    });
+    draw(this.ground, this.run.scene.ground, this.material(this.colourOf(-1)), false, 1);
+  }
+
+  /* Bars from the centre of mass to the markers of a body of unknown shape; of a flexible one to its attachments, which move with its modes */
+  addBars(b, k, reach) {
+    const radius = 0.006 * this.size, seen = new Set();
+    if (!b.shapes.length && !b.modes) this.mesh(this.bodies[k], new THREE.SphereBufferGeometry(0.014 * this.size, 24, 16), this.materials[k]);
+    for (const p of this.places()) {
+      const key = p.slice(1, 4).map(x => x.toFixed(6)).join();
+      if (p[0] !== k || seen.has(key) || Math.hypot(p[1], p[2], p[3]) < 1e-3 * this.size) continue;
+      seen.add(key);
+      this.addSpan([k, 0, 0, 0], p, new THREE.CylinderBufferGeometry(radius, radius, 1, 12), this.materials[k], k);
+    }
+    this.run.scene.bodies.forEach((f, c) => {
+      if (f.carrier === k) this.addSpan([k, 0, 0, 0], [c, 0, 0, 0], new THREE.CylinderBufferGeometry(radius, radius, 1, 12), this.materials[k], k);
+    });
+  }
+
+  /* Geometry of length one along y; within one body it is placed once */
+  addSpan(a, b, geometry, material, body) {
+    const fixed = a[0] === b[0], parent = !fixed ? this.scene3 : a[0] < 0 ? this.ground : this.bodies[a[0]];
+    const mesh = this.mesh(parent, geometry, material);
+    mesh.userData.body = body;
+    if (fixed) this.stretch(mesh, new THREE.Vector3(a[1], a[2], a[3]), new THREE.Vector3(b[1], b[2], b[3]));
+    else this.spans.push({a, b, mesh});
+    return mesh;
+  }
+
+  stretch(mesh, a, b) {
+    const along = b.clone().sub(a), length = along.length();
+    mesh.visible = length > 0 && Number.isFinite(length);
+    if (!mesh.visible) return;
+    mesh.position.copy(a).add(b).multiplyScalar(0.5);
+    mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
+    mesh.scale.set(1, length, 1);
+  }
+
+  addLines() {
+    const radius = 0.0045 * this.size;
+    for (const line of this.run.scene.lines)
+      for (let k = 0; k + 1 < line.length; k++) {
+        if (!line[k] || !line[k + 1]) continue;
+        const one = line[k][0] === line[k + 1][0], body = line[k][0];
+        this.addSpan(line[k], line[k + 1], new THREE.CylinderBufferGeometry(radius, radius, 1, 10), one && body >= 0 ? this.materials[body] : this.material('#6b7585'), body);
+      }
+  }
+
+  addElements() {
+    const s = 0.012 * this.size, metal = this.material('#5b6472'), spring = this.material('#7d8898'), joint = this.material('#4a5361');
+    const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.28, depthTest: false}); /* seen through what covers it */
+    for (const e of this.run.scene.elements) {
+      if (!e.i) continue;
+      const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
+      if (geometry) {
+        const mesh = this.mesh(e.i[0] < 0 ? this.ground : this.bodies[e.i[0]], geometry, joint, e.i);
+        mesh.userData.element = e.name;
+        const ghost = new THREE.Mesh(geometry, hidden);
+        ghost.renderOrder = 1;
+        ghost.userData.ghost = true;
+        mesh.add(ghost);
+        this.symbols.push(mesh);
+      }
+      if (!e.j || e.i[0] === e.j[0]) continue;
+      const length = this.first ? this.pointAt(this.first, e.i).distanceTo(this.pointAt(this.first, e.j)) : 0;
+      if (/^(spring-damper|nonlinear spring)$/.test(e.type) && length > 0.01 * this.size) this.addSpan(e.i, e.j, coilGeometry(Math.min(0.018 * this.size, 0.16 * length), length), spring, -1);
+      else if (/^beam$/.test(e.type)) this.addSpan(e.i, e.j, new THREE.CylinderBufferGeometry(0.007 * this.size, 0.007 * this.size, 1, 12), metal, -1);
+      else if (/distance/.test(e.type)) this.addSpan(e.i, e.j, new THREE.CylinderBufferGeometry(0.004 * this.size, 0.004 * this.size, 1, 10), metal, -1);
+    }
+  }
+
+  addSurfaces() {
+    for (const s of this.run.surfaces) {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', new THREE.BufferAttribute(s.point.slice(), 3));
+      geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * s.nodes).fill(1), 3));
+      geometry.setIndex(new THREE.BufferAttribute(s.triangle, 1));
+      geometry.computeVertexNormals();
+      const material = this.material(this.colourOf(s.body), {side: THREE.DoubleSide, vertexColors: THREE.VertexColors});
+      s.mesh = this.mesh(this.bodies[s.body], geometry, material);
+      s.mesh.frustumCulled = false; /* its bounds change */
+      s.active = s.mode.map((m, k) => k).filter(k => s.mode[k].largest > 0);
+      s.range = this.stressRange(s);
+    }
+    this.stress = this.run.surfaces.some(s => s.stress && s.field.length);
+    this.colourBy = this.stress ? 'stress' : 'body';
+    this.stressTop = Math.max(0, ...this.run.surfaces.map(s => s.range.top));
+  }
+
+  /* Largest stress of the run, and what all but one in a hundred of the nodes stay below: the colours end there, for a few nodes at
+     attachments would leave all others in one colour. */
+  stressRange(s) {
+    const most = new Float32Array(s.nodes);
+    for (const f of s.field) for (let i = 0; i < s.nodes; i++) most[i] = Math.max(most[i], f.largest * f.code[i] / 255);
+    const sorted = most.slice().sort();
+    return {largest: sorted.length ? sorted[sorted.length - 1] : 0, top: sorted.length ? sorted[Math.floor(0.99 * (sorted.length - 1))] : 0};
+  }
+
+  /* ---- motion ---- */
+
+  /* deflection: factor on the displacements of surfaces */
+  moveTo(t, deflection) {
+    const tracks = framesAt(this.run, t);
+    if (!tracks) return;
+    this.tracks = tracks;
+    this.bodies.forEach((g, k) => { g.visible = this.pose(tracks, k, g.position, g.quaternion); });
+    for (const {a, b, mesh} of this.spans) this.stretch(mesh, this.pointAt(tracks, a), this.pointAt(tracks, b));
+    for (const s of this.run.surfaces) {
+      this.deform(s, tracks, deflection);
+      this.paint(s, t);
+    }
+  }
+
+  deform(s, tracks, deflection) {
+    const eta = this.run.scene.bodies[s.body].modal, position = s.mesh.geometry.attributes.position, x = position.array;
+    x.set(s.point);
+    for (const k of s.active) {
+      const amount = deflection * tracks[eta + k], shape = s.mode[k].shape;
+      if (!(Math.abs(amount) * s.mode[k].largest > 1e-7 * this.size)) continue;
+      for (let i = 0; i < x.length; i++) x[i] += amount * shape[i];
+    }
+    position.needsUpdate = true;
+    if (s.triangle.length < 60000) s.mesh.geometry.computeVertexNormals();
+  }
+
+  paint(s, t) {
+    const attribute = s.mesh.geometry.attributes.color, c = attribute.array, by = s.stress && s.field.length ? this.colourBy : 'body';
+    if (by === 'body') {
+      if (s.painted !== by) c.fill(1);
+      s.mesh.material.color.set(this.colourOf(s.body));
+    } else {
+      const [k, part] = placeInTime(this.run, t), a = s.field[k], b = s.field[Math.min(k + 1, s.field.length - 1)];
+      const fa = (1 - part) * a.largest / this.stressTop, fb = part * b.largest / this.stressTop;
+      for (let i = 0; i < s.nodes; i++) {
+        const colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] + fb * b.code[i]) || 0))];
+        c[3 * i] = colour[0];
+        c[3 * i + 1] = colour[1];
+        c[3 * i + 2] = colour[2];
+      }
+      s.mesh.material.color.set(0xffffff);
+    }
+    if (by === 'stress' || s.painted !== by) attribute.needsUpdate = true;
+    s.painted = by;
+  }
+
+  /* Box around everything at some times of the run */
+  findBounds() {
+    this.bounds = new THREE.Box3();
+    const n = this.run.frame.length, some = Math.min(n, 24), box = new THREE.Box3();
+    for (let k = 0; k < some; k++) {
+      this.moveTo(this.run.time[some > 1 ? Math.round(k * (n - 1) / (some - 1)) : 0], 1);
+      this.scene3.updateMatrixWorld(true);
+      this.scene3.traverse(o => {
+        if (!o.isMesh || !this.shown(o)) return;
+        if (!o.geometry.boundingBox) o.geometry.computeBoundingBox();
+        box.copy(o.geometry.boundingBox).applyMatrix4(o.matrixWorld);
+        if (Number.isFinite(box.min.x + box.max.x + box.min.y + box.max.y + box.min.z + box.max.z)) this.bounds.union(box);
+      });
+    }
+    if (this.bounds.isEmpty()) this.bounds.set(new THREE.Vector3(-0.5, -0.5, -0.5), new THREE.Vector3(0.5, 0.5, 0.5));
+  }
+
+  shown(o) {
+    for (; o; o = o.parent) if (!o.visible) return false;
+    return true;
+  }
+
+  /* How far displacements may be scaled: until the largest of the run is a third of the scene's size */
+  largestDeflection() {
+    let most = 0;
+    for (const s of this.run.surfaces) {
+      const eta = this.run.scene.bodies[s.body].modal;
+      for (const k of s.active) for (const f of this.run.frame) most = Math.max(most, Math.abs(f[eta + k]) * s.mode[k].largest || 0);
+    }
+    return most > 0 ? 0.33 * this.size / most : 1;
+  }
+}

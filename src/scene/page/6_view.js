@@ -1,0 +1,181 @@
+/* Camera, ground grid, lights, picking: how the model is looked at. */
+
+class View {
+  constructor(model, canvas, changed) {
+    this.model = model;
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true});
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
+    this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
+    this.up = new THREE.Vector3(...model.run.scene.up);
+    this.camera.up.copy(this.up);
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.enableKeys = false;
+    this.controls.screenSpacePanning = true;
+    this.controls.addEventListener('change', changed);
+    if (window.self !== window.top) { /* inside another page the wheel scrolls that page until the view has been touched */
+      this.controls.enableZoom = false;
+      canvas.addEventListener('pointerdown', () => { this.controls.enableZoom = true; });
+    }
+    this.addGrid();
+    this.direction = this.chooseDirection();
+  }
+
+  /* Two directions across `up`, the first one along x as far as it goes */
+  horizontal() {
+    const along = Math.abs(this.up.x) < 0.9 ? new THREE.Vector3(1, 0, 0) : new THREE.Vector3(0, 1, 0);
+    along.addScaledVector(this.up, -along.dot(this.up)).normalize();
+    return [along, this.up.clone().cross(along)];
+  }
+
+  extents() {
+    const size = this.model.bounds.getSize(new THREE.Vector3());
+    return d => Math.abs(d.x) * size.x + Math.abs(d.y) * size.y + Math.abs(d.z) * size.z;
+  }
+
+  /* From where the motion is seen widest, a little from the side and from above */
+  chooseDirection() {
+    if (this.model.run.scene.planar) return new THREE.Vector3(0, 0, 1);
+    const [a, b] = this.horizontal(), extent = this.extents(), across = extent(b) <= extent(a);
+    const flat = extent(this.up) < 0.15 * Math.max(extent(a), extent(b));
+    return a.clone().multiplyScalar(across ? 0.55 : 1).addScaledVector(b, across ? -1 : -0.55).addScaledVector(this.up, flat ? 0.85 : 0.42).normalize();
+  }
+
+  addGrid() {
+    const {bounds, run} = this.model, planar = run.scene.planar, normal = planar ? new THREE.Vector3(0, 0, 1) : this.up;
+    const [a, b] = planar ? [new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 1, 0)] : this.horizontal();
+    const extent = this.extents(), centre = bounds.getCenter(new THREE.Vector3()), wide = Math.max(extent(a), extent(b), 0.4 * extent(normal));
+    this.gridStep = roundStep(wide, 8);
+    const half = this.gridStep * Math.ceil(0.8 * wide / this.gridStep), low = centre.dot(normal) - 0.5 * extent(normal) - 0.004 * this.model.size;
+    /* lines at multiples of the step from the origin of the scene */
+    const offset = new THREE.Vector3(...this.model.origin), step = this.gridStep, round = d => Math.round((centre.dot(d) + offset.dot(d)) / step) * step - offset.dot(d);
+    const middle = a.clone().multiplyScalar(round(a)).addScaledVector(b, round(b)).addScaledVector(normal, low);
+    const point = [], n = Math.round(half / step);
+    for (let k = -n; k <= n; k++)
+      for (const [d, e] of [[a, b], [b, a]])
+        for (const sign of [-1, 1]) point.push(middle.clone().addScaledVector(d, k * step).addScaledVector(e, sign * half));
+    this.grid = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(point), new THREE.LineBasicMaterial({transparent: true, opacity: 0.7}));
+    this.floor = new THREE.Mesh(new THREE.PlaneBufferGeometry(2 * half, 2 * half), new THREE.ShadowMaterial({opacity: 0.16}));
+    this.floor.position.copy(middle).addScaledVector(normal, -0.002 * this.model.size);
+    this.floor.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(a, b, normal));
+    this.floor.receiveShadow = true;
+    this.floor.userData.floor = true;
+    this.model.scene3.add(this.grid, this.floor);
+    this.addShadows(centre, half, planar);
+  }
+
+  addShadows(centre, half, planar) {
+    const sun = this.model.sun, [a, b] = this.horizontal(), reach = 1.5 * this.model.bounds.getSize(new THREE.Vector3()).length();
+    sun.target.position.copy(centre);
+    sun.position.copy(centre).addScaledVector(this.up, reach).addScaledVector(a, 0.35 * reach).addScaledVector(b, -0.5 * reach);
+    if (planar) sun.position.copy(centre).addScaledVector(this.up, 0.4 * reach).add(new THREE.Vector3(-0.3 * reach, 0, reach));
+    sun.castShadow = true;
+    sun.shadow.mapSize.set(2048, 2048);
+    Object.assign(sun.shadow.camera, {left: -0.5 * reach, right: 0.5 * reach, top: 0.5 * reach, bottom: -0.5 * reach, near: 0.1 * reach, far: 2.4 * reach});
+    sun.shadow.camera.updateProjectionMatrix();
+    sun.shadow.bias = -0.0006;
+  }
+
+  setTheme() {
+    const style = getComputedStyle(document.documentElement), colour = name => new THREE.Color(style.getPropertyValue(name).trim());
+    this.model.scene3.background = colour('--sky');
+    this.grid.material.color = colour('--grid');
+    this.floor.material.opacity = document.documentElement.dataset.theme === 'dark' ? 0.35 : 0.16;
+  }
+
+  resize() {
+    const width = this.canvas.parentElement.clientWidth, height = this.canvas.parentElement.clientHeight;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  /* All of the motion in the middle of the picture. free: part of its height that labels cover at the top. */
+  fit(free = 0) {
+    const {bounds} = this.model, centre = bounds.getCenter(new THREE.Vector3()), right = this.up.clone().cross(this.direction);
+    if (right.length() < 1e-6) right.set(1, 0, 0);
+    right.normalize();
+    const above = this.direction.clone().cross(right), tall = Math.tan(this.camera.fov * Math.PI / 360), wide = tall * this.camera.aspect;
+    let distance = 0;
+    for (let k = 0; k < 8; k++) {
+      const d = new THREE.Vector3(k & 1 ? bounds.max.x : bounds.min.x, k & 2 ? bounds.max.y : bounds.min.y, k & 4 ? bounds.max.z : bounds.min.z).sub(centre);
+      distance = Math.max(distance, d.dot(this.direction) + Math.abs(d.dot(right)) / wide, d.dot(this.direction) + Math.abs(d.dot(above)) / (tall * (1 - free)));
+    }
+    distance *= 1.08;
+    this.camera.near = 0.005 * distance;
+    this.camera.far = 40 * distance;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre).addScaledVector(above, free * tall * distance);
+    this.camera.position.copy(this.controls.target).addScaledVector(this.direction, distance);
+    this.controls.update();
+  }
+
+  /* The camera goes along with a body */
+  follow(body) {
+    const g = this.model.bodies[body];
+    if (!g || !g.visible) return;
+    if (this.followed === body) {
+      const by = g.position.clone().sub(this.followedAt);
+      this.camera.position.add(by);
+      this.controls.target.add(by);
+      this.controls.update();
+    }
+    this.followed = body;
+    this.followedAt = g.position.clone();
+  }
+
+  /* What is under a point of the page: {body, element, surface, node} or null */
+  pick(x, y) {
+    const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
+    const meshes = [];
+    this.model.scene3.traverse(o => { if (o.isMesh && !o.userData.floor && !o.userData.ghost && this.model.shown(o)) meshes.push(o); });
+    for (const s of this.model.run.surfaces) s.mesh.geometry.computeBoundingSphere();
+    const hit = ray.intersectObjects(meshes)[0];
+    if (!hit) return null;
+    const surface = this.model.run.surfaces.find(s => s.mesh === hit.object);
+    let o = hit.object;
+    while (o && o.userData.body === undefined) o = o.parent;
+    return {body: o ? o.userData.body : -1, element: hit.object.userData.element, surface, node: surface ? this.nearest(hit) : -1};
+  }
+
+  nearest(hit) {
+    const x = hit.object.geometry.attributes.position, at = hit.object.worldToLocal(hit.point.clone()), v = new THREE.Vector3();
+    let best = -1, least = Infinity;
+    for (const k of [hit.face.a, hit.face.b, hit.face.c]) {
+      const d = v.fromBufferAttribute(x, k).distanceTo(at);
+      if (d < least) [best, least] = [k, d];
+    }
+    return best;
+  }
+
+  /* Where a point of the scene is on the canvas, CSS pixels; null behind the camera */
+  project(point) {
+    const p = point.clone().project(this.camera);
+    return p.z > 1 ? null : [(p.x + 1) / 2 * this.canvas.clientWidth, (1 - p.y) / 2 * this.canvas.clientHeight];
+  }
+
+  draw() { this.renderer.render(this.model.scene3, this.camera); }
+
+  /* The axes of space, as the camera sees them, in a corner */
+  drawAxes(canvas) {
+    const g = canvas.getContext('2d'), middle = canvas.width / 2, inverse = this.camera.quaternion.clone().conjugate();
+    g.clearRect(0, 0, canvas.width, canvas.height);
+    g.font = 'bold 24px system-ui, "Liberation Sans", sans-serif';
+    g.textAlign = 'center';
+    g.textBaseline = 'middle';
+    g.lineWidth = 4;
+    const axes = [['x', '#d64545', 1, 0, 0], ['y', '#2f9e5b', 0, 1, 0], ['z', '#3b7ddd', 0, 0, 1]].map(([name, colour, ...d]) => ({name, colour, d: new THREE.Vector3(...d).applyQuaternion(inverse)}));
+    for (const {name, colour, d} of axes.sort((p, q) => p.d.z - q.d.z)) {
+      g.strokeStyle = g.fillStyle = colour;
+      g.beginPath();
+      g.moveTo(middle, middle);
+      g.lineTo(middle + 46 * d.x, middle - 46 * d.y);
+      g.stroke();
+      if (Math.hypot(d.x, d.y) > 0.2) g.fillText(name, middle + 64 * d.x, middle - 64 * d.y);
+    }
+  }
+}
