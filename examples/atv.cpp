@@ -7,9 +7,11 @@ static char help[] =
     "  -stress: the ten places of largest von Mises stress in the frame;  -spots <10>: how many\n"
     "  -field <prefix> -field_dt <0.02>: the frame with its stress for ParaView, prefix.pvd\n"
     "  -modes <0>: that many of the slowest modes of the vehicle at rest\n"
-    "  -scene_csv <file.csv>, -scene_animation <prefix>: channels every 4 ms; all parts for ParaView\n";
+    "  -scene_csv <file.csv>, -scene_animation <prefix>: channels every 4 ms; all parts for ParaView\n"
+    "  -scene_page <file.html>: all parts and the frame's stress in a page that any browser opens\n";
 
 #include "atv_model.h"
+#include "atv_surface.h"
 #include "problem.h"
 #include "scene_watch.h"
 
@@ -22,7 +24,7 @@ using namespace hhtdae;
 struct Settings {
   std::string frame = "frame.h5", field;
   PetscReal   end = 2, step_max = 5e-4, field_dt = 0.02;
-  PetscBool   stress = PETSC_FALSE;
+  PetscBool   stress = PETSC_FALSE, page = PETSC_FALSE;
   PetscInt    spots  = 10, modes = 0;
 };
 
@@ -39,6 +41,7 @@ static PetscErrorCode ReadSettings(Settings *s)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-step_max", &s->step_max, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-field_dt", &s->field_dt, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-stress", &s->stress, nullptr));
+  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-scene_page", &s->page));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-spots", &s->spots, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-modes", &s->modes, nullptr));
   PetscCheck(s->end > 0 && s->step_max >= 0 && s->field_dt > 0 && s->spots > 0, PETSC_COMM_WORLD,
@@ -147,10 +150,9 @@ static PetscErrorCode Run()
   hhtex::Atv  atv(PETSC_COMM_WORLD, model);
   ReducedBody body; /* with stress modes, where stress or pictures are asked for */
   const bool  recover = s.stress || !s.field.empty();
-  if (recover) {
-    atv.watchFrame();
-    PetscCall(body.load(PETSC_COMM_WORLD, s.frame));
-  }
+  if (recover) atv.watchFrame();
+  if (recover || s.page) PetscCall(body.load(PETSC_COMM_WORLD, s.frame));
+  if (s.page) PetscCall(hhtex::ShowAtvFrame(body, &atv));
   PetscCall(CreateTS(s, atv, &ts));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "atv: %d parts, %d joints, %d motions, %d modes\n", (int)atv.parts,
                         (int)atv.joints, (int)atv.motions, (int)model->modes()));

@@ -257,8 +257,8 @@ private:
     law.slip_velocity  = data.slip;
     const Element tire = scene.add(c.name + " tire", TorusPlane{center, top, data.wheel_z - data.tube, data.tube, law});
     scene.channel(c.name + " tire", Measure::force(tire, 2), "N");
-    scene.shape(wheel, Shape::cylinder(data.wheel_z, 2 * data.tube, Vector3::Zero(), axle));
-    scene.shape(post, Shape::box({0.15, 0.12, 0.02}, {0, 0, 0.03}));
+    scene.shape(wheel, Shape::cylinder(data.wheel_z, 2 * data.tube, Vector3::Zero(), axle).coloured(0x49505c));
+    scene.shape(post, Shape::box({0.15, 0.12, 0.02}, {0, 0, 0.03}).coloured(0xaab3bf));
   }
 };
 

@@ -45,18 +45,26 @@ inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &
 {
   hhtdae::Reduction   reduction;
   hhtdae::ReducedBody reduced;
+  PetscBool           page;
   PetscFunctionBegin;
+  PetscCall(PetscOptionsHasName(nullptr, nullptr, "-scene_page", &page));
   reduction.attachments = BeamAttachments(parts > 1 ? hhtdae::Tie::Rigid : tip);
   reduction.modes       = modes;
-  reduction.all_nodes   = false;
+  reduction.all_nodes   = page;
   reduction.stiffening  = stiffening;
   PetscCall(hhtdae::Reduce(part, reduction, &reduced));
+  auto surface = std::make_shared<hhtdae::Surface>();
+  if (page) { /* the beam as it bends, coloured by stress */
+    PetscCall(hhtdae::AddStressModes(part, &reduced));
+    PetscCall(hhtdae::MakeSurface(reduced, surface.get()));
+  }
   hhtdae::FlexibleBody body;
   body.model = std::make_shared<hhtdae::ModalBody>(reduced.modal);
   for (int k = 0; k < parts; k++) {
     body.position             = {k * length, 0, 0};
     const std::string  number = parts > 1 ? " " + std::to_string(k) : "";
     const hhtdae::Body member = scene.add("beam" + number, body), root = scene.attachment(member, "root");
+    if (page) scene.surface(member, surface);
     if (k == 0)
       ends->root = root;
     else

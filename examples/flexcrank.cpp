@@ -1,9 +1,11 @@
 static char help[] =
     "Planar slider-crank with an elastic rod (Simeon 1996; \"crank\" of the test set for IVP solvers), t in [0, 0.1].\n"
     "The rod is a body in modal coordinates; the reference was computed by extrapolation, to 11 digits.\n"
-    "  -mass <full,partial,constant>: how far the rod's mass matrix follows its deformation\n";
+    "  -mass <full,partial,constant>: how far the rod's mass matrix follows its deformation\n"
+    "  -scene_page <file.html>: the mechanism in a page that any browser opens, the rod coloured by its stress\n";
 
 #include "flexcrank_model.h"
+#include "flexcrank_surface.h"
 #include "problem.h"
 #include "scene_watch.h"
 
@@ -21,6 +23,8 @@ static PetscErrorCode Run(void)
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-mass", forms, &form, nullptr));
   hhtex::FlexCrank m((ModalMass)form);
+  m.scene.surface(m.link, hhtex::RodSurface(m.rod));
+  m.scene.output().page_title = "A slider-crank with an elastic rod";
   PetscCall(m.scene.createTS(&ts));
   PetscCall(TSSetMaxTime(ts, 0.1));
   PetscCall(TSSetMaxSteps(ts, 10000000));

@@ -38,13 +38,14 @@ struct Channel {
   PetscInt id = -1;
 };
 
-/* What a body looks like in the animation; placed by position and axes in body axes, from the body's origin */
+/* What a body looks like in the animation and the page; placed by position and axes in body axes, from the body's origin */
 struct Shape {
   enum Kind { Box, Cylinder, Sphere };
   Kind    kind     = Box;
   Vector3 size     = Vector3::Ones(); /* half edges; radius, radius, half length along z; radii: a sphere may be an ellipsoid */
   Vector3 position = Vector3::Zero();
   Matrix3 axes     = Matrix3::Identity();
+  int     colour   = -1; /* in the page, 0xRRGGBB; negative: one of its own for each body */
 
   static Shape box(const Vector3 &half, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity())
   {
@@ -57,6 +58,12 @@ struct Shape {
   static Shape sphere(double radius, const Vector3 &position = Vector3::Zero())
   {
     return {Sphere, {radius, radius, radius}, position, Matrix3::Identity()};
+  }
+  Shape coloured(int rgb) const
+  {
+    Shape s  = *this;
+    s.colour = rgb;
+    return s;
   }
 };
 

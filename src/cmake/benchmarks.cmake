@@ -41,6 +41,9 @@ foreach(source IN LISTS bench_sources)
   endif()
   # The benchmarks reach into src/ to time and compare single parts of the integrator.
   target_include_directories(${name} PRIVATE src tests)
+  if(NOT page_lacks)
+    target_compile_definitions(${name} PRIVATE HHTDAE_PAGE)
+  endif()
 
   # What concerns IDA stands behind this macro.
   file(STRINGS ${source} knows_ida REGEX "HHTDAE_HAVE_IDA")

@@ -22,8 +22,9 @@ struct AtvResults {
 class AtvPage
 {
 public:
-  AtvPage(const AtvResults &results, const hhtex::Atv &atv, const ReducedBody &body, const AtvStress &stress)
-      : r_(results), atv_(atv), body_(body), stress_(stress),
+  /* scene: file of the page that shows the vehicle */
+  AtvPage(const AtvResults &results, const hhtex::Atv &atv, const ReducedBody &body, const AtvStress &stress, const std::string &scene)
+      : r_(results), atv_(atv), body_(body), stress_(stress), scene_(scene),
         page_("An all-terrain vehicle with a flexible frame: hhtdae and BDF")
   {
   }
@@ -47,6 +48,7 @@ private:
   const hhtex::Atv  &atv_;
   const ReducedBody &body_;
   const AtvStress   &stress_;
+  std::string        scene_;
   Page               page_;
 
   static std::string title(const AtvRun &run) { return run.name; }
@@ -71,49 +73,12 @@ private:
                  {"BDF, first order, index 3", std::to_string(r_.main.back().equations), "927"}});
     page_.text("An attachment of the frame is a massless body held by six constraints here, 12 unknowns for each of "
                "the 20, which Adams does without.");
-    std::vector<double> largest;
-    PetscCall(stress_.largest(r_.reference, &largest));
-    PetscCall(page_.plot(vehicle(largest),
-                         "The vehicle at the start. Nodes of the frame: largest von Mises stress through the run [MPa]",
-                         900, 620));
+#if defined(HHTDAE_PAGE)
+    PetscCall(page_.frame(scene_, "The vehicle in motion: press play, drag to turn, click a part; colours are the von Mises stress of the frame"));
+#else
+    page_.text("The vehicle in motion is left out: the library was built without three.js or zlib (Debian: libjs-three, zlib1g-dev).");
+#endif
     PetscFunctionReturn(0);
-  }
-
-  /* Some of the nodes with stress modes, and the lines that the scene draws */
-  std::string vehicle(const std::vector<double> &largest) const
-  {
-    std::string g =
-        "set view 66,35,1.5\nset colorbox user origin 0.93,0.25 size 0.02,0.5\nset view equal xyz\nset xyplane at "
-        "0\nset cblabel 'MPa'\nset palette defined (0 "
-        "'#c8d4e8', 0.25 '#4878c8', 0.5 "
-        "'#30a050', 0.75 '#f0c000', 1 '#d00000')\nunset border\nunset tics\nset cbtics\nset key off\nsplot '-' using "
-        "1:2:3:4 with points pt 7 ps 0.25 palette, "
-        "'-' using 1:2:3 with lines lc rgb '#303030' lw 2, '-' using 1:2:3 with lines lc rgb '#909090'\n";
-    for (size_t i = 0; i < body_.stress.node.size(); i += 3) {
-      const double *x = &body_.coordinates[3 * (size_t)body_.stress.node[i]];
-      g += Text("%.3f %.3f %.3f %.1f\n", x[0], x[1], x[2], 1e-6 * largest[i]);
-    }
-    g += "e\n";
-    const SceneData &s = DataOf(atv_.scene);
-    for (const std::vector<PetscInt> &line : s.lines) {
-      for (PetscInt m : line) {
-        const Frame<double> f = s.frame(Marker{m});
-        g += Text("%.3f %.3f %.3f\n", f.x(0), f.x(1), f.x(2));
-      }
-      g += "\n\n";
-    }
-    g += "e\n";
-    for (const hhtex::AtvCorner &c : hhtex::AtvCorners()) {
-      for (double width : {-atv_.data.tube, atv_.data.tube}) {
-        for (int k = 0; k <= 36; k++) {
-          const Vector3 hub = c.at(atv_.data.wheel_x, atv_.data.wheel_y, atv_.data.wheel_z);
-          g += Text("%.3f %.3f %.3f\n", hub.x() + 0.28 * std::cos(k * PETSC_PI / 18), hub.y() + 0.7 * width,
-                    hub.z() + 0.28 * std::sin(k * PETSC_PI / 18));
-        }
-        g += "\n\n";
-      }
-    }
-    return g + "e\n";
   }
 
   void cost()

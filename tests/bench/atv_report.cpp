@@ -138,7 +138,13 @@ static PetscErrorCode Run()
   PetscCall(stress.spots(results.reference, 10, &results.spots));
   results.found.resize(results.main.size());
   for (size_t i = 0; i < results.main.size(); i++) PetscCall(stress.spots(results.main[i], 10, &results.found[i]));
-  PetscCall(AtvPage(results, atv, body, stress).write(out));
+  const std::string scene = std::string(out) + ".scene.html";
+#if defined(HHTDAE_PAGE)
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "the vehicle in motion\n"));
+  PetscCall(runs.page(body, scene));
+#endif
+  PetscCall(AtvPage(results, atv, body, stress, scene).write(out));
+  std::remove(scene.c_str());
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "page: %s\n", out));
   PetscFunctionReturn(0);
 }

@@ -7,6 +7,7 @@
 #define HHTDAE_BENCH_ATV_RUNS_H
 
 #include "atv_model.h"
+#include "atv_surface.h"
 #include "scene_watch.h"
 #include "stability_condition.h"
 #include "workprecision_scene.h"
@@ -94,6 +95,27 @@ public:
     PetscFunctionReturn(0);
   }
 #endif
+
+  /* The first of the runs once more, shown by a page */
+  PetscErrorCode page(const ReducedBody &body, const std::string &file) const
+  {
+    TS      ts;
+    TSAdapt adapt;
+
+    PetscFunctionBegin;
+    hhtex::Atv atv(PETSC_COMM_SELF, model);
+    PetscCall(hhtex::ShowAtvFrame(body, &atv));
+    atv.scene.output().page = file;
+    PetscCall(atv.scene.createTS(&ts));
+    PetscCall(TSSetMaxTime(ts, end));
+    PetscCall(TSSetMaxSteps(ts, 100000000));
+    PetscCall(TSSetTolerances(ts, 1e-5, nullptr, 1e-5, nullptr));
+    PetscCall(TSGetAdapt(ts, &adapt));
+    PetscCall(TSAdaptSetStepLimits(adapt, PETSC_DEFAULT, 5e-4));
+    PetscCall(atv.scene.solve(ts));
+    PetscCall(TSDestroy(&ts));
+    PetscFunctionReturn(0);
+  }
 
   /* cond_2 of the Newton matrix in the paper's three scalings, after ten steps, as steps of length h would have it */
   PetscErrorCode conditions(const std::vector<double> &h, std::vector<hhtstab::Conditions> *list) const
@@ -210,19 +232,6 @@ public:
     PetscFunctionBegin;
     for (size_t k = 0; k < run.x.size(); k++) PetscCall(hot.add(run.time[k], atv_.modes(run.x[k])));
     PetscCall(hot.highest(count, 0.05, list));
-    PetscFunctionReturn(0);
-  }
-
-  /* Largest of every node with stress modes, over every fifth time */
-  PetscErrorCode largest(const AtvRun &run, std::vector<double> *most) const
-  {
-    std::vector<double> mises;
-    PetscFunctionBegin;
-    most->assign(body_.stress.node.size(), 0);
-    for (size_t k = 0; k < run.x.size(); k += 5) {
-      PetscCall(VonMises(body_, atv_.modes(run.x[k]), &mises));
-      for (size_t i = 0; i < mises.size(); i++) (*most)[i] = std::max((*most)[i], mises[i]);
-    }
     PetscFunctionReturn(0);
   }
 

@@ -70,6 +70,19 @@ public:
     PetscFunctionReturn(0);
   }
 
+  /* A whole HTML page as part of this one */
+  PetscErrorCode frame(const std::string &file, const std::string &caption)
+  {
+    PetscFunctionBegin;
+    std::ifstream      in(file, std::ios::binary);
+    std::ostringstream data;
+    data << in.rdbuf();
+    PetscCheck(in && !data.str().empty(), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "The page %s for the report cannot be read", file.c_str());
+    body_ << "<figure class='wide'><iframe title='" << escaped(caption) << "' srcdoc='" << escaped(data.str()) << "'></iframe><figcaption>" << escaped(caption)
+          << "</figcaption></figure>\n";
+    PetscFunctionReturn(0);
+  }
+
   /* gnuplot's commands, drawn into the page as SVG of the given size; without gnuplot the caption says so */
   PetscErrorCode plot(const std::string &commands, const std::string &caption, int width = 900, int height = 480)
   {
@@ -103,10 +116,13 @@ public:
     PetscFunctionBegin;
     std::ofstream out(file);
     out << "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>" << escaped(title_)
-        << "</title>\n<style>body{font:16px/1.5 sans-serif;max-width:68em;margin:2em auto;padding:0 1em;color:#222}"
+        << "</title>\n<meta name='viewport' content='width=device-width,initial-scale=1'>\n"
+           "<style>body{font:16px/1.5 sans-serif;max-width:68em;margin:2em auto;padding:0 1em;color:#222}"
            "h1{font-size:1.7em}h2{margin-top:2em;border-bottom:1px solid #ccc}table{border-collapse:collapse;margin:1em 0;font-size:.88em}"
-           "caption{text-align:left;font-weight:bold;padding:.3em 0}th,td{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}"
-           "th{border-bottom:2px solid #888}td.n{text-align:right;font-variant-numeric:tabular-nums}tr.bad td{background:#fdd}.wide{overflow-x:auto}"
+           "caption{text-align:left;font-weight:bold;padding:.3em 0}th,td{padding:.25em .6em;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}"
+           "th{border-bottom:2px solid #888;white-space:normal;vertical-align:bottom;min-width:4em}td:first-child{white-space:normal;min-width:9em}td.n{text-align:right;font-variant-numeric:tabular-nums}tr.bad td{background:#fdd}.wide{overflow-x:auto;width:max-content;min-width:100%;max-width:calc(100vw - 3em);"
+           "position:relative;left:50%;transform:translateX(-50%)}iframe{display:block;width:min(72em,calc(100vw - 3em));height:min(46em,92vh);"
+           "border:1px solid #ccc;border-radius:8px}"
            "figure{margin:1.5em 0}figcaption{color:#555;font-size:.9em}img,svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:.6em;overflow-x:auto}"
            "</style></head>\n<body><h1>"
         << escaped(title_) << "</h1>\n"

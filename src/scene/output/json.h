@@ -30,7 +30,7 @@ inline std::string JSONNumber(double x)
 {
   char number[32];
   if (!std::isfinite(x)) return "null";
-  std::snprintf(number, sizeof number, "%.12g", x);
+  std::snprintf(number, sizeof number, "%.12g", x + 0.0); /* no "-0" */
   return number;
 }
 

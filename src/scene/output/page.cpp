@@ -45,11 +45,10 @@ public:
     PetscCallMPI(MPI_Bcast(&wrong, 1, MPI_INT, 0, R.scene.comm));
     PetscCheck(!wrong, R.scene.comm, PETSC_ERR_ARG_INCOMP, "%s", fault.c_str());
     if (R.rank == 0) {
-      std::vector<std::size_t> nodes;
+      std::vector<PageField> fields;
       for (const SurfaceData &d : R.scene.surfaces)
-        if (HasStress(*d.surface)) nodes.push_back(d.surface->point.size() / 3);
-      frames_ = PageFrames(tracks_, R.scene.channels.size(), nodes);
-      stress_.resize(nodes.size());
+        if (HasStress(*d.surface)) fields.push_back({d.surface.get(), modal_[d.body]});
+      frames_ = PageFrames(tracks_, R.scene.channels.size(), fields);
     }
     PetscFunctionReturn(0);
   }
@@ -62,10 +61,7 @@ public:
     if (R.rank) PetscFunctionReturn(0);
     if (!there_) PetscCall(writeHead(R.scene));
     continueQuaternions(frame, R.scene.bodies.size());
-    std::size_t field = 0;
-    for (const SurfaceData &d : R.scene.surfaces)
-      if (HasStress(*d.surface)) SurfaceStress(*d.surface, &frame[modal_[d.body]], &stress_[field++]);
-    frames_.add(e.t, frame.data(), frame.data() + tracks_, stress_);
+    frames_.add(e.t, frame.data(), frame.data() + tracks_);
     if (frames_.full()) PetscCall(writeFrames());
     PetscFunctionReturn(0);
   }
@@ -104,8 +100,7 @@ private:
   std::vector<std::vector<std::size_t>> place_; /* in a frame, of what every rank packs */
   std::vector<std::size_t>              modal_; /* of the modal coordinates of every body in a frame */
   std::size_t                           tracks_ = 0;
-  PageFrames                            frames_; /* this and the next two: on the first rank */
-  std::vector<std::vector<float>>       stress_;
+  PageFrames                            frames_; /* this and what follows: on the first rank */
   std::vector<double>                   last_; /* quaternions of the last frame */
   bool                                  there_ = false;
   long                                  end_   = 0; /* bytes of the file */

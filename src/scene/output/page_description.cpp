@@ -46,16 +46,16 @@ std::string MarkerText(const SceneData &s, Marker m)
   return PlaceText(k.body, k.s, k.R);
 }
 
-std::string ShapeText(const char *kind, const Vector3 &size, PetscInt body, const Vector3 &at, const Matrix3 &axes)
+std::string ShapeText(const char *kind, const Vector3 &size, PetscInt body, const Vector3 &at, const Matrix3 &axes, int colour = -1)
 {
-  return Object({{"kind", JSONText(kind)}, {"size", JSONNumbers(size)}, {"at", PlaceText(body, at, axes)}});
+  return Object({{"kind", JSONText(kind)}, {"size", JSONNumbers(size)}, {"at", PlaceText(body, at, axes)}, {"colour", std::to_string(colour)}});
 }
 
 std::string ShapeText(const SceneData &s, const ShapeData &d)
 {
   static const char *const kind[] = {"box", "cylinder", "sphere"};
   const Vector3            at     = d.body < 0 ? d.shape.position : Vector3(d.shape.position - s.bodies[d.body].center);
-  return ShapeText(kind[d.shape.kind], d.shape.size, d.body, at, d.shape.axes);
+  return ShapeText(kind[d.shape.kind], d.shape.size, d.body, at, d.shape.axes, d.shape.colour);
 }
 
 /* The solid box with the body's mass and moments of inertia, I_1 = m (a_2^2 + a_3^2)/3 for half edges a_k; empty where the inertia tells no shape */
@@ -77,9 +77,9 @@ std::vector<std::string> BodyTexts(const SceneData &s)
   std::vector<std::vector<std::string>> shapes(s.bodies.size());
   std::vector<char>                     drawn(s.bodies.size(), 0);
   std::vector<std::string>              out;
+  for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1; /* and no shape of the user, which would lie inside of it */
   for (const ShapeData &d : s.shapes)
-    if (d.body >= 0) shapes[d.body].push_back(ShapeText(s, d));
-  for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1;
+    if (d.body >= 0 && !drawn[d.body]) shapes[d.body].push_back(ShapeText(s, d));
   for (const std::vector<PetscInt> &line : s.lines) { /* a line that stays on a body shows it */
     const PetscInt first = s.markers[line[0]].body;
     if (first >= 0 && std::all_of(line.begin(), line.end(), [&](PetscInt m) { return s.markers[m].body == first; })) drawn[first] = 1;

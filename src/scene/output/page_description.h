@@ -12,7 +12,8 @@ namespace hhtdae
 
     {"format": 1, "title": text, "planar": bool, "up": [x, y, z],
      "bodies":   [{"name", "modes", "carrier": flexible body of an attachment's frame or -1,
-                   "shapes": [{"kind": "box" | "cylinder" | "sphere", "size": [x, y, z], "at": place}], "guess": the shape is that of the inertia}],
+                   "shapes": [{"kind": "box" | "cylinder" | "sphere", "size": [x, y, z], "at": place, "colour": 0xRRGGBB or -1}],
+                   "guess": the shape is that of the inertia}],
      "ground":   [shapes],
      "lines":    [[place, place, ...]],
      "elements": [{"name", "type", "kind": "joint" | "motion" | "force", "i": place, "j": place or null}],

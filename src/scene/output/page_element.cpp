@@ -15,7 +15,7 @@ PetscErrorCode PageElement(const PageBytes &bytes, const std::string &kind, std:
   uLongf                     size = compressBound((uLong)bytes.all.size());
   std::vector<unsigned char> packed(size);
   PetscFunctionBegin;
-  const int status = compress2(packed.data(), &size, bytes.all.data(), (uLong)bytes.all.size(), 9);
+  const int status = compress2(packed.data(), &size, bytes.all.data(), (uLong)bytes.all.size(), Z_DEFAULT_COMPRESSION);
   PetscCheck(status == Z_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "zlib cannot compress %zu bytes of a page, error %d", bytes.all.size(), status);
   *element = "<script type=\"application/octet-stream\" data-kind=\"" + kind + "\">" + Base64(packed.data(), size) + "</script>\n";
   PetscFunctionReturn(0);

@@ -1,4 +1,5 @@
 #include "scene/output/page_frames.h"
+#include "scene/output/page_surface.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,44 +15,44 @@ constexpr std::size_t   most_bytes  = 8 << 20; /* of a block in memory */
 constexpr double        levels      = 65534;   /* codes 0 to 65534 */
 constexpr std::uint16_t missing     = 65535;
 
+/* Finite, and far enough from the end of the numbers for differences of two */
+bool Usable(double x) { return std::abs(x) < 1e300; }
+
 struct Range {
   double low = 0, step = 0;
 };
 
-/* Of the finite values */
+/* Of the usable values */
 Range RangeOf(const std::vector<double> &x)
 {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (double v : x)
-    if (std::isfinite(v)) {
+    if (Usable(v)) {
       low  = std::min(low, v);
       high = std::max(high, v);
     }
   if (!(high >= low)) return {};
-  return {low, high / levels - low / levels}; /* the difference itself might overflow */
+  return {low, (high - low) / levels};
 }
 
 std::uint16_t Code(double x, const Range &r)
 {
-  if (!std::isfinite(x)) return missing;
+  if (!Usable(x)) return missing;
   return r.step > 0 ? (std::uint16_t)std::min(levels, std::round((x - r.low) / r.step)) : 0;
 }
 
 } // namespace
 
-void PageFrames::add(double time, const double *tracks, const double *channels, const std::vector<std::vector<float>> &fields)
+void PageFrames::add(double time, const double *tracks, const double *channels)
 {
   time_.push_back(time);
   track_.insert(track_.end(), tracks, tracks + tracks_);
   for (std::size_t c = 0; c < channels_; c++) channel_.push_back((float)channels[c]);
-  for (std::size_t f = 0; f < field_.size(); f++) field_[f].insert(field_[f].end(), fields[f].begin(), fields[f].end());
 }
 
 bool PageFrames::full() const
 {
-  std::size_t bytes = sizeof(double) * track_.size() + sizeof(float) * channel_.size();
-  for (const std::vector<float> &f : field_) bytes += sizeof(float) * f.size();
-  return time_.size() >= most_frames || bytes >= most_bytes;
+  return time_.size() >= most_frames || sizeof(double) * track_.size() + sizeof(float) * channel_.size() >= most_bytes;
 }
 
 void PageFrames::clear()
@@ -59,7 +60,6 @@ void PageFrames::clear()
   time_.clear();
   track_.clear();
   channel_.clear();
-  for (std::vector<float> &f : field_) f.clear();
 }
 
 PageBytes PageFrames::encode() const
@@ -69,7 +69,7 @@ PageBytes PageFrames::encode() const
   for (double t : time_) out.f64(t);
   encodeTracks(out);
   encodeChannels(out);
-  for (std::size_t f = 0; f < field_.size(); f++) encodeField(f, out);
+  for (const PageField &f : fields_) encodeField(f, out);
   return out;
 }
 
@@ -107,18 +107,20 @@ void PageFrames::encodeChannels(PageBytes &out) const
   out.planes(bits);
 }
 
-void PageFrames::encodeField(std::size_t field, PageBytes &out) const
+void PageFrames::encodeField(const PageField &field, PageBytes &out) const
 {
-  const std::vector<float> &x = field_[field];
-  const std::size_t         n = time_.size(), nodes = nodes_[field];
-  float                     largest = 0;
-  for (float v : x)
-    if (std::isfinite(v)) largest = std::max(largest, v);
+  const Eigen::Index n = (Eigen::Index)time_.size(), modes = field.surface->stress.cols();
+  Eigen::MatrixXf    eta(modes, n), stress;
+  for (Eigen::Index i = 0; i < n; i++) eta.col(i) = Eigen::Map<const Eigen::VectorXd>(&track_[i * tracks_ + field.first], modes).cast<float>();
+  SurfaceStress(*field.surface, eta, &stress);
+  float largest = 0;
+  for (Eigen::Index k = 0; k < stress.size(); k++)
+    if (std::isfinite(stress.data()[k])) largest = std::max(largest, stress.data()[k]);
   out.f32(largest);
-  for (std::size_t k = 0; k < nodes; k++) {
+  for (Eigen::Index node = 0; node < stress.rows(); node++) {
     unsigned char before = 0;
-    for (std::size_t i = 0; i < n; i++) {
-      const float         v   = x[i * nodes + k];
+    for (Eigen::Index i = 0; i < n; i++) {
+      const float         v   = stress(node, i);
       const unsigned char now = largest > 0 && v > 0 ? (unsigned char)std::lround(255 * std::min(1.f, v / largest)) : 0;
       out.u8((unsigned char)(now - before));
       before = now;

@@ -2,7 +2,7 @@
   Frames of a page, gathered in memory until they are worth a block. A block stands for itself: it can be read without those before.
 
     u32 frames;  f64 time of each
-    for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite
+    for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite, or beyond 1e300
     codes of the tracks, track by track: u16 differences from one frame to the next (the first from 0), in zigzag order, in planes
     channels, one after the other: f32, in planes
     for every field: f32 largest; u8 differences of round(255 value / largest), node by node
@@ -10,37 +10,41 @@
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
 
+#include "hhtdae/output.h"
 #include "scene/output/page_bytes.h"
 
 namespace hhtdae
 {
 
+/* Stress at the nodes of a surface, which is worked out for a block as a whole */
+struct PageField {
+  const Surface *surface;
+  std::size_t    first; /* of its modal coordinates among the tracks */
+};
+
 class PageFrames
 {
 public:
   PageFrames() = default;
-  PageFrames(std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes) : tracks_(tracks), channels_(channels), nodes_(nodes), field_(nodes.size())
-  {
-  }
+  PageFrames(std::size_t tracks, std::size_t channels, const std::vector<PageField> &fields) : tracks_(tracks), channels_(channels), fields_(fields) {}
 
   std::size_t frames() const { return time_.size(); }
-  /* tracks: coordinates of bodies and modes; fields: one value per node of every surface that shows stress */
-  void add(double time, const double *tracks, const double *channels, const std::vector<std::vector<float>> &fields);
+  /* tracks: coordinates of bodies and modes */
+  void add(double time, const double *tracks, const double *channels);
   /* Whether its memory, or the number of its frames, has reached what a block may have */
-  bool full() const;
+  bool      full() const;
   PageBytes encode() const;
   void      clear();
 
 private:
-  std::size_t                     tracks_ = 0, channels_ = 0;
-  std::vector<std::size_t>        nodes_;
-  std::vector<double>             time_, track_; /* frame by frame */
-  std::vector<float>              channel_;
-  std::vector<std::vector<float>> field_;
+  std::size_t            tracks_ = 0, channels_ = 0;
+  std::vector<PageField> fields_;
+  std::vector<double>    time_, track_; /* frame by frame */
+  std::vector<float>     channel_;
 
   void encodeTracks(PageBytes &out) const;
   void encodeChannels(PageBytes &out) const;
-  void encodeField(std::size_t field, PageBytes &out) const;
+  void encodeField(const PageField &field, PageBytes &out) const;
 };
 
 } // namespace hhtdae

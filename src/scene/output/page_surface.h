@@ -22,9 +22,9 @@ std::string SurfaceFault(const Surface &s, const ModalBody &m);
 */
 PageBytes EncodeSurface(const Surface &s, const ModalBody &m);
 
-/* von Mises stress at the nodes, for modal coordinates eta */
 inline bool HasStress(const Surface &s) { return s.stress.size() > 0; }
-void        SurfaceStress(const Surface &s, const double *eta, std::vector<float> *von_mises);
+/* von Mises stress, nodes x frames, for modal coordinates eta, modes x frames */
+void SurfaceStress(const Surface &s, const Eigen::MatrixXf &eta, Eigen::MatrixXf *von_mises);
 
 } // namespace hhtdae
 

@@ -32,6 +32,29 @@ function jointGeometry(type, s) {
   return null;
 }
 
+/* Nodes on edges of a surface become several vertices, one for each side, so that the edge stays sharp in the light: faces around a node whose normals
+   are within 50 degrees share one. Returns the node of every vertex, and the triangles by vertices. */
+function splitAtCreases(s) {
+  const faces = s.triangle.length / 3, normal = new Float32Array(s.triangle.length), share = Math.cos(50 * Math.PI / 180);
+  const [a, b, c] = [0, 1, 2].map(() => new THREE.Vector3());
+  for (let f = 0; f < faces; f++) {
+    [a, b, c].forEach((p, k) => p.fromArray(s.point, 3 * s.triangle[3 * f + k]));
+    b.sub(a).cross(c.sub(a)).normalize().toArray(normal, 3 * f);
+  }
+  const node = [], index = new Uint32Array(s.triangle.length), sides = Array.from({length: s.nodes}, () => []);
+  for (let k = 0; k < index.length; k++) {
+    const at = 3 * Math.floor(k / 3), list = sides[s.triangle[k]];
+    let side = list.find(v => v.n[0] * normal[at] + v.n[1] * normal[at + 1] + v.n[2] * normal[at + 2] > share);
+    if (!side) {
+      side = {vertex: node.length, n: normal.subarray(at, at + 3)};
+      list.push(side);
+      node.push(s.triangle[k]);
+    }
+    index[k] = side.vertex;
+  }
+  return {node: Uint32Array.from(node), index};
+}
+
 /* Colours of stress from none to the largest */
 const stressStops = [[0, '#30408f'], [0.15, '#3f7fd6'], [0.32, '#35b6c9'], [0.5, '#58c865'], [0.68, '#d8d62f'], [0.84, '#f28a22'], [1, '#c5141d']];
 const stressTable = (() => {

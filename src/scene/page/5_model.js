@@ -75,13 +75,13 @@ class Model {
 
   addLights() {
     const up = new THREE.Vector3(...this.run.scene.up);
-    this.sky = new THREE.HemisphereLight(0xffffff, 0x8891a0, 0.75);
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x8891a0, 0.66);
     this.sky.position.copy(up);
-    this.sun = new THREE.DirectionalLight(0xffffff, 0.55);
+    this.sun = new THREE.DirectionalLight(0xffffff, 0.5);
     this.scene3.add(this.sky, this.sun, this.sun.target);
   }
 
-  material(colour, more = {}) { return new THREE.MeshPhongMaterial({color: colour, specular: 0x1c1c1c, shininess: 35, ...more}); }
+  material(colour, more = {}) { return new THREE.MeshPhongMaterial({color: colour, specular: 0x1c1c1c, shininess: 35, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, ...more}); }
   colourOf(body) { return body < 0 ? '#8a94a3' : bodyColours[this.colourIndex[body] % bodyColours.length]; }
 
   mesh(parent, geometry, material, place) {
@@ -110,7 +110,7 @@ class Model {
     const edge = new THREE.LineBasicMaterial({color: 0x000000, transparent: true, opacity: 0.28});
     const draw = (group, shapes, material, guess, reach) => {
       for (const s of shapes) {
-        const mesh = this.mesh(group, shapeGeometry(s, guess, reach), material, s.at);
+        const mesh = this.mesh(group, shapeGeometry(s, guess, reach), s.colour < 0 ? material : this.material(s.colour), s.at);
         if (s.kind !== 'sphere') mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), edge));
       }
     };
@@ -168,7 +168,7 @@ class Model {
 
   addElements() {
     const s = 0.012 * this.size, metal = this.material('#5b6472'), spring = this.material('#7d8898'), joint = this.material('#4a5361');
-    const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.28, depthTest: false}); /* seen through what covers it */
+    const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.13, depthTest: false}); /* seen through what covers it */
     for (const e of this.run.scene.elements) {
       if (!e.i) continue;
       const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
@@ -191,11 +191,12 @@ class Model {
 
   addSurfaces() {
     for (const s of this.run.surfaces) {
-      const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute('position', new THREE.BufferAttribute(s.point.slice(), 3));
-      geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * s.nodes).fill(1), 3));
-      geometry.setIndex(new THREE.BufferAttribute(s.triangle, 1));
-      geometry.computeVertexNormals();
+      const geometry = new THREE.BufferGeometry(), {node, index} = splitAtCreases(s);
+      s.node = node;
+      s.now = new Float32Array(3 * s.nodes); /* positions of the nodes */
+      geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * node.length), 3));
+      geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * node.length).fill(1), 3));
+      geometry.setIndex(new THREE.BufferAttribute(index, 1));
       const material = this.material(this.colourOf(s.body), {side: THREE.DoubleSide, vertexColors: THREE.VertexColors});
       s.mesh = this.mesh(this.bodies[s.body], geometry, material);
       s.mesh.frustumCulled = false; /* its bounds change */
@@ -232,15 +233,22 @@ class Model {
   }
 
   deform(s, tracks, deflection) {
-    const eta = this.run.scene.bodies[s.body].modal, position = s.mesh.geometry.attributes.position, x = position.array;
+    const eta = this.run.scene.bodies[s.body].modal, position = s.mesh.geometry.attributes.position, to = position.array, x = s.now;
     x.set(s.point);
     for (const k of s.active) {
       const amount = deflection * tracks[eta + k], shape = s.mode[k].shape;
       if (!(Math.abs(amount) * s.mode[k].largest > 1e-7 * this.size)) continue;
       for (let i = 0; i < x.length; i++) x[i] += amount * shape[i];
     }
+    for (let v = 0; v < s.node.length; v++) {
+      const i = 3 * s.node[v];
+      to[3 * v] = x[i];
+      to[3 * v + 1] = x[i + 1];
+      to[3 * v + 2] = x[i + 2];
+    }
     position.needsUpdate = true;
-    if (s.triangle.length < 60000) s.mesh.geometry.computeVertexNormals();
+    if (!s.lit || s.triangle.length < 60000) s.mesh.geometry.computeVertexNormals(); /* of large meshes once: they turn little */
+    s.lit = true;
   }
 
   paint(s, t) {
@@ -251,11 +259,11 @@ class Model {
     } else {
       const [k, part] = placeInTime(this.run, t), a = s.field[k], b = s.field[Math.min(k + 1, s.field.length - 1)];
       const fa = (1 - part) * a.largest / this.stressTop, fb = part * b.largest / this.stressTop;
-      for (let i = 0; i < s.nodes; i++) {
-        const colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] + fb * b.code[i]) || 0))];
-        c[3 * i] = colour[0];
-        c[3 * i + 1] = colour[1];
-        c[3 * i + 2] = colour[2];
+      for (let v = 0; v < s.node.length; v++) {
+        const i = s.node[v], colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] + fb * b.code[i]) || 0))];
+        c[3 * v] = colour[0];
+        c[3 * v + 1] = colour[1];
+        c[3 * v + 2] = colour[2];
       }
       s.mesh.material.color.set(0xffffff);
     }

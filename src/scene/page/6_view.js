@@ -11,6 +11,8 @@ class View {
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
     this.up = new THREE.Vector3(...model.run.scene.up);
     this.camera.up.copy(this.up);
+    this.camera.add(new THREE.DirectionalLight(0xffffff, 0.22)); /* no side that is looked at is black */
+    model.scene3.add(this.camera);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
@@ -104,7 +106,7 @@ class View {
       const d = new THREE.Vector3(k & 1 ? bounds.max.x : bounds.min.x, k & 2 ? bounds.max.y : bounds.min.y, k & 4 ? bounds.max.z : bounds.min.z).sub(centre);
       distance = Math.max(distance, d.dot(this.direction) + Math.abs(d.dot(right)) / wide, d.dot(this.direction) + Math.abs(d.dot(above)) / (tall * (1 - free)));
     }
-    distance *= 1.08;
+    distance *= 1.02;
     this.camera.near = 0.005 * distance;
     this.camera.far = 40 * distance;
     this.camera.updateProjectionMatrix();
@@ -139,7 +141,7 @@ class View {
     const surface = this.model.run.surfaces.find(s => s.mesh === hit.object);
     let o = hit.object;
     while (o && o.userData.body === undefined) o = o.parent;
-    return {body: o ? o.userData.body : -1, element: hit.object.userData.element, surface, node: surface ? this.nearest(hit) : -1};
+    return {body: o ? o.userData.body : -1, element: hit.object.userData.element, surface, node: surface ? surface.node[this.nearest(hit)] : -1};
   }
 
   nearest(hit) {

@@ -90,7 +90,7 @@ function draw() {
     view.drawAxes(element('axes'));
     showTag();
   }
-  const digits = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10((end() - begin()) / 500 || 1))));
+  const digits = Math.min(6, Math.max(0, -Math.floor(Math.log10((end() - begin()) / 500 || 1))));
   element('time').textContent = state.t.toFixed(digits) + ' / ' + end().toFixed(Math.min(digits, 3));
   element('scrub').value = end() > begin() ? Math.round(1e4 * (state.t - begin()) / (end() - begin())) : 0;
   element('scrub').setAttribute('aria-valuetext', 'time ' + state.t.toFixed(digits));
@@ -103,7 +103,7 @@ function showTag() {
   let text = group ? run.scene.bodies[state.body].name : state.element || '', at = group && group.visible ? group.position : null;
   if (group && state.node) {
     const {surface, node} = state.node;
-    at = new THREE.Vector3().fromBufferAttribute(surface.mesh.geometry.attributes.position, node).applyMatrix4(surface.mesh.matrixWorld);
+    at = new THREE.Vector3().fromArray(surface.now, 3 * node).applyMatrix4(surface.mesh.matrixWorld);
     if (surface.stress && surface.field.length) text += ', ' + formatWithUnit(stressAt(surface, run, node, state.t), surface.unit, 3);
   }
   const p = at && text ? view.project(at) : null;
@@ -239,7 +239,7 @@ function prepareSurfaces() {
   element('legend').title = 'Largest of the run: ' + formatWithUnit(Math.max(...run.surfaces.map(s => s.range.largest)), unit, 3) + '. The colours end where 99 % of the nodes stay below.';
   element('legend-ticks').replaceChildren(...[1, 0.75, 0.5, 0.25, 0].map(x => {
     const tick = document.createElement('span');
-    tick.textContent = (x === 1 ? '≥ ' : '') + formatWithUnit(x * model.stressTop, unit, 3);
+    tick.textContent = x ? (x === 1 ? '≥ ' : '') + formatWithUnit(x * model.stressTop, unit, 3) : '0';
     return tick;
   }));
   setColour('stress');
@@ -314,7 +314,7 @@ function prepareControls() {
   element('scrub').max = 1e4;
   element('scrub').addEventListener('input', e => scrubTo(begin() + (end() - begin()) * e.target.value / 1e4));
   document.addEventListener('keydown', onKey);
-  new ResizeObserver(() => { if (view) view.resize(); change(); }).observe(element('view'));
+  new ResizeObserver(() => { if (view) view.resize(); draw(); }).observe(element('view'));
   new ResizeObserver(change).observe(element('plots'));
   if (!view) return;
   let down = null;

@@ -1,0 +1,74 @@
+"""The page of a run in a real browser without a screen: it reads its data, draws, plays, has plots, and says nothing on the console.
+
+usage: page.py BIN DIRECTORY
+"""
+
+import html
+import json
+import math
+import os
+import re
+import shutil
+import sys
+
+from common import check, run, skip
+
+bin, directory = sys.argv[1], sys.argv[2]
+browser = next((b for b in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if b), None)
+if not browser:
+    skip("no Chromium (Debian: chromium)")
+shutil.rmtree(directory, ignore_errors=True)
+os.makedirs(directory)
+
+
+def page(program, *options):
+    """The page that a program of examples/ writes"""
+    file = os.path.abspath(os.path.join(directory, program + ".html"))
+    run([os.path.join(bin, program), "-scene_page", file, *options])
+    return file
+
+
+def look(file, *settings):
+    """What the page finds when it tests itself"""
+    arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+                 "--user-data-dir=" + os.path.join(os.path.abspath(directory), "profile"), "--window-size=1000,700", "--virtual-time-budget=60000"]
+    dom = run([browser, *arguments, *settings, "--dump-dom", "file://" + file + "#selftest"], seconds=240)
+    found = re.search(r'data-selftest="([^"]*)"', dom)
+    check(found, "%s did not come to the end of its test: %s" % (file, re.findall(r'id="message"[^<]*<?', dom)))
+    return json.loads(html.unescape(found.group(1)))
+
+
+def expect(file, frames, bodies, channels, surfaces):
+    result = look(file)
+    print(os.path.basename(file), os.path.getsize(file), "bytes", result)
+    check(result["errors"] == [], "errors on the console: %s" % result["errors"])
+    for key, value in (("frames", frames), ("bodies", bodies), ("channels", channels), ("surfaces", surfaces), ("visible", bodies)):
+        check(result[key] == value, "%s: %s %s, not %d" % (file, result[key], key, value))
+    check(result["webgl"] and result["drawn"] > 500 and result["colours"] > 4, "nothing to be seen: %s" % result)
+    check(result["played"], "it does not play")
+    check(result["plots"] >= min(channels, 2) + 1, "%d plots" % result["plots"])
+    return result
+
+
+# The body of the page's test is the first one, the crank, which turns about the x axis through (0, 0.1, 0.12) at a distance of 0.04.
+file = page("slidercrank3d")
+result = expect(file, 501, 3, 3, 0)
+for place in (result["first"], result["last"]):
+    check(abs(place[0]) < 1e-4 and abs(math.hypot(place[1] - 0.1, place[2] - 0.12) - 0.04) < 1e-4, "the crank is at %s" % place)
+check(result["first"][:3] != result["last"][:3], "the crank does not move")
+
+# A flexible rod with stress; attachments are bodies, too
+expect(page("flexcrank"), 501, 5, 6, 1)
+
+# A page whose writer was stopped within a block shows what is whole
+with open(file) as whole:
+    text = whole.read()
+cut = file.replace(".html", "-cut.html")
+with open(cut, "w") as out:
+    out.write(text[:text.rindex('data-kind="frames"') + 1000])
+result = look(cut)
+check(result["frames"] == 384 and result["errors"] == [], "a page that was cut off: %s" % result)
+
+# Without WebGL the plots are left
+result = look(file, "--disable-gpu", "--disable-3d-apis")
+check(not result["webgl"] and result["plots"] == 4, "without WebGL: %s" % result)
