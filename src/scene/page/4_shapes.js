@@ -33,9 +33,9 @@ function jointGeometry(type, s) {
 }
 
 /* Nodes on edges of a surface become several vertices, one for each side, so that the edge stays sharp in the light: faces around a node whose normals
-   are within 50 degrees share one. Returns the node of every vertex, and the triangles by vertices. */
+   are within 60 degrees share one. Returns the node of every vertex, and the triangles by vertices. */
 function splitAtCreases(s) {
-  const faces = s.triangle.length / 3, normal = new Float32Array(s.triangle.length), share = Math.cos(50 * Math.PI / 180);
+  const faces = s.triangle.length / 3, normal = new Float32Array(s.triangle.length), share = 0.5;
   const [a, b, c] = [0, 1, 2].map(() => new THREE.Vector3());
   for (let f = 0; f < faces; f++) {
     [a, b, c].forEach((p, k) => p.fromArray(s.point, 3 * s.triangle[3 * f + k]));

@@ -271,21 +271,32 @@ class Model {
     s.painted = by;
   }
 
-  /* Box around everything at some times of the run */
+  /* Corners of everything at some times of the run, and the box around them */
   findBounds() {
+    const n = this.run.frame.length, some = Math.min(n, 24), corner = new THREE.Vector3();
     this.bounds = new THREE.Box3();
-    const n = this.run.frame.length, some = Math.min(n, 24), box = new THREE.Box3();
+    this.points = [];
     for (let k = 0; k < some; k++) {
       this.moveTo(this.run.time[some > 1 ? Math.round(k * (n - 1) / (some - 1)) : 0], 1);
+      for (const s of this.run.surfaces) s.mesh.geometry.boundingBox = null;
       this.scene3.updateMatrixWorld(true);
       this.scene3.traverse(o => {
         if (!o.isMesh || !this.shown(o)) return;
         if (!o.geometry.boundingBox) o.geometry.computeBoundingBox();
-        box.copy(o.geometry.boundingBox).applyMatrix4(o.matrixWorld);
-        if (Number.isFinite(box.min.x + box.max.x + box.min.y + box.max.y + box.min.z + box.max.z)) this.bounds.union(box);
+        const {min, max} = o.geometry.boundingBox;
+        for (let c = 0; c < 8; c++) {
+          corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z).applyMatrix4(o.matrixWorld);
+          if (!Number.isFinite(corner.x + corner.y + corner.z)) continue;
+          this.bounds.expandByPoint(corner);
+          this.points.push(corner.clone());
+        }
       });
     }
-    if (this.bounds.isEmpty()) this.bounds.set(new THREE.Vector3(-0.5, -0.5, -0.5), new THREE.Vector3(0.5, 0.5, 0.5));
+    if (!this.points.length)
+      for (const x of [-0.5, 0.5]) {
+        this.points.push(new THREE.Vector3(x, x, x));
+        this.bounds.expandByPoint(this.points[this.points.length - 1]);
+      }
   }
 
   shown(o) {

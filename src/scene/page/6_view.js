@@ -97,21 +97,34 @@ class View {
 
   /* All of the motion in the middle of the picture. free: part of its height that labels cover at the top. */
   fit(free = 0) {
-    const {bounds} = this.model, centre = bounds.getCenter(new THREE.Vector3()), right = this.up.clone().cross(this.direction);
+    const {bounds, points} = this.model, direction = this.direction, right = this.up.clone().cross(direction);
     if (right.length() < 1e-6) right.set(1, 0, 0);
     right.normalize();
-    const above = this.direction.clone().cross(right), tall = Math.tan(this.camera.fov * Math.PI / 360), wide = tall * this.camera.aspect;
+    const above = direction.clone().cross(right), tall = Math.tan(this.camera.fov * Math.PI / 360), wide = tall * this.camera.aspect;
+    const target = bounds.getCenter(new THREE.Vector3()), d = new THREE.Vector3();
     let distance = 0;
-    for (let k = 0; k < 8; k++) {
-      const d = new THREE.Vector3(k & 1 ? bounds.max.x : bounds.min.x, k & 2 ? bounds.max.y : bounds.min.y, k & 4 ? bounds.max.z : bounds.min.z).sub(centre);
-      distance = Math.max(distance, d.dot(this.direction) + Math.abs(d.dot(right)) / wide, d.dot(this.direction) + Math.abs(d.dot(above)) / (tall * (1 - free)));
+    for (let pass = 0; pass < 4; pass++) { /* from the distance follows the middle, and from that a smaller distance */
+      distance = 0;
+      for (const p of points) {
+        d.copy(p).sub(target);
+        distance = Math.max(distance, d.dot(direction) + Math.max(Math.abs(d.dot(right)) / wide, Math.abs(d.dot(above)) / (tall * (1 - free))) * 1.1);
+      }
+      const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+      for (const p of points) {
+        d.copy(p).sub(target);
+        const depth = distance - d.dot(direction);
+        [right, above].forEach((axis, k) => {
+          low[k] = Math.min(low[k], d.dot(axis) / depth);
+          high[k] = Math.max(high[k], d.dot(axis) / depth);
+        });
+      }
+      if (pass < 3) target.addScaledVector(right, 0.5 * distance * (low[0] + high[0])).addScaledVector(above, 0.5 * distance * (low[1] + high[1]));
     }
-    distance *= 1.02;
     this.camera.near = 0.005 * distance;
     this.camera.far = 40 * distance;
     this.camera.updateProjectionMatrix();
-    this.controls.target.copy(centre).addScaledVector(above, free * tall * distance);
-    this.camera.position.copy(this.controls.target).addScaledVector(this.direction, distance);
+    this.controls.target.copy(target).addScaledVector(above, free * tall * distance);
+    this.camera.position.copy(this.controls.target).addScaledVector(direction, distance);
     this.controls.update();
   }
 

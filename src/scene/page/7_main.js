@@ -91,7 +91,7 @@ function draw() {
     showTag();
   }
   const digits = Math.min(6, Math.max(0, -Math.floor(Math.log10((end() - begin()) / 500 || 1))));
-  element('time').textContent = state.t.toFixed(digits) + ' / ' + end().toFixed(Math.min(digits, 3));
+  element('time').textContent = state.t.toFixed(digits) + ' / ' + end().toFixed(digits);
   element('scrub').value = end() > begin() ? Math.round(1e4 * (state.t - begin()) / (end() - begin())) : 0;
   element('scrub').setAttribute('aria-valuetext', 'time ' + state.t.toFixed(digits));
   for (const p of [...bodyPlots, ...plots]) p.draw(state.t, place);
