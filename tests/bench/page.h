@@ -51,7 +51,8 @@ public:
     body_ << "<div class='wide'><table>";
     if (!caption.empty()) body_ << "<caption>" << escaped(caption) << "</caption>";
     body_ << "<tr>";
-    for (const std::string &cell : head) body_ << "<th>" << escaped(cell) << "</th>";
+    for (std::size_t k = 0; k < head.size(); k++)
+      body_ << (k && !rows.empty() && k < rows[0].size() && isNumber(rows[0][k]) ? "<th class='n'>" : "<th>") << escaped(head[k]) << "</th>";
     body_ << "</tr>\n";
     for (const Row &row : rows) addRow(row);
     body_ << "</table></div>\n";
@@ -120,7 +121,7 @@ public:
            "<style>body{font:16px/1.5 sans-serif;max-width:68em;margin:2em auto;padding:0 1em;color:#222}"
            "h1{font-size:1.7em}h2{margin-top:2em;border-bottom:1px solid #ccc}table{border-collapse:collapse;margin:1em 0;font-size:.88em}"
            "caption{text-align:left;font-weight:bold;padding:.3em 0}th,td{padding:.25em .6em;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}"
-           "th{border-bottom:2px solid #888;white-space:normal;vertical-align:bottom;min-width:4em}td:first-child{white-space:normal;min-width:9em}td.n{text-align:right;font-variant-numeric:tabular-nums}tr.bad td{background:#fdd}.wide{overflow-x:auto;width:max-content;min-width:100%;max-width:calc(100vw - 3em);"
+           "th{border-bottom:2px solid #888;white-space:normal;vertical-align:bottom;min-width:4em}td:first-child{white-space:normal;min-width:9em}td.n,th.n{text-align:right}td.n{font-variant-numeric:tabular-nums}tr.bad td{background:#fdd}.wide{overflow-x:auto;width:max-content;min-width:100%;max-width:calc(100vw - 3em);"
            "position:relative;left:50%;transform:translateX(-50%)}iframe{display:block;width:min(72em,calc(100vw - 3em));height:min(46em,92vh);"
            "border:1px solid #ccc;border-radius:8px}"
            "figure{margin:1.5em 0}figcaption{color:#555;font-size:.9em}img,svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:.6em;overflow-x:auto}"

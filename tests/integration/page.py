@@ -3,6 +3,7 @@
 usage: page.py BIN DIRECTORY
 """
 
+import base64
 import html
 import json
 import math
@@ -10,6 +11,7 @@ import os
 import re
 import shutil
 import sys
+import zlib
 
 from common import check, run, skip
 
@@ -36,6 +38,20 @@ def look(file, *settings):
     found = re.search(r'data-selftest="([^"]*)"', dom)
     check(found, "%s did not come to the end of its test: %s" % (file, re.findall(r'id="message"[^<]*<?', dom)))
     return json.loads(html.unescape(found.group(1)))
+
+
+def lose_first_body(block, bodies):
+    """A block of frames in which the first of these bodies, which have no modes, is at no finite place"""
+    data = bytearray(zlib.decompress(base64.b64decode(block)))
+    frames, tracks = int.from_bytes(data[:4], "little"), 7 * bodies
+    codes = 4 + 8 * frames + 16 * tracks
+    for plane in range(2):
+        begin = codes + plane * frames * tracks
+        data[begin:begin + 7 * frames] = bytes(7 * frames)
+        if plane == 0:
+            for track in range(7):
+                data[begin + track * frames] = 1  # from 0 to -1, which is 65535
+    return base64.b64encode(zlib.compress(bytes(data))).decode()
 
 
 def expect(file, frames, bodies, channels, surfaces):
@@ -68,6 +84,15 @@ with open(cut, "w") as out:
     out.write(text[:text.rindex('data-kind="frames"') + 1000])
 result = look(cut)
 check(result["frames"] == 384 and result["errors"] == [], "a page that was cut off: %s" % result)
+
+# A body that is nowhere, of a name that looks like a program: it is left out of the picture, and its name is text
+text = re.sub(r'(<script type="application/octet-stream" data-kind="frames">)([^<]*)', lambda m: m.group(1) + lose_first_body(m.group(2), 3), text)
+text = text.replace('"name":"crank"', '"name":"\\u003c/script\\u003e\\u003cimg src=x onerror=console.error(1)\\u003e"')
+lost = file.replace(".html", "-lost.html")
+with open(lost, "w") as out:
+    out.write(text)
+result = look(lost)
+check(result["visible"] == 2 and result["errors"] == [] and result["frames"] == 501, "a page with a lost body: %s" % result)
 
 # Without WebGL the plots are left
 result = look(file, "--disable-gpu", "--disable-3d-apis")

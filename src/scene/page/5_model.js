@@ -174,7 +174,7 @@ class Model {
       const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
       if (geometry) {
         const mesh = this.mesh(e.i[0] < 0 ? this.ground : this.bodies[e.i[0]], geometry, joint, e.i);
-        mesh.userData.element = e.name;
+        mesh.userData.element = `${e.name} (${e.type})`;
         const ghost = new THREE.Mesh(geometry, hidden);
         ghost.renderOrder = 1;
         ghost.userData.ghost = true;
@@ -182,10 +182,11 @@ class Model {
         this.symbols.push(mesh);
       }
       if (!e.j || e.i[0] === e.j[0]) continue;
+      const add = (geometry, material) => { this.addSpan(e.i, e.j, geometry, material, -1).userData.element = `${e.name} (${e.type})`; };
       const length = this.first ? this.pointAt(this.first, e.i).distanceTo(this.pointAt(this.first, e.j)) : 0;
-      if (/^(spring-damper|nonlinear spring)$/.test(e.type) && length > 0.01 * this.size) this.addSpan(e.i, e.j, coilGeometry(Math.min(0.018 * this.size, 0.16 * length), length), spring, -1);
-      else if (/^beam$/.test(e.type)) this.addSpan(e.i, e.j, new THREE.CylinderBufferGeometry(0.007 * this.size, 0.007 * this.size, 1, 12), metal, -1);
-      else if (/distance/.test(e.type)) this.addSpan(e.i, e.j, new THREE.CylinderBufferGeometry(0.004 * this.size, 0.004 * this.size, 1, 10), metal, -1);
+      if (/^(spring-damper|nonlinear spring)$/.test(e.type) && length > 0.01 * this.size) add(coilGeometry(Math.min(0.018 * this.size, 0.16 * length), length), spring);
+      else if (/^beam$/.test(e.type)) add(new THREE.CylinderBufferGeometry(0.007 * this.size, 0.007 * this.size, 1, 12), metal);
+      else if (/distance/.test(e.type)) add(new THREE.CylinderBufferGeometry(0.004 * this.size, 0.004 * this.size, 1, 10), metal);
     }
   }
 

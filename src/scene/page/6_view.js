@@ -142,7 +142,7 @@ class View {
     this.followedAt = g.position.clone();
   }
 
-  /* What is under a point of the page: {body, element, surface, node} or null */
+  /* What is under a point of the page: {body, element (its name and type), object, surface, node} or null */
   pick(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
@@ -154,7 +154,7 @@ class View {
     const surface = this.model.run.surfaces.find(s => s.mesh === hit.object);
     let o = hit.object;
     while (o && o.userData.body === undefined) o = o.parent;
-    return {body: o ? o.userData.body : -1, element: hit.object.userData.element, surface, node: surface ? surface.node[this.nearest(hit)] : -1};
+    return {body: o ? o.userData.body : -1, element: hit.object.userData.element, object: hit.object, surface, node: surface ? surface.node[this.nearest(hit)] : -1};
   }
 
   nearest(hit) {

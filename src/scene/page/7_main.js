@@ -3,7 +3,7 @@
 const element = id => document.getElementById(id);
 const mostPlots = 4;
 
-const state = {t: 0, playing: false, speed: 1, deflection: 1, body: -1, node: null, shown: [], dirty: true, last: 0, follow: false};
+const state = {t: 0, playing: false, speed: 1, deflection: 1, body: -1, node: null, element: null, shown: [], dirty: true, last: 0, follow: false};
 let run, model, view = null, plots = [], bodyPlots = [], usable = 1;
 
 function say(text, bad) {
@@ -100,8 +100,9 @@ function draw() {
 /* The name of what is selected, beside it */
 function showTag() {
   const tag = element('tag'), group = model.bodies[state.body];
-  let text = group ? run.scene.bodies[state.body].name : state.element || '', at = group && group.visible ? group.position : null;
-  if (group && state.node) {
+  let text = group ? run.scene.bodies[state.body].name : '', at = group && group.visible ? group.position : null;
+  if (state.element) [text, at] = [state.element.element, state.element.object.getWorldPosition(new THREE.Vector3())];
+  else if (group && state.node) {
     const {surface, node} = state.node;
     at = new THREE.Vector3().fromArray(surface.now, 3 * node).applyMatrix4(surface.mesh.matrixWorld);
     if (surface.stress && surface.field.length) text += ', ' + formatWithUnit(stressAt(surface, run, node, state.t), surface.unit, 3);
@@ -116,13 +117,15 @@ function showTag() {
 
 /* ---- selection and plots ---- */
 
-function select(body, node = null) {
+/* A body, a node of its surface, or a joint or force at it: what View.pick() returns */
+function select(body, node = null, picked = null) {
   if (model && view) {
     model.materials.forEach((m, k) => m.emissive.set(k === body ? 0x333333 : 0));
     for (const s of run.surfaces) s.mesh.material.emissive.set(s.body === body && model.colourBy === 'body' ? 0x222222 : 0);
   }
   state.body = body;
   state.node = node;
+  state.element = picked;
   bodyPlots = body < 0 ? [] : [positionPlot(body)];
   if (node && node.surface.stress && node.surface.field.length) bodyPlots.unshift(stressPlot(node));
   showPlots();
@@ -322,7 +325,7 @@ function prepareControls() {
   element('canvas').addEventListener('pointerup', e => {
     if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 5 || e.button) return;
     const hit = view.pick(e.clientX, e.clientY);
-    select(hit ? hit.body : -1, hit && hit.surface ? hit : null);
+    select(hit ? hit.body : -1, hit && hit.surface ? hit : null, hit && hit.element ? hit : null);
   });
 }
 
