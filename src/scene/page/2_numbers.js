@@ -10,7 +10,7 @@ function formatNumber(x, digits = 4) {
     const [m, e] = x.toExponential(digits - 1).split('e');
     return m.replace(/\.?0+$/, '').replace('-', '−') + '·10' + superscript(Number(e));
   }
-  return x.toPrecision(digits).replace(/(\.[0-9]*?)0+$/, '$1').replace(/\.$/, '').replace('-', '−');
+  return String(Number(x.toPrecision(digits))).replace('-', '−');
 }
 
 /* With a prefix where the unit takes one: "123 MPa" */

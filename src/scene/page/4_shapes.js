@@ -4,12 +4,24 @@ const bodyColours = ['#4e79a7', '#f28e2b', '#59a14f', '#b07aa1', '#e15759', '#3f
 
 const zUp = geometry => geometry.rotateX(Math.PI / 2); /* three.js has the axes of cylinders along y */
 
+/* Equal shapes share a geometry: scenes may have thousands. */
+const made = new Map();
+function once(key, make) {
+  if (!made.has(key)) made.set(key, make());
+  return made.get(key);
+}
+
+const edgesOf = geometry => once('edges ' + geometry.id, () => new THREE.EdgesGeometry(geometry, 30));
+const rod = radius => once('rod ' + radius, () => new THREE.CylinderBufferGeometry(radius, radius, 1, 12)); /* of length one along y */
+
 function shapeGeometry(shape, guess, reach) {
   let [a, b, c] = shape.size;
   if (guess) [a, b, c] = shape.size.map(x => Math.min(Math.max(x, 0.08 * reach), reach));
-  if (shape.kind === 'box') return new THREE.BoxBufferGeometry(2 * a, 2 * b, 2 * c);
-  if (shape.kind === 'cylinder') return zUp(new THREE.CylinderBufferGeometry(a, a, 2 * c, 40));
-  return new THREE.SphereBufferGeometry(1, 36, 24).scale(a, b, c);
+  return once([shape.kind, a, b, c].join(), () => {
+    if (shape.kind === 'box') return new THREE.BoxBufferGeometry(2 * a, 2 * b, 2 * c);
+    if (shape.kind === 'cylinder') return zUp(new THREE.CylinderBufferGeometry(a, a, 2 * c, 40));
+    return new THREE.SphereBufferGeometry(1, 36, 24).scale(a, b, c);
+  });
 }
 
 /* A coil of length one along y */
@@ -26,9 +38,9 @@ function coilGeometry(radius, length) {
 
 /* What stands for a joint, z along the axis of its marker; null: nothing */
 function jointGeometry(type, s) {
-  if (/revolute|cylindrical|screw/.test(type)) return zUp(new THREE.CylinderBufferGeometry(0.75 * s, 0.75 * s, 2.6 * s, 24));
-  if (/spherical|universal|constant velocity/.test(type)) return new THREE.SphereBufferGeometry(s, 24, 16);
-  if (/translational/.test(type)) return new THREE.BoxBufferGeometry(1.3 * s, 1.3 * s, 3 * s);
+  if (/revolute|cylindrical|screw/.test(type)) return once('pin', () => zUp(new THREE.CylinderBufferGeometry(0.75 * s, 0.75 * s, 2.6 * s, 24)));
+  if (/spherical|universal|constant velocity/.test(type)) return once('ball', () => new THREE.SphereBufferGeometry(s, 24, 16));
+  if (/translational/.test(type)) return once('slide', () => new THREE.BoxBufferGeometry(1.3 * s, 1.3 * s, 3 * s));
   return null;
 }
 

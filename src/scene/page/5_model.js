@@ -15,6 +15,7 @@ class Model {
     this.symbols = []; /* of joints */
     this.spans = [];   /* what stretches between two places: {a, b, mesh} */
     this.first = run.frame.length ? run.frame.find(f => f.slice(0, 7 * this.bodies.length).every(Number.isFinite)) || run.frame[0] : null;
+    this.findPlaces();
     this.findOrigin();
     this.size = this.extentAtStart();
     this.addLights();
@@ -53,11 +54,15 @@ class Model {
     return to.set(place[1], place[2], place[3]).applyQuaternion(rotation).add(position);
   }
 
-  places() {
-    const list = [];
-    for (const e of this.run.scene.elements) for (const p of [e.i, e.j]) if (p) list.push(p);
-    for (const line of this.run.scene.lines) list.push(...line.filter(Boolean));
-    return list;
+  /* Places of markers that joints, forces and lines use: all of them, and by body; frames of attachments by flexible body */
+  findPlaces() {
+    this.places = [];
+    for (const e of this.run.scene.elements) for (const p of [e.i, e.j]) if (p) this.places.push(p);
+    for (const line of this.run.scene.lines) this.places.push(...line.filter(Boolean));
+    this.placesOf = this.bodies.map(() => []);
+    for (const p of this.places) if (p[0] >= 0) this.placesOf[p[0]].push(p);
+    this.framesOf = this.bodies.map(() => []);
+    this.run.scene.bodies.forEach((b, k) => { if (b.carrier >= 0) this.framesOf[b.carrier].push(k); });
   }
 
   extentAtStart() {
@@ -65,7 +70,7 @@ class Model {
     const box = new THREE.Box3();
     const add = p => { if (Number.isFinite(p.x + p.y + p.z)) box.expandByPoint(p); };
     this.bodies.forEach((g, b) => add(this.pointAt(this.first, [b, 0, 0, 0])));
-    for (const p of this.places()) add(this.pointAt(this.first, p));
+    for (const p of this.places) add(this.pointAt(this.first, p));
     for (const body of this.run.scene.bodies) if (!body.guess) for (const s of body.shapes) for (const d of [-1, 1]) add(this.pointAt(this.first, [s.at[0], s.at[1] + d * s.size[0], s.at[2] + d * s.size[1], s.at[3] + d * s.size[2]]));
     const size = box.isEmpty() ? 0 : box.getSize(new THREE.Vector3()).length();
     return size > 0 ? size : 1;
@@ -98,7 +103,7 @@ class Model {
   /* The farthest marker from the centre of mass, by which shapes guessed from the inertia are kept in bounds */
   reachOf(body) {
     let reach = 0;
-    for (const p of this.places()) if (p[0] === body) reach = Math.max(reach, Math.hypot(p[1], p[2], p[3]));
+    for (const p of this.placesOf[body]) reach = Math.max(reach, Math.hypot(p[1], p[2], p[3]));
     return reach > 0 ? Math.max(reach, 0.02 * this.size) : 0.05 * this.size;
   }
 
@@ -111,7 +116,7 @@ class Model {
     const draw = (group, shapes, material, guess, reach) => {
       for (const s of shapes) {
         const mesh = this.mesh(group, shapeGeometry(s, guess, reach), s.colour < 0 ? material : this.material(s.colour), s.at);
-        if (s.kind !== 'sphere') mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry, 30), edge));
+        if (s.kind !== 'sphere') mesh.add(new THREE.LineSegments(edgesOf(mesh.geometry), edge));
       }
     };
     this.run.scene.bodies.forEach((b, k) => {
@@ -125,16 +130,14 @@ class Model {
   /* Bars from the centre of mass to the markers of a body of unknown shape; of a flexible one to its attachments, which move with its modes */
   addBars(b, k, reach) {
     const radius = 0.006 * this.size, seen = new Set();
-    if (!b.shapes.length && !b.modes) this.mesh(this.bodies[k], new THREE.SphereBufferGeometry(0.014 * this.size, 24, 16), this.materials[k]);
-    for (const p of this.places()) {
+    if (!b.shapes.length && !b.modes) this.mesh(this.bodies[k], once('dot', () => new THREE.SphereBufferGeometry(0.014 * this.size, 24, 16)), this.materials[k]);
+    for (const p of this.placesOf[k]) {
       const key = p.slice(1, 4).map(x => x.toFixed(6)).join();
-      if (p[0] !== k || seen.has(key) || Math.hypot(p[1], p[2], p[3]) < 1e-3 * this.size) continue;
+      if (seen.has(key) || Math.hypot(p[1], p[2], p[3]) < 1e-3 * this.size) continue;
       seen.add(key);
-      this.addSpan([k, 0, 0, 0], p, new THREE.CylinderBufferGeometry(radius, radius, 1, 12), this.materials[k], k);
+      this.addSpan([k, 0, 0, 0], p, rod(radius), this.materials[k], k);
     }
-    this.run.scene.bodies.forEach((f, c) => {
-      if (f.carrier === k) this.addSpan([k, 0, 0, 0], [c, 0, 0, 0], new THREE.CylinderBufferGeometry(radius, radius, 1, 12), this.materials[k], k);
-    });
+    for (const c of this.framesOf[k]) this.addSpan([k, 0, 0, 0], [c, 0, 0, 0], rod(radius), this.materials[k], k);
   }
 
   /* Geometry of length one along y; within one body it is placed once */
@@ -162,31 +165,34 @@ class Model {
       for (let k = 0; k + 1 < line.length; k++) {
         if (!line[k] || !line[k + 1]) continue;
         const one = line[k][0] === line[k + 1][0], body = line[k][0];
-        this.addSpan(line[k], line[k + 1], new THREE.CylinderBufferGeometry(radius, radius, 1, 10), one && body >= 0 ? this.materials[body] : this.material('#6b7585'), body);
+        this.addSpan(line[k], line[k + 1], rod(radius), one && body >= 0 ? this.materials[body] : this.material('#6b7585'), body);
       }
   }
 
   addElements() {
     const s = 0.012 * this.size, metal = this.material('#5b6472'), spring = this.material('#7d8898'), joint = this.material('#4a5361');
     const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.13, depthTest: false}); /* seen through what covers it */
+    const few = this.run.scene.elements.length < 200; /* many on top of each other would cover all else */
     for (const e of this.run.scene.elements) {
       if (!e.i) continue;
       const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
       if (geometry) {
         const mesh = this.mesh(e.i[0] < 0 ? this.ground : this.bodies[e.i[0]], geometry, joint, e.i);
         mesh.userData.element = `${e.name} (${e.type})`;
-        const ghost = new THREE.Mesh(geometry, hidden);
-        ghost.renderOrder = 1;
-        ghost.userData.ghost = true;
-        mesh.add(ghost);
+        if (few) {
+          const ghost = new THREE.Mesh(geometry, hidden);
+          ghost.renderOrder = 1;
+          ghost.userData.ghost = true;
+          mesh.add(ghost);
+        }
         this.symbols.push(mesh);
       }
       if (!e.j || e.i[0] === e.j[0]) continue;
       const add = (geometry, material) => { this.addSpan(e.i, e.j, geometry, material, -1).userData.element = `${e.name} (${e.type})`; };
       const length = this.first ? this.pointAt(this.first, e.i).distanceTo(this.pointAt(this.first, e.j)) : 0;
       if (/^(spring-damper|nonlinear spring)$/.test(e.type) && length > 0.01 * this.size) add(coilGeometry(Math.min(0.018 * this.size, 0.16 * length), length), spring);
-      else if (/^beam$/.test(e.type)) add(new THREE.CylinderBufferGeometry(0.007 * this.size, 0.007 * this.size, 1, 12), metal);
-      else if (/distance/.test(e.type)) add(new THREE.CylinderBufferGeometry(0.004 * this.size, 0.004 * this.size, 1, 10), metal);
+      else if (/^beam$/.test(e.type)) add(rod(0.007 * this.size), metal);
+      else if (/distance/.test(e.type)) add(rod(0.004 * this.size), metal);
     }
   }
 

@@ -17,6 +17,7 @@ class View {
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
     this.controls.addEventListener('change', changed);
+    this.controls.addEventListener('start', () => { this.fitted = false; });
     if (window.self !== window.top) { /* inside another page the wheel scrolls that page until the view has been touched */
       this.controls.enableZoom = false;
       canvas.addEventListener('pointerdown', () => { this.controls.enableZoom = true; });
@@ -126,12 +127,14 @@ class View {
     this.controls.target.copy(target).addScaledVector(above, free * tall * distance);
     this.camera.position.copy(this.controls.target).addScaledVector(direction, distance);
     this.controls.update();
+    this.fitted = true;
   }
 
   /* The camera goes along with a body */
   follow(body) {
     const g = this.model.bodies[body];
     if (!g || !g.visible) return;
+    this.fitted = false;
     if (this.followed === body) {
       const by = g.position.clone().sub(this.followedAt);
       this.camera.position.add(by);

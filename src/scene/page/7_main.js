@@ -317,7 +317,7 @@ function prepareControls() {
   element('scrub').max = 1e4;
   element('scrub').addEventListener('input', e => scrubTo(begin() + (end() - begin()) * e.target.value / 1e4));
   document.addEventListener('keydown', onKey);
-  new ResizeObserver(() => { if (view) view.resize(); draw(); }).observe(element('view'));
+  new ResizeObserver(() => { if (view && view.fitted) fit(); else if (view) view.resize(); draw(); }).observe(element('view'));
   new ResizeObserver(change).observe(element('plots'));
   if (!view) return;
   let down = null;
