@@ -21,6 +21,9 @@ PetscErrorCode DeclareSceneOptions()
                                       "scene_rate",
                                       "scene_animation",
                                       "scene_animation_dt",
+                                      "scene_page",
+                                      "scene_page_dt",
+                                      "scene_page_frames",
                                       "scene_balance",
                                       "scene_symmetric_storage",
                                       nullptr};

@@ -66,4 +66,16 @@ TEST(Page, AsOnOneRank)
   EXPECT_GT(moved, 0.1);
 }
 
+/* No rank waits for the first one where that cannot write */
+TEST(Page, AllRanksFail)
+{
+  for (const char *file : {"/dev/full", "/nowhere/page.html"}) {
+    Rods      rods(6, PETSC_COMM_WORLD);
+    SceneRun  solve(rods.scene, 0.2, fixedSteps(0.004) + "-scene_page " + file);
+    ErrorTrap trap;
+    EXPECT_NE(solve.solve(), 0);
+    EXPECT_NE(trap.message.find(file), std::string::npos) << trap.message;
+  }
+}
+
 #endif

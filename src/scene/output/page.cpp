@@ -58,20 +58,14 @@ public:
     std::vector<double> frame;
     PetscFunctionBegin;
     PetscCall(gather(R, e, frame));
-    if (R.rank) PetscFunctionReturn(0);
-    if (!there_) PetscCall(writeHead(R.scene));
-    continueQuaternions(frame, R.scene.bodies.size());
-    frames_.add(e.t, frame.data(), frame.data() + tracks_);
-    if (frames_.full()) PetscCall(writeFrames());
+    PetscCall(onFirst(R, [&] { return keep(R.scene, e.t, frame); }));
     PetscFunctionReturn(0);
   }
 
   PetscErrorCode finish(Runtime &R) override
   {
     PetscFunctionBegin;
-    if (R.rank || !there_) PetscFunctionReturn(0);
-    PetscCall(writeFrames());
-    PetscCall(SyncFile(file_));
+    PetscCall(onFirst(R, [&] { return complete(); }));
     PetscFunctionReturn(0);
   }
 
@@ -80,7 +74,7 @@ public:
   PetscErrorCode save(Runtime &R, double *x) override
   {
     PetscFunctionBegin;
-    if (R.rank == 0) PetscCall(writeFrames());
+    PetscCall(onFirst(R, [&] { return writeFrames(); }));
     x[0] = (double)end_;
     x[1] = dt;
     PetscFunctionReturn(0);
@@ -91,7 +85,7 @@ public:
     PetscFunctionBegin;
     end_ = (long)x[0];
     dt   = x[1];
-    if (R.rank == 0 && end_) PetscCall(ShortenFile(file_, end_, &there_));
+    PetscCall(onFirst(R, [&] { return end_ ? ShortenFile(file_, end_, &there_) : PetscErrorCode(0); }));
     PetscFunctionReturn(0);
   }
 
@@ -104,6 +98,37 @@ private:
   std::vector<double>                   last_; /* quaternions of the last frame */
   bool                                  there_ = false;
   long                                  end_   = 0; /* bytes of the file */
+
+  /* Where the first rank fails, all do: none of them waits for it */
+  template <class F> PetscErrorCode onFirst(const Runtime &R, const F &work) const
+  {
+    PetscFunctionBegin;
+    const PetscErrorCode code   = R.rank == 0 ? work() : 0;
+    PetscMPIInt          failed = code != 0;
+    if (R.size > 1) PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, R.scene.comm));
+    PetscCall(code);
+    PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "the first rank could not write the page %s", file_.c_str());
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode keep(const SceneData &s, double t, std::vector<double> &frame)
+  {
+    PetscFunctionBegin;
+    if (!there_) PetscCall(writeHead(s));
+    continueQuaternions(frame, s.bodies.size());
+    frames_.add(t, frame.data(), frame.data() + tracks_);
+    if (frames_.full()) PetscCall(writeFrames());
+    PetscFunctionReturn(0);
+  }
+
+  PetscErrorCode complete()
+  {
+    PetscFunctionBegin;
+    if (!there_) PetscFunctionReturn(0);
+    PetscCall(writeFrames());
+    PetscCall(SyncFile(file_));
+    PetscFunctionReturn(0);
+  }
 
   static PetscMPIInt ownerOf(const Runtime &R, std::size_t body) { return R.number.owner.empty() ? 0 : R.number.owner[body]; }
 
