@@ -10,13 +10,16 @@ void Scene::record(std::function<void(Scene &)> call) { journal_->calls.push_bac
 Parameter Scene::parameter(const std::string &name, double value)
 {
   const SceneData &s = data();
-  if (!journal_) journal_ = std::make_unique<Journal>();
+  if (!journal_) {
+    journal_ = std::make_unique<Journal>();
+    if (s.gravity != Vector3::Zero()) record([g = s.gravity](Scene &again) { again.gravity(g); }); /* which may come before */
+  }
   const auto fault = [&](const char *what) {
     journal_->errors.push_back("parameter " + name + ": " + what);
     data().errors.push_back(journal_->errors.back());
   };
-  if (!s.bodies.empty() || !s.markers.empty() || !s.elements.empty() || !s.variables.empty() || !s.states.empty())
-    fault("it came too late, parameters are made before everything else");
+  if (!s.bodies.empty() || !s.extensions.empty() || !s.markers.empty() || !s.elements.empty() || !s.variables.empty() || !s.states.empty() || !s.channels.empty() || !s.shapes.empty())
+    fault("it came too late, parameters are made before everything else but gravity");
   if (journal_->parameters.count(name)) fault("there is one of this name");
   if (!std::isfinite(value)) fault("its value is not finite");
   Parameter &p = journal_->parameters[name];

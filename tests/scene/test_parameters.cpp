@@ -88,6 +88,35 @@ TEST(Parameters, TheSameDigitsAsDescribed)
   EXPECT_EQ(b.after(0.4), first.after(0.4));
 }
 
+/* Gravity that was given before the first parameter stays when one changes; what else came before is refused */
+TEST(Parameters, WhatCameBeforeTheFirst)
+{
+  Scene scene(PETSC_COMM_SELF);
+  scene.gravity({0, 0, -10});
+  const Parameter mass = scene.parameter("mass", 1);
+  const Body      stone = scene.add("stone", [p = mass] {
+    PointMass b;
+    b.mass = p;
+    return b;
+  });
+  scene.channel("z", Measure::displacement(scene.marker(stone), 2), "m");
+  must(scene.set("mass", 2));
+  SceneRun            run(scene, 0.5, tolerance(1e-9));
+  std::vector<double> x;
+  must(run.solve());
+  must(scene.sample(run.ts, 0.5, x));
+  EXPECT_NEAR(x[0], -1.25, 1e-9);
+  for (int what = 0; what < 2; what++) {
+    Scene     late(PETSC_COMM_SELF);
+    ErrorTrap trap;
+    if (what) late.shape(late.ground(), Shape());
+    else late.channel("one", Expression{{}, [](const Real *) -> Real { return 1; }});
+    late.parameter("k", 1);
+    EXPECT_NE(late.setUp(), 0);
+    EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
+  }
+}
+
 /* Runs that were begun before keep theirs, side by side with later ones */
 TEST(Parameters, ARunKeepsItsOwn)
 {

@@ -131,8 +131,6 @@ class Scene:
         if self._begun:
             raise ValueError("parameter %s came too late: parameters are made before everything else but gravity" % name)
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
-        if len(self._parameters) == 1 and self._gravity is not None:
-            self.set_gravity(self._gravity)  # what came before the first parameter is not described anew
         return p
 
     def set(self, **values: float) -> None:
