@@ -121,6 +121,22 @@ class Pendulum(unittest.TestCase):
         self.assertAlmostEqual(s.q[0, 0], 1., delta=1e-9)
         self.assertAlmostEqual(s.v[0, 0], 0., delta=1e-9)
 
+    def test_velocity_constraints(self):
+        """A blade on a slope, which turns at a constant rate w: x = s sin(w t)^2, y = s (w t - sin(2 w t) / 2) with s = g / (2 w^2), down the slope and across"""
+        g, w = 3., 2.
+        motion = lambda t, q, v, a: [a[0] - g, a[1], 0.1 * a[2]]
+        blade = lambda t, q, v: [v[1] * np.cos(q[2]) - v[0] * np.sin(q[2])]
+        for trace in (False, True):
+            s = h.solve_mechanism(motion, (0, 3), [0, 0, 0], [0, 0, w], velocity_constraints=blade, rtol=1e-8, atol=1e-8, trace=trace)
+            self.assertTrue(s.success)
+            x = w * s.t
+            np.testing.assert_allclose(s.q, g / (2 * w * w) * np.array([np.sin(x)**2, x - np.sin(2 * x) / 2, x * 2 * w * w / g]), atol=5e-5)
+            self.assertEqual(s.multipliers.shape[0], 1)
+            self.assertAlmostEqual(blade(0, s.q[:, -1], s.v[:, -1])[0], 0, delta=1e-7)
+        both = h.solve_mechanism(motion, (0, 1), [0, 0, 0], [0, 0, w], velocity_constraints=blade, constraints=lambda t, q: [q[2] - w * t], trace=True)
+        np.testing.assert_allclose(both.q[0, -1], g / (2 * w * w) * np.sin(w)**2, atol=5e-4)
+        self.assertEqual(both.multipliers.shape[0], 2)
+
     def test_scipy_manner_without_constraints(self):
         s = h.solve_mechanism(lambda t, q, v, a, k: a + k * q, (0, 1), [1.], [0.], args=(4.,), rtol=1e-9, atol=1e-9, trace=True)
         self.assertAlmostEqual(s.q[0, -1], math.cos(2.), delta=1e-5)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 from . import _core
 
-__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role", "get_rotation_factor", "interpolate", "move_back",
-           "set_alpha", "set_checkpoint_vec", "set_coordinate_change", "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse",
-           "set_role", "set_rotations", "set_start", "set_step_limit", "statistics"]
+__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role",
+           "get_rotation_factor", "interpolate", "move_back", "set_alpha", "set_checkpoint_vec", "set_coordinate_change",
+           "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse", "set_role", "set_rotations", "set_start",
+           "set_step_limit", "statistics"]
 
 
 @dataclass(frozen=True)

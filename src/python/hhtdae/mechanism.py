@@ -40,7 +40,7 @@ class DenseOutput:
 class MechanismResult(dict):
     """What `solve_mechanism` returns; entries are attributes as well.
 
-    t : (k,); q, v, a : (n, k); multipliers : (m, k)
+    t : (times,); q, v, a : (n, times); multipliers : (m, times), those of velocity constraints last
     sol : DenseOutput or None
     t_events, q_events : lists with an array for each event, or None
     status : 0 the end was reached, 1 a terminal event came, -1 the run failed
@@ -58,8 +58,9 @@ class MechanismResult(dict):
         return "\n".join("%12s: %r" % (k, x if not isinstance(x, np.ndarray) else "array of shape %s" % (x.shape,)) for k, x in self.items())
 
 
-def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None, constraint_jacobian=None, rtol=1e-6, atol=1e-6, t_eval=None,
-                    dense_output=False, events=None, max_step=np.inf, first_step=None, args=(), trace=False, start="project", options=None):
+def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_constraints=None, jacobian=None, constraint_jacobian=None, rtol=1e-6,
+                    atol=1e-6, t_eval=None, dense_output=False, events=None, max_step=np.inf, first_step=None, args=(), trace=False, start="project",
+                    options=None):
     """Integrates M(q) q'' + Phi_q(t, q)^T lambda = Q(t, q, q'), Phi(t, q) = 0, an index-3 system, as it stands.
 
     Parameters
@@ -72,13 +73,16 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None
         Positions and velocities at the begin.
     constraints : callable, optional
         constraints(t, q, *args) returns Phi, (m,). Its multipliers are forces: Phi_q^T lambda acts on the left side.
+    velocity_constraints : callable, optional
+        velocity_constraints(t, q, v, *args) returns Psi, (k,), linear in v: rolling, blades. Their multipliers, after those of `constraints`, are forces as
+        well: Psi_v^T mu.
     jacobian : callable, optional
         jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central differences, 6 n + 1 calls of
         `residual` for each Newton matrix.
     constraint_jacobian : callable, optional
         constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences.
     rtol, atol : float
-        Tolerance of the positions' error in every step. The global error is larger: of order two the method takes steps as tol^(1/3), and errors go as tol^(2/3).
+        Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3).
     t_eval : sequence of float, optional
         Times of the output, increasing; default: the ends of steps. Accelerations and multipliers there solve the equations of motion.
     dense_output : bool
@@ -113,7 +117,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None
     >>> solution = hhtdae.solve_mechanism(residual, (0, 2), [1, 0], [0, 0], constraints=rod)
     >>> solution.q[:, -1]
     """
-    problem = _Problem(residual, t_span, q0, v0, constraints, jacobian, constraint_jacobian, args)
+    problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args)
     collect_garbage(PETSc.COMM_SELF)
     with temporary_options(options):
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
@@ -130,7 +134,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, jacobian=None
 class _Problem:
     """The user's functions with their sizes, checked"""
 
-    def __init__(self, residual, t_span, q0, v0, constraints, jacobian, constraint_jacobian, args):
+    def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args):
         self.t0, self.t1 = map(float, t_span)
         self.q0, self.v0 = (np.array(x, dtype=float).reshape(-1) for x in (q0, v0))
         self.n, self.args = len(self.q0), tuple(args)
@@ -139,8 +143,10 @@ class _Problem:
         if len(self.v0) != self.n:
             raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
         self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
+        self._rates = velocity_constraints
         self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
-        self.size = self.n + self.m
+        self.k = 0 if velocity_constraints is None else np.size(velocity_constraints(self.t0, self.q0.copy(), self.v0.copy(), *self.args))
+        self.size = self.n + self.m + self.k
         self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))
 
     def _shaped(self, x, shape, what):
@@ -155,6 +161,9 @@ class _Problem:
     def constraints(self, t, q):
         return self._shaped(self._constraints(t, q, *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
 
+    def rates(self, t, q, v):
+        return self._shaped(self._rates(t, q, v, *self.args), (self.k,), "what velocity_constraints() returns") if self.k else np.empty(0)
+
     def gradient(self, t, q):
         if not self.m:
             return np.empty((0, self.n))
@@ -162,9 +171,15 @@ class _Problem:
             return self._shaped(self._gradient(t, q, *self.args), (self.m, self.n), "what constraint_jacobian() returns")
         return _differences(lambda x: self.constraints(t, x), q, self.m)
 
+    def rate_gradient(self, t, q, v):
+        return _differences(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
+
+    def reactions(self, t, q, v, multipliers):
+        """Forces of the constraints"""
+        return self.gradient(t, q).T @ multipliers[:self.m] + self.rate_gradient(t, q, v).T @ multipliers[self.m:]
+
     def forces(self, t, q, v, a, multipliers):
-        f = self.residual(t, q, v, a)
-        return f + self.gradient(t, q).T @ multipliers if self.m else f
+        return self.residual(t, q, v, a) + self.reactions(t, q, v, multipliers)
 
     def matrices(self, t, q, v, a, multipliers):
         """Derivatives of the residual with the constraints' forces, by q, v, a"""
@@ -172,8 +187,8 @@ class _Problem:
             return (_differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n), _differences(lambda x: self.residual(t, q, x, a), v, self.n),
                     _differences(lambda x: self.residual(t, q, v, x), a, self.n))
         K, C, M = (self._shaped(x, (self.n, self.n), "a matrix that jacobian() returns") for x in self._jacobian(t, q, v, a, *self.args))
-        if self.m:
-            K = K + _differences(lambda x: self.gradient(t, x).T @ multipliers, q, self.n)
+        if self.m + self.k:
+            K = K + _differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n)
         return K, C, M
 
 
@@ -211,7 +226,8 @@ def _create(p, rtol, atol, max_step, first_step, start, trace):
     if np.isfinite(max_step):
         _core.set_max_step(ts, max_step)
     integrator.set_role(ts, "coordinate", range(p.n))
-    integrator.set_role(ts, "holonomic", range(p.n, p.size))
+    integrator.set_role(ts, "holonomic", range(p.n, p.n + p.m))
+    integrator.set_role(ts, "nonholonomic", range(p.n + p.m, p.size))
     integrator.set_start(ts, start)
     return ts
 
@@ -221,15 +237,19 @@ def _call(ts, p, keep):
     n, rows = p.n, np.arange(p.size, dtype=PETSc.IntType)
 
     def residual(ts, t, u, v, a, f):
-        q, out = u.array_r, f.array
-        out[:n] = p.forces(t, q[:n].copy(), v.array_r[:n].copy(), a.array_r[:n].copy(), q[n:])
-        out[n:] = p.constraints(t, q[:n].copy())
+        q, w, out = u.array_r, v.array_r[:n].copy(), f.array
+        out[:n] = p.forces(t, q[:n].copy(), w, a.array_r[:n].copy(), q[n:])
+        out[n:n + p.m] = p.constraints(t, q[:n].copy())
+        out[n + p.m:] = p.rates(t, q[:n].copy(), w)
 
     def jacobian(ts, t, u, v, a, shift_v, shift_a, J, P):
         q, w, b, multipliers = u.array_r[:n].copy(), v.array_r[:n].copy(), a.array_r[:n].copy(), u.array_r[n:].copy()
         K, C, M = p.matrices(t, q, w, b, multipliers)
-        full, G = np.zeros((p.size, p.size)), p.gradient(t, q)
-        full[:n, :n], full[:n, n:], full[n:, :n] = K + shift_v * C + shift_a * M, G.T, G
+        full, G, R, m = np.zeros((p.size, p.size)), p.gradient(t, q), p.rate_gradient(t, q, w), n + p.m
+        full[:n, :n], full[:n, n:m], full[:n, m:] = K + shift_v * C + shift_a * M, G.T, R.T
+        full[n:m, :n] = G
+        if p.k:
+            full[m:, :n] = _differences(lambda x: p.rates(t, x, w), q, p.k) + shift_v * R
         P.setValues(rows, rows, full)
         P.assemble()
         if J != P:
@@ -265,6 +285,11 @@ def _trace(ts, p, keep):
         for (row, column), d in differentiate(phi, range(1, 1 + n)).items():
             f[column - 1] = f[column - 1] + d * multipliers[row]
         f += phi
+    if p.k:
+        psi = _traced(p._rates, "velocity_constraints()", leaf[0], box(q), box(v), *p.args)
+        for (row, column), d in differentiate(psi, range(1 + size, 1 + size + n)).items():
+            f[column - 1 - size] = f[column - 1 - size] + d * multipliers[p.m + row]
+        f += psi
     entries = [[], [], []]
     for (row, k), d in differentiate(f, range(1, 1 + 3 * size)).items():
         entries[(k - 1) // size].append((row, (k - 1) % size, d))
@@ -374,7 +399,7 @@ class _Output:
         sol = None
         if self.dense and len(self.ends) > 1:
             sol = DenseOutput(np.array([r[0] for r in self.ends]), columns(1, p.n, self.ends), columns(2, p.n, self.ends), columns(3, p.n, self.ends))
-        return MechanismResult(t=t, q=columns(1, p.n, rows), v=columns(2, p.n, rows), a=columns(3, p.n, rows), multipliers=columns(4, p.m, rows), sol=sol,
+        return MechanismResult(t=t, q=columns(1, p.n, rows), v=columns(2, p.n, rows), a=columns(3, p.n, rows), multipliers=columns(4, p.m + p.k, rows), sol=sol,
                                t_events=[np.array(x) for x, _ in self.found] if self.events else None,
                                q_events=[np.array(x).reshape(-1, p.n) for _, x in self.found] if self.events else None,
                                status=status, success=status >= 0, message=message, statistics=integrator.statistics(ts))
