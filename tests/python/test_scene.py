@@ -395,6 +395,23 @@ class Mistakes(unittest.TestCase):
         self.assertTrue(caught.exception.trace)
         self.assertGreater(caught.exception.ierr, 0)
 
+    def test_runs_that_cannot_be(self):
+        scene, rod, pin = pendulum()
+        scene.channel("x", h.displacement(rod.marker(), 0))
+        run = scene.run(tolerance=1e-6, options={"ts_max_steps": 3})
+        self.assertEqual((run.values.shape, len(run["x"]), run.solve(0.).time), ((0, 1), 0, 0.))
+        with self.assertWarnsRegex(RuntimeWarning, "largest number of steps"):
+            run.solve(5.)
+        self.assertEqual(run.steps, 3)
+        with self.assertRaisesRegex(h.Error, "no step to interpolate"):
+            scene.run().sample()
+        with self.assertRaisesRegex(ValueError, "tolerance is -1"):
+            scene.run(tolerance=-1)
+        with self.assertRaisesRegex(h.Error, "no such file"):
+            scene.run().load("no such file").solve(1.)
+        with self.assertRaisesRegex(TypeError, "must be one of hhtdae.flexible"):
+            h.Scene().add("f", h.FlexibleBody(None))
+
     def test_foreign_handles(self):
         one, other = h.Scene(), h.Scene()
         a, b = one.add("a", h.PointMass()), other.add("b", h.PointMass())

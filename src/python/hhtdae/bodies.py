@@ -5,6 +5,7 @@ from typing import Any, Optional, Sequence, Tuple
 
 import numpy as np
 
+from . import _core
 from .spec import Number, Spec, Vector
 
 __all__ = ["FlexibleBody", "PointMass", "RigidBody", "Shape", "axes_along", "composed", "inertia", "rotation"]
@@ -65,8 +66,8 @@ class FlexibleBody(Spec):
 
     Parameters
     ----------
-    model : ModalBody
-        From `hhtdae.flexible`: ``reduced.modal()`` or ``load_modal_body(file)``.
+    model : ModalBody or ReducedBody
+        From `hhtdae.flexible`: what `reduce` or ``load_modal_body(file)`` gives.
     position, rotation : (3,), (3, 3)
         Of the origin and axes (columns) of the FE model, space axes.
     velocity, angular_velocity : (3,)
@@ -96,6 +97,10 @@ class FlexibleBody(Spec):
         if self.mass not in ("full", "partial", "constant"):
             raise ValueError("mass is %r, must be 'full', 'partial' or 'constant'" % (self.mass,))
         out = super()._fields(converted)
+        if hasattr(self.model, "modal"):
+            out["model"] = self.model.modal()
+        if not isinstance(out["model"], _core.ModalBody):
+            raise TypeError("the model of a flexible body is %r, must be one of hhtdae.flexible" % (self.model,))
         if np.ndim(out["damping"]) == 0:
             out["damping"] = [(np.inf, float(out["damping"]))] if out["damping"] else []
         return out

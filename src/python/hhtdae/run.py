@@ -1,5 +1,6 @@
 """Runs of a scene: everything that changes."""
 
+import warnings
 from contextlib import contextmanager
 from typing import Any, Callable, Dict, Iterator
 
@@ -53,6 +54,8 @@ class Run:
         self.scene, self.ts, self._recorder = scene, None, None
         if sample is not None and not sample >= 0:
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
+        if tolerance is not None and not tolerance > 0:
+            raise ValueError("tolerance is %r, must be positive" % (tolerance,))
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
         collect_garbage(scene.comm)
         with temporary_options(self._options):
@@ -79,7 +82,7 @@ class Run:
         ts = self._open()
         if not until >= ts.getTime():
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
-        if until == ts.getTime() and ts.getStepNumber() > 0:
+        if until == ts.getTime():
             return self
         ts.setMaxTime(until)
         with temporary_options(self._options):
@@ -87,6 +90,9 @@ class Run:
                 self._solve_with_events(ts)
             else:
                 self.scene._core.solve(ts)
+        reached = ts.getTime()
+        if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
+            warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
@@ -209,7 +215,8 @@ class Run:
     @property
     def values(self) -> np.ndarray:
         """All samples, (n, channels)."""
-        return self._recorder.values if self._recorder else np.empty((0, len(self._names)))
+        values = self._recorder.values if self._recorder else np.empty(0)
+        return values if len(values) else np.empty((0, len(self._names)))
 
     @property
     def channels(self) -> Dict[str, np.ndarray]:
