@@ -412,6 +412,22 @@ class Mistakes(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "must be one of hhtdae.flexible"):
             h.Scene().add("f", h.FlexibleBody(None))
 
+    def test_a_run_that_fails(self):
+        """A force that becomes infinite: the library's message, and what was recorded until then"""
+        scene = h.Scene()
+        m = scene.add("b", h.PointMass(position=(1, 0, 0), velocity=(2, 0, 0))).marker()
+        x = h.displacement(m, 0)
+        scene.add("f", h.UserForce(m, force=[6 * x**2, 0, 0]))  # x = 1/(1 - t)^2
+        scene.channel("x", x)
+        run = scene.run(tolerance=1e-5)
+        with self.assertRaisesRegex(h.Error, "No step from t = .* succeeded"):
+            run.solve(2.)
+        self.assertLess(run.time, 1.01)
+        self.assertGreater(run["x"][-1], 1e3)
+        run = scene.run(tolerance=1e-5, options={"ts_error_if_step_fails": 0})
+        with self.assertWarnsRegex(RuntimeWarning, "the run has failed at t = "):
+            run.solve(2.)
+
     def test_foreign_handles(self):
         one, other = h.Scene(), h.Scene()
         a, b = one.add("a", h.PointMass()), other.add("b", h.PointMass())

@@ -304,11 +304,13 @@ def _solve(ts, p, output):
     except PETSc.Error as error:
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
             raise
-        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), _reason(ts))
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), str(error).splitlines()[-1].split("] ", 1)[-1])
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:
         return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), _reason(ts))
+    if ts.getTime() < p.t1:
+        return -1, "the run has ended at t = %.6g: it has made the largest number of steps, -ts_max_steps" % ts.getTime()
     return 0, "the end of the interval was reached"
 
 

@@ -93,6 +93,8 @@ class Run:
         reached = ts.getTime()
         if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
             warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
+        elif ts.getConvergedReason() < 0:  # with -ts_error_if_step_fails 0
+            warnings.warn("the run has failed at t = %g, before %g" % (reached, until), RuntimeWarning, 2)
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
