@@ -116,7 +116,6 @@ class Scene:
         self._parameters = {}
         self._states = 0
         self._begun = False  # whether there is more than parameters
-        self._gravity = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False)
         self.ground = Body(self, self._core.ground(), "ground")
@@ -140,7 +139,6 @@ class Scene:
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
-        self._gravity = acceleration
         self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
