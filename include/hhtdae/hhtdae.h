@@ -50,6 +50,9 @@ typedef enum {
 } TSHHT3Start;
 PETSC_EXTERN const char *const TSHHT3Starts[];
 
+/* For TSHHT3SetOrder(): HHT of order two, and orders three to five where the motion is smooth */
+#define TSHHT3_ORDER_AUTO (-1)
+
 /* Cumulative counters of a run, in the order of the summary line */
 typedef struct {
   PetscInt  steps;           /* accepted steps */
@@ -67,6 +70,7 @@ typedef struct {
   PetscInt  changes;         /* changes of coordinates, TSHHT3SetCoordinateChange() */
   PetscInt  tiny_steps;      /* steps shorter than rounding in q allows the corrector, advanced by Taylor series */
   PetscReal h_min, h_max;    /* smallest and largest accepted step */
+  PetscInt  of_order[6];     /* accepted steps of order 2, 3, 4, 5, at these indices */
 } TSHHT3Statistics;
 
 /* Registers TSHHT3 and the ordering "metisnd" with PETSc; PETSc calls it itself when the library is loaded as a plugin */
@@ -78,6 +82,8 @@ PETSC_EXTERN PetscErrorCode TSHHT3GetForm(TS, TSHHT3Form *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetAlpha(TS, PetscReal);
 PETSC_EXTERN PetscErrorCode TSHHT3GetAlpha(TS, PetscReal *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetRadius(TS, PetscReal);
+PETSC_EXTERN PetscErrorCode TSHHT3SetOrder(TS, PetscInt);
+PETSC_EXTERN PetscErrorCode TSHHT3GetOrder(TS, PetscInt *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetCorrectorTolerance(TS, PetscReal);
 PETSC_EXTERN PetscErrorCode TSHHT3SetPredictorDegree(TS, PetscInt);
 PETSC_EXTERN PetscErrorCode TSHHT3SetReuse(TS, PetscReal, PetscReal, PetscReal);

@@ -39,6 +39,7 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   PetscCall((*static_cast<Basic *>(adapt->data)->choose)(adapt, ts, h, scheme, next, accept, wlte, wltea, wlter));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
   if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -137,6 +137,69 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
 }
 
 /*@
+  TSHHT3SetOrder - Sets the order of `TSHHT3`, or has it chosen in each step
+
+  Logically Collective, before `TSSetUp()`
+
+  Input Parameters:
++ ts    - the `TS` context
+- order - 2 to 5, or `TSHHT3_ORDER_AUTO`
+
+  Options Database Key:
+. -ts_hhtdae_order <2,3,4,5,auto> - the order
+
+  Level: intermediate
+
+  Notes:
+  Order 2, the default, is HHT. Orders 3 to 5 are backward differentiation of positions and of velocities over variable steps, with the same unknowns and the same matrix
+  but for beta and gamma. They start with steps of order 2, also after events and other restarts, and take from the history what is there.
+  After two failures in a row a step is made with order 2.
+
+  `TSHHT3_ORDER_AUTO` takes from step to step the order with which the next one may be longest, as long as differences of the positions fall with their order. Where they
+  do not, a motion with h omega near one or above is active, for which orders above 2 are not stable at small damping: then it is HHT for a while.
+  A fixed order of 3 or more has no such guard: it suits smooth or well damped motion alone.
+
+  In smooth motion positions, velocities, and at constant steps accelerations and multipliers converge with the order. A change of h leaves an error in accelerations and multipliers that is one
+  order lower for as many steps as the order has. They do not enter the error test.
+
+  Orders above 2 need the second-order form. With local rotation vectors, `TSHHT3SetRotations()`, the order stays 2, which -info reports.
+
+.seealso: `TSHHT3`, `TSHHT3GetOrder()`, `TSHHT3SetAlpha()`, `TSHHT3GetStatistics()`
+@*/
+PetscErrorCode TSHHT3SetOrder(TS ts, PetscInt order)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscValidLogicalCollectiveInt(ts, order, 2);
+  PetscTryMethod(ts, "TSHHT3SetOrder_C", (TS, PetscInt), (ts, order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3GetOrder - The order set by `TSHHT3SetOrder()`
+
+  Not Collective
+
+  Input Parameter:
+. ts - the `TS` context
+
+  Output Parameter:
+. order - 2 to 5, or `TSHHT3_ORDER_AUTO`
+
+  Level: intermediate
+
+.seealso: `TSHHT3`, `TSHHT3SetOrder()`
+@*/
+PetscErrorCode TSHHT3GetOrder(TS ts, PetscInt *order)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscAssertPointer(order, 2);
+  PetscUseMethod(ts, "TSHHT3GetOrder_C", (TS, PetscInt *), (ts, order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
   TSHHT3SetCorrectorTolerance - Sets where the Newton iteration of a step stops
 
   Logically Collective

@@ -88,6 +88,7 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(MapHistory(ts));
+  PetscCall(MapPast(ts));
   PetscCall(Publish(ts));
   PetscCall(UpdateWeights(ts, I.U0));
   if (I.F0) {
@@ -106,22 +107,24 @@ PetscErrorCode StepAfterChange(TS ts)
 {
   Integrator &I = Get(ts);
   PetscReal   e;
+  PetscInt    order;
 
   PetscFunctionBegin;
   if (I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
   I.h      = ts->time_step;
   I.t1     = ts->ptime + I.h;
   I.misfit = 0;
+  PetscCall(UseOrder(ts));
   PetscCall(PrepareStage(ts));
   PetscCall(Predict(ts, I.X));
   PetscCall(StageVectors(ts, I.X));
   const TSStepStatus status = I.status;
   I.status                  = TS_STEP_PENDING;
-  PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
+  PetscCall(EvaluateWLTE(ts, NORM_2, &order, &e));
   I.status = status;
   if (!(e > 1)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal next =
-      PetscMax(I.h * PetscMax(least_cut, 0.9 * PetscPowReal(e, (PetscReal)-1 / 3)), PetscMin(ts->adapt->dt_min, I.h));
+      PetscMax(I.h * PetscMax(least_cut, 0.9 * PetscPowReal(e, (PetscReal)-1 / order)), PetscMin(ts->adapt->dt_min, I.h));
   PetscCall(PetscInfo(ts, "h = %g would miss the tolerance %g times in the new coordinates, %g\n", (double)I.h,
                       (double)e, (double)next));
   ts->time_step = next;

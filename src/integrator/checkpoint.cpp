@@ -38,6 +38,7 @@ std::uint64_t Hash(const void *x, size_t n)
 struct Identity {
   PetscInt      N, n, extra, extra_n; /* unknowns of all ranks and of this one; entries of the application's own likewise */
   PetscInt      form, forces;         /* forces: whether there is F0 */
+  PetscInt      order;                /* the largest one */
   Parameters    p;
   std::uint64_t roles;
 };
@@ -56,7 +57,8 @@ PetscErrorCode Identify(TS ts, Identity *id)
   }
   id->form   = I.form;
   id->forces = I.F0 != nullptr;
-  id->p      = I.p;
+  id->p      = I.hht;
+  id->order  = I.order.max;
   id->roles  = Hash(I.role.data(), I.role.size());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,6 +87,7 @@ PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
   PetscCheck(was.form == is.form && was.forces == is.forces && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
              form(is.form), (double)is.p.af);
+  PetscCheck(was.order == is.order, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written with order up to %" PetscInt_FMT ", the run has %" PetscInt_FMT ": give the same -ts_hhtdae_order", file, was.order, is.order);
   PetscCall(Everywhere(ts, was.n == is.n && was.roles == is.roles, &same));
   PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s belongs to another problem: its unknowns have other roles, or are divided among the ranks in another way", file);
@@ -164,8 +167,11 @@ void TransferStructs(TS ts, Archive &a)
   a.plain(static_cast<StepState &>(I));
   a.plain(static_cast<CorrectorState &>(I.corrector));
   a.plain(static_cast<PredictorState &>(I.predictor));
+  a.plain(static_cast<OrderState &>(I.order));
+  a.plain(I.p);
   a.plain(static_cast<ChangeState &>(I.change));
   a.plain(static_cast<VerificationState &>(I.verify));
+  if (I.order.past < 0 || I.order.past > max_order || I.order.now < 2 || I.order.now > max_order) a.good = false;
   if (I.predictor.available < 0 || I.predictor.available > max_degree || I.predictor.degree < 0 || I.predictor.degree > I.predictor.available) a.good = false;
 }
 
@@ -209,6 +215,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   PetscFunctionBegin;
   if (I.F0) all.push_back(&I.F0);
   for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.D[k]);
+  for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
   for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
@@ -219,7 +226,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
 bool HasItsVectors(const Integrator &I)
 {
   const Verification &v = I.verify;
-  return (!I.have_misfit || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
+  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
          (v.largest == 0 || (v.inertia && v.claim && v.noise));
 }
 

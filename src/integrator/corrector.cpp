@@ -27,8 +27,8 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   Corrector  &c = I.corrector;
 
   PetscFunctionBegin;
-  c.matrix.want = (PetscBool)c.matrix.due(I.h, c);
-  if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)I.h, (double)c.matrix.h, (double)c.matrix.rate));
+  c.matrix.want = (PetscBool)c.matrix.due(EffectiveStep(I), c);
+  if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
   PetscCall(Iterate(ts, converged));
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {

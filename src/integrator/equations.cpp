@@ -238,7 +238,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   }
   I.rotations.factor = 0;
   PetscCall(NoteClaims(ts, X, P));
-  I.corrector.matrix.made(I.h);
+  I.corrector.matrix.made(EffectiveStep(I));
   I.stat.factorizations++;
 
   PetscCall(SNESGetKSP(snes, &ksp));

@@ -256,14 +256,17 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   PetscReal   acc = 0;
 
   PetscFunctionBegin;
-  if (order) *order = 3;
+  if (order) *order = I.order.now + 1;
   *wlte = -1;
   if (I.status != TS_STEP_PENDING) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(events.estimate, ts, 0, 0, 0));
-  PetscCall(CoordinateErrors(I, type, &acc));
-  PetscCall(AddRotationErrors(I, type, &acc));
-  PetscCall(AddStateErrors(I, type, &acc));
-  PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
+  if (I.order.now > 2) PetscCall(ErrorOfOrder(ts, type, wlte));
+  else {
+    PetscCall(CoordinateErrors(I, type, &acc));
+    PetscCall(AddRotationErrors(I, type, &acc));
+    PetscCall(AddStateErrors(I, type, &acc));
+    PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
+  }
   I.wlte_pending = *wlte;
   PetscCall(PetscLogEventEnd(events.estimate, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

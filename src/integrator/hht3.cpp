@@ -98,6 +98,7 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(SetUpJacobian(ts));
   PetscCall(SetUpRoles(ts));
   PetscCall(SetUpRotations(ts));
+  PetscCall(SetUpOrder(ts));
   PetscCall(AllocateForRoles(ts));
   PetscCall(SetUpSolvers(ts));
   I.auto_h = (PetscBool)(ts->time_step == unset_step);
@@ -120,6 +121,8 @@ PetscErrorCode Reset(TS ts)
   PetscCall(HooksRemove(ts));
   for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.driven}) PetscCall(VecDestroy(v));
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
+  for (Vec &u : I.order.U) PetscCall(VecDestroy(&u));
+  for (Vec &v : I.order.V) PetscCall(VecDestroy(&v));
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SamplerDestroy(I));
@@ -134,6 +137,8 @@ PetscErrorCode Reset(TS ts)
   static_cast<PredictorState &>(I.predictor) = PredictorState();
   static_cast<VerificationState &>(I.verify) = VerificationState();
   static_cast<ChangeState &>(I.change)       = ChangeState();
+  static_cast<OrderState &>(I.order)         = OrderState();
+  I.p                                        = I.hht;
   I.linear_chosen = PETSC_FALSE;
   I.scaled_h      = 0;
   I.scaled_state  = 0;
@@ -163,7 +168,8 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   TSHHT3Form  form = I.form;
   TSHHT3Start start = I.start_policy;
   PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[3] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold};
-  PetscInt    degree = -1, three = 3;
+  PetscInt    degree = -1, three = 3, order = I.order.wanted;
+  const char *const orders[] = {"2", "3", "4", "5", "auto"};
   PetscBool   flg;
 
   PetscFunctionBegin;
@@ -173,6 +179,8 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   if (flg) PetscCall(TSHHT3SetAlpha(ts, alpha));
   PetscCall(PetscOptionsReal("-ts_hhtdae_radius", "Spectral radius at infinite frequency (Chung and Hulbert)", "TSHHT3SetRadius", rho, &rho, &flg));
   if (flg) PetscCall(TSHHT3SetRadius(ts, rho));
+  PetscCall(PetscOptionsEList("-ts_hhtdae_order", "Largest order: that of HHT, of backward differentiation, or as the motion allows", "TSHHT3SetOrder", orders, 5, orders[order < 0 ? 4 : order - 2], &order, &flg));
+  if (flg) PetscCall(TSHHT3SetOrder(ts, order == 4 ? TSHHT3_ORDER_AUTO : order + 2));
   PetscCall(PetscOptionsReal("-ts_hhtdae_corrector_tolerance", "Error left by the corrector, relative to the tolerance", "TSHHT3SetCorrectorTolerance", c, &c, &flg));
   if (flg) PetscCall(TSHHT3SetCorrectorTolerance(ts, c));
   PetscCall(PetscOptionsInt("-ts_hhtdae_predictor_degree", "Degree 0..3 of the predictor, -1 to choose it in each step", "TSHHT3SetPredictorDegree", degree, &degree, &flg));
@@ -243,7 +251,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
 {
   Integrator      &I = Get(ts);
   const Corrector &c = I.corrector;
-  const Parameters &p = I.p;
+  const Parameters &p = I.hht;
   PetscBool        ascii;
 
   PetscFunctionBegin;
@@ -300,6 +308,7 @@ PetscErrorCode UpdateParameters(TS ts)
                "A spectral radius (%g) belongs to the second-order form; the paper's form takes alpha (-ts_hhtdae_alpha)", (double)I.radius);
     I.p = RadiusParameters(I.radius);
   } else I.p = HHTParameters(I.alpha, I.form == TSHHT3_FORM_PAPER);
+  I.hht = I.p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -313,6 +322,7 @@ PetscErrorCode UpdateParameters(TS ts)
 + -ts_hhtdae_form <paper,second_order>   - how inertia forces are averaged, `TSHHT3SetForm()`
 . -ts_hhtdae_alpha <alpha>               - numerical damping in [-1/3, 0], default -0.3, `TSHHT3SetAlpha()`
 . -ts_hhtdae_radius <rho>                - spectral radius at infinity in place of alpha, `TSHHT3SetRadius()`
+. -ts_hhtdae_order <2,3,4,5,auto>        - the order, default 2, `TSHHT3SetOrder()`
 . -ts_hhtdae_corrector_tolerance <c>     - where the Newton iteration stops, `TSHHT3SetCorrectorTolerance()`
 . -ts_hhtdae_predictor_degree <d>        - degree of the predictor, -1 to choose, `TSHHT3SetPredictorDegree()`
 . -ts_hhtdae_reuse <ratio,rate,hold>     - when the matrix is renewed, `TSHHT3SetReuse()`
@@ -356,7 +366,7 @@ PetscErrorCode Create(TS ts)
 {
   PetscFunctionBegin;
   ts->data                = new Integrator();
-  Get(ts).p               = HHTParameters(Get(ts).alpha, false);
+  Get(ts).p = Get(ts).hht = HHTParameters(Get(ts).alpha, false);
   ts->ops->setup          = SetUp;
   ts->ops->reset          = Reset;
   ts->ops->destroy        = Destroy;

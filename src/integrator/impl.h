@@ -2,6 +2,7 @@
 #ifndef HHTDAE_IMPL_H
 #define HHTDAE_IMPL_H
 
+#include "bdf.h"
 #include "compat.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
@@ -13,7 +14,8 @@
 namespace hht3
 {
 
-constexpr PetscInt max_degree = 3; /* of the predictor */
+constexpr PetscInt max_degree = max_order; /* of the predictor */
+constexpr PetscInt hht_degree = 3; /* that pays in steps of order two */
 
 /*
   What a run is at any time is kept in plain structs, ...State: checkpoint.cpp writes them as they are, so that a field added to one of
@@ -69,7 +71,7 @@ struct Verification : VerificationState {
 };
 
 struct PredictorOptions {
-  PetscInt  degree_max = max_degree; /* what the user allows */
+  PetscInt  degree_max = hht_degree; /* what the user allows */
   PetscBool fixed      = PETSC_FALSE;
 };
 
@@ -84,6 +86,30 @@ struct PredictorState {
 struct Predictor : PredictorOptions, PredictorState {
   Vec D[max_degree + 1] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
 };
+
+/* Orders above two, bdf.cpp and order.cpp. Nothing of it is used where the largest order is two. */
+struct OrderState {
+  PetscInt  now = 2, next = 2;          /* of the step from t_n, and of the one after it when it is accepted */
+  PetscInt  made = 0, accepted = 0;     /* of the step that led to t_n, and of the accepted one that leads away from it; 0: neither */
+  PetscInt  ready = 2;                  /* for which X0, D_0 and the misfit of velocities stand */
+  PetscInt  past = 0;                   /* states before t_n that are kept */
+  PetscInt  since = 0;                  /* steps since the order has changed */
+  PetscInt  wait = 0, penalty = 0;      /* steps of order two still to be made, and how many there were the last time */
+  PetscBool chosen = PETSC_FALSE;       /* next is */
+  PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
+  PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
+  PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */
+};
+
+struct Order : OrderState {
+  PetscInt wanted = 2;        /* by the user; may be TSHHT3_ORDER_AUTO */
+  PetscInt max    = 2;        /* that is possible */
+  Vec      U[max_order] = {}; /* U, U' at t_{n-1}, t_{n-2}, ... */
+  Vec      V[max_order] = {};
+};
+
+/* Of h from one step to the next above order two: coefficients of variable steps grow with it */
+constexpr PetscReal longest_growth = 2;
 
 struct ChangeState {
   PetscBool stale = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
@@ -176,10 +202,13 @@ struct Integrator : StepState {
   TSHHT3Form  form   = TSHHT3_FORM_SECOND_ORDER;
   PetscReal   alpha  = -0.3;
   PetscReal   radius = -1; /* set: Chung and Hulbert's parameters in the second-order form */
-  Parameters  p;
+  Parameters  hht;         /* of order two */
+  Parameters  p;           /* of the step at hand */
   TSHHT3Start start_policy = TSHHT3_START_REPORT;
   Corrector   corrector;
   Predictor   predictor;
+  Order       order;
+  PetscInt    local_size = 0; /* unknowns of this rank */
   Verification verify;
 
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
@@ -268,6 +297,9 @@ inline PetscReal CorrectorTolerance(const Integrator &I)
 {
   return I.corrector.c_given || !I.constraints() ? I.corrector.c : ConstrainedTolerance(I.corrector.c, I.p.rho);
 }
+
+/* That of the matrix: M + gamma^2 h^2 K above order two */
+inline PetscReal EffectiveStep(const Integrator &I) { return I.order.now > 2 ? I.p.gamma * I.h : I.h; }
 
 /* log events, declared once in hht3.cpp */
 struct Events {
@@ -358,6 +390,17 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
 PetscErrorCode NoteError(TS ts);
 /* adapt.cpp */
 PetscErrorCode CreateAdapt(TSAdapt adapt);
+/* bdf.cpp */
+PetscErrorCode SetUpOrder(TS ts);
+void           ResetOrder(TS ts);
+void           CommitOrder(Integrator &I);
+PetscErrorCode UseOrder(TS ts);
+PetscErrorCode PrepareBDF(TS ts);
+PetscErrorCode MapPast(TS ts);
+PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections);
+/* order.cpp */
+PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);
+PetscErrorCode ChooseOrder(TS ts, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);
@@ -384,6 +427,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
 /* misfit.cpp */
 PetscErrorCode AdaptVelocities(TS ts);
 PetscErrorCode StartMisfit(TS ts, Vec rate);
+PetscErrorCode MeasureMisfit(TS ts);
 /* history.cpp: what a change of coordinates does to the state and the history */
 PetscErrorCode MapStart(TS ts);
 PetscErrorCode MapHistory(TS ts);

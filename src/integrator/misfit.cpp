@@ -89,26 +89,6 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
-PetscErrorCode ComputeMisfit(TS ts)
-{
-  Integrator     &I   = Get(ts);
-  const PetscReal tau = 0.1 * I.h_last;
-
-  PetscFunctionBegin;
-  if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
-  PetscCall(VecZeroEntries(I.gamma));
-  PetscCall(VecZeroEntries(I.A1));
-  for (int sign = -1; sign <= 1; sign += 2) {
-    PetscCall(VecWAXPY(I.U1, sign * tau, I.V0, I.U0));
-    PetscCall(EvaluateResidual(ts, ts->ptime + sign * tau, I.U1, I.V0, I.A1, I.work));
-    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
-  }
-  PetscCall(SolveNormal(ts, I.dV));
-  I.have_misfit = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* From d to its normal part, in place. Phi is followed over a length that shows above its rounding. */
 PetscErrorCode ComputeBend(TS ts)
 {
@@ -135,6 +115,26 @@ PetscErrorCode ComputeBend(TS ts)
 
 } // namespace
 
+/* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
+PetscErrorCode MeasureMisfit(TS ts)
+{
+  Integrator     &I   = Get(ts);
+  const PetscReal tau = 0.1 * I.h_last;
+
+  PetscFunctionBegin;
+  if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
+  PetscCall(VecZeroEntries(I.gamma));
+  PetscCall(VecZeroEntries(I.A1));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(VecWAXPY(I.U1, sign * tau, I.V0, I.U0));
+    PetscCall(EvaluateResidual(ts, ts->ptime + sign * tau, I.U1, I.V0, I.A1, I.work));
+    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
+  }
+  PetscCall(SolveNormal(ts, I.dV));
+  I.have_misfit = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A consistent start has no misfit where the method wants -k h^2 (q''')_normal: the first step would make it good by an
    oscillation of the multipliers, which at little damping takes many steps to die out. With the matrix of the start. */
 PetscErrorCode StartMisfit(TS ts, Vec rate)
@@ -158,10 +158,11 @@ PetscErrorCode AdaptVelocities(TS ts)
 
   PetscFunctionBegin;
   I.misfit = 0;
+  if (I.order.now > 2) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.bent == Bend::Rates && I.corrector.matrix.have) PetscCall(ComputeBend(ts));
   if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!I.have_misfit) PetscCall(ComputeMisfit(ts));
+  if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
   I.misfit = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

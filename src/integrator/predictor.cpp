@@ -1,5 +1,5 @@
 /*
-  The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by a polynomial of degree 0 to 3 through the
+  The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by a polynomial of degree 0 to 3 (up to 5 above order two) through the
   accepted steps, in Newton's form
 
     P_d(t) = D_0 + (t - t_n) D_1 + (t - t_n)(t - t_{n-1}) D_2 + ...
@@ -58,13 +58,15 @@ void Renew(PetscInt n, const PetscReal span[], const PetscScalar *x, PetscScalar
 
 void RenewDifferences(PetscInt n, PetscInt have, PetscInt keep, const PetscReal span[], const PetscScalar *x, PetscScalar *const D[], const PetscScalar *w, PetscReal miss[])
 {
-  static_assert(max_degree == 3, "one case for each number of differences");
+  static_assert(max_degree == 5, "one case for each number of differences");
   const bool grow = have < keep;
   switch (have) {
   case 0: (grow ? Renew<0, true> : Renew<0, false>)(n, span, x, D, w, miss); break;
   case 1: (grow ? Renew<1, true> : Renew<1, false>)(n, span, x, D, w, miss); break;
   case 2: (grow ? Renew<2, true> : Renew<2, false>)(n, span, x, D, w, miss); break;
-  default: Renew<3, false>(n, span, x, D, w, miss); break;
+  case 3: (grow ? Renew<3, true> : Renew<3, false>)(n, span, x, D, w, miss); break;
+  case 4: (grow ? Renew<4, true> : Renew<4, false>)(n, span, x, D, w, miss); break;
+  default: Renew<5, false>(n, span, x, D, w, miss); break;
   }
 }
 
@@ -162,7 +164,9 @@ PetscErrorCode Predict(TS ts, Vec X)
   case 0: PetscCall(VecCopy(p.D[0], X)); break;
   case 1: PetscCall(Extrapolate<1>(p, I.t1, X)); break;
   case 2: PetscCall(Extrapolate<2>(p, I.t1, X)); break;
-  default: PetscCall(Extrapolate<3>(p, I.t1, X)); break;
+  case 3: PetscCall(Extrapolate<3>(p, I.t1, X)); break;
+  case 4: PetscCall(Extrapolate<4>(p, I.t1, X)); break;
+  default: PetscCall(Extrapolate<5>(p, I.t1, X)); break;
   }
   if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
@@ -174,9 +178,10 @@ PetscErrorCode PredictorUpdate(TS ts)
 {
   Integrator        &I    = Get(ts);
   Predictor         &p    = I.predictor;
-  const PetscInt     keep = PetscMax(p.degree_max, I.count[TSHHT3_STATE] ? 1 : 0); /* the estimate of states needs D_1 */
+  /* the estimate of states needs D_1, dense output of order k D_{k-1} */
+  const PetscInt     keep = PetscMax(p.degree_max, I.order.max > 2 ? I.order.max - 1 : I.count[TSHHT3_STATE] ? 1 : 0);
   const PetscInt     have = PetscMin(p.available, keep);                           /* old D_0..D_have exist */
-  PetscReal          span[max_degree + 1], miss[max_degree + 1] = {0, 0, 0, 0}, sum[max_degree + 1];
+  PetscReal          span[max_degree + 1], miss[max_degree + 1] = {}, sum[max_degree + 1];
   PetscScalar       *D[max_degree + 1] = {};
   const PetscReal    t = I.t1;
   const PetscScalar *x, *w;

@@ -18,6 +18,7 @@ PetscErrorCode Repair(TS ts)
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
   PetscCall(PetscInfo(ts, "h falls from %g to %g at t = %g: velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
   I.stat.restarts++;
+  ResetOrder(ts);
   if (!I.repaired) {
     Vec now[2] = {I.U0, I.V0};
     for (int k = 0; k < 2; k++) {

@@ -45,7 +45,7 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
                         " retries=%" PetscInt_FMT " restarts=%" PetscInt_FMT " tiny=%" PetscInt_FMT " h_min=%.3g h_max=%.3g form=%s alpha=%g reason=%s",
                         s.steps, s.rejected, s.newton, s.residuals, s.jacobians, s.factorizations, s.solves, (double)s.time, (double)s.cpu,
                         s.corrector_fails, s.retries, s.restarts, s.tiny_steps, (double)s.h_min, (double)s.h_max, TSHHT3Forms[I.form],
-                        (double)(I.radius < 0 ? I.alpha : -I.p.af), TSConvergedReasons[ts->reason]));
+                        (double)(I.radius < 0 ? I.alpha : -I.hht.af), TSConvergedReasons[ts->reason]));
   if (s.changes) PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), " changes=%" PetscInt_FMT, s.changes));
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -45,7 +45,7 @@ PetscErrorCode SetAlpha(TS ts, PetscReal alpha)
 PetscErrorCode GetAlpha(TS ts, PetscReal *alpha)
 {
   PetscFunctionBegin;
-  *alpha = Get(ts).radius < 0 ? Get(ts).alpha : -Get(ts).p.af;
+  *alpha = Get(ts).radius < 0 ? Get(ts).alpha : -Get(ts).hht.af;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -55,6 +55,23 @@ PetscErrorCode SetRadius(TS ts, PetscReal rho)
   PetscCheck(rho >= 0 && rho <= 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Spectral radius %g is not in [0, 1]", (double)rho);
   PetscCall(NotAfterSetUp(ts, "The spectral radius"));
   Get(ts).radius = rho;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetOrder(TS ts, PetscInt order)
+{
+  PetscFunctionBegin;
+  PetscCheck(order == TSHHT3_ORDER_AUTO || (order >= 2 && order <= max_order), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "Order %" PetscInt_FMT " is neither TSHHT3_ORDER_AUTO nor in 2..%" PetscInt_FMT, order, max_order);
+  if (order != Get(ts).order.wanted) PetscCall(NotAfterSetUp(ts, "The order"));
+  Get(ts).order.wanted = order;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode GetOrder(TS ts, PetscInt *order)
+{
+  PetscFunctionBegin;
+  *order = Get(ts).order.wanted;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -72,10 +89,10 @@ PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
   Predictor &p = Get(ts).predictor;
 
   PetscFunctionBegin;
-  PetscCheck(degree >= -1 && degree <= max_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, max_degree);
+  PetscCheck(degree >= -1 && degree <= hht_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, hht_degree);
   PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
   p.fixed      = (PetscBool)(degree >= 0);
-  p.degree_max = degree >= 0 ? degree : max_degree;
+  p.degree_max = degree >= 0 ? degree : hht_degree;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -150,6 +167,8 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(SetAlpha);
   HHT3_COMPOSE(GetAlpha);
   HHT3_COMPOSE(SetRadius);
+  HHT3_COMPOSE(SetOrder);
+  HHT3_COMPOSE(GetOrder);
   HHT3_COMPOSE(SetCorrectorTolerance);
   HHT3_COMPOSE(SetPredictorDegree);
   HHT3_COMPOSE(SetReuse);

@@ -235,6 +235,10 @@ PetscErrorCode PrepareStage(TS ts)
 
   PetscFunctionBegin;
   I.stage_id = 0;
+  if (I.order.now > 2) {
+    PetscCall(PrepareBDF(ts));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
   PetscCall(VecGetLocalSize(I.U0, &n));
   PetscCall(VecGetArrayRead(I.U0, &e.u0));

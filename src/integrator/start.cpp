@@ -373,6 +373,7 @@ PetscErrorCode Start(TS ts)
   PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
   PetscCall(CheckSettings(ts));
   I.stat.restarts++;
+  ResetOrder(ts);
   I.repaired = PETSC_FALSE;
   I.tiny_row = 0;
   PetscCall(VecCopy(ts->vec_sol, I.U0));

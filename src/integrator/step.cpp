@@ -79,6 +79,7 @@ PetscErrorCode Commit(TS ts)
 
   PetscFunctionBegin;
   PetscCall(PredictorUpdate(ts));
+  CommitOrder(I);
   std::swap(I.X, I.X0);
   std::swap(I.U1, I.U0);
   std::swap(I.V1, I.V0);
@@ -143,6 +144,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
   I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
   I.stat.steps++;
+  I.stat.of_order[I.order.now]++;
   I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
   I.stat.h_max = PetscMax(I.stat.h_max, h);
   I.have_step  = PETSC_TRUE;
@@ -166,6 +168,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscCall(TSPreStage(ts, I.t1));
   if (*tiny) PetscCall(TinyStep(ts, ok));
   else {
+    PetscCall(UseOrder(ts));
     if (I.change.stale) PetscCall(MatrixAfterChange(ts));
     PetscCall(AdaptVelocities(ts));
     PetscCall(PrepareStage(ts));
@@ -188,6 +191,7 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   PetscFunctionBegin;
   I.status       = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
   I.wlte_pending = -1;
+  I.order.chosen = PETSC_FALSE;
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
   PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
@@ -197,7 +201,11 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
     PetscCall(VecCopy(I.V0, ts->vec_dot));
     I.stat.rejected++;
     PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
-  } else if (!tiny) PetscCall(NoteError(ts));
+  } else if (!tiny) {
+    PetscCall(NoteError(ts));
+    PetscCall(ChooseOrder(ts, NULL)); /* unless our TSAdapt has done it, with its step */
+  }
+  I.order.accepted = tiny ? 0 : I.order.now;
   I.status = *accept ? TS_STEP_COMPLETE : TS_STEP_INCOMPLETE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -278,6 +286,7 @@ PetscErrorCode Step(TS ts)
       accept = PETSC_FALSE;
       PetscCall(RenewHistoryForces(ts));
       PetscCall(CheckRejections(ts, ++rejections));
+      PetscCall(LowerAfterFailures(ts, rejections));
     }
   }
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
@@ -294,6 +303,7 @@ PetscErrorCode RollBack(TS ts)
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   I.have_step = PETSC_FALSE;
   I.stat.steps--;
+  I.stat.of_order[I.order.now]--;
   PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

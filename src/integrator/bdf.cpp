@@ -1,0 +1,292 @@
+/*
+  Steps of order 3 to 5: the accepted states that they need, the stage that follows from these, and the way from and to HHT, the member of order two.
+
+  HHT's unknown is an acceleration a that lags behind q'' and its velocities miss the differentiated constraints by O(h^2), misfit.cpp; backward
+  differentiation has neither. Where the order goes from two to three, the misfit is taken out of the velocities of the history, or accelerations in the directions of the
+  constraints, and with them multipliers, would be off by an error of first order for as many steps as the history has. Where it comes back, a_n
+  and the misfit are put in as at a start.
+
+  A step far shorter than the one before, as to an event or the end of a run, does not lengthen the history: its beginning is left out.
+*/
+#include "entries.h"
+#include "impl.h"
+#include "sweeps.h"
+#include <utility>
+
+namespace hht3
+{
+
+namespace
+{
+
+/* A step below this part of the last one is too short to be differentiated over: what the corrector has left in the positions of its ends would
+   count so many times more in the velocities of the next one */
+constexpr PetscReal too_short = 0.2;
+
+/* tau_1, tau_2, ... for a step to t1 */
+void Spans(const Order &o, PetscReal t1, PetscReal tau[])
+{
+  for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
+}
+
+template <int k>
+struct BaseOfBDF {
+  PetscReal          c[k], gh, misfit;
+  const PetscScalar *u[k], *v[k], *dV;
+  const float       *moves; /* null where everything is a coordinate */
+  PetscScalar       *to[3];
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at) const
+  {
+    const Four zero = {0, 0, 0, 0};
+    Four       psi_u = zero, psi_v = dV ? -misfit * at.get(dV) : zero;
+    for (int j = 0; j < k; j++) psi_u += c[j] * at.get(u[j]);
+    for (int j = 0; j < k; j++) psi_v += c[j] * at.get(v[j]);
+    psi_u += gh * psi_v;
+    if (moves) {
+      const auto moving = at.get(moves) != 0;
+      psi_u             = moving ? psi_u : zero;
+      psi_v             = moving ? psi_v : zero;
+    }
+    at.put(to[0], psi_u);
+    at.put(to[1], psi_v);
+    at.put(to[2], zero);
+  }
+};
+
+template <int k>
+void Base(const Integrator &I, const BDF &b, const PetscScalar *const u[], const PetscScalar *const v[], const PetscScalar *dV, PetscReal misfit, PetscScalar *const to[])
+{
+  BaseOfBDF<k> base;
+  for (int j = 0; j < k; j++) {
+    base.c[j] = b.c[j];
+    base.u[j] = u[j];
+    base.v[j] = v[j];
+  }
+  base.gh     = b.gh;
+  base.misfit = misfit;
+  base.dV     = dV;
+  base.moves  = I.moves.empty() ? nullptr : I.moves.data();
+  for (int s = 0; s < 3; s++) base.to[s] = to[s];
+  Sweep((PetscInt)I.local_size, base);
+  for (PetscInt i : I.states) {
+    to[0][i] = to[1][i] = 0;
+    for (int j = 0; j < k; j++) to[0][i] += b.c[j] * u[j][i];
+  }
+}
+
+/* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
+PetscReal MisfitOfHistory(const Order &o, const BDF &b)
+{
+  PetscReal sum = 0;
+  for (PetscInt j = 0; j < o.now; j++)
+    if (o.misfit_h > 0) sum += b.c[j] * PetscSqr(o.hht[j] / o.misfit_h);
+  return sum;
+}
+
+/* x_i = y_i of coordinates */
+PetscErrorCode CopyCoordinates(const Integrator &I, Vec y, Vec x)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar from, PetscScalar &to) { if (IsCoordinate(I, i)) to = from; }, Read(y), Write(x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before the first attempt of order three or more from a state of HHT's: accelerations are q'', and the misfit of the velocities is measured */
+PetscErrorCode EnterBDF(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " from t = %g\n", o.now, (double)ts->ptime));
+  PetscCall(CopyCoordinates(I, I.A0, I.predictor.D[0]));
+  I.misfit = 0;
+  if (o.hht[0] > 0 && I.count[TSHHT3_HOLONOMIC] && I.corrector.matrix.have) {
+    if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
+    o.misfit_h = o.hht[0];
+  } else o.misfit_h = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before the first attempt of order two from a state of higher order's: what HHT would have left, from the slope of q'' */
+PetscErrorCode LeaveBDF(TS ts)
+{
+  Integrator &I = Get(ts);
+  Predictor  &p = I.predictor;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "order 2 from t = %g\n", (double)ts->ptime));
+  I.p = I.hht;
+  if (I.order.made > 2 && p.available > 0) {
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar a, PetscScalar v, PetscScalar slope, PetscScalar &x) {
+        const TSHHT3Role r = RoleOf(I, i);
+        if (r == TSHHT3_COORDINATE) x = a + I.p.lag() * I.h_last * slope;
+        if (r == TSHHT3_STATE) x = v + I.p.lagState() * I.h_last * slope;
+      },
+      Read(I.A0), Read(I.V0), Read(p.D[1]), Write(I.X0)));
+    I.bent = Bend::None;
+    if (I.corrector.matrix.have) PetscCall(StartMisfit(ts, p.D[1]));
+  }
+  PetscCall(CopyCoordinates(I, I.X0, p.D[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode SetUpOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  PetscFunctionBegin;
+  o.max = o.wanted == TSHHT3_ORDER_AUTO ? max_order : o.wanted;
+  PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+             "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
+  if (o.max > 2 && I.rotations.is) {
+    PetscCall(PetscInfo(ts, "local rotation vectors (TSHHT3SetRotations()) belong to one step alone, and orders above two need several: order 2\n"));
+    o.max = 2;
+  }
+  if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
+  PetscCall(VecGetLocalSize(ts->vec_sol, &I.local_size));
+  if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt j = 0; j < o.max; j++) {
+    if (!o.U[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.U[j]));
+    if (!o.V[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.V[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At a start: order two, and no history */
+void ResetOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  if (o.max == 2) return;
+  static_cast<OrderState &>(o) = OrderState();
+  o.t[0]                       = ts->ptime;
+  I.p                          = I.hht;
+  I.scaled_h                   = 0;
+}
+
+/* The accepted step is about to become t_n, its beginning a part of the past, and o.next the order */
+void CommitOrder(Integrator &I)
+{
+  Order &o = I.order;
+
+  if (o.max == 2) return;
+  if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * (o.t[0] - o.t[1]))) {
+    const PetscInt last = o.max - 1;
+    Vec            u = o.U[last], v = o.V[last];
+    for (PetscInt j = last; j > 0; j--) {
+      o.U[j] = o.U[j - 1];
+      o.V[j] = o.V[j - 1];
+    }
+    for (PetscInt j = o.max; j > 0; j--) {
+      o.t[j]   = o.t[j - 1];
+      o.hht[j] = o.hht[j - 1];
+    }
+    /* U1, V1 take the place of what goes, and U0, V0 are the first of the past when they have been exchanged */
+    o.U[0] = I.U0;
+    o.V[0] = I.V0;
+    I.U0   = u;
+    I.V0   = v;
+    o.past = PetscMin(o.past + 1, o.max);
+  }
+  o.t[0]   = I.t1;
+  o.hht[0] = o.accepted == 2 ? I.h : 0;
+  o.made   = o.accepted;
+  o.since  = o.next == o.now ? o.since + 1 : 0;
+  if (o.wait > 0) o.wait--;
+  o.now = PetscMin(o.next, PetscMax(2, o.past));
+  if (o.now < 3) o.now = 2;
+}
+
+/* Before an attempt of length I.h: parameters of its order */
+PetscErrorCode UseOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  PetscReal   tau[max_order + 1];
+
+  PetscFunctionBegin;
+  if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((o.now > 2) != (o.ready > 2)) {
+    if (o.now > 2) PetscCall(EnterBDF(ts));
+    else PetscCall(LeaveBDF(ts));
+    I.corrector.matrix.want = PETSC_TRUE;
+  }
+  o.ready = o.now;
+  Spans(o, I.t1, tau);
+  I.p        = o.now > 2 ? BDFParameters(o.now, I.h, tau) : I.hht;
+  I.scaled_h = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* As PrepareStage() does it for order two */
+PetscErrorCode PrepareBDF(TS ts)
+{
+  Integrator        &I = Get(ts);
+  Order             &o = I.order;
+  const PetscScalar *u[max_order], *v[max_order], *dV = nullptr;
+  PetscScalar       *to[3];
+  PetscReal          tau[max_order + 1];
+
+  PetscFunctionBegin;
+  Spans(o, I.t1, tau);
+  const BDF       b      = BDFOf(o.now, tau);
+  const PetscReal misfit = MisfitOfHistory(o, b);
+  for (PetscInt j = 0; j < o.now; j++) {
+    PetscCall(VecGetArrayRead(j ? o.U[j - 1] : I.U0, &u[j]));
+    PetscCall(VecGetArrayRead(j ? o.V[j - 1] : I.V0, &v[j]));
+  }
+  if (misfit != 0) PetscCall(VecGetArrayRead(I.dV, &dV));
+  for (int s = 0; s < 3; s++) PetscCall(VecGetArray(I.base[s], &to[s]));
+  if (o.now == 3) Base<3>(I, b, u, v, dV, misfit, to);
+  else if (o.now == 4) Base<4>(I, b, u, v, dV, misfit, to);
+  else Base<5>(I, b, u, v, dV, misfit, to);
+  for (int s = 0; s < 3; s++) PetscCall(VecRestoreArray(I.base[s], &to[s]));
+  if (dV) PetscCall(VecRestoreArrayRead(I.dV, &dV));
+  for (PetscInt j = 0; j < o.now; j++) {
+    PetscCall(VecRestoreArrayRead(j ? o.U[j - 1] : I.U0, &u[j]));
+    PetscCall(VecRestoreArrayRead(j ? o.V[j - 1] : I.V0, &v[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The past in new coordinates. What HHT has left in its velocities belongs to the old ones. */
+PetscErrorCode MapPast(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  WorkVec     A;
+
+  PetscFunctionBegin;
+  if (!o.past) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(A.like(I.A0));
+  for (PetscInt j = 0; j < o.past; j++) {
+    PetscCall(VecZeroEntries(A));
+    PetscCall((*I.change.map)(ts, o.t[j + 1], o.U[j], o.V[j], A, I.change.ctx));
+  }
+  o.misfit_h = 0;
+  for (PetscReal &h : o.hht) h = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of a step that was rejected or failed: order two is tried where that happens again */
+PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections)
+{
+  Order &o = Get(ts).order;
+
+  PetscFunctionBegin;
+  if (o.now == 2 || rejections < 2) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed twice at t = %g\n", o.now, (double)ts->ptime));
+  o.now = o.next = 2;
+  o.since        = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,215 @@
+/*
+  The error of steps above order two, and the choice of the order.
+
+  Both come from the scaled differences S_m = tau_1 ... tau_m |q[t_{n+1}, ..., t_{n+1-m}]|, by the weights of the error test: order m has the
+  error E_m = gamma_m h/tau_{m+1} S_{m+1}, HHT the one of (26) with q''' from the third difference. That order is taken with which the next step may be
+  longest, 1/E_m^{1/(m+1)}, among the one at hand and its neighbours.
+
+  Differences that do not fall with m belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
+  stable there: without damping it is A(86), A(73), A(51)-stable, and what is below the tolerance grows until the error test sees it. So the order goes back to two,
+  whose damping takes such a motion away, and stays there for a while that doubles when this happens again.
+*/
+#include "impl.h"
+#include "sweeps.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* S_{m+1} above this part of S_m does not fall: 2 sin(h omega/2) of an oscillation */
+constexpr PetscReal resolved = 0.8;
+
+/* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
+constexpr PetscReal silent = 0.05;
+
+/* A gain in h below this factor is not worth another order, or another matrix */
+constexpr PetscReal gain_up = 1.1, gain_down = 1.0, gain_enter = 1.0;
+
+/* Steps of order two after the guard has spoken, at first and at most */
+constexpr PetscInt first_wait = 16, last_wait = 512;
+
+/* Scaled differences of order first, first + 1, first + 2, as sums of squares or largest entries */
+template <int points, bool largest>
+struct Differences {
+  PetscReal          weight[3][points];
+  const PetscScalar *u[points], *w;
+  Four               result[3] = {};
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at)
+  {
+    const Four scale = at.get(w);
+    Four       d[3]  = {};
+    for (int j = 0; j < points; j++) {
+      const Four x = at.get(u[j]);
+      for (int s = 0; s < 3; s++) d[s] += weight[s][j] * x;
+    }
+    for (int s = 0; s < 3; s++) {
+      const Four x = d[s] * scale;
+      if (largest) result[s] = Larger(Absolute(x), result[s]);
+      else result[s] += x * x;
+    }
+  }
+};
+
+template <int points>
+void SweepDifferences(PetscInt n, NormType type, const PetscReal weight[3][max_order + 2], const PetscScalar *const u[], const PetscScalar *w, PetscReal result[3])
+{
+  const auto fill = [&](auto &d) {
+    d.w = w;
+    for (int j = 0; j < points; j++) {
+      d.u[j] = u[j];
+      for (int s = 0; s < 3; s++) d.weight[s][j] = weight[s][j];
+    }
+  };
+  if (type == NORM_2) {
+    Differences<points, false> d;
+    fill(d);
+    d = Sweep(n, d);
+    for (int s = 0; s < 3; s++) result[s] = Total(d.result[s]);
+  } else {
+    Differences<points, true> d;
+    fill(d);
+    d = Sweep(n, d);
+    for (int s = 0; s < 3; s++) result[s] = PetscMax(PetscMax(d.result[s][0], d.result[s][1]), PetscMax(d.result[s][2], d.result[s][3]));
+  }
+}
+
+/* tau_1, ... of the step at hand */
+void SpansOfStep(const Integrator &I, PetscReal tau[])
+{
+  for (PetscInt j = 0; j <= I.order.past; j++) tau[j] = I.t1 - I.order.t[j];
+}
+
+/* S_m for m = first, first + 1, first + 2, as far as the history goes; those beyond are left */
+PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscInt first, PetscReal S[])
+{
+  Integrator        &I      = Get(ts);
+  Order             &o      = I.order;
+  const PetscInt     points = PetscMin(o.past + 2, first + 3);
+  PetscReal          tau[max_order + 2], weight[3][max_order + 2] = {}, local[3] = {0, 0, 0}, all[3];
+  const PetscScalar *u[max_order + 2], *w;
+  PetscInt           n;
+
+  PetscFunctionBegin;
+  SpansOfStep(I, tau);
+  for (PetscInt s = 0; s < 3 && first + s < points; s++) DifferenceWeights(first + s, tau, weight[s]);
+  const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
+  PetscCall(VecGetLocalSize(I.U1, &n));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  for (PetscInt j = 0; j < points; j++) PetscCall(VecGetArrayRead(vec(j), &u[j]));
+  if (points == 4) SweepDifferences<4>(n, type, weight, u, w, local);
+  else if (points == 5) SweepDifferences<5>(n, type, weight, u, w, local);
+  else if (points == 6) SweepDifferences<6>(n, type, weight, u, w, local);
+  else SweepDifferences<7>(n, type, weight, u, w, local);
+  for (PetscInt j = 0; j < points; j++) PetscCall(VecRestoreArrayRead(vec(j), &u[j]));
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCallMPI(MPI_Allreduce(local, all, 3, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  for (PetscInt s = 0; s < 3 && first + s < points; s++) S[first + s] = type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How much longer the next step may be */
+PetscReal Reach(PetscReal error, PetscInt order) { return error > 0 ? PetscPowReal(error, (PetscReal)-1 / (order + 1)) : PETSC_MAX_REAL; }
+
+/* Of the accepted step, and the candidates for the next one */
+struct Candidates {
+  PetscReal S[max_order + 3]; /* -1: not known */
+  PetscReal E[max_order + 2]; /* likewise */
+};
+
+/* Whether differences up to S_{m+1} fall */
+bool Falls(const Candidates &c, PetscInt m)
+{
+  for (PetscInt i = 3; i <= m; i++)
+    if (c.S[i] >= 0 && c.S[i + 1] > PetscMax(resolved * c.S[i], silent)) return false;
+  return true;
+}
+
+PetscErrorCode FindCandidates(TS ts, Candidates *c)
+{
+  Integrator    &I   = Get(ts);
+  Order         &o   = I.order;
+  const PetscInt now = o.now, first = PetscMax(now, 3);
+  PetscReal      tau[max_order + 2];
+
+  PetscFunctionBegin;
+  for (PetscReal &s : c->S) s = -1;
+  for (PetscReal &e : c->E) e = -1;
+  SpansOfStep(I, tau);
+  PetscCall(ScaledDifferences(ts, NORM_2, first, c->S));
+  for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
+    if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
+  if (now == 2) c->E[2] = I.wlte_pending;
+  else if (now == 3) c->E[2] = HHTErrorFactor(I.hht, I.h, tau) * c->S[3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Better: at fixed steps the one with the smaller error, else the one with the larger step */
+bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than, PetscReal gain)
+{
+  if (c.E[m] < 0 || c.E[than] < 0) return false;
+  return I.fixed_h ? c.E[m] < c.E[than] : Reach(c.E[m], m) > gain * Reach(c.E[than], than);
+}
+
+/* The order for the step after the accepted one, -ts_hhtdae_order auto */
+PetscInt BestOrder(const Integrator &I, const Candidates &c)
+{
+  const Order   &o = I.order;
+  const PetscInt k = o.now;
+
+  if (k > 2 && !Falls(c, k)) return 2;
+  const bool known = k < o.max && c.E[k + 1] >= 0 && o.past >= k && Falls(c, k + 1);
+  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2, gain_enter) ? 3 : 2;
+  if (Better(I, c, k - 1, k, gain_down)) return k - 1;
+  return known && o.since >= k && Better(I, c, k + 1, k, gain_up) ? k + 1 : k;
+}
+
+/* A fixed order is reached from two as soon as the history is there */
+PetscInt NextToFixed(const Order &o) { return o.now < o.max && o.past >= o.now + 1 ? o.now + 1 : o.now; }
+
+} // namespace
+
+/* Of the attempt: its local error in units of the tolerance */
+PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
+{
+  Integrator    &I = Get(ts);
+  const PetscInt k = I.order.now;
+  PetscReal      tau[max_order + 2], S[max_order + 4];
+
+  PetscFunctionBegin;
+  SpansOfStep(I, tau);
+  PetscCall(ScaledDifferences(ts, type, k, S));
+  *wlte = ErrorFactor(k, tau) * S[k + 1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* For the step after the accepted one, whose estimate is known. *next: the length that the controller has chosen for the present order, and that of the next
+   one on return; NULL if another one than ours chooses it. */
+PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  Candidates  c;
+
+  PetscFunctionBegin;
+  if (o.chosen || o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  o.chosen = PETSC_TRUE;
+  o.next   = o.now;
+  if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FindCandidates(ts, &c));
+  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
+  if (o.next == 2 && o.now > 2) o.penalty = o.wait = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  if (o.next != o.now)
+    PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
+                        (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[PetscMax(o.now, 3)], (double)c.S[PetscMax(o.now, 3) + 1], (double)c.S[PetscMax(o.now, 3) + 2]));
+  if (!next) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o.next != o.now && c.E[o.next] >= 0) *next = I.h * PetscClipInterval(ts->adapt->safety * Reach(c.E[o.next], o.next), ts->adapt->clip[0], ts->adapt->clip[1]);
+  if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
+  *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
