@@ -178,7 +178,7 @@ void CommitOrder(Integrator &I)
   Order &o = I.order;
 
   if (o.max == 2) return;
-  if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * (o.t[0] - o.t[1]))) {
+  if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * I.h_last)) {
     const PetscInt last = o.max - 1;
     Vec            u = o.U[last], v = o.V[last];
     for (PetscInt j = last; j > 0; j--) {

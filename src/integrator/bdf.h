@@ -83,7 +83,7 @@ inline PetscReal HHTErrorFactor(const Parameters &p, PetscReal h, const PetscRea
   return PetscAbsReal(p.k) * 6 * h / tau[0] * h / tau[1] * h / tau[2];
 }
 
-/* Weights of the values at nodes x_0 ... x_k in the polynomial through them, at x */
+/* Weights of the values at nodes x_0 ... x_k in the polynomial through them, at x; exactly one and zero at the nodes */
 inline void LagrangeWeights(PetscInt k, const PetscReal node[], PetscReal x, PetscReal weight[])
 {
   for (PetscInt j = 0; j <= k; j++) {

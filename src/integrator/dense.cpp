@@ -1,6 +1,12 @@
 /*
-  Dense output within the last accepted step, section 7 of the method: cubic Hermite polynomials for q (from q, q'), for q'
-  (from q', q'') and for states (from s, s'); linear for q'', lambda, V and F. Both ends give back the step's own values.
+  Dense output within the last accepted step, section 7 of the method.
+
+  Order two: cubic Hermite polynomials for q (from q, q'), for q' (from q', q'') and for states (from s, s'); linear for q'', lambda, V and F.
+
+  Order k above it: the polynomials of degree k through the last k + 1 values of q, of q' and of states, which for q is the one that the step is made of, and of degree k
+  through those that the predictor keeps of q'', s', lambda, V and F, as far as these reach back.
+
+  Both ends give back the step's own values.
 */
 #include "impl.h"
 
@@ -40,6 +46,94 @@ void At(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const Pe
   }
 }
 
+/* A polynomial of order k, as a sum of vectors */
+struct Sum {
+  PetscInt           n = 0;
+  PetscReal          weight[max_order + 2];
+  Vec                vec[max_order + 2];
+  const PetscScalar *x[max_order + 2];
+
+  void add(PetscReal w, Vec v)
+  {
+    weight[n] = w;
+    vec[n++]  = v;
+  }
+  PetscScalar operator[](PetscInt i) const
+  {
+    PetscScalar sum = 0;
+    for (PetscInt j = 0; j < n; j++) sum += weight[j] * x[j][i];
+    return sum;
+  }
+  PetscErrorCode get()
+  {
+    PetscFunctionBegin;
+    for (PetscInt j = 0; j < n; j++) PetscCall(VecGetArrayRead(vec[j], &x[j]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscErrorCode restore()
+  {
+    PetscFunctionBegin;
+    for (PetscInt j = n - 1; j >= 0; j--) PetscCall(VecRestoreArrayRead(vec[j], &x[j]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
+
+/* Through the values at t_{n+1}, t_n, ... of U or U' */
+Sum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Vec past[])
+{
+  const Order   &o = I.order;
+  const PetscInt k = o.now;
+  PetscReal      node[max_order + 1] = {}, weight[max_order + 1];
+  Sum            sum;
+
+  node[0] = I.t1;
+  for (PetscInt j = 1; j <= k; j++) node[j] = o.t[j - 1];
+  LagrangeWeights(k, node, t, weight);
+  for (PetscInt j = 0; j <= k; j++) sum.add(weight[j], j == 0 ? end : j == 1 ? begin : past[j - 2]);
+  return sum;
+}
+
+/* Through `end` at t_{n+1} and the values whose divided differences the predictor keeps:
+   N(t) + (end - N(t_{n+1})) pi(t)/pi(t_{n+1}) with Newton's polynomial N and the product pi of all (t - t_j) */
+Sum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
+{
+  const Predictor &p = I.predictor;
+  const PetscInt   n = PetscMin(p.available + 1, I.order.now);
+  PetscReal        pi = 1, pi1 = 1, here[max_order + 1], there[max_order + 1];
+  Sum              sum;
+
+  for (PetscInt j = 0; j < n; j++) {
+    here[j]  = pi;
+    there[j] = pi1;
+    pi *= t - p.t[j];
+    pi1 *= I.t1 - p.t[j];
+  }
+  sum.add(pi / pi1, end);
+  for (PetscInt j = 0; j < n; j++) sum.add(here[j] - pi / pi1 * there[j], p.D[j]);
+  return sum;
+}
+
+/* Any of u, v, a may be null */
+PetscErrorCode AtHigherOrder(const Integrator &I, PetscReal t, PetscInt n, PetscScalar *u, PetscScalar *v, PetscScalar *a)
+{
+  Sum U = ThroughStates(I, t, I.U1, I.U0, I.order.U), V = ThroughStates(I, t, I.V1, I.V0, I.order.V), X = ThroughUnknowns(I, t, I.X);
+
+  PetscFunctionBegin;
+  PetscCall(U.get());
+  PetscCall(V.get());
+  PetscCall(X.get());
+  for (PetscInt i = 0; i < n; i++) {
+    const TSHHT3Role r = RoleOf(I, i);
+    if (u) u[i] = IsDifferential(r) ? U[i] : X[i];
+    if (v) v[i] = r == TSHHT3_COORDINATE ? V[i] : r == TSHHT3_STATE ? X[i] : 0;
+    if (a) a[i] = r == TSHHT3_COORDINATE ? X[i] : 0;
+  }
+  PetscCall(X.restore());
+  PetscCall(V.restore());
+  PetscCall(U.restore());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After At() */
 void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, const PetscScalar *const s0[], const PetscScalar *const s1[], PetscScalar *u)
 {
@@ -75,9 +169,12 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(VecGetArrayRead(end[k], &s1[k]));
     if (out[k]) PetscCall(VecGetArrayWrite(out[k], &o[k]));
   }
-  const Hermite H(x, I.h);
-  At(I, x, H, n, s0, s1, o[0], o[1], o[2]);
-  if (o[0]) AtRotations(I, x, H, s0, s1, o[0]);
+  if (I.order.accepted > 2) PetscCall(AtHigherOrder(I, PetscClipInterval(t, I.t0, I.t1), n, o[0], o[1], o[2]));
+  else {
+    const Hermite H(x, I.h);
+    At(I, x, H, n, s0, s1, o[0], o[1], o[2]);
+    if (o[0]) AtRotations(I, x, H, s0, s1, o[0]);
+  }
   for (int k = 0; k < 3; k++) {
     if (out[k]) PetscCall(VecRestoreArrayWrite(out[k], &o[k]));
     PetscCall(VecRestoreArrayRead(end[k], &s1[k]));

@@ -5,7 +5,7 @@
   error E_m = gamma_m h/tau_{m+1} S_{m+1}, HHT the one of (26) with q''' from the third difference. That order is taken with which the next step may be
   longest, 1/E_m^{1/(m+1)}, among the one at hand and its neighbours.
 
-  Differences that do not fall with m belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
+  Differences that do not fall with m, S_{m+1} neither below S_m nor below S_{m-1} (one of them may be near zero for a moment), belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
   stable there: without damping it is A(86), A(73), A(51)-stable, and what is below the tolerance grows until the error test sees it. So the order goes back to two,
   whose damping takes such a motion away, and stays there for a while that doubles when this happens again.
 */
@@ -18,7 +18,7 @@ namespace hht3
 namespace
 {
 
-/* S_{m+1} above this part of S_m does not fall: 2 sin(h omega/2) of an oscillation */
+/* S_{m+1} above this part of S_m, and its square of S_{m-1}, does not fall: 2 sin(h omega/2) of an oscillation */
 constexpr PetscReal resolved = 0.8;
 
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
@@ -30,23 +30,25 @@ constexpr PetscReal gain_up = 1.1, gain_down = 1.0, gain_enter = 1.0;
 /* Steps of order two after the guard has spoken, at first and at most */
 constexpr PetscInt first_wait = 16, last_wait = 512;
 
-/* Scaled differences of order first, first + 1, first + 2, as sums of squares or largest entries */
+constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
+
+/* Scaled differences as sums of squares or largest entries */
 template <int points, bool largest>
 struct Differences {
-  PetscReal          weight[3][points];
+  PetscReal          weight[kinds][points];
   const PetscScalar *u[points], *w;
-  Four               result[3] = {};
+  Four               result[kinds] = {};
 
   template <class At>
   HHT3_INLINE void operator()(const At &at)
   {
     const Four scale = at.get(w);
-    Four       d[3]  = {};
+    Four       d[kinds] = {};
     for (int j = 0; j < points; j++) {
       const Four x = at.get(u[j]);
-      for (int s = 0; s < 3; s++) d[s] += weight[s][j] * x;
+      for (int s = 0; s < kinds; s++) d[s] += weight[s][j] * x;
     }
-    for (int s = 0; s < 3; s++) {
+    for (int s = 0; s < kinds; s++) {
       const Four x = d[s] * scale;
       if (largest) result[s] = Larger(Absolute(x), result[s]);
       else result[s] += x * x;
@@ -55,25 +57,25 @@ struct Differences {
 };
 
 template <int points>
-void SweepDifferences(PetscInt n, NormType type, const PetscReal weight[3][max_order + 2], const PetscScalar *const u[], const PetscScalar *w, PetscReal result[3])
+void SweepDifferences(PetscInt n, NormType type, const PetscReal weight[kinds][max_order + 2], const PetscScalar *const u[], const PetscScalar *w, PetscReal result[kinds])
 {
   const auto fill = [&](auto &d) {
     d.w = w;
     for (int j = 0; j < points; j++) {
       d.u[j] = u[j];
-      for (int s = 0; s < 3; s++) d.weight[s][j] = weight[s][j];
+      for (int s = 0; s < kinds; s++) d.weight[s][j] = weight[s][j];
     }
   };
   if (type == NORM_2) {
     Differences<points, false> d;
     fill(d);
     d = Sweep(n, d);
-    for (int s = 0; s < 3; s++) result[s] = Total(d.result[s]);
+    for (int s = 0; s < kinds; s++) result[s] = Total(d.result[s]);
   } else {
     Differences<points, true> d;
     fill(d);
     d = Sweep(n, d);
-    for (int s = 0; s < 3; s++) result[s] = PetscMax(PetscMax(d.result[s][0], d.result[s][1]), PetscMax(d.result[s][2], d.result[s][3]));
+    for (int s = 0; s < kinds; s++) result[s] = PetscMax(PetscMax(d.result[s][0], d.result[s][1]), PetscMax(d.result[s][2], d.result[s][3]));
   }
 }
 
@@ -83,19 +85,19 @@ void SpansOfStep(const Integrator &I, PetscReal tau[])
   for (PetscInt j = 0; j <= I.order.past; j++) tau[j] = I.t1 - I.order.t[j];
 }
 
-/* S_m for m = first, first + 1, first + 2, as far as the history goes; those beyond are left */
-PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscInt first, PetscReal S[])
+/* S_m as far as the history goes, S[m]; those beyond are -1 */
+PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
 {
   Integrator        &I      = Get(ts);
   Order             &o      = I.order;
-  const PetscInt     points = PetscMin(o.past + 2, first + 3);
-  PetscReal          tau[max_order + 2], weight[3][max_order + 2] = {}, local[3] = {0, 0, 0}, all[3];
+  const PetscInt     points = PetscMin(o.past, max_order) + 2;
+  PetscReal          tau[max_order + 2], weight[kinds][max_order + 2] = {}, local[kinds] = {}, all[kinds];
   const PetscScalar *u[max_order + 2], *w;
   PetscInt           n;
 
   PetscFunctionBegin;
   SpansOfStep(I, tau);
-  for (PetscInt s = 0; s < 3 && first + s < points; s++) DifferenceWeights(first + s, tau, weight[s]);
+  for (PetscInt s = 0; s < kinds && lowest + s < points; s++) DifferenceWeights(lowest + s, tau, weight[s]);
   const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
   PetscCall(VecGetLocalSize(I.U1, &n));
   PetscCall(VecGetArrayRead(I.weight, &w));
@@ -106,8 +108,8 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscInt first, PetscReal
   else SweepDifferences<7>(n, type, weight, u, w, local);
   for (PetscInt j = 0; j < points; j++) PetscCall(VecRestoreArrayRead(vec(j), &u[j]));
   PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCallMPI(MPI_Allreduce(local, all, 3, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt s = 0; s < 3 && first + s < points; s++) S[first + s] = type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
+  PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  for (PetscInt s = 0; s < kinds; s++) S[lowest + s] = lowest + s >= points ? -1 : type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,30 +122,25 @@ struct Candidates {
   PetscReal E[max_order + 2]; /* likewise */
 };
 
-/* Whether differences up to S_{m+1} fall */
-bool Falls(const Candidates &c, PetscInt m)
-{
-  for (PetscInt i = 3; i <= m; i++)
-    if (c.S[i] >= 0 && c.S[i + 1] > PetscMax(resolved * c.S[i], silent)) return false;
-  return true;
-}
+/* Whether S_{m+1} is less than those before it */
+bool Falls(const Candidates &c, PetscInt m) { return c.S[m + 1] <= PetscMax(PetscMax(resolved * c.S[m], resolved * resolved * c.S[m - 1]), silent); }
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
 {
   Integrator    &I   = Get(ts);
   Order         &o   = I.order;
-  const PetscInt now = o.now, first = PetscMax(now, 3);
+  const PetscInt now = o.now;
   PetscReal      tau[max_order + 2];
 
   PetscFunctionBegin;
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
   SpansOfStep(I, tau);
-  PetscCall(ScaledDifferences(ts, NORM_2, first, c->S));
+  PetscCall(ScaledDifferences(ts, NORM_2, c->S));
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
     if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
   if (now == 2) c->E[2] = I.wlte_pending;
-  else if (now == 3) c->E[2] = HHTErrorFactor(I.hht, I.h, tau) * c->S[3];
+  else c->E[2] = HHTErrorFactor(I.hht, I.h, tau) * c->S[3];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,7 +178,7 @@ PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
 
   PetscFunctionBegin;
   SpansOfStep(I, tau);
-  PetscCall(ScaledDifferences(ts, type, k, S));
+  PetscCall(ScaledDifferences(ts, type, S));
   *wlte = ErrorFactor(k, tau) * S[k + 1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -204,7 +201,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   if (o.next == 2 && o.now > 2) o.penalty = o.wait = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
-                        (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[PetscMax(o.now, 3)], (double)c.S[PetscMax(o.now, 3) + 1], (double)c.S[PetscMax(o.now, 3) + 2]));
+                        (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   if (o.next != o.now && c.E[o.next] >= 0) *next = I.h * PetscClipInterval(ts->adapt->safety * Reach(c.E[o.next], o.next), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);

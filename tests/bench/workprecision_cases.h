@@ -151,9 +151,17 @@ inline std::vector<Solver> allSolvers()
       makeHHT("paper-0.3", "hhtdae, paper's form, {/Symbol a} = -0.3", true, form(paper, -.3)),
       makeHHT("paper-0.1", "hhtdae, paper's form, {/Symbol a} = -0.1", false, form(paper, -.1)),
   };
+  auto order = [](PetscInt k) { return [=](TS ts) { return TSHHT3SetOrder(ts, k); }; };
+  list.push_back(makeHHT("auto", "hhtdae, order chosen", true, order(TSHHT3_ORDER_AUTO)));
+  for (PetscInt k : {3, 4, 5}) {
+    const std::string digit = std::to_string(k);
+    list.push_back(makeHHT(("order" + digit).c_str(), ("hhtdae, order " + digit).c_str(), false, order(k)));
+  }
   TSSettings euler;
   euler.euler = true;
   list.push_back(makeTS("euler313", "hhtdae, scenes with Euler angles", false, euler));
+  euler.configure = order(TSHHT3_ORDER_AUTO);
+  list.push_back(makeTS("euler_auto", "hhtdae, Euler angles, order chosen", false, euler));
   addForeign(list);
   return list;
 }
