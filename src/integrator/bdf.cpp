@@ -276,14 +276,17 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of a step that was rejected or failed: order two is tried where that happens again */
+/* Rejections of one step after which it is tried with order two */
+static constexpr PetscInt patience = 3;
+
+/* Of a step that was rejected or failed */
 PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections)
 {
   Order &o = Get(ts).order;
 
   PetscFunctionBegin;
-  if (o.now == 2 || rejections < 2) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed twice at t = %g\n", o.now, (double)ts->ptime));
+  if (o.now == 2 || rejections < patience) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed again and again at t = %g\n", o.now, (double)ts->ptime));
   o.now = o.next = 2;
   o.since        = 0;
   PetscFunctionReturn(PETSC_SUCCESS);

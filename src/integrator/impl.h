@@ -96,6 +96,7 @@ struct OrderState {
   PetscInt  since = 0;                  /* steps since the order has changed */
   PetscInt  wait = 0, penalty = 0;      /* steps of order two still to be made, and how many there were the last time */
   PetscBool chosen = PETSC_FALSE;       /* next is */
+  PetscReal S[max_order + 2] = {};      /* amplitudes of the scaled differences of orders 2 to 6, order.cpp; 0: none yet */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
   PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */

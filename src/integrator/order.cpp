@@ -5,7 +5,9 @@
   error E_m = gamma_m h/tau_{m+1} S_{m+1}, HHT the one of (26) with q''' from the third difference. That order is taken with which the next step may be
   longest, 1/E_m^{1/(m+1)}, among the one at hand and its neighbours.
 
-  Differences that do not fall with m, S_{m+1} neither below S_m nor below S_{m-1} (one of them may be near zero for a moment), belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
+  In place of S_m stands an amplitude, which falls from step to step by no more than a fifth: where q^(m) passes zero S_m tells nothing of the next step.
+
+  Differences that do not fall with m belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
   stable there: without damping it is A(86), A(73), A(51)-stable, and what is below the tolerance grows until the error test sees it. So the order goes back to two,
   whose damping takes such a motion away, and stays there for a while that doubles when this happens again.
 */
@@ -18,8 +20,11 @@ namespace hht3
 namespace
 {
 
-/* S_{m+1} above this part of S_m, and its square of S_{m-1}, does not fall: 2 sin(h omega/2) of an oscillation */
+/* S_{m+1} above this part of S_m does not fall: 2 sin(h omega/2) of an oscillation */
 constexpr PetscReal resolved = 0.8;
+
+/* Of an amplitude in the course of a step of constant length */
+constexpr PetscReal forgets = 0.8;
 
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
 constexpr PetscReal silent = 0.05;
@@ -122,8 +127,8 @@ struct Candidates {
   PetscReal E[max_order + 2]; /* likewise */
 };
 
-/* Whether S_{m+1} is less than those before it */
-bool Falls(const Candidates &c, PetscInt m) { return c.S[m + 1] <= PetscMax(PetscMax(resolved * c.S[m], resolved * resolved * c.S[m - 1]), silent); }
+/* Whether S_{m+1} is less than S_m */
+bool Falls(const Candidates &c, PetscInt m) { return c.S[m + 1] <= PetscMax(resolved * c.S[m], silent); }
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
 {
@@ -137,6 +142,8 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   for (PetscReal &e : c->E) e = -1;
   SpansOfStep(I, tau);
   PetscCall(ScaledDifferences(ts, NORM_2, c->S));
+  for (PetscInt m = lowest; m < lowest + kinds; m++)
+    if (c->S[m] >= 0) c->S[m] = o.S[m] = PetscMax(c->S[m], forgets * o.S[m] * PetscPowRealInt(I.h / I.h_last, m));
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
     if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
   if (now == 2) c->E[2] = I.wlte_pending;
@@ -157,7 +164,7 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
   const Order   &o = I.order;
   const PetscInt k = o.now;
 
-  if (k > 2 && !Falls(c, k)) return 2;
+  if (k > 2 && o.since > k && !Falls(c, k)) return 2; /* differences over steps of order two have kinks where h changes */
   const bool known = k < o.max && c.E[k + 1] >= 0 && o.past >= k && Falls(c, k + 1);
   if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2, gain_enter) ? 3 : 2;
   if (Better(I, c, k - 1, k, gain_down)) return k - 1;
@@ -203,7 +210,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
-  if (o.next != o.now && c.E[o.next] >= 0) *next = I.h * PetscClipInterval(ts->adapt->safety * Reach(c.E[o.next], o.next), ts->adapt->clip[0], ts->adapt->clip[1]);
+  if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0) *next = I.h * PetscClipInterval(ts->adapt->safety * Reach(c.E[o.next], o.next), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
