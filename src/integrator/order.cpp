@@ -7,9 +7,10 @@
 
   In place of S_m stands an amplitude, which falls from step to step by no more than a fifth: where q^(m) passes zero S_m tells nothing of the next step.
 
-  Differences that do not fall with m belong to a motion that the steps do not resolve, h omega near one or above. Backward differentiation of order 3 to 5 is not
-  stable there: without damping it is A(86), A(73), A(51)-stable, and what is below the tolerance grows until the error test sees it. So the order goes back to two,
-  whose damping takes such a motion away, and stays there for a while that doubles when this happens again.
+  The guard. On the imaginary axis order 3 grows by 0.2 % a step at h omega = 0.3 and 1.1 % at 0.5, order 4 by 0.02 % and 0.5 %, order 5 not at all below 0.7
+  and by 13 % at 1 (roots of their characteristic polynomials). So orders 3 and 4 are ways to 5; and an oscillation that hardly anything damps, however small, grows under order 5 until the
+  error test holds h near 0.7/omega, where HHT would take it away. It shows in differences that hardly fall, S_{m+1}/S_m = 2 sin(h omega/2). Where they have done so for
+  a number of steps the order goes back to two, and stays there for a while. If HHT then makes no longer steps, the motion is one to be resolved, and the number grows; else the while does.
 */
 #include "impl.h"
 #include "sweeps.h"
@@ -20,8 +21,14 @@ namespace hht3
 namespace
 {
 
-/* S_{m+1} above this part of S_m does not fall: 2 sin(h omega/2) of an oscillation */
-constexpr PetscReal resolved = 0.8;
+/* S_{m+1} over S_m at h omega = 0.7, and above one */
+constexpr PetscReal hardly = 0.68, not_at_all = 1;
+
+/* Such steps until the guard speaks, of which one where differences grow counts as several */
+constexpr PetscInt first_patience = 16, last_patience = 1024, counts_as = 4;
+
+/* HHT makes longer steps: by this factor */
+constexpr PetscReal longer = 1.5;
 
 /* Of an amplitude in the course of a step of constant length */
 constexpr PetscReal forgets = 0.8;
@@ -30,7 +37,7 @@ constexpr PetscReal forgets = 0.8;
 constexpr PetscReal silent = 0.05;
 
 /* A gain in h below this factor is not worth another order, or another matrix */
-constexpr PetscReal gain_up = 1.1, gain_down = 1.0, gain_enter = 1.0;
+constexpr PetscReal gain_up = 1.05, gain_down = 1.2;
 
 /* Steps of order two after the guard has spoken, at first and at most */
 constexpr PetscInt first_wait = 16, last_wait = 512;
@@ -127,8 +134,8 @@ struct Candidates {
   PetscReal E[max_order + 2]; /* likewise */
 };
 
-/* Whether S_{m+1} is less than S_m */
-bool Falls(const Candidates &c, PetscInt m) { return c.S[m + 1] <= PetscMax(resolved * c.S[m], silent); }
+/* S_{m+1} over S_m; 0 where both are small */
+PetscReal Ratio(const Candidates &c, PetscInt m) { return c.S[m] > 0 && c.S[m + 1] > silent ? c.S[m + 1] / c.S[m] : 0; }
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
 {
@@ -158,16 +165,50 @@ bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than,
   return I.fixed_h ? c.E[m] < c.E[than] : Reach(c.E[m], m) > gain * Reach(c.E[than], than);
 }
 
-/* The order for the step after the accepted one, -ts_hhtdae_order auto */
-PetscInt BestOrder(const Integrator &I, const Candidates &c)
+/* Above order two: whether an oscillation has been holding h for long enough */
+bool GuardSpeaks(Order &o, const Candidates &c)
 {
-  const Order   &o = I.order;
-  const PetscInt k = o.now;
+  const PetscReal ratio = Ratio(c, o.now);
 
-  if (k > 2 && o.since > k && !Falls(c, k)) return 2; /* differences over steps of order two have kinks where h changes */
-  const bool known = k < o.max && c.E[k + 1] >= 0 && o.past >= k && Falls(c, k + 1);
-  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2, gain_enter) ? 3 : 2;
-  if (Better(I, c, k - 1, k, gain_down)) return k - 1;
+  if (o.since <= o.now) return false; /* differences over steps of order two have kinks where h changes */
+  if (ratio > not_at_all) o.suspicion += counts_as;
+  else if (ratio > hardly) o.suspicion++;
+  else o.suspicion = PetscMax(0, o.suspicion - 1);
+  return o.suspicion >= PetscMax(o.patience, first_patience);
+}
+
+/* The guard has spoken after a step of length h */
+void BackToTwo(Order &o, PetscReal h)
+{
+  o.suspicion = 0;
+  o.h_left    = h;
+  o.wait = o.penalty = PetscClipInterval(o.penalty, first_wait, last_wait);
+}
+
+/* At the end of the while: was the guard right? */
+void LearnFromWaiting(Order &o, PetscReal h)
+{
+  if (h > longer * o.h_left) o.penalty = PetscMin(4 * o.penalty, last_wait);
+  else o.patience = PetscMin(4 * PetscMax(o.patience, first_patience), last_patience);
+  o.h_left = 0;
+}
+
+/* The order for the step after the accepted one, -ts_hhtdae_order auto */
+PetscInt BestOrder(const Integrator &I, Order &o, const Candidates &c)
+{
+  const PetscInt k     = o.now;
+  const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
+
+  if (k == 2) {
+    if (o.wait > 0) return 2;
+    if (o.h_left > 0) LearnFromWaiting(o, I.h);
+    return known && Ratio(c, 3) <= hardly && Better(I, c, 3, 2, 1) ? 3 : 2;
+  }
+  if (GuardSpeaks(o, c)) {
+    BackToTwo(o, I.h);
+    return 2;
+  }
+  if (o.since >= k && Better(I, c, k - 1, k, gain_down)) return k - 1;
   return known && o.since >= k && Better(I, c, k + 1, k, gain_up) ? k + 1 : k;
 }
 
@@ -204,8 +245,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.next   = o.now;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
-  if (o.next == 2 && o.now > 2) o.penalty = o.wait = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, o, c) : NextToFixed(o);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
