@@ -25,10 +25,10 @@ namespace
 constexpr PetscReal hardly = 0.68, not_at_all = 1;
 
 /* Such steps until the guard speaks, of which one where differences grow counts as several */
-constexpr PetscInt first_patience = 16, last_patience = 1024, counts_as = 4;
+constexpr PetscInt first_patience = 24, last_patience = 1024, counts_as = 2;
 
-/* HHT makes longer steps: by this factor */
-constexpr PetscReal longer = 1.5;
+/* Steps that grow, and those of HHT that are longer */
+constexpr PetscReal growing = 1.02, longer = 1.5;
 
 /* Of an amplitude in the course of a step of constant length */
 constexpr PetscReal forgets = 0.8;
@@ -166,12 +166,13 @@ bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than,
 }
 
 /* Above order two: whether an oscillation has been holding h for long enough */
-bool GuardSpeaks(Order &o, const Candidates &c)
+bool GuardSpeaks(const Integrator &I, Order &o, const Candidates &c)
 {
   const PetscReal ratio = Ratio(c, o.now);
 
   if (o.since <= o.now) return false; /* differences over steps of order two have kinks where h changes */
-  if (ratio > not_at_all) o.suspicion += counts_as;
+  if (I.h > growing * I.h_last) o.suspicion = 0; /* nothing holds h */
+  else if (ratio > not_at_all) o.suspicion += counts_as;
   else if (ratio > hardly) o.suspicion++;
   else o.suspicion = PetscMax(0, o.suspicion - 1);
   return o.suspicion >= PetscMax(o.patience, first_patience);
@@ -204,7 +205,7 @@ PetscInt BestOrder(const Integrator &I, Order &o, const Candidates &c)
     if (o.h_left > 0) LearnFromWaiting(o, I.h);
     return known && Ratio(c, 3) <= hardly && Better(I, c, 3, 2, 1) ? 3 : 2;
   }
-  if (GuardSpeaks(o, c)) {
+  if (GuardSpeaks(I, o, c)) {
     BackToTwo(o, I.h);
     return 2;
   }
