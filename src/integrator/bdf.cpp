@@ -200,7 +200,7 @@ void CommitOrder(Integrator &I)
   o.hht[0] = o.accepted == 2 ? I.h : 0;
   o.made   = o.accepted;
   o.since  = o.next == o.now ? o.since + 1 : 0;
-  if (o.wait > 0) o.wait--;
+  o.above  = o.now > 2 ? o.above + 1 : 0;
   o.now = PetscMin(o.next, PetscMax(2, o.past));
   if (o.now < 3) o.now = 2;
 }

@@ -93,10 +93,9 @@ struct OrderState {
   PetscInt  made = 0, accepted = 0;     /* of the step that led to t_n, and of the accepted one that leads away from it; 0: neither */
   PetscInt  ready = 2;                  /* for which X0, D_0 and the misfit of velocities stand */
   PetscInt  past = 0;                   /* states before t_n that are kept */
-  PetscInt  since = 0;                  /* steps since the order has changed */
-  PetscInt  wait = 0, penalty = 0;      /* the guard of order.cpp: steps of order two still to be made, and how many there are at a time */
-  PetscInt  suspicion = 0, patience = 0; /* steps with differences that hardly fall, and how many are borne */
-  PetscReal h_left = 0;                 /* length of the step after which the guard has spoken; 0: it has not */
+  PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
+  PetscBool collapsed = PETSC_FALSE;    /* h has fallen so far that the next step is to start anew */
+  PetscReal h_high = 0;                 /* largest step above order two, forgetting */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal S[max_order + 2] = {};      /* amplitudes of the scaled differences of orders 2 to 6, order.cpp; 0: none yet */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */

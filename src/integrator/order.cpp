@@ -7,10 +7,11 @@
 
   In place of S_m stands an amplitude, which falls from step to step by no more than a fifth: where q^(m) passes zero S_m tells nothing of the next step.
 
-  The guard. On the imaginary axis order 3 grows by 0.2 % a step at h omega = 0.3 and 1.1 % at 0.5, order 4 by 0.02 % and 0.5 %, order 5 not at all below 0.7
-  and by 13 % at 1 (roots of their characteristic polynomials). So orders 3 and 4 are ways to 5; and an oscillation that hardly anything damps, however small, grows under order 5 until the
-  error test holds h near 0.7/omega, where HHT would take it away. It shows in differences that hardly fall, S_{m+1}/S_m = 2 sin(h omega/2). Where they have done so for
-  a number of steps the order goes back to two, and stays there for a while. If HHT then makes no longer steps, the motion is one to be resolved, and the number grows; else the while does.
+  The same differences tell how stable an order is. On the imaginary axis order 3 grows by 0.2 % a step at h omega = 0.3 and by 1.1 % at 0.5, order 4 by 0.02 % and
+  0.5 %, order 5 not at all below 0.7 but by 13 % at 1 (roots of their characteristic polynomials; A(86), A(73), A(51)-stable). An oscillation that hardly
+  anything damps grows there, however small it is, until the error test sees it, and a fast spin gains energy. It shows in S_{m+1}/S_m = 2 sin(h omega/2), long before it has the size of the tolerance,
+  since high differences magnify it. So this ratio limits the step of orders 3 to 5, and HHT, which has no such limit and takes the oscillation away, is chosen where its
+  step is longer. Orders 3 and 4, whose limits are lower, are mostly ways to 5.
 */
 #include "impl.h"
 #include "sweeps.h"
@@ -21,26 +22,20 @@ namespace hht3
 namespace
 {
 
-/* S_{m+1} over S_m at h omega = 0.7, and above one */
-constexpr PetscReal hardly = 0.68, not_at_all = 1;
+/* S_{m+1}/S_m up to which orders 3, 4, 5 are taken for stable: h omega = 0.4, 0.5, 0.65 */
+constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 
-/* Such steps until the guard speaks, of which one where differences grow counts as several */
-constexpr PetscInt first_patience = 24, last_patience = 1024, counts_as = 2;
-
-/* Steps that grow, and those of HHT that are longer */
-constexpr PetscReal growing = 1.02, longer = 1.5;
+/* h above order two, below this part of what it was, by a measure that loses this in each step */
+constexpr PetscReal collapsed = 0.1, forgets_h = 0.98;
 
 /* Of an amplitude in the course of a step of constant length */
 constexpr PetscReal forgets = 0.8;
 
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
-constexpr PetscReal silent = 0.05;
+constexpr PetscReal silent = 0.5;
 
 /* A gain in h below this factor is not worth another order, or another matrix */
 constexpr PetscReal gain_up = 1.05, gain_down = 1.2;
-
-/* Steps of order two after the guard has spoken, at first and at most */
-constexpr PetscInt first_wait = 16, last_wait = 512;
 
 constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
 
@@ -125,17 +120,12 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How much longer the next step may be */
-PetscReal Reach(PetscReal error, PetscInt order) { return error > 0 ? PetscPowReal(error, (PetscReal)-1 / (order + 1)) : PETSC_MAX_REAL; }
-
 /* Of the accepted step, and the candidates for the next one */
 struct Candidates {
   PetscReal S[max_order + 3]; /* -1: not known */
   PetscReal E[max_order + 2]; /* likewise */
+  bool      limited;          /* by stability: where the order is chosen */
 };
-
-/* S_{m+1} over S_m; 0 where both are small */
-PetscReal Ratio(const Candidates &c, PetscInt m) { return c.S[m] > 0 && c.S[m + 1] > silent ? c.S[m + 1] / c.S[m] : 0; }
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
 {
@@ -145,6 +135,7 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscReal      tau[max_order + 2];
 
   PetscFunctionBegin;
+  c->limited = o.wanted == TSHHT3_ORDER_AUTO;
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
   SpansOfStep(I, tau);
@@ -158,59 +149,44 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Better: at fixed steps the one with the smaller error, else the one with the larger step */
+/* What stability leaves of the present h for order m */
+PetscReal StableReach(const Candidates &c, PetscInt m) { return c.limited && m > 2 && c.S[m + 1] > silent ? stable[m] * c.S[m] / c.S[m + 1] : PETSC_MAX_REAL; }
+
+/* How much longer the next step of order m may be, with `safety` for its error */
+PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
+{
+  return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, StableReach(c, m));
+}
+
+/* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
 bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than, PetscReal gain)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
-  return I.fixed_h ? c.E[m] < c.E[than] : Reach(c.E[m], m) > gain * Reach(c.E[than], than);
+  if (!I.fixed_h) return Reach(c, m, 1) > gain * Reach(c, than, 1);
+  const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
+  return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
 
-/* Above order two: whether an oscillation has been holding h for long enough */
-bool GuardSpeaks(const Integrator &I, Order &o, const Candidates &c)
+/* Whether h has fallen by much: at a corner of a force, for which order two is right; or because the differences are those of what the corrector leaves in the
+   positions, e, which are the same at any h, and make velocities of e/h and accelerations of e/h^2 in the directions of the constraints. Both want a new start. */
+bool Falling(Order &o, PetscReal h)
 {
-  const PetscReal ratio = Ratio(c, o.now);
-
-  if (o.since <= o.now) return false; /* differences over steps of order two have kinks where h changes */
-  if (I.h > growing * I.h_last) o.suspicion = 0; /* nothing holds h */
-  else if (ratio > not_at_all) o.suspicion += counts_as;
-  else if (ratio > hardly) o.suspicion++;
-  else o.suspicion = PetscMax(0, o.suspicion - 1);
-  return o.suspicion >= PetscMax(o.patience, first_patience);
+  o.h_high = PetscMax(h, o.above ? forgets_h * o.h_high : 0);
+  return h < collapsed * o.h_high;
 }
 
-/* The guard has spoken after a step of length h */
-void BackToTwo(Order &o, PetscReal h)
+/* The order for the step after the accepted one, -ts_hhtdae_order auto. The present one is left after as many steps as its history has, or for HHT at once. */
+PetscInt BestOrder(const Integrator &I, const Candidates &c)
 {
-  o.suspicion = 0;
-  o.h_left    = h;
-  o.wait = o.penalty = PetscClipInterval(o.penalty, first_wait, last_wait);
-}
-
-/* At the end of the while: was the guard right? */
-void LearnFromWaiting(Order &o, PetscReal h)
-{
-  if (h > longer * o.h_left) o.penalty = PetscMin(4 * o.penalty, last_wait);
-  else o.patience = PetscMin(4 * PetscMax(o.patience, first_patience), last_patience);
-  o.h_left = 0;
-}
-
-/* The order for the step after the accepted one, -ts_hhtdae_order auto */
-PetscInt BestOrder(const Integrator &I, Order &o, const Candidates &c)
-{
+  const Order   &o     = I.order;
   const PetscInt k     = o.now;
   const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
 
-  if (k == 2) {
-    if (o.wait > 0) return 2;
-    if (o.h_left > 0) LearnFromWaiting(o, I.h);
-    return known && Ratio(c, 3) <= hardly && Better(I, c, 3, 2, 1) ? 3 : 2;
-  }
-  if (GuardSpeaks(I, o, c)) {
-    BackToTwo(o, I.h);
-    return 2;
-  }
-  if (o.since >= k && Better(I, c, k - 1, k, gain_down)) return k - 1;
-  return known && o.since >= k && Better(I, c, k + 1, k, gain_up) ? k + 1 : k;
+  if (k == 2) return known && Better(I, c, 3, 2, 1) ? 3 : 2;
+  if (o.above > k && Better(I, c, 2, k, gain_down)) return 2; /* differences over steps of order two have kinks where h changes */
+  if (o.since < k) return k;
+  if (k > 3 && Better(I, c, k - 1, k, gain_down)) return k - 1;
+  return known && Better(I, c, k + 1, k, gain_up) ? k + 1 : k;
 }
 
 /* A fixed order is reached from two as soon as the history is there */
@@ -246,12 +222,17 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.next   = o.now;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, o, c) : NextToFixed(o);
+  const bool falling = o.now > 2 && Falling(o, I.h);
+  if (falling) {
+    o.next      = 2;
+    o.collapsed = PETSC_TRUE;
+  } else o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
-  if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0) *next = I.h * PetscClipInterval(ts->adapt->safety * Reach(c.E[o.next], o.next), ts->adapt->clip[0], ts->adapt->clip[1]);
+  if (!falling && (o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
+    *next = I.h * PetscClipInterval(Reach(c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
