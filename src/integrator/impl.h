@@ -98,6 +98,7 @@ struct OrderState {
   PetscReal h_high = 0;                 /* largest step above order two, forgetting */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal S[max_order + 2] = {};      /* amplitudes of the scaled differences of orders 2 to 6, order.cpp; 0: none yet */
+  PetscReal ratio[max_order + 1] = {};  /* of one to the one before it, as stability sees it */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
   PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */

@@ -23,6 +23,7 @@ namespace
 {
 
 /* S_{m+1}/S_m up to which orders 3, 4, 5 are taken for stable: h omega = 0.4, 0.5, 0.65 */
+constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
 constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 
 /* h above order two, below this part of what it was, by a measure that loses this in each step */
@@ -124,7 +125,7 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
 struct Candidates {
   PetscReal S[max_order + 3]; /* -1: not known */
   PetscReal E[max_order + 2]; /* likewise */
-  bool      limited;          /* by stability: where the order is chosen */
+  PetscReal ratio[max_order + 1]; /* of S_{m+1} to S_m, for as long as it lasts; 0 where stability is no matter */
 };
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
@@ -135,13 +136,17 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscReal      tau[max_order + 2];
 
   PetscFunctionBegin;
-  c->limited = o.wanted == TSHHT3_ORDER_AUTO;
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
   SpansOfStep(I, tau);
   PetscCall(ScaledDifferences(ts, NORM_2, c->S));
   for (PetscInt m = lowest; m < lowest + kinds; m++)
     if (c->S[m] >= 0) c->S[m] = o.S[m] = PetscMax(c->S[m], forgets * o.S[m] * PetscPowRealInt(I.h / I.h_last, m));
+  for (PetscInt m = 0; m <= max_order; m++) {
+    const PetscReal ratio = m > 2 && c->S[m] > 0 && c->S[m + 1] > silent ? c->S[m + 1] / c->S[m] : 0;
+    o.ratio[m]            = PetscMin(ratio, PetscMax(recovers * o.ratio[m], least_ratio));
+    c->ratio[m]           = o.wanted == TSHHT3_ORDER_AUTO ? o.ratio[m] : 0;
+  }
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
     if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
   if (now == 2) c->E[2] = I.wlte_pending;
@@ -150,7 +155,7 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
 }
 
 /* What stability leaves of the present h for order m */
-PetscReal StableReach(const Candidates &c, PetscInt m) { return c.limited && m > 2 && c.S[m + 1] > silent ? stable[m] * c.S[m] / c.S[m + 1] : PETSC_MAX_REAL; }
+PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable[m] / c.ratio[m] : PETSC_MAX_REAL; }
 
 /* How much longer the next step of order m may be, with `safety` for its error */
 PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
