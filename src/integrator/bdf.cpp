@@ -199,6 +199,7 @@ void CommitOrder(Integrator &I)
   o.t[0]   = I.t1;
   o.hht[0] = o.accepted == 2 ? I.h : 0;
   o.made   = o.accepted;
+  o.memory = o.after;
   o.since  = o.next == o.now ? o.since + 1 : 0;
   o.above  = o.now > 2 ? o.above + 1 : 0;
   o.now = PetscMin(o.next, PetscMax(2, o.past));

@@ -87,6 +87,13 @@ struct Predictor : PredictorOptions, PredictorState {
   Vec D[max_degree + 1] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
 };
 
+/* What the choice of the order knows of the steps before */
+struct OrderMemory {
+  PetscReal S[max_order + 2] = {};     /* amplitudes of the scaled differences of orders 2 to 6; 0: none yet */
+  PetscReal ratio[max_order + 1] = {}; /* of one to the one before it, as stability sees it */
+  PetscReal h_high = 0;                /* largest step above order two, forgetting */
+};
+
 /* Orders above two, bdf.cpp and order.cpp. Nothing of it is used where the largest order is two. */
 struct OrderState {
   PetscInt  now = 2, next = 2;          /* of the step from t_n, and of the one after it when it is accepted */
@@ -94,11 +101,9 @@ struct OrderState {
   PetscInt  ready = 2;                  /* for which X0, D_0 and the misfit of velocities stand */
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
+  OrderMemory memory, after;            /* at t_n, and when the step is accepted */
   PetscBool collapsed = PETSC_FALSE;    /* h has fallen so far that the next step is to start anew */
-  PetscReal h_high = 0;                 /* largest step above order two, forgetting */
   PetscBool chosen = PETSC_FALSE;       /* next is */
-  PetscReal S[max_order + 2] = {};      /* amplitudes of the scaled differences of orders 2 to 6, order.cpp; 0: none yet */
-  PetscReal ratio[max_order + 1] = {};  /* of one to the one before it, as stability sees it */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
   PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */

@@ -141,11 +141,11 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   SpansOfStep(I, tau);
   PetscCall(ScaledDifferences(ts, NORM_2, c->S));
   for (PetscInt m = lowest; m < lowest + kinds; m++)
-    if (c->S[m] >= 0) c->S[m] = o.S[m] = PetscMax(c->S[m], forgets * o.S[m] * PetscPowRealInt(I.h / I.h_last, m));
+    if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], forgets * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
   for (PetscInt m = 0; m <= max_order; m++) {
     const PetscReal ratio = m > 2 && c->S[m] > 0 && c->S[m + 1] > silent ? c->S[m + 1] / c->S[m] : 0;
-    o.ratio[m]            = PetscMin(ratio, PetscMax(recovers * o.ratio[m], least_ratio));
-    c->ratio[m]           = o.wanted == TSHHT3_ORDER_AUTO ? o.ratio[m] : 0;
+    o.after.ratio[m]      = PetscMin(ratio, PetscMax(recovers * o.memory.ratio[m], least_ratio));
+    c->ratio[m]           = o.wanted == TSHHT3_ORDER_AUTO ? o.after.ratio[m] : 0;
   }
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
     if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
@@ -176,8 +176,8 @@ bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than,
    positions, e, which are the same at any h, and make velocities of e/h and accelerations of e/h^2 in the directions of the constraints. Both want a new start. */
 bool Falling(Order &o, PetscReal h)
 {
-  o.h_high = PetscMax(h, o.above ? forgets_h * o.h_high : 0);
-  return h < collapsed * o.h_high;
+  o.after.h_high = PetscMax(h, o.above ? forgets_h * o.memory.h_high : 0);
+  return h < collapsed * o.after.h_high;
 }
 
 /* The order for the step after the accepted one, -ts_hhtdae_order auto. The present one is left after as many steps as its history has, or for HHT at once. */
@@ -225,6 +225,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   if (o.chosen || o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
   o.chosen = PETSC_TRUE;
   o.next   = o.now;
+  o.after  = o.memory;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
   const bool falling = o.now > 2 && Falling(o, I.h);

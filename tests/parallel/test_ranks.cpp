@@ -201,3 +201,18 @@ TEST(Ranks, IndexOfAnotherRankIsRefused)
   EXPECT_EQ(TSSetUp(r.ts), PETSC_ERR_ARG_OUTOFRANGE);
   EXPECT_TRUE(trap.says("not among the unknowns")) << trap.message;
 }
+
+/* Orders above two, at fixed steps, and chosen under error control */
+TEST(Ranks, HigherOrder)
+{
+  const Pendulum pendulum(-90., 0., 1.);
+  const UserVars uservars(1.);
+  for (const char *order : {"3", "5"}) {
+    compare(pendulum, steps(pendulum, 100) + "-ts_hhtdae_order " + order);
+    compare(uservars, steps(uservars, 400) + "-ts_hhtdae_order " + order);
+  }
+  const std::string options = tolerance(1e-5) + " -ts_hhtdae_order auto ";
+  const End         all = run(PETSC_COMM_WORLD, pendulum, options, false), self = run(PETSC_COMM_SELF, pendulum, options, false);
+  for (int k = 2; k <= 5; k++) EXPECT_EQ(all.s.of_order[k], self.s.of_order[k]);
+  EXPECT_LT(relativeDifference(all.u, self.u), 1e-6);
+}

@@ -1,0 +1,385 @@
+/* Orders three to five: observed orders, dense output, restarts, roll-back, checkpoints, changes of coordinates, and what the choice of the order does where an oscillation is
+   not resolved */
+#include "support.h"
+#include "tumbling.h"
+
+#include <array>
+#include <unistd.h>
+
+using namespace hhtest;
+
+namespace
+{
+
+std::string ofOrder(int k) { return text(" -ts_hhtdae_order %d ", k); }
+
+/* Up to h from steps a hundred times shorter, so that what the steps of order two leave there counts nothing */
+void growTo(Simulation &run, double h)
+{
+  for (double s = .01 * h; s < h; s *= 1.2) {
+    must(TSSetTimeStep(run.ts, s));
+    must(run.step());
+  }
+  must(TSSetTimeStep(run.ts, h));
+}
+
+std::string strict() { return fixedSteps(.01) + " -ts_max_time 1e3 "; }
+
+/* Largest errors with steps h, ratio h, h, ratio h ..., in the second half of the run */
+ProblemErrors errorsAt(const Problem &p, double h, double ratio, const std::string &options)
+{
+  Simulation    run(p, strict() + options);
+  ProblemErrors worst;
+  bool          longer = false;
+  growTo(run, h);
+  while (run.t() < p.t1 - ratio * h) {
+    must(TSSetTimeStep(run.ts, longer ? ratio * h : h));
+    longer = !longer;
+    must(run.step());
+    if (run.t() < .5 * p.t1) continue;
+    const ProblemErrors e = run.errors();
+    widen(worst.q, e.q);
+    widen(worst.v, e.v);
+    widen(worst.lambda, e.lambda);
+    widen(worst.other, e.other);
+  }
+  return worst;
+}
+
+struct Orders {
+  double q, v, lambda, other;
+};
+
+Orders measure(const Problem &p, int k, double h, double ratio)
+{
+  const ProblemErrors coarse = errorsAt(p, h, ratio, ofOrder(k)), fine = errorsAt(p, h / 2, ratio, ofOrder(k));
+  const Orders o = {order(coarse.q, fine.q), order(coarse.v, fine.v), order(coarse.lambda, fine.lambda), order(coarse.other, fine.other)};
+  MEASURED("%-15s order %d, ratio %.1f: q %.2f, q' %.2f, lambda %.2f, others %.2f; errors q %.1e, q' %.1e, lambda %.1e", p.name.c_str(), k, ratio, o.q, o.v,
+           o.lambda, o.other, fine.q, fine.v, fine.lambda);
+  return o;
+}
+
+enum class Multipliers { None, Judged };
+
+/* h for order 3; longer for the others, whose errors would soon be rounding */
+void expectOrders(const Problem &p, double h, Multipliers lambda, bool others = false)
+{
+  for (double ratio : {1., 1.2})
+    for (int k : {3, 4, 5}) {
+      SCOPED_TRACE(p.name + text(" order %d, ratio %g", k, ratio));
+      const Orders o = measure(p, k, h * (k - 2), ratio);
+      EXPECT_GE(o.q, k - .25);
+      EXPECT_GE(o.v, k - .25);
+      EXPECT_LT(o.q, k + 1.2);
+      /* alternating steps leave the error of a change of h in all multipliers */
+      if (lambda == Multipliers::Judged) {
+        EXPECT_GE(o.lambda, ratio > 1 ? k - 1.3 : k - .3);
+      }
+      if (others) {
+        EXPECT_GE(o.other, k - 1.3);
+      }
+    }
+}
+
+struct Vectors {
+  Vec U, V, A;
+  explicit Vectors(Vec like)
+  {
+    for (Vec *x : {&U, &V, &A}) must(VecDuplicate(like, x));
+  }
+  ~Vectors()
+  {
+    for (Vec *x : {&U, &V, &A}) VecDestroy(x);
+  }
+};
+
+/* Largest error of dense output between steps, of q and of q' of coordinates, of q'', of multipliers */
+std::array<double, 4> betweenSteps(const Problem &p, int k, double h)
+{
+  Simulation            run(p, strict() + ofOrder(k));
+  Vectors               x(run.U);
+  std::array<double, 4> worst = {};
+  growTo(run, h);
+  while (run.t() < p.t1 - h) {
+    must(run.step());
+    if (run.t() < .5 * p.t1) continue;
+    for (double theta : {.3, .5, .8}) {
+      const double t = run.t() - theta * h;
+      Array        u(p.n), v(p.n), a(p.n);
+      must(TSHHT3Interpolate(run.ts, t, x.U, x.V, x.A));
+      p.reference(t, u.data(), v.data(), a.data());
+      const Array U = whole(x.U), V = whole(x.V), A = whole(x.A);
+      for (PetscInt i = 0; i < p.n; i++)
+        if (p.role[i] == TSHHT3_COORDINATE) {
+          widen(worst[0], std::abs(U[i] - u[i]));
+          widen(worst[1], std::abs(V[i] - v[i]));
+          widen(worst[2], std::abs(A[i] - a[i]));
+        } else
+          widen(worst[3], std::abs(U[i] - u[i]));
+    }
+  }
+  return worst;
+}
+
+struct Step {
+  double t;
+  Array  u, v, a;
+  bool   operator==(const Step &o) const { return t == o.t && u == o.u && v == o.v && a == o.a; }
+};
+
+Step now(const Simulation &run) { return {run.t(), run.u(), run.v(), run.a()}; }
+
+PetscInt above(const TSHHT3Statistics &s) { return s.of_order[3] + s.of_order[4] + s.of_order[5]; }
+
+} // namespace
+
+TEST(HigherOrder, ConstantMassWithConstraints) { expectOrders(Pendulum(-90., 0., 1.5), .004, Multipliers::Judged); }
+
+TEST(HigherOrder, VariableMass) { expectOrders(DoublePendulum(1.), .004, Multipliers::None); }
+
+TEST(HigherOrder, VariableMassWithConstraints) { expectOrders(HeavyTop(.2), .0001, Multipliers::Judged); }
+
+TEST(HigherOrder, StatesAndDefinitions) { expectOrders(UserVars(1.), .001, Multipliers::Judged, true); }
+
+TEST(HigherOrder, NonholonomicConstraints) { expectOrders(Sleigh(1.5), .004, Multipliers::Judged); }
+
+TEST(HigherOrder, DenseOutput)
+{
+  const Pendulum p(-90., 0., 1.2);
+  for (int k : {3, 4, 5}) {
+    const double                h = .004 * (k - 2);
+    const std::array<double, 4> coarse = betweenSteps(p, k, h), fine = betweenSteps(p, k, h / 2);
+    MEASURED("order %d between steps: q %.2f, q' %.2f, q'' %.2f, lambda %.2f", k, order(coarse[0], fine[0]), order(coarse[1], fine[1]), order(coarse[2], fine[2]), order(coarse[3], fine[3]));
+    for (int i = 0; i < 4; i++) EXPECT_GE(order(coarse[i], fine[i]), k - .3) << k << " " << i;
+  }
+}
+
+/* Both ends of every step, among them those where the order changes */
+TEST(HigherOrder, DenseOutputMeetsTheStep)
+{
+  const UserVars p(1.);
+  Simulation     run(p, tolerance(1e-6) + " -ts_hhtdae_order auto ");
+  Vectors        x(run.U);
+  Array          u = run.u(), v = run.v(), a;
+  double         t = 0.;
+  while (run.t() < p.t1) {
+    must(run.step());
+    if (t > 0.) {
+      must(TSHHT3Interpolate(run.ts, t, x.U, x.V, x.A));
+      EXPECT_LT(relativeDifference(whole(x.U), u), 1e-14);
+      EXPECT_LT(relativeDifference(whole(x.V), v), 1e-14);
+      EXPECT_LT(relativeDifference(whole(x.A), a), 1e-12);
+    }
+    t = run.t();
+    u = run.u();
+    v = run.v();
+    a = run.a();
+    must(TSHHT3Interpolate(run.ts, t, x.U, x.V, x.A));
+    EXPECT_TRUE(whole(x.U) == u);
+    EXPECT_TRUE(whole(x.V) == v);
+    EXPECT_TRUE(whole(x.A) == a);
+  }
+  EXPECT_GT(above(run.statistics()), 20);
+}
+
+/* Fewer steps for the same error, and the more so the smaller it is */
+TEST(HigherOrder, FewerSteps)
+{
+  const Pendulum p(-90., 0., 4.);
+  for (double eps : {1e-5, 1e-7}) {
+    double   error[2];
+    PetscInt steps[2];
+    for (int k = 0; k < 2; k++) {
+      Simulation run(p, tolerance(eps) + (k ? " -ts_hhtdae_order auto " : ""));
+      must(run.solve());
+      error[k] = run.errors().q;
+      steps[k] = run.statistics().steps;
+    }
+    MEASURED("eps %.0e: order 2 %d steps, error %.1e; auto %d steps, error %.1e", eps, (int)steps[0], error[0], (int)steps[1], error[1]);
+    EXPECT_LT(steps[1], steps[0] / (eps < 1e-6 ? 4 : 2));
+    EXPECT_LT(error[1], 1.5 * error[0]);
+  }
+}
+
+/* hω = 2 of an undamped mode that hardly moves: order 5 makes an oscillation of it, at constant steps without an end; the chosen order does not */
+TEST(HigherOrder, UndampedOscillationThatIsNotResolved)
+{
+  const Oscillators p({1., 1000.}, {0., 0.}, false, 4.);
+  for (const char *which : {"5", "auto"}) {
+    Simulation run(p, text(" -ts_adapt_type none -ts_dt 0.002 -ts_rtol 1e-6 -ts_atol 1e-6 -ts_hhtdae_order %s ", which));
+    double     largest = 0.;
+    run.watch          = [&](Simulation &r, PetscInt, double) { widen(largest, norm(r.u())); };
+    run.solve();
+    MEASURED("h omega = 2 at constant steps, order %s: largest |q| %.1e", which, largest);
+    if (which[0] == '5') {
+      EXPECT_GT(largest, 1e3);
+    } else {
+      EXPECT_LT(largest, 10.);
+    }
+  }
+}
+
+/* A stiff spring that hardly moves: BDF makes an oscillation of it that holds the step, HHT does not. The chosen order must be no slower than HHT alone. */
+TEST(HigherOrder, StiffUndampedModeDoesNotHoldTheStep)
+{
+  const SpringPendulum p(1e8, 10.);
+  PetscInt             steps[3];
+  const char *const    which[] = {"2", "5", "auto"};
+  for (int k = 0; k < 3; k++) {
+    Simulation run(p, tolerance(1e-4) + text(" -ts_max_steps 20000 -ts_hhtdae_order %s ", which[k]));
+    must(run.solve());
+    const TSHHT3Statistics s = run.statistics();
+    steps[k]                 = s.steps;
+    MEASURED("order %s: %d steps (%d of order 2), %d rejected", which[k], (int)s.steps, (int)s.of_order[2], (int)s.rejected);
+  }
+  EXPECT_LT(steps[2], 1.1 * steps[0] + 20);
+  EXPECT_GT(steps[1], 2 * steps[2]);
+}
+
+TEST(HigherOrder, RestartBeginsWithOrderTwo)
+{
+  const Pendulum p(-90., 0., 2.);
+  Simulation     run(p, tolerance(1e-6) + " -ts_hhtdae_order 5 ");
+  while (run.t() < 1.) must(run.step());
+  const TSHHT3Statistics before = run.statistics();
+  EXPECT_GT(before.of_order[5], 10);
+  must(TSRestartStep(run.ts));
+  for (int k = 0; k < 3; k++) must(run.step());
+  EXPECT_EQ(run.statistics().of_order[2], before.of_order[2] + 3);
+  EXPECT_EQ(run.statistics().restarts, 2);
+  while (run.t() < 1.9) must(run.step());
+  EXPECT_GT(run.statistics().of_order[5], before.of_order[5] + 10);
+  EXPECT_LT(run.errors().q, 1e-3);
+}
+
+/* A step, another one, back, and forth again; where the order has changed in between, too */
+TEST(HigherOrder, RollBack)
+{
+  const Pendulum p(-90., 0., 2.);
+  for (const char *which : {"3", "5", "auto"}) {
+    Simulation plain(p, tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which)), back(p, tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which));
+    for (int k = 0; k < 60; k++) {
+      PetscReal h;
+      must(plain.step());
+      must(TSGetTimeStep(back.ts, &h));
+      must(back.step());
+      must(TSRollBack(back.ts));
+      must(TSSetTimeStep(back.ts, h));
+      must(back.step());
+      EXPECT_NEAR(back.t(), plain.t(), 1e-6) << which << " " << k;
+      EXPECT_LT(relativeDifference(back.u(), plain.u()), 1e-5) << which << " " << k;
+    }
+    for (int k = 2; k <= 5; k++) EXPECT_NEAR(back.statistics().of_order[k], plain.statistics().of_order[k], 3) << which << " " << k;
+  }
+}
+
+TEST(HigherOrder, CheckpointsRepeatTheRun)
+{
+  const Pendulum    pendulum(-90., 0., 1.);
+  const UserVars    uservars(.6);
+  const std::string file = testing::TempDir() + "hhtdae-order-" + std::to_string((long)getpid());
+  for (const Problem *p : {(const Problem *)&pendulum, (const Problem *)&uservars})
+    for (const char *which : {"4", "auto"}) {
+      SCOPED_TRACE(p->name + " " + which);
+      const std::string options = tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which);
+      for (int at : {2, 5, 7, 20}) {
+        std::vector<Step> steps;
+        Simulation        plain(*p, options);
+        for (int k = 0; k < at; k++) must(plain.step());
+        must(TSHHT3CheckpointSave(plain.ts, file.c_str()));
+        for (int k = 0; k < 15; k++) {
+          must(plain.step());
+          steps.push_back(now(plain));
+        }
+        Simulation resumed(*p, options + " -ts_hhtdae_resume " + file);
+        for (int k = 0; k < 15; k++) {
+          must(resumed.step());
+          EXPECT_TRUE(now(resumed) == steps[k]) << at << " " << k;
+        }
+        for (int k = 2; k <= 5; k++) EXPECT_EQ(resumed.statistics().of_order[k], plain.statistics().of_order[k]);
+      }
+      ErrorTrap  trap;
+      Simulation other(*p, tolerance(1e-6) + " -ts_hhtdae_order 3 -ts_hhtdae_resume " + file);
+      EXPECT_NE(other.step(), 0);
+      EXPECT_TRUE(trap.says("give the same -ts_hhtdae_order")) << trap.message;
+    }
+  std::remove(file.c_str());
+  std::remove((file + ".info").c_str());
+}
+
+/* New Euler angles now and then, the past with them */
+TEST(HigherOrder, ChangesOfCoordinates)
+{
+  const Tumbling p(true, 4.);
+  for (int k : {3, 4, 5}) {
+    double worst[2] = {0., 0.};
+    for (int turn = 0; turn < 2; turn++) {
+      Simulation   run(p, tolerance(1e-7) + ofOrder(k));
+      FrameChanges changes(run, p, turn ? 12 : 0, true);
+      run.watch = [&](Simulation &s, PetscInt step, double t) {
+        if (step) widen(worst[turn], p.errors(t, s.u(), s.v(), s.a()).q);
+      };
+      must(run.solve());
+      const TSHHT3Statistics s = run.statistics();
+      EXPECT_EQ(s.restarts, 1);
+      EXPECT_GT(s.of_order[k], s.steps / 2);
+      MEASURED("order %d: %d steps, %d changes, error of q %.1e", k, (int)s.steps, (int)s.changes, worst[turn]);
+      if (turn) {
+        EXPECT_GT(s.changes, 5);
+      }
+    }
+    EXPECT_LT(worst[1], 10 * worst[0]);
+  }
+}
+
+TEST(HigherOrder, SettersAndOptions)
+{
+  const Pendulum p(-90., 0., .1);
+  {
+    Simulation run(p, "");
+    PetscInt   k;
+    must(TSHHT3GetOrder(run.ts, &k));
+    EXPECT_EQ(k, 2);
+    must(TSHHT3SetOrder(run.ts, TSHHT3_ORDER_AUTO));
+    must(TSHHT3GetOrder(run.ts, &k));
+    EXPECT_EQ(k, TSHHT3_ORDER_AUTO);
+    for (PetscInt bad : {0, 1, 6, -2}) {
+      ErrorTrap trap;
+      EXPECT_NE(TSHHT3SetOrder(run.ts, bad), 0);
+      EXPECT_TRUE(trap.says("neither TSHHT3_ORDER_AUTO nor in 2..5")) << trap.message;
+    }
+    must(run.step());
+    ErrorTrap trap;
+    EXPECT_NE(TSHHT3SetOrder(run.ts, 3), 0);
+    EXPECT_TRUE(trap.says("must be set before TSSetUp()")) << trap.message;
+  }
+  for (const char *which : {"2", "3", "4", "5", "auto"}) {
+    Simulation run(p, text(" -ts_hhtdae_order %s ", which));
+    PetscInt   k;
+    must(TSHHT3GetOrder(run.ts, &k));
+    EXPECT_EQ(k, which[0] == 'a' ? TSHHT3_ORDER_AUTO : which[0] - '0');
+  }
+  {
+    Simulation run(p, " -ts_hhtdae_order 3 -ts_hhtdae_form paper ");
+    ErrorTrap  trap;
+    EXPECT_NE(run.step(), 0);
+    EXPECT_TRUE(trap.says("-ts_hhtdae_form paper")) << trap.message;
+  }
+  /* a reset goes back to order two for the next run */
+  Simulation run(p, " -ts_hhtdae_order 4 ");
+  must(run.solve());
+  must(TSReset(run.ts));
+  must(TSHHT3SetOrder(run.ts, 2));
+}
+
+/* Order 2 is HHT and nothing else, whatever the option says that it is */
+TEST(HigherOrder, OrderTwoIsTheDefault)
+{
+  const FourBar p(2, .4);
+  Simulation    plain(p, tolerance(1e-5)), two(p, tolerance(1e-5) + ofOrder(2));
+  must(plain.solve());
+  must(two.solve());
+  EXPECT_TRUE(now(plain) == now(two));
+  EXPECT_EQ(two.statistics().of_order[2], two.statistics().steps);
+  EXPECT_EQ(above(plain.statistics()), 0);
+}
