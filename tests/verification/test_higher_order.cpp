@@ -127,19 +127,19 @@ struct Step {
   bool   operator==(const Step &o) const { return t == o.t && u == o.u && v == o.v && a == o.a; }
 };
 
-Step now(const Simulation &run) { return {run.t(), run.u(), run.v(), run.a()}; }
+Step now(const Simulation &run) { return {run.t(), run.u(), run.v(), run.statistics().steps ? run.a() : Array()}; }
 
 PetscInt above(const TSHHT3Statistics &s) { return s.of_order[3] + s.of_order[4] + s.of_order[5]; }
 
 } // namespace
 
-TEST(HigherOrder, ConstantMassWithConstraints) { expectOrders(Pendulum(-90., 0., 1.5), .004, Multipliers::Judged); }
+TEST(HigherOrder, ConstantMassWithConstraints) { expectOrders(Pendulum(-90., 0., 1.), .004, Multipliers::Judged); }
 
-TEST(HigherOrder, VariableMass) { expectOrders(DoublePendulum(1.), .004, Multipliers::None); }
+TEST(HigherOrder, VariableMass) { expectOrders(DoublePendulum(1.), .002, Multipliers::None); }
 
-TEST(HigherOrder, VariableMassWithConstraints) { expectOrders(HeavyTop(.2), .0001, Multipliers::Judged); }
+TEST(HigherOrder, VariableMassWithConstraints) { expectOrders(HeavyTop(.2), .00015, Multipliers::Judged); }
 
-TEST(HigherOrder, StatesAndDefinitions) { expectOrders(UserVars(1.), .001, Multipliers::Judged, true); }
+TEST(HigherOrder, StatesAndDefinitions) { expectOrders(UserVars(1.), .004, Multipliers::Judged, true); }
 
 TEST(HigherOrder, NonholonomicConstraints) { expectOrders(Sleigh(1.5), .004, Multipliers::Judged); }
 
@@ -147,10 +147,10 @@ TEST(HigherOrder, DenseOutput)
 {
   const Pendulum p(-90., 0., 1.2);
   for (int k : {3, 4, 5}) {
-    const double                h = .004 * (k - 2);
+    const double                h = .006 * (k - 2);
     const std::array<double, 4> coarse = betweenSteps(p, k, h), fine = betweenSteps(p, k, h / 2);
     MEASURED("order %d between steps: q %.2f, q' %.2f, q'' %.2f, lambda %.2f", k, order(coarse[0], fine[0]), order(coarse[1], fine[1]), order(coarse[2], fine[2]), order(coarse[3], fine[3]));
-    for (int i = 0; i < 4; i++) EXPECT_GE(order(coarse[i], fine[i]), k - .3) << k << " " << i;
+    for (int i = 0; i < 4; i++) EXPECT_GE(order(coarse[i], fine[i]), k - .4) << k << " " << i;
   }
 }
 
@@ -219,21 +219,25 @@ TEST(HigherOrder, UndampedOscillationThatIsNotResolved)
   }
 }
 
-/* A stiff spring that hardly moves: BDF makes an oscillation of it that holds the step, HHT does not. The chosen order must be no slower than HHT alone. */
+/* Springs that hardly move, of all stiffnesses. For some of them order 5 makes an oscillation that holds the step, HHT does not: the chosen order must be no slower than
+   HHT alone. */
 TEST(HigherOrder, StiffUndampedModeDoesNotHoldTheStep)
 {
-  const SpringPendulum p(1e8, 10.);
-  PetscInt             steps[3];
-  const char *const    which[] = {"2", "5", "auto"};
-  for (int k = 0; k < 3; k++) {
-    Simulation run(p, tolerance(1e-4) + text(" -ts_max_steps 20000 -ts_hhtdae_order %s ", which[k]));
-    must(run.solve());
-    const TSHHT3Statistics s = run.statistics();
-    steps[k]                 = s.steps;
-    MEASURED("order %s: %d steps (%d of order 2), %d rejected", which[k], (int)s.steps, (int)s.of_order[2], (int)s.rejected);
+  const char *const which[] = {"2", "5", "auto"};
+  double            held    = 0.;
+  for (double stiffness : {1e3, 3e3, 1e4, 3e4, 1e5, 1e6, 1e8}) {
+    const SpringPendulum p(stiffness, 10.);
+    TSHHT3Statistics     s[3];
+    for (int k = 0; k < 3; k++) {
+      Simulation run(p, tolerance(1e-3) + text(" -ts_max_steps 20000 -ts_hhtdae_order %s ", which[k]));
+      must(run.solve());
+      s[k] = run.statistics();
+    }
+    MEASURED("stiffness %g: order 2 %d steps, order 5 %d, auto %d (%d of order 2)", stiffness, (int)s[0].steps, (int)s[1].steps, (int)s[2].steps, (int)s[2].of_order[2]);
+    EXPECT_LT(s[2].steps, 1.1 * s[0].steps + 20) << stiffness;
+    widen(held, (double)s[1].steps / s[2].steps);
   }
-  EXPECT_LT(steps[2], 1.1 * steps[0] + 20);
-  EXPECT_GT(steps[1], 2 * steps[2]);
+  EXPECT_GT(held, 2.);
 }
 
 TEST(HigherOrder, RestartBeginsWithOrderTwo)
@@ -252,24 +256,33 @@ TEST(HigherOrder, RestartBeginsWithOrderTwo)
   EXPECT_LT(run.errors().q, 1e-3);
 }
 
-/* A step, another one, back, and forth again; where the order has changed in between, too */
+/* Every step twice; the second time it is the same but for what the corrector has learnt, and so are the orders */
 TEST(HigherOrder, RollBack)
 {
   const Pendulum p(-90., 0., 2.);
   for (const char *which : {"3", "5", "auto"}) {
-    Simulation plain(p, tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which)), back(p, tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which));
+    Simulation run(p, tolerance(1e-6) + text(" -ts_hhtdae_order %s ", which));
     for (int k = 0; k < 60; k++) {
-      PetscReal h;
-      must(plain.step());
-      must(TSGetTimeStep(back.ts, &h));
-      must(back.step());
-      must(TSRollBack(back.ts));
-      must(TSSetTimeStep(back.ts, h));
-      must(back.step());
-      EXPECT_NEAR(back.t(), plain.t(), 1e-6) << which << " " << k;
-      EXPECT_LT(relativeDifference(back.u(), plain.u()), 1e-5) << which << " " << k;
+      const Step             before = now(run);
+      must(run.step());
+      const Step             first = now(run);
+      const TSHHT3Statistics s     = run.statistics();
+      must(TSRollBack(run.ts));
+      EXPECT_EQ(run.t(), before.t);
+      if (k) {
+        EXPECT_TRUE(run.u() == before.u && run.v() == before.v) << which << " " << k;
+      }
+      must(TSSetTimeStep(run.ts, first.t - before.t));
+      must(run.step());
+      EXPECT_NEAR(run.t(), first.t, 1e-14);
+      const Array u = run.u();
+      for (PetscInt i = 0; i < p.n; i++)
+        if (p.role[i] == TSHHT3_COORDINATE) {
+          EXPECT_NEAR(u[i], first.u[i], 1e-7) << which << " " << k;
+        }
+      for (int m = 2; m <= 5; m++) EXPECT_EQ(run.statistics().of_order[m], s.of_order[m]) << which << " " << k;
     }
-    for (int k = 2; k <= 5; k++) EXPECT_NEAR(back.statistics().of_order[k], plain.statistics().of_order[k], 3) << which << " " << k;
+    EXPECT_GT(above(run.statistics()), 40);
   }
 }
 
