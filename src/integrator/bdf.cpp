@@ -159,6 +159,22 @@ PetscErrorCode SetUpOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
+{
+  const Integrator &I     = Get(ts);
+  const Order      &o     = I.order;
+  const PetscInt   *steps = I.stat.of_order;
+
+  PetscFunctionBegin;
+  if (o.wanted == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->setupcalled && o.max == 2) PetscCall(PetscViewerASCIIPrintf(viewer, "order 2: local rotation vectors have no higher one\n"));
+  else if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscViewerASCIIPrintf(viewer, "order chosen in each step, 2 to %" PetscInt_FMT, max_order));
+  else PetscCall(PetscViewerASCIIPrintf(viewer, "order %" PetscInt_FMT ", after starts from 2", o.wanted));
+  if (!ts->setupcalled || o.max > 2)
+    PetscCall(PetscViewerASCIIPrintf(viewer, " (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", o.now, steps[2], steps[3], steps[4], steps[5]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* At a start: order two, and no history */
 void ResetOrder(TS ts)
 {
@@ -196,11 +212,14 @@ void CommitOrder(Integrator &I)
     I.V0   = v;
     o.past = PetscMin(o.past + 1, o.max);
   }
+  if (o.forget) o.past = 0;
+  o.forget = PETSC_FALSE;
   o.t[0]   = I.t1;
   o.hht[0] = o.accepted == 2 ? I.h : 0;
   o.made   = o.accepted;
   o.memory = o.after;
   o.since  = o.next == o.now ? o.since + 1 : 0;
+  if (o.wait > 0) o.wait--;
   o.above  = o.now > 2 ? o.above + 1 : 0;
   o.now = PetscMin(o.next, PetscMax(2, o.past));
   if (o.now < 3) o.now = 2;
@@ -277,17 +296,26 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rejections of one step after which it is tried with order two */
+/* Rejections of one step by the error test after which it is tried with order two */
 static constexpr PetscInt patience = 3;
 
-/* Of a step that was rejected or failed */
-PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections)
+/* Steps of order two after a failed correction of a higher one, doubled each time: where they go on to fail, they only hide from -ts_max_snes_failures and the user */
+static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
+
+/* After a step that was rejected, or whose correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at
+   once, at the same h */
+PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections, PetscBool corrected)
 {
-  Order &o = Get(ts).order;
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
 
   PetscFunctionBegin;
-  if (o.now == 2 || rejections < patience) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed again and again at t = %g\n", o.now, (double)ts->ptime));
+  if (o.now == 2 || (corrected && rejections < patience)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed at t = %g\n", o.now, (double)ts->ptime));
+  if (!corrected) {
+    o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+    if (!ts->reason) ts->time_step = I.h;
+  }
   o.now = o.next = 2;
   o.since        = 0;
   PetscFunctionReturn(PETSC_SUCCESS);

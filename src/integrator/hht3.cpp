@@ -260,6 +260,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   if (I.radius < 0) PetscCall(PetscViewerASCIIPrintf(viewer, "form %s, alpha=%g (spectral radius %g)\n", TSHHT3Forms[I.form], (double)I.alpha, (double)p.rho));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "form %s, spectral radius %g: alpha_m=%g, alpha_f=%g\n", TSHHT3Forms[I.form], (double)p.rho, (double)p.am, (double)p.af));
   PetscCall(PetscViewerASCIIPrintf(viewer, "gamma=%g, beta=%g, local error %g h^2 (a_{n+1} - a_n)\n", (double)p.gamma, (double)p.beta, (double)p.k));
+  PetscCall(ViewOrder(ts, viewer));
   if (I.predictor.fixed) PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree %" PetscInt_FMT "\n", I.predictor.degree_max));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "predictor of degree up to %" PetscInt_FMT ", chosen in each step (now %" PetscInt_FMT ")\n", I.predictor.degree_max, I.predictor.degree));
   const PetscReal tol = CorrectorTolerance(I);

@@ -90,7 +90,7 @@ struct Predictor : PredictorOptions, PredictorState {
 /* What the choice of the order knows of the steps before */
 struct OrderMemory {
   PetscReal S[max_order + 2] = {};     /* amplitudes of the scaled differences of orders 2 to 6; 0: none yet */
-  PetscReal ratio[max_order + 1] = {}; /* of one to the one before it, as stability sees it */
+  PetscReal ratio[max_order + 1] = {10, 10, 10, 10, 10, 10}; /* of one to the one before it, as stability sees it; more than any where nothing is known */
   PetscReal h_high = 0;                /* largest step above order two, forgetting */
 };
 
@@ -102,6 +102,8 @@ struct OrderState {
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */
+  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a correction of a higher one has failed: still to be made, and the last time */
+  PetscBool forget = PETSC_FALSE;       /* the history ends with the accepted step */
   PetscBool collapsed = PETSC_FALSE;    /* h has fallen so far that the next step is to start anew */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
@@ -400,12 +402,13 @@ PetscErrorCode NoteError(TS ts);
 PetscErrorCode CreateAdapt(TSAdapt adapt);
 /* bdf.cpp */
 PetscErrorCode SetUpOrder(TS ts);
+PetscErrorCode ViewOrder(TS ts, PetscViewer viewer);
 void           ResetOrder(TS ts);
 void           CommitOrder(Integrator &I);
 PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 PetscErrorCode MapPast(TS ts);
-PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections);
+PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections, PetscBool corrected);
 /* order.cpp */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);
 PetscErrorCode ChooseOrder(TS ts, PetscReal *next);

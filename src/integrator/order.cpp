@@ -23,8 +23,10 @@ namespace
 {
 
 /* S_{m+1}/S_m up to which orders 3, 4, 5 are taken for stable: h omega = 0.4, 0.5, 0.65 */
-constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
 constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
+
+/* From step to step that ratio counts as no more than so many times as much, from this value up: sharp places that are soon over are no oscillation */
+constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
 
 /* h above order two, below this part of what it was, by a measure that loses this in each step */
 constexpr PetscReal collapsed = 0.1, forgets_h = 0.98;
@@ -142,10 +144,12 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscCall(ScaledDifferences(ts, NORM_2, c->S));
   for (PetscInt m = lowest; m < lowest + kinds; m++)
     if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], forgets * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
-  for (PetscInt m = 0; m <= max_order; m++) {
-    const PetscReal ratio = m > 2 && c->S[m] > 0 && c->S[m + 1] > silent ? c->S[m + 1] / c->S[m] : 0;
+  for (PetscInt m = 3; m <= max_order; m++) {
+    c->ratio[m] = 0;
+    if (c->S[m + 1] < 0) continue;
+    const PetscReal ratio = c->S[m] > 0 && c->S[m + 1] > (I.fixed_h ? 0 : silent) ? c->S[m + 1] / c->S[m] : 0;
     o.after.ratio[m]      = PetscMin(ratio, PetscMax(recovers * o.memory.ratio[m], least_ratio));
-    c->ratio[m]           = o.wanted == TSHHT3_ORDER_AUTO ? o.after.ratio[m] : 0;
+    if (o.wanted == TSHHT3_ORDER_AUTO) c->ratio[m] = o.after.ratio[m];
   }
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
     if (c->S[m + 1] >= 0) c->E[m] = ErrorFactor(m, tau) * c->S[m + 1];
@@ -187,7 +191,7 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
   const PetscInt k     = o.now;
   const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
 
-  if (k == 2) return known && Better(I, c, 3, 2, 1) ? 3 : 2;
+  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2, 1) ? 3 : 2;
   if (o.above > k && Better(I, c, 2, k, gain_down)) return 2; /* differences over steps of order two have kinks where h changes */
   if (o.since < k) return k;
   if (k > 3 && Better(I, c, k - 1, k, gain_down)) return k - 1;
@@ -195,7 +199,7 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
 }
 
 /* A fixed order is reached from two as soon as the history is there */
-PetscInt NextToFixed(const Order &o) { return o.now < o.max && o.past >= o.now + 1 ? o.now + 1 : o.now; }
+PetscInt NextToFixed(const Order &o) { return o.now < o.max && o.wait == 0 && o.past >= o.now + 1 ? o.now + 1 : o.now; }
 
 } // namespace
 
@@ -226,10 +230,14 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.chosen = PETSC_TRUE;
   o.next   = o.now;
   o.after  = o.memory;
+  o.forget = PETSC_FALSE;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
   const bool falling = o.now > 2 && Falling(o, I.h);
-  if (falling) {
+  if (I.fixed_h && o.now > 2 && o.wanted == TSHHT3_ORDER_AUTO && I.wlte_pending > 1) {
+    o.next   = 2;
+    o.forget = PETSC_TRUE; /* what error control would not have stepped over is no part of a history */
+  } else if (falling) {
     o.next      = 2;
     o.collapsed = PETSC_TRUE;
   } else o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);

@@ -286,7 +286,7 @@ PetscErrorCode Step(TS ts)
       accept = PETSC_FALSE;
       PetscCall(RenewHistoryForces(ts));
       PetscCall(CheckRejections(ts, ++rejections));
-      PetscCall(LowerAfterFailures(ts, rejections));
+      PetscCall(LowerAfterFailures(ts, rejections, ok));
     }
   }
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
