@@ -28,8 +28,8 @@ constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 /* From step to step that ratio counts as no more than so many times as much, from this value up: sharp places that are soon over are no oscillation */
 constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
 
-/* h above order two, below this part of what it was, by a measure that loses this in each step */
-constexpr PetscReal collapsed = 0.1, forgets_h = 0.98;
+/* h above order two, below this part of what it was, by a measure that loses this in each step; and an error that shows that h had to fall: others end at output times */
+constexpr PetscReal collapsed = 0.1, forgets_h = 0.98, filled = 0.1;
 
 /* Of an amplitude in the course of a step of constant length */
 constexpr PetscReal forgets = 0.8;
@@ -178,10 +178,10 @@ bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than,
 
 /* Whether h has fallen by much: at a corner of a force, for which order two is right; or because the differences are those of what the corrector leaves in the
    positions, e, which are the same at any h, and make velocities of e/h and accelerations of e/h^2 in the directions of the constraints. Both want a new start. */
-bool Falling(Order &o, PetscReal h)
+bool Falling(Order &o, PetscReal h, PetscReal error)
 {
   o.after.h_high = PetscMax(h, o.above ? forgets_h * o.memory.h_high : 0);
-  return h < collapsed * o.after.h_high;
+  return h < collapsed * o.after.h_high && error > filled;
 }
 
 /* The order for the step after the accepted one, -ts_hhtdae_order auto. The present one is left after as many steps as its history has, or for HHT at once. */
@@ -233,7 +233,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.forget = PETSC_FALSE;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  const bool falling = o.now > 2 && Falling(o, I.h);
+  const bool falling = o.now > 2 && Falling(o, I.h, I.wlte_pending);
   if (I.fixed_h && o.now > 2 && o.wanted == TSHHT3_ORDER_AUTO && I.wlte_pending > 1) {
     o.next   = 2;
     o.forget = PETSC_TRUE; /* what error control would not have stepped over is no part of a history */

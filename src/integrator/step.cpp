@@ -160,7 +160,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscFunctionBegin;
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
-  if (!*tiny && I.constraints() && (ts->time_step < shrink * I.h_last || I.order.collapsed)) PetscCall(Repair(ts));
+  if (!*tiny && I.constraints() && ((ts->time_step < shrink * I.h_last && I.order.now == 2) || I.order.collapsed)) PetscCall(Repair(ts));
   if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
   I.h  = ts->time_step;
   I.t0 = ts->ptime;

@@ -240,6 +240,43 @@ TEST(HigherOrder, StiffUndampedModeDoesNotHoldTheStep)
   EXPECT_GT(held, 2.);
 }
 
+/* The first steps of order three, from those of HHT, whose velocities miss the differentiated constraints: multipliers keep an error of second order there */
+TEST(HigherOrder, MultipliersWhereTheOrderChanges)
+{
+  const Pendulum p(-60., 0., 1.);
+  double         worst[2] = {0., 0.};
+  for (int fine = 0; fine < 2; fine++) {
+    Simulation run(p, fixedSteps(fine ? .0025 : .005) + ofOrder(3));
+    for (int k = 0; k < 12; k++) {
+      must(run.step());
+      if (run.statistics().of_order[3]) widen(worst[fine], run.errors().lambda);
+    }
+    EXPECT_GE(run.statistics().of_order[3], 6);
+  }
+  MEASURED("multipliers in the first steps of order 3: order %.2f, error %.1e", order(worst[0], worst[1]), worst[1]);
+  EXPECT_GE(order(worst[0], worst[1]), 1.8);
+}
+
+/* A step to an output time leaves no trace in those after it */
+TEST(HigherOrder, StepFarShorterThanTheOthers)
+{
+  const Pendulum p(-60., 0., 1.);
+  for (int k : {3, 5}) {
+    double worst[2] = {0., 0.};
+    for (int shorter = 0; shorter < 2; shorter++) {
+      Simulation run(p, fixedSteps(.005) + " -ts_max_time 1e3 " + ofOrder(k));
+      for (int n = 0; n < 80; n++) {
+        must(TSSetTimeStep(run.ts, shorter && n == 40 ? 1e-6 : .005));
+        must(run.step());
+        if (n > 40) widen(worst[shorter], run.errors().lambda);
+      }
+      EXPECT_EQ(run.statistics().restarts, 1);
+    }
+    MEASURED("order %d, error of lambda after a step of 1e-6: %.1e, without it %.1e", k, worst[1], worst[0]);
+    EXPECT_LT(worst[1], 100 * worst[0]);
+  }
+}
+
 TEST(HigherOrder, RestartBeginsWithOrderTwo)
 {
   const Pendulum p(-90., 0., 2.);
