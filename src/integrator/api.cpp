@@ -153,7 +153,7 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
   Notes:
   Order 2, the default, is HHT. Orders 3 to 5 are backward differentiation of positions and of velocities over variable steps, with the same unknowns and the same matrix
   but for beta and gamma. They start with steps of order 2, also after events and other restarts, and take from the history what is there.
-  After two failures in a row a step is made with order 2.
+  A step whose correction fails is repeated with order 2.
 
   `TSHHT3_ORDER_AUTO` takes from step to step the order with which the next one may be longest, as long as differences of the positions fall with their order. Where they
   do not, a motion with h omega near one or above is active, for which orders above 2 are not stable at small damping: then it is HHT for a while.

@@ -212,8 +212,6 @@ void CommitOrder(Integrator &I)
     I.V0   = v;
     o.past = PetscMin(o.past + 1, o.max);
   }
-  if (o.forget) o.past = 0;
-  o.forget = PETSC_FALSE;
   o.t[0]   = I.t1;
   o.hht[0] = o.accepted == 2 ? I.h : 0;
   o.made   = o.accepted;
@@ -296,28 +294,22 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rejections of one step by the error test after which it is tried with order two */
-static constexpr PetscInt patience = 3;
-
-/* Steps of order two after a failed correction of a higher one, doubled each time: where they go on to fail, they only hide from -ts_max_snes_failures and the user */
+/* Steps of order two after a failed correction of a higher one, doubled each time: where they go on to fail they would hide it */
 static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
 
-/* After a step that was rejected, or whose correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at
-   once, at the same h */
-PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections, PetscBool corrected)
+/* A correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at once, at the same h */
+PetscErrorCode LowerAfterFailure(TS ts)
 {
   Integrator &I = Get(ts);
   Order      &o = I.order;
 
   PetscFunctionBegin;
-  if (o.now == 2 || (corrected && rejections < patience)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " has failed at t = %g\n", o.now, (double)ts->ptime));
-  if (!corrected) {
-    o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
-    if (!ts->reason) ts->time_step = I.h;
-  }
+  if (o.now == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "the corrector has failed with order %" PetscInt_FMT " at t = %g\n", o.now, (double)ts->ptime));
+  if (!ts->reason) ts->time_step = I.h;
   o.now = o.next = 2;
   o.since        = 0;
+  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

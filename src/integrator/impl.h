@@ -91,7 +91,6 @@ struct Predictor : PredictorOptions, PredictorState {
 struct OrderMemory {
   PetscReal S[max_order + 2] = {};     /* amplitudes of the scaled differences of orders 2 to 6; 0: none yet */
   PetscReal ratio[max_order + 1] = {10, 10, 10, 10, 10, 10}; /* of one to the one before it, as stability sees it; more than any where nothing is known */
-  PetscReal h_high = 0;                /* largest step above order two, forgetting */
 };
 
 /* Orders above two, bdf.cpp and order.cpp. Nothing of it is used where the largest order is two. */
@@ -103,8 +102,6 @@ struct OrderState {
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */
   PetscInt  wait = 0, penalty = 0;      /* steps of order two after a correction of a higher one has failed: still to be made, and the last time */
-  PetscBool forget = PETSC_FALSE;       /* the history ends with the accepted step */
-  PetscBool collapsed = PETSC_FALSE;    /* h has fallen so far that the next step is to start anew */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
@@ -408,7 +405,7 @@ void           CommitOrder(Integrator &I);
 PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 PetscErrorCode MapPast(TS ts);
-PetscErrorCode LowerAfterFailures(TS ts, PetscInt rejections, PetscBool corrected);
+PetscErrorCode LowerAfterFailure(TS ts);
 /* order.cpp */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);
 PetscErrorCode ChooseOrder(TS ts, PetscReal *next);

@@ -28,17 +28,14 @@ constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 /* From step to step that ratio counts as no more than so many times as much, from this value up: sharp places that are soon over are no oscillation */
 constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
 
-/* h above order two, below this part of what it was, by a measure that loses this in each step; and an error that shows that h had to fall: others end at output times */
-constexpr PetscReal collapsed = 0.1, forgets_h = 0.98, filled = 0.1;
-
 /* Of an amplitude in the course of a step of constant length */
 constexpr PetscReal forgets = 0.8;
 
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
 constexpr PetscReal silent = 0.5;
 
-/* A gain in h below this factor is not worth another order, or another matrix */
-constexpr PetscReal gain_up = 1.05, gain_down = 1.2;
+/* A gain in h below this factor is not worth another order */
+constexpr PetscReal gain = 1.05;
 
 constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
 
@@ -168,20 +165,12 @@ PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
 }
 
 /* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
-bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than, PetscReal gain)
+bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
   if (!I.fixed_h) return Reach(c, m, 1) > gain * Reach(c, than, 1);
   const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
-}
-
-/* Whether h has fallen by much: at a corner of a force, for which order two is right; or because the differences are those of what the corrector leaves in the
-   positions, e, which are the same at any h, and make velocities of e/h and accelerations of e/h^2 in the directions of the constraints. Both want a new start. */
-bool Falling(Order &o, PetscReal h, PetscReal error)
-{
-  o.after.h_high = PetscMax(h, o.above ? forgets_h * o.memory.h_high : 0);
-  return h < collapsed * o.after.h_high && error > filled;
 }
 
 /* The order for the step after the accepted one, -ts_hhtdae_order auto. The present one is left after as many steps as its history has, or for HHT at once. */
@@ -191,11 +180,11 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
   const PetscInt k     = o.now;
   const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
 
-  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2, 1) ? 3 : 2;
-  if (o.above > k && Better(I, c, 2, k, gain_down)) return 2; /* differences over steps of order two have kinks where h changes */
+  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2) ? 3 : 2;
+  if (o.above > k && Better(I, c, 2, k)) return 2; /* differences over steps of order two have kinks where h changes */
   if (o.since < k) return k;
-  if (k > 3 && Better(I, c, k - 1, k, gain_down)) return k - 1;
-  return known && Better(I, c, k + 1, k, gain_up) ? k + 1 : k;
+  if (k > 3 && Better(I, c, k - 1, k)) return k - 1;
+  return known && Better(I, c, k + 1, k) ? k + 1 : k;
 }
 
 /* A fixed order is reached from two as soon as the history is there */
@@ -230,22 +219,14 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.chosen = PETSC_TRUE;
   o.next   = o.now;
   o.after  = o.memory;
-  o.forget = PETSC_FALSE;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  const bool falling = o.now > 2 && Falling(o, I.h, I.wlte_pending);
-  if (I.fixed_h && o.now > 2 && o.wanted == TSHHT3_ORDER_AUTO && I.wlte_pending > 1) {
-    o.next   = 2;
-    o.forget = PETSC_TRUE; /* what error control would not have stepped over is no part of a history */
-  } else if (falling) {
-    o.next      = 2;
-    o.collapsed = PETSC_TRUE;
-  } else o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
+  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!falling && (o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
+  if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
     *next = I.h * PetscClipInterval(Reach(c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);

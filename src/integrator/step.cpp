@@ -160,7 +160,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscFunctionBegin;
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
-  if (!*tiny && I.constraints() && ((ts->time_step < shrink * I.h_last && I.order.now == 2) || I.order.collapsed)) PetscCall(Repair(ts));
+  if (!*tiny && I.constraints() && ts->time_step < shrink * I.h_last && I.order.now == 2) PetscCall(Repair(ts));
   if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
   I.h  = ts->time_step;
   I.t0 = ts->ptime;
@@ -286,7 +286,7 @@ PetscErrorCode Step(TS ts)
       accept = PETSC_FALSE;
       PetscCall(RenewHistoryForces(ts));
       PetscCall(CheckRejections(ts, ++rejections));
-      PetscCall(LowerAfterFailures(ts, rejections, ok));
+      if (!ok) PetscCall(LowerAfterFailure(ts));
     }
   }
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
