@@ -34,9 +34,6 @@ constexpr PetscReal forgets = 0.8;
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
 constexpr PetscReal silent = 0.5;
 
-/* A gain in h below this factor is not worth another order */
-constexpr PetscReal gain = 1.05;
-
 constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
 
 /* Scaled differences as sums of squares or largest entries */
@@ -168,7 +165,7 @@ PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
 bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
-  if (!I.fixed_h) return Reach(c, m, 1) > gain * Reach(c, than, 1);
+  if (!I.fixed_h) return Reach(c, m, 1) > Reach(c, than, 1);
   const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
