@@ -1,5 +1,5 @@
 /* The formulas by what they promise: exact for polynomials, consistent with each other, error constants measured */
-#include "integrator/formulas.h"
+#include "integrator/bdf.h"
 
 #include <gtest/gtest.h>
 
@@ -120,4 +120,56 @@ TEST(Formulas, CorrectorStopsByTheRate)
   EXPECT_DOUBLE_EQ(CorrectorError(.1, 9.), 1.);
   EXPECT_EQ(CorrectorError(1., 1.), PETSC_MAX_REAL);
   EXPECT_EQ(CorrectorError(2., 1.), PETSC_MAX_REAL);
+}
+
+/* Backward differentiation: textbook values at constant steps, and at others exact for polynomials of its order */
+TEST(Formulas, BackwardDifferentiation)
+{
+  const double constant[] = {0., 1., 2. / 3., 6. / 11., 12. / 25., 60. / 137.};
+  const double equal[]    = {1., 2., 3., 4., 5., 6.}, uneven[] = {.3, .9, 1.1, 2.2, 2.7, 3.9};
+  for (int k = 1; k <= 5; k++) EXPECT_NEAR(hht3::BDFOf(k, equal).gh, constant[k], 1e-15);
+  EXPECT_NEAR(hht3::BDFOf(3, equal).c[0], 18. / 11., 1e-14);
+  EXPECT_NEAR(hht3::BDFOf(3, equal).c[1], -9. / 11., 1e-14);
+  EXPECT_NEAR(hht3::BDFOf(3, equal).c[2], 2. / 11., 1e-14);
+  for (int k = 1; k <= 5; k++) {
+    const hht3::BDF b = hht3::BDFOf(k, uneven);
+    for (int m = 0; m <= k + 1; m++) { /* q = t^m about t_{n+1} */
+      double psi = 0.;
+      for (int j = 0; j < k; j++) psi += b.c[j] * std::pow(-uneven[j], m);
+      const double derivative = ((m == 0) - psi) / b.gh, missed = std::abs(derivative - (m == 1));
+      if (m <= k) {
+        EXPECT_NEAR(missed, 0., 1e-12) << k << " " << m;
+        continue;
+      }
+      /* q[...] of t^{k+1} is 1: the error is gamma h tau_1 ... tau_k */
+      double product = b.gh;
+      for (int j = 0; j < k; j++) product *= uneven[j];
+      EXPECT_NEAR(missed * b.gh, product, 1e-12 * product) << k;
+      double weight[7], sum = 0.;
+      hht3::DifferenceWeights(k + 1, uneven, weight);
+      for (int j = 0; j <= k + 1; j++) sum += weight[j] * std::pow(j ? -uneven[j - 1] : 0., m);
+      EXPECT_NEAR(hht3::ErrorFactor(k, uneven) * sum, product, 1e-11 * product) << k;
+    }
+    const hht3::Parameters p = hht3::BDFParameters(k, uneven[0], uneven);
+    EXPECT_DOUBLE_EQ(p.beta, p.gamma * p.gamma);
+    EXPECT_NEAR(hht3::ScaleVelocity(p, uneven[0]), b.gh, 1e-15);
+    EXPECT_EQ(p.ca(), 1.);
+  }
+}
+
+/* At the nodes exactly one value, between them polynomials */
+TEST(Formulas, LagrangeWeights)
+{
+  const double node[] = {1.7, 1.1, .4, -.3, -2.};
+  double       weight[5];
+  for (int j = 0; j < 5; j++) {
+    hht3::LagrangeWeights(4, node, node[j], weight);
+    for (int i = 0; i < 5; i++) EXPECT_EQ(weight[i], i == j ? 1. : 0.);
+  }
+  hht3::LagrangeWeights(4, node, .9, weight);
+  for (int m = 0; m <= 4; m++) {
+    double sum = 0.;
+    for (int i = 0; i < 5; i++) sum += weight[i] * std::pow(node[i], m);
+    EXPECT_NEAR(sum, std::pow(.9, m), 1e-13);
+  }
 }
