@@ -239,7 +239,7 @@ PetscErrorCode TSHHT3SetCorrectorTolerance(TS ts, PetscReal c)
 
   Input Parameters:
 + ts     - the `TS` context
-- degree - 0 to 3, or -1 (default) to choose it in each step by which degree would have served best in the last one
+- degree - 0 to 3, or -1 (default) to choose it in each step by which degree would have served best in the last one; above order two up to the largest order
 
   Options Database Key:
 . -ts_hhtdae_predictor_degree <degree> - the degree
