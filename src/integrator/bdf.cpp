@@ -164,14 +164,18 @@ PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
   const Integrator &I     = Get(ts);
   const Order      &o     = I.order;
   const PetscInt   *steps = I.stat.of_order;
+  char              what[64];
 
   PetscFunctionBegin;
   if (o.wanted == 2) PetscFunctionReturn(PETSC_SUCCESS);
-  if (ts->setupcalled && o.max == 2) PetscCall(PetscViewerASCIIPrintf(viewer, "order 2: local rotation vectors have no higher one\n"));
-  else if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscViewerASCIIPrintf(viewer, "order chosen in each step, 2 to %" PetscInt_FMT, max_order));
-  else PetscCall(PetscViewerASCIIPrintf(viewer, "order %" PetscInt_FMT ", after starts from 2", o.wanted));
-  if (!ts->setupcalled || o.max > 2)
-    PetscCall(PetscViewerASCIIPrintf(viewer, " (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", o.now, steps[2], steps[3], steps[4], steps[5]));
+  if (ts->setupcalled && o.max == 2) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "order 2: local rotation vectors have no higher one\n"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscSNPrintf(what, sizeof(what), "chosen in each step, 2 to %" PetscInt_FMT, max_order));
+  else PetscCall(PetscSNPrintf(what, sizeof(what), "%" PetscInt_FMT ", after starts from 2", o.wanted));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "order %s (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", what, o.now,
+                                   steps[2], steps[3], steps[4], steps[5]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
