@@ -146,7 +146,8 @@ public:
   Body add(const std::string &name, const FlexibleBody &body);
 
   /* The frame that follows an attachment of a flexible body, its origin at the attachment's point, its axes those of the FE model
-     as long as there is no deformation: a body for markers and shapes. It costs 12 unknowns where it is asked for, nothing else. */
+     as long as there is no deformation: a body for markers and shapes. It has no unknowns: its motion is a function of the
+     body's coordinates, and loads on it act on them. */
   Body attachment(Body flexible, const std::string &name);
 
   /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes */

@@ -75,7 +75,7 @@ inline void Batch::resolve(const Pattern &p, bool again)
 
 /* ---- groups of coordinates of a marker's body ---- */
 
-inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || TurnsInSpace(k)) && group == 1; }
+inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || k == BodyKind::Attached || TurnsInSpace(k)) && group == 1; }
 inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
 
 /* An entry of the derivative that pairs x or theta of a row marker with x or theta of a column marker reaches groups (g, h) of
@@ -107,12 +107,9 @@ template <class K, class Instance> double LongestStep(const Instance &e, const E
   double        acceleration = 0, angular = 0;
   for (int k = 0; k < K::markers; k++) {
     const PetscInt   b = B.marker[e.marker[k]].body;
-    const LocalBody &l = B.body[b];
     f[k]               = B.frame<true>(e.marker[k]);
     w[k]               = B.twist(e.marker[k], f[k]);
-    Vector3 a          = Vector3::Zero();
-    for (int c = 0; l.kind != BodyKind::Ground && c < (PlanarScene(l.kind) ? 2 : 3); c++) a(c) = ev.a[l.first + c];
-    acceleration += a.norm() + w[k].w.squaredNorm() * (f[k].x - B.now[b].r).norm();
+    acceleration += B.acceleration(b, ev.v, ev.a).norm() + w[k].w.squaredNorm() * (f[k].x - B.now[b].r).norm();
     angular += B.angularAcceleration(b, ev.v, ev.a).norm();
   }
   return K::longestStep(e.data, f, w, acceleration, angular);

@@ -19,6 +19,11 @@ Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, P
    coordinates */
 void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const Vector3 &f, Six &H);
 
+/* The same of derivatives V by the twist of marker `column`, which is on an attachment's frame: to the groups of its v and w, for the groups of the row's body
+   that the load reaches; returns the number of slots used. PairBlock() has what positions make of V. */
+int RateBlocks(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &V, const Slot *slot,
+               const bool *loads);
+
 /* The part of D that belongs to groups g and h of two bodies */
 void AddBlock(const Sink &sink, const Slot &slot, const Six &D, BodyKind row, int g, BodyKind column, int h);
 

@@ -1,4 +1,5 @@
 #include "bodies.h"
+#include <algorithm>
 
 namespace hhtdae
 {
@@ -12,7 +13,7 @@ void Bodies::move(const double *u, const double *v)
     b.f.setZero();
     b.m.setZero();
     if (k.modal >= 0) modal[k.modal].load.setZero();
-    if (k.kind == BodyKind::Ground) continue;
+    if (k.kind == BodyKind::Ground || k.kind == BodyKind::Attached) continue;
     const double *q = u + k.first, *p = v + k.first;
     switch (k.kind) {
     case BodyKind::Flexible:
@@ -48,17 +49,32 @@ void Bodies::move(const double *u, const double *v)
       b.v << p[0], p[1], 0;
     }
   }
+  for (Carrier &c : carriers) c.move(*this, u, v);
 }
 
 Vector3 Bodies::angularAcceleration(PetscInt b, const double *v, const double *a) const
 {
   const LocalBody &k = body[b];
   if (k.kind == BodyKind::Planar) return {0, 0, a[k.first + 2]};
+  if (k.kind == BodyKind::Attached) {
+    Vector3 linear, angular;
+    carriers[k.carrier].acceleration(*this, (int)k.place, v, a, linear, angular);
+    return angular;
+  }
   if (!TurnsInSpace(k.kind)) return Vector3::Zero();
   const double *acc = a + k.first + 3, *rate = v + k.first + 3;
   if (local) return {acc[0], acc[1], acc[2]};
   const EulerAxes e(now[b].G);
   return AngularVelocity(e, Vector3(acc[0], acc[1], acc[2])) + Convective(e, Vector3(rate[0], rate[1], rate[2]), now[b].w);
+}
+
+Vector3 Bodies::acceleration(PetscInt b, const double *v, const double *a) const
+{
+  const LocalBody &k = body[b];
+  Vector3          linear = Vector3::Zero(), angular;
+  if (k.kind == BodyKind::Attached) carriers[k.carrier].acceleration(*this, (int)k.place, v, a, linear, angular);
+  else if (k.kind != BodyKind::Ground) std::copy(a + k.first, a + k.first + GroupSize(k.kind, 0), linear.data());
+  return linear;
 }
 
 /* ---- flexible bodies ---- */
@@ -87,11 +103,6 @@ void Bodies::modalResidual(PetscInt i, const double *u, const double *v, const d
   Eigen::Map<Vector3>(row + 3).noalias() = b.G.transpose() * n;
   h -= p.load;
 }
-
-/* How attitude, w and alpha change in a step with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
-struct Bodies::AngularGradient {
-  Matrix3 G, w, alpha;
-};
 
 Bodies::AngularGradient Bodies::byAngles(PetscInt i, const double *v, const double *a, double sv, double sa) const
 {
@@ -136,6 +147,7 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   B.setZero(padded, padded);
   p.dynamics->gradient(modalMotion(i, u, v, a), sv, sa, p.outer, D, &B.coeffRef(0, 0) + 6 * (std::ptrdiff_t)padded + 6, padded);
   if (p.stiffening.rows()) B.block(6, 6, m, m) += p.stiffening;
+  if (p.unsymmetric.rows()) B.block(6, 6, m, m) += p.unsymmetric;
   const AngularGradient g = byAngles(i, v, a, sv, sa);
   const auto by_angles = [&](const auto &X) {
     return X.template middleCols<3>(3).lazyProduct(g.G) + X.template middleCols<3>(6).lazyProduct(g.w) + X.template rightCols<3>().lazyProduct(g.alpha);
@@ -146,12 +158,14 @@ void Bodies::modalJacobian(PetscInt i, const double *u, const double *v, const d
   R.bottomRows<3>()  = Matrix<3, 6>(b.G.transpose() * R.bottomRows<3>());
   R.bottomRightCorner<3, 3>() += momentGradient(i, u, D.n - b.m);
   B.topLeftCorner<6, 6>() = R;
-  if (p.turned.rows()) D.rigid_modal.rightCols<3>() += p.turned;
   B.block(0, 6, 3, m)     = D.rigid_modal.leftCols<3>().transpose();
   B.block(3, 6, 3, m)     = D.rigid_modal.rightCols<3>().lazyProduct(b.G).transpose();
   B.block(6, 0, m, 3)     = sa * D.modal_rigid.leftCols<3>();
   B.block(6, 3, m, 3)     = by_angles(D.modal_rigid);
-  if (p.turned.rows()) B.block(6, 3, m, 3) += p.turned.lazyProduct(g.G);
+  if (!p.rigid_modal.rows()) return;
+  B.topLeftCorner<6, 6>() += p.rigid;
+  B.block(0, 6, 6, m) += p.rigid_modal.transpose();
+  B.block(6, 0, m, 6) += p.modal_rigid;
 }
 
 void Bodies::residual(const double *u, const double *v, const double *a, double *F)
@@ -161,6 +175,7 @@ void Bodies::residual(const double *u, const double *v, const double *a, double 
     const BodyMotion &b = now[i];
     const double     *acc = a + k.first;
     double           *row = F + k.first;
+    if (k.kind == BodyKind::Attached) continue;
     if (k.kind == BodyKind::Flexible) {
       modalResidual(i, u, v, a, row);
       continue;

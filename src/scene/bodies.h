@@ -9,6 +9,7 @@
 #ifndef HHTDAE_SCENE_BODIES_H
 #define HHTDAE_SCENE_BODIES_H
 
+#include "carrier.h"
 #include "euler.h"
 #include "frames.h"
 #include "rotation.h"
@@ -20,18 +21,25 @@
 namespace hhtdae
 {
 
-enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint, Flexible };
+/* Attached: the frame of an attachment of a flexible body, which has no coordinates */
+enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint, Flexible, Attached };
 
 constexpr int max_coordinates = 6; /* of a body with markers */
 /* without modal coordinates, which are a third group of a flexible body; see Bodies::modes() */
 inline int Coordinates(BodyKind k)
 {
-  constexpr int n[] = {0, 3, 6, 3, 2, 6};
+  constexpr int n[] = {0, 3, 6, 3, 2, 6, 0};
   return n[(int)k];
 }
 inline bool TurnsInSpace(BodyKind k) { return k == BodyKind::Rigid || k == BodyKind::Flexible; }
 /* Coordinates come in groups whose rows of the matrix have the same columns */
-inline int Groups(BodyKind k) { return k == BodyKind::Ground ? 0 : TurnsInSpace(k) || k == BodyKind::Planar ? 2 : 1; }
+inline int Groups(BodyKind k)
+{
+  if (k == BodyKind::Attached) return 2;
+  return k == BodyKind::Ground ? 0 : TurnsInSpace(k) || k == BodyKind::Planar ? 2 : 1;
+}
+/* What depends on the motion of an attachment's frame has blocks for its velocity and acceleration, too: groups x, theta, v, w, a, alpha, see projection.h */
+constexpr int frame_groups = 6, first_rate_group = 2;
 /* group 0: position, group 1: rotation */
 inline int GroupSize(BodyKind k, int group)
 {
@@ -48,6 +56,7 @@ struct LocalBody {
   PetscInt group = -1;
   PetscInt id    = -1; /* in the scene */
   PetscInt modal = -1; /* of a flexible body: its place in Bodies::modal */
+  PetscInt carrier = -1, place = -1; /* of an attachment's frame: its body in Bodies::carriers, and which one of it */
   double   mass  = 0;
   Matrix3  J;          /* inertia in body axes; planar: J(2,2) */
   Matrix3  C;          /* A = exp([x]) C, or body axes to the axes of the Euler angles */
@@ -68,8 +77,8 @@ struct LocalMarker {
   Matrix3  R; /* axes, in body axes */
 };
 
-/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix. What all attachments together
-   add to the matrix is in `outer` and `stiffening`, modes by modes, and `turned`, the derivative of the moment on the body by the modes, transposed. */
+/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix. The rest is what all attachments together add to the
+   matrix: by position and angles (`rigid`), by the modes to the first six rows (`rigid_modal`, transposed) and the other way round, and modes by modes. */
 struct ModalPart {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::unique_ptr<ModalDynamics>           dynamics;
@@ -78,7 +87,9 @@ struct ModalPart {
   RowMajor                                 block; /* coordinates x coordinates, and behind them the padding of the modes */
   ModalOuter                               outer;
   Eigen::MatrixXd                          stiffening; /* no rows: no attachment has any */
-  Eigen::Matrix<double, Eigen::Dynamic, 3> turned;
+  Matrix<6, 6>                             rigid;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> rigid_modal, modal_rigid; /* no rows: no attachment is in use */
+  Eigen::MatrixXd                          unsymmetric; /* modes by modes, what `outer` leaves; no rows: nothing */
 };
 
 class Bodies
@@ -88,6 +99,7 @@ public:
   std::vector<BodyMotion>  now;
   std::vector<LocalMarker> marker;
   std::vector<ModalPart>   modal;
+  std::vector<Carrier>     carriers; /* flexible bodies with attachments in use */
   PetscInt                 own = 0;
   long                     moves = 0; /* so far */
   bool                     local = false; /* rotations are local vectors, not Euler angles */
@@ -110,6 +122,7 @@ public:
     return f;
   }
   Vector3 angularAcceleration(PetscInt b, const double *v, const double *a) const; /* of all rates and accelerations */
+  Vector3 acceleration(PetscInt b, const double *v, const double *a) const;        /* of its origin */
   Twist<double> twist(PetscInt m, const Frame<double> &f) const
   {
     const BodyMotion &b = now[marker[m].body];
@@ -141,6 +154,10 @@ public:
       out.col(2)                 = J.col(5) - sy * J.col(0) + sx * J.col(1);
       return 3;
     }
+    case BodyKind::Attached: /* the frame's own x and theta */
+      out.template leftCols<3>()  = J.template leftCols<3>();
+      out.template rightCols<3>() = About(J, Vector3(f.x - b.r));
+      return 6;
     case BodyKind::Flexible: /* at its floating frame */
     case BodyKind::Rigid: /* dx = dr + dtheta x s, dtheta = G dU */
       out.template leftCols<3>()            = J.template leftCols<3>();
@@ -178,6 +195,9 @@ public:
       out.template leftCols<2>() += sv * J.template leftCols<2>();
       out.col(2) += sv * (J.col(5) - s(1) * J.col(0) + s(0) * J.col(1)) + J.template leftCols<3>() * b.w.cross(CrossZ(s));
       return;
+    case BodyKind::Attached: /* the frame's v and w are columns of their own */
+      out.template rightCols<3>() -= J.template leftCols<3>() * (Cross<double>(b.w) * Cross<double>(s));
+      return;
     case BodyKind::Flexible:
     case BodyKind::Rigid: { /* dv = dv_r + dw x s + w x (dtheta x s) */
       const Matrix3 turned = Cross<double>(b.w) * Cross<double>(s) * b.G * inStep(b);
@@ -200,6 +220,16 @@ public:
   /* the same of a flexible body, all its coordinates: ModalPart::block */
   void modalJacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa);
   ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* without a: q'' is not used */
+  /* the loads on attachments' frames to their bodies, when all elements have put theirs */
+  void loadCarriers()
+  {
+    for (Carrier &c : carriers) c.load(*this);
+  }
+  /* How attitude, w and alpha change in a step with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
+  struct AngularGradient {
+    Matrix3 G, w, alpha;
+  };
+  AngularGradient byAngles(PetscInt b, const double *v, const double *a, double sv, double sa) const;
 
 private:
   /* what a turn does through a marker at s from the centre of mass: J_theta - J_x [s] */
@@ -211,8 +241,6 @@ private:
     R.col(2) = J.col(5) - s(1) * J.col(0) + s(0) * J.col(1);
     return R;
   }
-  struct AngularGradient;
-  AngularGradient byAngles(PetscInt b, const double *v, const double *a, double sv, double sa) const;
   Matrix3         momentGradient(PetscInt b, const double *u, const Vector3 &m) const; /* d(G^T m)/dU for fixed m, in a step */
   void modalResidual(PetscInt b, const double *u, const double *v, const double *a, double *row);
 };

@@ -36,6 +36,8 @@ public:
           request_.push_back(p.need(e.group, b.group + g, diagonal));
           request_.push_back(p.need(b.group + g, e.group, diagonal));
         }
+        for (int g = 0; g < 2 && byRates(b.kind); g++)
+          if (uses(b.kind, g, k)) request_.push_back(p.need(e.group, b.group + first_rate_group + g));
       }
       for (int i = 0; i < Z; i++) request_.push_back(p.need(e.group, e.input[i].group));
       for (int k = 0; k < M; k++)
@@ -145,6 +147,9 @@ private:
     return Reaches([&](int x, int y) { return K::curved(2 * k + x, 2 * l + y); }, b, g, c, h);
   }
 
+  /* the velocity of an attachment's frame has columns of its own */
+  static bool byRates(BodyKind b) { return !K::holonomic && b == BodyKind::Attached; }
+
   static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)
   {
     if constexpr (Z > 0) K::template value<double>(e.data, f, w, t, z, psi);
@@ -205,6 +210,8 @@ private:
         ev.sink.add(*slot++, S.middleCols(at, size), rows, size);
         ev.sink.add(*slot++, T.middleCols(at, size).transpose(), size, rows);
       }
+      for (int g = 0; g < 2 && byRates(b.kind); g++)
+        if (uses(b.kind, g, k)) ev.sink.add(*slot++, T.template middleCols<3>(3 * g), rows, 3);
     }
     for (int i = 0; i < Z; i++) {
       Matrix<R, 1> column;

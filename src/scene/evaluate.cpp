@@ -69,6 +69,7 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
   R.bodies.move(local[0], local[1]);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
   for (auto &b : R.batches) b->residual(e);
+  R.bodies.loadCarriers();
   R.bodies.residual(local[0], local[1], local[2], f);
   PetscCall(VecRestoreArrayWrite(F, &f));
   PetscCall(VecRestoreArrayRead(U, &u));
@@ -96,6 +97,7 @@ void BodyBlocks(Runtime &R, const Evaluation &e)
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     Eigen::Matrix<double, 6, 6, Eigen::RowMajor> B;
     const BodyKind                               kind = R.bodies.body[b].kind;
+    if (kind == BodyKind::Attached) continue;
     if (kind == BodyKind::Flexible) {
       ModalBlocks(R, b, e, slot);
       continue;
@@ -110,7 +112,10 @@ void BodyBlocks(Runtime &R, const Evaluation &e)
 
 void AddAll(Runtime &R, Evaluation &e)
 {
+  R.projection.begin(e.sink);
   for (auto &b : R.batches) b->jacobian(e);
+  R.bodies.loadCarriers();
+  R.projection.finish(e);
   BodyBlocks(R, e);
 }
 

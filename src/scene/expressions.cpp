@@ -125,6 +125,7 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
   if (e.parts.empty()) return ""; /* absent, or with errors of its own */
   if (of_load != (e.kind == ElementData::Force))
     return who + (of_load ? " is not a force" : " is not a joint or motion");
+  if (in_equation && e.parts[0].store->isExplicit()) return who + " is a function of the state without equations of its own, and its reaction for output alone";
   if (m.kind == Measure::JointForce || m.kind == Measure::JointMoment) {
     if (m.component < 0 || m.component > 2)
       return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";

@@ -149,6 +149,28 @@ protected:
       }
   }
 
+  /* The same by the velocities of attachments' frames, which have columns of their own */
+  static bool byRates(const Instance &e, const Bodies &B, int l) { return K::damped && bodyOf(B, e, l).kind == BodyKind::Attached; }
+  void        ratePattern(const Instance &e, Pattern &p)
+  {
+    for (int l = 0; l < M; l++)
+      for (int k = 0; k < M && byRates(e, *bodies, l); k++) {
+        const LocalBody &b = bodyOf(*bodies, e, k), &c = bodyOf(*bodies, e, l);
+        for (int g = 0; g < Groups(b.kind); g++)
+          for (int h = 0; h < 2; h++)
+            if (loads(b.kind, g, k)) request_.push_back(p.need(b.group + g, c.group + first_rate_group + h));
+      }
+  }
+  static void rateBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Matrix<6 * M, 6 * M> &twists, const Slot *&slot)
+  {
+    for (int l = 0; l < M; l++)
+      for (int k = 0; k < M && byRates(e, ev.bodies, l); k++) {
+        const BodyKind b           = bodyOf(ev.bodies, e, k).kind;
+        const bool     reached[2]  = {loads(b, 0, k), loads(b, 1, k)};
+        if (Groups(b)) slot += RateBlocks(ev, e.marker[k], f[k], e.marker[l], f[l], -twists.template block<6, 6>(6 * k, 6 * l), slot, reached);
+      }
+  }
+
   /* - d load / d scalars: columns of one group of size n */
   template <int n>
   static void scalarColumns(Evaluation &ev, const Instance &e, const Frame<double> *f, const Matrix<6 * M, n> &J, PetscInt offset, const Slot *&slot)
@@ -179,6 +201,7 @@ public:
   {
     for (const auto &e : this->all) {
       this->bodyPattern(e, p);
+      this->ratePattern(e, p);
       for (int i = 0; i < Z; i++)
         for (int k = 0; k < M; k++) {
           const LocalBody &b = Base::bodyOf(*bodies, e, k);
@@ -214,6 +237,7 @@ public:
       K::jacobian(e.data, f, w, ev.t, z, on, J);
       Base::apply(ev, e, f, on);
       Base::bodyBlocks(ev, e, f, on, J.frames, K::damped ? &J.twists : nullptr, slot);
+      Base::rateBlocks(ev, e, f, J.twists, slot);
       for (int i = 0; i < Z; i++) this->template scalarColumns<1>(ev, e, f, J.inputs.col(i), e.input[i].offset, slot);
     }
   }
@@ -238,6 +262,8 @@ public:
         const LocalBody &b = Base::bodyOf(*bodies, e, k);
         for (int g = 0; g < Groups(b.kind); g++)
           if (Base::uses(b.kind, g, k)) request_.push_back(p.need(e.state_group, b.group + g));
+        for (int g = 0; g < 2 && Base::byRates(e, *bodies, k); g++)
+          if (Base::uses(b.kind, g, k)) request_.push_back(p.need(e.state_group, b.group + first_rate_group + g));
       }
       this->bodyPattern(e, p);
       for (int k = 0; k < M; k++) {
@@ -313,6 +339,10 @@ private:
       for (int g = 0; g < Groups(b.kind); g++)
         if (Base::uses(b.kind, g, k))
           ev.sink.add(*slot++, out.middleCols(GroupOffset(b.kind, g), GroupSize(b.kind, g)), C, GroupSize(b.kind, g));
+      if (!Base::byRates(e, ev.bodies, k)) continue;
+      ev.bodies.columns(e.marker[k], f[k], V, out);
+      for (int g = 0; g < 2; g++)
+        if (Base::uses(b.kind, g, k)) ev.sink.add(*slot++, out.template middleCols<3>(3 * g), C, 3);
     }
   }
 

@@ -8,9 +8,11 @@ namespace hhtdae
 namespace
 {
 
-void Start(const Runtime &R, const LocalBody &k, double *u, double *v)
+void Start(const Runtime &R, const LocalBody &k, double *U, double *V)
 {
+  if (k.kind == BodyKind::Attached) return;
   const BodyData &b = R.scene.bodies[k.id];
+  double         *u = U + k.first, *v = V + k.first;
   const int       n = Coordinates(k.kind), directions = PlanarScene(k.kind) ? 2 : 3;
   for (int i = 0; i < directions; i++) {
     u[i] = b.r(i);
@@ -50,7 +52,7 @@ PetscErrorCode InitialState(Runtime &R, Vec U, Vec V)
   PetscCall(VecGetArray(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    Start(R, k, u + k.first, v + k.first);
+    Start(R, k, u, v);
   }
   for (std::size_t i = 0; i < R.number.variable.size(); i++)
     if (R.number.variable_owner[i] == R.rank) u[R.number.variable[i] - R.start] = R.scene.variables[i].initial;

@@ -1,4 +1,5 @@
 /* What this rank needs of the scene: bodies, markers, joints and forces, the pattern of its rows, the exchange with other ranks. */
+#include "attach.h"
 #include "extension.h"
 #include "runtime.h"
 #include <algorithm>
@@ -37,7 +38,10 @@ public:
   {
     const MarkerData &m = R.scene.markers[id];
     if (collecting_) {
-      if (m.body >= 0 && OwnerOfBody(R, m.body) != R.rank) other_bodies.push_back(m.body);
+      if (m.body >= 0 && OwnerOfBody(R, m.body) != R.rank) {
+        other_bodies.push_back(m.body);
+        if (R.scene.bodies[m.body].carrier >= 0) other_bodies.push_back(R.scene.bodies[m.body].carrier);
+      }
       return 0;
     }
     if (marker_[id] < 0) {
@@ -140,15 +144,19 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
 {
   const BodyData &b = R.scene.bodies[id];
   LocalBody       k;
-  k.kind  = KindOf(R.scene, b);
+  k.kind  = b.carrier >= 0 ? BodyKind::Attached : KindOf(R.scene, b);
   k.owned = own;
   k.id    = id;
   k.mass  = b.mass;
   k.C.setIdentity();
   k.J = b.inertia;
+  k.group = (PetscInt)R.pattern.group.size();
+  if (k.kind == BodyKind::Attached) { /* it has no unknowns */
+    for (int g = 0; g < frame_groups; g++) R.pattern.addFrameGroup((PetscInt)R.bodies.body.size(), 3 * g);
+    return k;
+  }
   const PetscInt global = R.number.body[id];
   k.first = own ? global - R.start : R.n + (PetscInt)(std::lower_bound(R.others.begin(), R.others.end(), global) - R.others.begin());
-  k.group = (PetscInt)R.pattern.group.size();
   for (int g = 0; g < Groups(k.kind); g++) {
     const int at = GroupOffset(k.kind, g);
     R.pattern.addGroup(global + at, k.first + at, GroupSize(k.kind, g), own);
@@ -164,6 +172,35 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
     if (own) p.block.resize(6 + m, std::max(6 + m, 1));
   }
   return k;
+}
+
+/* Frames of attachments with their bodies, which are here wherever a frame is */
+void MakeCarriers(Runtime &R)
+{
+  Bodies               &B = R.bodies;
+  std::vector<PetscInt> of(B.body.size(), -1);
+  B.carriers.clear();
+  for (std::size_t i = 0; i < B.body.size(); i++) {
+    LocalBody &k = B.body[i];
+    if (k.kind != BodyKind::Attached) continue;
+    const BodyData        &frame = R.scene.bodies[k.id], &flexible = R.scene.bodies[frame.carrier];
+    const ModalAttachment &a     = flexible.flexible->model->attachments[frame.attachment];
+    const PetscInt         body  = R.local_body[frame.carrier];
+    if (of[body] < 0) {
+      of[body] = (PetscInt)B.carriers.size();
+      B.carriers.emplace_back();
+      B.carriers.back().body = body;
+    }
+    Carrier          &c = B.carriers[of[body]];
+    Carrier::Attached f;
+    f.body       = (PetscInt)i;
+    f.attachment = &a;
+    f.s          = a.position - flexible.center;
+    k.carrier    = of[body];
+    k.place      = c.count();
+    c.attached.push_back(f);
+  }
+  for (Carrier &c : B.carriers) c.finish(B.modes(c.body));
 }
 
 /* Own bodies in the order of their numbers, others', the ground */
@@ -194,6 +231,7 @@ void MakeBodies(Runtime &R, const std::vector<PetscInt> &other)
   still.f.setZero();
   still.m.setZero();
   B.now.assign(B.body.size(), still);
+  MakeCarriers(R);
   B.gravity = R.scene.gravity;
   B.local   = R.scene.start.rotations == Rotations::Local;
 }
@@ -238,6 +276,7 @@ PetscErrorCode MakePattern(Runtime &R)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
+    if (k.kind == BodyKind::Attached) continue;
     if (k.kind == BodyKind::Flexible) {
       for (int g = 0; g < 3; g++)
         for (int h = 0; h < 3; h++) bodies = 1 + R.pattern.need(k.group + g, k.group + h);
@@ -246,6 +285,7 @@ PetscErrorCode MakePattern(Runtime &R)
     for (int g = 0; g < Groups(k.kind); g++) bodies = 1 + R.pattern.need(k.group + g, k.group + g, g == 0);
   }
   for (auto &b : R.batches) b->pattern(R.pattern);
+  R.projection.pattern(R.pattern, R.bodies);
   R.body_slot.resize(bodies);
   PetscCall(ResolvePattern(R, false, R.model->wants_triangle));
   PetscFunctionReturn(0);
@@ -260,7 +300,7 @@ PetscErrorCode MakeRoles(Runtime &R)
   PetscFunctionBegin;
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    add(TSHHT3_COORDINATE, k.first + R.start, R.bodies.coordinates(b));
+    if (k.kind != BodyKind::Attached) add(TSHHT3_COORDINATE, k.first + R.start, R.bodies.coordinates(b));
   }
   for (StoreBase *s : R.scene.order)
     for (PetscInt e = 0; e < s->size(); e++)
@@ -287,7 +327,8 @@ PetscErrorCode Layout(Runtime &R)
 {
   PetscFunctionBegin;
   std::vector<PetscInt> other;
-  R.pattern = Pattern();
+  R.pattern    = Pattern();
+  R.projection = Projection();
   R.others.clear();
   if (R.size > 1) {
     LocalizerOf collect(R, LocalizerOf::Collect);
@@ -320,6 +361,7 @@ const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt elemen
   }
   std::vector<double> memory;
   for (std::size_t k = 0; k < parts.size(); k++) {
+    RecallMemories(*readers[k], R.batches);
     memory.resize(readers[k]->memory());
     for (const auto &b : R.batches)
       if (!memory.empty() && b->memoryOf(parts[k].store, parts[k].index, memory.data())) readers[k]->copyMemory(memory.data(), true);

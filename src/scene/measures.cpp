@@ -29,10 +29,8 @@ MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerat
   m.a.setZero();
   m.alpha.setZero();
   if (accelerations && l.kind != BodyKind::Ground) {
-    const double *a = e.a + l.first;
-    for (int i = 0; i < (PlanarScene(l.kind) ? 2 : 3); i++) m.a(i) = a[i];
-    if (l.kind == BodyKind::Planar) m.alpha(2) = a[2];
-    if (l.kind == BodyKind::Rigid) m.alpha = e.bodies.angularAcceleration(k.body, e.v, e.a);
+    m.a     = e.bodies.acceleration(k.body, e.v, e.a);
+    m.alpha = e.bodies.angularAcceleration(k.body, e.v, e.a);
   }
   Attach<double>(b.r, b.A * k.s, m);
   return m;
@@ -88,18 +86,42 @@ void PlanarMotion(const T &angle, const T &rate, const T &acceleration, Mat3<T> 
   m.alpha(2)        = acceleration;
 }
 
-/* Directions first..: coordinate c with its rate and acceleration, as du = 1, du' = sv, du'' = sa */
-template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt marker, int first)
+/* Of a marker on an attachment's frame, directions first..: x and theta of the frame, or v and w, or a and alpha, the others held */
+template <int N> MarkerMotion<Dual<N>> FrameMotion(const Evaluation &e, PetscInt marker, int first, int order)
+{
+  using T              = Dual<N>;
+  const LocalMarker &k = e.bodies.marker[marker];
+  const BodyMotion  &b = e.bodies.now[k.body];
+  const Frame<double>   at{b.r, b.A};
+  const Twist<double>   rates{b.v, b.w}, second{e.bodies.acceleration(k.body, e.v, e.a), e.bodies.angularAcceleration(k.body, e.v, e.a)};
+  const Frame<T>        f = order == 0 ? Seed<N>(at, first) : Constant<T>(at);
+  const Twist<T>        a = order == 2 ? Seed<N>(second, first) : Constant<T>(second);
+  MarkerMotion<T>       m;
+  m.w     = order == 1 ? Seed<N>(rates, first) : Constant<T>(rates);
+  m.a     = a.v;
+  m.alpha = a.w;
+  m.f.R   = f.R * Constant<T>(k.R);
+  const Vec3<T> arm = f.R * Constant<T>(k.s);
+  Attach<T>(f.x, arm, m);
+  return m;
+}
+
+/* Directions first..: coordinate c with its rate and acceleration, as du = 1, du' = sv, du'' = sa. Frames of attachments take one order at a time, and the
+   coordinates of other bodies belong to the first. */
+template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt marker, int first, int order)
 {
   using T              = Dual<N>;
   const LocalMarker &k = e.bodies.marker[marker];
   const LocalBody   &l = e.bodies.body[k.body];
+  if (l.kind == BodyKind::Attached) return FrameMotion<N>(e, marker, first, order);
   const int          n = Coordinates(l.kind), directions = n == 2 || l.kind == BodyKind::Planar ? 2 : n ? 3 : 0;
   T                  q[6], p[6], s[6];
   for (int c = 0; c < n; c++) {
-    q[c]                          = T(e.u[l.first + c], first + c);
-    p[c]                          = T(e.v[l.first + c]);
-    s[c]                          = T(e.a[l.first + c]);
+    q[c] = T(e.u[l.first + c]);
+    p[c] = T(e.v[l.first + c]);
+    s[c] = T(e.a[l.first + c]);
+    if (order) continue;
+    q[c].derivatives()(first + c) = 1;
     p[c].derivatives()(first + c) = e.sv;
     s[c].derivatives()(first + c) = e.sa;
   }
@@ -227,7 +249,7 @@ void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
   const Marker axes    = s.valid(m.frame) ? m.frame : e.j;
   k.frame              = s.valid(axes) ? l.marker(axes.id) : -1;
   for (const Part &p : e.parts)
-    if (p.store->isConstraint() && p.store->unknowns(p.index)) k.probes.push_back(p.store->probe(l, p.index));
+    if (p.store->isConstraint() && (p.store->isExplicit() || p.store->unknowns(p.index))) k.probes.push_back(p.store->probe(l, p.index));
 }
 
 void PlaceComponent(Localizer &l, const Measure &m, LocalMeasure &k)
@@ -295,7 +317,8 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
   case Measure::PotentialEnergy:
     break;
   case Measure::Multiplier:
-    k.input = l.input({ScalarRef::Multiplier, m.target, m.component});
+    if (s.elements[m.target].parts[0].store->isExplicit()) k.probes.push_back(s.elements[m.target].parts[0].store->probe(l, s.elements[m.target].parts[0].index));
+    else k.input = l.input({ScalarRef::Multiplier, m.target, m.component});
     break;
   case Measure::Value:
     k.input = l.input({ScalarRef::Variable, m.target, 0});
@@ -329,7 +352,7 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
 double MeasureValue(const LocalMeasure &m, const Evaluation &e)
 {
   if (m.kind == Measure::Time) return e.t;
-  if (m.kind == Measure::Component && !m.probes.empty()) {
+  if (IsScalar(m.kind) && !m.probes.empty()) {
     double c[kComponents];
     m.probes[0]->components(e, c);
     return c[m.component];
@@ -395,7 +418,7 @@ int Columns::body(const Bodies &B, PetscInt b)
   const LocalBody &k = B.body[b];
   if (k.kind == BodyKind::Ground) return -1;
   const int start = add(k.group, GroupSize(k.kind, 0));
-  for (int g = 1; g < Groups(k.kind); g++)
+  for (int g = 1; g < (k.kind == BodyKind::Attached ? frame_groups : Groups(k.kind)); g++)
     add(k.group + g, GroupSize(k.kind, g)); /* right behind: a body's groups come together */
   return start;
 }
@@ -442,13 +465,17 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
   using T                   = Dual<N>;
   const PetscInt  marker[3] = {m.i, m.j, m.frame};
   MarkerMotion<T> motion[3];
-  for (int i = 0; i < 3; i++)
-    if (marker[i] >= 0) motion[i] = Motion<N>(e, marker[i], i * max_coordinates);
-  const T x = MarkerMeasure<T>(m.kind, m.component, m.angle, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
-  for (int i = 0; i < 3; i++) {
-    if (at[i] < 0) continue;
-    const int n = Coordinates(e.bodies.body[e.bodies.marker[marker[i]].body].kind);
-    for (int c = 0; c < n; c++) row[at[i] + c] += factor * x.derivatives()(i * max_coordinates + c);
+  const auto      attached = [&](int i) { return marker[i] >= 0 && e.bodies.body[e.bodies.marker[marker[i]].body].kind == BodyKind::Attached; };
+  const int       orders   = !attached(0) && !attached(1) && !attached(2) ? 1 : Accelerates(m.kind) ? 3 : 2;
+  for (int order = 0; order < orders; order++) {
+    for (int i = 0; i < 3; i++)
+      if (marker[i] >= 0) motion[i] = Motion<N>(e, marker[i], i * max_coordinates, order);
+    const T x = MarkerMeasure<T>(m.kind, m.component, m.angle, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
+    for (int i = 0; i < 3; i++) {
+      if (at[i] < 0 || (order && !attached(i))) continue;
+      const int n = attached(i) ? max_coordinates : Coordinates(e.bodies.body[e.bodies.marker[marker[i]].body].kind);
+      for (int c = 0; c < n; c++) row[at[i] + max_coordinates * order + c] += factor * x.derivatives()(i * max_coordinates + c);
+    }
   }
 }
 

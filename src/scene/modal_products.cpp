@@ -141,6 +141,32 @@ ALWAYS_INLINE void AllDots(int rows, int columns, const double *A, const double 
   for (; c < columns; c++) Dots<1>(rows, A + (long)c * rows, x, y + c);
 }
 
+/* of two vectors, which read A once */
+template <int columns> ALWAYS_INLINE void DotsOfTwo(int rows, const double *A, const double *const x[2], double *const y[2], int first)
+{
+  Four s[columns], t[columns];
+  for (int c = 0; c < columns; c++) s[c] = t[c] = Four{0, 0, 0, 0};
+  for (int i = 0; i < rows; i += 4) {
+    const Four u = At(x[0] + i), v = At(x[1] + i);
+    for (int c = 0; c < columns; c++) {
+      const Four a = At(A + (long)c * rows + i);
+      s[c] += a * u;
+      t[c] += a * v;
+    }
+  }
+  for (int c = 0; c < columns; c++) {
+    y[0][first + c] = (s[c][0] + s[c][1]) + (s[c][2] + s[c][3]);
+    y[1][first + c] = (t[c][0] + t[c][1]) + (t[c][2] + t[c][3]);
+  }
+}
+
+ALWAYS_INLINE void AllDotsOfTwo(int rows, int columns, const double *A, const double *const x[2], double *const y[2])
+{
+  int c = 0;
+  for (; c + 6 <= columns; c += 6) DotsOfTwo<6>(rows, A + (long)c * rows, x, y, c);
+  for (; c < columns; c++) DotsOfTwo<1>(rows, A + (long)c * rows, x, y, c);
+}
+
 template <int columns> ALWAYS_INLINE void AddColumns(int rows, const double *A, const double *x, double *y)
 {
   for (int i = 0; i < rows; i += 4) {
@@ -162,12 +188,14 @@ ALWAYS_INLINE void AddAll(int rows, int columns, const double *A, const double *
 void ApplyPlain(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 void CombinePlain(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
 void DotsPlain(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+void DotsOfTwoPlain(int rows, int columns, const double *A, const double *const x[2], double *const y[2]) { AllDotsOfTwo(rows, columns, A, x, y); }
 void AddPlain(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 
 #if defined(TWO_VERSIONS)
 NEWER void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 NEWER void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
 NEWER void DotsNewer(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+NEWER void DotsOfTwoNewer(int rows, int columns, const double *A, const double *const x[2], double *const y[2]) { AllDotsOfTwo(rows, columns, A, x, y); }
 NEWER void AddNewer(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 
 bool Newer()
@@ -180,6 +208,7 @@ bool Newer() { return false; }
 void ApplyNewer(const Packed &p, const ModalProducts::Task *task, int count, int zz) { ApplyPanels(p, task, count, zz); }
 void CombineNewer(const Packed &p, const Sum &sum) { CombinePanels(p, sum); }
 void DotsNewer(int rows, int columns, const double *A, const double *x, double *y) { AllDots(rows, columns, A, x, y); }
+void DotsOfTwoNewer(int rows, int columns, const double *A, const double *const x[2], double *const y[2]) { AllDotsOfTwo(rows, columns, A, x, y); }
 void AddNewer(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 #endif
 
@@ -253,6 +282,11 @@ void ModalProducts::combine(const Eigen::Matrix3d &L, const double *left, const 
 void ModalProducts::transposedTimes(int rows, int columns, const double *A, const double *x, double *y)
 {
   (Newer() ? DotsNewer : DotsPlain)(rows, columns, A, x, y);
+}
+
+void ModalProducts::transposedTimes(int rows, int columns, const double *A, const double *const x[2], double *const y[2])
+{
+  (Newer() ? DotsOfTwoNewer : DotsOfTwoPlain)(rows, columns, A, x, y);
 }
 
 void ModalProducts::times(int rows, int columns, const double *A, const double *x, double *y)

@@ -44,6 +44,7 @@ public:
 
   /* y = A^T x and y = A x with `rows` a multiple of four and as many columns as wanted */
   static void transposedTimes(int rows, int columns, const double *A, const double *x, double *y);
+  static void transposedTimes(int rows, int columns, const double *A, const double *const x[2], double *const y[2]); /* of two vectors */
   static void times(int rows, int columns, const double *A, const double *x, double *y);
 
 private:

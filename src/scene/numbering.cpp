@@ -25,6 +25,7 @@ BodyKind KindOf(const SceneData &s, const BodyData &b)
 
 PetscInt CoordinatesOf(const SceneData &s, const BodyData &b)
 {
+  if (b.carrier >= 0) return 0; /* the frame of an attachment follows its body */
   return Coordinates(KindOf(s, b)) + (b.flexible ? b.flexible->model->modes() : 0);
 }
 

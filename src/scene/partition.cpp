@@ -13,15 +13,22 @@ struct Edge {
   PetscInt a, b, weight;
 };
 
-/* Pairs of bodies that an instance connects; the first with every other one is enough to keep them together */
-std::vector<Edge> Edges(const SceneData &s)
+/* Frames of attachments are where their bodies are */
+PetscInt BodyOf(const SceneData &s, PetscInt marker)
+{
+  const PetscInt b = s.markers[marker].body;
+  return b >= 0 && s.bodies[b].carrier >= 0 ? s.bodies[b].carrier : b;
+}
+
+/* Pairs of bodies that an instance connects, by their vertices; the first with every other one is enough to keep them together */
+std::vector<Edge> Edges(const SceneData &s, const std::vector<PetscInt> &vertex)
 {
   std::vector<Edge> edges;
   for (const StoreBase *store : s.order)
     for (PetscInt e = 0; e < store->size(); e++) {
       PetscInt first = -1;
       for (int k = 0; k < store->markers(); k++) {
-        const PetscInt b = s.markers[store->marker(e, k)].body;
+        const PetscInt body = BodyOf(s, store->marker(e, k)), b = body < 0 ? -1 : vertex[body];
         if (b < 0) continue;
         if (first >= 0 && b != first) {
           edges.push_back({first, b, store->rows()});
@@ -44,19 +51,30 @@ std::vector<Edge> Edges(const SceneData &s)
 
 PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt> &owner)
 {
-  const std::size_t n = s.bodies.size();
-  PetscMPIInt       rank;
+  std::vector<PetscInt> vertex(s.bodies.size(), -1), body; /* of bodies; of vertices */
+  PetscMPIInt           rank;
   PetscFunctionBegin;
   owner.clear();
   if (size == 1) PetscFunctionReturn(0);
-  owner.assign(n, 0);
+  for (std::size_t b = 0; b < s.bodies.size(); b++) {
+    if (s.bodies[b].carrier >= 0) continue;
+    vertex[b] = (PetscInt)body.size();
+    body.push_back((PetscInt)b);
+  }
+  const std::size_t        n = body.size();
+  std::vector<PetscMPIInt> of(n, 0);
+  const auto               spread = [&] {
+    owner.resize(s.bodies.size());
+    for (std::size_t b = 0; b < owner.size(); b++) owner[b] = of[vertex[s.bodies[b].carrier >= 0 ? s.bodies[b].carrier : (PetscInt)b]];
+  };
   PetscCallMPI(MPI_Comm_rank(s.comm, &rank));
   if (n <= (std::size_t)size) {
-    for (std::size_t b = 0; b < n; b++) owner[b] = (PetscMPIInt)b;
+    for (std::size_t b = 0; b < n; b++) of[b] = (PetscMPIInt)b;
+    spread();
     PetscFunctionReturn(0);
   }
   if (rank == 0) {
-    const std::vector<Edge> edges = Edges(s);
+    const std::vector<Edge> edges = Edges(s, vertex);
     std::vector<idx_t>      xadj(n + 1, 0), adjacent(edges.size()), weight(edges.size()), size_of(n), part(n);
     idx_t                   vertices = (idx_t)n, balances = 1, parts = size, cut;
     for (std::size_t k = 0; k < edges.size(); k++) {
@@ -66,7 +84,7 @@ PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt
     }
     for (std::size_t b = 0; b < n; b++) {
       xadj[b + 1] += xadj[b];
-      size_of[b] = (idx_t)CoordinatesOf(s, s.bodies[b]);
+      size_of[b] = (idx_t)CoordinatesOf(s, s.bodies[body[b]]);
     }
     idx_t options[METIS_NOPTIONS];
     METIS_SetDefaultOptions(options);
@@ -74,10 +92,11 @@ PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt
     const int error = METIS_PartGraphKway(&vertices, &balances, xadj.data(), adjacent.data(), size_of.data(), nullptr, weight.data(), &parts,
                                           nullptr, nullptr, options, &cut, part.data());
     PetscCheck(error == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS could not divide %zu bodies among %d ranks: error %d", n, size, error);
-    for (std::size_t b = 0; b < n; b++) owner[b] = (PetscMPIInt)part[b];
+    for (std::size_t b = 0; b < n; b++) of[b] = (PetscMPIInt)part[b];
     PetscCall(PetscInfo(nullptr, "scene: METIS divided %zu bodies among %d ranks, cutting joints of %d rows\n", n, size, (int)cut));
   }
-  PetscCallMPI(MPI_Bcast(owner.data(), (PetscMPIInt)n, MPI_INT, 0, s.comm));
+  PetscCallMPI(MPI_Bcast(of.data(), (PetscMPIInt)n, MPI_INT, 0, s.comm));
+  spread();
   PetscFunctionReturn(0);
 }
 

@@ -16,7 +16,7 @@ void Pattern::build(PetscInt start, PetscInt n, bool triangle)
   const std::size_t     groups = group.size();
   std::vector<PetscInt> first(groups + 1, 0);
   const auto            stored = [&](const Request &r) {
-    return r.row >= 0 && group[r.row].own && (!triangle || group[r.column].global >= group[r.row].global);
+    return r.row >= 0 && !toFrame(r) && group[r.row].own && (!triangle || group[r.column].global >= group[r.row].global);
   };
   for (const Request &r : request_)
     if (stored(r)) first[r.row + 1]++;

@@ -17,6 +17,8 @@ struct Group {
   PetscInt local;  /* the same among the local unknowns: own, then others' */
   PetscInt size;
   bool     own;
+  PetscInt frame = -1; /* of the motion of an attachment's frame, which is no unknown: blocks go to projection.h; and its first column there */
+  int      at    = 0;
 };
 
 /* Where a block goes: entry (r, c) at base + r stride + c of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix.
@@ -27,8 +29,9 @@ struct Slot {
   PetscInt stride = 0;
   bool     off    = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
   bool     shrinks = false, upper = false;
+  bool     frame = false; /* of an attachment's frame: in the array of the projection */
 
-  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, shrinks, upper}; }
+  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, shrinks, upper, frame}; }
 };
 
 class Pattern
@@ -41,6 +44,11 @@ public:
     group.push_back({global, local, size, own});
     return (PetscInt)group.size() - 1;
   }
+  PetscInt addFrameGroup(PetscInt frame, int at)
+  {
+    group.push_back({-1, -1, 3, false, frame, at});
+    return (PetscInt)group.size() - 1;
+  }
   /* asks for a block; its slot is known after build() under the number that is returned. Group -1: nothing, its slot takes nothing */
   PetscInt need(PetscInt row, PetscInt column, bool diagonal = false)
   {
@@ -50,6 +58,13 @@ public:
   /* diagonal entries that no element asks for are left out: multipliers have none */
   void build(PetscInt start, PetscInt n, bool triangle = false);
   Slot slot(PetscInt number) const { return slot_[number]; }
+  /* f(number, row, column) for all blocks of attachments' frames that were asked for; and where such a block goes, after build() */
+  template <class F> void ofFrames(F f) const
+  {
+    for (std::size_t q = 0; q < request_.size(); q++)
+      if (toFrame(request_[q])) f((PetscInt)q, request_[q].row, request_[q].column);
+  }
+  void put(PetscInt number, const Slot &s) { slot_[number] = s; }
   void release(); /* requests, slots and rows: only the groups stay */
 
   /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
@@ -63,6 +78,7 @@ private:
     PetscInt row, column;
     bool     diagonal; /* entries (r, r) alone, unless somebody else wants all */
   };
+  bool toFrame(const Request &r) const { return r.row >= 0 && (group[r.row].frame >= 0 || group[r.column].frame >= 0); }
   std::vector<Request> request_;
   std::vector<Slot>    slot_;
   bool                 triangle_ = false;
@@ -70,13 +86,13 @@ private:
 
 /* Adds blocks to the arrays of a matrix */
 struct Sink {
-  double *diagonal, *off;
+  double *diagonal, *off, *frame = nullptr; /* of the matrix, of the projection */
 
   /* rows, columns: of the block at (0, 0) of B; blocks of three columns are the common ones */
   template <class Block> void add(const Slot &s, const Block &B, int rows, int columns) const
   {
     if (s.base < 0) return;
-    double *p = (s.off ? off : diagonal) + s.base;
+    double *p = (s.frame ? frame : s.off ? off : diagonal) + s.base;
     if (s.shrinks) {
       addShrinking(s, B, rows, columns, p);
     } else if (s.diagonal) {

@@ -110,14 +110,13 @@ void Unpack(const double *x, Motion &m)
 Motion OfBody(const Runtime &R, PetscInt id, const Evaluation &e)
 {
   const PetscInt    b = R.local_body[id];
-  const LocalBody  &k = R.bodies.body[b];
   const BodyMotion &n = R.bodies.now[b];
   Motion            m;
   m.position         = n.r;
   m.velocity         = n.v;
   m.axes             = n.A;
   m.angular_velocity = n.w;
-  for (int c = 0; c < (PlanarScene(k.kind) ? 2 : 3); c++) m.acceleration(c) = e.a[k.first + c];
+  m.acceleration         = R.bodies.acceleration(b, e.v, e.a);
   m.angular_acceleration = R.bodies.angularAcceleration(b, e.v, e.a);
   return m;
 }
@@ -351,7 +350,7 @@ PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, boo
       continue;
     }
     const PetscMPIInt owner = OwnerOf(*R->model, *p.store, p.index);
-    if (constraint) {
+    if (constraint && !p.store->isExplicit()) {
       const unsigned char active = p.store->active(p.index);
       PetscInt            place  = 0;
       for (PetscInt i = 0; i < row; i++) place += active >> i & 1;

@@ -415,7 +415,7 @@ PetscErrorCode DropRedundant(Model &M)
     s.started.rows += all[1];
   }
   for (const RowBlock &b : blocks)
-    for (int r = 0; r < b.rows; r++) s.started.rows += b.has(r);
+    for (int r = 0; r < b.rows && !b.store->isExplicit(); r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);
   std::vector<RowRef> found = Find(s, blocks);
   if (!found.empty()) PetscCall(KeepSingular(M, blocks, found));

@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_RUNTIME_H
 
 #include "model.h"
+#include "projection.h"
 #include <functional>
 #include <petscsf.h>
 #include <petscts.h>
@@ -22,6 +23,7 @@ struct Runtime {
 
   Pattern                             pattern;
   Bodies                              bodies;
+  Projection                          projection; /* of the matrix, from attachments' frames */
   std::vector<std::unique_ptr<Batch>> batches;
   std::vector<Slot>                   body_slot; /* diagonal blocks of own bodies, group by group; all nine of a flexible one */
   std::vector<PetscInt>               local_body; /* of bodies in the scene, -1: not here */

@@ -31,8 +31,8 @@ struct BodyData {
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
   std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
-  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: its flexible body */
-  bool        massless = false; /* such a frame */
+  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: its flexible body; it has no coordinates in a run */
+  bool        massless = false; /* the frame of an attachment, also one of a body of another library */
   double      light_mass = 0, light_inertia = 0; /* what assembly takes, or adds, where there is no inertia: a little of that of others */
 };
 

@@ -117,7 +117,15 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
   const LocalBody &k        = R->bodies.body[local];
   const Vector3    moment   = in.moment + (m.position - centre.position).cross(in.load);
   const int        position = GroupSize(k.kind, 0);
-  double          *row      = b->data() + k.first;
+  if (k.kind == BodyKind::Attached) { /* to the flexible body and its modes */
+    const Carrier              &c = R->bodies.carriers[k.carrier];
+    Eigen::Matrix<double, 6, 1> on;
+    on << in.load, moment;
+    const Eigen::VectorXd all = c.jacobian(R->bodies, (int)k.place).transpose() * on;
+    std::copy(all.data(), all.data() + all.size(), b->data() + R->bodies.body[c.body].first);
+    PetscFunctionReturn(0);
+  }
+  double *row = b->data() + k.first;
   for (int c = 0; c < position; c++) row[c] = in.load(c);
   if (k.kind == BodyKind::Planar) row[2] = moment(2);
   else if (TurnsInSpace(k.kind)) std::copy(moment.data(), moment.data() + 3, row + 3);
@@ -178,6 +186,10 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::part()"));
   PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
+  Motion at; /* where it is, and so is what its attachments are attached to */
+  Vec    state[3] = {w.state[0], w.state[1], w.state[2]};
+  PetscCall(w.moved.take(*w.R, w.t, state));
+  PetscCall(w.moved.motion(b, &at));
   const PetscInt local = R.local_body[b.id];
   const bool     mine  = local >= 0 && R.bodies.body[local].owned;
   const PetscInt first = mine ? R.bodies.body[local].first : 0, last = mine ? first + R.bodies.coordinates(local) : 0;
@@ -201,9 +213,17 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   PetscCall(VecDestroy(&y));
   if (mine) {
     const BodyKind kind     = R.bodies.body[local].kind;
-    const int      position = GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : TurnsInSpace(kind) ? 3 : 0;
+    const int      position = kind == BodyKind::Attached ? 0 : GroupSize(kind, 0), rotations = kind == BodyKind::Planar ? 1 : TurnsInSpace(kind) ? 3 : 0;
     for (int c = 0; c < position; c++) motion[0](c) = m.shape[first + c];
     for (int c = 0; c < rotations; c++) motion[1](rotations == 1 ? 2 : c) = m.shape[first + position + c];
+  }
+  if (mine && R.bodies.body[local].kind == BodyKind::Attached) { /* as its body and the modes move it */
+    const LocalBody       &k    = R.bodies.body[local];
+    const Carrier         &c    = R.bodies.carriers[k.carrier];
+    const Eigen::MatrixXd  J    = c.jacobian(R.bodies, (int)k.place);
+    const Eigen::VectorXcd moved = J * Eigen::Map<const Eigen::VectorXcd>(m.shape.data() + R.bodies.body[c.body].first, J.cols());
+    motion[0]                   = moved.head<3>();
+    motion[1]                   = moved.tail<3>();
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPI_DOUBLE, MPI_SUM, w.comm()));
   for (Vector3c &x : motion) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x.data(), 6, MPI_DOUBLE, MPI_SUM, w.comm()));

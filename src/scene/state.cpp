@@ -51,7 +51,7 @@ PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
     mine.push_back((double)R.bodies.body[b].id);
     mine.insert(mine.end(), m.r.data(), m.r.data() + 3);
     const BodyKind kind  = R.bodies.body[b].kind;
-    const bool     turns = TurnsInSpace(kind) || kind == BodyKind::Planar;
+    const bool     turns = TurnsInSpace(kind) || kind == BodyKind::Planar || kind == BodyKind::Attached;
     const Matrix3  A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
     mine.insert(mine.end(), A.data(), A.data() + 9);
     mine.insert(mine.end(), m.v.data(), m.v.data() + 3);

@@ -42,6 +42,7 @@ public:
   virtual void          setActive(PetscInt, unsigned char) {}
   virtual bool          carried(PetscInt) const           = 0; /* as force states */
   virtual bool          usesVelocities() const { return true; }
+  virtual bool          isExplicit() const { return false; } /* a constraint of the description alone, which a run meets without unknowns */
   virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
   virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
   virtual bool          symmetric(PetscInt) const { return false; } /* its part of the matrix, where nothing else breaks that */
@@ -56,6 +57,7 @@ public:
   /* number of unknowns of its own: multipliers or force states */
   int unknowns(PetscInt e) const
   {
+    if (isExplicit()) return 0;
     if (!isConstraint()) return carried(e) ? rows() : 0;
     int n = 0;
     for (unsigned char m = active(e); m; m &= (unsigned char)(m - 1)) n++;

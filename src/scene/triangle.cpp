@@ -143,6 +143,7 @@ PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again)
   PetscFunctionBegin;
   R.pattern.build(R.start, R.n, triangle);
   for (std::size_t i = 0; i < R.body_slot.size(); i++) R.body_slot[i] = R.pattern.slot((PetscInt)i);
+  R.projection.resolve(R.pattern, again);
   for (auto &b : R.batches) b->resolve(R.pattern, again);
   PetscCall(MatDestroy(&R.J));
   PetscCall(R.pattern.createMat(R.scene.comm, R.n, &R.J));

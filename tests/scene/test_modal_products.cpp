@@ -51,6 +51,23 @@ TEST(ModalProducts, WithVectors)
     }
 }
 
+TEST(ModalProducts, WithShapes)
+{
+  for (int columns : {0, 1, 6, 13})
+    for (int m : {1, 4, 18, 33}) {
+      const int       n = ModalProducts::padded(m);
+      Eigen::MatrixXd A = Eigen::MatrixXd::Random(n, columns), x = Eigen::MatrixXd::Random(n, 2), y(columns, 2), z(columns, 1), back(n, 1);
+      const double   *in[2]  = {x.data(), x.data() + n};
+      double         *out[2] = {y.data(), y.data() + columns};
+      ModalProducts::transposedTimes(n, columns, A.data(), in, out);
+      ModalProducts::transposedTimes(n, columns, A.data(), x.data(), z.data());
+      EXPECT_LT((y - A.transpose() * x).norm(), 1e-13 * n);
+      EXPECT_LT((z - A.transpose() * x.col(0)).norm(), 1e-13 * n);
+      ModalProducts::times(n, columns, A.data(), z.data(), back.data());
+      EXPECT_LT((back - A * z).norm(), 1e-12 * n);
+    }
+}
+
 TEST(ModalProducts, SumsWithOuterProducts)
 {
   const Eigen::Matrix3d L = Eigen::Matrix3d::Random();
