@@ -155,11 +155,11 @@ private:
     }
     stress.resize(first + n);
     for (std::size_t count : nodes) {
-      const float          largest = in.number<float>();
+      const auto           largest = in.planes<float>(count);
       const unsigned char *x       = in.bytes(n * count);
       for (std::size_t k = 0; k < count; k++) {
         unsigned char now = 0;
-        for (std::size_t i = 0; i < n; i++) stress[first + i].push_back((double)largest * (now = (unsigned char)(now + x[k * n + i])) / 255);
+        for (std::size_t i = 0; i < n; i++) stress[first + i].push_back((double)largest[k] * (now = (unsigned char)(now + x[k * n + i])) / 255);
       }
     }
     if (!in.atEnd()) throw std::runtime_error("a block of frames is longer than it says");

@@ -113,19 +113,24 @@ void PageFrames::encodeField(const PageField &field, PageBytes &out) const
   Eigen::MatrixXf    eta(modes, n), stress;
   for (Eigen::Index i = 0; i < n; i++) eta.col(i) = Eigen::Map<const Eigen::VectorXd>(&track_[i * tracks_ + field.first], modes).cast<float>();
   SurfaceStress(*field.surface, eta, &stress);
-  float largest = 0;
-  for (Eigen::Index k = 0; k < stress.size(); k++)
-    if (std::isfinite(stress.data()[k])) largest = std::max(largest, stress.data()[k]);
-  out.f32(largest);
+  std::vector<std::uint32_t> bits((std::size_t)stress.rows());
+  std::vector<unsigned char> code;
+  code.reserve((std::size_t)stress.size());
   for (Eigen::Index node = 0; node < stress.rows(); node++) {
+    float largest = 0;
+    for (Eigen::Index i = 0; i < n; i++)
+      if (std::isfinite(stress(node, i))) largest = std::max(largest, stress(node, i));
+    std::memcpy(&bits[(std::size_t)node], &largest, sizeof largest);
     unsigned char before = 0;
     for (Eigen::Index i = 0; i < n; i++) {
       const float         v   = stress(node, i);
       const unsigned char now = largest > 0 && v > 0 ? (unsigned char)std::lround(255 * std::min(1.f, v / largest)) : 0;
-      out.u8((unsigned char)(now - before));
+      code.push_back((unsigned char)(now - before));
       before = now;
     }
   }
+  out.planes(bits);
+  out.all.insert(out.all.end(), code.begin(), code.end());
 }
 
 } // namespace hhtdae

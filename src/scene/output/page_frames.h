@@ -5,7 +5,7 @@
     for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite, or beyond 1e300
     codes of the tracks, track by track: u16 differences from one frame to the next (the first from 0), in zigzag order, in planes
     channels, one after the other: f32, in planes
-    for every field: f32 largest; u8 differences of round(255 value / largest), node by node
+    for every field: largest of every node, f32 in planes; u8 differences of round(255 value / largest), node by node
 */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H

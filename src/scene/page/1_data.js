@@ -72,7 +72,7 @@ function readFrames(r, run) {
   run.scene.channels.forEach((channel, c) => { for (let i = 0; i < n; i++) channel.value.push(bits[c * n + i]); });
   for (const s of run.surfaces) {
     if (!s.stress) continue;
-    const largest = r.f32(), code = r.u8s(n * s.nodes), field = [];
+    const largest = r.f32s(s.nodes), code = r.u8s(n * s.nodes), field = [];
     for (let i = 0; i < n; i++) field.push(new Uint8Array(s.nodes));
     for (let k = 0, at = 0; k < s.nodes; k++)
       for (let i = 0, c = 0; i < n; i++) field[i][k] = c = c + code[at++] & 255;
@@ -143,7 +143,7 @@ function framesAt(run, t) {
 
 /* von Mises stress at a node and time */
 function stressAt(surface, run, node, t) {
-  const [k, s] = placeInTime(run, t), at = f => f.largest * f.code[node] / 255;
+  const [k, s] = placeInTime(run, t), at = f => f.largest[node] * f.code[node] / 255;
   const a = surface.field[k], b = surface.field[Math.min(k + 1, surface.field.length - 1)];
   return a ? at(a) * (1 - s) + at(b) * s : NaN;
 }

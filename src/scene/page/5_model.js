@@ -219,7 +219,7 @@ class Model {
      attachments would leave all others in one colour. */
   stressRange(s) {
     const most = new Float32Array(s.nodes);
-    for (const f of s.field) for (let i = 0; i < s.nodes; i++) most[i] = Math.max(most[i], f.largest * f.code[i] / 255);
+    for (const f of s.field) for (let i = 0; i < s.nodes; i++) if (f.code[i] === 255) most[i] = Math.max(most[i], f.largest[i]);
     const sorted = most.slice().sort();
     return {largest: sorted.length ? sorted[sorted.length - 1] : 0, top: sorted.length ? sorted[Math.floor(0.99 * (sorted.length - 1))] : 0};
   }
@@ -265,9 +265,9 @@ class Model {
       s.mesh.material.color.set(this.colourOf(s.body));
     } else {
       const [k, part] = placeInTime(this.run, t), a = s.field[k], b = s.field[Math.min(k + 1, s.field.length - 1)];
-      const fa = (1 - part) * a.largest / this.stressTop, fb = part * b.largest / this.stressTop;
+      const fa = (1 - part) / this.stressTop, fb = part / this.stressTop;
       for (let v = 0; v < s.node.length; v++) {
-        const i = s.node[v], colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] + fb * b.code[i]) || 0))];
+        const i = s.node[v], colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] * a.largest[i] + fb * b.code[i] * b.largest[i]) || 0))];
         c[3 * v] = colour[0];
         c[3 * v + 1] = colour[1];
         c[3 * v + 2] = colour[2];

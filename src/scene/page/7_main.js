@@ -137,7 +137,7 @@ function positionPlot(body) {
 }
 
 function stressPlot({surface, node}) {
-  const value = surface.field.map(f => f.largest * f.code[node] / 255);
+  const value = surface.field.map(f => f.largest[node] * f.code[node] / 255);
   return new Plot(run.time, run.scene.bodies[surface.body].name + ': von Mises stress where selected', surface.unit, [{name: 'stress', value}], scrubTo);
 }
 
