@@ -112,6 +112,7 @@ TEST(Parameters, WhatCameBeforeTheFirst)
     if (what) late.shape(late.ground(), Shape());
     else late.channel("one", Expression{{}, [](const Real *) -> Real { return 1; }});
     late.parameter("k", 1);
+    late.add("stone", PointMass());
     EXPECT_NE(late.setUp(), 0);
     EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
   }
