@@ -15,14 +15,13 @@ StillSystem::~StillSystem()
   for (Vec *x : {&U, &V, &A, &zero, &F, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* As the integrator would: KLU where it is there, which it is on one rank alone; of one triangle MUMPS, which reads it */
+/* As the integrator would: KLU where it is there, which it is on one rank alone; else, and of one triangle, MUMPS through the package that gives
+   it more room where pivots change with the length of a step (AnalysesRanks.HangingChain) */
 PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
 {
   PetscFunctionBegin;
   for (const char *package : {"klupair", MATSOLVERKLU, "mumpsnd", MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST}) {
-    PetscBool is, ours;
-    PetscCall(PetscStrcmp(package, "mumpsnd", &ours));
-    if (ours && !triangle) continue;
+    PetscBool is;
     PetscCall(MatGetFactorAvailable(J, package, triangle ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &is));
     if (!is) continue;
     PetscCall(PCFactorSetMatSolverType(pc, package));

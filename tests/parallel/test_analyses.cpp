@@ -74,3 +74,39 @@ TEST(AnalysesRanks, TheSameAnswers)
   ASSERT_EQ(one.size(), all.size());
   for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
 }
+
+/* Forty rods of 1/40 m and 2 kg in all, pulled along x by 30 N: in equilibrium rod k hangs by the weights from it on over the pull */
+TEST(AnalysesRanks, HangingChain)
+{
+  const int    n = 40;
+  const double length = 1. / n, mass = 2. / n;
+  Scene        scene(PETSC_COMM_WORLD);
+  Marker       last = scene.marker(scene.ground());
+  TS           ts;
+  Snapshot     now;
+  Motion       end;
+  double       exact = 0;
+  scene.gravity({0, -9.81, 0});
+  for (int k = 0; k < n; k++) {
+    RigidBody b;
+    b.mass          = mass;
+    b.inertia       = Vector3(mass * 0.005 * 0.005 / 2, mass * length * length / 12, mass * length * length / 12).asDiagonal();
+    b.position      = {(k + 0.5) * length, 0, 0};
+    const Body rod  = scene.add("rod" + std::to_string(k), b);
+    scene.add("pin" + std::to_string(k), Revolute{scene.marker(rod, {-length / 2, 0, 0}), last});
+    last                = scene.marker(rod, {length / 2, 0, 0});
+    const double weight = mass * 9.81 * (n - k - 0.5);
+    exact -= length * weight / std::hypot(weight, 30);
+  }
+  UserForce pull;
+  pull.i     = last;
+  const Expression none{{}, [](const Real *) -> Real { return 0; }};
+  pull.force = {Expression{{}, [](const Real *) -> Real { return 30; }}, none, none};
+  scene.add("pull", pull);
+  must(scene.createTS(&ts));
+  must(StaticEquilibrium(ts, 0));
+  must(now.take(ts));
+  must(now.motion(last, &end));
+  EXPECT_NEAR(end.position(1), exact, 1e-8);
+  must(TSDestroy(&ts));
+}

@@ -75,7 +75,7 @@ class Ranks(unittest.TestCase):
                 self.assertAlmostEqual(a, b, delta=1e-7 * (1 + abs(a)))
 
     def test_chain(self):
-        text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "24")
+        text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "30")
         found, exact = re.search(r"2 ranks: the end hangs (\S+) m .* exact (\S+) m", text).groups()
         self.assertAlmostEqual(float(found), float(exact), delta=1e-8)
 
