@@ -1,6 +1,7 @@
 /* The preconditioner "hhtconstraint": what it leaves out, conjugate gradients on the constraints, what it refuses */
 #include "linear/constraint.h"
 #include "bench/linear_matrices.h"
+#include "view_text.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
 #include <petscksp.h>
@@ -87,17 +88,7 @@ protected:
   }
   std::string view()
   {
-    PetscViewer viewer;
-    char        text[4096] = "";
-    FILE       *file       = tmpfile();
-    EXPECT_EQ(PetscViewerASCIIOpenWithFILE(PETSC_COMM_SELF, file, &viewer), 0);
-    EXPECT_EQ(KSPView(ksp, viewer), 0);
-    EXPECT_EQ(PetscViewerFlush(viewer), 0);
-    rewind(file);
-    text[fread(text, 1, sizeof text - 1, file)] = 0;
-    EXPECT_EQ(PetscViewerDestroy(&viewer), 0);
-    fclose(file);
-    return text;
+    return ViewText([this](PetscViewer viewer) { return KSPView(ksp, viewer); });
   }
 
 public:

@@ -2,6 +2,7 @@
 #include "linear/klupair.h"
 #include "linear/klupair_matching.h"
 #include "bench/linear_matrices.h"
+#include "view_text.h"
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
@@ -275,18 +276,7 @@ protected:
 
   std::string view()
   {
-    PetscViewer viewer;
-    char        text[4096] = "";
-    FILE       *file       = tmpfile();
-    EXPECT_EQ(PetscViewerASCIIOpenWithFILE(PETSC_COMM_SELF, file, &viewer), 0);
-    EXPECT_EQ(PetscViewerPushFormat(viewer, PETSC_VIEWER_ASCII_INFO), 0);
-    EXPECT_EQ(MatView(F, viewer), 0);
-    EXPECT_EQ(PetscViewerFlush(viewer), 0);
-    rewind(file);
-    text[fread(text, 1, sizeof text - 1, file)] = 0;
-    EXPECT_EQ(PetscViewerDestroy(&viewer), 0);
-    fclose(file);
-    return text;
+    return ViewText([this](PetscViewer viewer) { return MatView(F, viewer); }, PETSC_VIEWER_ASCII_INFO);
   }
 
   Counts counts()
