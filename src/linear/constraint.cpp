@@ -29,7 +29,7 @@ Constraint &Of(PC pc) { return *static_cast<Constraint *>(pc->data); }
 
 PetscErrorCode NodesGiven(Mat A, IS is, Constraint &c)
 {
-  PetscInt        begin, end, n, size;
+  PetscInt        begin, end, n, size, least, most;
   const PetscInt *row;
 
   PetscFunctionBegin;
@@ -37,14 +37,14 @@ PetscErrorCode NodesGiven(Mat A, IS is, Constraint &c)
   PetscCall(ISGetLocalSize(is, &n));
   PetscCall(ISGetBlockSize(is, &size));
   PetscCall(ISGetIndices(is, &row));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCheck(row[k] >= begin && row[k] < end, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-               "The nodes of the matrix (" LINEAR_NODES ") have row %" PetscInt_FMT ", which is not among this rank's rows %" PetscInt_FMT " to %" PetscInt_FMT,
-               row[k], begin, end - 1);
-    c.node[(size_t)(row[k] - begin)] = row[k - k % size];
-  }
+  least = n ? *std::min_element(row, row + n) : begin;
+  most  = n ? *std::max_element(row, row + n) : begin;
+  for (PetscInt k = 0; k < n && least >= begin && most < end; k++) c.node[(size_t)(row[k] - begin)] = row[k - k % size];
   c.nodes = n / size;
   PetscCall(ISRestoreIndices(is, &row));
+  PetscCheck(!n || (least >= begin && most < end), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "The nodes of the matrix (" LINEAR_NODES ") have rows %" PetscInt_FMT " to %" PetscInt_FMT ", this rank has rows %" PetscInt_FMT " to %" PetscInt_FMT, least, most, begin,
+             end - 1);
   PetscFunctionReturn(0);
 }
 
