@@ -65,7 +65,7 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);
-  PetscReal   left = 0, stay = 0, part = 0;
+  Imbalance   left;
 
   PetscFunctionBegin;
   if (!I.corrector.matrix.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -73,8 +73,8 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   *evaluated = PETSC_TRUE;
   PetscCall(MeasureRows(ts, X, F));
   PetscCall(Model(ts, dX));
-  PetscCall(Compare(ts, F, &left, &stay, &part));
-  if (left > 0 && PetscAbsReal(part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
+  PetscCall(Compare(ts, F, &left));
+  if (left.all > 0 && PetscAbsReal(left.part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

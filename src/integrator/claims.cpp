@@ -50,8 +50,9 @@ PetscErrorCode NoteInertia(TS ts, Mat P)
   v.largest = v.since = 0;
   PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
   if (!has) PetscFunctionReturn(PETSC_SUCCESS);
-  for (Vec *x : {&v.inertia, &v.claim, &v.noise})
+  for (Vec *x : {&v.inertia, &v.claim, &v.noise, &v.unproved})
     if (!*x) PetscCall(VecDuplicate(I.X, x));
+  PetscCall(VecZeroEntries(v.unproved));
   PetscCall(MatGetDiagonal(P, v.inertia));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar m) {

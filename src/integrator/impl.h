@@ -61,12 +61,13 @@ struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
   PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
   PetscBool looked   = PETSC_FALSE; /* the residual after the last correction was needed for its proof */
-  PetscReal since = 0;              /* time for which forces may have been missing that no proof has excluded */
+  PetscReal since = 0;              /* time since the residual was looked at last: forces may have been missing for so long */
 };
 
 /* Whether small corrections prove anything, verify.cpp */
 struct Verification : VerificationState {
   Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
+  Vec unproved = nullptr; /* time before `since` in which a row's residual has stayed as it was, whenever it was looked at */
   Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
 };
 

@@ -12,7 +12,8 @@
   missing since the last proof, a time T ago, and with them positions of A T^2/2. Before this exceeds a part of the tolerance, the
   residual is evaluated once more after the last correction. It must have followed: what is left of every entry is below
   `followed` times what it was (P dX, the linear model that the correction has solved), or rounding, which is then measured (claims.cpp),
-  or too little to move the positions: within this step, and since the last proof where an entry has stayed as it was.
+  or too little to move the positions: within this step, and since its own last proof where an entry has stayed as it was. A few of many
+  entries look so by chance, other ones each time: so T is a row's own.
 
   Otherwise the iteration goes on; the rate that it then measures, or a new matrix, settles the matter.
 */
@@ -35,25 +36,75 @@ PetscErrorCode Keep(const Integrator &I, Vec R, TSHHT3Role one, TSHHT3Role other
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* E: the correction times the claims. Definitions hide stiffness from the diagonal: then what inertia alone would make of the model */
-PetscErrorCode Claimed(TS ts, Vec dX, PetscReal *E)
+/* Largest change of the positions, in units of the tolerance, by accelerations that would have made a correction of E = |k| h^2 a, over one step */
+PetscReal Drift(const Integrator &I, PetscReal E) { return E / (2 * PetscAbsReal(I.p.k)); }
+
+/* The same by accelerations that the correction dX may have missed in each row since it was proved. Definitions hide stiffness from the
+   diagonal: then what inertia alone would make of the model counts */
+PetscErrorCode Claimed(TS ts, Vec dX, PetscReal *drift)
 {
-  Integrator &I           = Get(ts);
-  const bool  definitions = HasDefinitions(I);
+  Integrator &I = Get(ts);
   PetscReal   sum[4];
 
   PetscFunctionBegin;
-  if (definitions) {
+  if (HasDefinitions(I)) {
     PetscCall(Model(ts, dX));
-    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal model) { local[0] += PetscSqr(model * s.answer); }, Read(I.verify.model)));
+    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal model) { local[0] += PetscSqr(model * s.answer * PetscSqr(s.steps)); }, Read(I.verify.model)));
   } else /* claim dX is P_ii dX_i / inertia_i: the diagonal's part of the model */
-    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal d, PetscReal c) { local[0] += PetscSqr(c * d * s.claimed); }, Read(dX), Read(I.verify.claim)));
-  *E = PetscSqrtReal(sum[0] / I.norm_size);
+    PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal d, PetscReal c) { local[0] += PetscSqr(c * d * s.claimed * PetscSqr(s.steps)); }, Read(dX), Read(I.verify.claim)));
+  *drift = Drift(I, PetscSqrtReal(sum[0] / I.norm_size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest change of the positions, in units of the tolerance, by accelerations of E/(|k| h^2) over the time T */
-PetscReal Drift(const Integrator &I, PetscReal E, PetscReal T) { return E * PetscSqr(T / I.h) / (2 * PetscAbsReal(I.p.k)); }
+/* A row of the residual after a correction, as a correction that inertia alone would make */
+struct Row {
+  PetscReal is, was, excess; /* excess: of what may be left of it */
+
+  Row(const RowScale &s, bool known, PetscReal f, PetscReal model, PetscReal force)
+    : is(f * s.answer), was(model * s.answer), excess(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + (known ? PetscAbsReal(force) * s.answer : 0)) - s.rounding))
+  {
+  }
+  bool stays() const { return excess > 0 && PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was); }
+};
+
+/* The iteration has been seen to converge: what is left of constraint forces is a part of what they were */
+bool RateIsKnown(const Integrator &I) { return I.corrector.matrix.rate >= 0; }
+
+/* R: the residual F, with definitions what they make of it in the equations of motion */
+PetscErrorCode OfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
+{
+  PetscFunctionBegin;
+  *R = F;
+  if (!HasDefinitions(Get(ts))) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(passed.like(F));
+  PetscCall(VecCopy(F, passed));
+  PetscCall(PassDefinitionsOn(ts, passed));
+  *R = passed;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All rows are proved now, but for those whose residual F has stayed as it was */
+PetscErrorCode NoteProof(TS ts, Vec F)
+{
+  Integrator     &I     = Get(ts);
+  Verification   &v     = I.verify;
+  const bool      known = RateIsKnown(I);
+  const RowScales scale(I);
+  WorkVec         passed;
+  Vec             R;
+
+  PetscFunctionBegin;
+  PetscCall(OfMotion(ts, F, passed, &R));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m, PetscScalar w, PetscScalar noise, PetscScalar f, PetscScalar model, PetscScalar force, PetscScalar &unproved) {
+      if (!(PetscRealPart(m) > 0)) return;
+      const RowScale s = scale(i, m, w, noise, unproved);
+      unproved         = Row(s, known, PetscRealPart(f), PetscRealPart(model), PetscRealPart(force)).stays() ? s.steps * I.h : 0;
+    },
+    Read(v.inertia), Read(I.weight), Read(v.noise), Read(R), Read(v.model), Read(v.work), Write(v.unproved)));
+  v.since = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 } // namespace
 
@@ -100,36 +151,31 @@ PetscErrorCode Model(TS ts, Vec dX)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is left of the residual F that the correction was to take away, in units of the tolerance; of this, what has stayed in entries about
-   as they were; and which part of the whole is as it was */
-PetscErrorCode Compare(TS ts, Vec F, PetscReal *left, PetscReal *stay, PetscReal *part)
+/* What is left in F after the correction that has the model at hand */
+PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
 {
   Integrator &I     = Get(ts);
-  const bool  known = I.corrector.matrix.rate >= 0; /* then the iteration has been seen to converge, and what is left of constraint forces is a part of what they were */
+  const bool  known = RateIsKnown(I);
   PetscReal   sum[4];
   WorkVec     passed;
+  Vec         R;
 
   PetscFunctionBegin;
-  if (HasDefinitions(I)) {
-    PetscCall(passed.like(F));
-    PetscCall(VecCopy(F, passed));
-    PetscCall(PassDefinitionsOn(ts, passed));
-  }
+  PetscCall(OfMotion(ts, F, passed, &R));
   PetscCall(SumRows(
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal model, PetscReal force) {
-      const PetscReal is = f * s.answer, was = model * s.answer, constraint = known ? PetscAbsReal(force) * s.answer : 0;
-      const PetscReal excess = PetscSqr(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + constraint) - s.rounding));
-      local[0] += excess;
-      if (PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was)) local[3] += excess;
-      if (PetscAbsReal(was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
-      local[1] += is * was;
-      local[2] += was * was;
+      const Row row(s, known, f, model, force);
+      local[0] += PetscSqr(row.excess);
+      if (row.stays()) local[3] += PetscSqr(row.excess * PetscSqr(s.steps));
+      if (PetscAbsReal(row.was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
+      local[1] += row.is * row.was;
+      local[2] += row.was * row.was;
     },
-    Read(passed ? (Vec)passed : F), Read(I.verify.model), Read(I.verify.work)));
-  *left = PetscSqrtReal(sum[0] / I.norm_size);
-  *stay = PetscSqrtReal(sum[3] / I.norm_size);
-  *part = sum[2] > 0 ? sum[1] / sum[2] : 0;
+    Read(R), Read(I.verify.model), Read(I.verify.work)));
+  left->all  = Drift(I, PetscSqrtReal(sum[0] / I.norm_size));
+  left->stay = Drift(I, PetscSqrtReal(sum[3] / I.norm_size));
+  left->part = sum[2] > 0 ? sum[1] / sum[2] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,38 +185,39 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
   Corrector    &c = I.corrector;
-  PetscReal     E, left = 0, stay = 0, part = 0;
+  PetscReal     claimed;
+  Imbalance     left;
 
   PetscFunctionBegin;
   *proved  = PETSC_TRUE;
   v.looked = PETSC_FALSE;
   if (!Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1), T = v.since + I.h;
-  PetscCall(Claimed(ts, dX, &E));
-  if (Drift(I, E, T) <= limit) {
-    v.since = T;
+  const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1);
+  PetscCall(Claimed(ts, dX, &claimed));
+  if (claimed <= limit) {
+    v.since += I.h;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = v.looked = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
-    PetscCall(Compare(ts, F, &left, &stay, &part));
+    PetscCall(Compare(ts, F, &left));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
-    const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && part < 0.5;
-    *proved         = (PetscBool)((good || Drift(I, left, I.h) <= limit) && Drift(I, stay, T) <= limit);
+    const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && left.part < 0.5;
+    *proved         = (PetscBool)((good || left.all <= limit) && left.stay <= limit);
     if (attempt && !*proved) {
-      PetscCall(Claimed(ts, dX, &E));
-      *proved = (PetscBool)(!Claims(I) || Drift(I, E, T) <= limit);
+      PetscCall(Claimed(ts, dX, &claimed));
+      *proved = (PetscBool)(!Claims(I) || claimed <= limit);
     }
     if (*proved) {
-      v.since = stay > 0 ? T : 0;
+      PetscCall(NoteProof(ts, F));
       PetscFunctionReturn(PETSC_SUCCESS);
     }
     if (!attempt) PetscCall(MeasureRows(ts, X, F));
   }
   PetscCall(PetscInfo(ts, "corrector: a correction of %g of the tolerance at t = %g is no proof: the residual, %g of the tolerance by inertia alone, has not followed (%g of it as before)\n",
-                      (double)c.e, (double)I.t1, (double)left, (double)part));
+                      (double)c.e, (double)I.t1, (double)left.all, (double)left.part));
   if (c.matrix.fresh) PetscCall(CheckJacobian(ts, dX, F, &c.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
