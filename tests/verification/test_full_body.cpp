@@ -118,7 +118,7 @@ TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
 }
 
 /* Some of many rows of the residual look by chance as if they had not followed a correction, other ones in every step. As long as the time since
-   the last proof was one for all rows, these added up to a doubt, and to 18 matrices in these 20 steps. */
+   the last proof was one for all rows, these added up to a doubt, and to 14 matrices in these 20 steps. */
 TEST(FullBodyDynamics, FixedStepsOfManyNodesKeepTheirMatrix)
 {
   hhtex::SolidBeam rubber;
