@@ -2,15 +2,39 @@
 #include "impl.h"
 #include "linear/constraint.h"
 
+namespace
+{
+
+constexpr char reference_name[] = "hhtdae_reference"; /* on the matrix: what TSHHT3SetNodes() was given */
+
+PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
+{
+  PetscInt  rows, n, size = 3;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(P, &rows, NULL));
+  PetscCall(VecGetLocalSize(reference, &n));
+  if (nodes) PetscCall(ISGetBlockSize(nodes, &size));
+  same = (PetscBool)(n == rows && size == 3);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
+  PetscCheck(same, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ, "TSHHT3SetNodes(): positions need nodes of three unknowns, and a vector of the layout of the solution");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
 /*@
-  TSHHT3SetNodes - Tells which unknowns belong to nodes of finite elements, for `-pc_type hhtconstraint`
+  TSHHT3SetNodes - Tells which unknowns belong to nodes of finite elements, and where these are, for `-pc_type hhtconstraint`
 
   Collective, after `TSSetI2Jacobian()`
 
   Input Parameters:
-+ ts    - the `TS` context
-- nodes - of each rank its own unknowns by their global numbers, those of a node one after the other, as many as the block size of the `IS` (`ISSetBlockSize()`); `NULL`
-          to take back what was told
++ ts        - the `TS` context
+. nodes     - of each rank its own unknowns by their global numbers, those of a node one after the other, as many as the block size of the `IS` (`ISSetBlockSize()`); `NULL`
+              to take back what was told
+- reference - where nodes of three unknowns are when these are zero, in the rows of these unknowns: zeros if the unknowns are positions in space; `NULL` if that is not
+              known, which costs iterations
 
   Level: advanced
 
@@ -18,31 +42,75 @@
   The preconditioner `hhtconstraint` leaves out of the Newton matrix what couples different nodes, and factors the rest, with rigid bodies, modes and multipliers whole. So it
   satisfies the constraints exactly, at a cost that grows as the number of nodes, and a Krylov method does what it leaves to do,
 .vb
-  -ksp_type cg -pc_type hhtconstraint -ksp_rtol 0.1         (fgmres where the matrix is not symmetric)
+  -ksp_type cg -pc_type hhtconstraint         (fgmres where the matrix is not symmetric)
 .ve
   where a factorization of the whole matrix has no room. Its own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
   but for multipliers, are taken for a node. Scenes make the call themselves.
 
+  Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, move together as a rigid body on a coarse level, whose solver has the prefix
+  `coarse_`; with 0 there is none.
+
 .seealso: `TSHHT3`, `TSSetI2Jacobian()`
 @*/
-PetscErrorCode TSHHT3SetNodes(TS ts, IS nodes)
+PetscErrorCode TSHHT3SetNodes(TS ts, IS nodes, Vec reference)
 {
-  Mat       P;
-  PetscInt  n, size;
-  PetscBool whole = PETSC_TRUE;
+  Mat P;
 
   PetscFunctionBegin;
   PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
   if (nodes) PetscValidHeaderSpecific(nodes, IS_CLASSID, 2);
+  if (reference) PetscValidHeaderSpecific(reference, VEC_CLASSID, 3);
   PetscCall(TSGetI2Jacobian(ts, NULL, &P, NULL, NULL));
   PetscCheck(P, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "TSHHT3SetNodes() tells of the rows of the matrix: call TSSetI2Jacobian() before it");
-  if (nodes) {
-    PetscCall(ISGetLocalSize(nodes, &n));
-    PetscCall(ISGetBlockSize(nodes, &size));
-    whole = (PetscBool)(n % size == 0);
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &whole, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
-  PetscCheck(whole, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ, "TSHHT3SetNodes(): the unknowns of a rank are no multiple of the block size of the index set, which is that of a node");
+  if (reference) PetscCall(CheckReference(ts, P, nodes, reference));
   PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_NODES, (PetscObject)nodes));
+  PetscCall(PetscObjectCompose((PetscObject)P, reference_name, (PetscObject)(nodes ? reference : NULL)));
+  PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_POSITIONS, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+namespace hht3
+{
+
+namespace
+{
+
+PetscErrorCode TellMultipliers(TS ts, Mat P)
+{
+  const Integrator     &I = Get(ts);
+  std::vector<PetscInt> rows;
+  PetscInt              start;
+  IS                    multipliers;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(P, &start, NULL));
+  for (size_t i = 0; i < I.role.size(); i++)
+    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) rows.push_back(start + (PetscInt)i);
+  PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &multipliers));
+  PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
+  PetscCall(ISDestroy(&multipliers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The matrix P has been evaluated at U: positions of its nodes, where they are asked for */
+PetscErrorCode TellPositions(TS ts, Mat P, Vec U)
+{
+  Vec reference, positions;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)P, reference_name, (PetscObject *)&reference));
+  if (!reference) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TellMultipliers(ts, P));
+  PetscCall(PetscObjectQuery((PetscObject)P, LINEAR_POSITIONS, (PetscObject *)&positions));
+  if (!positions) {
+    PetscCall(VecDuplicate(U, &positions));
+    PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_POSITIONS, (PetscObject)positions));
+    PetscCall(PetscObjectDereference((PetscObject)positions)); /* the matrix has it */
+  }
+  PetscCall(VecWAXPY(positions, 1, U, reference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -3,6 +3,7 @@
   and is chosen as any other direct solver where the user chooses none.
 */
 #include "constraint.h"
+#include "coarse.h"
 #include "linear.h"
 #include <algorithm>
 #include <petsc/private/pcimpl.h>
@@ -11,14 +12,17 @@
 namespace
 {
 
+constexpr PetscInt in_aggregate = 200; /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
+
 struct Constraint {
-  KSP                   inner = nullptr;
-  Mat                   P     = nullptr;
-  LinearChoice          choice;
+  InnerSolver           inner;
+  Mat                   P = nullptr;
   std::vector<PetscInt> node;    /* of own rows: the first row of their node, or -1 */
   std::vector<PetscInt> columns; /* of other ranks, ascending, and the nodes of these */
   std::vector<PetscInt> of_columns;
   PetscInt              nodes = 0; /* of this rank */
+  PetscInt              aggregate = in_aggregate;
+  CoarseLevel           coarse;
   PetscObjectId         matrix  = 0;
   PetscObjectState      pattern = -1;
 };
@@ -196,22 +200,6 @@ PetscErrorCode FillP(PC pc, Constraint &c)
 
 /* ---- the preconditioner ---- */
 
-PetscErrorCode CreateInner(PC pc, Constraint &c)
-{
-  const char *prefix;
-
-  PetscFunctionBegin;
-  PetscCall(KSPCreate(PetscObjectComm((PetscObject)pc), &c.inner));
-  PetscCall(PetscObjectIncrementTabLevel((PetscObject)c.inner, (PetscObject)pc, 1));
-  PetscCall(PCGetOptionsPrefix(pc, &prefix));
-  PetscCall(KSPSetOptionsPrefix(c.inner, prefix));
-  PetscCall(KSPAppendOptionsPrefix(c.inner, "constraint_"));
-  PetscCall(KSPSetErrorIfNotConverged(c.inner, PETSC_FALSE));
-  PetscCall(LinearDefaults(c.inner, &c.choice));
-  PetscCall(KSPSetFromOptions(c.inner));
-  PetscFunctionReturn(0);
-}
-
 PetscErrorCode FindNodes(PC pc, Constraint &c)
 {
   PetscInt begin, end;
@@ -228,52 +216,81 @@ PetscErrorCode FindNodes(PC pc, Constraint &c)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode SetUp(PC pc)
+PetscErrorCode CheckType(PC pc)
 {
-  Constraint      &c = Of(pc);
-  PetscObjectId    id;
-  PetscObjectState pattern;
-  PetscBool        aij, symmetric, fresh = PETSC_FALSE;
-  MatType          type;
-  PC               inner;
-  PCFailedReason   failed;
+  PetscBool aij;
+  MatType   type;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)pc->pmat, &aij, MATSEQAIJ, MATMPIAIJ, ""));
   PetscCall(MatGetType(pc->pmat, &type));
   PetscCheck(aij, PetscObjectComm((PetscObject)pc), PETSC_ERR_SUP, "-pc_type " PCHHTCONSTRAINT " reads the rows of a matrix of type " MATAIJ ", not of %s", type);
+  PetscFunctionReturn(0);
+}
+
+/* *fresh: another matrix or another pattern than before */
+PetscErrorCode SetUpP(PC pc, Constraint &c, PetscBool *fresh)
+{
+  PetscObjectId    id;
+  PetscObjectState pattern;
+
+  PetscFunctionBegin;
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
-  if (!c.P || id != c.matrix || pattern != c.pattern) {
+  *fresh = (PetscBool)(!c.P || id != c.matrix || pattern != c.pattern);
+  if (*fresh) {
     PetscCall(FindNodes(pc, c));
     PetscCall(CreateP(pc, c));
     c.matrix  = id;
     c.pattern = pattern;
-    fresh     = PETSC_TRUE;
   }
   PetscCall(FillP(pc, c));
-  if (!c.inner) PetscCall(CreateInner(pc, c));
-  PetscCall(KSPSetOperators(c.inner, c.P, c.P));
-  if (fresh || c.choice.cholesky) {
-    PetscCall(LinearIsSymmetric(c.P, &symmetric));
-    if (fresh || !symmetric) PetscCall(LinearChoose(c.inner, c.P, symmetric, &c.choice));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *failed)
+{
+  Vec         positions;
+  IS          multipliers;
+  const char *prefix;
+
+  PetscFunctionBegin;
+  *failed = PETSC_FALSE;
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PetscOptionsGetInt(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_aggregate", &c.aggregate, NULL));
+  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_POSITIONS, (PetscObject *)&positions));
+  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_MULTIPLIERS, (PetscObject *)&multipliers));
+  if (c.aggregate <= 0 || !positions) PetscCall(CoarseDestroy(&c.coarse));
+  else {
+    if (fresh || !c.coarse.R) PetscCall(CoarseCreate({c.node, c.P, positions, multipliers}, c.aggregate, &c.coarse));
+    PetscCall(CoarseFill(pc, positions, &c.coarse, failed));
   }
-  PetscCall(KSPSetUp(c.inner));
-  PetscCall(KSPGetPC(c.inner, &inner));
-  PetscCall(PCGetFailedReason(inner, &failed));
-  pc->failedreason = failed ? PC_SUBPC_ERROR : PC_NOERROR;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SetUp(PC pc)
+{
+  Constraint &c = Of(pc);
+  PetscBool   fresh = PETSC_FALSE, fine, coarse;
+
+  PetscFunctionBegin;
+  PetscCall(CheckType(pc));
+  PetscCall(SetUpP(pc, c, &fresh));
+  PetscCall(InnerSetUp(pc, "constraint_", c.P, fresh, &c.inner, &fine));
+  PetscCall(SetUpCoarse(pc, c, fresh, &coarse));
+  pc->failedreason = fine || coarse ? PC_SUBPC_ERROR : PC_NOERROR;
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Apply(PC pc, Vec x, Vec y)
 {
-  Constraint        &c = Of(pc);
-  KSPConvergedReason reason;
+  Constraint &c = Of(pc);
+  PetscBool   fine, coarse = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(KSPSolve(c.inner, x, y));
-  PetscCall(KSPGetConvergedReason(c.inner, &reason));
-  if (reason < 0) pc->failedreason = PC_SUBPC_ERROR;
+  PetscCall(InnerSolve(&c.inner, x, y, &fine));
+  if (c.coarse.R) PetscCall(CoarseAdd(&c.coarse, x, y, &coarse));
+  if (fine || coarse) pc->failedreason = PC_SUBPC_ERROR;
   PetscFunctionReturn(0);
 }
 
@@ -301,10 +318,9 @@ PetscErrorCode View(PC pc, PetscViewer viewer)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
   PetscCall(MatGetInfo(pc->pmat, MAT_GLOBAL_SUM, &all));
   PetscCall(MatGetInfo(c.P, MAT_GLOBAL_SUM, &kept));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g; %s\n", nodes, (double)kept.nz_used, (double)all.nz_used, c.choice.text));
-  PetscCall(PetscViewerASCIIPushTab(viewer));
-  PetscCall(KSPView(c.inner, viewer));
-  PetscCall(PetscViewerASCIIPopTab(viewer));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g; %s\n", nodes, (double)kept.nz_used, (double)all.nz_used, c.inner.choice.text));
+  PetscCall(InnerView(c.inner, viewer));
+  if (c.coarse.A) PetscCall(CoarseView(c.coarse, viewer));
   PetscFunctionReturn(0);
 }
 
@@ -313,9 +329,9 @@ PetscErrorCode Reset(PC pc)
   Constraint &c = Of(pc);
 
   PetscFunctionBegin;
-  PetscCall(KSPDestroy(&c.inner));
+  PetscCall(InnerDestroy(&c.inner));
+  PetscCall(CoarseDestroy(&c.coarse));
   PetscCall(MatDestroy(&c.P));
-  c.choice = LinearChoice();
   PetscFunctionReturn(0);
 }
 

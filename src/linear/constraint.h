@@ -7,6 +7,9 @@
   few unknowns are not nodes that costs as many operations as there are nodes. Each solve with P satisfies the constraints exactly, so that
   conjugate gradients, which begin at P^-1 b, move along them from then on and do not meet the indefiniteness of the whole matrix (Gould,
   Hribar, Nocedal, SIAM J. Sci. Comput. 23, 2001, 1376-1395, algorithm 6.2). Without multipliers D alone is block Jacobi.
+
+  Where positions of nodes are known, a coarse level (coarse.h) is added: iterations no longer grow with the size of a body in elements.
+  -pc_hhtconstraint_aggregate says how many nodes it takes together, 0: no such level.
 */
 #ifndef HHTDAE_LINEAR_CONSTRAINT_H
 #define HHTDAE_LINEAR_CONSTRAINT_H
@@ -18,6 +21,10 @@
 /* On a matrix, by PetscObjectCompose(): an IS of its rank's unknowns that belong to nodes, of as many at a time as the block size of the IS.
    Where there is none, consecutive rows with a diagonal entry and the same pattern are a node. */
 #define LINEAR_NODES "hhtdae_nodes"
+
+/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these, and an IS of the multipliers */
+#define LINEAR_POSITIONS   "hhtdae_positions"
+#define LINEAR_MULTIPLIERS "hhtdae_multipliers"
 
 PetscErrorCode LinearRegisterConstraint(void);
 

@@ -132,13 +132,16 @@ PetscErrorCode TellNodes(const Runtime &R, TS ts)
 {
   std::vector<PetscInt> rows;
   IS                    nodes;
+  Vec                   zero; /* coordinates of nodes are positions */
   PetscFunctionBegin;
   if (R.scene.extensions.empty()) PetscFunctionReturn(0);
   for (const auto &x : R.scene.extensions)
     for (PetscInt i = 0; i < x->coordinates(); i++) rows.push_back(x->start[R.rank] + i);
   PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &nodes));
   PetscCall(ISSetBlockSize(nodes, 3));
-  PetscCall(TSHHT3SetNodes(ts, nodes));
+  PetscCall(VecCreateMPI(R.scene.comm, R.n, PETSC_DETERMINE, &zero));
+  PetscCall(TSHHT3SetNodes(ts, nodes, zero));
+  PetscCall(VecDestroy(&zero));
   PetscCall(ISDestroy(&nodes));
   PetscFunctionReturn(0);
 }

@@ -1,4 +1,5 @@
-/* The preconditioner "hhtconstraint": what it leaves out, conjugate gradients on the constraints, what it refuses */
+/* The preconditioner "hhtconstraint": what it leaves out, its coarse level, conjugate gradients on the constraints, what it refuses */
+#include "linear/coarse.h"
 #include "linear/constraint.h"
 #include "bench/linear_matrices.h"
 #include "view_text.h"
@@ -8,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#define OK(call) ASSERT_EQ((call), 0)
+#define OK(call)       ASSERT_EQ((call), 0)
+#define OK_VALUE(call) EXPECT_EQ((call), 0) /* in functions that return a value */
 
 namespace
 {
@@ -31,6 +33,42 @@ protected:
     OK(VecSetRandom(b, NULL));
   }
   void bricks(PetscInt size) { create(block(size, size, size, true), 3 * (size + 1) * (size + 1) * (size + 1)); }
+  /* with the positions of all nodes, of bricks of 1/nx */
+  void bar(PetscInt nx, PetscInt ny, PetscInt nz, bool clamped = true)
+  {
+    create(block(nx, ny, nz, clamped), 3 * (nx + 1) * (ny + 1) * (nz + 1));
+    nodes(3);
+    place([&](PetscInt node, double place[3]) {
+      place[0] = (double)(node % (nx + 1)) / (double)nx;
+      place[1] = (double)(node / (nx + 1) % (ny + 1)) / (double)nx;
+      place[2] = (double)(node / (nx + 1) / (ny + 1)) / (double)nx;
+    });
+  }
+  template <class Place> void place(Place at)
+  {
+    Vec          positions;
+    PetscScalar *place;
+    IS           multipliers;
+    OK(MatCreateVecs(A, &positions, NULL));
+    OK(VecGetArray(positions, &place));
+    for (PetscInt i = 0; i < coordinates; i += 3) at(i / 3, place + i);
+    OK(VecRestoreArray(positions, &place));
+    OK(ISCreateStride(PETSC_COMM_SELF, n - coordinates, coordinates, 1, &multipliers));
+    OK(PetscObjectCompose((PetscObject)A, LINEAR_POSITIONS, (PetscObject)positions));
+    OK(PetscObjectCompose((PetscObject)A, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
+    OK(VecDestroy(&positions));
+    OK(ISDestroy(&multipliers));
+  }
+  PetscInt iterationsWith(const char aggregate[])
+  {
+    OK_VALUE(PetscOptionsSetValue(NULL, "-pc_hhtconstraint_aggregate", aggregate));
+    solver(KSPCG, 1e-6);
+    EXPECT_GT(solve(), 0);
+    const PetscInt its = iterations();
+    OK_VALUE(PetscOptionsClearValue(NULL, "-pc_hhtconstraint_aggregate"));
+    OK_VALUE(KSPDestroy(&ksp));
+    return its;
+  }
   void TearDown() override
   {
     OK(KSPDestroy(&ksp));
@@ -193,6 +231,85 @@ TEST_F(ConstraintPC, DependentConstraintsFail)
   nodes(3);
   solver(KSPCG, 1e-8);
   EXPECT_LT(solve(), 0);
+}
+
+/* What the whole body does crosses it in one iteration, not brick by brick */
+TEST_F(ConstraintPC, CoarseLevelKeepsIterationsDown)
+{
+  PetscInt without[2], with[2], i = 0;
+  for (PetscInt size : {8, 24}) {
+    bar(size, size / 4, size / 4);
+    without[i] = iterationsWith("0");
+    with[i++]  = iterationsWith("30");
+    TearDown();
+  }
+  EXPECT_GT(without[1], 2 * without[0]);
+  EXPECT_LT(with[1], 1.5 * with[0]);
+  EXPECT_LT(with[1], without[1] / 2);
+}
+
+TEST_F(ConstraintPC, CoarseLevelMovesAlongTheConstraints)
+{
+  double forces, constraints;
+  bar(8, 4, 4);
+  OK(PetscOptionsSetValue(NULL, "-pc_hhtconstraint_aggregate", "30"));
+  solver(KSPCG, 1e-10);
+  OK(KSPMonitorSet(ksp, watch, this, NULL));
+  EXPECT_GT(solve(), 0);
+  OK(PetscOptionsClearValue(NULL, "-pc_hhtconstraint_aggregate"));
+  left(x, &forces, &constraints);
+  EXPECT_LT(forces, 1e-7);
+  EXPECT_LT(constraints, 1e-12);
+  EXPECT_LT(worst_on_the_way, 1e-12);
+  EXPECT_NE(view().find("coarse level: 8 aggregates, " + std::to_string(6 * 8 + 2 * 3 * 25) + " unknowns"), std::string::npos) << view();
+}
+
+/* Of a block that is not held and moves as one aggregate A_c is its mass and its moments of inertia, in units of its size: stiffness has no part in it */
+TEST_F(ConstraintPC, AggregateIsARigidBody)
+{
+  const PetscInt size[3] = {8, 4, 2};
+  const double   side[3] = {1, 0.5, 0.25}, mass = 8 * 4 * 2, radius = 0.5;
+  PC             pc;
+  CoarseLevel    coarse;
+  PetscBool      failed;
+  PetscObject    positions;
+  bar(size[0], size[1], size[2], false);
+  std::vector<PetscInt> node((size_t)n);
+  for (PetscInt i = 0; i < n; i++) node[(size_t)i] = i - i % 3;
+  solver(KSPCG, 1e-6);
+  OK(KSPGetPC(ksp, &pc));
+  OK(PetscObjectQuery((PetscObject)A, LINEAR_POSITIONS, &positions));
+  Mat P; /* three entries in each row: nothing but nodes */
+  OK(MatCreateSeqAIJ(PETSC_COMM_SELF, n, n, 3, NULL, &P));
+  for (PetscInt i = 0; i < n; i++)
+    for (PetscInt k = 0; k < 3; k++) OK(MatSetValue(P, i, node[(size_t)i] + k, 1, INSERT_VALUES));
+  OK(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+  OK(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+  OK(CoarseCreate({node, P, (Vec)positions, NULL}, n, &coarse));
+  OK(CoarseFill(pc, (Vec)positions, &coarse, &failed));
+  EXPECT_FALSE(failed);
+  for (PetscInt i = 0; i < 6; i++)
+    for (PetscInt j = 0; j < 6; j++) {
+      const double square = side[0] * side[0] + side[1] * side[1] + side[2] * side[2];
+      const double moment = i < 3 ? 0 : mass * (square - side[i - 3] * side[i - 3]) / 12 / (radius * radius);
+      PetscScalar  a;
+      OK(MatGetValue(coarse.A, i, j, &a));
+      EXPECT_NEAR(a, i != j ? 0 : i < 3 ? mass : moment, 1e-10 * mass) << i << ' ' << j;
+    }
+  OK(CoarseDestroy(&coarse));
+  OK(MatDestroy(&P));
+}
+
+/* Nodes on a line are no rigid body: each keeps its own unknowns */
+TEST_F(ConstraintPC, NodesOnALineStandApart)
+{
+  bar(6, 2, 2);
+  place([](PetscInt node, double place[3]) {
+    for (int k = 0; k < 3; k++) place[k] = 0.1 * (k + 1) * (double)node;
+  });
+  solver(KSPCG, 1e-8);
+  EXPECT_GT(solve(), 0);
+  EXPECT_NE(view().find("coarse level: 0 aggregates, " + std::to_string(n) + " unknowns"), std::string::npos) << view();
 }
 
 TEST_F(ConstraintPC, Refusals)

@@ -1,0 +1,268 @@
+#include "coarse.h"
+#include <algorithm>
+#include <cmath>
+#include <petsc/private/pcimpl.h>
+
+namespace
+{
+
+constexpr PetscInt motions = 6;    /* of an aggregate */
+constexpr double   flat    = 1e-6; /* of an aggregate's size: nodes this near to a line cannot turn about it */
+
+using Node = CoarseLevel::Node;
+
+/* ---- aggregates ---- */
+
+PetscErrorCode Positions(Vec positions, CoarseLevel *c)
+{
+  const PetscScalar *x;
+  PetscInt           begin;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(positions, &begin, NULL));
+  PetscCall(VecGetArrayRead(positions, &x));
+  for (Node &n : c->nodes)
+    for (int k = 0; k < 3; k++) n.x[k] = PetscRealPart(x[n.row - begin + k]);
+  PetscCall(VecRestoreArrayRead(positions, &x));
+  PetscFunctionReturn(0);
+}
+
+/* Nodes of three unknowns that nothing but nodes is coupled to; the rows of all others stand apart */
+PetscErrorCode Sort(const CoarseNodes &of, CoarseLevel *c)
+{
+  PetscInt begin, end;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(of.P, &begin, &end));
+  for (PetscInt i = begin, last; i < end; i = last) {
+    const PetscInt first = of.node[(size_t)(i - begin)];
+    bool           alone = first == i;
+    for (last = i + 1; alone && last < end && of.node[(size_t)(last - begin)] == first;) last++;
+    alone = alone && last == i + 3;
+    for (PetscInt k = i; alone && k < last; k++) {
+      PetscInt n;
+      PetscCall(MatGetRow(of.P, k, &n, NULL, NULL));
+      alone = n <= 3;
+      PetscCall(MatRestoreRow(of.P, k, &n, NULL, NULL));
+    }
+    if (alone) c->nodes.push_back({i, {0, 0, 0}});
+    else
+      for (PetscInt k = i; k < last; k++) c->apart.push_back(k);
+  }
+  PetscFunctionReturn(0);
+}
+
+/* The component in which the nodes [from, to) are spread most */
+int LongestSide(const CoarseLevel &c, PetscInt from, PetscInt to)
+{
+  int    side    = 0;
+  double longest = -1;
+  for (int k = 0; k < 3; k++) {
+    const auto ends = std::minmax_element(c.nodes.begin() + from, c.nodes.begin() + to, [k](const Node &a, const Node &b) { return a.x[k] < b.x[k]; });
+    if (ends.second->x[k] - ends.first->x[k] <= longest) continue;
+    longest = ends.second->x[k] - ends.first->x[k];
+    side    = k;
+  }
+  return side;
+}
+
+/* Halves the nodes [from, to) until no more than `most` are left in a part */
+void Divide(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt most)
+{
+  if (to - from <= most) {
+    c->first.push_back(to);
+    return;
+  }
+  const int      side   = LongestSide(*c, from, to);
+  const PetscInt middle = from + (to - from) / 2;
+  std::nth_element(c->nodes.begin() + from, c->nodes.begin() + middle, c->nodes.begin() + to,
+                   [side](const Node &a, const Node &b) { return a.x[side] != b.x[side] ? a.x[side] < b.x[side] : a.row < b.row; });
+  Divide(c, from, middle, most);
+  Divide(c, middle, to, most);
+}
+
+/* Centre of the nodes [from, to), and the largest distance from it in a component */
+double Centre(const CoarseLevel &c, PetscInt from, PetscInt to, double centre[3])
+{
+  double radius = 0;
+  for (int k = 0; k < 3; k++) {
+    centre[k] = 0;
+    for (PetscInt i = from; i < to; i++) centre[k] += c.nodes[(size_t)i].x[k] / (double)(to - from);
+    for (PetscInt i = from; i < to; i++) radius = std::max(radius, std::abs(c.nodes[(size_t)i].x[k] - centre[k]));
+  }
+  return radius;
+}
+
+/* Whether the nodes [from, to) are on a line, of which two points are the centre and the node that is farthest from it */
+bool OnALine(const CoarseLevel &c, PetscInt from, PetscInt to)
+{
+  double       m[3], far[3] = {0, 0, 0}, farthest = 0, off = 0;
+  const double radius = Centre(c, from, to, m);
+  for (PetscInt i = from; i < to; i++) {
+    const double *x = c.nodes[(size_t)i].x, d = std::hypot(x[0] - m[0], x[1] - m[1], x[2] - m[2]);
+    if (d <= farthest) continue;
+    farthest = d;
+    for (int k = 0; k < 3; k++) far[k] = (x[k] - m[k]) / d;
+  }
+  for (PetscInt i = from; i < to; i++)
+    for (int k = 0; k < 3; k++) {
+      const double *x = c.nodes[(size_t)i].x;
+      const int     j = (k + 1) % 3, l = (k + 2) % 3;
+      off = std::max(off, std::abs((x[j] - m[j]) * far[l] - (x[l] - m[l]) * far[j]));
+    }
+  return off <= flat * radius;
+}
+
+/* The nodes of aggregates that are no rigid bodies stand apart */
+void Dissolve(CoarseLevel *c)
+{
+  std::vector<Node>     nodes;
+  std::vector<PetscInt> first{0};
+  for (size_t a = 0; a + 1 < c->first.size(); a++) {
+    const auto from = c->nodes.begin() + c->first[a], to = c->nodes.begin() + c->first[a + 1];
+    if (OnALine(*c, c->first[a], c->first[a + 1])) {
+      for (auto n = from; n != to; ++n)
+        for (PetscInt k = 0; k < 3; k++) c->apart.push_back(n->row + k);
+    } else {
+      nodes.insert(nodes.end(), from, to);
+      first.push_back((PetscInt)nodes.size());
+    }
+  }
+  std::sort(c->apart.begin(), c->apart.end());
+  c->nodes.swap(nodes);
+  c->first.swap(first);
+}
+
+PetscErrorCode FindMultipliers(IS multipliers, CoarseLevel *c)
+{
+  const PetscInt *row;
+  PetscInt        n;
+
+  PetscFunctionBegin;
+  if (!multipliers) PetscFunctionReturn(0);
+  PetscCall(ISGetLocalSize(multipliers, &n));
+  PetscCall(ISGetIndices(multipliers, &row));
+  for (PetscInt k = 0; k < n; k++) c->multipliers.push_back((PetscInt)(std::lower_bound(c->apart.begin(), c->apart.end(), row[k]) - c->apart.begin()));
+  PetscCall(ISRestoreIndices(multipliers, &row));
+  PetscFunctionReturn(0);
+}
+
+/* ---- the matrices ---- */
+
+/* Rows of R of an aggregate whose columns begin with `column`: its translations, and its rotations about the centre in units of its size */
+PetscErrorCode FillAggregate(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt column)
+{
+  double       m[3];
+  const double radius = Centre(*c, from, to, m);
+
+  PetscFunctionBegin;
+  for (PetscInt i = from; i < to; i++) {
+    const double *x = c->nodes[(size_t)i].x;
+    for (PetscInt k = 0; k < 3; k++) {
+      const PetscInt    row = c->nodes[(size_t)i].row + k, j = (k + 1) % 3, l = (k + 2) % 3;
+      const PetscInt    at[3]    = {column + k, column + 3 + j, column + 3 + l};
+      const PetscScalar value[3] = {1, (x[l] - m[l]) / radius, -(x[j] - m[j]) / radius}; /* (e_j x r)_k = r_l, (e_l x r)_k = -r_j */
+      PetscCall(MatSetValues(c->R, 1, &row, 3, at, value, INSERT_VALUES));
+    }
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FillR(CoarseLevel *c)
+{
+  PetscInt          column;
+  const PetscScalar one = 1;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRangeColumn(c->R, &column, NULL));
+  for (PetscInt row : c->apart) {
+    PetscCall(MatSetValues(c->R, 1, &row, 1, &column, &one, INSERT_VALUES));
+    column++;
+  }
+  for (size_t a = 0; a + 1 < c->first.size(); a++, column += motions) PetscCall(FillAggregate(c, c->first[a], c->first[a + 1], column));
+  PetscCall(MatAssemblyBegin(c->R, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(c->R, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(0);
+}
+
+/* Zeros in the places of multipliers */
+PetscErrorCode WithoutMultipliers(const CoarseLevel &c, Vec x)
+{
+  PetscScalar *entry;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(x, &entry));
+  for (PetscInt i : c.multipliers) entry[i] = 0;
+  PetscCall(VecRestoreArray(x, &entry));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode CoarseDestroy(CoarseLevel *c)
+{
+  PetscFunctionBegin;
+  PetscCall(InnerDestroy(&c->inner));
+  PetscCall(MatDestroy(&c->R));
+  PetscCall(MatDestroy(&c->A));
+  PetscCall(VecDestroy(&c->residual));
+  PetscCall(VecDestroy(&c->answer));
+  *c = CoarseLevel();
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c)
+{
+  PetscInt n, columns;
+
+  PetscFunctionBegin;
+  PetscCall(CoarseDestroy(c));
+  PetscCall(Sort(of, c));
+  PetscCall(Positions(of.positions, c));
+  c->first.push_back(0);
+  if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), most);
+  Dissolve(c);
+  PetscCall(FindMultipliers(of.multipliers, c));
+  PetscCall(MatGetLocalSize(of.P, &n, NULL));
+  columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.P), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
+  PetscCall(MatSetOption(c->R, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  PetscCall(MatCreateVecs(c->R, &c->residual, NULL));
+  PetscCall(VecDuplicate(c->residual, &c->answer));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseFill(PC pc, Vec positions, CoarseLevel *c, PetscBool *failed)
+{
+  const PetscBool first = (PetscBool)!c->A;
+
+  PetscFunctionBegin;
+  PetscCall(Positions(positions, c));
+  PetscCall(FillR(c));
+  PetscCall(MatPtAP(pc->pmat, c->R, first ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, 1, &c->A));
+  PetscCall(InnerSetUp(pc, "coarse_", c->A, first, &c->inner, failed));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseAdd(CoarseLevel *c, Vec x, Vec y, PetscBool *failed)
+{
+  PetscFunctionBegin;
+  PetscCall(MatMultTranspose(c->R, x, c->residual));
+  PetscCall(WithoutMultipliers(*c, c->residual));
+  PetscCall(InnerSolve(&c->inner, c->residual, c->answer, failed));
+  PetscCall(WithoutMultipliers(*c, c->answer));
+  PetscCall(MatMultAdd(c->R, c->answer, y, y));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseView(const CoarseLevel &c, PetscViewer viewer)
+{
+  PetscInt aggregates = (PetscInt)c.first.size() - 1, columns;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(c.R, NULL, &columns));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &aggregates, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)c.R)));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  coarse level: %" PetscInt_FMT " aggregates, %" PetscInt_FMT " unknowns; %s\n", aggregates, columns, c.inner.choice.text));
+  PetscCall(InnerView(c.inner, viewer));
+  PetscFunctionReturn(0);
+}
