@@ -74,6 +74,11 @@ void Base(const Integrator &I, const BDF &b, const PetscScalar *const u[], const
     to[0][i] = to[1][i] = 0;
     for (int j = 0; j < k; j++) to[0][i] += b.c[j] * u[j][i];
   }
+  for (PetscInt i : I.rotations.at) /* psi_q alone: StageOfRotations() */
+    for (int c = 0; c < 3; c++) {
+      to[0][i + c] = 0;
+      for (int j = 0; j < k; j++) to[0][i + c] += b.c[j] * u[j][i + c];
+    }
 }
 
 /* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
@@ -145,10 +150,6 @@ PetscErrorCode SetUpOrder(TS ts)
   o.max = o.wanted == TSHHT3_ORDER_AUTO ? max_order : o.wanted;
   PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
-  if (o.max > 2 && I.rotations.is) {
-    PetscCall(PetscInfo(ts, "local rotation vectors (TSHHT3SetRotations()) belong to one step alone, and orders above two need several: order 2\n"));
-    o.max = 2;
-  }
   if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
   PetscCall(VecGetLocalSize(ts->vec_sol, &I.local_size));
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,10 +169,6 @@ PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
 
   PetscFunctionBegin;
   if (o.wanted == 2) PetscFunctionReturn(PETSC_SUCCESS);
-  if (ts->setupcalled && o.max == 2) {
-    PetscCall(PetscViewerASCIIPrintf(viewer, "order 2: local rotation vectors have no higher one\n"));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscSNPrintf(what, sizeof(what), "chosen in each step, 2 to %" PetscInt_FMT, max_order));
   else PetscCall(PetscSNPrintf(what, sizeof(what), "%" PetscInt_FMT ", after starts from 2", o.wanted));
   PetscCall(PetscViewerASCIIPrintf(viewer, "order %s (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", what, o.now,
@@ -225,6 +222,21 @@ void CommitOrder(Integrator &I)
   o.above  = o.now > 2 ? o.above + 1 : 0;
   o.now = PetscMin(o.next, PetscMax(2, o.past));
   if (o.now < 3) o.now = 2;
+}
+
+/* Keeps n states of the past */
+PetscErrorCode CutPast(TS ts, PetscInt n)
+{
+  Order &o = Get(ts).order;
+
+  PetscFunctionBegin;
+  if (n == o.past) PetscFunctionReturn(PETSC_SUCCESS);
+  o.past = n;
+  if (o.now == 2 || o.now <= n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "bodies turn too far in %" PetscInt_FMT " steps for order %" PetscInt_FMT " at t = %g\n", o.now, o.now, (double)ts->ptime));
+  o.now   = n < 3 ? 2 : n;
+  o.since = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Before an attempt of length I.h: parameters of its order */

@@ -155,17 +155,20 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
 /* What stability leaves of the present h for order m */
 PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable[m] / c.ratio[m] : PETSC_MAX_REAL; }
 
+/* What is left of it by the m steps in which no body may turn farther than a rotation vector tells, with some room for spins that grow */
+PetscReal TurnReach(const Integrator &I, PetscInt m) { return m > 2 && I.order.spin > 0 ? 0.9 * longest_turn / (m * I.order.spin * I.h) : PETSC_MAX_REAL; }
+
 /* How much longer the next step of order m may be, with `safety` for its error */
-PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
+PetscReal Reach(const Integrator &I, const Candidates &c, PetscInt m, PetscReal safety)
 {
-  return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, StableReach(c, m));
+  return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, PetscMin(StableReach(c, m), TurnReach(I, m)));
 }
 
 /* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
 bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
-  if (!I.fixed_h) return Reach(c, m, 1) > Reach(c, than, 1);
+  if (!I.fixed_h) return Reach(I, c, m, 1) > Reach(I, c, than, 1);
   const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
@@ -224,7 +227,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
-    *next = I.h * PetscClipInterval(Reach(c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
+    *next = I.h * PetscClipInterval(Reach(I, c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
