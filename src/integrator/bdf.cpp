@@ -248,6 +248,7 @@ PetscErrorCode UseOrder(TS ts)
 
   PetscFunctionBegin;
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  o.measured = PETSC_FALSE;
   if ((o.now > 2) != (o.ready > 2)) {
     if (o.now > 2) PetscCall(EnterBDF(ts));
     else PetscCall(LeaveBDF(ts));
@@ -310,8 +311,19 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps of order two after a failed correction of a higher one, doubled each time: where they go on to fail they would hide it */
+/* Steps of order two after a higher one has failed, doubled each time: where the corrector goes on to fail they would hide it, and where an oscillation comes back each
+   attempt at a higher order lets it grow */
 static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
+
+/* After so many times as many steps above order two it begins anew */
+static constexpr PetscInt forgiven_after = 10;
+
+void LowerToTwo(Order &o)
+{
+  if (o.above > forgiven_after * o.penalty) o.penalty = 0;
+  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  o.next             = 2;
+}
 
 /* A correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at once, at the same h */
 PetscErrorCode LowerAfterFailure(TS ts)
@@ -323,9 +335,9 @@ PetscErrorCode LowerAfterFailure(TS ts)
   if (o.now == 2) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "the corrector has failed with order %" PetscInt_FMT " at t = %g\n", o.now, (double)ts->ptime));
   if (!ts->reason) ts->time_step = I.h;
-  o.now = o.next = 2;
-  o.since        = 0;
-  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  LowerToTwo(o);
+  o.now   = 2;
+  o.since = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -101,7 +101,7 @@ struct OrderState {
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */
-  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a correction of a higher one has failed: still to be made, and the last time */
+  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a higher one has failed: still to be made, and the last time */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal spin = 0;                   /* fastest rotation of a body in the step that led to t_n, rad per time; 0 where there is no history or no rotation vector */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
@@ -112,6 +112,8 @@ struct OrderState {
 struct Order : OrderState {
   PetscInt wanted = 2;        /* by the user; may be TSHHT3_ORDER_AUTO */
   PetscInt max    = 2;        /* that is possible */
+  PetscBool measured = PETSC_FALSE; /* S are the scaled differences of the attempt, order.cpp */
+  PetscReal S[max_order + 2] = {};
   Vec      U[max_order] = {}; /* U, U' at t_{n-1}, t_{n-2}, ... */
   Vec      V[max_order] = {};
 };
@@ -410,6 +412,7 @@ PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 PetscErrorCode MapPast(TS ts);
 PetscErrorCode LowerAfterFailure(TS ts);
+void           LowerToTwo(Order &o);
 PetscErrorCode CutPast(TS ts, PetscInt n);
 /* order.cpp */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);

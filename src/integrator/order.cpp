@@ -15,6 +15,7 @@
 */
 #include "impl.h"
 #include "sweeps.h"
+#include <algorithm>
 
 namespace hht3
 {
@@ -100,6 +101,10 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscInt           n;
 
   PetscFunctionBegin;
+  if (o.measured && type == NORM_2) { /* by the estimate */
+    std::copy_n(o.S, max_order + 2, S);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   SpansOfStep(I, tau);
   for (PetscInt s = 0; s < kinds && lowest + s < points; s++) DifferenceWeights(lowest + s, tau, weight[s]);
   const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
@@ -114,6 +119,10 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   for (PetscInt s = 0; s < kinds; s++) S[lowest + s] = lowest + s >= points ? -1 : type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
+  if (type == NORM_2) {
+    o.measured = PETSC_TRUE;
+    std::copy_n(S, max_order + 2, o.S);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -221,7 +230,8 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.after  = o.memory;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
+  if (o.now > 2 && StableReach(c, o.now) < 1) LowerToTwo(o);
+  else o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
