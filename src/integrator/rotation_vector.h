@@ -7,8 +7,7 @@
 #ifndef HHTDAE_ROTATION_VECTOR_H
 #define HHTDAE_ROTATION_VECTOR_H
 
-#include <petscsystypes.h>
-#include <petscmath.h>
+#include <petscsys.h>
 
 namespace hht3
 {
