@@ -162,7 +162,7 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
   In smooth motion positions, velocities, and at constant steps accelerations and multipliers converge with the order. A change of h leaves an error in accelerations and multipliers that is one
   order lower for as many steps as the order has. They do not enter the error test.
 
-  Orders above 2 need the second-order form. With local rotation vectors, `TSHHT3SetRotations()`, the order stays 2, which -info reports.
+  Orders above 2 need the second-order form. They need the attitudes of as many steps within half a turn, where there are local rotation vectors (`TSHHT3SetRotations()`): of fast spins the order is lower.
 
 .seealso: `TSHHT3`, `TSHHT3GetOrder()`, `TSHHT3SetAlpha()`, `TSHHT3GetStatistics()`
 @*/

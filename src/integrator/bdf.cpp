@@ -74,6 +74,11 @@ void Base(const Integrator &I, const BDF &b, const PetscScalar *const u[], const
     to[0][i] = to[1][i] = 0;
     for (int j = 0; j < k; j++) to[0][i] += b.c[j] * u[j][i];
   }
+  for (PetscInt i : I.rotations.at) /* psi_q alone: StageOfRotations() */
+    for (int c = 0; c < 3; c++) {
+      to[0][i + c] = 0;
+      for (int j = 0; j < k; j++) to[0][i + c] += b.c[j] * u[j][i + c];
+    }
 }
 
 /* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
@@ -145,10 +150,6 @@ PetscErrorCode SetUpOrder(TS ts)
   o.max = o.wanted == TSHHT3_ORDER_AUTO ? max_order : o.wanted;
   PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
-  if (o.max > 2 && I.rotations.is) {
-    PetscCall(PetscInfo(ts, "local rotation vectors (TSHHT3SetRotations()) belong to one step alone, and orders above two need several: order 2\n"));
-    o.max = 2;
-  }
   if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
   PetscCall(VecGetLocalSize(ts->vec_sol, &I.local_size));
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,10 +169,6 @@ PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
 
   PetscFunctionBegin;
   if (o.wanted == 2) PetscFunctionReturn(PETSC_SUCCESS);
-  if (ts->setupcalled && o.max == 2) {
-    PetscCall(PetscViewerASCIIPrintf(viewer, "order 2: local rotation vectors have no higher one\n"));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscSNPrintf(what, sizeof(what), "chosen in each step, 2 to %" PetscInt_FMT, max_order));
   else PetscCall(PetscSNPrintf(what, sizeof(what), "%" PetscInt_FMT ", after starts from 2", o.wanted));
   PetscCall(PetscViewerASCIIPrintf(viewer, "order %s (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", what, o.now,
@@ -227,6 +224,21 @@ void CommitOrder(Integrator &I)
   if (o.now < 3) o.now = 2;
 }
 
+/* Keeps n states of the past */
+PetscErrorCode CutPast(TS ts, PetscInt n)
+{
+  Order &o = Get(ts).order;
+
+  PetscFunctionBegin;
+  if (n == o.past) PetscFunctionReturn(PETSC_SUCCESS);
+  o.past = n;
+  if (o.now == 2 || o.now <= n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "bodies turn too far in %" PetscInt_FMT " steps for order %" PetscInt_FMT " at t = %g\n", o.now, o.now, (double)ts->ptime));
+  o.now   = n < 3 ? 2 : n;
+  o.since = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Before an attempt of length I.h: parameters of its order */
 PetscErrorCode UseOrder(TS ts)
 {
@@ -236,6 +248,7 @@ PetscErrorCode UseOrder(TS ts)
 
   PetscFunctionBegin;
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  o.measured = PETSC_FALSE;
   if ((o.now > 2) != (o.ready > 2)) {
     if (o.now > 2) PetscCall(EnterBDF(ts));
     else PetscCall(LeaveBDF(ts));
@@ -298,8 +311,19 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps of order two after a failed correction of a higher one, doubled each time: where they go on to fail they would hide it */
+/* Steps of order two after a higher one has failed, doubled each time: where the corrector goes on to fail they would hide it, and where an oscillation comes back each
+   attempt at a higher order lets it grow */
 static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
+
+/* After so many times as many steps above order two it begins anew */
+static constexpr PetscInt forgiven_after = 10;
+
+void LowerToTwo(Order &o)
+{
+  if (o.above > forgiven_after * o.penalty) o.penalty = 0;
+  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  o.next             = 2;
+}
 
 /* A correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at once, at the same h */
 PetscErrorCode LowerAfterFailure(TS ts)
@@ -311,9 +335,9 @@ PetscErrorCode LowerAfterFailure(TS ts)
   if (o.now == 2) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "the corrector has failed with order %" PetscInt_FMT " at t = %g\n", o.now, (double)ts->ptime));
   if (!ts->reason) ts->time_step = I.h;
-  o.now = o.next = 2;
-  o.since        = 0;
-  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  LowerToTwo(o);
+  o.now   = 2;
+  o.since = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

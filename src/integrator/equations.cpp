@@ -228,7 +228,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.matrix, ts, 0, 0, 0));
   PetscCall(StageVectors(ts, X));
-  I.rotations.factor = I.h * I.h / 12;
+  I.rotations.factor = RotationFactor(I);
   PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P));
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */

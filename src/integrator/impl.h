@@ -102,8 +102,9 @@ struct OrderState {
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */
-  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a correction of a higher one has failed: still to be made, and the last time */
+  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a higher one has failed: still to be made, and the last time */
   PetscBool chosen = PETSC_FALSE;       /* next is */
+  PetscReal spin = 0;                   /* fastest rotation of a body in the step that led to t_n, rad per time; 0 where there is no history or no rotation vector */
   PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
   PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */
@@ -112,12 +113,17 @@ struct OrderState {
 struct Order : OrderState {
   PetscInt wanted = 2;        /* by the user; may be TSHHT3_ORDER_AUTO */
   PetscInt max    = 2;        /* that is possible */
+  PetscBool measured = PETSC_FALSE; /* S are the scaled differences of the attempt, order.cpp */
+  PetscReal S[max_order + 2] = {};
   Vec      U[max_order] = {}; /* U, U' at t_{n-1}, t_{n-2}, ... */
   Vec      V[max_order] = {};
 };
 
 /* Of h from one step to the next above order two: coefficients of variable steps grow with it */
 constexpr PetscReal longest_growth = 2;
+
+/* Of a body from a past attitude to that of the reference, rad: a rotation vector knows no more than half a turn */
+constexpr PetscReal longest_turn = 3;
 
 struct ChangeState {
   PetscBool stale = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
@@ -140,7 +146,7 @@ struct Rotations {
   TSHHT3ReferBack       back  = nullptr;
   void                 *ctx   = nullptr;
   std::vector<PetscInt> at;         /* local indices of first components */
-  PetscReal             factor = 0; /* h^2/12 while the matrix of a step is made */
+  PetscReal             factor = 0; /* RotationFactor() while the matrix of a step is made */
 };
 
 /* limit.cpp */
@@ -409,6 +415,8 @@ PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 PetscErrorCode MapPast(TS ts);
 PetscErrorCode LowerAfterFailure(TS ts);
+void           LowerToTwo(Order &o);
+PetscErrorCode CutPast(TS ts, PetscInt n);
 /* order.cpp */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);
 PetscErrorCode ChooseOrder(TS ts, PetscReal *next);
@@ -455,7 +463,8 @@ PetscErrorCode SetUpRotations(TS ts);
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result);
 PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor, Vec *begin);
 PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
-PetscErrorCode AddCommutators(const Integrator &I, const PetscScalar *v1, PetscScalar *u1);
+PetscErrorCode StageOfRotations(const Integrator &I, const PetscScalar *base, const PetscScalar *v1, PetscScalar *u1);
+PetscReal      RotationFactor(const Integrator &I);
 void           InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 PetscErrorCode ReferToState(TS ts);
 PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before);

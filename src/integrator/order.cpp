@@ -15,6 +15,7 @@
 */
 #include "impl.h"
 #include "sweeps.h"
+#include <algorithm>
 
 namespace hht3
 {
@@ -100,6 +101,10 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscInt           n;
 
   PetscFunctionBegin;
+  if (o.measured && type == NORM_2) { /* by the estimate */
+    std::copy_n(o.S, max_order + 2, S);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   SpansOfStep(I, tau);
   for (PetscInt s = 0; s < kinds && lowest + s < points; s++) DifferenceWeights(lowest + s, tau, weight[s]);
   const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
@@ -114,6 +119,10 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   for (PetscInt s = 0; s < kinds; s++) S[lowest + s] = lowest + s >= points ? -1 : type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
+  if (type == NORM_2) {
+    o.measured = PETSC_TRUE;
+    std::copy_n(S, max_order + 2, o.S);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,17 +164,20 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
 /* What stability leaves of the present h for order m */
 PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable[m] / c.ratio[m] : PETSC_MAX_REAL; }
 
+/* What is left of it by the m steps in which no body may turn farther than a rotation vector tells, with some room for spins that grow */
+PetscReal TurnReach(const Integrator &I, PetscInt m) { return m > 2 && I.order.spin > 0 ? 0.9 * longest_turn / (m * I.order.spin * I.h) : PETSC_MAX_REAL; }
+
 /* How much longer the next step of order m may be, with `safety` for its error */
-PetscReal Reach(const Candidates &c, PetscInt m, PetscReal safety)
+PetscReal Reach(const Integrator &I, const Candidates &c, PetscInt m, PetscReal safety)
 {
-  return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, StableReach(c, m));
+  return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, PetscMin(StableReach(c, m), TurnReach(I, m)));
 }
 
 /* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
 bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
-  if (!I.fixed_h) return Reach(c, m, 1) > Reach(c, than, 1);
+  if (!I.fixed_h) return Reach(I, c, m, 1) > Reach(I, c, than, 1);
   const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
@@ -218,13 +230,14 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
   o.after  = o.memory;
   if (o.past < 2 || I.wlte_pending < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(FindCandidates(ts, &c));
-  o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
+  if (o.now > 2 && StableReach(c, o.now) < 1) LowerToTwo(o);
+  else o.next = o.wanted == TSHHT3_ORDER_AUTO ? BestOrder(I, c) : NextToFixed(o);
   if (o.next != o.now)
     PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " after %" PetscInt_FMT " at t = %g, h = %g: errors %g, %g, %g of the tolerance, differences %g, %g, %g\n", o.next, o.now, (double)I.t1, (double)I.h,
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
-    *next = I.h * PetscClipInterval(Reach(c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
+    *next = I.h * PetscClipInterval(Reach(I, c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
   if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);

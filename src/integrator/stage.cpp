@@ -189,7 +189,7 @@ PetscErrorCode StageVectors(TS ts, Vec X)
   if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
   else Sweep(s.n, MakeStage<false>(I, s, x));
   StageOfStates(I, x, s.base, s.to);
-  PetscCall(AddCommutators(I, s.to[1], s.to[0]));
+  PetscCall(StageOfRotations(I, s.base[0], s.to[1], s.to[0]));
   PetscCall(NoteStage(I, X));
   PetscCall(RestoreStage(I, &s));
   PetscCall(VecRestoreArrayRead(X, &x));
@@ -213,7 +213,7 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   if (I.moves.empty()) sum = Sweep(s.n, CorrectedStage<true>{MakeStage<true>(I, s, x), d, w, x}).sum;
   else sum = Sweep(s.n, CorrectedStage<false>{MakeStage<false>(I, s, x), d, w, x}).sum;
   StageOfStates(I, x, s.base, s.to);
-  PetscCall(AddCommutators(I, s.to[1], s.to[0]));
+  PetscCall(StageOfRotations(I, s.base[0], s.to[1], s.to[0]));
   PetscCall(RestoreStage(I, &s));
   PetscCall(VecRestoreArrayRead(I.weight, &w));
   PetscCall(VecRestoreArrayRead(dX, &d));

@@ -4,7 +4,7 @@ static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPH
                      "the reference over the\n"
                      "output points. Time: CPU time of the solve alone, median of the repeats. Results: tables, CSV, "
                      "pictures, report.html.\n"
-                     "  -problems <a,b,...>: problems [all]; \"written\" and \"scenes\" are all of one kind\n"
+                     "  -problems <a,b,...>: problems [all but heldout]; \"written\", \"scenes\", \"heldout\" are all of one kind\n"
                      "  -solvers <a,b,...>: solvers [all]; the first one is what the others are compared with\n"
                      "  -sweep <also>: variations of hhtdae's own settings: also, only (in full), no\n"
                      "  -eps_max <1e-2> -eps_min <1e-8>: range of tolerances, two per decade with -dense [one]\n"
@@ -17,8 +17,8 @@ static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPH
 #include <hhtdae/flexible.h>
 #include <hhtdae/scene.h>
 
+#include "workprecision_heldout.h"
 #include "workprecision_page.h"
-#include "workprecision_scenes.h"
 #if defined(HHTDAE_HAVE_IDA)
 #include "workprecision_ida.h"
 #endif
@@ -60,6 +60,8 @@ template <class T> static PetscErrorCode Select(const char *option, std::vector<
   PetscFunctionReturn(0);
 }
 
+static bool IsHeldOut(const Case &c) { return c.name.rfind("held:", 0) == 0; }
+
 /* Likewise, with names for all of one kind */
 static PetscErrorCode SelectCases(std::vector<Case> &list)
 {
@@ -69,12 +71,12 @@ static PetscErrorCode SelectCases(std::vector<Case> &list)
   PetscFunctionBegin;
   PetscCall(PetscOptionsGetString(nullptr, nullptr, "-problems", name, sizeof(name), &given));
   const std::string kind = given ? name : "";
-  if (kind != "written" && kind != "scenes") {
+  if (given && kind != "written" && kind != "scenes" && kind != "heldout") {
     PetscCall(Select("-problems", list));
     PetscFunctionReturn(0);
   }
-  list.erase(std::remove_if(list.begin(), list.end(), [&](const Case &c) { return c.scene != (kind == "scenes"); }),
-             list.end());
+  const auto other = [&](const Case &c) { return IsHeldOut(c) != (kind == "heldout") || (kind == "written" && c.scene) || (kind == "scenes" && !c.scene); };
+  list.erase(std::remove_if(list.begin(), list.end(), other), list.end());
   PetscFunctionReturn(0);
 }
 
@@ -281,9 +283,8 @@ int main(int argc, char **argv)
   PetscCall(TSHHT3Initialize());
   PetscCall(ReadGrid(grid));
   PetscCall(OutputDirectory(argv[0], page.out));
-  r.cases                        = allCases();
-  const std::vector<Case> scenes = allScenes();
-  r.cases.insert(r.cases.end(), scenes.begin(), scenes.end());
+  r.cases = allCases();
+  for (const std::vector<Case> &scenes : {allScenes(), heldOutScenes()}) r.cases.insert(r.cases.end(), scenes.begin(), scenes.end());
   PetscCall(SelectCases(r.cases));
   PetscCall(ReadSweep(r, sweep, grid, coarse));
   PetscCall(RunAll(r, sweep, grid, coarse));

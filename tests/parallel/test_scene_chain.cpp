@@ -55,10 +55,10 @@ End run(MPI_Comm comm, Space space, const Build &build, double end, const std::s
   return e;
 }
 
-End compare(const char *what, Space space, const Build &build, double end, int steps)
+End compare(const char *what, Space space, const Build &build, double end, int steps, const char *more = "")
 {
   constexpr double  q       = 1e-10;
-  const std::string options = fixedSteps(end / steps) + "-ts_hhtdae_corrector_tolerance 1e-7 -ts_hhtdae_alpha -0.1 ";
+  const std::string options = fixedSteps(end / steps) + "-ts_hhtdae_corrector_tolerance 1e-7 -ts_hhtdae_alpha -0.1 " + more;
   int               size, rank;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
@@ -206,6 +206,15 @@ TEST(SceneRanks, Net)
 {
   compare(
       "net of 4 x 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100);
+}
+
+/* Past attitudes with the bodies of every rank; some turn too far for order 5 */
+TEST(SceneRanks, HigherOrder)
+{
+  const End e = compare("net of 4 x 5, order 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100, "-ts_hhtdae_order 5 ");
+  EXPECT_GT(e.s.of_order[5], 80);
+  const End t = compare("bodies turning over, order 5", Space::Spatial, turning, 2.4, 160, "-ts_hhtdae_order 5 ");
+  EXPECT_GT(t.s.of_order[3] + t.s.of_order[4] + t.s.of_order[5], 50);
 }
 
 TEST(SceneRanks, Mixed) { compare("mixed scene", Space::Spatial, mixed, 0.2, 400); }

@@ -224,6 +224,42 @@ TEST(Rotation, StiffAcrossTheAxisOfSpin)
     }
 }
 
+/* The same above order two, where the rotation follows from backward differentiation. Stiffnesses are those for which this is stable without a spin. */
+TEST(Rotation, StiffAcrossTheAxisOfSpinAboveOrderTwo)
+{
+  for (double spin : {0., 10., 30.})
+    for (double k : {1e7, 1e8})
+      for (int order : {3, 4, 5}) {
+        BodyRun r(constant(1e-2) + " -ts_rtol 1e-10 -ts_atol 1e-10 -ts_hhtdae_order " + std::to_string(order) + " -ts_max_time 2 ");
+        r.body.J         = {1, 1, 1};
+        r.body.spin      = {0, 0, spin};
+        r.body.stiffness = k;
+        r.body.C         = exponential({1e-6, 0, 0});
+        must(VecZeroEntries(r.V));
+        must(VecSetValue(r.V, 2, spin, INSERT_VALUES));
+        must(VecAssemblyBegin(r.V));
+        must(VecAssemblyEnd(r.V));
+        must(TSSolve(r.ts, nullptr));
+        TSHHT3Statistics s;
+        must(TSHHT3GetStatistics(r.ts, &s));
+        const double tilt = r.body.attitude(r.U).col(2).head<2>().norm();
+        EXPECT_LT(tilt, 1e-8) << "stiffness " << k << ", order " << order << ", spin " << spin;
+        EXPECT_GT(s.of_order[order], 150);
+        EXPECT_EQ(s.corrector_fails, 0);
+      }
+}
+
+TEST(Rotation, HigherOrdersThroughPETSc)
+{
+  for (int order : {3, 4, 5}) {
+    const std::string options = " -ts_hhtdae_order " + std::to_string(order) + " -ts_hhtdae_corrector_tolerance 1e-6 ";
+    const double      a = errorOf(options + tolerance(1e-6)), b = errorOf(options + tolerance(1e-9));
+    MEASURED("free body, order %d: errors of the attitude %.2e at 1e-6, %.2e at 1e-9", order, a, b);
+    EXPECT_LT(b, a / 100);
+    EXPECT_LT(a, 2e-3);
+  }
+}
+
 TEST(Rotation, WhatIsRefused)
 {
   TS  ts;

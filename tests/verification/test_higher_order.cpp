@@ -461,23 +461,6 @@ TEST(HigherOrder, SettersAndOptions)
   must(TSHHT3SetOrder(run.ts, 2));
 }
 
-/* Rotation vectors belong to one step: order two, and -ts_view says why */
-TEST(HigherOrder, RotationVectorsKeepOrderTwo)
-{
-  const UserVars p(1.);
-  Simulation     run(p, tolerance(1e-5) + ofOrder(5));
-  const PetscInt first = 0;
-  IS             is;
-  must(ISCreateGeneral(PETSC_COMM_SELF, 1, &first, PETSC_COPY_VALUES, &is));
-  must(TSHHT3SetRotations(run.ts, is, [](TS, Vec, void *) -> PetscErrorCode { return 0; }, [](TS, void *) -> PetscErrorCode { return 0; }, nullptr));
-  must(ISDestroy(&is));
-  for (int k = 0; k < 20; k++) must(run.step());
-  EXPECT_EQ(run.statistics().of_order[2], 20);
-  Printed printed;
-  must(TSView(run.ts, PETSC_VIEWER_STDOUT_SELF));
-  EXPECT_TRUE(printed.says("order 2: local rotation vectors have no higher one"));
-}
-
 /* Order 2 is HHT and nothing else, whatever the option says that it is */
 TEST(HigherOrder, OrderTwoIsTheDefault)
 {
