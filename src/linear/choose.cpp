@@ -3,6 +3,7 @@
 #include "klupair.h"
 #include "kluparts.h"
 #include "linear.h"
+#include "mumpsmixed.h"
 #include "mumpsnd.h"
 
 /*
@@ -31,6 +32,10 @@ static const PetscInt LARGE_INTERFACE = 2000;
 
 /* Counting stops here: a factor with this many entries is large by any measure */
 static const double COUNT_LIMIT = 1e7;
+
+/* Matrices distributed over ranks, or of one triangle: entries of the whole matrix from which its factor is as large in all likelihood. Fewer are factored in a
+   fraction of a second in any precision. */
+static const double MANY_ENTRIES = 4e6;
 
 static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
                                              MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
@@ -129,7 +134,7 @@ namespace
 
 struct Size {
   LinearWork work;
-  PetscBool  large, parts;
+  PetscBool  large, parts, single;
   char       text[160];
 };
 
@@ -166,6 +171,7 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
 static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
 {
   PetscMPIInt     processes;
+  MatInfo         info;
   PetscBool       seqaij, triangle, bounded, done;
   IS              row, col;
   const PetscInt *order;
@@ -174,6 +180,8 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscFunctionBegin;
   *size = Size();
   PetscCall(LinearStoresTriangle(P, &triangle));
+  PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
+  size->single = (PetscBool)((triangle ? 2 : 1) * info.nz_used > MANY_ENTRIES);
   if (triangle) { /* MUMPS reads it, KLU and the like do not: a chain of 50 unknowns takes 0.28 ms in place of 0.007 ms (above) */
     size->large = PETSC_TRUE;
     PetscCall(PetscStrncpy(size->text, "the matrix holds one triangle", sizeof size->text));
@@ -198,6 +206,7 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscCall(ISDestroy(&col));
   const double threshold = symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC;
   const double per_entry = size->work.flops / PetscMax(size->work.factor, 1.0);
+  size->single = (PetscBool)!bounded;
   size->large = !bounded || (size->work.flops > threshold && per_entry > LARGE_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(PetscSNPrintf(size->text, sizeof size->text, "factor with %s%.2g entries, %.2g operations",
                           bounded ? "" : "more than ", size->work.factor, size->work.flops));
@@ -234,12 +243,14 @@ static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large,
 /* Packages that exploit symmetry of an indefinite matrix; the others' PCCHOLESKY wants a definite one */
 static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
 {
-  PetscBool mumps, ours;
+  PetscBool same;
 
   PetscFunctionBegin;
-  PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
-  PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &ours));
-  *yes = mumps || ours ? PETSC_TRUE : PETSC_FALSE;
+  *yes = PETSC_FALSE;
+  for (const char *name : {MATSOLVERMUMPS, LINEAR_MUMPSND, LINEAR_SMUMPSND, LINEAR_MUMPSMIXED}) {
+    PetscCall(PetscStrcmp(package, name, &same));
+    if (same) *yes = PETSC_TRUE;
+  }
   PetscFunctionReturn(0);
 }
 
@@ -339,6 +350,19 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
   PetscFunctionReturn(0);
 }
 
+/* Factors in single precision in place of those of "mumpsnd" where the factor is the solver: a Krylov method multiplies its rough solves by as many
+   iterations as it makes */
+static PetscErrorCode PreferSingle(KSP ksp, Mat P, MatFactorType type, const char **package)
+{
+  PetscBool ours, preonly;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrcmp(*package, LINEAR_MUMPSND, &ours));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &preonly));
+  if (ours && preonly) PetscCall(IfAvailable(P, LINEAR_MUMPSMIXED, type, package));
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
 {
   Size        size;
@@ -370,6 +394,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);
   }
+  if (package && size.single && choice->may_be_rough) PetscCall(PreferSingle(ksp, P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &package));
   if (package && choice->user_pc)
     PetscCall(SetPackage(pc, package));
   else if (package)
@@ -377,7 +402,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   PetscMPIInt ranks;
   PetscBool   mumps = PETSC_FALSE;
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &ranks));
-  if (package && ranks > 1) PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &mumps));
+  if (package && ranks > 1) PetscCall(FactorsIndefinite(package, &mumps));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s%s: %s", cholesky ? "LDL^T" : "LU",
                           package ? package : "PETSc's default", mumps ? " (runs repeat to rounding only)" : "", size.text));
   PetscFunctionReturn(0);
