@@ -12,18 +12,22 @@
 namespace
 {
 
-/* Of the error of a solve, what refinement may leave: with more, double precision is as quick, and a corrector would see it in its rate */
-constexpr PetscReal slow = 0.01;
+/* Of the error of a solve, what the next one may leave: with more, double precision is as quick, and a corrector would see it in its rate */
+constexpr PetscReal slow = 0.05;
 
 /* Relative to the solution: refined as far as it goes; and the largest correction that may be rounding where they no longer fall */
 constexpr PetscReal refined = 1e-14, rounding = 1e-8;
 constexpr PetscInt  max_it  = 20;
+
+/* Factorizations in double precision at most before single precision is tried again */
+constexpr PetscInt most_wait = 256;
 
 struct Mixed {
   Mat              A = nullptr; /* that was factored, and its state then */
   PetscObjectState state;
   Mat              F      = nullptr;
   bool             fallen = false; /* F is of double precision */
+  PetscInt         wait = 0, left = 0; /* factorizations from then until single precision is tried again, and those to come; doubled with every fall back */
   char             why[128] = "";
   PetscReal        rate   = 0; /* of refinement, measured */
   IS               given  = nullptr; /* order of elimination that PETSc has handed over */
@@ -88,6 +92,7 @@ PetscErrorCode FallBack(Mat F, Mat A, const char why[])
   PetscFunctionBegin;
   PetscCall(PetscInfo(F, "From single to double precision: %s\n", why));
   m.fallen = true;
+  m.left = m.wait = PetscClipInterval(2 * m.wait, 1, most_wait);
   PetscCall(PetscStrncpy(m.why, why, sizeof(m.why)));
   PetscCall(MakeFactor(F, A, LINEAR_MUMPSND));
   PetscCall(Symbolic(F, A));
@@ -226,6 +231,12 @@ PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   PetscCall(MatDestroy(&m.A));
   m.A = A;
   PetscCall(PetscObjectStateGet((PetscObject)A, &m.state));
+  if (m.fallen && m.left-- <= 0) { /* what was in the way may have been one wild iterate: half the memory is worth another analysis now and then */
+    m.fallen = false;
+    PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
+    PetscCall(Symbolic(F, A));
+    if (F->factorerrortype) PetscFunctionReturn(0);
+  }
   PetscCall((m.fallen ? Numeric : FactorSingle)(F, A));
   F->assembled = PETSC_TRUE;
   PetscFunctionReturn(0);
@@ -258,6 +269,8 @@ PetscErrorCode SaveState(Mat F, Archive *archive)
 
   PetscFunctionBegin;
   archive->plain(m.fallen);
+  archive->plain(m.wait);
+  archive->plain(m.left);
   archive->plain(m.why);
   PetscTryMethod(m.F, LINEAR_SAVE_STATE, (Mat, Archive *), (m.F, archive));
   PetscFunctionReturn(0);
@@ -267,15 +280,20 @@ PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
   Mixed &m      = Of(F);
   bool   fallen = m.fallen;
+  PetscInt wait = 0, left = 0;
   char   why[sizeof(m.why)] = "";
 
   PetscFunctionBegin;
   archive->plain(fallen);
+  archive->plain(wait);
+  archive->plain(left);
   archive->plain(why);
   why[sizeof(why) - 1] = 0;
   PetscMPIInt change = fallen != m.fallen, all;
   PetscCallMPI(MPI_Allreduce(&change, &all, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)F)));
   if (all && !m.fallen) PetscCall(FallBack(F, A, why)); /* single precision where it was double would be another run */
+  m.wait = wait;
+  m.left = left;
   PetscTryMethod(m.F, LINEAR_LOAD_STATE, (Mat, Mat, Archive *, PetscBool *), (m.F, A, archive, same));
   F->factorerrortype = m.F->factorerrortype;
   if (!F->factorerrortype && !m.fallen) PetscCall(MeasureRate(m));

@@ -8,8 +8,9 @@
   rough ones, which take one sweep: LinearSolveRoughly() in linear.h.
 
   How fast refinement contracts is measured with every factorization, by two steps of power iteration. Where it is too slow, where the matrix is
-  singular to single precision, or has entries beyond its range, the factor is made in double precision by "mumpsnd" instead, for this
-  matrix and all that follow. -info says so then and -ksp_view, and with it -ts_view, from then on.
+  singular to single precision, or has entries beyond its range, the factor is made in double precision by "mumpsnd" instead. The next matrix
+  gets another try in single precision; if that fails the one after two more, then after four, ... -info tells every fall back, -ksp_view, and with it -ts_view,
+  the present state.
 */
 #ifndef HHTDAE_LINEAR_MUMPSMIXED_H
 #define HHTDAE_LINEAR_MUMPSMIXED_H
