@@ -145,9 +145,10 @@ PetscErrorCode Refine(const Mixed &m, Vec b, Vec x, bool transposed, PetscBool *
     PetscCall(VecAXPY(x, 1, m.d));
     PetscCall(VecNorm(m.d, NORM_2, &e));
     PetscCall(VecNorm(x, NORM_2, &size));
-    const bool falls = !it || e <= 0.5 * last;
+    *good = (PetscBool)(e * PetscMax(m.rate, it ? e / last : 0) <= refined * size);
+    if (*good || PetscIsInfOrNanReal(e)) PetscFunctionReturn(0);
     *good = (PetscBool)(e <= rounding * size);
-    if (!falls || PetscIsInfOrNanReal(e) || e * PetscMax(m.rate, it ? e / last : 0) <= refined * size) PetscFunctionReturn(0);
+    if (it && e > 0.5 * last) PetscFunctionReturn(0);
   }
   PetscFunctionReturn(0);
 }
