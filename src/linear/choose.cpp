@@ -1,4 +1,5 @@
 /* The choice of a direct solver: by the work that a factorization takes, not by the number of unknowns */
+#include "choose.h"
 #include "graph.h"
 #include "klupair.h"
 #include "kluparts.h"
@@ -44,7 +45,7 @@ static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS, M
 
 /* ---- what the user settled ---- */
 
-static PetscErrorCode OptionGiven(KSP ksp, const char name[], PetscBool *given)
+PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given)
 {
   PetscOptions options;
   const char  *prefix;
@@ -112,9 +113,9 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetType(pc, &pc_type));
   PetscCall(SetByProgram(pc, &pc_by_program));
-  PetscCall(OptionGiven(ksp, "-pc_type", &pc_by_option));
+  PetscCall(LinearOptionGiven(ksp, "-pc_type", &pc_by_option));
   if (pc_by_program) PetscCall(PackageGiven(pc, &package_by_program));
-  PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
+  PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
   choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
   choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
   if (!pc_type) { /* options that name a package have PETSc look for its factorization of this matrix at once */
@@ -291,7 +292,7 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
   if (!same) PetscCall(PCSetType(pc, type));
   PetscCall(SetPackage(pc, package));
   if (!same) PetscCall(PCSetFromOptions(pc));
-  PetscCall(OptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
+  PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
   PetscCall(PetscStrcmp(package, MATSOLVERPETSC, &petsc));
   if (!ordering && !petsc) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGEXTERNAL));
   PetscFunctionReturn(0);
@@ -342,7 +343,7 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
                             "LU with petsc: no other installed package factors matrices of type %s", type));
     PetscFunctionReturn(0);
   }
-  PetscCall(OptionGiven(ksp, "-ksp_type", &by_option));
+  PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
   if (!by_option) PetscCall(KSPSetType(ksp, KSPGMRES));
   PetscCall(PCSetType(pc, PCNONE));
   PetscCall(PetscStrncpy(choice->text, "GMRES without preconditioner: nothing factors this type of matrix",
@@ -445,13 +446,17 @@ static PetscErrorCode RefuseTriangle(PC pc, Mat P)
   PetscFunctionReturn(0);
 }
 
+/* ---- the choice ---- */
+
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice)
 {
   PC pc;
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  if (choice->user_pc && choice->user_package)
+  if (choice->iterative)
+    PetscCall(LinearSetKrylov(ksp, choice->cholesky = symmetric, choice));
+  else if (choice->user_pc && choice->user_package)
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
   else if (choice->user_package)
     PetscCall(FollowPackage(ksp, P, symmetric, pc, choice));

@@ -13,6 +13,7 @@ struct LinearChoice {
   PetscBool user_pc      = PETSC_FALSE; /* the program or the options chose the preconditioner's type */
   PetscBool user_package = PETSC_FALSE; /* ... or the package that factors the matrix */
   PetscBool may_be_rough = PETSC_FALSE; /* the caller has LinearSolveRoughly() for most solves: factors in single precision pay */
+  PetscBool iterative    = PETSC_FALSE; /* there was no room for a factor: a Krylov method with the constraint preconditioner */
   PetscBool cholesky     = PETSC_FALSE; /* LDL^T was chosen, which stands on the symmetry of the matrix */
   char      text[256]    = "";          /* for -ts_view and -info: what was chosen, and why */
 };
@@ -26,6 +27,10 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
 /* Once the Newton matrix P has its first values: the package and factorization, where the user chose none.
    The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);
+
+/* Where there was no room for the factor that was chosen: conjugate gradients, or FGMRES if the matrix is not symmetric, with the preconditioner "hhtconstraint"
+   (constraint.h). *changed = PETSC_FALSE if the choice was the user's, or is this one already. */
+PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBool *changed);
 
 /* The same where a run goes on with the solver that it had: package and factorization are not looked for anew. */
 PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice);

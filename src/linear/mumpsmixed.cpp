@@ -29,6 +29,7 @@ struct Mixed {
   bool             fallen = false; /* F is of double precision */
   PetscInt         wait = 0, left = 0; /* factorizations from then until single precision is tried again, and those to come; doubled with every fall back */
   char             why[128] = "";
+  bool             no_analysis = false; /* it failed: structurally singular, or no room for the factor */
   PetscReal        rate   = 0; /* of refinement, measured */
   IS               given  = nullptr; /* order of elimination that PETSc has handed over */
   Vec              r = nullptr, d = nullptr;
@@ -63,6 +64,7 @@ PetscErrorCode Symbolic(Mat F, Mat A)
   if (F->factortype == MAT_FACTOR_LU) PetscCall(m.F->ops->lufactorsymbolic(m.F, A, m.given, m.given, &info));
   else PetscCall(m.F->ops->choleskyfactorsymbolic(m.F, A, m.given, &info));
   F->factorerrortype = m.F->factorerrortype;
+  m.no_analysis      = F->factorerrortype != MAT_FACTOR_NOERROR;
   PetscFunctionReturn(0);
 }
 
@@ -227,7 +229,7 @@ PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT && m.F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT) PetscFunctionReturn(0); /* the analysis failed */
+  if (m.no_analysis) PetscFunctionReturn(0);
   PetscCall(PetscObjectReference((PetscObject)A));
   PetscCall(MatDestroy(&m.A));
   m.A = A;

@@ -1,5 +1,6 @@
 /*
-  "mumpsnd", and "smumpsnd" in single precision: the factor matrix. Options: -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
+  "mumpsnd", and "smumpsnd" in single precision: the factor matrix. Options: -mat_mumps_memory <MB>, the memory that a factor may take on each machine (what is
+  free there; 0: nobody asks); -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
   MatMumpsSetIcntl(), MatMumpsGetInfog() and the like work on the factor. Unless ICNTL(7) or PETSc's ordering is set,
   the analysis is done for METIS and for MUMPS's automatic choice and the one with fewer operations is kept: an analysis
   costs a few percent of one factorization, and on long thin bodies PORD is sometimes the better one.
@@ -11,6 +12,7 @@
 
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
 #include "linear.h"
+#include "memory.h"
 #include "mumpsnd_data.h"
 
 /* MUMPS foresees its workspace without the pivots that are delayed; an indefinite matrix can need several times as much
@@ -51,6 +53,28 @@ template <class P> static PetscErrorCode ReportRange(Mat F, Mat A)
              "The matrix has entries beyond the range of single precision; use -pc_factor_mat_solver_type %s", LINEAR_MUMPSND);
   PetscCall(PetscInfo(F, "The matrix has entries beyond the range of single precision\n"));
   F->factorerrortype = MAT_FACTOR_OTHER;
+  PetscFunctionReturn(0);
+}
+
+/*
+  Linux grants more memory than there is, and kills a process that takes it: a factor without room is not begun. What the analysis foresees holds in core
+  and without compression.
+*/
+template <class P> static PetscErrorCode ReportMemory(Mat F, Mat A)
+{
+  MumpsND<P>  *m = Data<P>(F);
+  LinearMemory fullest;
+
+  PetscFunctionBegin;
+  m->no_room = false;
+  if (m->infog(1) < 0 || m->memory == 0 || m->icntl(22) || m->icntl(35)) PetscFunctionReturn(0);
+  PetscCall(LinearMemoryOf(m->comm, m->id.info[14], m->memory, &fullest)); /* INFO(15) */
+  if (fullest.need <= fullest.free) PetscFunctionReturn(0);
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_MEM,
+             "The factor of the matrix of %" PetscInt_FMT " rows needs %.0f MB on a machine, %.0f MB are free there (-mat_mumps_memory)", A->rmap->N, fullest.need, fullest.free);
+  PetscCall(PetscInfo(F, "The factor needs %.0f MB on a machine, %.0f MB are free there (-mat_mumps_memory)\n", fullest.need, fullest.free));
+  m->no_room         = true;
+  F->factorerrortype = MAT_FACTOR_OUTMEMORY;
   PetscFunctionReturn(0);
 }
 
@@ -166,6 +190,7 @@ template <class P> static PetscErrorCode ReadOptions(Mat F)
     if (set) PetscCall(SetIcntl<P>(F, i, value));
     if (set && i == 4) Data<P>(F)->icntl(3) = 6;
   }
+  PetscCall(PetscOptionsGetReal(options, prefix, "-mat_mumps_memory", &Data<P>(F)->memory, NULL));
   for (int i = 1; i <= 15; ++i) {
     PetscCall(PetscSNPrintf(name, sizeof name, "-mat_mumps_cntl_%d", i));
     PetscReal value;
@@ -180,7 +205,7 @@ template <class P> static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFa
   MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
-  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT) PetscFunctionReturn(0); /* the analysis failed */
+  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT || m->no_room) PetscFunctionReturn(0); /* the analysis failed */
   F->factorerrortype = MAT_FACTOR_NOERROR;
   PetscCall(MumpsNDDropScatter(m));
   PetscCall(CopyValues(A, m));
@@ -209,6 +234,7 @@ template <class P> static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
   PetscCall(CopyValues(A, m));
   PetscCall(MumpsNDAnalyse(A, m->size == 1 ? given : NULL, m));
   PetscCall(ReportError<P>(F, A, "analysis"));
+  PetscCall(ReportMemory<P>(F, A));
   F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric<P>;
   MumpsNDSetSolves<P>(F);
   PetscFunctionReturn(0);

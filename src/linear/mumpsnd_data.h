@@ -51,6 +51,8 @@ template <class Precision> struct MumpsND {
   Vec                    sol;        /* placed there */
   VecScatter             scatter;
 
+  double    memory = -1;                     /* -mat_mumps_memory, MB */
+  bool      no_room = false;                 /* the analysis foresees more than there is */
   PetscBool user_ordering, user_null_pivots; /* ICNTL(7) and ICNTL(24) were set from outside */
 
   /* MUMPS numbers its arrays from 1 */
