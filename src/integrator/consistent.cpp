@@ -112,7 +112,7 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
     PetscCall(MatrixHasNumbers(c.P, &numbers));
   }
   PetscCall(ChooseSolver(c.ksp, c.P, c.linear, c.chosen));
-  PetscCall(Factor(ts, c.ksp, c.P, c.P, c.failed));
+  PetscCall(Factor(ts, c.ksp, c.P, c.P, c.linear, c.failed));
   I.stat.factorizations++;
   if (!numbers && !*c.failed) *c.failed = PC_FACTOR_OTHER;
   *ok  = (PetscBool)!*c.failed;

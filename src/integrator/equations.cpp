@@ -244,7 +244,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
 
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(ChooseSolver(ksp, P, &I.linear, &I.linear_chosen));
-  PetscCall(Factor(ts, ksp, J, P, &I.unfactored));
+  PetscCall(Factor(ts, ksp, J, P, &I.linear, &I.unfactored));
   if (I.unfactored) PetscCall(SNESSetJacobianDomainError(snes));
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

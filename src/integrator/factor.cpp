@@ -59,9 +59,10 @@ PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *cho
 }
 
 /* failed: of the last factorization on entry, of this one on return, the same on all ranks */
-PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, PCFailedReason *failed)
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed)
 {
-  PC pc;
+  PC        pc;
+  PetscBool smaller = PETSC_FALSE, numbers;
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
@@ -72,6 +73,15 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, PCFailedReason *failed)
   if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
   PetscCall(KSPSetUp(ksp));
   PetscCall(FailedReason(pc, failed));
+  if (*failed == PC_FACTOR_OUTMEMORY) {
+    PetscCall(MatrixHasNumbers(P, &numbers));
+    if (numbers) PetscCall(LinearChooseSmaller(ksp, P, linear, &smaller));
+  }
+  if (smaller) {
+    PetscCall(KSPSetOperators(ksp, J, P));
+    PetscCall(KSPSetUp(ksp));
+    PetscCall(FailedReason(pc, failed));
+  }
   PetscCall(CheckMemory(ts, pc, P, *failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

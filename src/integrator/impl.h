@@ -353,7 +353,7 @@ PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);
 /* factor.cpp */
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
-PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, PCFailedReason *failed);
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed);
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
 /* equations.cpp */

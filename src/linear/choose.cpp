@@ -1,9 +1,10 @@
 /* The choice of a direct solver: by the work that a factorization takes, not by the number of unknowns */
-#include "constraint.h"
+#include "choose.h"
 #include "graph.h"
 #include "klupair.h"
 #include "kluparts.h"
 #include "linear.h"
+#include "mumpsmixed.h"
 #include "mumpsnd.h"
 
 /*
@@ -33,6 +34,10 @@ static const PetscInt LARGE_INTERFACE = 2000;
 /* Counting stops here: a factor with this many entries is large by any measure */
 static const double COUNT_LIMIT = 1e7;
 
+/* Matrices distributed over ranks, or of one triangle: entries of the whole matrix from which its factor is as large in all likelihood. Fewer are factored in a
+   fraction of a second in any precision. */
+static const double MANY_ENTRIES = 4e6;
+
 static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
                                              MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
 static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST, MATSOLVERUMFPACK,
@@ -40,7 +45,7 @@ static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS, M
 
 /* ---- what the user settled ---- */
 
-static PetscErrorCode OptionGiven(KSP ksp, const char name[], PetscBool *given)
+PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given)
 {
   PetscOptions options;
   const char  *prefix;
@@ -108,9 +113,9 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetType(pc, &pc_type));
   PetscCall(SetByProgram(pc, &pc_by_program));
-  PetscCall(OptionGiven(ksp, "-pc_type", &pc_by_option));
+  PetscCall(LinearOptionGiven(ksp, "-pc_type", &pc_by_option));
   if (pc_by_program) PetscCall(PackageGiven(pc, &package_by_program));
-  PetscCall(OptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
+  PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
   choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
   choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
   if (!pc_type) { /* options that name a package have PETSc look for its factorization of this matrix at once */
@@ -130,7 +135,7 @@ namespace
 
 struct Size {
   LinearWork work;
-  PetscBool  large, parts;
+  PetscBool  large, parts, single;
   char       text[160];
 };
 
@@ -167,6 +172,7 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
 static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
 {
   PetscMPIInt     processes;
+  MatInfo         info;
   PetscBool       seqaij, triangle, bounded, done;
   IS              row, col;
   const PetscInt *order;
@@ -175,6 +181,8 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscFunctionBegin;
   *size = Size();
   PetscCall(LinearStoresTriangle(P, &triangle));
+  PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
+  size->single = (PetscBool)((triangle ? 2 : 1) * info.nz_used > MANY_ENTRIES);
   if (triangle) { /* MUMPS reads it, KLU and the like do not: a chain of 50 unknowns takes 0.28 ms in place of 0.007 ms (above) */
     size->large = PETSC_TRUE;
     PetscCall(PetscStrncpy(size->text, "the matrix holds one triangle", sizeof size->text));
@@ -199,6 +207,7 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscCall(ISDestroy(&col));
   const double threshold = symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC;
   const double per_entry = size->work.flops / PetscMax(size->work.factor, 1.0);
+  size->single = (PetscBool)!bounded;
   size->large = !bounded || (size->work.flops > threshold && per_entry > LARGE_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(PetscSNPrintf(size->text, sizeof size->text, "factor with %s%.2g entries, %.2g operations",
                           bounded ? "" : "more than ", size->work.factor, size->work.flops));
@@ -235,12 +244,14 @@ static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large,
 /* Packages that exploit symmetry of an indefinite matrix; the others' PCCHOLESKY wants a definite one */
 static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
 {
-  PetscBool mumps, ours;
+  PetscBool same;
 
   PetscFunctionBegin;
-  PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
-  PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &ours));
-  *yes = mumps || ours ? PETSC_TRUE : PETSC_FALSE;
+  *yes = PETSC_FALSE;
+  for (const char *name : {MATSOLVERMUMPS, LINEAR_MUMPSND, LINEAR_SMUMPSND, LINEAR_MUMPSMIXED}) {
+    PetscCall(PetscStrcmp(package, name, &same));
+    if (same) *yes = PETSC_TRUE;
+  }
   PetscFunctionReturn(0);
 }
 
@@ -281,7 +292,7 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
   if (!same) PetscCall(PCSetType(pc, type));
   PetscCall(SetPackage(pc, package));
   if (!same) PetscCall(PCSetFromOptions(pc));
-  PetscCall(OptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
+  PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
   PetscCall(PetscStrcmp(package, MATSOLVERPETSC, &petsc));
   if (!ordering && !petsc) PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGEXTERNAL));
   PetscFunctionReturn(0);
@@ -332,11 +343,24 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
                             "LU with petsc: no other installed package factors matrices of type %s", type));
     PetscFunctionReturn(0);
   }
-  PetscCall(OptionGiven(ksp, "-ksp_type", &by_option));
+  PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
   if (!by_option) PetscCall(KSPSetType(ksp, KSPGMRES));
   PetscCall(PCSetType(pc, PCNONE));
   PetscCall(PetscStrncpy(choice->text, "GMRES without preconditioner: nothing factors this type of matrix",
                          sizeof choice->text));
+  PetscFunctionReturn(0);
+}
+
+/* Factors in single precision in place of those of "mumpsnd" where the factor is the solver: a Krylov method multiplies its rough solves by as many
+   iterations as it makes */
+static PetscErrorCode PreferSingle(KSP ksp, Mat P, MatFactorType type, const char **package)
+{
+  PetscBool ours, preonly;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrcmp(*package, LINEAR_MUMPSND, &ours));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &preonly));
+  if (ours && preonly) PetscCall(IfAvailable(P, LINEAR_MUMPSMIXED, type, package));
   PetscFunctionReturn(0);
 }
 
@@ -371,6 +395,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);
   }
+  if (package && size.single && choice->may_be_rough) PetscCall(PreferSingle(ksp, P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &package));
   if (package && choice->user_pc)
     PetscCall(SetPackage(pc, package));
   else if (package)
@@ -378,7 +403,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   PetscMPIInt ranks;
   PetscBool   mumps = PETSC_FALSE;
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &ranks));
-  if (package && ranks > 1) PetscCall(PetscStrcmp(package, LINEAR_MUMPSND, &mumps));
+  if (package && ranks > 1) PetscCall(FactorsIndefinite(package, &mumps));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s%s: %s", cholesky ? "LDL^T" : "LU",
                           package ? package : "PETSc's default", mumps ? " (runs repeat to rounding only)" : "", size.text));
   PetscFunctionReturn(0);
@@ -421,23 +446,7 @@ static PetscErrorCode RefuseTriangle(PC pc, Mat P)
   PetscFunctionReturn(0);
 }
 
-/* A correction is followed by the next one, which makes up for what the Krylov method leaves: with PETSc's 1e-5 a step of a finite-element body takes
-   twice the iterations. */
-static PetscErrorCode LooseTolerance(KSP ksp, PC pc)
-{
-  const PetscReal petscs = 1e-5, loose = 1e-2;
-  PetscReal       rtol;
-  PetscBool       constraint, given;
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCHHTCONSTRAINT, &constraint));
-  PetscCall(OptionGiven(ksp, "-ksp_rtol", &given));
-  PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
-  if (!constraint || given || rtol != petscs) PetscFunctionReturn(0);
-  PetscCall(KSPSetTolerances(ksp, loose, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(PetscInfo(ksp, "Linear solver: relative tolerance %g with " PCHHTCONSTRAINT ", -ksp_rtol sets another\n", (double)loose));
-  PetscFunctionReturn(0);
-}
+/* ---- the choice ---- */
 
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice)
 {
@@ -445,14 +454,16 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  if (choice->user_pc && choice->user_package)
+  if (choice->iterative)
+    PetscCall(LinearSetKrylov(ksp, choice->cholesky = symmetric, choice));
+  else if (choice->user_pc && choice->user_package)
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
   else if (choice->user_package)
     PetscCall(FollowPackage(ksp, P, symmetric, pc, choice));
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
-  PetscCall(LooseTolerance(ksp, pc));
+  PetscCall(LinearLoosen(ksp));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);
 }

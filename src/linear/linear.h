@@ -12,6 +12,8 @@
 struct LinearChoice {
   PetscBool user_pc      = PETSC_FALSE; /* the program or the options chose the preconditioner's type */
   PetscBool user_package = PETSC_FALSE; /* ... or the package that factors the matrix */
+  PetscBool may_be_rough = PETSC_FALSE; /* the caller has LinearSolveRoughly() for most solves: factors in single precision pay */
+  PetscBool iterative    = PETSC_FALSE; /* there was no room for a factor: a Krylov method with the constraint preconditioner */
   PetscBool cholesky     = PETSC_FALSE; /* LDL^T was chosen, which stands on the symmetry of the matrix */
   char      text[256]    = "";          /* for -ts_view and -info: what was chosen, and why */
 };
@@ -26,6 +28,10 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
    The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);
 
+/* Where there was no room for the factor that was chosen: conjugate gradients, or FGMRES if the matrix is not symmetric, with the preconditioner "hhtconstraint"
+   (constraint.h). *changed = PETSC_FALSE if the choice was the user's, or is this one already. */
+PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBool *changed);
+
 /* The same where a run goes on with the solver that it had: package and factorization are not looked for anew. */
 PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice);
 
@@ -37,6 +43,13 @@ PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool
 */
 PetscErrorCode LinearSaveState(KSP ksp, Archive *archive);
 PetscErrorCode LinearLoadState(KSP ksp, Mat P, Archive *archive, PetscBool *same, PetscBool *usable);
+
+/*
+  Solves with the matrix P may be rough from now on, or may no longer be: those of a caller whose own iteration removes their error. A package
+  whose factors are of single precision leaves out its refinement then (mumpsmixed.h); others do not ask.
+*/
+PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough);
+PetscErrorCode LinearSolvesRoughly(Mat P, PetscBool *rough);
 
 /* Functions of a factor by these names, (Mat F, Archive *) and (Mat F, Mat P, Archive *, PetscBool *same) */
 #define LINEAR_SAVE_STATE "LinearSaveState_C"

@@ -1,25 +1,25 @@
 /*
-  "mumpsnd": the factor matrix. Options: -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
+  "mumpsnd", and "smumpsnd" in single precision: the factor matrix. Options: -mat_mumps_memory <MB>, the memory that a factor may take on each machine (what is
+  free there; 0: nobody asks); -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
   MatMumpsSetIcntl(), MatMumpsGetInfog() and the like work on the factor. Unless ICNTL(7) or PETSc's ordering is set,
   the analysis is done for METIS and for MUMPS's automatic choice and the one with fewer operations is kept: an analysis
   costs a few percent of one factorization, and on long thin bodies PORD is sometimes the better one.
 */
 #include "mumpsnd.h"
 #include <algorithm>
+#include <cmath>
 #include <petsc/private/matimpl.h>
 
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
 #include "linear.h"
+#include "memory.h"
 #include "mumpsnd_data.h"
-
-/* Rows below this, relative to the scaled matrix, count as null: redundant constraints leave rounding there */
-static const double NULL_PIVOT = 1e-14;
 
 /* MUMPS foresees its workspace without the pivots that are delayed; an indefinite matrix can need several times as much
  */
 static const int WORKSPACE_PERCENT = 30, WORKSPACE_RETRIES = 5;
 
-static MumpsND *Data(Mat F) { return static_cast<MumpsND *>(F->data); }
+template <class P> static MumpsND<P> *Data(Mat F) { return static_cast<MumpsND<P> *>(F->data); }
 
 /* ---- errors ---- */
 
@@ -31,9 +31,9 @@ static MatFactorError FactorError(int infog1)
   return MAT_FACTOR_OTHER;
 }
 
-static PetscErrorCode ReportError(Mat F, Mat A, const char phase[])
+template <class P> static PetscErrorCode ReportError(Mat F, Mat A, const char phase[])
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   if (m->infog(1) >= 0) PetscFunctionReturn(0);
@@ -45,11 +45,44 @@ static PetscErrorCode ReportError(Mat F, Mat A, const char phase[])
   PetscFunctionReturn(0);
 }
 
+template <class P> static PetscErrorCode ReportRange(Mat F, Mat A)
+{
+  PetscFunctionBegin;
+  if (!Data<P>(F)->beyond_range) PetscFunctionReturn(0);
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_ARG_OUTOFRANGE,
+             "The matrix has entries beyond the range of single precision; use -pc_factor_mat_solver_type %s", LINEAR_MUMPSND);
+  PetscCall(PetscInfo(F, "The matrix has entries beyond the range of single precision\n"));
+  F->factorerrortype = MAT_FACTOR_OTHER;
+  PetscFunctionReturn(0);
+}
+
+/*
+  Linux grants more memory than there is, and kills a process that takes it: a factor without room is not begun. What the analysis foresees holds in core
+  and without compression.
+*/
+template <class P> static PetscErrorCode ReportMemory(Mat F, Mat A)
+{
+  MumpsND<P>  *m = Data<P>(F);
+  LinearMemory fullest;
+
+  PetscFunctionBegin;
+  m->no_room = false;
+  if (m->infog(1) < 0 || m->memory == 0 || m->icntl(22) || m->icntl(35)) PetscFunctionReturn(0);
+  PetscCall(LinearMemoryOf(m->comm, m->id.info[14], m->memory, &fullest)); /* INFO(15) */
+  if (fullest.need <= fullest.free) PetscFunctionReturn(0);
+  PetscCheck(!A->erroriffailure, PetscObjectComm((PetscObject)F), PETSC_ERR_MEM,
+             "The factor of the matrix of %" PetscInt_FMT " rows needs %.0f MB on a machine, %.0f MB are free there (-mat_mumps_memory)", A->rmap->N, fullest.need, fullest.free);
+  PetscCall(PetscInfo(F, "The factor needs %.0f MB on a machine, %.0f MB are free there (-mat_mumps_memory)\n", fullest.need, fullest.free));
+  m->no_room         = true;
+  F->factorerrortype = MAT_FACTOR_OUTMEMORY;
+  PetscFunctionReturn(0);
+}
+
 /* MUMPS goes on past a null pivot with one of many solutions; unless the user asked for that, it is a singular matrix
  */
-static PetscErrorCode ReportNullPivots(Mat F, Mat A)
+template <class P> static PetscErrorCode ReportNullPivots(Mat F, Mat A)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   if (m->infog(1) < 0 || m->infog(28) == 0 || m->user_null_pivots) PetscFunctionReturn(0);
@@ -62,9 +95,9 @@ static PetscErrorCode ReportNullPivots(Mat F, Mat A)
 
 /* ---- the entries ---- */
 
-static bool Wanted(const MumpsND *m, PetscInt row, PetscInt col) { return m->id.sym == 0 || col >= row; }
+template <class P> static bool Wanted(const MumpsND<P> *m, PetscInt row, PetscInt col) { return m->id.sym == 0 || col >= row; }
 
-static PetscErrorCode CopyPattern(Mat A, MumpsND *m)
+template <class P> static PetscErrorCode CopyPattern(Mat A, MumpsND<P> *m)
 {
   PetscInt        begin, end, count;
   const PetscInt *cols;
@@ -93,12 +126,13 @@ static PetscErrorCode CopyPattern(Mat A, MumpsND *m)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode CopyValues(Mat A, MumpsND *m)
+template <class P> static PetscErrorCode CopyValues(Mat A, MumpsND<P> *m)
 {
   PetscInt           begin, end, count;
   const PetscInt    *cols;
   const PetscScalar *vals;
-  size_t             next = 0;
+  size_t             next   = 0;
+  PetscMPIInt        beyond = 0;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(A, &begin, &end));
@@ -110,11 +144,15 @@ static PetscErrorCode CopyValues(Mat A, MumpsND *m)
         PetscCheck(
             next < m->val.size() && m->col[next] == cols[k] + 1, PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP,
             "Row %" PetscInt_FMT " of the matrix has another pattern than the one analysed; set the operators anew", i);
-        m->val[next++] = vals[k];
+        m->val[next] = (typename P::Real)vals[k];
+        if (!std::isfinite(m->val[next]) && std::isfinite(vals[k])) beyond = 1;
+        next++;
       }
     PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
   }
   PetscCall(MatRestoreRowUpperTriangular(A));
+  if (sizeof(typename P::Real) < sizeof(PetscScalar)) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &beyond, 1, MPI_INT, MPI_MAX, m->comm));
+  m->beyond_range = beyond;
   PetscFunctionReturn(0);
 }
 
@@ -123,21 +161,21 @@ static PetscErrorCode CopyValues(Mat A, MumpsND *m)
 /* Controls that describe how the matrix and the vectors are passed belong to this file */
 static bool Owned(PetscInt i) { return i == 5 || i == 9 || i == 18 || i == 19 || i == 20 || i == 21; }
 
-static PetscErrorCode SetIcntl(Mat F, PetscInt i, PetscInt value)
+template <class P> static PetscErrorCode SetIcntl(Mat F, PetscInt i, PetscInt value)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   PetscCheck(i >= 1 && i <= 60 && !Owned(i) && !(i == 7 && value == 1), PetscObjectComm((PetscObject)F),
              PETSC_ERR_ARG_OUTOFRANGE, "ICNTL(%" PetscInt_FMT ")=%" PetscInt_FMT " cannot be set for solver type %s", i,
-             value, LINEAR_MUMPSND);
+             value, P::package());
   m->icntl((int)i) = (MUMPS_INT)value;
   if (i == 7) m->user_ordering = PETSC_TRUE;
   if (i == 24) m->user_null_pivots = PETSC_TRUE;
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode ReadOptions(Mat F)
+template <class P> static PetscErrorCode ReadOptions(Mat F)
 {
   const PetscOptions options = ((PetscObject)F)->options;
   const char *const  prefix  = ((PetscObject)F)->prefix;
@@ -149,69 +187,75 @@ static PetscErrorCode ReadOptions(Mat F)
     PetscInt value;
     PetscCall(PetscSNPrintf(name, sizeof name, "-mat_mumps_icntl_%d", i));
     PetscCall(PetscOptionsGetInt(options, prefix, name, &value, &set));
-    if (set) PetscCall(SetIcntl(F, i, value));
-    if (set && i == 4) Data(F)->icntl(3) = 6;
+    if (set) PetscCall(SetIcntl<P>(F, i, value));
+    if (set && i == 4) Data<P>(F)->icntl(3) = 6;
   }
+  PetscCall(PetscOptionsGetReal(options, prefix, "-mat_mumps_memory", &Data<P>(F)->memory, NULL));
   for (int i = 1; i <= 15; ++i) {
     PetscCall(PetscSNPrintf(name, sizeof name, "-mat_mumps_cntl_%d", i));
-    PetscCall(PetscOptionsGetReal(options, prefix, name, &Data(F)->cntl(i), NULL));
+    PetscReal value;
+    PetscCall(PetscOptionsGetReal(options, prefix, name, &value, &set));
+    if (set) Data<P>(F)->cntl(i) = (typename P::Real)value;
   }
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
+template <class P> static PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
-  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT) PetscFunctionReturn(0); /* the analysis failed */
+  if (F->factorerrortype == MAT_FACTOR_STRUCT_ZEROPIVOT || m->no_room) PetscFunctionReturn(0); /* the analysis failed */
   F->factorerrortype = MAT_FACTOR_NOERROR;
   PetscCall(MumpsNDDropScatter(m));
   PetscCall(CopyValues(A, m));
+  PetscCall(ReportRange<P>(F, A));
+  if (m->beyond_range) PetscFunctionReturn(0);
   MumpsRun(m, MUMPS_FACTOR);
   for (int k = 0; k < WORKSPACE_RETRIES && (m->infog(1) == -8 || m->infog(1) == -9); ++k) {
     m->icntl(14) = std::max(2 * m->icntl(14), m->icntl(14) + 50);
     PetscCall(PetscInfo(F, "MUMPS ran out of workspace, again with ICNTL(14)=%d\n", m->icntl(14)));
     MumpsRun(m, MUMPS_FACTOR);
   }
-  PetscCall(ReportError(F, A, "factorization"));
-  PetscCall(ReportNullPivots(F, A));
+  PetscCall(ReportError<P>(F, A, "factorization"));
+  PetscCall(ReportNullPivots<P>(F, A));
   F->assembled = PETSC_TRUE;
   PetscCall(PetscLogFlops(m->id.rinfo[1])); /* RINFO(2) */
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
+template <class P> static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
-  PetscCall(ReadOptions(F));
+  PetscCall(ReadOptions<P>(F));
   PetscCall(CopyPattern(A, m));
   PetscCall(CopyValues(A, m));
   PetscCall(MumpsNDAnalyse(A, m->size == 1 ? given : NULL, m));
-  PetscCall(ReportError(F, A, "analysis"));
-  F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric;
-  MumpsNDSetSolves(F);
+  PetscCall(ReportError<P>(F, A, "analysis"));
+  PetscCall(ReportMemory<P>(F, A));
+  F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric<P>;
+  MumpsNDSetSolves<P>(F);
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode LUFactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorInfo *)
+template <class P> static PetscErrorCode LUFactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorInfo *)
 {
-  return FactorSymbolic(F, A, row);
+  return FactorSymbolic<P>(F, A, row);
 }
 
-static PetscErrorCode CholeskyFactorSymbolic(Mat F, Mat A, IS row, const MatFactorInfo *)
+template <class P> static PetscErrorCode CholeskyFactorSymbolic(Mat F, Mat A, IS row, const MatFactorInfo *)
 {
-  return FactorSymbolic(F, A, row);
+  return FactorSymbolic<P>(F, A, row);
 }
 
 /* ---- state ---- */
 
 /* Pivots are chosen anew with every matrix, but the analysis has ordered the unknowns by the values of its own one */
-static PetscErrorCode SaveState(Mat F, Archive *archive)
+template <class P> static PetscErrorCode SaveState(Mat F, Archive *archive)
 {
-  MumpsND  *m         = Data(F);
+  MumpsND<P> *m         = Data<P>(F);
   MUMPS_INT ordering  = m->icntl(7), workspace = m->icntl(14);
 
   PetscFunctionBegin;
@@ -233,9 +277,9 @@ static bool IsPermutation(const std::vector<MUMPS_INT> &position, MUMPS_INT n)
   return position.size() == (size_t)n;
 }
 
-static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
+template <class P> static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
-  MumpsND  *m        = Data(F);
+  MumpsND<P> *m        = Data<P>(F);
   MUMPS_INT ordering = 0, workspace = 0;
 
   PetscFunctionBegin;
@@ -249,29 +293,29 @@ static PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
   PetscCall(MumpsNDDropScatter(m));
   m->icntl(14) = workspace;
   MumpsNDAnalyseAgain(m, ordering);
-  PetscCall(ReportError(F, A, "analysis"));
-  if (!F->factorerrortype) PetscCall(FactorNumeric(F, A, NULL));
+  PetscCall(ReportError<P>(F, A, "analysis"));
+  if (!F->factorerrortype) PetscCall(FactorNumeric<P>(F, A, NULL));
   *same = (PetscBool)(!F->factorerrortype && m->size == 1);
   PetscFunctionReturn(0);
 }
 
 /* ---- what can be asked of the factor ---- */
 
-static PetscErrorCode GetIcntl(Mat F, PetscInt i, PetscInt *value) { return *value = Data(F)->icntl((int)i), 0; }
+template <class P> static PetscErrorCode GetIcntl(Mat F, PetscInt i, PetscInt *value) { return *value = Data<P>(F)->icntl((int)i), 0; }
 
-static PetscErrorCode SetCntl(Mat F, PetscInt i, PetscReal value) { return Data(F)->cntl((int)i) = value, 0; }
+template <class P> static PetscErrorCode SetCntl(Mat F, PetscInt i, PetscReal value) { return Data<P>(F)->cntl((int)i) = (typename P::Real)value, 0; }
 
-static PetscErrorCode GetCntl(Mat F, PetscInt i, PetscReal *value) { return *value = Data(F)->cntl((int)i), 0; }
+template <class P> static PetscErrorCode GetCntl(Mat F, PetscInt i, PetscReal *value) { return *value = Data<P>(F)->cntl((int)i), 0; }
 
-static PetscErrorCode GetInfog(Mat F, PetscInt i, PetscInt *value) { return *value = Data(F)->infog((int)i), 0; }
+template <class P> static PetscErrorCode GetInfog(Mat F, PetscInt i, PetscInt *value) { return *value = Data<P>(F)->infog((int)i), 0; }
 
-static PetscErrorCode GetRinfog(Mat F, PetscInt i, PetscReal *value) { return *value = Data(F)->rinfog((int)i), 0; }
+template <class P> static PetscErrorCode GetRinfog(Mat F, PetscInt i, PetscReal *value) { return *value = Data<P>(F)->rinfog((int)i), 0; }
 
-static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_MUMPSND, 0; }
+template <class P> static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = P::package(), 0; }
 
-static PetscErrorCode GetInertia(Mat F, PetscInt *negative, PetscInt *zero, PetscInt *positive)
+template <class P> static PetscErrorCode GetInertia(Mat F, PetscInt *negative, PetscInt *zero, PetscInt *positive)
 {
-  const MumpsND *m = Data(F);
+  const MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   if (negative) *negative = m->infog(12);
@@ -280,9 +324,9 @@ static PetscErrorCode GetInertia(Mat F, PetscInt *negative, PetscInt *zero, Pets
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
+template <class P> static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
 {
-  const MumpsND *m       = Data(F);
+  const MumpsND<P> *m       = Data<P>(F);
   const double   entries = m->infog(29) < 0 ? -1e6 * m->infog(29) : m->infog(29);
 
   PetscFunctionBegin;
@@ -292,9 +336,9 @@ static PetscErrorCode GetInfo(Mat F, MatInfoType, MatInfo *info)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode View(Mat F, PetscViewer viewer)
+template <class P> static PetscErrorCode View(Mat F, PetscViewer viewer)
 {
-  MumpsND          *m = Data(F);
+  MumpsND<P>       *m = Data<P>(F);
   PetscBool         ascii;
   PetscViewerFormat format;
 
@@ -304,7 +348,8 @@ static PetscErrorCode View(Mat F, PetscViewer viewer)
   PetscCall(PetscViewerGetFormat(viewer, &format));
   if (format != PETSC_VIEWER_ASCII_INFO && format != PETSC_VIEWER_ASCII_INFO_DETAIL) PetscFunctionReturn(0);
   PetscCall(
-      PetscViewerASCIIPrintf(viewer, "MUMPS %s, SYM=%d, ordering %s\n", m->id.version_number, m->id.sym, m->ordering));
+      PetscViewerASCIIPrintf(viewer, "MUMPS %s in %s precision, SYM=%d, ordering %s\n", m->id.version_number,
+                                   sizeof(typename P::Real) < sizeof(double) ? "single" : "double", m->id.sym, m->ordering));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  operations: %g foreseen, %g done; delayed pivots: %d\n", m->rinfog(1),
                                    m->rinfog(3), m->infog(13)));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  memory used: %d MB on the fullest process, %d MB in all; ICNTL(14)=%d\n",
@@ -316,28 +361,28 @@ static const char *const composed[] = {"MatFactorGetSolverType_C", "MatMumpsSetI
                                        "MatMumpsSetCntl_C",        "MatMumpsGetCntl_C",  "MatMumpsGetInfog_C",
                                        "MatMumpsGetRinfog_C",      LINEAR_SAVE_STATE,    LINEAR_LOAD_STATE};
 
-static PetscErrorCode Compose(Mat F)
+template <class P> static PetscErrorCode Compose(Mat F)
 {
   const PetscObject f = (PetscObject)F;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectComposeFunction(f, "MatFactorGetSolverType_C", GetSolverType));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetIcntl_C", SetIcntl));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetIcntl_C", GetIcntl));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetCntl_C", SetCntl));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetCntl_C", GetCntl));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetInfog_C", GetInfog));
-  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetRinfog_C", GetRinfog));
-  PetscCall(PetscObjectComposeFunction(f, LINEAR_SAVE_STATE, SaveState));
-  PetscCall(PetscObjectComposeFunction(f, LINEAR_LOAD_STATE, LoadState));
+  PetscCall(PetscObjectComposeFunction(f, "MatFactorGetSolverType_C", GetSolverType<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetIcntl_C", SetIcntl<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetIcntl_C", GetIcntl<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsSetCntl_C", SetCntl<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetCntl_C", GetCntl<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetInfog_C", GetInfog<P>));
+  PetscCall(PetscObjectComposeFunction(f, "MatMumpsGetRinfog_C", GetRinfog<P>));
+  PetscCall(PetscObjectComposeFunction(f, LINEAR_SAVE_STATE, SaveState<P>));
+  PetscCall(PetscObjectComposeFunction(f, LINEAR_LOAD_STATE, LoadState<P>));
   PetscFunctionReturn(0);
 }
 
 /* ---- create and destroy ---- */
 
-static PetscErrorCode Destroy(Mat F)
+template <class P> static PetscErrorCode Destroy(Mat F)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   PetscCall(MumpsNDDropScatter(m));
@@ -349,9 +394,9 @@ static PetscErrorCode Destroy(Mat F)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode CreateInstance(Mat A, int sym, MumpsND **instance)
+template <class P> static PetscErrorCode CreateInstance(Mat A, int sym, MumpsND<P> **instance)
 {
-  MumpsND *m = new MumpsND();
+  MumpsND<P> *m = new MumpsND<P>();
   PetscInt begin, end;
 
   PetscFunctionBegin;
@@ -374,12 +419,12 @@ static PetscErrorCode CreateInstance(Mat A, int sym, MumpsND **instance)
   m->icntl(21) = m->size > 1 ? 1 : 0;
   m->icntl(24) = 1;
   m->icntl(28) = 1; /* one process orders: there is no parallel METIS here */
-  m->cntl(3)   = NULL_PIVOT;
+  m->cntl(3)   = (typename P::Real)P::null_pivot;
   *instance    = m;
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode MatGetFactor_MumpsND(Mat A, MatFactorType type, Mat *factor)
+template <class P> static PetscErrorCode MatGetFactor_MumpsND(Mat A, MatFactorType type, Mat *factor)
 {
   Mat       F;
   PetscBool known, spd;
@@ -389,39 +434,53 @@ static PetscErrorCode MatGetFactor_MumpsND(Mat A, MatFactorType type, Mat *facto
              "MUMPS takes at most %d rows, the matrix has %" PetscInt_FMT, PETSC_MPI_INT_MAX, A->rmap->N);
   PetscCall(MatCreate(PetscObjectComm((PetscObject)A), &F));
   PetscCall(MatSetSizes(F, A->rmap->n, A->cmap->n, A->rmap->N, A->cmap->N));
-  PetscCall(PetscStrallocpy(LINEAR_MUMPSND, &((PetscObject)F)->type_name));
+  PetscCall(PetscStrallocpy(P::package(), &((PetscObject)F)->type_name));
   PetscCall(MatSetUp(F));
   PetscCall(MatIsSPDKnown(A, &known, &spd));
 
-  MumpsND  *m   = NULL;
+  MumpsND<P> *m   = NULL;
   const int sym = type == MAT_FACTOR_LU ? 0 : (known && spd ? 1 : 2);
-  PetscCall(CreateInstance(A, sym, &m));
+  PetscCall(CreateInstance<P>(A, sym, &m));
   F->data                        = m;
   F->factortype                  = type;
   F->canuseordering              = m->size == 1 ? PETSC_TRUE : PETSC_FALSE;
-  F->ops->lufactorsymbolic       = LUFactorSymbolic;
-  F->ops->choleskyfactorsymbolic = CholeskyFactorSymbolic;
-  F->ops->getinertia             = sym ? GetInertia : NULL;
-  F->ops->getinfo                = GetInfo;
-  F->ops->view                   = View;
-  F->ops->destroy                = Destroy;
+  F->ops->lufactorsymbolic       = LUFactorSymbolic<P>;
+  F->ops->choleskyfactorsymbolic = CholeskyFactorSymbolic<P>;
+  F->ops->getinertia             = sym && sizeof(typename P::Real) == sizeof(double) ? GetInertia<P> : NULL; /* signs of small pivots are rounding in single precision */
+  F->ops->getinfo                = GetInfo<P>;
+  F->ops->view                   = View<P>;
+  F->ops->destroy                = Destroy<P>;
   PetscCall(PetscFree(F->solvertype));
-  PetscCall(PetscStrallocpy(LINEAR_MUMPSND, &F->solvertype));
+  PetscCall(PetscStrallocpy(P::package(), &F->solvertype));
   PetscCall(PetscStrallocpy(MATORDERINGEXTERNAL, (char **)&F->preferredordering[type]));
-  PetscCall(Compose(F));
+  PetscCall(Compose<P>(F));
   *factor = F;
+  PetscFunctionReturn(0);
+}
+
+template <class P> static PetscErrorCode Register()
+{
+  PetscFunctionBegin;
+  PetscCall(LinearRegisterForTypes(P::package(), MatGetFactor_MumpsND<P>));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearRegisterForTypes(const char package[], PetscErrorCode (*get)(Mat, MatFactorType, Mat *))
+{
+  PetscFunctionBegin;
+  for (MatFactorType type : {MAT_FACTOR_LU, MAT_FACTOR_CHOLESKY})
+    for (MatType matrix : {MATSEQAIJ, MATMPIAIJ}) PetscCall(MatSolverTypeRegister(package, matrix, type, get));
+  for (MatType matrix : {MATSEQSBAIJ, MATMPISBAIJ}) PetscCall(MatSolverTypeRegister(package, matrix, MAT_FACTOR_CHOLESKY, get));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LinearRegisterMumpsND(void)
 {
   PetscFunctionBegin;
-  for (MatFactorType type : {MAT_FACTOR_LU, MAT_FACTOR_CHOLESKY}) {
-    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATSEQAIJ, type, MatGetFactor_MumpsND));
-    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, MATMPIAIJ, type, MatGetFactor_MumpsND));
-  }
-  for (MatType type : {MATSEQSBAIJ, MATMPISBAIJ})
-    PetscCall(MatSolverTypeRegister(LINEAR_MUMPSND, type, MAT_FACTOR_CHOLESKY, MatGetFactor_MumpsND));
+  PetscCall(Register<MumpsDouble>());
+#if defined(HHTDAE_HAVE_SMUMPS)
+  PetscCall(Register<MumpsSingle>());
+#endif
   PetscFunctionReturn(0);
 }
 

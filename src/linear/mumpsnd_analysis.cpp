@@ -77,7 +77,8 @@ static PetscErrorCode FindPartners(Mat A, std::vector<int> *partner)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode GatherToFirst(const MumpsND *m, const std::vector<int> &local, std::vector<int> *all)
+template <class P>
+static PetscErrorCode GatherToFirst(const MumpsND<P> *m, const std::vector<int> &local, std::vector<int> *all)
 {
   PetscMPIInt              count;
   std::vector<PetscMPIInt> counts(m->size), starts(m->size + 1, 0);
@@ -99,13 +100,13 @@ static PetscErrorCode GatherToFirst(const MumpsND *m, const std::vector<int> &lo
 }
 
 /* PERM_IN wants the position of each unknown, an ordering lists the unknowns by position */
-static void SetPositions(const PetscInt order[], MumpsND *m)
+template <class P> static void SetPositions(const PetscInt order[], MumpsND<P> *m)
 {
   m->position.resize(m->id.n);
   for (MUMPS_INT k = 0; k < m->id.n; ++k) m->position[order[k]] = k + 1;
 }
 
-static PetscErrorCode OrderByMetis(Mat A, MumpsND *m)
+template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
 {
   std::vector<int>      partner, row, col, partners;
   std::vector<PetscInt> order;
@@ -123,7 +124,7 @@ static PetscErrorCode OrderByMetis(Mat A, MumpsND *m)
   PetscFunctionReturn(0);
 }
 
-static void AnalyseGiven(MumpsND *m, const char name[])
+template <class P> static void AnalyseGiven(MumpsND<P> *m, const char name[])
 {
   m->icntl(7)   = 1;
   m->id.perm_in = m->rank ? NULL : m->position.data();
@@ -131,7 +132,7 @@ static void AnalyseGiven(MumpsND *m, const char name[])
   MumpsRun(m, MUMPS_ANALYSIS);
 }
 
-static void AnalyseBuiltIn(MumpsND *m, MUMPS_INT choice)
+template <class P> static void AnalyseBuiltIn(MumpsND<P> *m, MUMPS_INT choice)
 {
   static const char *const names[] = {"AMD", "given", "AMF", "Scotch", "PORD", "METIS", "QAMD"};
   m->icntl(7)                      = choice;
@@ -141,7 +142,7 @@ static void AnalyseBuiltIn(MumpsND *m, MUMPS_INT choice)
 }
 
 /* METIS and MUMPS's own choice compete by the operations that the analysis foresees, RINFOG(1) */
-static PetscErrorCode AnalyseBest(Mat A, MumpsND *m)
+template <class P> static PetscErrorCode AnalyseBest(Mat A, MumpsND<P> *m)
 {
   const MUMPS_INT automatic = 7;
 
@@ -156,7 +157,7 @@ static PetscErrorCode AnalyseBest(Mat A, MumpsND *m)
   PetscFunctionReturn(0);
 }
 
-void MumpsNDAnalyseAgain(MumpsND *m, MUMPS_INT ordering)
+template <class P> void MumpsNDAnalyseAgain(MumpsND<P> *m, MUMPS_INT ordering)
 {
   if (ordering == 1)
     AnalyseGiven(m, std::string(m->ordering).c_str());
@@ -164,7 +165,7 @@ void MumpsNDAnalyseAgain(MumpsND *m, MUMPS_INT ordering)
     AnalyseBuiltIn(m, ordering);
 }
 
-PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m)
+template <class P> PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND<P> *m)
 {
   PetscFunctionBegin;
   if (given) {
@@ -179,5 +180,12 @@ PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND *m)
     PetscCall(AnalyseBest(A, m));
   PetscFunctionReturn(0);
 }
+
+template void           MumpsNDAnalyseAgain(MumpsND<MumpsDouble> *, MUMPS_INT);
+template PetscErrorCode MumpsNDAnalyse(Mat, IS, MumpsND<MumpsDouble> *);
+#if defined(HHTDAE_HAVE_SMUMPS)
+template void           MumpsNDAnalyseAgain(MumpsND<MumpsSingle> *, MUMPS_INT);
+template PetscErrorCode MumpsNDAnalyse(Mat, IS, MumpsND<MumpsSingle> *);
+#endif
 
 #endif

@@ -11,21 +11,23 @@
 #include "mumpsnd_data.h"
 #include <algorithm>
 #include <cstdlib>
+#include <type_traits>
 
-static MumpsND *Data(Mat F) { return static_cast<MumpsND *>(F->data); }
+template <class P> static MumpsND<P> *Data(Mat F) { return static_cast<MumpsND<P> *>(F->data); }
 
-PetscErrorCode MumpsNDDropScatter(MumpsND *m)
+template <class P> PetscErrorCode MumpsNDDropScatter(MumpsND<P> *m)
 {
   PetscFunctionBegin;
   PetscCall(VecScatterDestroy(&m->scatter));
   PetscCall(VecDestroy(&m->sol));
-  m->sol_values = std::vector<double>();
+  m->sol_values = {};
+  m->sol_values.shrink_to_fit();
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode CheckSolved(Mat F)
+template <class P> static PetscErrorCode CheckSolved(Mat F)
 {
-  const MumpsND *m = Data(F);
+  const MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   PetscCheck(m->infog(1) >= 0, PetscObjectComm((PetscObject)F), PETSC_ERR_LIB,
@@ -36,7 +38,7 @@ static PetscErrorCode CheckSolved(Mat F)
 
 /* A or its transpose is solved with from here on; what MUMPS decided about places of the solution may not hold any more
  */
-static PetscErrorCode Direction(MumpsND *m, bool transposed)
+template <class P> static PetscErrorCode Direction(MumpsND<P> *m, bool transposed)
 {
   const MUMPS_INT which = transposed ? 0 : 1;
 
@@ -49,23 +51,23 @@ static PetscErrorCode Direction(MumpsND *m, bool transposed)
 /* ---- one process ---- */
 
 /* x: the right-hand sides, which the solutions replace */
-static PetscErrorCode SolveInPlace(Mat F, PetscScalar *x, PetscInt lda, PetscInt count)
+template <class P> static PetscErrorCode SolveInPlace(Mat F, typename P::Real *x, PetscInt lda, PetscInt count)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   m->id.nrhs = (MUMPS_INT)count;
   m->id.lrhs = (MUMPS_INT)lda;
   m->id.rhs  = x;
   MumpsRun(m, MUMPS_SOLVE);
-  PetscCall(CheckSolved(F));
+  PetscCall(CheckSolved<P>(F));
   PetscFunctionReturn(0);
 }
 
 /* ---- several processes ---- */
 
 /* MUMPS decides anew in every factorization which process returns which part of the solution */
-static PetscErrorCode CreateScatter(MumpsND *m, Vec x)
+template <class P> static PetscErrorCode CreateScatter(MumpsND<P> *m, Vec x)
 {
   IS                    to;
   std::vector<PetscInt> rows(m->sol_rows.begin(), m->sol_rows.end());
@@ -79,9 +81,9 @@ static PetscErrorCode CreateScatter(MumpsND *m, Vec x)
 }
 
 /* Solutions of `count` right-hand sides to sol_values */
-static PetscErrorCode SolveDistributed(Mat F, const PetscScalar *b, PetscInt lda, PetscInt count)
+template <class P> static PetscErrorCode SolveDistributed(Mat F, const typename P::Real *b, PetscInt lda, PetscInt count)
 {
-  MumpsND *m = Data(F);
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   if (!m->sol) {
@@ -92,7 +94,7 @@ static PetscErrorCode SolveDistributed(Mat F, const PetscScalar *b, PetscInt lda
   const size_t rows = m->sol_rows.size();
   if (m->sol_values.size() < std::max<size_t>(rows * count, 1)) m->sol_values.resize(std::max<size_t>(rows * count, 1));
   m->id.nrhs     = (MUMPS_INT)count;
-  m->id.rhs_loc  = const_cast<PetscScalar *>(b); /* MUMPS only reads it */
+  m->id.rhs_loc  = const_cast<typename P::Real *>(b); /* MUMPS only reads it */
   m->id.irhs_loc = m->rhs_rows.data();
   m->id.nloc_rhs = (MUMPS_INT)m->rhs_rows.size();
   m->id.lrhs_loc = (MUMPS_INT)std::max<PetscInt>(lda, 1);
@@ -100,16 +102,20 @@ static PetscErrorCode SolveDistributed(Mat F, const PetscScalar *b, PetscInt lda
   m->id.isol_loc = m->sol_rows.data();
   m->id.lsol_loc = (MUMPS_INT)std::max<size_t>(rows, 1);
   MumpsRun(m, MUMPS_SOLVE);
-  PetscCall(CheckSolved(F));
+  PetscCall(CheckSolved<P>(F));
   PetscFunctionReturn(0);
 }
 
-/* The k-th of the solutions to the vector that was asked for */
-static PetscErrorCode TakeSolution(MumpsND *m, PetscInt k, Vec x)
+/* The k-th of the solutions, times `scale`, to the vector that was asked for */
+template <class P> static PetscErrorCode TakeSolution(MumpsND<P> *m, PetscInt k, double scale, Vec x)
 {
+  const size_t rows = m->sol_rows.size();
+
   PetscFunctionBegin;
   if (!m->scatter) PetscCall(CreateScatter(m, x));
-  PetscCall(VecPlaceArray(m->sol, m->sol_values.data() + k * m->sol_rows.size()));
+  m->column.resize(rows);
+  std::transform(m->sol_values.begin() + k * rows, m->sol_values.begin() + (k + 1) * rows, m->column.begin(), [&](double y) { return scale * y; });
+  PetscCall(VecPlaceArray(m->sol, m->column.data()));
   PetscCall(VecScatterBegin(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(m->scatter, m->sol, x, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecResetArray(m->sol));
@@ -118,9 +124,61 @@ static PetscErrorCode TakeSolution(MumpsND *m, PetscInt k, Vec x)
 
 /* ---- one right-hand side ---- */
 
-static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
+static PetscErrorCode SolveOne(Mat F, Vec b, Vec x, MumpsND<MumpsDouble> *m)
 {
-  MumpsND *m = Data(F);
+  PetscFunctionBegin;
+  if (m->size == 1) {
+    PetscScalar *array;
+    PetscCall(VecCopy(b, x));
+    PetscCall(VecGetArray(x, &array));
+    PetscCall(SolveInPlace<MumpsDouble>(F, array, m->id.n, 1));
+    PetscCall(VecRestoreArray(x, &array));
+  } else {
+    const PetscScalar *array;
+    PetscCall(VecGetArrayRead(b, &array));
+    PetscCall(SolveDistributed<MumpsDouble>(F, array, (PetscInt)m->rhs_rows.size(), 1));
+    PetscCall(VecRestoreArrayRead(b, &array));
+    PetscCall(TakeSolution(m, 0, 1, x));
+  }
+  PetscFunctionReturn(0);
+}
+
+#if defined(HHTDAE_HAVE_SMUMPS)
+/* With the largest entry of b as the unit, so that no right-hand side is too small or too large for single precision */
+static PetscErrorCode SolveOne(Mat F, Vec b, Vec x, MumpsND<MumpsSingle> *m)
+{
+  PetscReal          unit;
+  PetscInt           n;
+  const PetscScalar *from;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(b, NORM_INFINITY, &unit));
+  if (!(unit > 0) || PetscIsInfOrNanReal(unit)) {
+    PetscCall(VecSet(x, unit));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(VecGetLocalSize(b, &n));
+  m->rhs_values.resize((size_t)n);
+  PetscCall(VecGetArrayRead(b, &from));
+  for (PetscInt i = 0; i < n; ++i) m->rhs_values[(size_t)i] = (float)(from[i] / unit);
+  PetscCall(VecRestoreArrayRead(b, &from));
+  if (m->size == 1) {
+    PetscScalar *to;
+    PetscCall(SolveInPlace<MumpsSingle>(F, m->rhs_values.data(), n, 1));
+    PetscCall(VecGetArrayWrite(x, &to));
+    for (PetscInt i = 0; i < n; ++i) to[i] = unit * m->rhs_values[(size_t)i];
+    PetscCall(VecRestoreArrayWrite(x, &to));
+  } else {
+    PetscCall(SolveDistributed<MumpsSingle>(F, m->rhs_values.data(), n, 1));
+    PetscCall(TakeSolution(m, 0, unit, x));
+  }
+  PetscFunctionReturn(0);
+}
+#endif
+
+template <class P> static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
+{
+  MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
   if (F->factorerrortype) {
@@ -129,27 +187,15 @@ static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
     PetscFunctionReturn(0);
   }
   PetscCall(Direction(m, transposed));
-  if (m->size == 1) {
-    PetscScalar *array;
-    PetscCall(VecCopy(b, x));
-    PetscCall(VecGetArray(x, &array));
-    PetscCall(SolveInPlace(F, array, m->id.n, 1));
-    PetscCall(VecRestoreArray(x, &array));
-  } else {
-    const PetscScalar *array;
-    PetscCall(VecGetArrayRead(b, &array));
-    PetscCall(SolveDistributed(F, array, (PetscInt)m->rhs_rows.size(), 1));
-    PetscCall(VecRestoreArrayRead(b, &array));
-    PetscCall(TakeSolution(m, 0, x));
-  }
+  PetscCall(SolveOne(F, b, x, m));
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode MatSolve_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, false); }
+template <class P> static PetscErrorCode MatSolve_MumpsND(Mat F, Vec b, Vec x) { return Solve<P>(F, b, x, false); }
 
-static PetscErrorCode MatSolveTranspose_MumpsND(Mat F, Vec b, Vec x) { return Solve(F, b, x, Data(F)->id.sym == 0); }
+template <class P> static PetscErrorCode MatSolveTranspose_MumpsND(Mat F, Vec b, Vec x) { return Solve<P>(F, b, x, Data<P>(F)->id.sym == 0); }
 
-/* ---- many right-hand sides ---- */
+/* ---- many right-hand sides, in double precision; PETSc takes one by one in single precision ---- */
 
 static PetscErrorCode CheckDense(Mat A)
 {
@@ -185,7 +231,7 @@ static PetscErrorCode SolveAllInPlace(Mat F, Mat B, Mat X)
   if (B != X) PetscCall(MatCopy(B, X, SAME_NONZERO_PATTERN));
   PetscCall(MatDenseGetLDA(X, &lda));
   PetscCall(MatDenseGetArray(X, &x));
-  PetscCall(SolveInPlace(F, x, lda, X->cmap->N));
+  PetscCall(SolveInPlace<MumpsDouble>(F, x, lda, X->cmap->N));
   PetscCall(MatDenseRestoreArray(X, &x));
   PetscFunctionReturn(0);
 }
@@ -193,7 +239,7 @@ static PetscErrorCode SolveAllInPlace(Mat F, Mat B, Mat X)
 /* In blocks of the size that MUMPS takes at a time, so that no more than one block of solutions is held twice */
 static PetscErrorCode SolveBlocks(Mat F, Mat B, Mat X)
 {
-  MumpsND       *m     = Data(F);
+  MumpsND<MumpsDouble>    *m     = Data<MumpsDouble>(F);
   const PetscInt block = std::max(1, std::abs(m->icntl(27))), all = B->cmap->N;
   PetscInt       lda;
 
@@ -203,12 +249,12 @@ static PetscErrorCode SolveBlocks(Mat F, Mat B, Mat X)
     const PetscInt     count = std::min(block, all - from);
     const PetscScalar *b;
     PetscCall(MatDenseGetArrayRead(B, &b));
-    PetscCall(SolveDistributed(F, b + (size_t)from * lda, lda, count));
+    PetscCall(SolveDistributed<MumpsDouble>(F, b + (size_t)from * lda, lda, count));
     PetscCall(MatDenseRestoreArrayRead(B, &b));
     for (PetscInt k = 0; k < count; ++k) {
       Vec x;
       PetscCall(MatDenseGetColumnVecWrite(X, from + k, &x));
-      PetscCall(TakeSolution(m, k, x));
+      PetscCall(TakeSolution(m, k, 1, x));
       PetscCall(MatDenseRestoreColumnVecWrite(X, from + k, &x));
     }
   }
@@ -226,19 +272,26 @@ static PetscErrorCode MatMatSolve_MumpsND(Mat F, Mat B, Mat X)
     PetscCall(FillColumns(X, PETSC_INFINITY));
     PetscFunctionReturn(0);
   }
-  PetscCall(Direction(Data(F), false));
-  if (Data(F)->size == 1)
+  PetscCall(Direction(Data<MumpsDouble>(F), false));
+  if (Data<MumpsDouble>(F)->size == 1)
     PetscCall(SolveAllInPlace(F, B, X));
   else
     PetscCall(SolveBlocks(F, B, X));
   PetscFunctionReturn(0);
 }
 
-void MumpsNDSetSolves(Mat F)
+template <class P> void MumpsNDSetSolves(Mat F)
 {
-  F->ops->solve          = MatSolve_MumpsND;
-  F->ops->solvetranspose = MatSolveTranspose_MumpsND;
-  F->ops->matsolve       = MatMatSolve_MumpsND;
+  F->ops->solve          = MatSolve_MumpsND<P>;
+  F->ops->solvetranspose = MatSolveTranspose_MumpsND<P>;
+  F->ops->matsolve       = std::is_same<typename P::Real, PetscScalar>::value ? MatMatSolve_MumpsND : NULL;
 }
+
+template void           MumpsNDSetSolves<MumpsDouble>(Mat);
+template PetscErrorCode MumpsNDDropScatter(MumpsND<MumpsDouble> *);
+#if defined(HHTDAE_HAVE_SMUMPS)
+template void           MumpsNDSetSolves<MumpsSingle>(Mat);
+template PetscErrorCode MumpsNDDropScatter(MumpsND<MumpsSingle> *);
+#endif
 
 #endif

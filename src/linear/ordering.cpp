@@ -4,6 +4,7 @@
 #include "klupair.h"
 #include "kluparts.h"
 #include "linear.h"
+#include "mumpsmixed.h"
 #include "mumpsnd.h"
 
 /* PETSc calls this with the diagonal block of a distributed matrix, so the matrix here is always sequential */
@@ -33,6 +34,7 @@ PetscErrorCode LinearRegister(void)
   PetscFunctionBegin;
   PetscCall(MatOrderingRegister(MATORDERINGMETISND, MatGetOrdering_MetisND));
   PetscCall(LinearRegisterMumpsND());
+  PetscCall(LinearRegisterMumpsMixed());
   PetscCall(LinearRegisterKLUPair());
   PetscCall(LinearRegisterKLUParts());
   PetscCall(LinearRegisterConstraint());

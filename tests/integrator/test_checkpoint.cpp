@@ -208,7 +208,7 @@ TEST(Checkpoint, AfterEveryStep)
 /* The solvers that it may be, and an option that rules the reuse of matrices */
 TEST(Checkpoint, OtherSolvers)
 {
-  for (const char *options : {"-pc_type lu -pc_factor_mat_solver_type mumpsnd ", "-pc_type lu -pc_factor_mat_solver_type klupair ", "-pc_factor_mat_solver_type klupair ",
+  for (const char *options : {"-pc_type lu -pc_factor_mat_solver_type mumpsnd ", "-pc_type lu -pc_factor_mat_solver_type mumpsmixed ", "-pc_type lu -pc_factor_mat_solver_type klupair ", "-pc_factor_mat_solver_type klupair ",
                               "-snes_lag_jacobian 3 ", "-ts_adapt_type none -ts_dt 1e-4 "}) {
     repeat(Andrews(.02), tolerance(1e-6) + options, 50, 100);
     unchanged(Andrews(.02), tolerance(1e-6) + options, 20);

@@ -106,6 +106,45 @@ TEST_F(LinearChoiceTest, BlockTakesMUMPS)
   EXPECT_FALSE(unsymmetric.choice.cholesky);
 }
 
+/* A large factor is of single precision if the caller's own iteration removes the error of its solves, unless the user has said otherwise */
+TEST_F(LinearChoiceTest, LargeFactorsAreSingle)
+{
+  Mat  A;
+  KSP  ksp;
+  auto chosen = [&](bool rough, const char type[], const std::string &option) {
+    LinearChoice  choice;
+    PetscOptions  database;
+    PC            pc;
+    MatSolverType package;
+    std::string   name;
+    EXPECT_EQ(PetscOptionsCreate(&database), 0);
+    EXPECT_EQ(PetscOptionsInsertString(database, option.c_str()), 0);
+    EXPECT_EQ(KSPCreate(PETSC_COMM_SELF, &ksp), 0);
+    EXPECT_EQ(KSPGetPC(ksp, &pc), 0);
+    for (PetscObject o : {(PetscObject)ksp, (PetscObject)pc}) EXPECT_EQ(PetscObjectSetOptions(o, database), 0);
+    EXPECT_EQ(KSPSetType(ksp, type), 0);
+    EXPECT_EQ(LinearDefaults(ksp, &choice), 0);
+    choice.may_be_rough = (PetscBool)rough;
+    EXPECT_EQ(KSPSetOperators(ksp, A, A), 0);
+    EXPECT_EQ(KSPSetFromOptions(ksp), 0);
+    EXPECT_EQ(LinearChoose(ksp, A, PETSC_TRUE, &choice), 0);
+    EXPECT_EQ(PCFactorGetMatSolverType(pc, &package), 0);
+    name = package;
+    EXPECT_EQ(KSPDestroy(&ksp), 0);
+    EXPECT_EQ(PetscOptionsDestroy(&database), 0);
+    return name;
+  };
+  OK(create_matrix(block(18, 18, 18, true), &A));
+  if (!has(A, "mumpsmixed", MAT_FACTOR_CHOLESKY)) GTEST_SKIP() << "there is no MUMPS of single precision";
+  EXPECT_EQ(chosen(true, KSPPREONLY, ""), "mumpsmixed");
+  EXPECT_EQ(chosen(true, KSPPREONLY, "-pc_type lu"), "mumpsmixed");
+  EXPECT_EQ(chosen(true, KSPPREONLY, "-pc_factor_mat_solver_type mumpsnd"), "mumpsnd");
+  EXPECT_EQ(chosen(true, KSPPREONLY, "-ksp_type fgmres"), "mumpsnd");
+  EXPECT_EQ(chosen(false, KSPPREONLY, ""), "mumpsnd");
+  OK(MatDestroy(&A));
+  EXPECT_EQ(choose(large, true, {}, [](KSP, PC) {}).package, "mumpsnd");
+}
+
 /* 645 unknowns with one dense block want MUMPS, 5000 in a chain do not: size alone does not decide */
 TEST_F(LinearChoiceTest, DenseBlockTakesMUMPS)
 {

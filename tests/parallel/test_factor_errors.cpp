@@ -52,7 +52,8 @@ TEST(ParallelFactorErrors, ABlockOfOneRankAtTheStart)
 /* One matrix over both ranks, which every package of ours reports on all of them */
 TEST(ParallelFactorErrors, OneMatrixOverAllRanks)
 {
-  for (const char *package : {"", "-pc_factor_mat_solver_type mumps ", "-pc_factor_mat_solver_type kluparts ", "-pc_factor_mat_solver_type mumpsnd "}) {
+  for (const char *package : {"", "-pc_factor_mat_solver_type mumps ", "-pc_factor_mat_solver_type kluparts ", "-pc_factor_mat_solver_type mumpsnd ",
+                              "-pc_factor_mat_solver_type smumpsnd ", "-pc_factor_mat_solver_type mumpsmixed "}) {
     const Fading p(.5, 2.);
     Simulation   run(p, tolerance(1e-5) + "-snes_lag_jacobian 1 -ts_max_reject 8 " + package, PETSC_COMM_WORLD);
     ErrorTrap    trap;

@@ -36,6 +36,45 @@ Array runBeam(MPI_Comm comm, FeLaw law, const std::string &options = "")
   return x;
 }
 
+/* A beam with a load at its tip, held by a clamp or a hinge: displacement of the tip, force of the joint, motion of what is held */
+Array runHeld(MPI_Comm comm, bool clamp, double young, const std::string &options, PetscReal *null_pivot)
+{
+  const double end = 0.05 * std::sqrt(2e6 / young);
+  FeModel      model(comm);
+  BoxBuilder({{6, 2, 2}, {2, 0.3, 0.2}, {young, 0.3, 1000}}, &model);
+  Scene      scene(comm);
+  FullFeBody fe;
+  FullBody   b;
+  b.attachments = {{"left"}, {"right", "", Tie::Average}};
+  scene.gravity({0, 0, -9.81 * young / 2e6});
+  must(fe.add(scene, "beam", model, b));
+  const Marker  left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
+  const auto    l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
+  const Marker  ground = scene.marker(scene.ground(), l.x, l.R);
+  const Element joint  = clamp ? scene.add("joint", Fixed{left, ground}) : scene.add("joint", Revolute{left, ground});
+  RigidBody     load;
+  load.mass     = 20;
+  load.position = r.x;
+  scene.add("weld", Fixed{right, scene.marker(scene.add("load", load))});
+  for (int k = 0; k < 3; k++) scene.channel(std::string("tip") + "xyz"[k], Measure::displacement(right, k));
+  for (int k = 0; k < 3; k++) scene.channel(std::string("force") + "xyz"[k], Measure::jointForce(joint, k));
+  for (int k = 0; k < 3; k++) scene.channel(std::string("held") + "xyz"[k], Measure::displacement(left, k, ground));
+  SceneRun run(scene, end, tolerance(1e-6) + " -ts_hhtdae_corrector_tolerance 1e-5 " + options);
+  Array    x;
+  SNES     snes;
+  KSP      ksp;
+  PC       pc;
+  Mat      F;
+  must(run.solve());
+  must(scene.sample(run.ts, end, x));
+  must(TSGetSNES(run.ts, &snes));
+  must(SNESGetKSP(snes, &ksp));
+  must(KSPGetPC(ksp, &pc));
+  must(PCFactorGetMatrix(pc, &F));
+  must(MatMumpsGetCntl(F, 3, null_pivot));
+  return x;
+}
+
 } // namespace
 
 TEST(FullBodyRanks, SameAsOnOne)
@@ -56,4 +95,25 @@ TEST(FullBodyRanks, ByConjugateGradients)
     const Array all = runBeam(PETSC_COMM_WORLD, law, "-ksp_type cg -pc_type hhtconstraint -pc_hhtconstraint_aggregate 12 ");
     for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(all[k], one[k], 1e-8) << "channel " << k;
   }
+}
+
+/* Factors in single precision: constraints hold as well, and reactions differ by what the corrector leaves of them */
+TEST(FullBodyRanks, InSinglePrecision)
+{
+  const std::string package = "-pc_factor_mat_solver_type ";
+  for (bool clamp : {true, false})
+    for (double young : {2e6, 2e11}) {
+      PetscReal   in_double, in_single; /* tell which of the two was in use at the end */
+      const Array d = runHeld(PETSC_COMM_SELF, clamp, young, package + "mumpsnd ", &in_double), s = runHeld(PETSC_COMM_WORLD, clamp, young, package + "mumpsmixed ", &in_single);
+      EXPECT_LT(in_double, 1e-12);
+      EXPECT_GT(in_single, 1e-8) << "it has fallen back";
+      const double force = std::abs(d[5]);
+      MEASURED("held %.1e %.1e tip %.1e force %.1e of %g", std::abs(d[8]), std::abs(s[8]), std::abs(d[2] - s[2]), std::abs(d[5] - s[5]), force);
+      for (int k = 0; k < 3; k++) {
+        EXPECT_NEAR(s[k], d[k], 1e-8) << k;
+        EXPECT_NEAR(s[3 + k], d[3 + k], 1e-6 * force) << k;
+        EXPECT_LT(std::abs(s[6 + k]), 1e-14) << k;
+      }
+      EXPECT_GT(force, 100);
+    }
 }

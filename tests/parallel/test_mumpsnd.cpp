@@ -1,7 +1,6 @@
 /* The solver type "mumpsnd" on all ranks together: many right-hand sides at once, and workspace that has to grow */
-#include "../bench/linear_matrices.h"
+#include "distributed_matrix.h"
 #include "linear/linear.h"
-#include "support.h"
 #include <hhtdae/hhtdae.h>
 #include <petsc/private/matimpl.h>
 
@@ -34,27 +33,10 @@ protected:
     must(MatDestroy(&A));
   }
 
-  /* All rows but few on the first ranks, so that one of three has next to nothing */
   void distribute(const ::Entries &e)
   {
-    PetscMPIInt rank, size;
     must(MatDestroy(&A));
-    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    MPI_Comm_size(PETSC_COMM_WORLD, &size);
-    const PetscInt begin = rank == 0 ? 0 : e.n * 2 / 3 + rank - 1, end = rank == size - 1 ? e.n : e.n * 2 / 3 + rank;
-    std::vector<PetscInt>    row, col;
-    std::vector<PetscScalar> val;
-    for (std::size_t k = 0; k < e.row.size(); k++)
-      if (e.row[k] >= begin && e.row[k] < end) {
-        row.push_back(e.row[k]);
-        col.push_back(e.col[k]);
-        val.push_back(e.val[k]);
-      }
-    must(MatCreate(PETSC_COMM_WORLD, &A));
-    must(MatSetSizes(A, end - begin, end - begin, e.n, e.n));
-    must(MatSetType(A, MATAIJ));
-    must(MatSetPreallocationCOO(A, (PetscCount)row.size(), row.data(), col.data()));
-    must(MatSetValuesCOO(A, val.data(), INSERT_VALUES));
+    A = distributed(e);
   }
 
   void factor(MatFactorType type)

@@ -1,0 +1,351 @@
+/* Factors in single precision: what solves with them are worth, and when double precision takes over */
+#include "bench/linear_matrices.h"
+#include "linear/linear.h"
+#include "view_text.h"
+#include <gtest/gtest.h>
+#include <hhtdae/hhtdae.h>
+#include <petsc/private/matimpl.h>
+#include <petscksp.h>
+#include <string>
+
+#define OK(call) ASSERT_EQ((call), 0)
+
+namespace
+{
+
+/* A KSP with the factorization named, and a solution that is known */
+struct Solver {
+  Mat       A;
+  KSP       ksp;
+  PC        pc;
+  Vec       known, b, x;
+  PetscReal error = -1; /* relative to the solution known */
+
+  Solver(Mat matrix, const char package[], const char type[] = PCCHOLESKY) : A(matrix)
+  {
+    EXPECT_EQ(KSPCreate(PetscObjectComm((PetscObject)A), &ksp), 0);
+    EXPECT_EQ(KSPSetType(ksp, KSPPREONLY), 0);
+    EXPECT_EQ(KSPGetPC(ksp, &pc), 0);
+    EXPECT_EQ(PCSetType(pc, type), 0);
+    EXPECT_EQ(PCFactorSetMatSolverType(pc, package), 0);
+    EXPECT_EQ(KSPSetOperators(ksp, A, A), 0);
+    EXPECT_EQ(MatCreateVecs(A, &x, &b), 0);
+    EXPECT_EQ(VecDuplicate(x, &known), 0);
+    EXPECT_EQ(VecSetRandom(known, NULL), 0);
+  }
+  ~Solver()
+  {
+    EXPECT_EQ(KSPDestroy(&ksp), 0);
+    for (Vec *v : {&known, &b, &x}) EXPECT_EQ(VecDestroy(v), 0);
+  }
+  Solver(const Solver &) = delete;
+
+  void solve(double unit = 1, bool transposed = false)
+  {
+    PetscReal size;
+    EXPECT_EQ((transposed ? MatMultTranspose : MatMult)(A, known, b), 0);
+    EXPECT_EQ(VecScale(b, unit), 0);
+    EXPECT_EQ((transposed ? KSPSolveTranspose : KSPSolve)(ksp, b, x), 0);
+    EXPECT_EQ(VecScale(x, 1 / unit), 0);
+    EXPECT_EQ(VecAXPY(x, -1, known), 0);
+    EXPECT_EQ(VecNorm(x, NORM_2, &error), 0);
+    EXPECT_EQ(VecNorm(known, NORM_2, &size), 0);
+    error /= size;
+  }
+
+  KSPConvergedReason reason() const
+  {
+    KSPConvergedReason r;
+    EXPECT_EQ(KSPGetConvergedReason(ksp, &r), 0);
+    return r;
+  }
+
+  PCFailedReason failed() const
+  {
+    PCFailedReason r;
+    EXPECT_EQ(PCGetFailedReason(pc, &r), 0);
+    return r;
+  }
+
+  std::string text() const
+  {
+    return ViewText([&](PetscViewer v) { return KSPView(ksp, v); });
+  }
+};
+
+/* The stiffness of a rod, held at its ends: its condition grows like n^2 */
+Entries rod(PetscInt n)
+{
+  Entries e;
+  e.n = n;
+  for (PetscInt i = 0; i < n; i++) {
+    e.add(i, i, 2.);
+    if (i) e.add_symmetric(i - 1, i, -1.);
+  }
+  return e;
+}
+
+/* The first node of a block held twice */
+Entries redundant()
+{
+  Entries e = block(4, 4, 4, true);
+  for (PetscInt d = 0; d < 3; ++d) {
+    const PetscInt row = e.n++;
+    e.add_symmetric(row, d, 2.0);
+    e.add(row, row, 0.0);
+  }
+  return e;
+}
+
+class MumpsMixed : public testing::Test
+{
+protected:
+  Mat A = nullptr;
+
+  void SetUp() override
+  {
+    PetscBool available;
+    create(block(6, 6, 6, true));
+    OK(MatGetFactorAvailable(A, "mumpsmixed", MAT_FACTOR_LU, &available));
+    if (!available) GTEST_SKIP() << "there is no MUMPS of single precision";
+  }
+  void TearDown() override { OK(MatDestroy(&A)); }
+
+  void create(const Entries &e)
+  {
+    OK(MatDestroy(&A));
+    OK(create_matrix(e, &A));
+  }
+
+  /* No longer symmetric */
+  void skew()
+  {
+    OK(MatSetValue(A, 0, 1, 5.0, INSERT_VALUES));
+    OK(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    OK(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  }
+};
+
+} // namespace
+
+TEST_F(MumpsMixed, SinglePrecisionIsSingle)
+{
+  for (const char *type : {PCLU, PCCHOLESKY}) {
+    Solver s(A, "smumpsnd", type);
+    s.solve();
+    EXPECT_LT(s.error, 1e-3) << type;
+    EXPECT_GT(s.error, 1e-9) << type;
+    EXPECT_NE(s.text().find("in single precision"), std::string::npos) << s.text();
+  }
+}
+
+TEST_F(MumpsMixed, SolvesToDoublePrecision)
+{
+  for (const char *type : {PCLU, PCCHOLESKY}) {
+    Solver s(A, "mumpsmixed", type), d(A, "mumpsnd", type);
+    s.solve();
+    d.solve();
+    EXPECT_LT(s.error, 1e-12) << type;
+    EXPECT_LT(s.error, 10 * d.error + 1e-14) << type;
+    EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
+  }
+  skew();
+  Solver s(A, "mumpsmixed", PCLU);
+  s.solve();
+  EXPECT_LT(s.error, 1e-12);
+  s.solve(1, true);
+  EXPECT_LT(s.error, 1e-12);
+}
+
+/* Half of the memory, which is why it is there */
+TEST_F(MumpsMixed, TakesHalfTheMemory)
+{
+  PetscInt bytes[2];
+  create(block(16, 16, 16, true));
+  for (int k = 0; k < 2; k++) {
+    Mat    F;
+    Solver s(A, k ? "mumpsmixed" : "mumpsnd");
+    s.solve();
+    EXPECT_LT(s.error, 1e-11);
+    OK(PCFactorGetMatrix(s.pc, &F));
+    OK(MatMumpsGetInfog(F, 19, &bytes[k])); /* MB on all ranks */
+  }
+  EXPECT_LT((double)bytes[1], 0.6 * (double)bytes[0]);
+}
+
+/* One sweep while the caller removes the error, as many as it takes before and after */
+TEST_F(MumpsMixed, RoughSolves)
+{
+  Solver s(A, "mumpsmixed");
+  s.solve();
+  EXPECT_LT(s.error, 1e-12);
+  OK(LinearSolveRoughly(A, PETSC_TRUE));
+  s.solve();
+  EXPECT_LT(s.error, 1e-3);
+  EXPECT_GT(s.error, 1e-9);
+  OK(LinearSolveRoughly(A, PETSC_FALSE));
+  s.solve();
+  EXPECT_LT(s.error, 1e-12);
+}
+
+/* The factor of a matrix that has changed since answers as any other old factor does: nothing is refined towards a mixture of both */
+TEST_F(MumpsMixed, AnOldFactorStaysOne)
+{
+  Solver old(A, "mumpsnd"), s(A, "mumpsmixed");
+  for (Solver *k : {&old, &s}) {
+    OK(VecSet(k->known, 1));
+    k->solve();
+    OK(PCSetReusePreconditioner(k->pc, PETSC_TRUE));
+  }
+  OK(MatScale(A, 1.5));
+  for (Solver *k : {&old, &s}) {
+    k->solve();
+    EXPECT_NEAR(k->error, 0.5, 1e-4);
+  }
+}
+
+TEST_F(MumpsMixed, RightHandSidesOfAnySize)
+{
+  for (const char *package : {"smumpsnd", "mumpsmixed"}) {
+    Solver    s(A, package);
+    PetscReal norm;
+    for (double unit : {1e-200, 1e-40, 1e40, 1e200}) {
+      s.solve(unit);
+      EXPECT_LT(s.error, package[0] == 's' ? 1e-3 : 1e-12) << package << " " << unit;
+    }
+    OK(VecSet(s.b, 0));
+    OK(KSPSolve(s.ksp, s.b, s.x));
+    OK(VecNorm(s.x, NORM_2, &norm));
+    EXPECT_EQ(norm, 0);
+    OK(VecSetValue(s.b, 3, NAN, INSERT_VALUES));
+    OK(VecAssemblyBegin(s.b));
+    OK(VecAssemblyEnd(s.b));
+    OK(KSPSolve(s.ksp, s.b, s.x));
+    OK(VecNorm(s.x, NORM_2, &norm));
+    EXPECT_FALSE(std::isfinite(norm)) << package;
+  }
+}
+
+TEST_F(MumpsMixed, EntriesBeyondTheRange)
+{
+  for (double unit : {1e60, 1e-60}) {
+    create(block(4, 4, 4, true));
+    OK(MatScale(A, unit));
+    Solver single(A, "smumpsnd"), mixed(A, "mumpsmixed");
+    single.solve();
+    EXPECT_LT(single.reason(), 0) << unit;
+    EXPECT_NE(single.failed(), PC_NOERROR) << unit;
+    mixed.solve();
+    EXPECT_GT(mixed.reason(), 0) << unit;
+    EXPECT_LT(mixed.error, 1e-12) << unit;
+    EXPECT_NE(mixed.text().find("factors in double precision: in single precision, the matrix is"), std::string::npos) << mixed.text();
+  }
+}
+
+TEST_F(MumpsMixed, SingularMatrixIsReported)
+{
+  create(redundant());
+  for (const char *type : {PCLU, PCCHOLESKY})
+    for (const char *package : {"smumpsnd", "mumpsmixed"}) {
+      Solver s(A, package, type);
+      s.solve();
+      EXPECT_EQ(s.reason(), KSP_DIVERGED_PC_FAILED) << package << type;
+      EXPECT_TRUE(s.failed() == PC_FACTOR_NUMERIC_ZEROPIVOT || s.failed() == PC_FACTOR_STRUCT_ZEROPIVOT) << package << type << s.failed();
+    }
+  Solver s(A, "mumpsmixed");
+  OK(KSPSetErrorIfNotConverged(s.ksp, PETSC_TRUE));
+  OK(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  EXPECT_NE(KSPSetUp(s.ksp), 0);
+  OK(PetscPopErrorHandler());
+  EXPECT_TRUE(A->erroriffailure);
+}
+
+/* A matrix that is not a number is no reason to wait for ever, nor a solution */
+TEST_F(MumpsMixed, MatrixThatIsNotANumber)
+{
+  OK(MatSetValue(A, 4, 4, NAN, INSERT_VALUES));
+  OK(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  OK(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  for (const char *package : {"smumpsnd", "mumpsmixed"}) {
+    Solver s(A, package);
+    s.solve();
+    EXPECT_FALSE(s.reason() > 0 && std::isfinite(s.error)) << package;
+  }
+}
+
+/* Regular, but not to single precision */
+TEST_F(MumpsMixed, BadConditionTakesDoublePrecision)
+{
+  create(rod(300));
+  Solver good(A, "mumpsmixed");
+  good.solve();
+  EXPECT_LT(good.error, 1e-11);
+  EXPECT_NE(good.text().find("factors in single precision"), std::string::npos) << good.text();
+  Mat B;
+  OK(create_matrix(rod(20000), &B));
+  Solver bad(B, "mumpsmixed"), d(B, "mumpsnd");
+  bad.solve();
+  d.solve();
+  EXPECT_NE(bad.text().find("factors in double precision"), std::string::npos) << bad.text();
+  EXPECT_LE(bad.error, 1e-8);
+  EXPECT_LE(bad.error, 10 * d.error + 1e-14);
+  OK(MatDestroy(&B));
+}
+
+/* With the controls that the program has set; after every fall back twice as many matrices get double precision before single precision is tried again */
+TEST_F(MumpsMixed, FallsBackAndReturns)
+{
+  Mat         F;
+  PetscInt    value;
+  Solver      s(A, "mumpsmixed");
+  std::string said;
+  OK(PCFactorSetUpMatSolverType(s.pc));
+  OK(PCFactorGetMatrix(s.pc, &F));
+  OK(MatMumpsSetIcntl(F, 14, 77));
+  for (double unit : {2., 1e60, 2., 2., 1e60, 2., 2., 2., 2.}) {
+    OK(MatScale(A, unit));
+    s.solve();
+    EXPECT_LT(s.error, 1e-12);
+    said += s.text().find("factors in double precision") != std::string::npos ? 'd' : 's';
+    OK(MatMumpsGetIcntl(F, 14, &value));
+    EXPECT_EQ(value, 77);
+    OK(MatScale(A, 1 / unit));
+  }
+  EXPECT_EQ(said, "sddsdddss");
+}
+
+TEST_F(MumpsMixed, SmallWorkspaceGrows)
+{
+  Mat      F;
+  PetscInt percent;
+  Solver   s(A, "mumpsmixed", PCLU);
+  OK(PCFactorSetUpMatSolverType(s.pc));
+  OK(PCFactorGetMatrix(s.pc, &F));
+  OK(MatMumpsSetIcntl(F, 14, -60));
+  s.solve();
+  EXPECT_LT(s.error, 1e-12);
+  OK(MatMumpsGetIcntl(F, 14, &percent));
+  EXPECT_GT(percent, -60);
+  EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
+}
+
+TEST_F(MumpsMixed, ManyRightHandSides)
+{
+  Mat           F, B, X, R;
+  MatFactorInfo info;
+  PetscReal     error, norm;
+  OK(MatFactorInfoInitialize(&info));
+  OK(MatCreateDense(PETSC_COMM_SELF, PETSC_DECIDE, 5, A->rmap->N, 5, NULL, &B));
+  OK(MatSetRandom(B, NULL));
+  OK(MatDuplicate(B, MAT_DO_NOT_COPY_VALUES, &X));
+  OK(MatNorm(B, NORM_FROBENIUS, &norm));
+  OK(MatGetFactor(A, "mumpsmixed", MAT_FACTOR_CHOLESKY, &F));
+  OK(MatCholeskyFactorSymbolic(F, A, NULL, &info));
+  OK(MatCholeskyFactorNumeric(F, A, &info));
+  OK(MatMatSolve(F, B, X));
+  OK(MatMatMult(A, X, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &R));
+  OK(MatAXPY(R, -1.0, B, SAME_NONZERO_PATTERN));
+  OK(MatNorm(R, NORM_FROBENIUS, &error));
+  EXPECT_LT(error, 1e-12 * norm);
+  for (Mat *M : {&F, &B, &X, &R}) OK(MatDestroy(M));
+}
