@@ -127,6 +127,7 @@ struct Expression {
   Expression() = default;
   Expression(std::vector<Measure> a, RealFunction<const Real *> g) : arguments(std::move(a)), f(std::move(g)) {}
   Expression(const Measure &m) : arguments{m}, f([](const Real *x) { return x[0]; }) {}
+  Expression(const TimeFunction &f); /* of time alone */
 };
 
 } // namespace hhtdae
