@@ -354,3 +354,62 @@ TEST(KeptNodes, DynamicsUnderPressure)
   MEASURED("displacement %.3e, relative difference %.2e", u.cwiseAbs().maxCoeff(), off);
   EXPECT_LT(off, 1e-3);
 }
+
+/* A block on springs that its bottom nodes press: the model's stiffness and the contact's, which is linear beyond its onset, and the weight of each node */
+TEST(KeptNodes, ABlockOnThePlane)
+{
+  Small       s;
+  ReducedBody body;
+  must(Reduce(s.model, everything(s.model.nodes), &body));
+  const double k = 2e4, g = 9.81;
+  Scene        scene(PETSC_COMM_SELF);
+  FlexibleBody b;
+  ContactLaw   law;
+  b.model        = std::make_shared<ModalBody>(body.modal);
+  b.position     = {0, 0, -0.003};
+  law.stiffness  = k;
+  law.exponent   = 1;
+  law.friction   = 1; /* holds the block in the plane */
+  law.slip_velocity = 1;
+  const Body    flex  = scene.add("block", b);
+  const Element touch = scene.add("touch", NodeContact{flex, {}, 0, scene.marker(scene.ground()), 0, law});
+  scene.gravity({0, 0, -g});
+  for (PetscInt i = 0; i < s.model.nodes; i++) scene.channel(text("z%d", (int)i), Measure::displacement(scene.marker(scene.node(flex, i + 1)), 2));
+  scene.channel("force", Measure::force(touch, 2));
+  /* no tangential force at rest: two weak springs take the three motions in the plane */
+  const Marker c = scene.marker(scene.node(flex, 1)), e = scene.marker(scene.node(flex, 12));
+  for (int n = 0; n < 2; n++) {
+    const Vector3 at = place(s.model, n ? 11 : 0);
+    scene.add(text("hold %d", n), Bushing{n ? e : c, scene.marker(scene.ground(), at), {1, 1, 0}});
+  }
+  scene.start().equilibrium = true;
+  TS    ts;
+  Array x;
+  must(scene.createTS(&ts));
+  must(TSSetMaxTime(ts, 1e-6));
+  must(TSSetTimeStep(ts, 1e-6));
+  must(scene.solve(ts));
+  must(scene.sample(ts, 1e-6, x));
+  must(TSDestroy(&ts));
+  MatrixXd K = dense(s.model.K);
+  VectorXd f = VectorXd::Zero(K.rows()), down = f;
+  for (PetscInt i = 0; i < s.model.nodes; i++) {
+    down(3 * i + 2) = -g;
+    const double z = place(s.model, i)(2);
+    if (z > 1e-9) continue;
+    K(3 * i + 2, 3 * i + 2) += k;
+    f(3 * i + 2) -= k * z;
+  }
+  for (PetscInt i : {(PetscInt)0, (PetscInt)11})
+    for (int d : {0, 1}) K(3 * i + d, 3 * i + d) += 1;
+  f += dense(s.model.M) * down;
+  const VectorXd u = K.ldlt().solve(f);
+  double         off = 0, most = 0;
+  for (PetscInt i = 0; i < s.model.nodes; i++) {
+    off  = std::max(off, std::abs(x[i] - place(s.model, i)(2) - u(3 * i + 2)));
+    most = std::max(most, std::abs(u(3 * i + 2)));
+  }
+  MEASURED("sinks by %.3e, off by %.1e; force %.9g, weight %.9g", most, off, x[s.model.nodes], body.modal.mass * g);
+  EXPECT_LT(off, 2e-3 * most);
+  EXPECT_NEAR(x[s.model.nodes], body.modal.mass * g, 1e-4 * body.modal.mass * g);
+}

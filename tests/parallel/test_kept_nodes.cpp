@@ -61,6 +61,13 @@ Array shake(MPI_Comm comm)
     scene.channel(text("eta %d", k), Measure::modal(flex[k], 1));
     scene.channel(text("x %d", k), Measure::displacement(at[k], 2));
   }
+  ContactLaw law;
+  law.stiffness = 100;
+  law.friction  = 0.2;
+  for (int k = 0; k < 3; k++) { /* with the next body, and with the ground */
+    const Element touch = scene.add(text("touch %d", k), NodeContact{flex[k], {}, 1, k < 2 ? scene.marker(scene.attachment(flex[k + 1], "hub")) : scene.markerAt(scene.ground(), {6, 0, 0}), 1, law});
+    scene.channel(text("force %d", k), Measure::force(touch, 0));
+  }
   scene.add("ball", Spherical{at[0], scene.markerAt(scene.ground(), DataOf(scene).frame(at[0]).x)});
   SceneRun run(scene, 0.3, tolerance(1e-6) + " -ts_hhtdae_corrector_tolerance 1e-8 ");
   Array    x;

@@ -241,3 +241,140 @@ TEST(NodesAndLoads, GroundAccelerationIsAMovingBase)
   EXPECT_GT(most, 0.1);
   EXPECT_LT(off, 3e-6); /* 2e-5 with a hundredfold tolerance */
 }
+
+namespace
+{
+
+/* No node has a rotation, so that a frame at a node turns as the ball of a contact does */
+FlexibleBody plainNodes(int modes, unsigned seed)
+{
+  ModalCloud c = withNodes(modes, seed);
+  for (ModalNode &n : c.body.nodes) {
+    n.turns = false;
+    n.rotation.setZero();
+  }
+  return flexible(c);
+}
+
+enum class Other { Ground, Part, Attachment };
+
+/* Nodes of a flexible body against a plane or a sphere, as one element or one by one; loads of the one element are asked for by the caller */
+void describeTouching(Scene &scene, Other other, bool sphere, bool single)
+{
+  FlexibleBody b = plainNodes(4, 11), d = plainNodes(3, 21);
+  b.rotation     = tilted;
+  const Body one = scene.add("one", b), two = scene.add("two", d);
+  Marker     j   = scene.markerAt(scene.ground(), {0.2, -0.1, 0.1}, tilted);
+  if (other == Other::Part) j = scene.marker(scene.add("part", RigidBody()), {0.2, -0.1, 0.1}, tilted);
+  if (other == Other::Attachment) j = scene.marker(scene.attachment(two, "tip"), {0.2, 0.1, 0.3}, tilted.transpose());
+  ContactLaw law;
+  law.stiffness     = 50;
+  law.damping       = 0.2;
+  law.friction      = 0.3;
+  law.slip_velocity = 0.5;
+  const double radius = 0.4, radius_j = sphere ? 1 : 0;
+  if (!single) {
+    scene.add("touch", NodeContact{one, {}, radius, j, radius_j, law});
+  } else {
+    for (const ModalNode &n : b.model->nodes) {
+      const Marker i = scene.marker(scene.node(one, n.label));
+      if (sphere) scene.add(text("touch %d", (int)n.label), SphereSphere{i, j, radius, radius_j, law});
+      else scene.add(text("touch %d", (int)n.label), SpherePlane{i, j, radius, law});
+    }
+  }
+  scene.start().assembly = Assembly::Off;
+  must(scene.setUp());
+}
+
+} // namespace
+
+TEST(NodeContact, IsOneContactForEachNode)
+{
+  for (Other other : {Other::Ground, Other::Part, Other::Attachment})
+    for (bool sphere : {false, true}) {
+      Array  F[2];
+      double energy[2];
+      for (int single = 0; single < 2; single++) {
+        Scene scene(PETSC_COMM_WORLD);
+        describeTouching(scene, other, sphere, single);
+        AnyState s(scene, 5, 0.3);
+        F[single]      = s.residual();
+        energy[single] = 0;
+        const Array u = whole(s.U), v = whole(s.V), a = whole(s.A);
+        Evaluation  ev{0, u.data(), v.data(), a.data(), s.R.bodies, s.R.n};
+        for (const auto &batch : s.R.batches) energy[single] += batch->energy(ev);
+      }
+      ASSERT_EQ(F[0].size(), F[1].size());
+      for (std::size_t i = 0; i < F[0].size(); i++) EXPECT_NEAR(F[0][i], F[1][i], 1e-10 * (1 + std::abs(F[1][i])));
+      EXPECT_GT(energy[1], 0);
+      EXPECT_NEAR(energy[0], energy[1], 1e-12 * energy[1]);
+    }
+}
+
+TEST(NodeContact, JacobianAgainstDifferences)
+{
+  for (Other other : {Other::Ground, Other::Part, Other::Attachment})
+    for (bool sphere : {false, true}) {
+      Scene scene(PETSC_COMM_WORLD);
+      describeTouching(scene, other, sphere, false);
+      for (Rotations rotations : all_rotations) {
+        AnyState s(scene, 5, 0.3, rotations);
+        EXPECT_LT(s.jacobianError(2.7, 13., rotations == Rotations::Local ? .2 : 0), 1e-5) << (int)other << sphere;
+        EXPECT_LT(s.jacobianError(0, 0), 1e-5) << (int)other << sphere;
+      }
+    }
+}
+
+TEST(NodeContact, RefusedByName)
+{
+  const auto says = [](const std::string &message, const std::string &part) { EXPECT_NE(message.find(part), std::string::npos) << message; };
+  const auto touch = [](const std::function<void(NodeContact &, Scene &)> &change) {
+    return refused([&](Scene &s, Body b) {
+      NodeContact c;
+      c.body = b;
+      c.j    = s.marker(s.ground());
+      change(c, s);
+      s.add("touch", c);
+    });
+  };
+  says(touch([](NodeContact &c, Scene &) { c.nodes = {10, 11}; }), "node contact touch: cloud has not kept node 11; keep it when the body is reduced");
+  says(touch([](NodeContact &c, Scene &) { c.radius = -1; }), "node contact touch: radius is -1, must be finite and not negative");
+  says(touch([](NodeContact &c, Scene &) { c.radius_j = 1; }), "node contact touch: radius is 0, must be finite and positive");
+  says(touch([](NodeContact &c, Scene &) { c.radius_j = -1; }), "radius_j is -1, must be finite and positive");
+  says(touch([](NodeContact &c, Scene &s) { c.j = s.marker(s.node(c.body, 13)); }), "marker j is on the same flexible body cloud");
+  says(touch([](NodeContact &c, Scene &s) { c.body = s.add("part", RigidBody()); }), "node contact touch: its body is not a flexible one of this scene");
+  says(touch([](NodeContact &c, Scene &) { c.law.stiffness = 0; }), "node contact touch: stiffness is 0");
+}
+
+/* A bounce without damping or friction keeps energy, and its resultant is read as any other element's */
+TEST(NodeContact, ABounceKeepsEnergy)
+{
+  double drift[2], impulse = 0;
+  for (int k = 0; k < 2; k++) {
+    Scene         scene(PETSC_COMM_SELF);
+    FlexibleBody  b = flexible(withNodes(4, 11));
+    TemporaryFile file(text("bounce%d.csv", k));
+    ContactLaw    law;
+    b.position         = {0, 0, 3};
+    b.velocity         = {0, 0, -2};
+    b.angular_velocity = {0.3, 0.1, 0.2};
+    b.damping.clear();
+    law.stiffness       = 500;
+    const Body    body  = scene.add("body", b);
+    const Element touch = scene.add("touch", NodeContact{body, {}, 0.1, scene.marker(scene.ground()), 0, law});
+    scene.channel("force", Measure::force(touch, 2));
+    scene.output().balance      = true;
+    scene.output().balance_file = file.name;
+    SceneRun run(scene, 3, text(" -ts_dt %g -ts_adapt_type none -ts_max_steps 100000 -ts_hhtdae_alpha 0 ", 2e-3 / (1 << k)));
+    must(run.solve());
+    const CSV   table(file.text());
+    const Array energy = table.column("total"), pz = table.column("pz");
+    drift[k] = 0;
+    for (double e : energy) widen(drift[k], std::abs(e - energy[0]) / energy[0]);
+    impulse = pz.back() - pz.front();
+  }
+  MEASURED("drift of energy %.2e, %.2e; impulse %.3f", drift[0], drift[1], impulse);
+  EXPECT_GT(impulse, 10); /* it has come back */
+  EXPECT_LT(drift[1], 2e-3);
+  EXPECT_LT(drift[1], 0.35 * drift[0]);
+}
