@@ -193,14 +193,6 @@ TimeFunction TimeFunction::spline(const std::vector<double> &t, const std::vecto
 Real step(const Real &x, double x0, double h0, double x1, double h1) { return Step(Cubic, x, x0, h0, x1, h1); }
 Real step5(const Real &x, double x0, double h0, double x1, double h1) { return Step(Quintic, x, x0, h0, x1, h1); }
 
-Expression::Expression(const TimeFunction &g) : arguments{Measure::time()}
-{
-  f = [g](const Real *t) {
-    const TimeFunction::Value v = g(t[0].value());
-    return chain(t[0], v.f, v.f1);
-  };
-}
-
 TimeFunction TimeFunction::formula(std::function<Number(const Number &)> f)
 {
   if (!f) return faulty("the formula is empty");
