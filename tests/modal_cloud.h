@@ -46,6 +46,38 @@ struct ModalCloud {
     for (auto &a : body.attachments)
       for (auto &B : a.stiffening) symmetric(B);
   }
+  /* Every particle p is a kept node with the label 10 + 3 p, those of odd p with a rotation; load cases "dead", forces on all particles that stay in body axes,
+     and "follows", with gradients at random */
+  static hhtdae::Vector3 deadForce(std::size_t p) { return {0.3 + (double)p, -1., 0.2 * (double)p}; }
+  void                   keepNodes(unsigned seed)
+  {
+    const int                              modes = (int)body.modes();
+    std::mt19937                           random(seed);
+    std::uniform_real_distribution<double> any(-1, 1);
+    const auto                             numbers = [&](int rows, int columns) { return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return any(random); })); };
+    hhtdae::ModalLoadCase                  dead;
+    dead.name            = "dead";
+    dead.modal           = Eigen::VectorXd::Zero(modes);
+    dead.moment_gradient = Eigen::MatrixXd::Zero(3, modes);
+    for (std::size_t p = 0; p < X.size(); p++) {
+      const hhtdae::Vector3 f = deadForce(p);
+      hhtdae::ModalNode     n;
+      n.label       = 10 + 3 * (PetscInt)p;
+      n.position    = X[p];
+      n.translation = shape.middleRows<3>(3 * p);
+      n.turns       = p % 2 == 1;
+      n.rotation    = n.turns ? numbers(3, modes) : Eigen::MatrixXd::Zero(3, modes);
+      body.nodes.push_back(n);
+      dead.force += f;
+      dead.moment += X[p].cross(f);
+      dead.modal += n.translation.transpose() * f;
+      for (int k = 0; k < modes; k++) dead.moment_gradient.col(k) += hhtdae::Vector3(n.translation.col(k)).cross(f);
+    }
+    body.loads.assign(2, dead);
+    body.loads[1].name           = "follows";
+    body.loads[1].force_gradient = numbers(3, modes);
+    body.loads[1].modal_gradient = numbers(modes, modes);
+  }
   /* y^T m z over all particles, y and z stacked */
   double product(const Eigen::VectorXd &y, const Eigen::VectorXd &z) const
   {

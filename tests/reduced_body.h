@@ -79,6 +79,29 @@ private:
       a.rotation    = Numbers(3, n, 40 + (double)a.name.size());
       m.attachments.push_back(a);
     }
+    for (int k = 0; k < 3; k++) { /* the last one without rotation */
+      ModalNode a;
+      a.label       = 1000 + 9 * k;
+      a.position    = Numbers(3, 1, 80 + k);
+      a.translation = Numbers(3, n, 83 + k);
+      a.turns       = k < 2;
+      a.rotation    = a.turns ? Numbers(3, n, 86 + k) : Eigen::MatrixXd(Eigen::MatrixXd::Zero(3, n));
+      m.nodes.push_back(a);
+    }
+    for (const char *name : {"wind", "pressure", "weight of snow"}) {
+      const double  seed = 90 + 10 * (double)m.loads.size();
+      ModalLoadCase l;
+      l.name            = name;
+      l.force           = Numbers(3, 1, seed);
+      l.moment          = Numbers(3, 1, seed + 1);
+      l.modal           = Numbers(n, 1, seed + 2);
+      l.moment_gradient = Numbers(3, n, seed + 3);
+      if (m.loads.size() == 1 && n) {
+        l.force_gradient = Numbers(3, n, seed + 4);
+        l.modal_gradient = Numbers(n, n, seed + 5);
+      }
+      m.loads.push_back(l);
+    }
     for (PetscInt k = 0; k < n; k++) body.mode.push_back({m.omega[k] / (2 * PETSC_PI), 1e-9 * (k + 1)});
   }
 
@@ -153,6 +176,15 @@ inline bool Same(const ModalBody &a, const ModalBody &b)
     same = alike(a.attachments[i].stiffening, b.attachments[i].stiffening) && a.attachments[i].name == b.attachments[i].name && a.attachments[i].position == b.attachments[i].position &&
            a.attachments[i].translation == b.attachments[i].translation &&
            a.attachments[i].rotation == b.attachments[i].rotation;
+  const auto matrix = [](const Eigen::MatrixXd &x, const Eigen::MatrixXd &y) { return x.rows() == y.rows() && x.cols() == y.cols() && x == y; };
+  same = same && a.nodes.size() == b.nodes.size() && a.loads.size() == b.loads.size();
+  for (std::size_t i = 0; same && i < a.nodes.size(); i++)
+    same = a.nodes[i].label == b.nodes[i].label && a.nodes[i].turns == b.nodes[i].turns && a.nodes[i].position == b.nodes[i].position &&
+           matrix(a.nodes[i].translation, b.nodes[i].translation) && matrix(a.nodes[i].rotation, b.nodes[i].rotation);
+  for (std::size_t i = 0; same && i < a.loads.size(); i++)
+    same = a.loads[i].name == b.loads[i].name && a.loads[i].force == b.loads[i].force && a.loads[i].moment == b.loads[i].moment && a.loads[i].modal == b.loads[i].modal &&
+           matrix(a.loads[i].moment_gradient, b.loads[i].moment_gradient) && matrix(a.loads[i].modal_gradient, b.loads[i].modal_gradient) &&
+           a.loads[i].force_gradient.size() == b.loads[i].force_gradient.size() && (!a.loads[i].force_gradient.size() || a.loads[i].force_gradient == b.loads[i].force_gradient);
   return same;
 }
 

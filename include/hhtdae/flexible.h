@@ -99,6 +99,18 @@ enum class Method {
   Static        /* constraint modes alone (Guyan) */
 };
 
+/* Forces on the FE model that the reduction keeps as a load case of the body, see ModalLoad of forces.h */
+struct LoadCase {
+  std::string name;
+  /* Pressure one, which pushes inwards, on the outer faces of elements whose nodes are all in this set; needs elements. If it follows, it stays normal
+     to the deformed surface, to first order; else its forces stay as they are in the axes of the body. */
+  std::string surface = {};
+  bool        follows = true;
+  /* or forces on nodes by label, three components each, in the axes of the FE model; the same on all ranks */
+  std::vector<PetscInt> node  = {};
+  std::vector<double>   force = {};
+};
+
 struct Reduction {
   std::vector<Attachment> attachments;
   Method   method = Method::CraigBampton;
@@ -107,6 +119,9 @@ struct Reduction {
   double   keep_below    = 0;      /* modes of the reduced pair that are kept; 0: all */
   std::vector<PetscInt> keep;      /* modes of the reduced pair, by number from 0; empty: all */
   bool     stiffening = false;     /* geometric stiffening by loads on attachments and by angular velocity; needs elements and an attachment */
+  std::vector<std::string> node_sets; /* nodes of these sets are kept for markers, forces and contact */
+  std::vector<PetscInt>    nodes;     /* and these, by label; the same on all ranks */
+  std::vector<LoadCase>    loads;
   bool     all_nodes = true;       /* the modes at all nodes are kept (for stress, pictures) */
   bool     progress  = false;      /* printed by rank 0 */
 };

@@ -105,6 +105,15 @@ struct UserScalarForce {
   bool       state      = false;
 };
 
+/* A load case of a flexible body (ModalBody::loads: pressure on a surface, nodal forces), times `scale`, in the axes of the
+   body. Component: the scale. The resultant acts on the floating frame, the rest on the modes. */
+struct ModalLoad {
+  Body        body;
+  std::string load;  /* its name */
+  Expression  scale; /* of time or of the state */
+  bool        state = false;
+};
+
 /* ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ---- */
 struct ContactLaw {
   double stiffness = 1e5, exponent = 1.5;
@@ -145,6 +154,20 @@ struct SphereBox {
   Vector3    half   = Vector3::Ones(); /* half of its edges */
   ContactLaw law   = {};
   bool       state = false;
+};
+
+/*
+  Kept nodes of a flexible body (Scene::node()) as balls against one shape of another body: what one SpherePlane or SphereSphere for each node
+  would do, but with a cost in proportion to the nodes that touch. The balls turn with the body's floating frame. Components: the
+  resultant force on the flexible body in space axes.
+*/
+struct NodeContact {
+  Body                  body;         /* the flexible one */
+  std::vector<PetscInt> nodes  = {};  /* their numbers in the FE model; empty: all that are kept */
+  double                radius = 0;   /* of the balls; with a plane it may be zero */
+  Marker                j;            /* plane: xy of j, outside z > 0; or the centre of a sphere */
+  double                radius_j = 0; /* of the sphere; 0: a plane */
+  ContactLaw            law      = {};
 };
 
 /*

@@ -127,6 +127,13 @@ struct Expression {
   Expression() = default;
   Expression(std::vector<Measure> a, RealFunction<const Real *> g) : arguments(std::move(a)), f(std::move(g)) {}
   Expression(const Measure &m) : arguments{m}, f([](const Real *x) { return x[0]; }) {}
+  Expression(const TimeFunction &g) /* of time alone */
+    : arguments{Measure::time()}, f([g](const Real *t) {
+        const TimeFunction::Value v = g(t[0].value());
+        return chain(t[0], v.f, v.f1);
+      })
+  {
+  }
 };
 
 } // namespace hhtdae

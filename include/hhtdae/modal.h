@@ -28,6 +28,30 @@ struct ModalAttachment {
   std::array<Eigen::MatrixXd, 6> stiffening;
 };
 
+/* A node of the FE model that the reduction has kept, by its number there: as an attachment of its own, but without geometric stiffening. It turns with the
+   nodes that it shares elements with; where these tell no rotation, `rotation` is zero, and the node takes forces alone. */
+struct ModalNode : ModalAttachment {
+  PetscInt label = 0;
+  bool     turns = true;
+};
+
+/*
+  Nodal forces f of a load case as the modes see them: their resultant, their moment about the undeformed centre of mass and their work with the modes, in body
+  axes and to first order in the modal coordinates,
+
+    force + force_gradient eta,   moment + moment_gradient eta,   modal + modal_gradient eta
+
+  Forces that stay as they are in body axes have moment_gradient = sum phi x f alone; those of a pressure that stays normal to the surface have all three.
+*/
+struct ModalLoadCase {
+  std::string     name;
+  Vector3         force = Vector3::Zero(), moment = Vector3::Zero();
+  Eigen::VectorXd modal; /* sum phi^T f */
+  Eigen::Matrix<double, 3, Eigen::Dynamic> moment_gradient; /* 3 x modes */
+  Eigen::Matrix<double, 3, Eigen::Dynamic> force_gradient;  /* 3 x modes; empty: zero */
+  Eigen::MatrixXd                          modal_gradient;  /* modes x modes; empty: zero */
+};
+
 struct ModalBody {
   std::string name;
   double      mass    = 0;
@@ -46,6 +70,8 @@ struct ModalBody {
   std::array<Eigen::MatrixXd, 6> stiffening;
 
   std::vector<ModalAttachment> attachments;
+  std::vector<ModalNode>       nodes; /* by increasing label */
+  std::vector<ModalLoadCase>   loads;
 
   PetscInt modes() const { return (PetscInt)omega.size(); }
   Matrix3  inertia() const { return moments.trace() * Matrix3::Identity() - moments; } /* undeformed, about the centre of mass */
@@ -53,6 +79,18 @@ struct ModalBody {
   {
     for (std::size_t i = 0; i < attachments.size(); i++)
       if (attachments[i].name == name) return (PetscInt)i;
+    return -1;
+  }
+  PetscInt node(PetscInt label) const /* likewise */
+  {
+    for (std::size_t i = 0; i < nodes.size(); i++)
+      if (nodes[i].label == label) return (PetscInt)i;
+    return -1;
+  }
+  PetscInt load(const std::string &load) const
+  {
+    for (std::size_t i = 0; i < loads.size(); i++)
+      if (loads[i].name == load) return (PetscInt)i;
     return -1;
   }
 };

@@ -63,7 +63,8 @@ struct DampingBand { /* modes up to this frequency, in cycles per unit of time *
 
 /*
   A flexible body: 6 + modes coordinates, those of its floating frame, whose origin is the undeformed centre of mass, and of the
-  modes of its model. Joints, forces and markers take hold of its attachments, Scene::attachment().
+  modes of its model. Joints, forces and markers take hold of its attachments and kept nodes, Scene::attachment() and node(); loads
+  that are spread over it are ModalLoad and gravity.
 */
 struct FlexibleBody {
   std::shared_ptr<const ModalBody> model;
@@ -149,6 +150,9 @@ public:
      as long as there is no deformation: a body for markers and shapes. It has no unknowns: its motion is a function of the
      body's coordinates, and loads on it act on them. */
   Body attachment(Body flexible, const std::string &name);
+  /* The same at a node that the body's file keeps (Reduction::node_sets), by its number in the FE model. Elements that need a
+     rotation refuse a node whose neighbours tell none. */
+  Body node(Body flexible, PetscInt label);
 
   /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes */
   Marker marker(Body body, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity(),
@@ -168,6 +172,9 @@ public:
   State    state(const std::string &name, const Expression &rate, double initial);
 
   void gravity(const Vector3 &acceleration);
+  /* The ground's acceleration, along the space axes, which go with it: base excitation. All coordinates are relative to the ground, and every mass,
+     that of flexible bodies point by point, feels gravity less this acceleration. */
+  void groundAcceleration(const TimeFunction &x, const TimeFunction &y, const TimeFunction &z);
 
   /*
     Parameters: numbers that may be others in the next run, without describing the scene again. They come before everything else.
@@ -278,7 +285,8 @@ private:
   SceneData &data() const;
   Element    absent(const std::string &name);
   Body       addRigid(const std::string &name, const RigidBody &body);
-  Body       addFrame(Body flexible, PetscInt attachment);
+  Body       frameAt(Body flexible, PetscInt place);
+  Body       addFrame(Body flexible, PetscInt place);
   void       describeAnew();
 };
 

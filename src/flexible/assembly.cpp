@@ -14,12 +14,12 @@ PetscInt ElementNodes::place(PetscInt number) const
   return (PetscInt)(std::lower_bound(global.begin(), global.end(), number) - global.begin());
 }
 
-PetscErrorCode ElementNodes::setUp(const FeModel &model)
+PetscErrorCode ElementNodes::setUp(const FeModel &model, const std::vector<FeElement> &elements)
 {
   PetscLayout layout;
   PetscFunctionBegin;
   global.clear();
-  for (const FeElement &e : model.elements) global.insert(global.end(), e.node, e.node + FeNodes(e.type));
+  for (const FeElement &e : elements) global.insert(global.end(), e.node, e.node + FeNodes(e.type));
   std::sort(global.begin(), global.end());
   global.erase(std::unique(global.begin(), global.end()), global.end());
   global.reserve(1);

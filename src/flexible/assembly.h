@@ -21,7 +21,8 @@ public:
   ElementNodes() = default;
   ~ElementNodes();
   ElementNodes(const ElementNodes &) = delete;
-  PetscErrorCode setUp(const FeModel &model);
+  PetscErrorCode setUp(const FeModel &model) { return setUp(model, model.elements); }
+  PetscErrorCode setUp(const FeModel &model, const std::vector<FeElement> &elements); /* of these alone */
   PetscInt       place(PetscInt number) const; /* among global */
   /* width values per node, from the owners to all who need them, and summed back to the owners */
   PetscErrorCode bring(int width, const double *own, double *here) const;

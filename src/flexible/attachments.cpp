@@ -29,30 +29,29 @@ static PetscErrorCode AllTrue(MPI_Comm comm, bool mine, bool *all)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode TakeNodes(const FeModel &model, const std::string &set, Tied *t)
+PetscErrorCode OwnNodesOf(const FeModel &model, const std::string &set, const std::string &who, std::vector<PetscInt> *node)
 {
   const auto found = model.sets.find(set);
   bool       has, right = true;
 
   PetscFunctionBegin;
+  node->clear();
   PetscCall(AllTrue(model.comm, found != model.sets.end(), &has));
   if (!has) {
     std::string known;
     for (const auto &s : model.sets) known += (known.empty() ? "" : ", ") + s.first;
-    SETERRQ(model.comm, PETSC_ERR_ARG_WRONG, "Attachment %s: the model has no node set '%s'; its sets are: %s",
-            t->name.c_str(), set.c_str(), known.empty() ? "none" : known.c_str());
+    SETERRQ(model.comm, PETSC_ERR_ARG_WRONG, "%s: the model has no node set '%s'; its sets are: %s", who.c_str(), set.c_str(),
+            known.empty() ? "none" : known.c_str());
   }
   PetscInt before = -1;
   for (PetscInt n : found->second) {
     right  = right && n > before && n >= model.first && n < model.first + model.own;
     before = n;
-    t->node.push_back(n - model.first);
+    node->push_back(n - model.first);
   }
   PetscCall(AllTrue(model.comm, right, &right));
-  PetscCheck(
-      right, model.comm, PETSC_ERR_ARG_WRONG,
-      "Attachment %s: the node set '%s' has to list own nodes by global number, in ascending order and each once",
-      t->name.c_str(), set.c_str());
+  PetscCheck(right, model.comm, PETSC_ERR_ARG_WRONG, "%s: the node set '%s' has to list own nodes by global number, in ascending order and each once",
+             who.c_str(), set.c_str());
   PetscFunctionReturn(0);
 }
 
@@ -165,7 +164,7 @@ static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied
   PetscFunctionBegin;
   t->name = a.name;
   t->tie  = a.tie;
-  PetscCall(TakeNodes(model, a.set.empty() ? a.name : a.set, t));
+  PetscCall(OwnNodesOf(model, a.set.empty() ? a.name : a.set, "Attachment " + a.name, &t->node));
   PetscCall(CountNodes(model, t, &start));
   PetscCall(GetWeights(model, a, *t, start, &weight));
   PetscCall(Moments(model, *t, weight, &sum, &centroid, &J));

@@ -48,6 +48,9 @@ inline Eigen::Matrix<double, 3, 6> RigidMotion(const Vector3 &X, const Vector3 &
   return u;
 }
 
+/* Own nodes of a set, from 0; who: "Attachment hub", for errors. Collective */
+PetscErrorCode OwnNodesOf(const FeModel &model, const std::string &set, const std::string &who, std::vector<PetscInt> *node);
+
 PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
                                   std::vector<Tied> *tied);
 

@@ -4,7 +4,8 @@
 
     attributes of /
       format         text "hhtdae reduced body"
-      version        int64, 3; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|, version 2 no stiffening
+      version        int64, 4; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|, version 2 no stiffening,
+                     version 3 neither kept nodes nor loads
       program        text: what wrote the file
       source, method, units, name   text: provenance; name is the body's
       fe_nodes       int64: nodes of the finite-element model
@@ -29,6 +30,21 @@
       translation    float64 {a, n, 3}
       rotation       float64 {a, n, 3}
       stiffening     float64 {6 a, n, n}    by forces and moments; absent if /modal/stiffening is
+    /kept            nodes for markers; absent if there are none, k of them
+      label          int64 {k}              ascending
+      position       float64 {k, 3}
+      turns          uint8 {k}              0: no rotation is known, and that below is zero
+      translation    float64 {k, n, 3}
+      rotation       float64 {k, n, 3}
+    /loads           load cases, ModalLoadCase of hhtdae/modal.h; absent if there are none, l of them, f that follow the surface
+      name           uint8 {characters}     each name ends with a zero
+      force          float64 {l, 3}
+      moment         float64 {l, 3}
+      modal          float64 {l, n}
+      moment_gradient float64 {l, n, 3}
+      follows        uint8 {l}
+      force_gradient float64 {f, n, 3}
+      modal_gradient float64 {f, n, n}
     /nodes           absent if the nodes are not kept
       coordinates    float64 {N, 3}
       label          int64 {N}
@@ -72,7 +88,7 @@ namespace bodyfile
 {
 
 constexpr const char *format_name    = "hhtdae reduced body";
-constexpr int64_t     format_version = 3;
+constexpr int64_t     format_version = 4;
 constexpr const char *program_name   = "hhtdae 0.1.0";
 constexpr hsize_t     block_entries  = 1 << 22; /* of one part that is sent to be written */
 
@@ -262,7 +278,12 @@ const char *const every_dataset[] = {"/modal/mass",           "/modal/center",  
                                      "/attachments/rotation", "/nodes/coordinates",    "/nodes/label",
                                      "/nodes/shape",          "/elements/type",        "/elements/material",
                                      "/elements/node",        "/stress/node",          "/stress/values",
-                                     "/modal/stiffening",     "/attachments/stiffening"};
+                                     "/modal/stiffening",     "/attachments/stiffening",
+                                     "/kept/label",           "/kept/position",       "/kept/turns",
+                                     "/kept/translation",     "/kept/rotation",       "/loads/name",
+                                     "/loads/force",          "/loads/moment",        "/loads/modal",
+                                     "/loads/moment_gradient", "/loads/follows",      "/loads/force_gradient",
+                                     "/loads/modal_gradient"};
 
 /* A dataset cut along one dimension: all of the first (1 if there is none), own of the middle one, all of the last */
 struct Cut {
@@ -293,6 +314,11 @@ inline std::string NotFinite(const ModalBody &m)
   if (!finite(m.stiffening)) return "stiffening";
   for (const auto &a : m.attachments)
     if (!a.position.allFinite() || !a.translation.allFinite() || !a.rotation.allFinite() || !finite(a.stiffening)) return "attachment " + a.name;
+  for (const auto &a : m.nodes)
+    if (!a.position.allFinite() || !a.translation.allFinite() || !a.rotation.allFinite()) return "kept node " + std::to_string(a.label);
+  for (const auto &l : m.loads)
+    if (!l.force.allFinite() || !l.moment.allFinite() || !l.modal.allFinite() || !l.moment_gradient.allFinite() || !l.force_gradient.allFinite() || !l.modal_gradient.allFinite())
+      return "load case " + l.name;
   return "";
 }
 

@@ -211,6 +211,86 @@ Modes3 ThreeRows(const std::vector<double> &v, hsize_t begin, hsize_t n)
   return Eigen::Map<const Modes3>(v.data() + begin * 3 * n, 3, (Eigen::Index)n);
 }
 
+/* Names that end with a zero each; an error if they are not `count` */
+std::vector<std::string> GetNames(Reader *in, const std::string &path, hsize_t count)
+{
+  std::vector<std::string> all;
+  const Dims               characters = in->dims<uint8_t>(path);
+  if (!in->error.empty()) return all;
+  const auto names = in->get<uint8_t>(path, {characters[0]});
+  if (!in->error.empty()) return all;
+  if ((hsize_t)std::count(names.begin(), names.end(), 0) != count || (count && names.back())) {
+    in->fail(path + " does not have a name for each");
+    return all;
+  }
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    const auto end = std::find(name, names.end(), 0);
+    all.emplace_back(name, end);
+    name = end;
+  }
+  return all;
+}
+
+void GetKept(Reader *in, hsize_t n, ModalBody *m)
+{
+  if (!in->has("/kept/label")) return;
+  const Dims labels = in->dims<int64_t>("/kept/label");
+  if (!in->error.empty()) return;
+  const hsize_t k        = labels[0];
+  const auto    label    = in->get<int64_t>("/kept/label", {k});
+  const auto    turns    = in->get<uint8_t>("/kept/turns", {k});
+  const auto    position = in->get<double>("/kept/position", {k, 3}), translation = in->get<double>("/kept/translation", {k, n, 3}),
+             rotation = in->get<double>("/kept/rotation", {k, n, 3});
+  if (!in->error.empty()) return;
+  for (hsize_t i = 0; i < k; i++) {
+    ModalNode node;
+    if (label[i] < 0 || label[i] > (int64_t)PETSC_MAX_INT) return in->fail("/kept/label has an impossible number, " + std::to_string(label[i]));
+    if (turns[i] > 1) return in->fail("/kept/turns has " + std::to_string(turns[i]) + ", must be 0 or 1");
+    node.label       = (PetscInt)label[i];
+    node.turns       = turns[i] != 0;
+    node.position    = Eigen::Map<const Vector3>(position.data() + 3 * i);
+    node.translation = ThreeRows(translation, i, n);
+    node.rotation    = ThreeRows(rotation, i, n);
+    m->nodes.push_back(node);
+  }
+}
+
+void GetLoads(Reader *in, hsize_t n, ModalBody *m)
+{
+  if (!in->has("/loads/force")) return;
+  const Dims forces = in->dims<double>("/loads/force");
+  if (!in->error.empty()) return;
+  const hsize_t l         = forces[0];
+  const auto    names     = GetNames(in, "/loads/name", l);
+  const auto    follows   = in->get<uint8_t>("/loads/follows", {l});
+  const auto    force     = in->get<double>("/loads/force", {l, 3}), moment = in->get<double>("/loads/moment", {l, 3}),
+             modal = in->get<double>("/loads/modal", {l, n}), by_moment = in->get<double>("/loads/moment_gradient", {l, n, 3});
+  if (!in->error.empty()) return;
+  for (uint8_t f : follows)
+    if (f > 1) return in->fail("/loads/follows has " + std::to_string(f) + ", must be 0 or 1");
+  const hsize_t       f = (hsize_t)std::count(follows.begin(), follows.end(), 1);
+  std::vector<double> by_force, by_modal;
+  if (f) {
+    by_force = in->get<double>("/loads/force_gradient", {f, n, 3});
+    by_modal = in->get<double>("/loads/modal_gradient", {f, n, n});
+  }
+  if (!in->error.empty()) return;
+  const Eigen::Index modes = (Eigen::Index)n;
+  for (hsize_t i = 0, at = 0; i < l; i++) {
+    ModalLoadCase c;
+    c.name            = names[i];
+    c.force           = Eigen::Map<const Vector3>(force.data() + 3 * i);
+    c.moment          = Eigen::Map<const Vector3>(moment.data() + 3 * i);
+    c.modal           = Eigen::Map<const Eigen::VectorXd>(modal.data() + n * i, modes);
+    c.moment_gradient = ThreeRows(by_moment, i, n);
+    if (follows[i]) {
+      c.force_gradient = ThreeRows(by_force, at, n);
+      c.modal_gradient = Eigen::Map<const Eigen::MatrixXd>(by_modal.data() + at++ * n * n, modes, modes).transpose();
+    }
+    m->loads.push_back(c);
+  }
+}
+
 void GetAttachments(Reader *in, hsize_t n, ModalBody *m)
 {
   const Dims characters = in->dims<uint8_t>("/attachments/name"), positions = in->dims<double>("/attachments/position");
@@ -261,6 +341,8 @@ void GetModal(Reader *in, ModalBody *m)
   if (in->has("/modal/quadratic")) quadratic = in->get<double>("/modal/quadratic", {6, n, n});
   GetAttachments(in, n, m);
   GetStiffening(in, n, m);
+  GetKept(in, n, m);
+  GetLoads(in, n, m);
   if (!in->error.empty()) return;
   m->name    = in->head.name;
   m->mass    = mass[0];

@@ -230,7 +230,68 @@ std::string Inconsistent(const ModalBody &m)
       return "modes of attachment " + a.name + " are not as many as the body's";
     if (a.name.find('\0') != std::string::npos) return "a name with a zero inside";
   }
+  for (const auto &a : m.nodes)
+    if (a.translation.cols() != n || a.rotation.cols() != n) return "modes of kept node " + std::to_string(a.label) + " are not as many as the body's";
+  for (const auto &l : m.loads) {
+    const Eigen::Index f = l.modal_gradient.rows();
+    if (l.modal.size() != n || l.moment_gradient.cols() != n || l.modal_gradient.cols() != f || l.force_gradient.cols() != f || (f && f != n))
+      return "load case " + l.name + " of another size than the modes, or with one gradient alone of force and work";
+    if (l.name.find('\0') != std::string::npos) return "a name with a zero inside";
+  }
   return "";
+}
+
+void Append(std::vector<double> *v, const std::vector<double> &more) { v->insert(v->end(), more.begin(), more.end()); }
+
+void PutKept(Writer *out, const ModalBody &m)
+{
+  const hsize_t        k = m.nodes.size(), n = (hsize_t)m.omega.size();
+  std::vector<int64_t> label;
+  std::vector<uint8_t> turns;
+  std::vector<double>  position, translation, rotation;
+  if (!k) return;
+  for (const ModalNode &a : m.nodes) {
+    label.push_back(a.label);
+    turns.push_back(a.turns);
+    Append(&position, Flat(a.position));
+    Append(&translation, Flat(a.translation));
+    Append(&rotation, Flat(a.rotation));
+  }
+  out->put("/kept/label", {k}, label);
+  out->put("/kept/position", {k, 3}, position);
+  out->put("/kept/turns", {k}, turns);
+  out->put("/kept/translation", {k, n, 3}, translation);
+  out->put("/kept/rotation", {k, n, 3}, rotation);
+}
+
+void PutLoads(Writer *out, const ModalBody &m)
+{
+  const hsize_t        l = m.loads.size(), n = (hsize_t)m.omega.size();
+  std::vector<uint8_t> names, follows;
+  std::vector<double>  force, moment, modal, by_moment, by_force, by_modal;
+  hsize_t              f = 0;
+  if (!l) return;
+  for (const ModalLoadCase &c : m.loads) {
+    names.insert(names.end(), c.name.begin(), c.name.end());
+    names.push_back(0);
+    follows.push_back(c.modal_gradient.size() > 0);
+    f += follows.back();
+    Append(&force, Flat(c.force));
+    Append(&moment, Flat(c.moment));
+    Append(&modal, Flat(c.modal));
+    Append(&by_moment, Flat(c.moment_gradient));
+    Append(&by_force, Flat(c.force_gradient));
+    Append(&by_modal, Flat(c.modal_gradient.transpose()));
+  }
+  out->put("/loads/name", {names.size()}, names);
+  out->put("/loads/force", {l, 3}, force);
+  out->put("/loads/moment", {l, 3}, moment);
+  out->put("/loads/modal", {l, n}, modal);
+  out->put("/loads/moment_gradient", {l, n, 3}, by_moment);
+  out->put("/loads/follows", {l}, follows);
+  if (!f) return;
+  out->put("/loads/force_gradient", {f, n, 3}, by_force);
+  out->put("/loads/modal_gradient", {f, n, n}, by_modal);
 }
 
 void PutModal(Writer *out, const ModalBody &m)
@@ -272,6 +333,8 @@ void PutModal(Writer *out, const ModalBody &m)
   out->put("/attachments/position", {a, 3}, position);
   out->put("/attachments/translation", {a, n, 3}, translation);
   out->put("/attachments/rotation", {a, n, 3}, rotation);
+  PutKept(out, m);
+  PutLoads(out, m);
 }
 
 /* How many nodes there are on all ranks, and what of them is kept */

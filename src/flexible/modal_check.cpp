@@ -43,6 +43,13 @@ std::string Impossible(const ModalBody &m)
   for (const ModalAttachment &a : m.attachments)
     if (a.name.empty() || !names.insert(a.name).second)
       return a.name.empty() ? "an attachment without a name" : "two attachments of the name " + a.name;
+  for (std::size_t k = 0; k < m.nodes.size(); k++) {
+    if (m.nodes[k].label < 0 || (k && m.nodes[k].label <= m.nodes[k - 1].label)) return "kept nodes whose numbers are not ascending from 0 up";
+    if (!m.nodes[k].turns && !m.nodes[k].rotation.isZero(0)) return "a rotation of kept node " + std::to_string(m.nodes[k].label) + ", which is said to have none";
+  }
+  names.clear();
+  for (const ModalLoadCase &l : m.loads)
+    if (l.name.empty() || !names.insert(l.name).second) return l.name.empty() ? "a load case without a name" : "two load cases of the name " + l.name;
   bool symmetric = true;
   for (const auto &B : m.stiffening) symmetric = symmetric && Symmetric(B);
   for (const ModalAttachment &a : m.attachments)

@@ -6,6 +6,8 @@
 */
 #include "craig_bampton.h"
 #include "invariants.h"
+#include "kept_nodes.h"
+#include "loads.h"
 #include "stiffening.h"
 #include <algorithm>
 #include <cmath>
@@ -34,8 +36,8 @@ static PetscErrorCode CheckReduction(const FeModel &model, const Reduction &r)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode CheckModel(const FeModel &model, const Reduction &reduction, std::vector<Tied> *tied,
-                                 BodyScales *scales)
+static PetscErrorCode CheckModel(const FeModel &model, const Reduction &reduction, std::vector<Tied> *tied, KeptNodes *kept,
+                                 std::vector<ResolvedLoad> *loads, BodyScales *scales)
 {
   Phase phase(model.comm, reduction.progress);
 
@@ -44,6 +46,8 @@ static PetscErrorCode CheckModel(const FeModel &model, const Reduction &reductio
   PetscCall(CheckReduction(model, reduction));
   PetscCall(CheckMatrices(model));
   PetscCall(ResolveAttachments(model, reduction.attachments, tied));
+  PetscCall(ResolveKeptNodes(model, reduction, kept));
+  PetscCall(ResolveLoads(model, reduction.loads, loads));
   PetscCall(CheckConnected(model, *tied));
   PetscCall(ComputeScales(model, scales));
   PetscCall(CheckUnsupported(model, *scales));
@@ -222,15 +226,17 @@ static PetscErrorCode StartSlepc()
 
 PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedBody *body)
 {
-  std::vector<Tied> tied;
-  BodyScales        scales;
-  ReductionSpace    space;
-  Method            method;
-  Phase             phase(model.comm, reduction.progress);
+  std::vector<Tied>         tied;
+  KeptNodes                 kept;
+  std::vector<ResolvedLoad> loads;
+  BodyScales                scales;
+  ReductionSpace            space;
+  Method                    method;
+  Phase                     phase(model.comm, reduction.progress);
 
   PetscFunctionBegin;
   PetscCall(StartSlepc());
-  PetscCall(CheckModel(model, reduction, &tied, &scales));
+  PetscCall(CheckModel(model, reduction, &tied, &kept, &loads, &scales));
   PetscCall(FindSpace(model, tied, reduction, scales, &method, &space));
   PetscCall(ToModes(model, tied, reduction, scales, &space));
 
@@ -238,6 +244,8 @@ PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedB
   FillModes(space, body);
   PetscCall(ComputeInvariants(model, scales, space.x, &body->modal));
   PetscCall(FillAttachments(model, tied, space.x, space.motion, &body->modal));
+  PetscCall(FillNodes(model, kept, space.x, &body->modal));
+  PetscCall(FillLoads(model, reduction.loads, loads, scales, space.x, &body->modal));
   PetscCall(CheckMeanAxes(model, scales, body->modal));
   PetscCall(phase.end(std::to_string(body->modal.modes()) + " modes"));
   if (reduction.stiffening) PetscCall(ComputeStiffening(model, tied, scales, reduction, space.x, &body->modal));

@@ -133,6 +133,14 @@ PetscErrorCode ReducedBody::view(PetscViewer viewer) const
   for (const ModalAttachment &a : modal.attachments)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  attachment %s at (%.8g, %.8g, %.8g)\n", a.name.c_str(), a.position[0],
                                      a.position[1], a.position[2]));
+  if (!modal.nodes.empty()) {
+    const auto turning = std::count_if(modal.nodes.begin(), modal.nodes.end(), [](const ModalNode &n) { return n.turns; });
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  nodes for markers: %d, from %" PetscInt_FMT " to %" PetscInt_FMT ", %d of them with rotation\n", (int)modal.nodes.size(),
+                                     modal.nodes.front().label, modal.nodes.back().label, (int)turning));
+  }
+  for (const ModalLoadCase &l : modal.loads)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  load case %s%s: force (%.8g, %.8g, %.8g), moment about the centre of mass (%.8g, %.8g, %.8g)\n", l.name.c_str(),
+                                     l.modal_gradient.size() ? ", follows the surface" : "", l.force[0], l.force[1], l.force[2], l.moment[0], l.moment[1], l.moment[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  kept: %lld nodes%s, %lld of them with stress modes\n",
                                    (long long)count[0], count[2] ? " with shapes" : " without shapes",
                                    (long long)count[1]));

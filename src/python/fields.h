@@ -49,7 +49,10 @@ private:
   }
   static void read(py::handle g, double &x, const std::string &w) { plain(g, x, w, "a number"); }
   static void read(py::handle g, int &x, const std::string &w) { plain(g, x, w, "a whole number"); }
+  static void read(py::handle g, PetscInt64 &x, const std::string &w) { plain(g, x, w, "a whole number"); }
   static void read(py::handle g, bool &x, const std::string &w) { plain(g, x, w, "True or False"); }
+  static void read(py::handle g, std::string &x, const std::string &w) { plain(g, x, w, "a text"); }
+  static void read(py::handle g, Body &x, const std::string &w) { x = ToHandle<Body>(g, w); }
   static void read(py::handle g, Marker &x, const std::string &w) { x = ToHandle<Marker>(g, w); }
   static void read(py::handle g, Element &x, const std::string &w) { x = ToHandle<Element>(g, w); }
   static void read(py::handle g, Vector3 &x, const std::string &w) { x = ToVector(g, w); }

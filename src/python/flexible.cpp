@@ -40,6 +40,25 @@ Attachment ToAttachment(py::handle x)
   return a;
 }
 
+/* (name, set, follows), or (name, {label: force}) */
+LoadCase ToLoad(py::handle x)
+{
+  const py::tuple t = py::reinterpret_borrow<py::tuple>(x);
+  LoadCase        l;
+  l.name = t[0].cast<std::string>();
+  if (t.size() == 3) {
+    l.surface = t[1].cast<std::string>();
+    l.follows = t[2].cast<bool>();
+    return l;
+  }
+  for (auto force : py::dict(t[1])) {
+    const Vector3 f = ToVector(force.second, "load case " + l.name + ": force");
+    l.node.push_back(force.first.cast<PetscInt>());
+    l.force.insert(l.force.end(), f.data(), f.data() + 3);
+  }
+  return l;
+}
+
 Reduction ToReduction(const py::dict &d)
 {
   Reduction         r;
@@ -50,6 +69,9 @@ Reduction ToReduction(const py::dict &d)
   r.max_frequency = d["max_frequency"].cast<double>();
   r.keep_below    = d["keep_below"].cast<double>();
   for (py::handle k : py::object(d["keep"])) r.keep.push_back(k.cast<PetscInt>());
+  for (py::handle s : py::object(d["node_sets"])) r.node_sets.push_back(s.cast<std::string>());
+  for (py::handle k : py::object(d["nodes"])) r.nodes.push_back(k.cast<PetscInt>());
+  for (py::handle l : py::object(d["loads"])) r.loads.push_back(ToLoad(l));
   r.stiffening = d["stiffening"].cast<bool>();
   r.all_nodes  = d["all_nodes"].cast<bool>();
   r.progress   = d["progress"].cast<bool>();

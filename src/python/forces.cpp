@@ -29,6 +29,11 @@ template <class F> static void Fields(Beam &s, F &f)
 }
 template <class F> static void Fields(UserForce &s, F &f) { Pair(s, f), f("frame", s.frame), f("force", s.force), f("moment", s.moment); }
 template <class F> static void Fields(UserScalarForce &s, F &f) { Pair(s, f), f("value", s.value), f("rotational", s.rotational); }
+template <class F> static void Fields(ModalLoad &s, F &f) { f("body", s.body), f("load", s.load), f("scale", s.scale), f("state", s.state); }
+template <class F> static void Fields(NodeContact &s, F &f)
+{
+  f("body", s.body), f("nodes", s.nodes), f("radius", s.radius), f("j", s.j), f("radius_j", s.radius_j), f("law", s.law);
+}
 template <class F> static void Fields(SpherePlane &s, F &f) { Pair(s, f), f("radius", s.radius), f("law", s.law); }
 template <class F> static void Fields(EllipsoidPlane &s, F &f) { Pair(s, f), f("semiaxes", s.semiaxes), f("law", s.law); }
 template <class F> static void Fields(TorusPlane &s, F &f) { Pair(s, f), f("radius", s.radius), f("tube", s.tube), f("law", s.law); }
@@ -56,6 +61,8 @@ void RegisterForces(Kinds &k)
   Register<Beam>(k, "Beam");
   Register<UserForce>(k, "UserForce");
   Register<UserScalarForce>(k, "UserScalarForce");
+  Register<ModalLoad>(k, "ModalLoad");
+  Register<NodeContact>(k, "NodeContact");
   Register<SpherePlane>(k, "SpherePlane");
   Register<EllipsoidPlane>(k, "EllipsoidPlane");
   Register<TorusPlane>(k, "TorusPlane");

@@ -97,7 +97,7 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
 {
   const MarkerData      &m = s.markers[all[e].marker[0]];
   const BodyData        &b = s.bodies[m.body], &c = s.bodies[s.markers[all[e].marker[1]].body];
-  const ModalAttachment &a = b.flexible->model->attachments[c.attachment];
+  const ModalAttachment &a = b.flexible->place(c.attachment);
   const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), (Eigen::Index)b.flexible->deformation.size());
   const AttachedPoint    point(a, eta);
   const SmallTurn        turn(point.motion.tail<3>());

@@ -67,6 +67,7 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
   PetscCall(VecGetArrayWrite(F, &f));
   std::fill(f, f + R.n, 0.0);
   R.bodies.move(local[0], local[1]);
+  R.bodies.gravity = R.scene.gravityAt(t);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
   for (auto &b : R.batches) b->residual(e);
   R.bodies.loadCarriers();
@@ -160,6 +161,7 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
   PetscCall(VecGetArrayRead(A, &a));
   PetscCall(LocalState(R, u, v, a, local));
   R.bodies.move(local[0], local[1]);
+  R.bodies.gravity = R.scene.gravityAt(t);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, nullptr, sv, sa};
   if (R.triangle) PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQSBAIJ, MATMPISBAIJ, ""));
   else PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQAIJ, MATMPIAIJ, ""));

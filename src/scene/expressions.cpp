@@ -88,6 +88,10 @@ std::string CheckMarkers(const SceneData &s, const Measure &m)
   if (pair && m.i.id == m.j.id) return "markers i and j are the same";
   if (!pair && (m.component < 0 || m.component > 2))
     return "component is " + std::to_string(m.component) + ", must be 0, 1 or 2";
+  const bool turns = m.kind == Measure::Angle || m.kind == Measure::AngularVelocity || m.kind == Measure::AngularAcceleration;
+  for (Marker k : {m.i, m.j})
+    if (turns && k.id != -1 && s.markers[k.id].body >= 0 && s.bodies[s.markers[k.id].body].forces_alone)
+      return "a marker is on " + s.turnlessName(s.markers[k.id].body);
   if (m.kind != Measure::Angle) return "";
   if (std::abs(s.frame(m.i).R.col(0).dot(s.frame(m.j).R.col(2))) > 1 - 1e-8)
     return "the x axis of marker i is along the z axis of j, the angle about it is undefined";

@@ -33,6 +33,11 @@ bool SameColumns(const ModalBody &m)
   for (const auto &x : m.quadratic) same = same && ((x.rows() == n && x.cols() == n) || x.size() == 0);
   same = same && square(m.stiffening);
   for (const ModalAttachment &a : m.attachments) same = same && a.translation.cols() == n && a.rotation.cols() == n && square(a.stiffening);
+  for (const ModalNode &a : m.nodes) same = same && a.translation.cols() == n && a.rotation.cols() == n && !a.stiffening[0].size();
+  const auto gradient = [n](Eigen::Index columns) { return columns == n || columns == 0; };
+  for (const ModalLoadCase &l : m.loads)
+    same = same && l.modal.size() == n && l.moment_gradient.cols() == n && gradient(l.force_gradient.cols()) && gradient(l.modal_gradient.cols()) &&
+           l.modal_gradient.rows() == l.modal_gradient.cols();
   return same;
 }
 
@@ -45,6 +50,10 @@ bool Finite(const ModalBody &m)
     good = good && a.position.allFinite() && a.translation.allFinite() && a.rotation.allFinite();
     for (const auto &x : a.stiffening) good = good && x.allFinite();
   }
+  for (const ModalNode &a : m.nodes) good = good && a.position.allFinite() && a.translation.allFinite() && a.rotation.allFinite();
+  for (const ModalLoadCase &l : m.loads)
+    good = good && l.force.allFinite() && l.moment.allFinite() && l.modal.allFinite() && l.moment_gradient.allFinite() && l.force_gradient.allFinite() &&
+           l.modal_gradient.allFinite();
   return good;
 }
 
@@ -67,7 +76,7 @@ std::string Fault(const FlexibleBody &b, bool planar)
   const ModalBody &m = *b.model;
   const PetscInt   n = m.modes();
   if (planar) return "flexible bodies need a scene in space";
-  if (!SameColumns(m)) return "its ModalBody has " + std::to_string(n) + " frequencies, and invariants or attachments with another number of modes";
+  if (!SameColumns(m)) return "its ModalBody has " + std::to_string(n) + " frequencies, and invariants, attachments, nodes or loads with another number of modes";
   if (!Finite(m)) return "its ModalBody has values that are not finite";
   if (n && m.omega.minCoeff() <= 0) return "mode " + std::to_string(n) + " or another has no positive frequency; rigid-body modes do not belong to a ModalBody";
   for (const auto &x : m.quadratic)
@@ -137,9 +146,34 @@ Body Scene::attachment(Body body, const std::string &name)
     s.errors.push_back("flexible body " + s.bodies[body.id].name + ": it has no attachment " + name + (known.empty() ? ", in fact none" : ", but " + known));
     return Body{};
   }
+  return frameAt(body, a);
+}
+
+Body Scene::node(Body body, PetscInt label)
+{
+  if (recording()) record([=](Scene &s) { s.node(body, label); });
+  SceneData        &s   = data();
+  const std::string who = "node " + std::to_string(label);
+  if (!s.valid(body) || !s.bodies[body.id].flexible) {
+    s.errors.push_back(who + ": its body is not a flexible one of this scene");
+    return Body{};
+  }
+  const ModalBody &m = *s.bodies[body.id].flexible->model;
+  const PetscInt   n = m.node(label);
+  if (n < 0) {
+    s.errors.push_back("flexible body " + s.bodies[body.id].name + ": its model has not kept " + who + ", but " + std::to_string(m.nodes.size()) +
+                       " others; keep it when the body is reduced (Reduction::node_sets, hhtreduce -keep_nodes)");
+    return Body{};
+  }
+  return frameAt(body, (PetscInt)m.attachments.size() + n);
+}
+
+Body Scene::frameAt(Body body, PetscInt place)
+{
+  const SceneData &s = data();
   for (std::size_t b = 0; b < s.bodies.size(); b++)
-    if (s.bodies[b].carrier == body.id && s.bodies[b].attachment == a) return Body{(PetscInt)b, s.number};
-  return addFrame(body, a);
+    if (s.bodies[b].carrier == body.id && s.bodies[b].attachment == place) return Body{(PetscInt)b, s.number};
+  return addFrame(body, place);
 }
 
 /* The frame starts where the deformation at the start has its point */
@@ -147,14 +181,15 @@ Body Scene::addFrame(Body body, PetscInt a)
 {
   SceneData             &s = data();
   const BodyData        &b = s.bodies[body.id];
-  const ModalAttachment &x = b.flexible->model->attachments[a];
+  const ModalAttachment &x = b.flexible->place(a);
+  const PetscInt         k = a - (PetscInt)b.flexible->model->attachments.size(); /* of a node */
   const PetscInt         n = b.flexible->model->modes();
   const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), n), rate(b.flexible->deformation_rate.data(), n);
   const AttachedPoint point(x, eta);
   const Vector3   place = x.position - b.center, arm = place + point.motion.head<3>();
   const SmallTurn turn(point.motion.tail<3>());
   BodyData        f;
-  f.name        = b.name + "." + x.name;
+  f.name        = b.name + "." + (k < 0 ? x.name : "node " + std::to_string(b.flexible->model->nodes[k].label));
   f.mass        = 0;
   f.inertia     = Matrix3::Zero();
   f.center      = Vector3::Zero();
@@ -168,6 +203,7 @@ Body Scene::addFrame(Body body, PetscInt a)
   f.light_inertia = 1e-3 * b.inertia.trace();
   f.carrier     = body.id;
   f.attachment  = a;
+  f.forces_alone = k >= 0 && !b.flexible->model->nodes[k].turns;
   s.bodies.push_back(f);
   const Body frame{(PetscInt)s.bodies.size() - 1, s.number};
   s.markers.push_back({body.id, place, Matrix3::Identity()});

@@ -82,6 +82,7 @@ Digest MakeDigest(const SceneData &s)
   Digest d;
   d.whole(s.planar + 2 * (int)s.start.rotations);
   d.numbers(s.gravity);
+  d.whole((long)s.ground_acceleration.size());
   for (const BodyData &b : s.bodies) Add(d, b);
   for (const MarkerData &m : s.markers) {
     d.whole(m.body);

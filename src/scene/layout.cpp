@@ -184,7 +184,7 @@ void MakeCarriers(Runtime &R)
     LocalBody &k = B.body[i];
     if (k.kind != BodyKind::Attached) continue;
     const BodyData        &frame = R.scene.bodies[k.id], &flexible = R.scene.bodies[frame.carrier];
-    const ModalAttachment &a     = flexible.flexible->model->attachments[frame.attachment];
+    const ModalAttachment &a     = flexible.flexible->place(frame.attachment);
     const PetscInt         body  = R.local_body[frame.carrier];
     if (of[body] < 0) {
       of[body] = (PetscInt)B.carriers.size();

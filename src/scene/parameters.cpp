@@ -13,6 +13,7 @@ Parameter Scene::parameter(const std::string &name, double value)
   if (!journal_) {
     journal_ = std::make_unique<Journal>();
     if (s.gravity != Vector3::Zero()) record([g = s.gravity](Scene &again) { again.gravity(g); }); /* which may come before */
+    if (!s.ground_acceleration.empty()) record([a = s.ground_acceleration](Scene &again) { again.groundAcceleration(a[0], a[1], a[2]); });
   }
   const auto fault = [&](const char *what) {
     journal_->errors.push_back("parameter " + name + ": " + what);

@@ -79,13 +79,14 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
   s.refuseLate(who);
   if (!good) s.errors.push_back(who + ": its body is not one of this scene");
   else if (body.id >= 0 && s.bodies[body.id].flexible)
-    s.errors.push_back(who + ": a flexible body is held at its attachments; use scene.attachment(" + s.bodies[body.id].name + ", ...) as the marker's body");
+    s.errors.push_back(who + ": a flexible body is held at its attachments and kept nodes; use scene.attachment(" + s.bodies[body.id].name +
+                       ", ...) or scene.node(...) as the marker's body");
   if (!position.allFinite() || !axes.allFinite() || (axes.transpose() * axes - Matrix3::Identity()).norm() > 1e-8 || axes.determinant() < 0)
     s.errors.push_back(who + ": position must be finite and axes orthonormal and right-handed");
   MarkerData m{good ? body.id : -2, position, axes};
   if (good && body.id >= 0) {
     m.s -= s.bodies[body.id].center;
-    if (s.bodies[body.id].point && m.s.norm() > 0) s.errors.push_back(who + ": a marker on the point mass " + s.bodies[body.id].name + " must be at its position");
+    if (s.turnless(body.id) && m.s.norm() > 0) s.errors.push_back(who + ": a marker on " + s.turnlessName(body.id) + " must be at its position");
   }
   s.markers.push_back(m);
   if (!name.empty()) s.marker_names[id] = name;
@@ -123,6 +124,22 @@ void Scene::gravity(const Vector3 &acceleration)
   data().refuseLate("gravity");
   if (!acceleration.allFinite()) data().errors.push_back("gravity must be finite");
   data().gravity = acceleration;
+}
+
+void Scene::groundAcceleration(const TimeFunction &x, const TimeFunction &y, const TimeFunction &z)
+{
+  if (recording()) record([=](Scene &s) { s.groundAcceleration(x, y, z); });
+  data().refuseLate("the ground's acceleration");
+  for (const TimeFunction *f : {&x, &y, &z})
+    if (!f->error().empty()) data().errors.push_back("the ground's acceleration: " + f->error());
+  data().ground_acceleration = {x, y, z};
+}
+
+Vector3 SceneData::gravityAt(double t) const
+{
+  Vector3 g = gravity;
+  for (std::size_t c = 0; c < ground_acceleration.size(); c++) g((int)c) -= ground_acceleration[c](t).f;
+  return g;
 }
 
 Frame<double> SceneData::frame(Marker m) const

@@ -18,6 +18,13 @@ struct FlexibleData {
   std::shared_ptr<const ModalBody> model;
   ModalMass                        mass;
   std::vector<double>              damping, deformation, deformation_rate; /* ratios, modal coordinates at the start */
+
+  /* Places that markers take hold of: attachments, and behind them the kept nodes */
+  const ModalAttachment &place(PetscInt k) const
+  {
+    const std::size_t n = model->attachments.size(), i = (std::size_t)k;
+    return i < n ? model->attachments[i] : model->nodes[i - n];
+  }
 };
 Eigen::VectorXd ModalDamping(const FlexibleData &f); /* 2 zeta omega */
 
@@ -31,7 +38,8 @@ struct BodyData {
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
   std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
-  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment: its flexible body; it has no coordinates in a run */
+  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment or node: its flexible body and FlexibleData::place(); it has no coordinates in a run */
+  bool        forces_alone = false;             /* the frame of a node whose neighbours tell no rotation */
   bool        massless = false; /* the frame of an attachment, also one of a body of another library */
   double      light_mass = 0, light_inertia = 0; /* what assembly takes, or adds, where there is no inertia: a little of that of others */
 };
@@ -117,6 +125,7 @@ struct SceneData {
   std::vector<StoreBase *>    order; /* of first use: the order of assembly */
   std::vector<std::unique_ptr<Extension>> extensions;
   Vector3                     gravity = Vector3::Zero();
+  std::vector<TimeFunction>   ground_acceleration; /* along the space axes; empty: none */
   std::vector<ChannelData>    channels;
   std::vector<ShapeData>      shapes;
   std::vector<SurfaceData>    surfaces;
@@ -130,6 +139,12 @@ struct SceneData {
   SceneData();
   ~SceneData();
   std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
+  /* Whether a body takes no moment, and what it is then called in messages */
+  bool        turnless(PetscInt b) const { return b >= 0 && (bodies[b].point || bodies[b].forces_alone); }
+  std::string turnlessName(PetscInt b) const
+  {
+    return bodies[b].point ? "the point mass " + bodies[b].name : bodies[b].name + ", a node whose neighbours tell no rotation";
+  }
   /* Whether a handle is of this scene. Number 0 stands for a handle made by hand. */
   template <class Handle> bool mine(Handle h) const { return h.scene == 0 || h.scene == number; }
   bool valid(Marker m) const { return mine(m) && m.id >= 0 && m.id < (PetscInt)markers.size(); }
@@ -139,6 +154,7 @@ struct SceneData {
   {
     if (fixed) errors.push_back(what + " came too late: the scene is fixed from createTS() or setUp() on");
   }
+  Vector3 gravityAt(double t) const; /* less the ground's acceleration */
   /* at the start */
   Frame<double> frame(Marker m) const;
   Twist<double> twist(Marker m) const;

@@ -176,7 +176,7 @@ TEST(ReducedFile, OtherFormatAndNewerVersion)
   HandMade    made(PETSC_COMM_SELF);
   Scratch     other("other.h5"), newer("newer.h5");
   PetscViewer viewer;
-  int         version = 4;
+  int         version = 5;
   must(PetscViewerHDF5Open(PETSC_COMM_SELF, other.name.c_str(), FILE_MODE_WRITE, &viewer));
   must(PetscViewerHDF5WriteAttribute(viewer, "/", "version", PETSC_INT, &version));
   must(PetscViewerDestroy(&viewer));
@@ -185,7 +185,7 @@ TEST(ReducedFile, OtherFormatAndNewerVersion)
   must(PetscViewerHDF5Open(PETSC_COMM_SELF, newer.name.c_str(), FILE_MODE_UPDATE, &viewer));
   must(PetscViewerHDF5WriteAttribute(viewer, "/", "version", PETSC_INT, &version));
   must(PetscViewerDestroy(&viewer));
-  EXPECT_SAYS(Refused(newer.name), "it has version 4 of the format, this program knows version 3");
+  EXPECT_SAYS(Refused(newer.name), "it has version 5 of the format, this program knows version 4");
 }
 
 /* A number's share in the checksum, as src/flexible/file.h tells */
@@ -201,16 +201,15 @@ uint64_t VersionShare(uint64_t version)
   return mix(version ^ mix(key));
 }
 
-/* Turns a file into one of version 1, which had the same layout. PETSc knows signed numbers only: false if the checksum
+/* Turns a file into one of an older version, whose parts have the same layout. PETSc knows signed numbers only: false if the checksum
  * is none */
-bool MakeVersionOne(const std::string &file)
+bool MakeOlder(const std::string &file, int version)
 {
   PetscViewer viewer;
   long        checksum;
-  int         version = 1;
   must(PetscViewerHDF5Open(PETSC_COMM_SELF, file.c_str(), FILE_MODE_UPDATE, &viewer));
   must(PetscViewerHDF5ReadAttribute(viewer, "/", "checksum", PETSC_LONG, nullptr, &checksum));
-  const long of_one = (long)((uint64_t)checksum + VersionShare(1) - VersionShare(3));
+  const long of_one = (long)((uint64_t)checksum + VersionShare((uint64_t)version) - VersionShare(4));
   const bool fits   = checksum != std::numeric_limits<long>::max() && of_one >= 0;
   if (fits) {
     must(PetscViewerHDF5WriteAttribute(viewer, "/", "version", PETSC_INT, &version));
@@ -229,7 +228,7 @@ TEST(ReducedFile, VersionOne)
   for (int attempt = 0; attempt < 3000 && !fits; attempt++) {
     made.body.source = std::to_string(attempt) + ", so that the checksum is another";
     must(made.body.save(old.name));
-    fits = MakeVersionOne(old.name);
+    fits = MakeOlder(old.name, 1);
   }
   ASSERT_TRUE(fits);
   ReducedBody body;
@@ -244,6 +243,42 @@ TEST(ReducedFile, VersionOne)
   ReducedBody read;
   must(read.load(PETSC_COMM_SELF, again.name));
   EXPECT_EQ(read.mode[0].residual, -1);
+}
+
+/* Version 3 had neither kept nodes nor loads */
+TEST(ReducedFile, VersionThree)
+{
+  HandMade made(PETSC_COMM_SELF);
+  Scratch  old("three.h5");
+  bool     fits = false;
+  made.body.modal.nodes.clear();
+  made.body.modal.loads.clear();
+  for (int attempt = 0; attempt < 3000 && !fits; attempt++) {
+    made.body.source = std::to_string(attempt) + ", so that the checksum is another";
+    must(made.body.save(old.name));
+    fits = MakeOlder(old.name, 3);
+  }
+  ASSERT_TRUE(fits);
+  ReducedBody body;
+  must(body.load(PETSC_COMM_SELF, old.name));
+  EXPECT_TRUE(Same(made.body, body));
+}
+
+TEST(ReducedFile, KeptNodesAndLoadsThatCannotBe)
+{
+  const auto refused = [](const std::function<void(ModalBody &)> &damage) {
+    HandMade made(PETSC_COMM_SELF);
+    damage(made.body.modal);
+    return SaveRefused(made.body);
+  };
+  EXPECT_SAYS(refused([](ModalBody &m) { std::swap(m.nodes[0], m.nodes[1]); }), "kept nodes whose numbers are not ascending");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.nodes[1].turns = false; }), "a rotation of kept node 1009, which is said to have none");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.nodes[1].translation(2, 1) = NAN; }), "not finite: kept node 1009");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.nodes[1].rotation.conservativeResize(3, 2); }), "modes of kept node 1009 are not as many as the body's");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.loads[1].name = "wind"; }), "two load cases of the name wind");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.loads[0].name.clear(); }), "a load case without a name");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.loads[1].modal_gradient(0, 1) = NAN; }), "not finite: load case pressure");
+  EXPECT_SAYS(refused([](ModalBody &m) { m.loads[1].force_gradient.resize(3, 0); }), "load case pressure of another size than the modes");
 }
 
 TEST(ReducedFile, OtherFiles)

@@ -20,6 +20,11 @@ bool PositiveBody(const ModalBody &m)
   bool good = m.mass > 0 && NotFinite(m).empty() && (m.moments - m.moments.transpose()).norm() <= 1e-8 * m.moments.norm();
   for (Eigen::Index k = 0; k < m.omega.size(); k++) good = good && m.omega[k] > 0;
   good = good && m.inertia().diagonal().minCoeff() >= -1e-8 * m.moments.norm();
+  for (const ModalNode &a : m.nodes) good = good && a.label >= 0 && a.translation.cols() == m.modes() && a.rotation.cols() == m.modes() && (a.turns || a.rotation.isZero(0));
+  for (const ModalLoadCase &l : m.loads) {
+    const Eigen::Index f = l.modal_gradient.rows();
+    good = good && !l.name.empty() && l.modal.size() == m.modes() && l.moment_gradient.cols() == m.modes() && l.force_gradient.cols() == f && (!f || f == m.modes());
+  }
   return good && m.first.cols() == m.omega.size();
 }
 

@@ -42,7 +42,7 @@ added = {match.group(1) for match in (re.match(r"hhtdae::Element hhtdae::Scene::
 elements = set()
 for text in (header("joints"), header("forces")):
     for name, body in re.findall(r"^struct (\w+) \{(.*?)(?:^\}| \});", text, flags=re.DOTALL | re.MULTILINE):
-        if re.search(r"^\s*(Marker|Element)\b|struct Term|vector<Expression>", body, flags=re.MULTILINE):
+        if re.search(r"^\s*(Marker|Element|Body)\b|struct Term|vector<Expression>", body, flags=re.MULTILINE):
             elements.add(name)
 check(len(elements) > 35, "joints.h and forces.h declare only %s" % sorted(elements))
 for name in analyses:

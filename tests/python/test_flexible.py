@@ -72,6 +72,27 @@ class Beam(unittest.TestCase):
             scene.connect("pin", h.Fixed, b, scene.ground, (0, 0, 0))
             scene.run()
 
+    def test_kept_nodes_and_loads(self):
+        """A pressure on the tip pulls on a node of it as its resultant does, and nodes touch a plane"""
+        node = int(self.model.label[self.model.sets["tip"][0]])
+        body = flexible.reduce(self.model, [flexible.Attachment("root")], modes=12, node_sets=["tip"], nodes=[1], pressures={"pull": ("tip", False)},
+                               nodal_loads={"push": {node: (0, 0, -3.)}})
+        scene = h.Scene()
+        b = scene.add("beam", h.FlexibleBody(body.modal()))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        load = scene.add("load", h.ModalLoad(b, "pull", -1e6))
+        scene.add("push", h.ModalLoad(b, "push", h.time() * 0))
+        scene.add("touch", h.NodeContact(b, scene.ground.marker((0, 0, -1))))
+        marker = b.node(node).marker()
+        now = scene.run().equilibrium().snapshot()
+        moved = now.motion(marker).position - self.model.coordinates[self.model.sets["tip"][0]]
+        self.assertAlmostEqual(moved[0], 1e6 / E * L, delta=0.2e6 / E * L)  # the first of the modes along the axis: 8 / pi^2
+        self.assertEqual(load.name, "load")
+        with self.assertRaisesRegex(h.Error, "has not kept node 999"):
+            scene = h.Scene()
+            scene.add("beam", h.FlexibleBody(body.modal())).node(999)
+            scene.run()
+
     def test_deflection_and_stress(self):
         """A force at the tip: F L^3 / (3 E I) and, half way, the stress of the outer fibre; fields and files"""
         scene = h.Scene()

@@ -51,7 +51,8 @@ class Elements(unittest.TestCase):
             "TranslationalMotion": lambda: h.TranslationalMotion(i, j, h.harmonic(1, 2), of="velocity", axis=0),
             "NonlinearSpring": lambda: h.NonlinearSpring(i, j, lambda l, v: l - 1 + v), "JointFriction": lambda: h.JointFriction(pin, 0.1, radius=0.1),
             "NonlinearTorsionalSpring": lambda: h.NonlinearTorsionalSpring(i, j, lambda p, w: -h.sin(p)),
-            "UserForce": lambda: h.UserForce(i, force=[1, 2, h.time()]), "UserScalarForce": lambda: h.UserScalarForce(i, j, h.sin(h.time()))}
+            "UserForce": lambda: h.UserForce(i, force=[1, 2, h.time()]), "UserScalarForce": lambda: h.UserScalarForce(i, j, h.sin(h.time())),
+            "ModalLoad": lambda: h.ModalLoad(b, "wind", h.time()), "NodeContact": lambda: h.NodeContact(b, j)}
         for count, name in enumerate(elements.ELEMENTS):
             e = scene.add("my " + name, special.get(name, lambda: getattr(h, name)(i, j))())
             self.assertEqual(e._id, pin._id + 1 + count)

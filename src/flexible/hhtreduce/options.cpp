@@ -5,6 +5,7 @@
 #include <cstring>
 #include <fstream>
 #include <set>
+#include <sstream>
 
 namespace hhtreduce
 {
@@ -46,6 +47,13 @@ const char *const help =
     "  -keep_below <f>          modes of the reduced body that are kept, by frequency\n"
     "  -keep <0,1,5-9>          the same by number from 0\n"
     "  -stiffening              geometric stiffening by loads on the attachments and by angular velocity\n"
+    "  -keep_nodes <set,17,20-30,...>\n"
+    "                           nodes for markers, forces and contact of a scene: of sets and by number\n"
+    "  -pressure <name:set[:follows|:fixed],...>\n"
+    "                           load case: pressure one, inwards, on the outer faces whose nodes are all in the set; it follows the "
+    "deformed\n"
+    "                           surface, or its forces are fixed in the axes of the body\n"
+    "  -load <name:file,...>    load case: forces on nodes, lines \"label fx fy fz\"\n"
     "  -stress                  stress modes too, for stress over time and pictures\n"
     "  -no_shapes               the file is for scenes alone: no nodes, no pictures\n"
     "\n"
@@ -67,7 +75,7 @@ const char *const help =
     "  -traceback               errors with PETSc's trace of calls\n"
     "All options of PETSc and SLEPc are alive (-log_view, -options_left ...); -help with a task lists them.\n"
     "\n"
-    "Layout of the file (HDF5, little-endian, format \"hhtdae reduced body\" version 3; n modes, a attachments, N "
+    "Layout of the file (HDF5, little-endian, format \"hhtdae reduced body\" version 4; n modes, a attachments, N "
     "nodes, S nodes with stress)\n"
     "  attributes of /: format, version, program, source, method, units, name, fe_nodes, elastic_scale, checksum\n"
     "  /modal        mass {1}, center {3}, moments {3,3}, omega {n}, first {n,3}, moment {3,n,3}, quadratic {6,n,n},\n"
@@ -77,6 +85,9 @@ const char *const help =
     "                relative to it, and about eta^2 too high (version 1 had residuals of forces, read as not known: negative)\n"
     "  /attachments  name (each ends with a zero), position {a,3}, translation {a,n,3}, rotation {a,n,3},\n"
     "                stiffening {6a,n,n}\n"
+    "  /kept         nodes for markers: label {k}, position {k,3}, turns {k}, translation {k,n,3}, rotation {k,n,3}\n"
+    "  /loads        name, force {l,3}, moment {l,3}, modal {l,n}, moment_gradient {l,n,3}, follows {l}; of those that follow\n"
+    "                force_gradient {f,n,3}, modal_gradient {f,n,n}\n"
     "  /nodes        coordinates {N,3}, label {N}, shape {n,N,3}\n"
     "  /elements     type {E}, material {E}, node\n"
     "  /stress       node {S}, values {n,S,6}: xx yy zz xy yz zx\n"
@@ -88,7 +99,8 @@ namespace
 const std::vector<std::string> with_value = {
     "mesh",   "material", "calculix", "stiffness",     "mass",       "nodes", "sets",
     "attach", "modes",    "method",   "max_frequency", "keep_below", "keep",  "o",
-    "units",  "name",     "vtu",      "mode",          "scale",      "body",  "body_info"};
+    "units",  "name",     "vtu",      "mode",          "scale",      "body",  "body_info",
+    "keep_nodes", "pressure", "load"};
 const std::vector<std::string> without_value = {"stress", "stiffening", "no_shapes", "quiet", "traceback"};
 
 bool IsOption(const std::string &word)
@@ -187,6 +199,26 @@ PetscErrorCode Flag(const char *name, bool *value)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode ReadNodesAndLoads(Reduction *r)
+{
+  std::string nodes, pressures, loads, error;
+  PetscFunctionBegin;
+  PetscCall(Text("-keep_nodes", &nodes));
+  PetscCall(Text("-pressure", &pressures));
+  PetscCall(Text("-load", &loads));
+  for (const std::string &part : Split(nodes, ',')) {
+    if (nodes.empty()) break;
+    if (part.empty()) error = "-keep_nodes " + nodes + " has an empty part";
+    else if (!std::isdigit((unsigned char)part[0])) r->node_sets.push_back(part);
+    else if (!(error = ParseNumbers(part, &r->nodes)).empty()) error = "-keep_nodes: " + error;
+    if (!error.empty()) break;
+  }
+  if (error.empty() && !pressures.empty()) error = ParsePressures(pressures, &r->loads);
+  if (error.empty() && !loads.empty()) error = ReadLoads(loads, &r->loads);
+  PetscCheck(error.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "%s", error.c_str());
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode ReadReduction(Reduction *r)
 {
   std::string text, method, error;
@@ -211,6 +243,7 @@ PetscErrorCode ReadReduction(Reduction *r)
   PetscCall(Text("-keep", &text));
   if (!text.empty()) error = ParseNumbers(text, &r->keep);
   PetscCheck(error.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-keep %s: %s", text.c_str(), error.c_str());
+  PetscCall(ReadNodesAndLoads(r));
   PetscCall(Flag("-no_shapes", &no_shapes));
   r->all_nodes = !no_shapes;
   PetscCheck(r->method == Method::FreeFree || !r->attachments.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -374,6 +407,53 @@ std::string ParseNumbers(const std::string &text, std::vector<PetscInt> *numbers
     if (end == part.c_str() || from < 0 || to < from || to > 1000000 || (*end == '-' ? last == end + 1 || *last : *end))
       return "\"" + part + "\" is not a number from 0 up or a range as 5-9";
     for (long k = from; k <= to; k++) numbers->push_back((PetscInt)k);
+  }
+  return "";
+}
+
+std::string ParsePressures(const std::string &text, std::vector<LoadCase> *loads)
+{
+  for (const std::string &part : Split(text, ',')) {
+    const std::vector<std::string> field = Split(part, ':');
+    LoadCase                       l;
+    if (field.size() < 2 || field.size() > 3 || field[0].empty() || field[1].empty() || (field.size() == 3 && field[2] != "follows" && field[2] != "fixed"))
+      return "-pressure \"" + part + "\" is not name:set[:follows|:fixed]";
+    l.name    = field[0];
+    l.surface = field[1];
+    l.follows = field.size() < 3 || field[2] == "follows";
+    loads->push_back(l);
+  }
+  return "";
+}
+
+/* Lines "label fx fy fz", empty ones and what comes behind a # left out */
+std::string ReadLoads(const std::string &text, std::vector<LoadCase> *loads)
+{
+  for (const std::string &part : Split(text, ',')) {
+    const std::size_t colon = part.find(':');
+    LoadCase          l;
+    if (!colon || colon == std::string::npos || colon + 1 == part.size()) return "-load \"" + part + "\" is not name:file";
+    l.name                 = part.substr(0, colon);
+    const std::string file = part.substr(colon + 1);
+    std::ifstream     in(file);
+    std::string       line, word;
+    if (!in) return "-load " + l.name + ": " + file + " cannot be read";
+    for (long number = 1; std::getline(in, line); number++) {
+      std::istringstream  words(line.substr(0, line.find('#')));
+      std::vector<double> x;
+      double              value = 0;
+      bool                good = true;
+      while (words >> word) {
+        good = good && Number(word, &value);
+        x.push_back(value);
+      }
+      if (x.empty()) continue;
+      if (!good || x.size() != 4 || x[0] < 0 || x[0] != std::floor(x[0]) || x[0] > 2147483647.) return file + ", line " + std::to_string(number) + " is not \"label fx fy fz\"";
+      l.node.push_back((PetscInt)x[0]);
+      l.force.insert(l.force.end(), x.begin() + 1, x.end());
+    }
+    if (l.node.empty()) return "-load " + l.name + ": " + file + " has no forces";
+    loads->push_back(l);
   }
   return "";
 }

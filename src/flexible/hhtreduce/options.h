@@ -43,6 +43,8 @@ PetscErrorCode WarnOfUnused();
 /* Lists in the words of the command line; the text says what is wrong */
 std::string ParseMaterials(const std::string &text, std::map<std::string, hhtdae::Material> *materials);
 std::string ParseAttachments(const std::string &text, std::vector<hhtdae::Attachment> *attachments);
+std::string ParsePressures(const std::string &text, std::vector<hhtdae::LoadCase> *loads);
+std::string ReadLoads(const std::string &text, std::vector<hhtdae::LoadCase> *loads); /* from their files */
 std::string ParseNumbers(const std::string &text, std::vector<PetscInt> *numbers);
 
 } // namespace hhtreduce

@@ -235,7 +235,8 @@ class ReducedBody:
 
 
 def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] = 20, max_frequency=0., keep_below=0., keep: Sequence[int] = (),
-           stiffening=False, stress=False, all_nodes=True, progress=False):
+           stiffening=False, stress=False, all_nodes=True, progress=False, node_sets: Sequence[str] = (), nodes: Sequence[int] = (), pressures=None,
+           nodal_loads=None):
     """Reduces an FE model to a body in modal coordinates.
 
     Parameters
@@ -258,6 +259,12 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
         Stress modes as well.
     all_nodes : bool
         The modes at all nodes are kept, for stress and pictures.
+    node_sets, nodes : sequences of str and of int
+        Nodes that are kept for markers, forces and contact, by set and by label.
+    pressures : dict of load cases
+        ``{name: set}`` or ``{name: (set, follows)}``: pressure one on the outer faces whose nodes are all in the set; it follows the surface, or not.
+    nodal_loads : dict of load cases
+        ``{name: {label: (fx, fy, fz)}}``.
 
     Returns
     -------
@@ -265,7 +272,9 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
     """
     if method not in ("craig_bampton", "free_free", "static"):
         raise ValueError("method is %r, must be 'craig_bampton', 'free_free' or 'static'" % (method,))
-    core = _flexible.reduce(model._core, dict(attachments=[a._fields() for a in attachments], method=method, modes=modes, max_frequency=max_frequency,
+    loads = [(name, p, True) if isinstance(p, str) else (name, p[0], bool(p[1])) for name, p in (pressures or {}).items()]
+    loads += [(name, dict(forces)) for name, forces in (nodal_loads or {}).items()]
+    core = _flexible.reduce(model._core, dict(node_sets=list(node_sets), nodes=list(nodes), loads=loads, attachments=[a._fields() for a in attachments], method=method, modes=modes, max_frequency=max_frequency,
                                               keep_below=keep_below, keep=list(keep), stiffening=stiffening, all_nodes=all_nodes, progress=progress))
     body = ReducedBody(core)
     return body.add_stress_modes(model) if stress else body

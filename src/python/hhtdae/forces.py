@@ -10,7 +10,7 @@ from .measures import description
 from .spec import Formula, Law, Number, Spec, Vector, _Joint, _expressions, _law, _spec, _zero
 
 __all__ = ["SpringDamper", "NonlinearSpring", "TorsionalSpringDamper", "NonlinearTorsionalSpring", "Bushing", "Beam", "UserForce", "UserScalarForce",
-           "ContactLaw", "SpherePlane", "EllipsoidPlane", "TorusPlane", "SphereSphere", "SphereBox", "RotationalStop", "TranslationalStop",
+           "ModalLoad", "NodeContact", "ContactLaw", "SpherePlane", "EllipsoidPlane", "TorusPlane", "SphereSphere", "SphereBox", "RotationalStop", "TranslationalStop",
            "DistanceStop", "JointFriction"]
 
 
@@ -135,6 +135,20 @@ class UserScalarForce(_Joint):
 
 
 @_spec
+class ModalLoad(Spec):
+    """A load case of a flexible body times a formula, in the axes of the body. Component: the scale.
+
+    body : flexible Body
+    load : name of the load case
+    scale : formula"""
+    body: Any
+    load: str
+    scale: Formula
+    state: bool = False
+    _functions = {"scale": description}
+
+
+@_spec
 class ContactLaw(Spec):
     """Smooth penalty stiffness d^exponent (1 + damping d'), never tensile, with regularized Coulomb friction.
 
@@ -162,6 +176,22 @@ class SpherePlane(_Joint):
     radius: Number = 1.
     law: ContactLaw = _contact_law()
     state: bool = False
+
+
+@_spec
+class NodeContact(Spec):
+    """Kept nodes of a flexible body as balls against the xy plane of j, outside z > 0, or a sphere about j. Components: the resultant on the body, in space axes.
+
+    body : flexible Body
+    nodes : labels; default: all that are kept
+    radius : of the balls; with a plane it may be zero
+    radius_j : of the sphere; 0: a plane"""
+    body: Any
+    j: Any
+    nodes: Optional[Sequence[int]] = None
+    radius: Number = 0.
+    radius_j: Number = 0.
+    law: ContactLaw = _contact_law()
 
 
 @_spec

@@ -44,8 +44,12 @@ class Body(_Handle):
         return self._scene._marker(self, position, axes, name, True)
 
     def attachment(self, name: str) -> "Body":
-        """The frame of an attachment of a flexible body: a body for markers and shapes. It costs 12 unknowns where it is asked for."""
+        """The frame of an attachment of a flexible body: a body for markers and shapes. It has no unknowns."""
         return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
+
+    def node(self, label: int) -> "Body":
+        """The same at a node that the reduction has kept, by its number in the FE model."""
+        return Body(self._scene, self._scene._core.node(self, label), "%s.node %d" % (self.name, label))
 
     def shape(self, shape: Shape) -> "Body":
         """Draws the body in animations."""

@@ -53,19 +53,15 @@ inline void RequireTwoBodies(ElementBuilder &e, Marker i, Marker j)
             "both markers are on " + e.scene().bodyName(b) + ", where its action and reaction cancel");
 }
 
-inline bool OnPoint(const ElementBuilder &e, Marker m)
-{
-  const PetscInt b = e.scene().markers[m.id].body;
-  return b >= 0 && e.scene().bodies[b].point;
-}
+inline bool OnPoint(const ElementBuilder &e, Marker m) { return e.scene().turnless(e.scene().markers[m.id].body); }
 
 /* the body of m can take a moment */
 inline void RequireTurning(ElementBuilder &e, Marker m, const char *marker)
 {
   if (!e.good()) return;
-  e.require(!OnPoint(e, m), std::string("marker ") + marker + " is on the point mass " +
-                                e.scene().bodyName(e.scene().markers[m.id].body) +
-                                ", which takes no moment; use a rigid body");
+  if (OnPoint(e, m))
+    e.require(false, std::string("marker ") + marker + " is on " + e.scene().turnlessName(e.scene().markers[m.id].body) +
+                       ", which takes no moment; use a rigid body");
 }
 
 /* no distance but rounding */

@@ -41,9 +41,8 @@ public:
   {
     for (int k = 0; k < 2 && good(); k++) {
       if (!Depends(K::depends, 2 * k + 1) || body(k) < 0) continue;
-      require(!scene().bodies[body(k)].point, std::string("marker ") + (k == 0 ? "i" : "j") + " is on the point mass " +
-                                                  scene().bodyName(body(k)) +
-                                                  ", must be on a rigid body or the ground");
+      if (scene().turnless(body(k)))
+        require(false, std::string("marker ") + (k == 0 ? "i" : "j") + " is on " + scene().turnlessName(body(k)) + ", must be on a rigid body or the ground");
     }
     if (good()) constrain<K>({marker_[0], marker_[1]}, data);
   }

@@ -24,8 +24,8 @@ template <class Spec> void CheckBodies(ElementBuilder &e, const Spec &s)
                                     scene.bodyName(carrier) + ", must be on the same carrier");
   e.require(body(s.i1) != body(s.i2), "both bodies are " + scene.bodyName(body(s.i1)) + ", must be two");
   for (Marker m : {s.i1, s.i2})
-    e.require(body(m) < 0 || !scene.bodies[body(m)].point, "marker " + std::string(m.id == s.i1.id ? "i1" : "i2") + " is on the point mass " +
-                                                               scene.bodyName(body(m)) + ", must be on a rigid body");
+    if (scene.turnless(body(m)))
+      e.require(false, "marker " + std::string(m.id == s.i1.id ? "i1" : "i2") + " is on " + scene.turnlessName(body(m)) + ", must be on a rigid body");
 }
 
 void CheckWheel(ElementBuilder &e, Marker i, Marker j, const char *which)

@@ -24,9 +24,7 @@ inline void RequirePair(ElementBuilder &e, Marker i, Marker j, bool rotation, co
   const PetscInt   body[2] = {s.markers[i.id].body, s.markers[j.id].body};
   e.require(body[0] != body[1], where + "both markers are on " + s.bodyName(body[0]) + ", must be on two bodies");
   for (int k = rotation ? 0 : 1; k < 2; k++) /* an advance takes its axis from j */
-    e.require(body[k] < 0 || !s.bodies[body[k]].point, where + "marker " + "ij"[k] + " is on the point mass " +
-                                                           s.bodyName(body[k]) +
-                                                           ", must be on a rigid body or the ground");
+    if (s.turnless(body[k])) e.require(false, where + "marker " + "ij"[k] + " is on " + s.turnlessName(body[k]) + ", must be on a rigid body or the ground");
   if (rotation && e.good())
     e.require(AngleDefined(e.frame(i), e.frame(j)), where + "the x axis of marker i is along the z axis of j, so that "
                                                             "there is no angle about z; turn the axes of marker i");

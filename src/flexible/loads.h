@@ -1,0 +1,34 @@
+/* Load cases of a reduction: nodal forces and pressure on a surface, as the modes see them; ModalLoadCase of hhtdae/modal.h. */
+#ifndef HHTDAE_FLEXIBLE_LOADS_H
+#define HHTDAE_FLEXIBLE_LOADS_H
+
+#include "diagnose.h"
+#include "modes.h"
+
+namespace hhtdae
+{
+
+/* What of a load case is on this rank */
+struct ResolvedLoad {
+  struct NodeForce {
+    PetscInt node; /* own, from 0 */
+    Vector3  force;
+  };
+  struct ElementFace {
+    std::size_t element;
+    int         face;
+  };
+  std::vector<NodeForce>   forces;
+  std::vector<ElementFace> faces;
+};
+
+/* Finds nodes and faces, and what is wrong with the load cases, before any work is done */
+PetscErrorCode ResolveLoads(const FeModel &model, const std::vector<LoadCase> &loads, std::vector<ResolvedLoad> *resolved);
+
+/* Fills body->loads from the modes x at own dofs */
+PetscErrorCode FillLoads(const FeModel &model, const std::vector<LoadCase> &loads, const std::vector<ResolvedLoad> &resolved, const BodyScales &scales,
+                         const MatrixXd &x, ModalBody *body);
+
+} // namespace hhtdae
+
+#endif
