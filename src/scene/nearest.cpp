@@ -143,7 +143,7 @@ PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
 PetscErrorCode NearestSystem::factor(const std::vector<RowBlock> &blocks)
 {
   PC        pc;
-  PetscBool cholmod = PETSC_FALSE;
+  PetscBool mumps;
   PetscFunctionBegin;
   if (!b_) PetscCall(number(blocks));
   PetscCall(assemble(blocks));
@@ -153,8 +153,8 @@ PetscErrorCode NearestSystem::factor(const std::vector<RowBlock> &blocks)
     PetscCall(KSPSetType(ksp_, KSPPREONLY));
     PetscCall(KSPGetPC(ksp_, &pc));
     PetscCall(PCSetType(pc, PCCHOLESKY));
-    if (M.size == 1) PetscCall(MatGetFactorAvailable(S_, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &cholmod));
-    PetscCall(PCFactorSetMatSolverType(pc, cholmod ? MATSOLVERCHOLMOD : MATSOLVERMUMPS));
+    PetscCall(MatGetFactorAvailable(S_, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &mumps));
+    if (mumps) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS)); /* CHOLMOD's threads, which OMP_NUM_THREADS does not bound, take 50 times as long on a busy machine */
     PetscCall(KSPSetFromOptions(ksp_));
   }
   PetscCall(KSPSetOperators(ksp_, S_, S_));
