@@ -76,6 +76,7 @@ public:
     settings.maxStep      = step_max;
     settings.testVelocity = form == wp::FirstOrder::Form::Stabilized;
     settings.looser       = form == wp::FirstOrder::Form::Stabilized ? 1e3 : 1e6;
+    settings.part         = partOfTolerance(*atv, p->n);
     settings.look         = [&](double t, const double *u, const double *v, const double *a) {
       states.push_back({t, {u, u + p->n}, {v, v + p->n}, {a, a + p->n}});
     };
@@ -143,6 +144,20 @@ public:
   }
 
 private:
+  /* IDA tests every unknown against the same absolute tolerance, in metres and radians. A modal coordinate has units of its own, so that its part is
+     the reciprocal of the largest motion of an attachment per unit of it: the frame's points and their rotations are as exact as other bodies. */
+  std::vector<double> partOfTolerance(const hhtex::Atv &atv, PetscInt n) const
+  {
+    std::vector<double> part(n, 1.);
+    const PetscInt      first = ModelOf(atv.scene).number.body[atv.frame.id] + 6;
+    for (PetscInt k = 0; k < model->modes(); k++) {
+      double most = 1;
+      for (const ModalAttachment &a : model->attachments) most = std::max({most, a.translation.col(k).norm(), a.rotation.col(k).norm()});
+      part[first + k] = 1 / most;
+    }
+    return part;
+  }
+
   PetscErrorCode hhtSolve(const Configure &configure, bool watched, AtvRun *run) const
   {
     TS                ts;
