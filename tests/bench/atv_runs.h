@@ -146,7 +146,7 @@ public:
 private:
   /* IDA tests every unknown against the same absolute tolerance, in metres and radians. A modal coordinate has units of its own: its part is a tenth of
      the reciprocal of the largest motion of an attachment per unit of it, the best for IDA of those tried. Errors of pitch rate and reaction with the largest
-     step of the paper: part 1 10 % and 14 %; the reciprocal 6.7 % and 12.5 %; a tenth of it 0.2 % and 1.0 %; a hundredth 1.0 % and 2.2 %, all at 4,600 to 4,900
+     step of the paper: part 1 10 % and 14 %; the reciprocal 6.7 % and 12.5 %; a tenth of it 0.2 % and 0.4 %, all at 4,600 to 4,900
      iterations. They are left behind by iterations that end too early; with IDA's iteration ended at 0.01 in place of a third part 1 gives 1.3 % and 1.2 %. */
   std::vector<double> partOfTolerance(const hhtex::Atv &atv, PetscInt n) const
   {
