@@ -212,7 +212,7 @@ Modes3 ThreeRows(const std::vector<double> &v, hsize_t begin, hsize_t n)
 }
 
 /* Names that end with a zero each; an error if they are not `count` */
-std::vector<std::string> GetNames(Reader *in, const std::string &path, hsize_t count)
+std::vector<std::string> GetNames(Reader *in, const std::string &path, hsize_t count, const std::string &of)
 {
   std::vector<std::string> all;
   const Dims               characters = in->dims<uint8_t>(path);
@@ -220,7 +220,7 @@ std::vector<std::string> GetNames(Reader *in, const std::string &path, hsize_t c
   const auto names = in->get<uint8_t>(path, {characters[0]});
   if (!in->error.empty()) return all;
   if ((hsize_t)std::count(names.begin(), names.end(), 0) != count || (count && names.back())) {
-    in->fail(path + " does not have a name for each");
+    in->fail(path + " does not have a name for each " + of);
     return all;
   }
   for (auto name = names.begin(); name != names.end(); ++name) {
@@ -261,7 +261,7 @@ void GetLoads(Reader *in, hsize_t n, ModalBody *m)
   const Dims forces = in->dims<double>("/loads/force");
   if (!in->error.empty()) return;
   const hsize_t l         = forces[0];
-  const auto    names     = GetNames(in, "/loads/name", l);
+  const auto    names     = GetNames(in, "/loads/name", l, "load case");
   const auto    follows   = in->get<uint8_t>("/loads/follows", {l});
   const auto    force     = in->get<double>("/loads/force", {l, 3}), moment = in->get<double>("/loads/moment", {l, 3}),
              modal = in->get<double>("/loads/modal", {l, n}), by_moment = in->get<double>("/loads/moment_gradient", {l, n, 3});
@@ -293,21 +293,17 @@ void GetLoads(Reader *in, hsize_t n, ModalBody *m)
 
 void GetAttachments(Reader *in, hsize_t n, ModalBody *m)
 {
-  const Dims characters = in->dims<uint8_t>("/attachments/name"), positions = in->dims<double>("/attachments/position");
+  const Dims positions = in->dims<double>("/attachments/position");
   if (!in->error.empty()) return;
   const hsize_t a        = positions[0];
-  const auto    names    = in->get<uint8_t>("/attachments/name", {characters[0]});
+  const auto    names    = GetNames(in, "/attachments/name", a, "attachment");
   const auto    position = in->get<double>("/attachments/position", {a, 3}),
              translation = in->get<double>("/attachments/translation", {a, n, 3}),
              rotation    = in->get<double>("/attachments/rotation", {a, n, 3});
   if (!in->error.empty()) return;
-  if ((hsize_t)std::count(names.begin(), names.end(), 0) != a || (a && names.back()))
-    return in->fail("/attachments/name does not have a name for each attachment");
-  auto name = names.begin();
   for (hsize_t i = 0; i < a; i++) {
     ModalAttachment at;
-    for (; *name; ++name) at.name += (char)*name;
-    ++name;
+    at.name        = names[i];
     at.position    = Eigen::Map<const Vector3>(position.data() + 3 * i);
     at.translation = ThreeRows(translation, i, n);
     at.rotation    = ThreeRows(rotation, i, n);

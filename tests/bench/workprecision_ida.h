@@ -33,6 +33,7 @@ struct IDASettings {
                             four. With that a matrix that is older than the end of a strong damper holds on to it. */
   double firstStep = 0.; /* 0: 0.01 sqrt(eps) of the run. IDA's own is so short where velocities are tested that
                             rounding drowns the accelerations and the first step fails. */
+  std::vector<double> part; /* of the absolute tolerance for each unknown of the problem that is tested; empty: one */
   /* sees every output point: t, U, U', U'' */
   std::function<void(double, const double *, const double *, const double *)> look = nullptr;
 };
@@ -109,6 +110,7 @@ private:
       const bool tested          = system_.isDifferential(i) && (settings_.testVelocity || !system_.isVelocity(i));
       N_VGetArrayPointer(id_)[i] = tested;
       N_VGetArrayPointer(tolerance_)[i] = tested ? eps : eps * settings_.looser;
+      if (tested && (size_t)i < settings_.part.size()) N_VGetArrayPointer(tolerance_)[i] *= settings_.part[i];
     }
     memory_ = IDACreate(context_);
     check(IDASetErrFile(memory_, nullptr), "IDASetErrFile");

@@ -413,3 +413,64 @@ TEST(KeptNodes, ABlockOnThePlane)
   EXPECT_LT(off, 2e-3 * most);
   EXPECT_NEAR(x[s.model.nodes], body.modal.mass * g, 1e-4 * body.modal.mass * g);
 }
+
+/* Held at one end, shaken by equal forces on the nodes of the other: the whole finite-element body beside the one in modes, a load case of which is these forces */
+TEST(KeptNodes, DynamicsOfTheWholeBody)
+{
+  const double t = 0.15;
+  const auto   shake = [](int c) { return TimeFunction::harmonic(0.1 * (c + 1), 30); };
+  Small        whole, s;
+  Scene        fe_scene(PETSC_COMM_SELF), scene(PETSC_COMM_SELF);
+  FullFeBody   fe;
+  FullBody     full;
+  full.law         = FeLaw::Small;
+  full.attachments = {attach("left"), attach("right", Tie::Average)};
+  must(fe.add(fe_scene, "block", whole.model, full));
+  const Marker left = fe_scene.marker(fe.attachment("left"));
+  const auto   at   = DataOf(fe_scene).frame(left);
+  UserForce    f;
+  fe_scene.add("clamp", Fixed{left, fe_scene.marker(fe_scene.ground(), at.x, at.R)});
+  f.i = fe_scene.marker(fe.attachment("right"));
+  for (int c = 0; c < 3; c++) f.force.push_back(shake(c));
+  fe_scene.add("shake", f);
+  Array    x, y;
+  SceneRun first(fe_scene, t, tolerance(1e-10) + " -ts_hhtdae_corrector_tolerance 1e-6 ");
+  must(first.solve());
+  must(fe.positions(first.ts, t, &x));
+
+  ReducedBody body;
+  Reduction   r     = everything(s.model.nodes);
+  const auto &right = s.model.sets["right"];
+  for (int c = 0; c < 3; c++) {
+    LoadCase l{std::string(1, "xyz"[c])};
+    for (PetscInt i : right) {
+      const Vector3 one = Vector3::Unit(c) / (double)right.size();
+      l.node.push_back(i + 1);
+      l.force.insert(l.force.end(), one.data(), one.data() + 3);
+    }
+    r.loads.push_back(l);
+  }
+  must(Reduce(s.model, r, &body));
+  FlexibleBody b;
+  b.model         = std::make_shared<ModalBody>(body.modal);
+  const Body flex = scene.add("block", b);
+  for (PetscInt i : s.model.sets["left"]) {
+    const Marker m = scene.marker(scene.node(flex, i + 1));
+    scene.add(text("hold %d", (int)i), Spherical{m, scene.marker(scene.ground(), place(s.model, i))});
+  }
+  for (int c = 0; c < 3; c++) scene.add(text("shake %d", c), ModalLoad{flex, std::string(1, "xyz"[c]), shake(c)});
+  for (PetscInt i : right)
+    for (int c = 0; c < 3; c++) scene.channel(text("x%d%d", (int)i, c), Measure::displacement(scene.marker(scene.node(flex, i + 1)), c));
+  SceneRun second(scene, t, tolerance(1e-10) + " -ts_hhtdae_corrector_tolerance 1e-6 ");
+  must(second.solve());
+  must(scene.sample(second.ts, t, y));
+  double most = 0, off = 0;
+  for (std::size_t k = 0; k < right.size(); k++) {
+    const Vector3 u = Eigen::Map<const Vector3>(&x[3 * right[k]]), v = Eigen::Map<const Vector3>(&y[3 * k]), X = place(s.model, right[k]);
+    most = std::max(most, (u - X).norm());
+    off  = std::max(off, (u - v).norm());
+  }
+  MEASURED("displacement %.3e, difference %.1e", most, off);
+  EXPECT_GT(most, 1e-6);
+  EXPECT_LT(off, 5e-3 * most);
+}

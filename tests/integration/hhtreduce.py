@@ -77,6 +77,27 @@ def reduction(folder):
     return body, bare, base
 
 
+def nodes_and_loads(folder, base):
+    """Nodes of a set and by number, pressure on the tip's face, whose area is 0.005, forces on two nodes"""
+    forces, body, again = (os.path.join(folder, name) for name in ("forces.txt", "loaded.h5", "loaded2.h5"))
+    with open(forces, "w") as out:
+        out.write("# node, force\n3 1 0 2.5\n\n5 0 -4e0 0\n")
+    words = [*base, "-keep_nodes", "tip,1,3-5", "-pressure", "wind:tip,gust:tip:fixed", "-load", "push:" + forces, "-quiet"]
+    run([PROGRAM, *words, "-o", body])
+    info = run([PROGRAM, "-info", body])
+    for part in ("nodes for markers: 8, from 1 to 28, 8 of them with rotation", "load case wind, follows the surface: force (-0.005, ", "load case gust: force (-0.005, ",
+                 "load case push: force (1, -4, 2.5)"):
+        check(part in info, "%r is not in\n%s" % (part, info))
+    run([MPIEXEC, RANKS, 2, PROGRAM, *words, "-o", again])
+    lines = [[line for line in run([PROGRAM, "-info", file]).splitlines() if "load case push" in line or "nodes for" in line] for file in (body, again)]
+    check(lines[0] == lines[1], "nodes and loads on two ranks are others: %s" % lines)
+    for more, message in (
+            (["-keep_nodes", "tip,999"], "the model has no node 999"), (["-pressure", "wind:nowhere"], "no node set 'nowhere'"),
+            (["-pressure", "wind:tip:along"], "is not name:set"), (["-load", "push:" + os.path.join(folder, "bar.msh")], "line 1 is not")):
+        error = run([PROGRAM, *base, *more, "-o", os.path.join(folder, "no.h5")], fails=True)
+        check(message in error and error.startswith("hhtreduce: error:"), "%s\nhas no %r in\n%s" % (more, message, error))
+
+
 def pictures(folder, body):
     vtu, again = os.path.join(folder, "mode.vtu"), os.path.join(folder, "again.vtu")
     said = run([PROGRAM, "-vtu", vtu, "-mode", 3, body])
@@ -135,5 +156,6 @@ with tempfile.TemporaryDirectory() as folder:
     check("-calculix" in trial, "PETSc's own -info and -help")
     body, bare, base = reduction(folder)
     pictures(folder, body)
+    nodes_and_loads(folder, base)
     failures(folder, body, bare, base)
 print("hhtreduce: reduced, shown, drawn; what is wrong was refused")

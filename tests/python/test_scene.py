@@ -59,6 +59,16 @@ class Elements(unittest.TestCase):
         with self.assertRaises(h.Error):
             scene.set_up()  # so much at once is no mechanism
 
+    def test_ground_acceleration(self):
+        """A free body falls behind the ground by half its acceleration times the square of time"""
+        scene = h.Scene()
+        body = scene.add("body", h.RigidBody())
+        scene.ground_acceleration(2., z=lambda t: 0 * t + 4)
+        for c, name in enumerate("xyz"):
+            scene.channel(name, h.displacement(body.marker(), c))
+        last = scene.solve(0.5, tolerance=1e-8).sample()
+        np.testing.assert_allclose([last[name] for name in "xyz"], [-0.25, 0, -0.5], atol=1e-6)
+
     def test_view(self):
         scene, rod, pin = pendulum()
         with tempfile.TemporaryDirectory() as folder:

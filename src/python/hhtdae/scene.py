@@ -12,6 +12,7 @@ from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
 from .spec import Formula, Spec, has_formula, plain
+from .tracing import time_function
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
 
@@ -144,6 +145,10 @@ class Scene:
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
         self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
+
+    def ground_acceleration(self, x=0., y=0., z=0.) -> None:
+        """Base excitation: the ground's acceleration along the space axes, functions of time. All coordinates are relative to the ground."""
+        self._core.ground_acceleration(*(time_function(f, self._keep) for f in (x, y, z)))
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
         """Adds a body, joint, motion or force.

@@ -1,4 +1,5 @@
 #include "node_contact.h"
+#include <petscblaslapack.h>
 
 namespace hhtdae
 {
@@ -73,8 +74,8 @@ void NodesOnBody::pattern(const Bodies &B, Pattern &p, std::vector<PetscInt> &re
 void NodesOnBody::begin(const Evaluation &ev, Matrices &M) const
 {
   const Eigen::Index n = 6 + ev.bodies.modes(body);
-  M.left.resize(48, n);
-  M.right.resize(48, n);
+  M.left.resize(n, 24);
+  M.right.resize(n, 24);
   M.own.setZero(n, n);
   M.by_j.setZero(n, 6);
   M.rate_j.setZero(n, 6);
@@ -103,13 +104,15 @@ void NodesOnBody::add(const Evaluation &ev, const Ball &x, const Bodies::Angular
   V.block<3, 3>(3, 3)     = g.w;
   V.topRightCorner(3, m)  = W * APhi + ev.sv * APhi;
 
-  const Eigen::Index row = 6 * (M.count - 1);
-  if (row + 6 > M.left.rows()) {
-    M.left.conservativeResize(2 * M.left.rows(), Eigen::NoChange);
-    M.right.conservativeResize(2 * M.right.rows(), Eigen::NoChange);
+  const Eigen::Index column = 3 * (M.count - 1);
+  if (column + 3 > M.left.cols()) {
+    M.left.conservativeResize(Eigen::NoChange, 2 * M.left.cols());
+    M.right.conservativeResize(Eigen::NoChange, 2 * M.right.cols());
   }
-  M.left.middleRows<6>(row)  = L;
-  M.right.middleRows<6>(row) = -(J.frames.topLeftCorner<6, 6>() * X + J.twists.topLeftCorner<6, 6>() * V);
+  const Eigen::MatrixXd wrench = -(J.frames.topLeftCorner<6, 6>() * X + J.twists.topLeftCorner<6, 6>() * V);
+  M.left.middleCols<3>(column)  = L.topRows<3>().transpose();
+  M.right.middleCols<3>(column) = wrench.topRows<3>().transpose();
+  M.own.middleRows<3>(3) += b.G.transpose() * wrench.bottomRows<3>();
   M.own.block<3, 3>(3, 3) -= b.G.transpose() * F * E * g.G;
   M.own.block(3, 6, 3, m) += b.G.transpose() * F * APhi;
   M.own.block(6, 3, m, 3) -= APhi.transpose() * F * g.G;
@@ -142,7 +145,9 @@ void NodesOnBody::deliver(Evaluation &ev, Matrices &M, const Slot *&slot) const
     slot += 9 + 6 * n + n * n + (kind == BodyKind::Attached ? 10 : 0);
     return;
   }
-  M.own.noalias() += M.left.topRows(6 * M.count).transpose() * M.right.topRows(6 * M.count);
+  const PetscBLASInt order = 6 + m, columns = 3 * M.count;
+  const double       one   = 1;
+  BLASgemm_("N", "T", &order, &order, &columns, &one, M.left.data(), &order, M.right.data(), &order, &one, M.own.data(), &order);
   for (int a = 0; a < 3; a++)
     for (int c = 0; c < 3; c++) ev.sink.add(*slot++, M.own.block(at[a], at[c], size[a], size[c]), size[a], size[c]);
   for (int c = 0; c < n; c++)

@@ -49,7 +49,7 @@ public:
   void pattern(const Bodies &B, Pattern &p, std::vector<PetscInt> &request) const;
   /* sums over the balls that touch */
   struct Matrices {
-    Eigen::MatrixXd left, right;       /* 6 rows a ball, and room for more: L, and - (K X + C V) of the wrench on the ball */
+    Eigen::MatrixXd left, right;       /* 3 columns a ball, and room for more: of its position in L, and - (K X + C V) of the force on it, both transposed */
     Eigen::MatrixXd own, by_j, rate_j; /* own: what is left of the body's own block; columns x, theta and v, w of j's body */
     Eigen::MatrixXd of_j;              /* rows of j's body */
     Six             jj, jj_rate;
