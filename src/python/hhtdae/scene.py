@@ -44,7 +44,7 @@ class Body(_Handle):
         return self._scene._marker(self, position, axes, name, True)
 
     def attachment(self, name: str) -> "Body":
-        """The frame of an attachment of a flexible body: a body for markers and shapes. It costs 12 unknowns where it is asked for."""
+        """The frame of an attachment of a flexible body: a body for markers and shapes. It has no unknowns."""
         return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
 
     def shape(self, shape: Shape) -> "Body":
