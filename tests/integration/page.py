@@ -76,6 +76,10 @@ check(result["first"][:3] != result["last"][:3], "the crank does not move")
 # A flexible rod with stress; attachments are bodies, too
 expect(page("flexcrank"), 501, 5, 6, 1)
 
+# A whole finite-element body on a hub: its nodes move by themselves
+if os.path.exists(os.path.join(bin, "spinbeam")):
+    expect(page("spinbeam", "-body", "full", "-end", "2"), 501, 4, 2, 1)
+
 # A page whose writer was stopped within a block shows what is whole
 with open(file) as whole:
     text = whole.read()
