@@ -2,6 +2,7 @@
 #ifndef HHTDAE_TESTS_PAGE_READER_H
 #define HHTDAE_TESTS_PAGE_READER_H
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -98,6 +99,12 @@ struct PageSurface {
   }
 };
 
+/* A surface whose nodes move by themselves */
+struct PageMotion {
+  std::size_t nodes;
+  bool        stress;
+};
+
 /* Frames of all blocks */
 struct PageFile {
   std::string                      text, scene; /* JSON */
@@ -106,10 +113,13 @@ struct PageFile {
   std::vector<std::vector<double>> track, step; /* frame by frame; step: of its codes */
   std::vector<std::vector<float>>  channel;     /* frame by frame */
   std::vector<std::vector<double>> stress;      /* frame by frame, of the surfaces with stress in turn */
+  std::vector<std::vector<double>> moved;       /* frame by frame, x, y, z of the nodes of all PageMotions */
+  std::vector<double>              moved_step;  /* frame by frame, the largest of them */
   int                              blocks = 0;
 
-  /* tracks: 7 per body, and modes; nodes: of the surfaces with stress */
-  PageFile(const std::string &page, std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes = {}) : text(page)
+  /* tracks: 7 per body, and modes; nodes: of the surfaces with modes and stress */
+  PageFile(const std::string &page, std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes = {}, const std::vector<PageMotion> &motion = {})
+      : text(page)
   {
     const std::string begin = "<script id=\"scene\" type=\"application/json\">";
     std::size_t       at    = text.find(begin);
@@ -123,12 +133,34 @@ struct PageFile {
       if (end == std::string::npos) throw std::runtime_error("a block of the page does not end");
       PageInput in(inflated(fromBase64(text.substr(data, end - data))));
       if (kind == "surface") surface.emplace_back(in);
-      else readFrames(in, tracks, channels, nodes);
+      else readFrames(in, tracks, channels, nodes, motion);
     }
   }
 
 private:
-  void readFrames(PageInput in, std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes)
+  void readMotion(PageInput &in, std::size_t nodes, std::size_t n, std::size_t first)
+  {
+    const double step = in.number<float>();
+    const auto   code = in.planes<std::uint16_t>(3 * nodes * n);
+    for (std::size_t k = 0; k < 3 * nodes; k++) {
+      int now = 0;
+      for (std::size_t i = 0; i < n; i++) {
+        now = (std::int16_t)(now + unfold(code[k * n + i]));
+        moved[first + i].push_back(step * now);
+      }
+    }
+    for (std::size_t i = first; i < first + n; i++) moved_step[i] = std::max(moved_step[i], step);
+  }
+  void readStress(PageInput &in, std::size_t count, std::size_t n, std::size_t first)
+  {
+    const auto           largest = in.planes<float>(count);
+    const unsigned char *x       = in.bytes(n * count);
+    for (std::size_t k = 0; k < count; k++) {
+      unsigned char now = 0;
+      for (std::size_t i = 0; i < n; i++) stress[first + i].push_back((double)largest[k] * (now = (unsigned char)(now + x[k * n + i])) / 255);
+    }
+  }
+  void readFrames(PageInput in, std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes, const std::vector<PageMotion> &motion)
   {
     const std::size_t n = in.number<std::uint32_t>(), first = time.size();
     blocks++;
@@ -154,13 +186,12 @@ private:
       for (std::size_t c = 0; c < channels; c++) channel.back().push_back(value[c * n + i]);
     }
     stress.resize(first + n);
-    for (std::size_t count : nodes) {
-      const auto           largest = in.planes<float>(count);
-      const unsigned char *x       = in.bytes(n * count);
-      for (std::size_t k = 0; k < count; k++) {
-        unsigned char now = 0;
-        for (std::size_t i = 0; i < n; i++) stress[first + i].push_back((double)largest[k] * (now = (unsigned char)(now + x[k * n + i])) / 255);
-      }
+    moved.resize(first + n);
+    moved_step.resize(first + n);
+    for (std::size_t count : nodes) readStress(in, count, n, first);
+    for (const PageMotion &m : motion) {
+      readMotion(in, m.nodes, n, first);
+      if (m.stress) readStress(in, m.nodes, n, first);
     }
     if (!in.atEnd()) throw std::runtime_error("a block of frames is longer than it says");
   }

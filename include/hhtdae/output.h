@@ -18,6 +18,7 @@
     -scene_page <file.html>       one HTML file that any browser opens without a network: the run in three dimensions, with its channels
     -scene_page_frames <500>      frames from the start to the final time; every step where the run has no final time
     -scene_page_dt <dt>           time between frames, which wins over their number
+    -scene_page_nodes <6000>      nodes of all surfaces of whole finite-element bodies, which are thinned to so many
     -scene_balance [file]         energy and momentum at every step, into a file or printed; largest drift at the end
 
   Samples between the ends of steps: positions and velocities are cubic in the step, TSHHT3Interpolate(). Where a channel needs
@@ -89,6 +90,7 @@ struct OutputSettings {
   std::string page_title;       /* empty: the file's name */
   double      page_dt = 0;      /* between its frames; 0: page_frames of them from the start to the final time, or every step if there is none */
   PetscInt    page_frames = 500;
+  PetscInt    page_nodes  = 6000; /* of all surfaces of whole finite-element bodies */
   bool        balance = false;  /* of energy and momentum, at every step */
   std::string balance_file;     /* empty: printed */
 };

@@ -71,7 +71,7 @@ function(hhtdae_python_module name library)
     target_precompile_headers(python_${name} PRIVATE ${HHTDAE_PRECOMPILED} <pybind11/pybind11.h> <pybind11/numpy.h>)
   endif()
   set_target_properties(python_${name} PROPERTIES OUTPUT_NAME ${name} PREFIX "" SUFFIX "${python_suffix}" CXX_VISIBILITY_PRESET hidden
-                        LIBRARY_OUTPUT_DIRECTORY ${package_build} INSTALL_RPATH "$ORIGIN/${from_package}")
+                        LIBRARY_OUTPUT_DIRECTORY ${package_build} INSTALL_RPATH "$ORIGIN/lib;$ORIGIN/${from_package}") # of a wheel, and of a prefix
   install(TARGETS python_${name} LIBRARY DESTINATION ${HHTDAE_PYTHON_DIR}/hhtdae)
   add_dependencies(python python_${name})
   add_dependencies(installed python_${name})

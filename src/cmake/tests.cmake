@@ -40,7 +40,7 @@ function(hhtdae_test_program folder)
     target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
     target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
     target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
-    if(NOT page_lacks AND folder MATCHES "^(scene|parallel)$") # pages are unpacked by zlib
+    if(NOT page_lacks AND folder MATCHES "^(scene|flexible|parallel)$") # pages are unpacked by zlib
       target_compile_definitions(${folder}_tests PRIVATE HHTDAE_PAGE)
       target_link_libraries(${folder}_tests PRIVATE ZLIB::ZLIB)
     endif()

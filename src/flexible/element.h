@@ -199,6 +199,18 @@ public:
     stress.noalias() = at * Extrapolation<Shape>();
   }
 
+  /* The same at large: Cauchy's stress F S F^T / det F of a St. Venant-Kirchhoff material */
+  void large(const NodeVectors<Shape> &u, const Lame &lame, NodeStress<Shape> &stress) const
+  {
+    Eigen::Matrix<double, 6, count> at;
+    for (int q = 0; q < count; q++) {
+      const Eigen::Matrix3d D = u * G_[q].transpose(), F = Eigen::Matrix3d::Identity() + D, E = (D + D.transpose() + D.transpose() * D) / 2;
+      const Eigen::Matrix3d s = F * (lame.lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * lame.mu * E) * F.transpose() / F.determinant();
+      at.col(q) << s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(1, 2), s(2, 0);
+    }
+    stress.noalias() = at * Extrapolation<Shape>();
+  }
+
 private:
   std::array<Gradients<Shape::nodes>, count> G_;
   double                                     least_;

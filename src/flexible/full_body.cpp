@@ -228,6 +228,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   DataOf(scene).refuseLate("finite-element body " + name);
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
+  x->name  = name;
   x->spec  = body;
   x->model = &model;
   x->node_first.resize(size + 1);

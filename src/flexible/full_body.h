@@ -27,6 +27,7 @@ struct TieNodes {
 class FullExtension : public Extension
 {
 public:
+  std::string           name;
   FullBody              spec;
   const FeModel        *model = nullptr;
   std::vector<PetscInt> node_first; /* first node of each rank, and the number of nodes */
@@ -47,6 +48,7 @@ public:
   void     startFrom(const double *x, const double *y) override;
   bool     symmetric() const override { return true; } /* as K and M of the model are */
   void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
+  PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *mesh) const override; /* full_surface.cpp */
 
   PetscMPIInt ownerOf(PetscInt node) const;
   PetscInt    number(PetscInt node) const; /* global number of its first coordinate, once start is known */

@@ -9,6 +9,7 @@
 #include "flexible/assembly.h"
 #include "flexible/element.h"
 #include "flexible/exchange.h"
+#include "flexible/sides.h"
 #include <algorithm>
 #include <numeric>
 
@@ -47,11 +48,7 @@ PetscErrorCode CheckInput(const FeModel &model, const ReducedBody &body)
   PetscFunctionReturn(0);
 }
 
-/* The material that each node's stress is taken in, and the number of its elements around the node */
-struct Sides {
-  std::vector<PetscInt> material; /* of the nodes of this rank's elements */
-  std::vector<double>   count;    /* of own nodes */
-};
+} // namespace
 
 PetscErrorCode ChooseSides(const FeModel &model, const ElementNodes &nodes, Sides *sides)
 {
@@ -86,6 +83,9 @@ PetscErrorCode ChooseSides(const FeModel &model, const ElementNodes &nodes, Side
   PetscCall(nodes.add(1, around.data(), sides->count.data()));
   PetscFunctionReturn(0);
 }
+
+namespace
+{
 
 /* Adds an element's stress to its nodes; u and stress have `together` columns per node */
 template <class Shape>

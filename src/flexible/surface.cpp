@@ -2,8 +2,8 @@
   The surface of a reduced body's mesh, for the page of a scene: faces that belong to one element alone, as triangles between their corners. The
   first rank has it whole; the others send it their elements and their nodes' rows.
 */
+#include "flexible/surface.h"
 #include "flexible/exchange.h"
-#include "hhtdae/flexible.h"
 #include <algorithm>
 #include <array>
 
@@ -60,6 +60,16 @@ void Triangulate(const std::vector<Face> &faces, std::vector<PetscInt> *node, st
   }
 }
 
+} // namespace
+
+void OuterTriangles(const std::vector<FeElement> &elements, std::vector<PetscInt> *node, std::vector<int> *triangle)
+{
+  Triangulate(OuterFaces(elements), node, triangle);
+}
+
+namespace
+{
+
 /* What the surface takes of this rank's nodes */
 struct Rows {
   std::vector<double> point;
@@ -105,7 +115,7 @@ PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface)
   PetscCall(Agree(body.comm, error, PETSC_ERR_ARG_INCOMP));
   *surface = Surface();
   PetscCall(GatherTo0(body.comm, body.elements.data(), body.elements.size(), &elements, &of));
-  if (!rank) Triangulate(OuterFaces(elements), &node, &surface->triangle);
+  if (!rank) OuterTriangles(elements, &node, &surface->triangle);
   PetscInt nodes = (PetscInt)node.size();
   PetscCallMPI(MPI_Bcast(&nodes, 1, MPIU_INT, 0, body.comm));
   node.resize(nodes);

@@ -160,6 +160,17 @@ void SetStart(Scene &s, const std::string &assembly, const std::string &redundan
   p.angle_tol    = angle_tol;
 }
 
+void SetPage(Scene &s, const std::string &file, const std::string &title, double dt, int frames, int nodes)
+{
+  OutputSettings &o = s.output();
+  if (!(dt >= 0) || frames <= 0 || nodes <= 0) throw py::value_error("output(): page_dt must not be negative, page_frames and page_nodes must be positive");
+  o.page            = file;
+  o.page_title      = title;
+  o.page_dt         = dt;
+  o.page_frames     = frames;
+  o.page_nodes      = nodes;
+}
+
 void SetOutput(Scene &s, const std::string &file, const std::string &csv, double dt, const std::string &animation, double animation_dt, py::object balance)
 {
   OutputSettings &o = s.output();
@@ -225,6 +236,7 @@ void BindScene(py::module_ &m)
     })
     .def("start", SetStart)
     .def("output", SetOutput)
+    .def("page", SetPage)
     .def("set_up", [](Scene &s) { Check(s.setUp()); })
     .def("create_ts", NewRun)
     .def("solve", Solve)

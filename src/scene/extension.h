@@ -10,6 +10,8 @@
 namespace hhtdae
 {
 
+class PageMesh; /* output/page_mesh.h */
+
 class Extension
 {
 public:
@@ -20,6 +22,12 @@ public:
   virtual void     startFrom(const double *u, const double *v) = 0; /* these become the initial coordinates and velocities */
   virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
   virtual bool     symmetric() const { return false; } /* forces have a potential, damping is a constant symmetric matrix */
+  /* What a page shows of it, at most so many nodes; none where its shape is not known. Collective */
+  virtual PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *) const
+  {
+    (void)most_nodes;
+    return 0;
+  }
   PetscInt         unknowns() const { return coordinates() + multipliers(); }
 
   std::vector<PetscInt> start; /* global number of the first unknown on every rank; numbering.cpp */

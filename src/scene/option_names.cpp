@@ -24,6 +24,7 @@ PetscErrorCode DeclareSceneOptions()
                                       "scene_page",
                                       "scene_page_dt",
                                       "scene_page_frames",
+                                      "scene_page_nodes",
                                       "scene_balance",
                                       "scene_symmetric_storage",
                                       nullptr};

@@ -76,6 +76,12 @@ check(result["first"][:3] != result["last"][:3], "the crank does not move")
 # A flexible rod with stress; attachments are bodies, too
 expect(page("flexcrank"), 501, 5, 6, 1)
 
+# A whole finite-element body on a hub: its nodes move by themselves
+if os.path.exists(os.path.join(bin, "spinbeam")):
+    result = look(page("spinbeam", "-body", "full", "-end", "2"))
+    check([result[key] for key in ("frames", "bodies", "visible", "surfaces", "errors")] == [501, 4, 4, 1, []], "a whole body: %s" % result)
+    check(result["drawn"] > 300 and result["colours"] > 100 and result["played"], "a whole body is not to be seen: %s" % result)
+
 # A page whose writer was stopped within a block shows what is whole
 with open(file) as whole:
     text = whole.read()

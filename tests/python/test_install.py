@@ -1,4 +1,5 @@
-"""What `make install` gives: the package in an empty prefix, found by PYTHONPATH alone, shows PyInit functions and links no Python library.
+"""What `make install` gives: the package in an empty prefix, found by PYTHONPATH alone, shows PyInit functions and links no Python library. What pip gives:
+a wheel that runs with the libraries in it.
 
 Needs the environment variables HHTDAE_BUILD and HHTDAE_CMAKE, which CTest sets.
 """
@@ -55,6 +56,30 @@ class Installed(unittest.TestCase):
             for name in files:
                 if name.startswith("libhht") and ".so" in name:
                     self.assertNotIn("python", run("readelf", "-d", os.path.join(folder, name)).lower().replace(self.folder.lower(), ""))
+
+
+@unittest.skipUnless(BUILD, "no build tree is given")
+class Wheel(unittest.TestCase):
+    def test_pip_installs_what_it_needs(self):
+        """pip without a network, from the source tree; what the build tree has compiled is not compiled again"""
+        source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "src", "python")
+        if subprocess.run([sys.executable, "-m", "pip", "--version"], capture_output=True).returncode:
+            self.skipTest("there is no pip for %s (Debian: python3-pip)" % sys.executable)
+        with tempfile.TemporaryDirectory(prefix="wheel-", dir=BUILD) as folder:
+            run(sys.executable, "-B", "-m", "pip", "install", "--no-index", "--no-deps", "--no-compile", "--target", folder, "--config-settings", "builddir=" + BUILD, source)
+            script = ("import hhtdae as h, importlib.metadata as m\n"
+                      "s = h.Scene(gravity=(0, 0, -2))\n"
+                      "b = s.add('b', h.PointMass())\n"
+                      "s.channel('z', h.displacement(b.marker(), 'z'))\n"
+                      "print(h.__file__, round(s.solve(1.)['z'][-1], 9))\n"
+                      "if %r: h.flexible\n"
+                      "print(all(line.split()[-1].startswith(%r) for line in open('/proc/self/maps') if 'libhht' in line), m.requires('hhtdae')[-1])\n"
+                      % (any(name.startswith("_flexible.") for name in os.listdir(os.path.join(folder, "hhtdae"))), os.path.join(folder, "hhtdae", "lib")))
+            where, z, own, needs = run(sys.executable, "-c", script, PYTHONPATH=folder).split()
+            self.assertTrue(where.startswith(folder), where)
+            self.assertEqual(float(z), -1.)
+            self.assertEqual(own, "True", "libraries from elsewhere were loaded")
+            self.assertTrue(needs.startswith("petsc4py"), needs)
 
 
 if __name__ == "__main__":

@@ -311,8 +311,27 @@ class Runs(unittest.TestCase):
             run.solve(1.)
         with self.assertRaisesRegex(TypeError, "there are file, csv"):
             scene.output(table="x")
+        with self.assertRaisesRegex(ValueError, "page_frames"):
+            scene.output(page_frames=0)
         with self.assertRaisesRegex(ValueError, "must be one of report"):
             scene.start(assembly="maybe")
+
+    def test_page(self):
+        """A page with its frames, where the library has pages"""
+        scene = h.Scene(gravity=(0, 0, -1))
+        scene.add("falling", h.PointMass())
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "page.html")
+            scene.output(page=file, page_title="a fall", page_frames=10)
+            try:
+                scene.solve(1.)
+            except h.Error as error:
+                self.assertIn("built without", str(error))
+                self.skipTest("the library was built without pages")
+            with open(file) as page:
+                text = page.read()
+        self.assertIn('"title":"a fall"', text)
+        self.assertEqual(text.count('data-kind="frames">'), 1)
 
 
 class Questions(unittest.TestCase):

@@ -122,7 +122,8 @@ class Scene:
         self._states = 0
         self._begun = False  # whether there is more than parameters
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
-        self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False)
+        self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False, page="", page_title="", page_dt=0.,
+                            page_frames=500, page_nodes=6000)
         self.ground = Body(self, self._core.ground(), "ground")
         if gravity is not None:
             self.set_gravity(gravity)
@@ -291,9 +292,18 @@ class Scene:
             Between frames; 0: every step.
         balance : bool or str
             Energy and momentum at every step: printed, or into a file.
+        page : str
+            HTML file that shows the run in three dimensions, with its channels, in any browser.
+        page_title : str
+            Default: the file's name.
+        page_dt : float
+            Between its frames; 0: `page_frames` of them up to the time that `Run.solve` first goes to.
+        page_frames, page_nodes : int
+            Frames, and nodes that are shown of whole finite-element bodies, at most.
         """
         self._choose(self._output, settings, "output")
         self._core.output(*[self._output[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
+        self._core.page(*[self._output[k] for k in ("page", "page_title", "page_dt", "page_frames", "page_nodes")])
 
     @staticmethod
     def _choose(present, given, what, **choices):

@@ -3,14 +3,17 @@
   are written at the first frame, beside and renamed when they are on the disk; blocks of frames are appended, so that the file is whole after
   each of them and a run that is killed leaves what it had. Every rank packs what it owns of a frame, the first rank writes.
 */
+#include "scene/extension.h"
 #include "scene/output/channels.h"
 #include "scene/output/files.h"
 #include "scene/output/page_assets.h"
 #include "scene/output/page_description.h"
 #include "scene/output/page_frames.h"
+#include "scene/output/page_mesh.h"
 #include "scene/output/page_surface.h"
 #include "scene/output/recorder.h"
 #include "scene/output/table.h"
+#include <numeric>
 
 namespace hhtdae
 {
@@ -23,12 +26,11 @@ constexpr std::size_t pose_size = 7; /* position of the centre of mass, quaterni
 class Page : public Task
 {
 public:
-  Page(Runtime &R, const OutputSettings &o) : Task(o.page_dt), file_(o.page), title_(o.page_title)
+  Page(Runtime &R, const OutputSettings &o) : Task(o.page_dt), file_(o.page), title_(o.page_title), most_nodes_((std::size_t)o.page_nodes)
   {
     const std::size_t slash = file_.find_last_of('/');
     if (title_.empty()) title_ = slash == std::string::npos ? file_ : file_.substr(slash + 1);
     from_equations = ChannelsFollowFromEquations(R);
-    placeAll(R);
   }
 
   PetscErrorCode begin(Runtime &R)
@@ -36,6 +38,8 @@ public:
     std::string fault;
     PetscMPIInt wrong = 0;
     PetscFunctionBegin;
+    PetscCall(makeMeshes(R));
+    placeAll(R);
     if (R.rank == 0)
       for (const SurfaceData &d : R.scene.surfaces) {
         const BodyData &b = R.scene.bodies[d.body];
@@ -48,7 +52,13 @@ public:
       std::vector<PageField> fields;
       for (const SurfaceData &d : R.scene.surfaces)
         if (HasStress(*d.surface)) fields.push_back({d.surface.get(), modal_[d.body]});
-      frames_ = PageFrames(tracks_, R.scene.channels.size(), fields);
+      std::vector<PageNodes> moving;
+      for (const auto &m : meshes_) {
+        const Eigen::Map<const Eigen::Matrix3Xd> X(m->surface.point.data(), 3, (Eigen::Index)m->surface.point.size() / 3);
+        moving.push_back({(std::size_t)X.cols(), m->stress});
+        rest_.push_back(X.colwise() - Eigen::Vector3d(X.rowwise().mean()));
+      }
+      frames_ = PageFrames(tracks_, R.scene.channels.size(), fields, moving);
     }
     PetscFunctionReturn(0);
   }
@@ -93,7 +103,11 @@ private:
   std::string                           file_, title_;
   std::vector<std::vector<std::size_t>> place_; /* in a frame, of what every rank packs */
   std::vector<std::size_t>              modal_; /* of the modal coordinates of every body in a frame */
-  std::size_t                           tracks_ = 0;
+  std::size_t                           tracks_ = 0, numbers_ = 0; /* of a frame: before the channels; in all */
+  std::size_t                           most_nodes_;               /* of all meshes together */
+  std::vector<std::unique_ptr<PageMesh>> meshes_;
+  std::vector<const Extension *>        mesh_of_;
+  std::vector<Eigen::Matrix3Xd>         rest_;  /* of each mesh, on the first rank: its nodes without deformation, from their mean */
   PageFrames                            frames_; /* this and what follows: on the first rank */
   std::vector<double>                   last_; /* quaternions of the last frame */
   bool                                  there_ = false;
@@ -115,8 +129,10 @@ private:
   {
     PetscFunctionBegin;
     if (!there_) PetscCall(writeHead(s));
-    continueQuaternions(frame, s.bodies.size());
-    frames_.add(t, frame.data(), frame.data() + tracks_);
+    for (std::size_t m = 0, at = tracks_ + s.channels.size(); m < meshes_.size(); at += meshes_[m]->perNode() * (std::size_t)rest_[m].cols(), m++)
+      takeRigidMotion(rest_[m], &frame[at], &frame[pose_size * (s.bodies.size() + m)]);
+    continueQuaternions(frame, s.bodies.size() + meshes_.size());
+    frames_.add(t, frame.data(), frame.data() + tracks_, frame.data() + tracks_ + s.channels.size());
     if (frames_.full()) PetscCall(writeFrames());
     PetscFunctionReturn(0);
   }
@@ -132,7 +148,31 @@ private:
 
   static PetscMPIInt ownerOf(const Runtime &R, std::size_t body) { return R.number.owner.empty() ? 0 : R.number.owner[body]; }
 
-  /* A frame: poses of all bodies, modal coordinates of the flexible ones, channels */
+  /* The meshes share the number of nodes evenly */
+  PetscErrorCode makeMeshes(const Runtime &R)
+  {
+    PetscFunctionBegin;
+    for (const auto &x : R.scene.extensions) {
+      std::unique_ptr<PageMesh> mesh;
+      PetscCall(x->pageMesh(std::max((std::size_t)1, most_nodes_ / R.scene.extensions.size()), &mesh));
+      if (!mesh) continue;
+      meshes_.push_back(std::move(mesh));
+      mesh_of_.push_back(x.get());
+    }
+    PetscFunctionReturn(0);
+  }
+
+  /* Places of nodes become displacements in the axes of a rigid motion, whose pose it writes */
+  static void takeRigidMotion(const Eigen::Matrix3Xd &X, double *x, double *pose)
+  {
+    Eigen::Map<Eigen::Matrix3Xd> now(x, 3, X.cols());
+    const RigidFit               fit = FitRigid(X, Eigen::Map<const Eigen::Matrix3Xd>(x, 3, X.cols()));
+    const Eigen::Quaterniond     q(fit.R);
+    now = (fit.R.transpose() * (now.colwise() - Eigen::Vector3d(fit.origin)) - X).eval();
+    for (double y : {fit.origin(0), fit.origin(1), fit.origin(2), q.x(), q.y(), q.z(), q.w()}) *pose++ = y;
+  }
+
+  /* A frame: poses of all bodies, then of the meshes, which no rank packs; modal coordinates of the flexible bodies, channels, nodes of the meshes */
   void placeAll(const Runtime &R)
   {
     const std::vector<BodyData> &bodies = R.scene.bodies;
@@ -141,11 +181,23 @@ private:
       for (std::size_t k = 0; k < n; k++) place_[rank].push_back(tracks_++);
     };
     for (std::size_t b = 0; b < bodies.size(); b++) put(ownerOf(R, b), pose_size);
+    tracks_ += pose_size * meshes_.size();
     for (std::size_t b = 0; b < bodies.size(); b++) {
       modal_.push_back(tracks_);
       if (bodies[b].flexible) put(ownerOf(R, b), (std::size_t)bodies[b].flexible->model->modes());
     }
     for (std::size_t c = 0; c < ChannelOwners(R).size(); c++) place_[ChannelOwners(R)[c]].push_back(tracks_ + c);
+    numbers_ = tracks_ + ChannelOwners(R).size();
+    for (const auto &m : meshes_) {
+      const std::size_t all = (std::size_t)std::accumulate(m->nodes.begin(), m->nodes.end(), 0);
+      std::size_t       first = 0; /* node of a rank */
+      for (PetscMPIInt r = 0; r < R.size; first += (std::size_t)m->nodes[r++]) {
+        for (std::size_t k = 3 * first; k < 3 * (first + (std::size_t)m->nodes[r]); k++) place_[r].push_back(numbers_ + k);
+        if (m->stress)
+          for (std::size_t k = first; k < first + (std::size_t)m->nodes[r]; k++) place_[r].push_back(numbers_ + 3 * all + k);
+      }
+      numbers_ += m->perNode() * all;
+    }
   }
 
   PetscErrorCode pack(const Runtime &R, const Evaluation &e, std::vector<double> &mine) const
@@ -164,6 +216,7 @@ private:
       mine.insert(mine.end(), eta, eta + d.flexible->model->modes());
     }
     PetscCall(ChannelValues(R, e, mine));
+    for (std::size_t m = 0; m < meshes_.size(); m++) PetscCall(meshes_[m]->values(e.u + mesh_of_[m]->start[R.rank] - R.start, mine));
     PetscFunctionReturn(0);
   }
 
@@ -179,7 +232,7 @@ private:
     }
     if (R.rank == 0) all.resize(start[R.size]);
     PetscCallMPI(MPI_Gatherv(mine.data(), (int)mine.size(), MPI_DOUBLE, all.data(), count.data(), start.data(), MPI_DOUBLE, 0, R.scene.comm));
-    frame.resize(all.size());
+    frame.assign(R.rank == 0 ? numbers_ : 0, 0);
     const double *x = all.data();
     if (R.rank == 0)
       for (const auto &places : place_)
@@ -202,9 +255,17 @@ private:
   {
     std::string head = PageHead(), element;
     PetscFunctionBegin;
-    head += "<script id=\"scene\" type=\"application/json\">" + DescribePage(s, title_) + "</script>\n";
+    head += "<script id=\"scene\" type=\"application/json\">" + DescribePage(s, title_, meshes_) + "</script>\n";
     for (const SurfaceData &d : s.surfaces) {
       PetscCall(PageElement(EncodeSurface(*d.surface, *s.bodies[d.body].flexible->model), "surface", &element));
+      head += element;
+    }
+    for (std::size_t m = 0; m < meshes_.size(); m++) {
+      Surface   from_mean = meshes_[m]->surface; /* EncodeSurface() takes coordinates from the body's centre */
+      ModalBody none;
+      Eigen::Map<Eigen::Matrix3Xd>(from_mean.point.data(), 3, rest_[m].cols()) = rest_[m];
+      from_mean.shape.resize(3 * rest_[m].cols(), 0);
+      PetscCall(PageElement(EncodeSurface(from_mean, none), "surface", &element));
       head += element;
     }
     PetscCall(WriteWhole(file_, head));

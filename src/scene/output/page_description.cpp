@@ -72,11 +72,22 @@ std::string BoxOfInertia(const SceneData &s, PetscInt id)
   return half.allFinite() && half.maxCoeff() > 0 ? ShapeText("box", half, id, Vector3::Zero(), axes) : "";
 }
 
-std::vector<std::string> BodyTexts(const SceneData &s)
+using Meshes = std::vector<std::unique_ptr<PageMesh>>;
+
+std::string MeshText(const PageMesh &m)
+{
+  return Object({{"name", JSONText(m.name)}, {"modes", "0"}, {"carrier", "-1"}, {"mesh", "true"}, {"guess", "false"}, {"shapes", "[]"}});
+}
+
+std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
 {
   std::vector<std::vector<std::string>> shapes(s.bodies.size());
   std::vector<char>                     drawn(s.bodies.size(), 0);
   std::vector<std::string>              out;
+  std::vector<PetscInt>                 carrier;
+  for (const BodyData &b : s.bodies) carrier.push_back(b.carrier);
+  for (std::size_t m = 0; m < meshes.size(); m++)
+    for (Marker frame : meshes[m]->frames) carrier[s.markers[frame.id].body] = (PetscInt)(s.bodies.size() + m);
   for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1; /* and no shape of the user, which would lie inside of it */
   for (const ShapeData &d : s.shapes)
     if (d.body >= 0 && !drawn[d.body]) shapes[d.body].push_back(ShapeText(s, d));
@@ -93,7 +104,8 @@ std::vector<std::string> BodyTexts(const SceneData &s)
     }
     out.push_back(Object({{"name", JSONText(d.name)},
                           {"modes", std::to_string(d.flexible ? d.flexible->model->modes() : 0)},
-                          {"carrier", std::to_string(d.carrier)},
+                          {"carrier", std::to_string(carrier[b])},
+                          {"mesh", "false"},
                           {"guess", Boolean(guess)},
                           {"shapes", List(shapes[b])}}));
   }
@@ -120,7 +132,7 @@ Vector3 Up(const SceneData &s)
 
 } // namespace
 
-std::string DescribePage(const SceneData &s, const std::string &title)
+std::string DescribePage(const SceneData &s, const std::string &title, const Meshes &meshes)
 {
   std::vector<std::string> ground, lines, channels, surfaces;
   for (const ShapeData &d : s.shapes)
@@ -132,12 +144,20 @@ std::string DescribePage(const SceneData &s, const std::string &title)
   }
   for (const ChannelData &c : s.channels) channels.push_back(Object({{"name", JSONText(c.name)}, {"unit", JSONText(c.unit)}}));
   for (const SurfaceData &d : s.surfaces)
-    surfaces.push_back(Object({{"body", std::to_string(d.body)}, {"stress", Boolean(d.surface && HasStress(*d.surface))}, {"unit", JSONText(d.surface ? d.surface->stress_unit : "")}}));
+    surfaces.push_back(Object({{"body", std::to_string(d.body)}, {"stress", Boolean(d.surface && HasStress(*d.surface))}, {"unit", JSONText(d.surface ? d.surface->stress_unit : "")}, {"moving", "false"}}));
+  std::vector<std::string> bodies = BodyTexts(s, meshes);
+  for (std::size_t m = 0; m < meshes.size(); m++) {
+    bodies.push_back(MeshText(*meshes[m]));
+    surfaces.push_back(Object({{"body", std::to_string(s.bodies.size() + m)},
+                               {"stress", Boolean(meshes[m]->stress)},
+                               {"unit", JSONText(meshes[m]->surface.stress_unit)},
+                               {"moving", "true"}}));
+  }
   return Object({{"format", "1"},
                  {"title", JSONText(title)},
                  {"planar", Boolean(s.planar)},
                  {"up", JSONNumbers(Up(s))},
-                 {"bodies", List(BodyTexts(s))},
+                 {"bodies", List(bodies)},
                  {"ground", List(ground)},
                  {"lines", List(lines)},
                  {"elements", List(ElementTexts(s))},

@@ -2,25 +2,26 @@
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_DESCRIPTION_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_DESCRIPTION_H
 
+#include "scene/output/page_mesh.h"
 #include "scene/scene_data.h"
 
 namespace hhtdae
 {
 
 /*
-  A place is [body, x, y, z, qx, qy, qz, qw]: of a marker, from the body's centre of mass in its axes; body -1 is the ground.
+  Behind the scene's bodies there is one for each mesh, which carries the frames of its attachments. A place is [body, x, y, z, qx, qy, qz, qw]: of a marker, from the body's centre of mass in its axes; body -1 is the ground.
 
     {"format": 1, "title": text, "planar": bool, "up": [x, y, z],
-     "bodies":   [{"name", "modes", "carrier": flexible body of an attachment's frame or -1,
+     "bodies":   [{"name", "modes", "carrier": flexible body of an attachment's frame or -1, "mesh": bool,
                    "shapes": [{"kind": "box" | "cylinder" | "sphere", "size": [x, y, z], "at": place, "colour": 0xRRGGBB or -1}],
                    "guess": the shape is that of the inertia}],
      "ground":   [shapes],
      "lines":    [[place, place, ...]],
      "elements": [{"name", "type", "kind": "joint" | "motion" | "force", "i": place, "j": place or null}],
      "channels": [{"name", "unit"}],
-     "surfaces": [{"body", "stress": bool, "unit"}]}
+     "surfaces": [{"body", "stress": bool, "unit", "moving": bool, whether its nodes move by themselves}]}
 */
-std::string DescribePage(const SceneData &s, const std::string &title);
+std::string DescribePage(const SceneData &s, const std::string &title, const std::vector<std::unique_ptr<PageMesh>> &meshes);
 
 } // namespace hhtdae
 

@@ -14,6 +14,7 @@ constexpr std::size_t   most_frames = 128;     /* of a block: a page that is kil
 constexpr std::size_t   most_bytes  = 8 << 20; /* of a block in memory */
 constexpr double        levels      = 65534;   /* codes 0 to 65534 */
 constexpr std::uint16_t missing     = 65535;
+constexpr float         node_levels = 4095; /* of displacements of nodes, to each side of 0 in a block */
 
 /* Finite, and far enough from the end of the numbers for differences of two */
 bool Usable(double x) { return std::abs(x) < 1e300; }
@@ -43,16 +44,17 @@ std::uint16_t Code(double x, const Range &r)
 
 } // namespace
 
-void PageFrames::add(double time, const double *tracks, const double *channels)
+void PageFrames::add(double time, const double *tracks, const double *channels, const double *moving)
 {
   time_.push_back(time);
   track_.insert(track_.end(), tracks, tracks + tracks_);
   for (std::size_t c = 0; c < channels_; c++) channel_.push_back((float)channels[c]);
+  for (std::size_t k = 0; k < numbers_; k++) number_.push_back((float)moving[k]);
 }
 
 bool PageFrames::full() const
 {
-  return time_.size() >= most_frames || sizeof(double) * track_.size() + sizeof(float) * channel_.size() >= most_bytes;
+  return time_.size() >= most_frames || sizeof(double) * track_.size() + sizeof(float) * (channel_.size() + number_.size()) >= most_bytes;
 }
 
 void PageFrames::clear()
@@ -60,6 +62,7 @@ void PageFrames::clear()
   time_.clear();
   track_.clear();
   channel_.clear();
+  number_.clear();
 }
 
 PageBytes PageFrames::encode() const
@@ -70,6 +73,11 @@ PageBytes PageFrames::encode() const
   encodeTracks(out);
   encodeChannels(out);
   for (const PageField &f : fields_) encodeField(f, out);
+  std::size_t first = 0;
+  for (const PageNodes &m : moving_) {
+    encodeNodes(m, first, out);
+    first += m.numbers();
+  }
   return out;
 }
 
@@ -107,12 +115,10 @@ void PageFrames::encodeChannels(PageBytes &out) const
   out.planes(bits);
 }
 
-void PageFrames::encodeField(const PageField &field, PageBytes &out) const
+/* nodes x frames */
+static void EncodeStress(const Eigen::MatrixXf &stress, PageBytes &out)
 {
-  const Eigen::Index n = (Eigen::Index)time_.size(), modes = field.surface->stress.cols();
-  Eigen::MatrixXf    eta(modes, n), stress;
-  for (Eigen::Index i = 0; i < n; i++) eta.col(i) = Eigen::Map<const Eigen::VectorXd>(&track_[i * tracks_ + field.first], modes).cast<float>();
-  SurfaceStress(*field.surface, eta, &stress);
+  const Eigen::Index         n = stress.cols();
   std::vector<std::uint32_t> bits((std::size_t)stress.rows());
   std::vector<unsigned char> code;
   code.reserve((std::size_t)stress.size());
@@ -131,6 +137,44 @@ void PageFrames::encodeField(const PageField &field, PageBytes &out) const
   }
   out.planes(bits);
   out.all.insert(out.all.end(), code.begin(), code.end());
+}
+
+void PageFrames::encodeField(const PageField &field, PageBytes &out) const
+{
+  const Eigen::Index n = (Eigen::Index)time_.size(), modes = field.surface->stress.cols();
+  Eigen::MatrixXf    eta(modes, n), stress;
+  for (Eigen::Index i = 0; i < n; i++) eta.col(i) = Eigen::Map<const Eigen::VectorXd>(&track_[i * tracks_ + field.first], modes).cast<float>();
+  SurfaceStress(*field.surface, eta, &stress);
+  EncodeStress(stress, out);
+}
+
+void PageFrames::encodeNodes(const PageNodes &m, std::size_t first, PageBytes &out) const
+{
+  const std::size_t          n = time_.size(), tracks = 3 * m.nodes;
+  std::vector<std::uint16_t> code;
+  float                      largest = 0;
+  const auto                 at      = [&](std::size_t frame, std::size_t k) {
+    const float x = number_[frame * numbers_ + first + k];
+    return std::isfinite(x) ? x : 0.f; /* the body is at no finite place then, and not shown */
+  };
+  for (std::size_t i = 0; i < n; i++)
+    for (std::size_t k = 0; k < tracks; k++) largest = std::max(largest, std::abs(at(i, k)));
+  const float step = largest / node_levels;
+  out.f32(step);
+  code.reserve(n * tracks);
+  for (std::size_t k = 0; k < tracks; k++) {
+    std::uint16_t before = 0;
+    for (std::size_t i = 0; i < n; i++) {
+      const std::uint16_t now = (std::uint16_t)(std::int16_t)(step > 0 ? std::lround(at(i, k) / step) : 0);
+      code.push_back(ZigZag((std::uint16_t)(now - before)));
+      before = now;
+    }
+  }
+  out.planes(code);
+  if (!m.stress) return;
+  Eigen::MatrixXf stress((Eigen::Index)m.nodes, (Eigen::Index)n);
+  for (std::size_t i = 0; i < n; i++) stress.col((Eigen::Index)i) = Eigen::Map<const Eigen::VectorXf>(&number_[i * numbers_ + first + tracks], (Eigen::Index)m.nodes);
+  EncodeStress(stress, out);
 }
 
 } // namespace hhtdae

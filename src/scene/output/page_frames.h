@@ -5,7 +5,10 @@
     for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite, or beyond 1e300
     codes of the tracks, track by track: u16 differences from one frame to the next (the first from 0), in zigzag order, in planes
     channels, one after the other: f32, in planes
-    for every field: largest of every node, f32 in planes; u8 differences of round(255 value / largest), node by node
+    for every surface, in their order, as far as it has them:
+      nodes that move by themselves: f32 step; u16 codes of their displacements in the axes of their body, node by node x, y, z: differences from one frame
+        to the next (the first from 0), in zigzag order, in planes
+      stress: largest of every node, f32 in planes; u8 differences of round(255 value / largest), node by node
 */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
@@ -16,35 +19,48 @@
 namespace hhtdae
 {
 
-/* Stress at the nodes of a surface, which is worked out for a block as a whole */
+/* Stress at the nodes of a surface with modes, which is worked out for a block as a whole */
 struct PageField {
   const Surface *surface;
   std::size_t    first; /* of its modal coordinates among the tracks */
+};
+
+/* A surface whose nodes move by themselves: of each frame 3 displacements a node, then the stress of each */
+struct PageNodes {
+  std::size_t nodes;
+  bool        stress;
+  std::size_t numbers() const { return (stress ? 4 : 3) * nodes; }
 };
 
 class PageFrames
 {
 public:
   PageFrames() = default;
-  PageFrames(std::size_t tracks, std::size_t channels, const std::vector<PageField> &fields) : tracks_(tracks), channels_(channels), fields_(fields) {}
+  PageFrames(std::size_t tracks, std::size_t channels, const std::vector<PageField> &fields, const std::vector<PageNodes> &moving = {})
+      : tracks_(tracks), channels_(channels), fields_(fields), moving_(moving)
+  {
+    for (const PageNodes &m : moving_) numbers_ += m.numbers();
+  }
 
   std::size_t frames() const { return time_.size(); }
-  /* tracks: coordinates of bodies and modes */
-  void add(double time, const double *tracks, const double *channels);
+  /* tracks: coordinates of bodies and modes; moving: the numbers of all PageNodes */
+  void add(double time, const double *tracks, const double *channels, const double *moving = nullptr);
   /* Whether its memory, or the number of its frames, has reached what a block may have */
   bool      full() const;
   PageBytes encode() const;
   void      clear();
 
 private:
-  std::size_t            tracks_ = 0, channels_ = 0;
+  std::size_t            tracks_ = 0, channels_ = 0, numbers_ = 0;
   std::vector<PageField> fields_;
+  std::vector<PageNodes> moving_;
   std::vector<double>    time_, track_; /* frame by frame */
-  std::vector<float>     channel_;
+  std::vector<float>     channel_, number_;
 
   void encodeTracks(PageBytes &out) const;
   void encodeChannels(PageBytes &out) const;
   void encodeField(const PageField &field, PageBytes &out) const;
+  void encodeNodes(const PageNodes &nodes, std::size_t first, PageBytes &out) const;
 };
 
 } // namespace hhtdae

@@ -119,9 +119,10 @@ PetscErrorCode ReadOptions(TS ts, OutputSettings &o)
   PetscCall(name("-scene_page", "HTML page that shows the run", o.page));
   PetscCall(PetscOptionsReal("-scene_page_dt", "Time between the page's frames, 0: as -scene_page_frames says", "Scene::output", page_dt, &page_dt, nullptr));
   PetscCall(PetscOptionsInt("-scene_page_frames", "Frames of the page from the start to the final time", "Scene::output", o.page_frames, &o.page_frames, nullptr));
+  PetscCall(PetscOptionsInt("-scene_page_nodes", "Nodes that the page shows of whole finite-element bodies", "Scene::output", o.page_nodes, &o.page_nodes, nullptr));
   PetscOptionsEnd();
-  PetscCheck(page_dt >= 0 && o.page_frames > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
-             "-scene_page_dt %g must not be negative, -scene_page_frames %d must be positive", (double)page_dt, (int)o.page_frames);
+  PetscCheck(page_dt >= 0 && o.page_frames > 0 && o.page_nodes > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "-scene_page_dt %g must not be negative, -scene_page_frames %d and -scene_page_nodes %d must be positive", (double)page_dt, (int)o.page_frames, (int)o.page_nodes);
   PetscCheck(dt >= 0 && animation_dt >= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "times between samples (%g) and frames (%g) must not be negative", (double)dt, (double)animation_dt);
   o.dt           = dt;

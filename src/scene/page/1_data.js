@@ -54,6 +54,19 @@ function readSurface(r) {
   return s;
 }
 
+/* Displacements of nodes that move by themselves, in the axes of their body: frame by frame a step and the codes that it multiplies */
+function readMotion(r, s, n) {
+  const step = r.f32(), code = r.u16s(3 * s.nodes * n), frames = [];
+  for (let i = 0; i < n; i++) frames.push({step, code: new Int16Array(3 * s.nodes), largest: 0});
+  for (let k = 0, at = 0; k < 3 * s.nodes; k++)
+    for (let i = 0, c = 0; i < n; i++) {
+      c = c + fromZigZag(code[at++]) << 16 >> 16;
+      frames[i].code[k] = c;
+      frames[i].largest = Math.max(frames[i].largest, step * Math.abs(c));
+    }
+  s.motion.push(...frames);
+}
+
 /* All frames of a block, appended to the run */
 function readFrames(r, run) {
   const n = r.u32(), tracks = run.tracks, first = run.time.length;
@@ -71,6 +84,7 @@ function readFrames(r, run) {
   const bits = r.f32s(n * run.scene.channels.length);
   run.scene.channels.forEach((channel, c) => { for (let i = 0; i < n; i++) channel.value.push(bits[c * n + i]); });
   for (const s of run.surfaces) {
+    if (s.moving) readMotion(r, s, n);
     if (!s.stress) continue;
     const largest = r.f32s(s.nodes), code = r.u8s(n * s.nodes), field = [];
     for (let i = 0; i < n; i++) field.push(new Uint8Array(s.nodes));
@@ -98,7 +112,7 @@ async function readRun(progress) {
     progress(k / elements.length);
     try {
       const r = await unpack(elements[k]);
-      if (elements[k].dataset.kind === 'surface') run.surfaces.push({...scene.surfaces[surface++], field: [], ...readSurface(r)});
+      if (elements[k].dataset.kind === 'surface') run.surfaces.push({...scene.surfaces[surface++], field: [], motion: [], ...readSurface(r)});
       else readFrames(r, run);
     } catch (e) {
       if (k + 1 < elements.length || elements[k].dataset.kind === 'surface') throw e;

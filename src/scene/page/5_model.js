@@ -72,6 +72,7 @@ class Model {
     this.bodies.forEach((g, b) => add(this.pointAt(this.first, [b, 0, 0, 0])));
     for (const p of this.places) add(this.pointAt(this.first, p));
     for (const body of this.run.scene.bodies) if (!body.guess) for (const s of body.shapes) for (const d of [-1, 1]) add(this.pointAt(this.first, [s.at[0], s.at[1] + d * s.size[0], s.at[2] + d * s.size[1], s.at[3] + d * s.size[2]]));
+    for (const s of this.run.surfaces) if (s.moving) for (let k = 0; k < s.point.length; k += 3) add(this.pointAt(this.first, [s.body, ...s.point.slice(k, k + 3)]));
     const size = box.isEmpty() ? 0 : box.getSize(new THREE.Vector3()).length();
     return size > 0 ? size : 1;
   }
@@ -234,19 +235,33 @@ class Model {
     this.bodies.forEach((g, k) => { g.visible = this.pose(tracks, k, g.position, g.quaternion); });
     for (const {a, b, mesh} of this.spans) this.stretch(mesh, this.pointAt(tracks, a), this.pointAt(tracks, b));
     for (const s of this.run.surfaces) {
-      this.deform(s, tracks, deflection);
+      this.deform(s, tracks, t, deflection);
       this.paint(s, t);
     }
   }
 
-  deform(s, tracks, deflection) {
-    const eta = this.run.scene.bodies[s.body].modal, position = s.mesh.geometry.attributes.position, to = position.array, x = s.now;
-    x.set(s.point);
+  addModes(s, x, tracks, deflection) {
+    const eta = this.run.scene.bodies[s.body].modal;
     for (const k of s.active) {
       const amount = deflection * tracks[eta + k], shape = s.mode[k].shape;
       if (!(Math.abs(amount) * s.mode[k].largest > 1e-7 * this.size)) continue;
       for (let i = 0; i < x.length; i++) x[i] += amount * shape[i];
     }
+  }
+
+  /* Nodes that move by themselves */
+  addMotion(s, x, t, deflection) {
+    const [k, part] = placeInTime(this.run, t), a = s.motion[k], b = s.motion[Math.min(k + 1, s.motion.length - 1)];
+    if (!a) return;
+    const fa = deflection * (1 - part) * a.step, fb = deflection * part * b.step;
+    for (let i = 0; i < x.length; i++) x[i] += fa * a.code[i] + fb * b.code[i];
+  }
+
+  deform(s, tracks, t, deflection) {
+    const position = s.mesh.geometry.attributes.position, to = position.array, x = s.now;
+    x.set(s.point);
+    if (s.moving) this.addMotion(s, x, t, deflection);
+    else this.addModes(s, x, tracks, deflection);
     for (let v = 0; v < s.node.length; v++) {
       const i = 3 * s.node[v];
       to[3 * v] = x[i];
@@ -316,6 +331,7 @@ class Model {
     let most = 0;
     for (const s of this.run.surfaces) {
       const eta = this.run.scene.bodies[s.body].modal;
+      for (const f of s.motion) most = Math.max(most, f.largest);
       for (const k of s.active) for (const f of this.run.frame) most = Math.max(most, Math.abs(f[eta + k]) * s.mode[k].largest || 0);
     }
     return most > 0 ? 0.33 * this.size / most : 1;

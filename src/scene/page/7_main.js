@@ -133,7 +133,7 @@ function select(body, node = null, picked = null) {
 
 function positionPlot(body) {
   const series = ['x', 'y', 'z'].slice(0, run.scene.planar ? 2 : 3).map((name, c) => ({name, value: run.frame.map(f => f[7 * body + c])}));
-  return new Plot(run.time, run.scene.bodies[body].name + ': position of the centre of mass', '', series, scrubTo);
+  return new Plot(run.time, run.scene.bodies[body].name + (run.scene.bodies[body].mesh ? ': mean position of its surface' : ': position of the centre of mass'), '', series, scrubTo);
 }
 
 function stressPlot({surface, node}) {
