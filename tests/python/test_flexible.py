@@ -1,6 +1,7 @@
 """Flexible bodies: mesh and matrices, reduction against beam theory, files, stress, bodies in scenes, whole models."""
 
 import os
+import pickle
 import sys
 import tempfile
 import unittest
@@ -134,6 +135,16 @@ class Beam(unittest.TestCase):
         np.testing.assert_array_equal(flexible.load_modal_body(file).omega, self.body.modal().omega)
         with self.assertRaises(h.Error):
             flexible.ReducedBody.load(file + " that is not there")
+
+    def test_pickle(self):
+        """The bytes of the file: modes and stress are the same to the last bit"""
+        try:
+            again = pickle.loads(pickle.dumps(self.body))
+        except h.Error as error:  # no HDF5
+            self.skipTest(str(error))
+        np.testing.assert_array_equal(again.frequencies, self.body.frequencies)
+        np.testing.assert_array_equal(again.shape, self.body.shape)
+        np.testing.assert_array_equal(again.stress, self.body.stress)
 
     def test_matrices_in_memory(self):
         """K and M as scipy has them: the same body"""

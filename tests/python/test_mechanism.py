@@ -1,6 +1,7 @@
 """The integrator on petsc4py's TS, and solve_mechanism: order, agreement of traced and called equations, output, events, messages."""
 
 import math
+import pickle
 import unittest
 
 import numpy as np
@@ -78,6 +79,10 @@ class Pendulum(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "known from"):
             s.sol(2.5)
         self.assertIn("statistics", repr(s))
+        again = pickle.loads(pickle.dumps(s))
+        np.testing.assert_array_equal(again.q, s.q)
+        self.assertEqual(again.statistics, s.statistics)
+        np.testing.assert_array_equal(again.sol(0.3), s.sol(0.3))
 
     def test_events(self):
         """The bottom is passed at a quarter of the period, 4 K(1/2) / sqrt(g); the ends of the swing are where the velocity is zero"""

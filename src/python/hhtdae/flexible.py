@@ -8,6 +8,8 @@
 Arrays are those of this rank where a model is distributed. All functions that read, reduce or write are collective.
 """
 
+import os
+import tempfile
 from dataclasses import asdict, dataclass, field
 from typing import Any, List, NamedTuple, Optional, Sequence
 
@@ -161,7 +163,7 @@ def _matrix(A, comm):
 
 
 class ReducedBody:
-    """A body in modal coordinates, made by `reduce` or `ReducedBody.load`.
+    """A body in modal coordinates, made by `reduce` or `ReducedBody.load`. On one rank it can be pickled.
 
     Attributes
     ----------
@@ -189,6 +191,16 @@ class ReducedBody:
     def save(self, file):
         """Writes the body into a file in HDF5."""
         self._core.save(str(file))
+
+    def __reduce__(self):
+        """Pickled as the bytes of its file, on one rank"""
+        if PETSc.COMM_WORLD.size > 1:
+            raise TypeError("a reduced body is distributed over ranks: save() writes it from all of them")
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "body.h5")
+            self.save(file)
+            with open(file, "rb") as whole:
+                return _unpickled, (whole.read(),)
 
     def modal(self):
         """What a scene takes: the `model` of a `hhtdae.FlexibleBody`."""
@@ -232,6 +244,14 @@ class ReducedBody:
 
         data = {} if eta is None else {"displacement": self.shape @ np.asarray(eta, dtype=float)}
         return meshio.Mesh(self.coordinates, list(self.elements.cells().items()), point_data=data)
+
+
+def _unpickled(whole):
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "body.h5")
+        with open(file, "wb") as out:
+            out.write(whole)
+        return ReducedBody.load(file)
 
 
 def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] = 20, max_frequency=0., keep_below=0., keep: Sequence[int] = (),
