@@ -1,6 +1,7 @@
 /* Factors in single precision: what solves with them are worth, and when double precision takes over */
 #include "bench/linear_matrices.h"
 #include "linear/linear.h"
+#include "linear/memory.h"
 #include "view_text.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
@@ -9,6 +10,7 @@
 #include <string>
 
 #define OK(call) ASSERT_EQ((call), 0)
+#define OKIN(call) EXPECT_EQ((call), 0) /* in functions with results */
 
 namespace
 {
@@ -327,6 +329,78 @@ TEST_F(MumpsMixed, SmallWorkspaceGrows)
   OK(MatMumpsGetIcntl(F, 14, &percent));
   EXPECT_GT(percent, -60);
   EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
+}
+
+/* What the analysis foresees does not fit: nothing is begun, with every package, and on its way to double precision as well */
+TEST_F(MumpsMixed, NoRoom)
+{
+  create(block(12, 12, 12, true)); /* 22 MB in single precision, 40 in double */
+  const auto solved = [&](const char package[], const char memory[]) {
+    OKIN(PetscOptionsSetValue(NULL, "-mat_mumps_memory", memory));
+    Solver s(A, package);
+    s.solve();
+    OKIN(PetscOptionsClearValue(NULL, "-mat_mumps_memory"));
+    if (s.reason() < 0) {
+      EXPECT_EQ(s.failed(), PC_FACTOR_OUTMEMORY) << package << memory;
+      EXPECT_FALSE(std::isfinite(s.error)) << package << memory;
+    }
+    return s.reason() > 0;
+  };
+  for (const char *package : {"mumpsnd", "smumpsnd", "mumpsmixed"}) {
+    EXPECT_FALSE(solved(package, "1")) << package;
+    EXPECT_TRUE(solved(package, "1000")) << package;
+    EXPECT_TRUE(solved(package, "0")) << package;
+  }
+  EXPECT_TRUE(solved("mumpsmixed", "30"));
+  EXPECT_FALSE(solved("mumpsnd", "30"));
+  OK(MatScale(A, 1e60));
+  EXPECT_FALSE(solved("mumpsmixed", "30"));
+}
+
+/* In place of a factor without room, if nobody asked for one */
+TEST_F(MumpsMixed, WhatSolvesWithoutRoom)
+{
+  for (PetscBool symmetric : {PETSC_TRUE, PETSC_FALSE}) {
+    create(block(8, 8, 8, true));
+    KSP          ksp;
+    LinearChoice choice;
+    PetscBool    changed, same;
+    OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+    OK(LinearDefaults(ksp, &choice));
+    OK(KSPSetOperators(ksp, A, A));
+    OK(LinearChoose(ksp, A, symmetric, &choice));
+    OK(LinearChooseSmaller(ksp, A, &choice, &changed));
+    EXPECT_TRUE(changed);
+    OK(PetscObjectTypeCompare((PetscObject)ksp, symmetric ? KSPCG : KSPFGMRES, &same));
+    EXPECT_TRUE(same);
+    OK(LinearChooseSmaller(ksp, A, &choice, &changed));
+    EXPECT_FALSE(changed);
+    OK(LinearChoose(ksp, A, PETSC_FALSE, &choice)); /* symmetry is lost */
+    OK(PetscObjectTypeCompare((PetscObject)ksp, KSPFGMRES, &same));
+    EXPECT_TRUE(same);
+    OK(KSPDestroy(&ksp));
+  }
+  Solver       s(A, "mumpsnd");
+  LinearChoice choice;
+  PetscBool    changed;
+  OK(LinearDefaults(s.ksp, &choice));
+  OK(LinearChooseSmaller(s.ksp, A, &choice, &changed));
+  EXPECT_FALSE(changed);
+}
+
+TEST(Memory, OfTheMachine)
+{
+  LinearMemory m;
+  const double free = LinearFreeMemory();
+  EXPECT_GT(free, 1);
+#if defined(__linux__)
+  EXPECT_LT(free, 1e9);
+#endif
+  OK(LinearMemoryOf(PETSC_COMM_SELF, 7, 5, &m));
+  EXPECT_EQ(m.need, 7);
+  EXPECT_EQ(m.free, 5);
+  OK(LinearMemoryOf(PETSC_COMM_SELF, 7, -1, &m));
+  EXPECT_GT(m.free, 0.5 * free);
 }
 
 TEST_F(MumpsMixed, ManyRightHandSides)

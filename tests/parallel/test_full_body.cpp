@@ -97,6 +97,46 @@ TEST(FullBodyRanks, ByConjugateGradients)
   }
 }
 
+/* No room for the factor of a thick body, which would be MUMPS' by default: conjugate gradients, unless the user asks for a factor */
+TEST(FullBodyRanks, WithoutRoomForAFactor)
+{
+  const auto runBlock = [](const std::string &options, bool iterative) {
+    FeModel model(PETSC_COMM_WORLD);
+    BoxBuilder({{9, 9, 9}, {1, 1, 1}, {2e6, 0.3, 1000}}, &model);
+    Scene      scene(PETSC_COMM_WORLD);
+    FullFeBody fe;
+    FullBody   b;
+    b.law         = FeLaw::Small;
+    b.attachments = {{"left"}, {"right", "", Tie::Average}};
+    scene.gravity({0, 0, -9.81});
+    must(fe.add(scene, "block", model, b));
+    const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
+    const auto   l = DataOf(scene).frame(left);
+    scene.add("clamp", Fixed{left, scene.marker(scene.ground(), l.x, l.R)});
+    scene.channel("z", Measure::displacement(right, 2));
+    SceneRun  run(scene, 0.01, tolerance(1e-6) + " -ts_hhtdae_corrector_tolerance 1e-5 " + options);
+    SNES      snes;
+    KSP       ksp;
+    PC        pc;
+    PetscBool constraint;
+    Array     x;
+    must(run.solve());
+    must(scene.sample(run.ts, 0.01, x));
+    must(TSGetSNES(run.ts, &snes));
+    must(SNESGetKSP(snes, &ksp));
+    must(KSPGetPC(ksp, &pc));
+    must(PetscObjectTypeCompare((PetscObject)pc, "hhtconstraint", &constraint));
+    EXPECT_EQ((bool)constraint, iterative);
+    return x[0];
+  };
+  const double factored = runBlock("", false), without = runBlock("-mat_mumps_memory 1 ", true);
+  EXPECT_LT(factored, 0.5 - 1e-4); /* it sags */
+  EXPECT_NEAR(without, factored, 1e-8);
+  ErrorTrap trap;
+  EXPECT_ANY_THROW(runBlock("-mat_mumps_memory 1 -pc_type cholesky -pc_factor_mat_solver_type mumpsnd ", false));
+  EXPECT_TRUE(trap.says("not enough memory")) << trap.message;
+}
+
 /* Factors in single precision: constraints hold as well, and reactions differ by what the corrector leaves of them */
 TEST(FullBodyRanks, InSinglePrecision)
 {

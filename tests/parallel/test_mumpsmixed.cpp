@@ -1,6 +1,7 @@
 /* Factors in single precision over all ranks: solutions that are known, and the same decision everywhere where double precision takes over */
 #include "distributed_matrix.h"
 #include "linear/linear.h"
+#include "linear/memory.h"
 #include <hhtdae/hhtdae.h>
 #include <petscksp.h>
 
@@ -130,6 +131,24 @@ TEST_F(MumpsMixedRanks, AnEntryBeyondTheRange)
   solve();
   EXPECT_GT(reason(), 0);
   EXPECT_LT(error, 1e-8);
+}
+
+/* Room on all ranks together, since they share a machine, and the same answer on all */
+TEST_F(MumpsMixedRanks, NoRoom)
+{
+  PetscMPIInt size;
+  LinearMemory m;
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  must(LinearMemoryOf(PETSC_COMM_WORLD, 3, 100, &m));
+  EXPECT_EQ(m.need, 3 * size);
+  EXPECT_EQ(m.free, 100);
+  must(PetscOptionsSetValue(nullptr, "-mat_mumps_memory", "0.5"));
+  for (const char *package : {"mumpsnd", "mumpsmixed"}) {
+    use(package, PCCHOLESKY);
+    solve();
+    EXPECT_EQ(reason(), KSP_DIVERGED_PC_FAILED) << package;
+  }
+  must(PetscOptionsClearValue(nullptr, "-mat_mumps_memory"));
 }
 
 TEST_F(MumpsMixedRanks, Singular)
