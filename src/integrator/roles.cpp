@@ -204,9 +204,10 @@ PetscErrorCode Detect(TS ts, const Probe &p)
 /* Roles from the application's index sets */
 PetscErrorCode TakeSets(TS ts)
 {
-  Integrator     &I = Get(ts);
-  const PetscInt *index;
-  PetscInt        start, end, n;
+  Integrator                &I = Get(ts);
+  const PetscInt            *index;
+  PetscInt                   start, end, n;
+  std::vector<PetscInt>      set; /* of its own, since an error leaves indices of the IS behind */
   std::vector<unsigned char> taken(I.role.size(), 0);
 
   PetscFunctionBegin;
@@ -215,14 +216,14 @@ PetscErrorCode TakeSets(TS ts)
     if (!I.is[r]) continue;
     PetscCall(ISGetLocalSize(I.is[r], &n));
     PetscCall(ISGetIndices(I.is[r], &index));
-    for (PetscInt k = 0; k < n; k++) {
-      const PetscInt i = index[k];
+    set.assign(index, index + n);
+    PetscCall(ISRestoreIndices(I.is[r], &index));
+    for (PetscInt i : set) {
       PetscCheck(i >= start && i < end, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "Index %" PetscInt_FMT " of role \"%s\" is not among the unknowns %" PetscInt_FMT "..%" PetscInt_FMT " of its rank", i, TSHHT3Roles[r], start, end - 1);
       PetscCheck(!taken[i - start], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "Unknown %" PetscInt_FMT " is named twice, as \"%s\" and as \"%s\"", i, TSHHT3Roles[I.role[i - start]], TSHHT3Roles[r]);
       taken[i - start]  = 1;
       I.role[i - start] = (unsigned char)r;
     }
-    PetscCall(ISRestoreIndices(I.is[r], &index));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
