@@ -207,7 +207,7 @@ PetscErrorCode TakeSets(TS ts)
   Integrator                &I = Get(ts);
   const PetscInt            *index;
   PetscInt                   start, end, n;
-  std::vector<PetscInt>      set; /* of its own, since an error leaves indices of the IS behind */
+  std::vector<PetscInt>      set; /* a copy: an error would leave indices of the IS behind */
   std::vector<unsigned char> taken(I.role.size(), 0);
 
   PetscFunctionBegin;
