@@ -196,7 +196,7 @@ private:
 
   /* ---- references ---- */
 
-  double patience(double seconds) const { return choice_.small ? 0.12 * seconds : seconds; }
+  double patience(double seconds) const { return choice_.small ? 0.4 * seconds : seconds; }
 
   void refer()
   {
