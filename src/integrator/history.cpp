@@ -353,6 +353,19 @@ PetscErrorCode MapStart(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode MapAll(TS ts, const Motion &m, Mapping &map, Vec value[])
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(MapNodes(ts, m, map, value));
+  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(TakeOver(I, m, map, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* U0, V0, A0, X0, the predictor's differences, and what misfit.cpp needs to know */
 PetscErrorCode MapHistory(TS ts)
 {
@@ -364,13 +377,10 @@ PetscErrorCode MapHistory(TS ts)
   PetscFunctionBegin;
   PetscCall(CreateMapping(I, &map));
   for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDuplicate(I.U0, &value[k]));
-  PetscCall(MapNodes(ts, m, map, value));
-  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
-  PetscCall(MapState(ts, map));
-  PetscCall(CheckRoles(ts, map));
-  PetscCall(TakeOver(I, m, map, value));
+  const PetscErrorCode failed = MapAll(ts, m, map, value);
   for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDestroy(&value[k]));
   PetscCall(DestroyMapping(&map));
+  PetscCall(failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

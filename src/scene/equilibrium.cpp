@@ -231,12 +231,23 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   PetscFunctionReturn(0);
 }
 
+static PetscErrorCode MoveToEquilibrium(Model &M, Runtime &R, Vec U, Vec V)
+{
+  SceneData              &s      = M.scene;
+  const std::vector<Pose> before = Poses(s);
+  PetscFunctionBegin;
+  PetscCall(InitialState(R, U, V));
+  PetscCall(RelaxAt(R, s.start.time, U, &s.started.equilibrium_iterations));
+  PetscCall(WriteState(M, R, U, nullptr));
+  PetscCall(ReportMoves(s, before, "equilibrium"));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
 {
-  SceneData              &s      = M->scene;
-  const std::vector<Pose> before = Poses(s);
-  Runtime                 R(M);
-  Vec                     U, V;
+  SceneData &s = M->scene;
+  Runtime    R(M);
+  Vec        U, V;
   PetscFunctionBegin;
   PetscCall(Layout(R));
   PetscCall(StoreTriangle(R));
@@ -244,12 +255,10 @@ PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));
   PetscCall(VecDuplicate(U, &V));
-  PetscCall(InitialState(R, U, V));
-  PetscCall(RelaxAt(R, s.start.time, U, &s.started.equilibrium_iterations));
-  PetscCall(WriteState(*M, R, U, nullptr));
-  PetscCall(ReportMoves(s, before, "equilibrium"));
+  const PetscErrorCode failed = MoveToEquilibrium(*M, R, U, V);
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&U));
+  PetscCall(failed);
   PetscFunctionReturn(0);
 }
 
