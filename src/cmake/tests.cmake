@@ -204,3 +204,9 @@ hhtdae_script(instructions ${PROJECT_BINARY_DIR} ${CMAKE_COMMAND} $<CONFIG> ${PE
 if(TARGET hhtreduce)
   hhtdae_script(hhtreduce $<TARGET_FILE:hhtreduce> ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG})
 endif()
+# One makes the documentation anew, the others install it
+foreach(test IN ITEMS python.install integration.docs integration.install integration.instructions)
+  if(TEST ${test})
+    set_tests_properties(${test} PROPERTIES RESOURCE_LOCK documentation)
+  endif()
+endforeach()
