@@ -58,6 +58,14 @@ PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *cho
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SolverDefaults(TS ts, KSP ksp)
+{
+  PetscFunctionBegin;
+  PetscCall(LinearDefaults(ksp, &Get(ts).linear));
+  Get(ts).linear.may_be_rough = PETSC_TRUE; /* the corrector measures what its solves leave */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* failed: of the last factorization on entry, of this one on return, the same on all ranks */
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed)
 {

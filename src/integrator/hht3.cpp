@@ -232,8 +232,7 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; of one triangle there is no LU */
-  PetscCall(LinearDefaults(ksp, &I.linear));
-  I.linear.may_be_rough = PETSC_TRUE; /* the corrector measures what its solves leave */
+  PetscCall(SolverDefaults(ts, ksp));
   PetscCall(HooksLineSearch(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

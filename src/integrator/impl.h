@@ -352,6 +352,7 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);
 /* factor.cpp */
+PetscErrorCode SolverDefaults(TS ts, KSP ksp);
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed);
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);

@@ -225,10 +225,11 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* since the set-up */
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.matrix.want ? -2 : -1));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* corrections remove each other's errors, at a rate that is measured */
+  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* corrections remove each other's errors, at a rate that is measured */
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
-  PetscCall(SNESSolve(ts->snes, NULL, I.X));
-  PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
+  const PetscErrorCode failed = SNESSolve(ts->snes, NULL, I.X);
+  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
+  PetscCall(failed);
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));

@@ -89,7 +89,7 @@ PetscErrorCode SetUpSolvers(TS ts)
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
-  if (!((PetscObject)ksp)->type_name) PetscCall(LinearDefaults(ksp, &Get(ts).linear));
+  if (!((PetscObject)ksp)->type_name) PetscCall(SolverDefaults(ts, ksp));
   PetscCall(CorrectorSetUp(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -32,15 +32,15 @@ PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
   KSP                ksp;
   KSPConvergedReason reason;
   Mat                P;
-  PetscBool          rough;
+  PetscBool          rough = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(LinearSolvesRoughly(P, &rough));
-  PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
+  if (Get(ts).linear.refines) PetscCall(LinearSolvesRoughly(P, &rough));
+  if (rough) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
   PetscCall(KSPSolve(ksp, r, dX));
-  PetscCall(LinearSolveRoughly(P, rough));
+  if (rough) PetscCall(LinearSolveRoughly(P, PETSC_TRUE));
   Get(ts).stat.solves++;
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   *solved = (PetscBool)(reason >= 0);

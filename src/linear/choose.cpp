@@ -448,6 +448,16 @@ static PetscErrorCode RefuseTriangle(PC pc, Mat P)
 
 /* ---- the choice ---- */
 
+static PetscErrorCode NoteRefinement(PC pc, LinearChoice *choice)
+{
+  MatSolverType package = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCall(PetscStrcmp(package, LINEAR_MUMPSMIXED, &choice->refines));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice)
 {
   PC pc;
@@ -464,6 +474,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
   PetscCall(LinearLoosen(ksp));
+  PetscCall(NoteRefinement(pc, choice));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);
 }
@@ -475,6 +486,7 @@ PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(NoteRefinement(pc, choice));
   if (choice->user_pc && choice->user_package) PetscFunctionReturn(0);
   available = (PetscBool)(package[0] != 0);
   if (available) PetscCall(MatGetFactorAvailable(P, package, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
@@ -486,6 +498,7 @@ PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool
     PetscCall(SetPackage(pc, package));
   else
     PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
+  PetscCall(NoteRefinement(pc, choice));
   choice->cholesky = (PetscBool)(cholesky && !choice->user_pc);
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", cholesky ? "LDL^T" : "LU", package));
   PetscFunctionReturn(0);
