@@ -66,8 +66,8 @@ struct KnifeEdge { Marker i, j; };      /* no velocity of i's origin along y_i; 
 
 /*
   The user's own constraint: expressions that stay zero. A row reads displacements, distances, angles and time; or, at velocity level,
-  velocities, rates and angular velocities as well, which it has to be linear in, and up to two variables or states. It may name six
-  markers. The load of a row on the bodies is its multiplier times the derivatives of the expression by positions (at velocity level, by
+  velocities, rates and angular velocities as well, which it has to be linear in, and up to two states, or variables of positions, states
+  and time. It may name six markers. The load of a row on the bodies is its multiplier times the derivatives of the expression by positions (at velocity level, by
   velocities): where the expression is a displacement less a constant, the force on i's body along it. Joint forces as measures are those
   on the body of the first marker, in the axes of the first marker on another body (default: space axes).
 

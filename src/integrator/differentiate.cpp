@@ -78,7 +78,8 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
   f0.resize(n);
   Best d1(I.levels[0], n, again), d2(I.levels[1], n, again);
-  PetscCall(EvaluateResidual(ts, t, U, V, zero, F));
+  PetscCall(VecCopy(U, Ut));
+  PetscCall(ResidualAlong(ts, t, Ut, V, zero, F));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
   for (int level = 0; level < levels; level++) {
     if (!used[level]) continue;
@@ -90,7 +91,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
     }
     for (int j = 1; j < points; j++) {
       PetscCall(VecWAXPY(Ut, j * tau, V, U));
-      PetscCall(EvaluateResidual(ts, t + j * tau, Ut, V, zero, F));
+      PetscCall(ResidualAlong(ts, t + j * tau, Ut, V, zero, F));
       PetscCall(ForEntries(
         [&](PetscInt i, PetscScalar f) {
           s1[i] += first_weights[j] * PetscRealPart(f);

@@ -138,7 +138,7 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
   PetscCall(VecZeroEntries(c.gamma));
   for (int k = 0; k < points; k++) {
     PetscCall(VecWAXPY(c.d, z[k], c.V, c.U));
-    PetscCall(EvaluateResidual(ts, c.t + z[k], c.d, c.V, c.A, c.F));
+    PetscCall(ResidualAlong(ts, c.t + z[k], c.d, c.V, c.A, c.F));
     PetscCall(ForEntries(
       [&](PetscInt i, PetscScalar f, PetscScalar &g) {
         if (IsConstraint(I, i)) g += weight[k][I.role[i] == TSHHT3_HOLONOMIC ? 2 : 1] * f;

@@ -97,6 +97,7 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(DuplicateAll(ts));
   PetscCall(SetUpJacobian(ts));
   PetscCall(SetUpRoles(ts));
+  PetscCall(CheckDependence(ts));
   PetscCall(SetUpRotations(ts));
   PetscCall(SetUpOrder(ts));
   PetscCall(AllocateForRoles(ts));
@@ -352,6 +353,9 @@ PetscErrorCode UpdateParameters(TS ts)
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
+
+  Constraints of positions depend on coordinates and time alone, those of velocities also on first-order states, and on variables and force
+  states V - v(...) = 0 of positions, states and time. Others are refused at the set-up: consistent accelerations need their derivatives.
 
   Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
   this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.

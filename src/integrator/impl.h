@@ -232,6 +232,7 @@ struct Integrator : StepState {
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for sweeps without branches */
   std::vector<PetscInt>      states; /* local unknowns that are first-order states */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
+  PetscBool                  follow = PETSC_FALSE; /* constraints of velocities depend on variables, see variables.cpp */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
   PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
   /* the same answer on every rank, also on one without unknowns, whose list of roles is empty too */
@@ -334,6 +335,8 @@ PetscErrorCode TakeSNESSettings(TS ts);
 PetscErrorCode ComposeSetters(TS ts, bool attach);
 /* roles.cpp */
 PetscErrorCode SetUpRoles(TS ts);
+PetscErrorCode CheckDependence(TS ts);
+PetscErrorCode ResidualAlong(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode ViewRoles(TS ts, PetscViewer viewer);
 /* triangle.cpp: matrices of which one triangle is stored */
 PetscErrorCode CheckTriangle(TS ts);

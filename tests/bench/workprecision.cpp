@@ -284,7 +284,7 @@ int main(int argc, char **argv)
   PetscCall(ReadGrid(grid));
   PetscCall(OutputDirectory(argv[0], page.out));
   r.cases = allCases();
-  for (const std::vector<Case> &scenes : {allScenes(), heldOutScenes()}) r.cases.insert(r.cases.end(), scenes.begin(), scenes.end());
+  for (const std::vector<Case> &scenes : {allScenes(), heldOut()}) r.cases.insert(r.cases.end(), scenes.begin(), scenes.end());
   PetscCall(SelectCases(r.cases));
   PetscCall(ReadSweep(r, sweep, grid, coarse));
   PetscCall(RunAll(r, sweep, grid, coarse));

@@ -8,6 +8,7 @@
 #include "problems/caraxis.h"
 #include "problems/chain.h"
 #include "problems/doublependulum.h"
+#include "problems/fekete.h"
 #include "problems/fourbar.h"
 #include "problems/heavytop.h"
 #include "problems/oscillators.h"
@@ -419,7 +420,7 @@ INSTANTIATE_TEST_SUITE_P(
                     make<Oscillators>("OscillatorsCoupled", Array{0., 1., 10., 3.}, Array{0., .2, 1., 1.5}, true),
                     make<Chain>("Chain", (PetscInt)7), make<Chain>("ChainAtAnAngle", (PetscInt)1, -30.),
                     make<DoublePendulum>("DoublePendulum"), make<SpringPendulum>("SpringPendulum", 1e4),
-                    make<SliderCrank>("SliderCrank"), make<HeavyTop>("HeavyTop")),
+                    make<SliderCrank>("SliderCrank"), make<HeavyTop>("HeavyTop"), make<Fekete>("Fekete")),
     [](const testing::TestParamInfo<Factory> &info) { return std::string(info.param.name); });
 
 /* The report measures differences against the reference in the scales it documents */

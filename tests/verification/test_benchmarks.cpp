@@ -1,5 +1,7 @@
 /* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight ones
  */
+#include "problems/fekete.h"
+#include "problems/wheelset.h"
 #include "support.h"
 
 using namespace hhtest;
@@ -79,4 +81,43 @@ TEST(Benchmarks, CarAxisPaperForm)
 {
   const std::vector<double> q = errorsAgainstTolerance(CarAxis(), "-ts_hhtdae_form paper", 4, 8);
   expectFalling(q);
+}
+
+/* Published digits of other codes: RADAU5 and DASSL at index 2 */
+TEST(Benchmarks, Fekete)
+{
+  EXPECT_GE(digits(errorsAgainstTolerance(Fekete(), "", 4, 9).back()), 6.5);
+  EXPECT_GE(digits(errorsAgainstTolerance(Fekete(), "-ts_hhtdae_order 5", 9, 9).back()), 7.);
+}
+
+TEST(Benchmarks, Wheelset)
+{
+  const std::vector<double> q = errorsAgainstTolerance(Wheelset(), "", 7, 9);
+  EXPECT_LT(q.back(), q.front() / 5.);
+  EXPECT_GE(digits(errorsAgainstTolerance(Wheelset(), "-ts_hhtdae_order 5", 10, 10).back()), 6.);
+}
+
+/* Its matrix, by dual numbers, against differences near its motion */
+TEST(Benchmarks, MatrixOfTheWheelset)
+{
+  const Wheelset p;
+  const PetscInt n = p.n;
+  Array          u(n), v(n), a(n, .1), f(n), g(n);
+  p.initial(u.data(), v.data());
+  for (PetscInt i = 0; i < n; i++) v[i] = .01 * (double)(i + 1);
+  Entries J;
+  p.jacobian(0., u.data(), v.data(), a.data(), 0., 0., J);
+  for (PetscInt j = 0; j < n; j++) {
+    const double d = 1e-6 * std::max(1e-2, std::abs(u[j]));
+    Array        plus = u, minus = u;
+    plus[j] += d;
+    minus[j] -= d;
+    p.residual(0., plus.data(), v.data(), a.data(), f.data());
+    p.residual(0., minus.data(), v.data(), a.data(), g.data());
+    for (size_t k = 0; k < J.value.size(); k++)
+      if (J.col[k] == j) {
+        const double difference = (f[J.row[k]] - g[J.row[k]]) / (2. * d);
+        EXPECT_NEAR(J.value[k], difference, 1e-5 * std::max(1., std::abs(difference))) << J.row[k] << " " << j;
+      }
+  }
 }

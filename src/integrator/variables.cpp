@@ -1,0 +1,206 @@
+/*
+  Variables and states in constraints.
+
+  Accelerations and multipliers at given positions and velocities need Phi'' and Psi' along the motion, with a matrix of q'' alone. So what else stands in a
+  constraint has to be known along the motion without q'': first-order states by their rates, variables and force states by their definitions, where these
+  depend on positions, states and time only. In rows of positions they would change with q'' in any case, and would take no part of the constraint's force.
+
+  The residual tells what depends on what, at the set-up and where there are such unknowns beside constraints.
+*/
+#include "entries.h"
+#include "impl.h"
+#include "random.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr int max_sweeps = 20; /* definitions that refer to one another, one after the other */
+
+bool IsDefined(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_VARIABLE || RoleOf(I, i) == TSHHT3_FORCE; }
+
+/* A state near the initial one, its residual, and others beside it */
+struct Dependence {
+  TS      ts;
+  WorkVec U, V, A, F, other, moved;
+
+  explicit Dependence(TS t) : ts(t) {}
+
+  PetscErrorCode begin()
+  {
+    PetscFunctionBegin;
+    for (WorkVec *v : {&U, &V, &A, &F, &other, &moved}) PetscCall(v->like(ts->vec_sol));
+    PetscCall(VecCopy(ts->vec_sol, U));
+    PetscCall(VecCopy(ts->vec_dot, V));
+    PetscCall(VecZeroEntries(A));
+    PetscCall(shake(U, 1e-4, 11, [](PetscInt) { return true; }));
+    PetscCall(shake(V, 1e-3, 12, [](PetscInt) { return true; }));
+    PetscCall(shake(A, 1e-3, 13, [](PetscInt) { return true; }));
+    PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  template <class Which>
+  PetscErrorCode shake(Vec x, PetscReal by, unsigned salt, const Which &which)
+  {
+    PetscInt start;
+
+    PetscFunctionBegin;
+    PetscCall(VecGetOwnershipRange(x, &start, NULL));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar &a) { if (which(i)) a += by * (1 + PetscAbsScalar(a)) * RandomNumber(start + i, salt); }, Write(x)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* changed(i) for rows that are not what they were when unknowns `which` of x have others values; a residual that is not a number tells nothing */
+  template <class Which, class Changed>
+  PetscErrorCode vary(Vec x, const Which &which, const Changed &changed)
+  {
+    PetscFunctionBegin;
+    PetscCall(VecCopy(x, moved));
+    PetscCall(shake(moved, 1e-3, 14, which));
+    PetscCall(EvaluateResidual(ts, ts->ptime, x == (Vec)U ? moved : U, x == (Vec)V ? moved : V, x == (Vec)A ? moved : A, other));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar g) { if (f != g && !PetscIsInfOrNanScalar(f) && !PetscIsInfOrNanScalar(g)) changed(i); }, Read(F), Read(other)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
+
+/* The first of rows marked on any rank, or -1 */
+PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
+{
+  PetscInt start, mine = HHT3_INT_MAX;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
+  for (size_t i = 0; i < mark.size() && mine == HHT3_INT_MAX; i++)
+    if (mark[i]) mine = start + (PetscInt)i;
+  PetscCallMPI(MPI_Allreduce(&mine, row, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  if (*row == HHT3_INT_MAX) *row = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RefuseHolonomic(TS ts, Dependence &d)
+{
+  Integrator       &I = Get(ts);
+  std::vector<char> bad(I.role.size(), 0);
+  PetscInt          row;
+
+  PetscFunctionBegin;
+  if (!I.count[TSHHT3_HOLONOMIC]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i) || RoleOf(I, i) == TSHHT3_STATE; }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_HOLONOMIC) bad[i] = 1; }));
+  PetscCall(FirstRow(ts, bad, &row));
+  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "The holonomic constraint of row %" PetscInt_FMT " depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
+             "Make it a coordinate without mass, with its equation as one more constraint",
+             row);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Definitions that change with q', q'' or multipliers, directly or by others, must not stand in a constraint of velocities */
+PetscErrorCode RefuseFast(TS ts, Dependence &d)
+{
+  Integrator       &I = Get(ts);
+  std::vector<char> fast(I.role.size(), 0), bad(I.role.size(), 0);
+  const auto        defined = [&](PetscInt i) { if (IsDefined(I, i)) fast[i] = 1; };
+  PetscInt          row, before = -1, now = 0;
+
+  PetscFunctionBegin;
+  PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, defined));
+  PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, defined));
+  PetscCall(d.vary(d.U, [&](PetscInt i) { return IsConstraint(I, i); }, defined));
+  while (now != before) {
+    before = now;
+    PetscCall(d.vary(
+      d.U, [&](PetscInt i) { return fast[i] != 0; },
+      [&](PetscInt i) {
+        defined(i);
+        if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) bad[i] = 1;
+      }));
+    now = 0;
+    for (char f : fast) now += f;
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
+  }
+  PetscCall(FirstRow(ts, bad, &row));
+  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "The velocity-level constraint of row %" PetscInt_FMT " depends on a variable or force state that itself depends on velocities, accelerations or multipliers. "
+             "Write these velocities into the row instead",
+             row);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sweeps of V - (V - v(...)) lead to the definitions, unless these are written with another factor */
+PetscErrorCode CheckSweeps(TS ts, Dependence &d)
+{
+  Integrator       &I = Get(ts);
+  std::vector<char> bad(I.role.size(), 0);
+  PetscInt          row;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(d.U, d.moved));
+  PetscCall(ResidualAlong(ts, ts->ptime, d.moved, d.V, d.A, d.other));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar f) { if (IsDefined(I, i) && PetscAbsScalar(f) > 1e-8 * (1 + PetscAbsScalar(u))) bad[i] = 1; }, Read(d.moved), Read(d.other)));
+  PetscCall(FirstRow(ts, bad, &row));
+  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "Row %" PetscInt_FMT " defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide "
+             "the row by the factor of V",
+             row);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* After the roles are known */
+PetscErrorCode CheckDependence(TS ts)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  const PetscInt         defined = I.count[TSHHT3_VARIABLE] + I.count[TSHHT3_FORCE];
+  Dependence             d(ts);
+  std::vector<char>      uses(I.role.size(), 0);
+  PetscInt               row = -1;
+
+  PetscFunctionBegin;
+  I.follow = PETSC_FALSE;
+  if (!I.constraints() || defined + I.count[TSHHT3_STATE] == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(d.begin());
+  PetscCall(RefuseHolonomic(ts, d));
+  if (defined && I.count[TSHHT3_NONHOLONOMIC]) {
+    PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i); }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) uses[i] = 1; }));
+    PetscCall(FirstRow(ts, uses, &row));
+  }
+  if (row >= 0) {
+    PetscCall(RefuseFast(ts, d));
+    I.follow = PETSC_TRUE;
+    PetscCall(CheckSweeps(ts, d));
+    PetscCall(PetscInfo(ts, "velocity-level constraints depend on variables, first in row %" PetscInt_FMT ": these follow their definitions where constraints are differentiated\n", row));
+  }
+  I.stat = saved; /* no part of the run */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual at a place along the motion, where variables that stand in constraints follow their definitions V - v(...) = 0 in U */
+PetscErrorCode ResidualAlong(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F)
+{
+  Integrator &I = Get(ts);
+  PetscBool   moved;
+
+  PetscFunctionBegin;
+  PetscCall(EvaluateResidual(ts, t, U, V, A, F));
+  for (int sweep = 0; I.follow && sweep < max_sweeps; sweep++) {
+    moved = PETSC_FALSE;
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar &u, PetscScalar f) {
+        if (!IsDefined(I, i) || !(PetscAbsScalar(f) > 2 * PETSC_MACHINE_EPSILON * PetscAbsScalar(u))) return;
+        u -= f;
+        moved = PETSC_TRUE;
+      },
+      Write(U), Read(F)));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &moved, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+    if (!moved) break;
+    PetscCall(EvaluateResidual(ts, t, U, V, A, F));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
