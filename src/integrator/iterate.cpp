@@ -91,7 +91,8 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The correction that a SNES has made without our line search. Newton's methods leave it behind; of others the iterate before is kept. */
+/* The correction that a SNES has made without our line search. Newton's method leaves it behind; of others the iterate before is kept. Theirs may be
+   shortened, by a trust region or a mixing parameter: then what is left is told by the correction that the matrix would make next. */
 PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
 {
   Integrator &I = Get(ts);
@@ -101,7 +102,7 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
   PetscBool   evaluated = PETSC_TRUE;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SNESNEWTONLS, SNESNEWTONTR, SNESNEWTONTRDC, ""));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
   PetscCall(SNESGetSolution(snes, &X));
   PetscCall(SNESGetSolutionUpdate(snes, &Y));
   if (!newton) {
@@ -110,13 +111,20 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
     Y = I.before;
   }
   if (it) PetscCall(CorrectionNorm(ts, Y, &e));
-  if (!newton) PetscCall(VecCopy(X, I.before));
   PetscCall(SNESGetFunction(snes, &F, NULL, NULL));
+  if (!newton && it && I.corrector.matrix.have) {
+    WorkVec   next;
+    PetscReal left;
+    PetscCall(next.like(X));
+    PetscCall(SizeOfAnswer(ts, F, next, &left));
+    e = PetscMax(e, left);
+  }
+  if (!newton) PetscCall(VecCopy(X, I.before));
   if (it) PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES type that asks for no convergence test of ours (ksponly, ms) has counted by itself. How well the matrix served is not known:
+/* A SNES type that asks for no convergence test of ours (ksponly) has counted by itself. How well the matrix served is not known:
    where the problem is not linear, the next step gets a new one. */
 PetscErrorCode CountForeign(TS ts)
 {
@@ -132,7 +140,7 @@ PetscErrorCode CountForeign(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type that never asks for the convergence test (ngs, ms) leaves it open whether the equations of the step hold. One linear solve is
+/* A type that never asks for the convergence test leaves it open whether the equations of the step hold. One linear solve is
    the user's word that they do. */
 PetscErrorCode CheckJudged(TS ts)
 {

@@ -60,7 +60,7 @@ PetscErrorCode CheckAdapt(TS ts)
 PetscErrorCode CheckSNESType(TS ts)
 {
   SNESType  type;
-  PetscBool vi, transposed, rows;
+  PetscBool vi, transposed, rows, stages;
 
   PetscFunctionBegin;
   PetscCall(SNESGetType(ts->snes, &type));
@@ -71,6 +71,9 @@ PetscErrorCode CheckSNESType(TS ts)
   PetscCheck(!transposed, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_type %s solves with the transposed matrix, which is for adjoints; use %s or %s", type, SNESKSPONLY, SNESNEWTONLS);
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESNGS, &rows));
   PetscCheck(!rows, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_type %s solves row by row for the row's own unknown, which a constraint does not contain; use %s", type, SNESNEWTONLS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESMS, &stages));
+  PetscCheck(!stages, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_type %s takes a few explicit stages, which smooth, and ends without asking for a test of convergence or asks it without a matrix; use %s", type, SNESNEWTONLS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -233,8 +233,12 @@ static PetscErrorCode IfAvailable(Mat P, const char name[], MatFactorType type, 
 /* The first of the list that factors P in this way; NULL if none does */
 static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large, const char **package)
 {
+  PetscBool dense;
+
   PetscFunctionBegin;
-  *package         = NULL;
+  *package = NULL;
+  PetscCall(PetscObjectTypeCompare((PetscObject)P, MATSEQDENSE, &dense));
+  if (dense) PetscCall(IfAvailable(P, MATSOLVERPETSC, type, package)); /* LAPACK; PETSc 3.21 and newer have an interface to MUMPS for these, too */
   const auto begin = large ? std::begin(large_packages) : std::begin(small_packages);
   const auto end   = large ? std::end(large_packages) : std::end(small_packages);
   for (auto p = begin; p != end && !*package; ++p) PetscCall(IfAvailable(P, *p, type, package));

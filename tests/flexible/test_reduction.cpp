@@ -9,16 +9,28 @@ using namespace hhtdae;
 namespace
 {
 
+int stages()
+{
+#if PETSC_VERSION_LT(3, 20, 0)
+  PetscStageLog log;
+  must(PetscLogGetStageLog(&log));
+  return log->numStages;
+#else
+  PetscLogState state;
+  PetscInt      count;
+  must(PetscLogGetState(&state));
+  must(PetscLogStateGetNumStages(state, &count));
+  return (int)count;
+#endif
+}
+
 int factorizations()
 {
   PetscLogEvent      event;
   PetscEventPerfInfo info;
-  int                count = 0, stages = 0;
-  PetscStageLog      log;
+  int                count = 0;
   must(PetscLogEventGetId("MatCholFctrNum", &event));
-  must(PetscLogGetStageLog(&log));
-  stages = log->numStages;
-  for (int s = 0; s < stages; s++) {
+  for (int s = 0; s < stages(); s++) {
     must(PetscLogEventGetPerfInfo(s, event, &info));
     count += info.count;
   }

@@ -24,7 +24,7 @@ void expectRefused(const Refusal &r)
     code = PETSC_ERR_ARG_WRONG; /* when options were read */
   }
   EXPECT_NE(code, 0) << r.options;
-  EXPECT_TRUE(trap.says(r.says)) << r.options << ": " << trap.message;
+  EXPECT_TRUE(trap.says(r.says) || trap.says("less than allowed bound") || trap.says("greater than allowed bound")) << r.options << ": " << trap.message; /* PETSc's own words since 3.21 */
 }
 
 } // namespace
@@ -192,6 +192,12 @@ TEST(RefusedSettings, FinalTimeByInterpolation)
   const Pendulum p(-90., 0., .5);
   Simulation     run(p, tolerance(1e-6) + "-ts_exact_final_time interpolate");
   ErrorTrap      trap;
-  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_NULL); /* TSSolve(ts, NULL) */
+  /* TSSolve(ts, NULL), which older versions of PETSc cannot interpolate into */
+#if PETSC_VERSION_LT(3, 20, 0)
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_NULL);
   EXPECT_TRUE(trap.says("TSSolve(ts, U)")) << trap.message;
+#else
+  EXPECT_EQ(run.solve(), 0) << trap.message;
+  EXPECT_DOUBLE_EQ(run.t(), .5);
+#endif
 }
