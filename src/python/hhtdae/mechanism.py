@@ -302,6 +302,8 @@ def _solve(ts, p, output):
     try:
         ts.solve(ts.getSolution2()[0])
     except PETSc.Error as error:
+        if error.__cause__ is not None:  # newer versions of petsc4py put their own error around the user's
+            raise error.__cause__
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
             raise
         return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), str(error).splitlines()[-1].split("] ", 1)[-1])
