@@ -144,6 +144,7 @@ class _Problem:
             raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
         self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
         self._rates = velocity_constraints
+        self.error = None  # the first exception of these functions in a run
         self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
         self.k = 0 if velocity_constraints is None else np.size(velocity_constraints(self.t0, self.q0.copy(), self.v0.copy(), *self.args))
         self.size = self.n + self.m + self.k
@@ -233,8 +234,27 @@ def _create(p, rtol, atol, max_step, first_step, start, trace):
 
 
 def _call(ts, p, keep):
-    """Equations that call Python"""
+    """Equations that call Python. An exception of the user's ends the run by a residual that is not a number, and is raised when PETSc has returned: newer versions
+    of petsc4py (3.22) may crash where one is under way through PETSc."""
     n, rows = p.n, np.arange(p.size, dtype=PETSc.IntType)
+
+    def caught(f, fail):
+        def call(*arguments):
+            try:
+                if p.error is None:
+                    return f(*arguments)
+            except Exception as error:
+                p.error = error
+            return fail(*arguments)
+        return call
+
+    def no_residual(ts, t, u, v, a, f):
+        f.set(np.nan)
+
+    def no_jacobian(ts, t, u, v, a, shift_v, shift_a, J, P):
+        P.setValues(rows, rows, np.full((p.size, p.size), np.nan))
+        P.assemble()
+        return True
 
     def residual(ts, t, u, v, a, f):
         q, w, out = u.array_r, v.array_r[:n].copy(), f.array
@@ -259,8 +279,8 @@ def _call(ts, p, keep):
     J = PETSc.Mat().createAIJ([p.size, p.size], nnz=p.size, comm=PETSc.COMM_SELF)
     J.setValues(rows, rows, np.zeros((p.size, p.size)))
     J.assemble()
-    ts.setI2Function(residual, J.createVecLeft())
-    ts.setI2Jacobian(jacobian, J)
+    ts.setI2Function(caught(residual, no_residual), J.createVecLeft())
+    ts.setI2Jacobian(caught(jacobian, no_jacobian), J)
 
 
 def _traced(f, what, *arguments):
@@ -302,7 +322,9 @@ def _solve(ts, p, output):
     try:
         ts.solve(ts.getSolution2()[0])
     except PETSc.Error as error:
-        if error.__cause__ is not None:  # newer versions of petsc4py put their own error around the user's
+        if p.error is not None:
+            raise p.error from None
+        if error.__cause__ is not None:  # newer versions of petsc4py put their own error around one in a monitor of the user's
             raise error.__cause__
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
             raise
