@@ -189,8 +189,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   Imbalance     left;
 
   PetscFunctionBegin;
-  *proved  = PETSC_TRUE;
-  v.looked = PETSC_FALSE;
+  *proved = PETSC_TRUE;
   if (!Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1);
   PetscCall(Claimed(ts, dX, &claimed));
@@ -199,7 +198,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
-  *evaluated = v.looked = PETSC_TRUE;
+  *evaluated = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
     PetscCall(Compare(ts, F, &left));
