@@ -3,7 +3,7 @@
   memory; by hhtdae, by backward Euler on the same equations, or at rest. The scripts t10_beam.py and calculix_beam.py
   run it beside others' figures and programs.
 
-    solidbeam -size 9,6,3 -load 5000,0,0 -ts_dt 1e-3 -end 0.05 -history u.txt
+    solidbeam -size 9,6,3 -load 5000,0,0 -ts_dt 1e-3 -end 0.05 -motion u.txt
 
   -by hhtdae, euler, static: euler solves each step by Newton's method with a new matrix in every iteration, prefix
   euler_; static raises the load in -increments <1>, prefix static_;
@@ -11,7 +11,7 @@
   or one brick; -write_mesh FILE keeps this mesh; -mesh FILE in their place: Gmsh's, with physical groups "root", which
   is clamped, and "tip"; -young <7e8>, -poisson <0.33>, -density <2700>;
   -load: the force on the tip, the same part of it on each of its nodes; -rise <0>: time in which it grows to that;
-  -end: time; -history FILE: time and displacement of two nodes at the end of each step, those nearest to the corner of
+  -end: time; -motion FILE: time and displacement of two nodes at the end of each step, those nearest to the corner of
   the tip with the largest coordinates and to the middle of the edge with the largest y and z, and of the tip's mean.
 */
 #include "beam_mesh.h"
@@ -35,7 +35,7 @@ struct Case {
   Vector3          load = Vector3::Zero();
   double           end = 0.05, h = 1e-3, rise = 0;
   PetscInt         increments = 1;
-  std::string      mesh, write_mesh, history;
+  std::string      mesh, write_mesh, motion;
 };
 
 PetscErrorCode Name(const char *option, std::string *name)
@@ -85,7 +85,7 @@ PetscErrorCode ReadCase(Case *c)
     PetscCall(PetscOptionsGetReal(nullptr, nullptr, name, &c->h, nullptr));
   PetscCall(Name("-mesh", &c->mesh));
   PetscCall(Name("-write_mesh", &c->write_mesh));
-  PetscCall(Name("-history", &c->history));
+  PetscCall(Name("-motion", &c->motion));
   PetscCheck(c->h > 0 && c->end > 0 && c->increments > 0 && c->rise >= 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
              "-ts_dt, -end and -increments must be positive, -rise not negative");
   c->by = (By)by;
@@ -127,7 +127,8 @@ PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBo
   body.attachments[1].name = "tip";
   body.attachments[1].tie  = Tie::Average;
   PetscCall(fe->add(scene, "beam", model, body));
-  scene.add("clamp", Fixed{scene.marker(fe->attachment("root")), scene.marker(scene.ground())});
+  const Marker root = scene.marker(fe->attachment("root"));
+  scene.add("clamp", Fixed{root, scene.marker(scene.ground(), DataOf(scene).frame(root).x)});
   load.i = scene.marker(fe->attachment("tip"));
   for (int k = 0; k < 3; k++) {
     const double f = c.load[k], rise = c.rise;
@@ -162,9 +163,9 @@ public:
     PetscCall(nearest(Vector3((low[0] + high[0]) / 2, high[1], high[2]), &node_[1]));
     in_tip_ = (PetscInt)model.sets.at("tip").size();
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &in_tip_, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-    if (c.history.empty() || rank_ > 0) PetscFunctionReturn(0);
-    out_ = std::fopen(c.history.c_str(), "w");
-    PetscCheck(out_, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", c.history.c_str());
+    if (c.motion.empty() || rank_ > 0) PetscFunctionReturn(0);
+    out_ = std::fopen(c.motion.c_str(), "w");
+    PetscCheck(out_, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", c.motion.c_str());
     PetscFunctionReturn(0);
   }
 
