@@ -12,7 +12,8 @@
   is clamped, and "tip"; -young <7e8>, -poisson <0.33>, -density <2700>;
   -load: the force on the tip, the same part of it on each of its nodes; -rise <0>: time in which it grows to that;
   -end: time; -motion FILE: time and displacement of two nodes at the end of each step, those nearest to the corner of
-  the tip with the largest coordinates and to the middle of the edge with the largest y and z, and of the tip's mean.
+  the tip with the largest coordinates and to the middle of the edge with the largest y and z, and of the tip's mean; -every DT: at the multiples of DT in place of
+  the ends of steps, interpolated within hhtdae's steps.
 */
 #include "beam_mesh.h"
 #include "flexible/full_body.h"
@@ -33,7 +34,7 @@ struct Case {
   hhtex::SolidBeam beam;
   By               by   = HHTDAE;
   Vector3          load = Vector3::Zero();
-  double           end = 0.05, h = 1e-3, rise = 0;
+  double           end = 0.05, h = 1e-3, rise = 0, every = 0;
   PetscInt         increments = 1;
   std::string      mesh, write_mesh, motion;
 };
@@ -78,6 +79,7 @@ PetscErrorCode ReadCase(Case *c)
                   {"-poisson", &b.material.poisson},
                   {"-density", &b.material.density},
                   {"-rise", &c->rise},
+                  {"-every", &c->every},
                   {"-end", &c->end}})
     PetscCall(PetscOptionsGetReal(nullptr, nullptr, o.first, o.second, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-increments", &c->increments, nullptr));
@@ -249,21 +251,39 @@ struct Counts {
 struct Watcher {
   History *history;
   Counts  *counts;
+  double   every; /* 0: ends of steps */
+  PetscInt done = 0;
 
-  static PetscErrorCode monitor(TS, PetscInt step, PetscReal t, Vec U, void *ctx)
+  static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
   {
     Watcher *w = static_cast<Watcher *>(ctx);
     PetscFunctionBeginUser;
     if (step <= 0) PetscFunctionReturn(0);
     if (step == 1) w->counts->first = Processor();
-    PetscCall(w->history->write(t, U));
+    if (w->every > 0) PetscCall(w->within(ts, t, U));
+    else PetscCall(w->history->write(t, U));
+    PetscFunctionReturn(0);
+  }
+
+private:
+  PetscErrorCode within(TS ts, PetscReal t, Vec U)
+  {
+    Vec between;
+    PetscFunctionBeginUser;
+    PetscCall(VecDuplicate(U, &between));
+    for (; (double)(done + 1) * every <= t * (1 + 1e-12); done++) {
+      const double at = std::fmin((double)(done + 1) * every, t);
+      PetscCall(TSHHT3Interpolate(ts, at, between, nullptr, nullptr));
+      PetscCall(history->write(at, between));
+    }
+    PetscCall(VecDestroy(&between));
     PetscFunctionReturn(0);
   }
 };
 
 PetscErrorCode RunHHT(const Case &c, Scene &scene, TS ts, History &history, Counts &counts)
 {
-  Watcher          watcher{&history, &counts};
+  Watcher          watcher{&history, &counts, c.every};
   TSAdapt          adapt;
   TSHHT3Statistics s;
   PetscFunctionBeginUser;
