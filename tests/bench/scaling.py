@@ -18,12 +18,17 @@ import re
 
 from bench_tools import numbers, run, table
 
-# What the extrapolation assumes of the machine, and of one element
-MEMORY = 5e9  # bytes/s of a rank, with all ranks of a node at work
+# What the extrapolation assumes
+MEMORY = 4e9  # bytes/s of a rank, with all ranks of a node at work
 LATENCY = 2e-6  # s a message, and for each doubling of the ranks in a reduction
-NETWORK = 2e9  # bytes/s of a rank
+NETWORK = 1e9  # bytes/s of a rank
+NEIGHBOURS = 26  # of a rank, one message each way in a product
+ROW = 176  # entries of a row of a large body of bricks with 20 nodes
 ENTRY = 12  # bytes that a product moves for each entry of the matrix: a number and a column
 WORK = 10 * 8 * 2  # bytes of vectors for each unknown and iteration: ten vectors read and written
+FORCE = 11.5e-6 / 12  # s of an evaluation for each unknown: fekernels, 12 unknowns a brick
+COARSE = 100  # unknowns for one of the coarse level: 200 nodes an aggregate
+SOLVE, SOLVED = 0.155, 119898  # s of one solve by MUMPS on one rank with so many unknowns (src/linear/README.md); it grows with the power 4/3
 
 
 def count(path):
@@ -70,6 +75,29 @@ def fit(rows, value, basis):
     return c, max(abs(sum(k * col[i] for k, col in zip(c, columns)) - 1) for i in range(len(rows)))
 
 
+def model(rows, iterations, corrections):
+    own, surface = lambda r: r["own"], lambda r: r["own"] ** (2 / 3)
+    several = [r for r in rows if r["ranks"] > 1]
+    (volume,), off = fit(rows, lambda r: r["flops"], [own])
+    (border,), off_border = fit(several, lambda r: r["bytes"], [surface])
+    neighbours, reductions = max(r["messages"] for r in several), max(r["reductions"] for r in several)
+    (kept, shared), off_memory = fit(rows, lambda r: r["memory"], [own, lambda r: 1.0])
+    print("\nn unknowns a rank, one iteration: %.0f n operations (off by at most %.0f %%), %.0f n^(2/3) bytes in at most %.0f messages (%.0f %%), %.1f reductions; memory "
+          "%.0f MB + %.1f kB n (%.0f %%)" % (volume, 100 * off, border, neighbours, 100 * off_border, reductions, shared, 1e3 * kept, 100 * off_memory))
+    result = []
+    solves = iterations * corrections
+    for unknowns, ranks in ((1e6, 16), (1e7, 16), (1e7, 256), (1e8, 256), (1e8, 4096)):
+        n = unknowns / ranks
+        moved, sent = n * (ENTRY * ROW + WORK), border * n ** (2 / 3)
+        result.append(["%.0e" % unknowns, ranks, "%.2g" % (solves * volume * n), "%.2g" % (solves * moved), "%.2g" % (solves * sent),
+                       "%.2g" % (solves * moved / MEMORY), "%.2g" % (corrections * n * FORCE), "%.2g" % (solves * (2 * NEIGHBOURS * LATENCY + sent / NETWORK)),
+                       "%.2g" % (solves * reductions * math.log2(ranks) * LATENCY), "%.2g" % (solves * SOLVE * (unknowns / COARSE / SOLVED) ** (4 / 3)),
+                       "%.2g" % (1e-3 * (shared + kept * n))])
+    print()
+    table(["unknowns", "ranks", "operations", "bytes of memory", "bytes sent", "s: memory", "elements", "messages", "reductions", "coarse level on one rank",
+           "GB a rank"], result)
+
+
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("program")
@@ -88,33 +116,7 @@ def main():
     table(["ranks", "size", "unknowns", "iterations a solve", "operations of a rank, most", "mean", "messages", "bytes", "reductions", "MB"],
           [[r["ranks"], r["size"], r["unknowns"], r["iterations"], "%.3g" % r["flops"], "%.3g" % r["mean"], "%.1f" % r["messages"], "%.3g" % r["bytes"],
             "%.1f" % r["reductions"], "%.0f" % r["memory"]] for r in rows])
-
-    own, surface = lambda r: r["own"], lambda r: r["own"] ** (2 / 3)
-    several = [r for r in rows if r["ranks"] > 1]
-    density = max(r["entries"] / r["unknowns"] for r in rows)
-    (volume,), off = fit(rows, lambda r: r["flops"], [own])
-    (border,), off_border = fit(several, lambda r: r["bytes"], [surface])
-    neighbours, reductions = max(r["messages"] for r in several), max(r["reductions"] for r in several)
-    (kept, shared), off_memory = fit(rows, lambda r: r["memory"], [own, lambda r: 1.0])
-    print("\nn unknowns a rank, one iteration: %.0f n operations (off by at most %.0f %%), %.0f n^(2/3) bytes in at most %.0f messages (%.0f %%), %.1f reductions; memory "
-          "%.0f MB + %.1f kB n (%.0f %%); %.0f entries a row" % (volume, 100 * off, border, neighbours, 100 * off_border, reductions, shared, 1e3 * kept,
-                                                                100 * off_memory, density))
-    result = []
-    for unknowns in (1e6, 1e7, 1e8):
-        for p_ in (16, 256, 4096):
-            n = unknowns / p_
-            if n < 1e4:
-                continue
-            memory = n * (ENTRY * density + WORK) / MEMORY
-            messages = 26 * LATENCY + border * n ** (2 / 3) / NETWORK
-            reduce = reductions * math.log2(p_) * LATENCY
-            step = a.iterations * a.corrections
-            result.append(["%.0e" % unknowns, p_, "%.3g" % (volume * n * step), "%.3g" % (step * n * (ENTRY * density + WORK)), "%.3g" % (step * border * n ** (2 / 3)),
-                           "%.3g" % (step * memory), "%.2g" % (step * messages), "%.2g" % (step * reduce), "%.3g" % (1e-3 * (shared + 1e0 * kept * n)),
-                           "%.2g" % (unknowns / 100)])
-    print()
-    table(["unknowns", "ranks", "operations a step and rank", "bytes of memory", "bytes sent", "s for memory", "s for messages", "s for reductions", "GB a rank",
-           "coarse unknowns"], result)
+    model(rows, a.iterations, a.corrections)
 
 
 if __name__ == "__main__":
