@@ -153,8 +153,17 @@ static PetscErrorCode TellBlocks(TS ts, Mat K)
 
 /* ---- results ---- */
 
+/* Processor time of this rank so far, s */
+static double Processor()
+{
+  rusage use;
+  getrusage(RUSAGE_SELF, &use);
+  return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) + 1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
+}
+
 struct Clock {
   PetscLogDouble   run = 0, start = 0; /* the run, its second step */
+  double           processor = 0;      /* at its second step */
   TSHHT3Statistics first = {};
   PetscLogStage    stage = -1; /* steps after the first */
 
@@ -165,6 +174,7 @@ struct Clock {
     PetscFunctionBegin;
     if (step != 1) PetscFunctionReturn(0);
     PetscCall(PetscTime(&c->start));
+    c->processor = Processor();
     PetscCall(TSHHT3GetStatistics(ts, &c->first));
     PetscCall(PetscLogStagePush(c->stage));
     PetscFunctionReturn(0);
@@ -228,18 +238,20 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   PetscCall(Solver(ts, &solver));
   PetscCall(Memory(&most, &all));
   const double n          = (double)PetscMax(s.steps - clock.first.steps, 1);
+  double       processor  = (Processor() - clock.processor) / n;
   char         turned[64] = "";
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &processor, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(TSGetTime(ts, &end));
   if (c.held == ROD) PetscCall(PetscSNPrintf(turned, sizeof turned, "; the crank has turned by %.3g degrees", CrankSpeed(c) * end * 180 / PETSC_PI));
   PetscCall(PetscPrintf(
       PETSC_COMM_WORLD,
       "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
       "  reading, assembly and set-up %.2f s, first step %.2f s\n"
-      "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
+      "  %.3f s per step (%g steps), of a processor %.3f s at most; per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
       "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
       "\n  memory at most %.0f MB on a rank, %.0f MB on all%s\n",
       ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
-      clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
+      clock.start - clock.run, (now - clock.start) / n, (double)n, processor, 100 * (double)(s.newton - clock.first.newton) / n,
       100 * (double)(s.jacobians - clock.first.jacobians) / n,
       100 * (double)(s.factorizations - clock.first.factorizations) / n,
       (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all, turned));
