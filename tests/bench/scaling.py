@@ -76,14 +76,14 @@ def fit(rows, value, basis):
 
 
 def model(rows, iterations, corrections):
-    own, surface = lambda r: r["own"], lambda r: r["own"] ** (2 / 3)
+    own = lambda r: r["own"]
     several = [r for r in rows if r["ranks"] > 1]
     (volume,), off = fit(rows, lambda r: r["flops"], [own])
-    (border,), off_border = fit(several, lambda r: r["bytes"], [surface])
-    neighbours, reductions = max(r["messages"] for r in several), max(r["reductions"] for r in several)
     (kept, shared), off_memory = fit(rows, lambda r: r["memory"], [own, lambda r: 1.0])
-    print("\nn unknowns a rank, one iteration: %.0f n operations (off by at most %.0f %%), %.0f n^(2/3) bytes in at most %.0f messages (%.0f %%), %.1f reductions; memory "
-          "%.0f MB + %.1f kB n (%.0f %%)" % (volume, 100 * off, border, neighbours, 100 * off_border, reductions, shared, 1e3 * kept, 100 * off_memory))
+    border = max(r["bytes"] / own(r) ** (2 / 3) for r in several)  # of a part with neighbours on all sides, as most are among many
+    messages, reductions = max(r["messages"] for r in several), max(r["reductions"] for r in several)
+    print("\nn unknowns a rank, one iteration: %.0f n operations (off by at most %.0f %%), at most %.0f n^(2/3) bytes, %.0f messages and %.1f reductions; memory "
+          "%.0f MB + %.1f kB n (%.0f %%)" % (volume, 100 * off, border, messages, reductions, shared, 1e3 * kept, 100 * off_memory))
     result = []
     solves = iterations * corrections
     for unknowns, ranks in ((1e6, 16), (1e7, 16), (1e7, 256), (1e8, 256), (1e8, 4096)):

@@ -309,12 +309,14 @@ PetscErrorCode RunHHT(const Case &c, Scene &scene, TS ts, History &history, Coun
 
 /*
   Positions are the unknowns of a step: u' = (u - u_n)/h, u'' = (u' - u'_n)/h in the scene's equations, which is backward
-  Euler on the first-order system with u' eliminated. At rest both are zero.
+  Euler on the first-order system with u' eliminated. At rest both are zero. Rows of constraints are multiplied by a mean
+  diagonal entry s of the others, and so are multipliers' columns (the unknowns are lambda/s): with constraints as small as
+  they are LDL^T has to delay thousands of pivots, and takes more than twice as long.
 */
 struct Euler {
   TS      ts;
   double  h, t = 0; /* h zero: at rest */
-  Vec     Un, Vn, V, A;
+  Vec     Un, Vn, V, A, scale, U; /* scale: 1, and s for multipliers; U: with lambda */
   Counts *counts;
 
   PetscErrorCode motion(Vec U)
@@ -327,27 +329,58 @@ struct Euler {
     PetscCall(VecScale(A, 1 / h));
     PetscFunctionReturn(0);
   }
-  static PetscErrorCode function(SNES, Vec U, Vec F, void *ctx)
+  /* s from the matrix at x, where every factor is one yet */
+  PetscErrorCode findScale(Vec x, Mat J)
+  {
+    IS          multipliers;
+    Vec         part;
+    PetscScalar sum;
+    PetscInt    n, m;
+    PetscFunctionBeginUser;
+    PetscCall(VecSet(scale, 1));
+    PetscCall(matrix(x, J));
+    PetscCall(MatGetDiagonal(J, U));
+    PetscCall(VecAbs(U));
+    PetscCall(VecSum(U, &sum));
+    PetscCall(TSHHT3GetIS(ts, TSHHT3_HOLONOMIC, &multipliers));
+    PetscCall(VecGetSize(U, &n));
+    PetscCall(ISGetSize(multipliers, &m));
+    PetscCall(VecGetSubVector(scale, multipliers, &part));
+    PetscCall(VecSet(part, sum / (double)(n - m)));
+    PetscCall(VecRestoreSubVector(scale, multipliers, &part));
+    PetscFunctionReturn(0);
+  }
+  PetscErrorCode matrix(Vec x, Mat J)
+  {
+    TSI2Jacobian f;
+    void        *scene;
+    const double rate = h > 0 ? 1 / h : 0;
+    PetscFunctionBeginUser;
+    PetscCall(motion(x));
+    PetscCall(VecPointwiseMult(U, scale, x));
+    PetscCall(TSGetI2Jacobian(ts, nullptr, nullptr, &f, &scene));
+    PetscCall((*f)(ts, t, U, V, A, rate, rate * rate, J, J, scene));
+    PetscCall(MatDiagonalScale(J, scale, scale));
+    PetscFunctionReturn(0);
+  }
+  static PetscErrorCode function(SNES, Vec x, Vec F, void *ctx)
   {
     Euler       *e = static_cast<Euler *>(ctx);
     TSI2Function f;
     void        *scene;
     PetscFunctionBeginUser;
-    PetscCall(e->motion(U));
+    PetscCall(e->motion(x));
+    PetscCall(VecPointwiseMult(e->U, e->scale, x));
     PetscCall(TSGetI2Function(e->ts, nullptr, &f, &scene));
-    PetscCall((*f)(e->ts, e->t, U, e->V, e->A, F, scene));
+    PetscCall((*f)(e->ts, e->t, e->U, e->V, e->A, F, scene));
+    PetscCall(VecPointwiseMult(F, e->scale, F));
     PetscFunctionReturn(0);
   }
-  static PetscErrorCode jacobian(SNES, Vec U, Mat J, Mat P, void *ctx)
+  static PetscErrorCode jacobian(SNES, Vec x, Mat, Mat J, void *ctx)
   {
-    Euler       *e = static_cast<Euler *>(ctx);
-    TSI2Jacobian f;
-    void        *scene;
+    Euler *e = static_cast<Euler *>(ctx);
     PetscFunctionBeginUser;
-    PetscCall(e->motion(U));
-    PetscCall(TSGetI2Jacobian(e->ts, nullptr, nullptr, &f, &scene));
-    const double rate = e->h > 0 ? 1 / e->h : 0;
-    PetscCall((*f)(e->ts, e->t, U, e->V, e->A, rate, rate * rate, J, P, scene));
+    PetscCall(e->matrix(x, J));
     e->counts->matrices++;
     PetscFunctionReturn(0);
   }
@@ -380,8 +413,9 @@ PetscErrorCode CreateSNES(Euler &e, const char *prefix, double force, SNES *snes
 
 PetscErrorCode RunEuler(const Case &c, TS ts, History &history, Counts &counts)
 {
-  Euler               e{ts, c.by == STATIC ? 0 : c.h, 0, nullptr, nullptr, nullptr, nullptr, &counts};
-  Vec                 U, U0, V0;
+  Euler               e{ts, c.by == STATIC ? 0 : c.h, 0, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr, &counts};
+  Vec                 x, U0, V0;
+  Mat                 J;
   SNES                snes;
   SNESConvergedReason reason;
   PetscInt            iterations;
@@ -389,33 +423,36 @@ PetscErrorCode RunEuler(const Case &c, TS ts, History &history, Counts &counts)
   const PetscInt      steps = c.by == STATIC ? c.increments : (PetscInt)std::llround(c.end / c.h);
   PetscFunctionBeginUser;
   PetscCall(TS2GetSolution(ts, &U0, &V0));
-  for (Vec *x : {&U, &e.Un, &e.Vn, &e.V, &e.A}) PetscCall(VecDuplicate(U0, x));
-  PetscCall(VecCopy(U0, U));
+  for (Vec *v : {&x, &e.Un, &e.Vn, &e.V, &e.A, &e.scale, &e.U}) PetscCall(VecDuplicate(U0, v));
+  PetscCall(VecCopy(U0, x)); /* with multipliers of zero */
+  PetscCall(VecCopy(U0, e.Un));
   PetscCall(VecCopy(V0, e.Vn));
   PetscCall(VecZeroEntries(e.V));
   PetscCall(VecZeroEntries(e.A));
   PetscCall(CreateSNES(e, c.by == STATIC ? "static_" : "euler_", c.load.norm(), &snes));
   counts.begun = Processor();
+  PetscCall(TSGetI2Jacobian(ts, nullptr, &J, nullptr, nullptr));
+  PetscCall(e.findScale(x, J));
   for (PetscInt n = 1; n <= steps; n++) {
     e.t = (double)n * h;
-    PetscCall(VecCopy(U, e.Un));
-    if (c.by == EULER) PetscCall(VecAXPY(U, h, e.Vn));
-    PetscCall(SNESSolve(snes, nullptr, U));
+    PetscCall(VecCopy(x, e.Un));
+    if (c.by == EULER) PetscCall(VecAXPY(x, h, e.Vn));
+    PetscCall(SNESSolve(snes, nullptr, x));
     PetscCall(SNESGetConvergedReason(snes, &reason));
     PetscCheck(reason > 0, PETSC_COMM_WORLD, PETSC_ERR_NOT_CONVERGED, "step %" PetscInt_FMT ": Newton's method has not converged, %s", n,
                SNESConvergedReasons[reason]);
     PetscCall(SNESGetIterationNumber(snes, &iterations));
     counts.iterations += iterations;
     counts.steps++;
-    PetscCall(e.motion(U));
+    PetscCall(e.motion(x));
     PetscCall(VecCopy(e.V, e.Vn));
-    PetscCall(history.write(e.t, U));
+    PetscCall(history.write(e.t, x));
     if (n == 1) counts.first = Processor();
   }
   counts.ended = Processor();
   counts.factorizations = counts.matrices;
   PetscCall(SNESDestroy(&snes));
-  for (Vec *x : {&U, &e.Un, &e.Vn, &e.V, &e.A}) PetscCall(VecDestroy(x));
+  for (Vec *v : {&x, &e.Un, &e.Vn, &e.V, &e.A, &e.scale, &e.U}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(0);
 }
 
