@@ -189,6 +189,11 @@ if(HHTDAE_PROGRAMS)
   if(NOT page_lacks)
     hhtdae_script(page ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/page)
   endif()
+  if(TARGET solidbeam)
+    hhtdae_script(bench_scripts ${PROJECT_SOURCE_DIR} $<TARGET_FILE:solidbeam> $<TARGET_FILE:fullbody> ${PROJECT_BINARY_DIR}/bench_scripts
+                  ${MPIEXEC_EXECUTABLE})
+    set_tests_properties(integration.bench_scripts PROPERTIES PROCESSORS 2)
+  endif()
   # A slice of "make kill9", and every example resumed in its middle
   hhtdae_script(kill9 ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/kill9 10)
   foreach(ranks 1 2)

@@ -18,13 +18,17 @@
 
 PetscErrorCode KluPairGetRows(Mat A, LinearRows *rows)
 {
-  PetscBool done;
+  static const PetscInt    none = 0;
+  static const PetscScalar zero = 0;
+  PetscBool                done;
 
   PetscFunctionBegin;
   PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &rows->n, &rows->start, &rows->col, &done));
   PetscCheck(done, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
              "The matrix does not give its rows; convert it to type seqaij");
   PetscCall(MatSeqAIJGetArrayRead(A, &rows->val));
+  if (!rows->col) rows->col = &none; /* a matrix without entries has no places for them, which KLU insists on */
+  if (!rows->val) rows->val = &zero;
   PetscFunctionReturn(0);
 }
 

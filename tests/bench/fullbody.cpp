@@ -3,8 +3,10 @@
 
     mpiexec -n 2 fullbody -size 60,12,12 -law large -steps 20
 
-  -size: bricks along x, y, z; -brick8: of 8 nodes in place of 20; -held clamp,hinge,free: at its root, or it spins
-  freely, which needs no multipliers; -steps after the first, which the table leaves out with the choice of the solver;
+  -size: bricks along x, y, z; -brick8: of 8 nodes in place of 20; -held clamp,hinge,free,rod: at its root, or it spins
+  freely, which needs no multipliers, or it is the connecting rod of a slider-crank, tied to pins at both ends, whose
+  crank turns once in -turn <4> bending periods; -steps after the first, which the table leaves out with the choice of
+  the solver, and which are a stage of their own in -log_view;
   -part <0.01>: of the first bending period, the step's length (-ts_adapt_type basic for steps by error);
   -blocks: tells the solver of the three unknowns of a node and of rigid motions (free alone). Any -ksp_, -pc_, -mat_
   and -ts_hhtdae_ option holds.
@@ -18,14 +20,14 @@
 
 using namespace hhtdae;
 
-enum { CLAMP, HINGE, FREE };
+enum { CLAMP, HINGE, FREE, ROD };
 
 struct Case {
   hhtex::SolidBeam block;
   FeLaw            law    = FeLaw::Large;
   int              held   = CLAMP;
   PetscInt         steps  = 20;
-  PetscReal        part   = 0.01;
+  PetscReal        part   = 0.01, turn = 4;
   PetscBool        blocks = PETSC_FALSE;
 };
 
@@ -33,7 +35,7 @@ struct Case {
 static PetscErrorCode ReadCase(Case *c)
 {
   const char *const laws[]  = {"large", "small", "Law", "", nullptr};
-  const char *const helds[] = {"clamp", "hinge", "free", "Held", "", nullptr};
+  const char *const helds[] = {"clamp", "hinge", "free", "rod", "Held", "", nullptr};
   PetscInt          n[3] = {40, 8, 8}, three = 3;
   PetscEnum         law = (PetscEnum)0, held = (PetscEnum)CLAMP;
   PetscBool         brick8 = PETSC_FALSE, sized;
@@ -45,10 +47,11 @@ static PetscErrorCode ReadCase(Case *c)
   PetscCall(PetscOptionsGetEnum(nullptr, nullptr, "-held", helds, &held, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-steps", &c->steps, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-part", &c->part, nullptr));
+  PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-turn", &c->turn, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-brick8", &brick8, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-blocks", &c->blocks, nullptr));
-  PetscCheck(c->steps > 0 && c->part > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
-             "-steps and -part must be positive");
+  PetscCheck(c->steps > 0 && c->part > 0 && c->turn > 0, PETSC_COMM_WORLD, PETSC_ERR_ARG_OUTOFRANGE,
+             "-steps, -part and -turn must be positive");
   c->held             = held;
   c->law              = law ? FeLaw::Small : FeLaw::Large;
   hhtex::SolidBeam &b = c->block;
@@ -61,13 +64,57 @@ static PetscErrorCode ReadCase(Case *c)
   PetscFunctionReturn(0);
 }
 
-/* First bending period of the cantilever, or of the free beam */
+/* First bending period of the cantilever, of the free beam, or between pins */
 static double Period(const Case &c)
 {
   const hhtex::SolidBeam &b    = c.block;
-  const double            root = c.held == FREE ? 4.730 : 1.8751, I = std::fmin(b.Iyy(), b.Izz());
+  const double            root = c.held == FREE ? 4.730 : c.held == ROD ? PETSC_PI : 1.8751, I = std::fmin(b.Iyy(), b.Izz());
   return 2 * PETSC_PI * b.length * b.length / (root * root) *
          std::sqrt(b.material.density * b.area() / (b.material.young * I));
+}
+
+static const Matrix3 &AlongY() /* axes of markers of hinges */
+{
+  static const Matrix3 axes = Eigen::AngleAxisd(-PETSC_PI / 2, Vector3::UnitX()).toRotationMatrix();
+  return axes;
+}
+
+static double CrankSpeed(const Case &c) { return 2 * PETSC_PI / (c.turn * Period(c)); }
+
+/* The crank of a quarter of the rod's length stands up from the origin, turns about y at constant speed, and pushes the
+   slider, which has the rod's mass, along x. With the crank up the rod moves without turning. */
+static PetscErrorCode BuildSliderCrank(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
+{
+  const double            length = c.block.length, r = length / 4, mass = c.block.material.density * length * c.block.area(), speed = CrankSpeed(c);
+  const Vector3           pin(0, 0, r), end(std::sqrt(length * length - r * r), 0, 0), velocity(speed * r, 0, 0);
+  const Matrix3           along_x = Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitY()).toRotationMatrix();
+  FullBody                body;
+  RigidBody               crank, slider;
+  PetscFunctionBeginUser;
+  body.law         = c.law;
+  body.attachments = hhtex::BeamAttachments(Tie::Rigid);
+  body.position    = pin;
+  body.rotation    = Eigen::AngleAxisd(std::asin(r / length), Vector3::UnitY()).toRotationMatrix();
+  body.velocity    = velocity;
+  PetscCall(fe->add(scene, "rod", model, body));
+  crank.mass             = mass / 2;
+  crank.inertia          = (crank.mass * r * r / 12) * Matrix3::Identity();
+  crank.position         = pin / 2;
+  crank.velocity         = velocity / 2;
+  crank.angular_velocity = {0, speed, 0};
+  slider.mass            = mass;
+  slider.inertia         = (mass * r * r / 12) * Matrix3::Identity();
+  slider.position        = end;
+  slider.velocity        = velocity;
+  const Body   cranked = scene.add("crank", crank), sliding = scene.add("slider", slider), ground = scene.ground();
+  const Body   big = fe->attachment("root"), small = fe->attachment("tip");
+  const Marker shaft = scene.markerAt(cranked, Vector3::Zero(), AlongY()), bearing = scene.markerAt(ground, Vector3::Zero(), AlongY());
+  scene.add("shaft", Revolute{shaft, bearing});
+  scene.add("drive", RotationalMotion{shaft, bearing, TimeFunction::polynomial({0, speed})});
+  scene.add("big end", Revolute{scene.markerAt(big, pin, AlongY()), scene.markerAt(cranked, pin, AlongY())});
+  scene.add("small end", Revolute{scene.markerAt(small, end, AlongY()), scene.markerAt(sliding, end, AlongY())});
+  scene.add("guide", Translational{scene.markerAt(sliding, end, along_x), scene.markerAt(ground, end, along_x)});
+  PetscFunctionReturn(0);
 }
 
 static PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
@@ -81,16 +128,13 @@ static PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, F
   } else {
     body.attachments = {hhtex::BeamAttachments()[0]};
   }
-  scene.gravity({0, 0, -9.81});
   PetscCall(fe->add(scene, "block", model, body));
   if (c.held == FREE) PetscFunctionReturn(0);
-  const Marker  root = scene.marker(fe->attachment("root")), ground = scene.marker(scene.ground());
-  const Matrix3 lie = Eigen::AngleAxisd(PETSC_PI / 2, Vector3::UnitX()).toRotationMatrix(); /* z axes along y */
+  const Body root = fe->attachment("root"), ground = scene.ground();
   if (c.held == CLAMP)
-    scene.add("clamp", Fixed{root, ground});
+    scene.add("clamp", Fixed{scene.marker(root), scene.marker(ground)});
   else
-    scene.add("hinge", Revolute{scene.marker(fe->attachment("root"), Vector3::Zero(), lie),
-                                scene.marker(scene.ground(), Vector3::Zero(), lie)});
+    scene.add("hinge", Revolute{scene.marker(root, Vector3::Zero(), AlongY()), scene.marker(ground, Vector3::Zero(), AlongY())});
   PetscFunctionReturn(0);
 }
 
@@ -109,9 +153,19 @@ static PetscErrorCode TellBlocks(TS ts, Mat K)
 
 /* ---- results ---- */
 
+/* Processor time of this rank so far, s */
+static double Processor()
+{
+  rusage use;
+  getrusage(RUSAGE_SELF, &use);
+  return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) + 1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
+}
+
 struct Clock {
   PetscLogDouble   run = 0, start = 0; /* the run, its second step */
+  double           processor[2] = {};  /* likewise */
   TSHHT3Statistics first = {};
+  PetscLogStage    stage = -1; /* steps after the first */
 
   /* the first step has ended */
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal, Vec, void *ctx)
@@ -120,7 +174,9 @@ struct Clock {
     PetscFunctionBegin;
     if (step != 1) PetscFunctionReturn(0);
     PetscCall(PetscTime(&c->start));
+    c->processor[1] = Processor();
     PetscCall(TSHHT3GetStatistics(ts, &c->first));
+    PetscCall(PetscLogStagePush(c->stage));
     PetscFunctionReturn(0);
   }
 };
@@ -161,6 +217,7 @@ static PetscErrorCode Solver(TS ts, std::string *name)
 static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double building)
 {
   PetscLogDouble   now;
+  PetscReal        end;
   TSHHT3Statistics s;
   PetscInt         unknowns, iterations;
   PetscMPIInt      ranks;
@@ -180,19 +237,24 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   PetscCall(TSGetKSPIterations(ts, &iterations));
   PetscCall(Solver(ts, &solver));
   PetscCall(Memory(&most, &all));
-  const double n = (double)PetscMax(s.steps - clock.first.steps, 1);
+  const double n          = (double)PetscMax(s.steps - clock.first.steps, 1);
+  double       processor[2] = {clock.processor[1] - clock.processor[0], (Processor() - clock.processor[1]) / n}; /* first step, a further one */
+  char         turned[64] = "";
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, processor, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCall(TSGetTime(ts, &end));
+  if (c.held == ROD) PetscCall(PetscSNPrintf(turned, sizeof turned, "; the crank has turned by %.3g degrees", CrankSpeed(c) * end * 180 / PETSC_PI));
   PetscCall(PetscPrintf(
       PETSC_COMM_WORLD,
       "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
-      "  reading, assembly and set-up %.2f s, first step %.2f s\n"
-      "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
+      "  reading, assembly and set-up %.2f s, first step %.2f s, of a processor %.2f s at most\n"
+      "  %.3f s per step (%g steps), of a processor %.3f s at most; per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
       "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
-      "\n  memory at most %.0f MB on a rank, %.0f MB on all\n",
+      "\n  memory at most %.0f MB on a rank, %.0f MB on all%s\n",
       ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
-      clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
+      clock.start - clock.run, processor[0], (now - clock.start) / n, (double)n, processor[1], 100 * (double)(s.newton - clock.first.newton) / n,
       100 * (double)(s.jacobians - clock.first.jacobians) / n,
       100 * (double)(s.factorizations - clock.first.factorizations) / n,
-      (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
+      (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all, turned));
   PetscFunctionReturn(0);
 }
 
@@ -209,7 +271,9 @@ static PetscErrorCode Run()
   Scene      scene(PETSC_COMM_WORLD);
   FullFeBody fe;
   PetscCall(ReadSolidBeam(c.block, &model));
-  PetscCall(Build(c, model, scene, &fe));
+  scene.gravity({0, 0, -9.81});
+  if (c.held == ROD) PetscCall(BuildSliderCrank(c, model, scene, &fe));
+  else PetscCall(Build(c, model, scene, &fe));
   PetscCall(scene.createTS(&ts));
   if (c.blocks && c.held == FREE) PetscCall(TellBlocks(ts, model.K));
   PetscCall(TSSetMaxTime(ts, 100 * c.steps * c.part * Period(c)));
@@ -222,8 +286,11 @@ static PetscErrorCode Run()
   PetscCall(TSSetFromOptions(ts));
   PetscCall(TSMonitorSet(ts, Clock::monitor, &clock, nullptr));
   PetscCall(PetscTime(&built));
-  clock.run = built;
+  clock.run          = built;
+  clock.processor[0] = Processor();
+  PetscCall(PetscLogStageRegister("Further steps", &clock.stage));
   PetscCall(scene.solve(ts));
+  PetscCall(PetscLogStagePop());
   PetscCall(Report(ts, c, clock, built - start));
   PetscCall(TSDestroy(&ts));
   PetscFunctionReturn(0);

@@ -221,6 +221,15 @@ TEST_F(KluPair, SingularMatricesAreReported)
   }
 }
 
+/* As interiors of ranks are that hold multipliers alone, the unknowns of which are all at the border of the next rank */
+TEST_F(KluPair, MatrixWithoutEntries)
+{
+  Entries nothing;
+  nothing.n = 6;
+  factor(nothing);
+  EXPECT_EQ(error(), MAT_FACTOR_NUMERIC_ZEROPIVOT);
+}
+
 TEST_F(KluPair, ValuesThatAreNotFinite)
 {
   for (double value : {(double)NAN, (double)INFINITY}) {
