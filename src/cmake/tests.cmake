@@ -6,7 +6,7 @@ if(NOT GTest_FOUND)
 endif()
 
 if(HHTDAE_PRECOMPILE AND GTest_FOUND)
-  hhtdae_precompiled(precompiled_for_tests <gtest/gtest.h>)
+  hhtdae_precompiled(precompiled_for_tests <gtest/gtest.h> <hhtdae/scene.h>)
   target_link_libraries(precompiled_for_tests PRIVATE GTest::gtest)
   target_compile_options(precompiled_for_tests PRIVATE -O1)
 endif()
