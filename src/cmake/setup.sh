@@ -52,7 +52,7 @@ echo "setup: package lists"
 # A third party's broken list must not stop us: what counts is whether the packages can be installed.
 apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
 for package in $optional; do
-  if apt-cache show "$package" >/dev/null 2>&1; then
+  if apt install -s "$package" >/dev/null 2>&1; then # "apt-cache show" also knows packages that nobody offers any more
     required="$required $package"
   else
     echo "setup: $package is not to be had here, the tests that need it will be skipped"

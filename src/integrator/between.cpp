@@ -40,7 +40,7 @@ PetscErrorCode Along(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *phi)
    steep part is a bend between flat ones, the middle is about as far as one of the ends */
 PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s, PetscBool *found)
 {
-  PetscReal low = 0, high = 1, at_low = begin, at_high, phi;
+  PetscReal low = 0, high = 1, at_low = begin, at_high = 0, phi = 0;
 
   PetscFunctionBegin;
   *s = 1;
@@ -64,20 +64,19 @@ PetscErrorCode Search(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s
 PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 {
   Integrator &I = Get(ts);
-  Line        l = {X, dX, nullptr, nullptr, nullptr};
-  PetscScalar begin;
+  WorkVec     begin, along, next;
+  PetscScalar moved;
   PetscReal   s;
 
   PetscFunctionBegin;
   *found = PETSC_FALSE;
-  for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDuplicate(X, v));
-  PetscCall(VecWAXPY(l.begin, 1, dX, X));
-  PetscCall(WeightCorrection(I, dX, l.along));
-  PetscCall(VecDot(l.along, dX, &begin));
-  PetscCall(Search(ts, l, PetscRealPart(begin), F, &s, found));
-  if (!*found) PetscCall(VecWAXPY(X, -1, dX, l.begin));
+  for (WorkVec *v : {&begin, &along, &next}) PetscCall(v->like(X));
+  PetscCall(VecWAXPY(begin, 1, dX, X));
+  PetscCall(WeightCorrection(I, dX, along));
+  PetscCall(VecDot(along, dX, &moved));
+  PetscCall(Search(ts, {X, dX, begin, along, next}, PetscRealPart(moved), F, &s, found));
+  if (!*found) PetscCall(VecWAXPY(X, -1, dX, begin));
   else PetscCall(PetscInfo(ts, "corrector: corrections turn back at t = %g, h = %g; the solution is at %g of the last one\n", (double)I.t1, (double)I.h, (double)s));
-  for (Vec *v : {&l.begin, &l.along, &l.next}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

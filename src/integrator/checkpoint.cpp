@@ -6,127 +6,17 @@
   the coordinates and the memory that it was made in), and what the factor has taken over from the matrices before it, LinearSaveState().
   It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
 
-  To tell whether a file belongs to the run: sizes, roles and method, and the residual at the state in the file, with other accelerations than
-  its own, at which it would be zero.
+  Whether a file belongs to the run: checkpoint_identity.cpp.
 */
-#include "impl.h"
 #include "checkpoint_file.h"
-#include "entries.h"
+#include "checkpoint_identity.h"
 #include "linear/archive.h"
-#include <cstdint>
-#include <string>
 
 namespace hht3
 {
 
 namespace
 {
-
-/* Residuals at the state in the file that differ by more than this part of the largest row's belong to another problem: rounding of
-   another machine is far below it. */
-constexpr PetscReal other_problem = 1e-11;
-
-/* FNV-1a */
-std::uint64_t Hash(const void *x, size_t n)
-{
-  std::uint64_t sum = 14695981039346656037ull;
-  for (size_t i = 0; i < n; i++) sum = (sum ^ static_cast<const unsigned char *>(x)[i]) * 1099511628211ull;
-  return sum;
-}
-
-/* What must be the same in both runs, rank by rank */
-struct Identity {
-  PetscInt      N, n, extra, extra_n; /* unknowns of all ranks and of this one; entries of the application's own likewise */
-  PetscInt      form, forces;         /* forces: whether there is F0 */
-  PetscInt      order;                /* the largest one */
-  Parameters    p;
-  std::uint64_t roles;
-};
-
-PetscErrorCode Identify(TS ts, Identity *id)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  std::memset(id, 0, sizeof(*id));
-  PetscCall(VecGetSize(ts->vec_sol, &id->N));
-  PetscCall(VecGetLocalSize(ts->vec_sol, &id->n));
-  if (I.checkpoint_vec) {
-    PetscCall(VecGetSize(I.checkpoint_vec, &id->extra));
-    PetscCall(VecGetLocalSize(I.checkpoint_vec, &id->extra_n));
-  }
-  id->form   = I.form;
-  id->forces = I.F0 != nullptr;
-  id->p      = I.hht;
-  id->order  = I.order.max;
-  id->roles  = Hash(I.role.data(), I.role.size());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* An answer for all ranks */
-PetscErrorCode Everywhere(TS ts, bool mine, bool *all)
-{
-  int both = mine;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &both, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  *all = both;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
-{
-  Identity   is;
-  bool       same;
-  MPI_Comm   comm = PetscObjectComm((PetscObject)ts);
-  const auto form = [](PetscInt f) { return TSHHT3Forms[f == TSHHT3_FORM_PAPER ? 0 : 1]; };
-
-  PetscFunctionBegin;
-  PetscCall(Identify(ts, &is));
-  PetscCheck(was.N == is.N, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, was.N, is.N);
-  PetscCheck(was.form == is.form && was.forces == is.forces && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
-             "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
-             form(is.form), (double)is.p.af);
-  PetscCheck(was.order == is.order, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written with order up to %" PetscInt_FMT ", the run has %" PetscInt_FMT ": give the same -ts_hhtdae_order", file, was.order, is.order);
-  PetscCall(Everywhere(ts, was.n == is.n && was.roles == is.roles, &same));
-  PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
-             "Checkpoint %s belongs to another problem: its unknowns have other roles, or are divided among the ranks in another way", file);
-  PetscCall(Everywhere(ts, was.extra == is.extra && was.extra_n == is.extra_n, &same));
-  PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
-             "Checkpoint %s has %" PetscInt_FMT " entries of the application's own, the run expects %" PetscInt_FMT ", or has them on other ranks: give TSHHT3SetCheckpointVec() the vector of the run that wrote it",
-             file, was.extra, is.extra);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Options that the run may change, at the cost of repeating the uninterrupted one no more: for comparison and for the message */
-PetscErrorCode OptionsInWords(TS ts, std::string *text)
-{
-  const Integrator       &I = Get(ts);
-  const CorrectorOptions &c = I.corrector;
-  KSP                     ksp;
-  PC                      pc;
-  TSAdaptType             adapt;
-  SNESType                snes;
-  KSPType                 method;
-  PCType                  preconditioner;
-  MatSolverType           package = NULL;
-  char                    words[512];
-
-  PetscFunctionBegin;
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(TSAdaptGetType(ts->adapt, &adapt));
-  PetscCall(SNESGetType(ts->snes, &snes));
-  PetscCall(KSPGetType(ksp, &method));
-  PetscCall(PCGetType(pc, &preconditioner));
-  if (I.linear.user_package) PetscCall(PCFactorGetMatSolverType(pc, &package));
-  PetscCall(PetscSNPrintf(words, sizeof(words), "rtol %g%s, atol %g%s, adapt %s, corrector %g, %" PetscInt_FMT " iterations, reuse %g,%g,%g%s, predictor %" PetscInt_FMT "%s, %s, %s, %s%s%s",
-                          (double)ts->rtol, ts->vrtol ? " by entries" : "", (double)ts->atol, ts->vatol ? " by entries" : "", adapt ? adapt : "none", (double)CorrectorTolerance(I),
-                          c.max_it, (double)c.ratio, (double)c.slow_rate, (double)c.hold, c.user_lag ? " by the user" : "", I.predictor.degree_max, I.predictor.fixed ? " fixed" : "",
-                          snes ? snes : "", method ? method : "", I.linear.user_pc && preconditioner ? preconditioner : "own solver", package ? " of " : "", package ? package : ""));
-  *text = words;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Numbers of TS and SNES */
 struct SolverState {
@@ -138,8 +28,8 @@ struct SolverState {
 void Transfer(TS ts, Archive &a)
 {
   SNES        snes = ts->snes;
-  SolverState s    = {ts->steps,       ts->reject,     ts->snes_its,   ts->ksp_its,        ts->num_snes_failures, ts->adapt->timestepjustdecreased, snes->lagjacobian, snes->lagpreconditioner,
-                      snes->jac_iter,  snes->pre_iter, ts->ptime,      ts->ptime_prev,     ts->ptime_prev_rollback, ts->time_step, ts->steprestart};
+  SolverState s    = {ts->steps, ts->reject, ts->snes_its, ts->ksp_its, ts->num_snes_failures, ts->adapt->timestepjustdecreased, snes->lagjacobian, snes->lagpreconditioner,
+                      snes->jac_iter, snes->pre_iter, ts->ptime, ts->ptime_prev, ts->ptime_prev_rollback, ts->time_step, ts->steprestart};
   a.plain(s);
   if (!a.reading || !a.good) return;
   ts->steps                        = s.steps;
@@ -209,7 +99,7 @@ PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
 /* The last step's two ends, the history, and what else there is at the time */
 PetscErrorCode TransferVectors(TS ts, Archive &a)
 {
-  Integrator        &I = Get(ts);
+  Integrator        &I   = Get(ts);
   std::vector<Vec *> all = {&ts->vec_sol, &ts->vec_dot, &I.U0, &I.V0, &I.A0, &I.X0, &I.U1, &I.V1, &I.A1, &I.X, &I.ymax, &I.weight};
 
   PetscFunctionBegin;
@@ -230,65 +120,6 @@ bool HasItsVectors(const Integrator &I)
          (v.largest == 0 || (v.inertia && v.claim && v.noise && v.unproved));
 }
 
-/* The residual by which a problem is told: at the last state, with accelerations that leave the inertia forces in it */
-PetscErrorCode Probe(TS ts, Vec F)
-{
-  Integrator            &I     = Get(ts);
-  const TSHHT3Statistics saved = I.stat;
-  WorkVec                A;
-
-  PetscFunctionBegin;
-  PetscCall(A.like(I.A1));
-  PetscCall(VecCopy(I.A1, A));
-  PetscCall(VecScale(A, 2));
-  PetscCall(VecShift(A, 1));
-  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, F));
-  I.stat = saved;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode CheckProbe(TS ts, const char file[], Vec was, Vec is)
-{
-  PetscReal scale = 0, rows[2] = {0, 0}, pair[2] = {0, 0};
-  PetscInt  start, bad = HHT3_INT_MAX, first;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(was, &start, NULL));
-  PetscCall(ForEntries([&](PetscInt, PetscScalar x) { if (!PetscIsInfOrNanScalar(x)) scale = PetscMax(scale, PetscAbsScalar(x)); }, Read(was)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar x, PetscScalar y) {
-      if (bad < HHT3_INT_MAX || (PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) || PetscAbsScalar(x - y) <= other_problem * scale) return;
-      bad     = start + i;
-      pair[0] = PetscRealPart(x);
-      pair[1] = PetscRealPart(y);
-    },
-    Read(was), Read(is)));
-  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  if (first == bad) rows[0] = pair[0], rows[1] = pair[1];
-  if (first == HHT3_INT_MAX) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED,
-          "Checkpoint %s belongs to another problem: in its state the residual of row %" PetscInt_FMT " was %g, in this run it is %g. Resume the problem that wrote it; "
-          "what its residual depends on besides the state has to be in the vector of TSHHT3SetCheckpointVec()", file, first, (double)rows[0], (double)rows[1]);
-}
-
-/* A run writes no state that is not finite, and a residual that is NaN in both runs tells nothing. */
-PetscErrorCode CheckFinite(TS ts, const char file[])
-{
-  Integrator &I = Get(ts);
-  PetscReal   sum;
-
-  PetscFunctionBegin;
-  for (Vec x : {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.U1, I.V1, I.A1}) {
-    PetscCall(VecNorm(x, NORM_1, &sum)); /* the largest entry may pass over NaN */
-    PetscCheck(!PetscIsInfOrNanReal(sum), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a state that is not finite", file);
-  }
-  for (PetscReal t : {ts->ptime, ts->time_step, I.t0, I.t1, I.h, I.h_last})
-    PetscCheck(!PetscIsInfOrNanReal(t), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a time or a step size that is not finite", file);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What this rank has to say */
 PetscErrorCode Gather(TS ts, Archive &a)
 {
@@ -302,7 +133,7 @@ PetscErrorCode Gather(TS ts, Archive &a)
   PetscCall(OptionsInWords(ts, &options));
   words.assign(options.begin(), options.end());
   PetscCall(probe.like(ts->vec_sol));
-  PetscCall(Probe(ts, probe));
+  PetscCall(TellingResidual(ts, probe));
   a.plain(id);
   a.list(words);
   TransferStructs(ts, a);
@@ -313,23 +144,9 @@ PetscErrorCode Gather(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Other options are the user's right, but then the run is another one */
-PetscErrorCode CompareOptions(TS ts, const char file[], const std::vector<char> &words)
-{
-  std::string       is;
-  const std::string was(words.begin(), words.end());
-
-  PetscFunctionBegin;
-  PetscCall(OptionsInWords(ts, &is));
-  if (was != is)
-    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
-                          "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, was.c_str(), is.c_str()));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode Spread(TS ts, const char file[], Archive &a)
 {
-  Integrator       &I  = Get(ts);
+  Integrator       &I    = Get(ts);
   MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
   Identity          id;
   std::vector<char> words;
@@ -357,8 +174,8 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   I.scaled_h = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
   PetscCall(CompareOptions(ts, file, words));
-  PetscCall(Probe(ts, is));
-  PetscCall(CheckProbe(ts, file, was, is));
+  PetscCall(TellingResidual(ts, is));
+  PetscCall(CheckTellingResidual(ts, file, was, is));
   PetscCall(LoadMatrix(ts, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -217,7 +217,6 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
 
 PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
 {
-  Integrator &I = Get(ts);
   SNES        snes;
   KSP         ksp;
   Mat         J, P;

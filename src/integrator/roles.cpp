@@ -60,14 +60,13 @@ bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
   return d > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)) && d > least;
 }
 
-/* Flags of the local unknowns that a vector marks with positive entries; the vector is destroyed */
-PetscErrorCode TakeMarks(Vec *mark, std::vector<unsigned char> &flag)
+/* Flags of the local unknowns that a vector marks with positive entries */
+PetscErrorCode TakeMarks(Vec mark, std::vector<unsigned char> &flag)
 {
   PetscFunctionBegin;
-  PetscCall(VecAssemblyBegin(*mark));
-  PetscCall(VecAssemblyEnd(*mark));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar m) { if (PetscRealPart(m) > 0) flag[i] = 1; }, Read(*mark)));
-  PetscCall(VecDestroy(mark));
+  PetscCall(VecAssemblyBegin(mark));
+  PetscCall(VecAssemblyEnd(mark));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar m) { if (PetscRealPart(m) > 0) flag[i] = 1; }, Read(mark)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,7 +77,7 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   std::vector<PetscInt>       col, offset, col2, offset2;
   std::vector<unsigned char> &row_flag = acceleration ? probe.row_a : probe.row_v, &col_flag = acceleration ? probe.col_a : probe.col_v;
   const PetscReal             t = ts->ptime;
-  Vec                         mark;
+  WorkVec                     mark;
   PetscInt                    start;
 
   PetscFunctionBegin;
@@ -87,7 +86,7 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : 2 * big, acceleration ? 2 * big : 0, J, P));
   PetscCall(LocalValues(P, probe.triangle, two, col2, offset2));
   PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
-  PetscCall(VecDuplicate(U, &mark));
+  PetscCall(mark.like(U));
   PetscCall(VecZeroEntries(mark));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
   for (size_t i = 0; i < row_flag.size(); i++) {
@@ -101,7 +100,7 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
       if (probe.triangle) PetscCall(VecSetValue(mark, start + (PetscInt)i, 1, ADD_VALUES));
     }
   }
-  PetscCall(TakeMarks(&mark, col_flag));
+  PetscCall(TakeMarks(mark, col_flag));
   if (probe.triangle) row_flag = col_flag;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -111,7 +110,7 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
   std::vector<PetscScalar> val;
   std::vector<PetscInt>    col, offset;
   PetscInt                 start;
-  Vec                      mark;
+  WorkVec                  mark;
 
   PetscFunctionBegin;
   PetscCall(ProbeShift(ts, J, P, U, V, A, true, probe));
@@ -119,7 +118,7 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
   PetscCall(EvaluateJacobian(ts, ts->ptime, U, V, A, 0, 0, J, P));
   PetscCall(LocalValues(P, probe.triangle, val, col, offset));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
-  PetscCall(VecDuplicate(U, &mark));
+  PetscCall(mark.like(U));
   PetscCall(VecZeroEntries(mark));
   for (size_t i = 0; i < probe.row_u.size(); i++)
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
@@ -128,7 +127,7 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
       if (probe.triangle) PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
       if (col[k] == start + (PetscInt)i) probe.self[i] = 1;
     }
-  PetscCall(TakeMarks(&mark, probe.row_u));
+  PetscCall(TakeMarks(mark, probe.row_u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,16 +145,15 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
 /* One triangle does not show whether the rows of multipliers depend on q': the residual does, with U and A as they are */
 PetscErrorCode ProbeRates(TS ts, Vec U, Vec V, Vec A, Probe &probe)
 {
-  Vec F[2];
+  WorkVec F[2];
 
   PetscFunctionBegin;
   for (int k = 0; k < 2; k++) {
-    PetscCall(VecDuplicate(U, &F[k]));
+    PetscCall(F[k].like(U));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F[k]));
     if (!k) PetscCall(Shake(V, 1e-3, 4));
   }
   PetscCall(ForEntries([&](PetscInt i, PetscScalar before, PetscScalar after) { if (before != after) probe.row_v[i] = 1; }, Read(F[0]), Read(F[1])));
-  for (Vec &f : F) PetscCall(VecDestroy(&f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -63,17 +63,16 @@ PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
 /* e of rounding at the iterate X, in units of the tolerance */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
 {
-  Vec F, noise, r;
+  WorkVec F, noise, r;
 
   PetscFunctionBegin;
   *e = 0;
   if (!Get(ts).corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
-  for (Vec *v : {&F, &noise, &r}) PetscCall(VecDuplicate(X, v));
+  for (WorkVec *v : {&F, &noise, &r}) PetscCall(v->like(X));
   PetscCall(SNESComputeFunction(ts->snes, X, F));
   PetscCall(MeasureRounding(ts, X, F, noise));
   PetscCall(Scatter(noise, r));
   PetscCall(SizeOfAnswer(ts, r, F, e));
-  for (Vec *v : {&F, &noise, &r}) PetscCall(VecDestroy(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

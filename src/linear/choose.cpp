@@ -103,7 +103,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PCType    pc_type;
   PetscBool operators, triangle = PETSC_FALSE;
   Mat       P;
-  PetscBool pc_by_program, pc_by_option, package_by_program = PETSC_FALSE, package_by_option;
+  PetscBool pc_by_program = PETSC_FALSE, pc_by_option, package_by_program = PETSC_FALSE, package_by_option;
 
   PetscFunctionBegin;
   *choice = LinearChoice();

@@ -169,6 +169,7 @@ private:
     const double        start = cpuSeconds();
     system_.extra             = 0;
     counted_.deadline         = start + limits.seconds;
+    counted_.most             = limits.residuals;
     while (!recorder_.done()) {
       realtype  t;
       const int code = IDASolve(memory_, recorder_.next(), &t, y_, yp_, IDA_NORMAL);

@@ -45,12 +45,13 @@ struct Run {
   std::string failure;
 };
 
-/* Passes everything on, and counts. After the deadline residuals are not a number, which ends solvers that never accept
-   a step and so never come by a monitor. */
+/* Passes everything on, and counts. After the deadline, and after as many residuals as there may be, they are not a number, which ends solvers
+   that never accept a step and so never come by a monitor. */
 struct CountedProblem : Problem {
   const Problem &p;
   mutable long   residuals = 0, jacobians = 0;
   double         deadline = 1e300; /* CPU time of the process */
+  double         most     = 1e300; /* residuals */
   mutable bool   late     = false;
 
   explicit CountedProblem(const Problem &problem) : p(problem)
@@ -64,7 +65,7 @@ struct CountedProblem : Problem {
   void initial(double *u, double *v) const override { p.initial(u, v); }
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
-    if (++residuals % 256 == 0 && !late) late = cpuSeconds() > deadline;
+    if (++residuals > most || (residuals % 256 == 0 && cpuSeconds() > deadline)) late = true;
     if (late)
       std::fill_n(f, n, std::nan(""));
     else
@@ -186,9 +187,9 @@ struct Case {
   bool                                                                           scene    = false;
 };
 
-/* The limit for one run, in CPU seconds; beyond it a solver counts as failed */
+/* The limits for one run, in CPU seconds and residuals; beyond them a solver counts as failed */
 struct Limits {
-  double seconds = 10.;
+  double seconds = 10., residuals = 1e300;
 };
 
 } // namespace wp

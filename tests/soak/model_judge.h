@@ -196,7 +196,7 @@ private:
 
   /* ---- references ---- */
 
-  double patience(double seconds) const { return choice_.small ? 0.4 * seconds : seconds; }
+  double patience(double seconds) const { return (choice_.small ? 0.12 : 1) * seconds * work_per_second; }
 
   void refer()
   {
@@ -219,10 +219,10 @@ private:
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = 10 * reference_eps;
-    tight.seconds = patience(5);
+    tight.work    = patience(5);
     looser_       = RunHHT(build(), tight);
     tight.eps     = reference_eps;
-    tight.seconds = patience(10);
+    tight.work    = patience(10);
     if (looser_.arrived()) reference_ = RunHHT(build(), tight);
     if (looser_.arrived() && reference_.arrived()) o_.by = ByHHT;
   }
@@ -349,7 +349,7 @@ private:
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = 10 * reference_eps;
-    tight.seconds = patience(4);
+    tight.work    = patience(4);
     return RunHHT(build(push), tight);
   }
 
@@ -430,7 +430,7 @@ private:
     Settings tight;
     tight.radius  = 0.8;
     tight.eps     = reference_eps;
-    tight.seconds = patience(10);
+    tight.work    = patience(10);
     tight.first   = 1e-14 * model_.period;
     return RunHHT(build(), tight);
   }
@@ -469,7 +469,7 @@ private:
         Settings s;
         s.eps                 = eps;
         s.radius              = other ? 0.8 : -1;
-        s.seconds             = 60;
+        s.work                = 60 * work_per_second;
         const char      *what = other ? "radius 0.8" : "alpha -0.3";
         const Trajectory t    = RunHHT(build(), s);
         if (!t.arrived())

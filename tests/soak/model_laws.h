@@ -20,7 +20,7 @@ namespace soak
 
 constexpr double allowed_imbalance = 1e-9, allowed_residual = 1e-9;
 
-inline Settings LawSettings(double seconds)
+inline Settings LawSettings(double work)
 {
   Settings s;
   s.corrector = 1e-9;
@@ -28,7 +28,7 @@ inline Settings LawSettings(double seconds)
   s.slack     = 1e3 * s.corrector * s.tolerance; /* the measured rate is that of the largest corrections; in stiff directions, where
                                                     they are small, the iteration may be far slower */
   s.laws      = true;
-  s.seconds   = seconds;
+  s.work      = work;
   return s;
 }
 

@@ -110,6 +110,7 @@ struct ReferenceRun {
   std::unique_ptr<hhtbench::SceneProblem> problem;
   Trajectory                              result;
   int                                     legs = 0;
+  double                                  work = 0; /* so far */
 };
 
 constexpr int fine = 16; /* output points of IDA per sample */
@@ -128,8 +129,11 @@ inline Way    WayOf(int k)
   return all[k];
 }
 
+/* A residual of IDA, and what goes with it, take about three times as long as one of hhtdae of the same size */
+inline double WorkOfIDA(double residuals, const Leg &leg) { return 3 * WorkOf(residuals, 2 * leg.n); }
+
 /* One leg, until IDA stops; the state at the last output point it got to becomes the start of the next */
-inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, double eps, double newton, double seconds,
+inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, double eps, double newton, double work,
                              std::string *failure)
 {
   std::vector<double> times, values;
@@ -156,9 +160,10 @@ inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, dou
   leg.singular = false;
   const wp::Reference output(leg, times);
   wp::IDASolver       ida(CaseOf(leg), leg, output, settings);
-  const wp::Run       run = ida.run(eps, wp::Limits{seconds});
+  const wp::Run       run = ida.run(eps, wp::Limits{1e9, work / WorkOfIDA(1, leg)});
   *failure                = run.failure;
   r.result.steps += run.count.steps;
+  r.work += WorkOfIDA((double)run.count.residuals, leg);
   r.legs++;
   if (u.empty() && !run.failure.empty()) PetscFunctionReturn(failed);
   leg.u0 = u;
@@ -168,7 +173,7 @@ inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, dou
   PetscFunctionReturn(failed);
 }
 
-inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, double seconds)
+inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, double work)
 {
   std::string failure;
   PetscFunctionBegin;
@@ -183,9 +188,9 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, dou
   const double start = CpuSeconds();
   for (int point = 0, stuck = 0, way = 0; point < samples * fine;) {
     const int before = point;
-    PetscCall(RunLeg(r, leg, point, way, eps, newton, seconds - (CpuSeconds() - start), &failure));
+    PetscCall(RunLeg(r, leg, point, way, eps, newton, work - r.work, &failure));
     if (failure.empty()) break;
-    const bool late = r.legs > 100 || CpuSeconds() - start > seconds;
+    const bool late = r.legs > 100 || r.work >= work;
     stuck           = point == before ? stuck + 1 : 0;
     if (leg.singular && stuck < 2)
       leg.reframe();
@@ -201,12 +206,12 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, dou
 }
 
 /* newton: see wp::IDASettings */
-inline Trajectory RunIDA(Model model, double eps, double seconds, int *legs, double newton = 0)
+inline Trajectory RunIDA(Model model, double eps, double work, int *legs, double newton = 0)
 {
   ReferenceRun r;
   Quiet        quiet;
   r.model = std::move(model);
-  if (SolveByIDA(r, eps, newton, seconds)) r.result.failure = "IDA: " + quiet.message;
+  if (SolveByIDA(r, eps, newton, work)) r.result.failure = "IDA: " + quiet.message;
   if (r.result.failure.empty() && (int)r.result.x.size() != samples) r.result.failure = "IDA ended early";
   *legs = r.legs;
   return r.result;

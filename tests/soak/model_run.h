@@ -57,6 +57,10 @@ private:
   }
 };
 
+/* What runs may take is counted, so that a busy machine decides nothing: residuals, those of small systems for at least what goes with them */
+constexpr double work_per_second = 1e7; /* about, of an idle core */
+inline double    WorkOf(double residuals, PetscInt unknowns) { return residuals * ((double)unknowns + 50); }
+
 /* ---- hhtdae ---- */
 
 struct Settings {
@@ -64,7 +68,7 @@ struct Settings {
   bool              paper     = false;
   double            radius    = -1;    /* negative: as it comes */
   bool              options   = false; /* from the command line */
-  double            seconds   = 1e9;
+  double            work      = 1e300; /* that it may take, see WorkOf() */
   double            first     = 0;     /* first step, from which steps grow by a fifth at most; 0: as they come */
   double            corrector = 0;     /* 0: as it comes */
   bool              laws      = false; /* judge the balance of every body */
@@ -77,7 +81,7 @@ struct Settings {
 
 struct Watcher {
   Scene               &scene;
-  double               end, deadline;
+  double               end;
   const Settings      &settings;
   std::size_t          observed; /* channels of the model; those of the laws come after */
   hhtest::NewtonEuler *laws;
@@ -139,11 +143,12 @@ inline PetscErrorCode Misfit(TS ts, PetscReal t, Trajectory *result)
   PetscFunctionReturn(0);
 }
 
-inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
+inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *ctx)
 {
   Watcher            &w = *static_cast<Watcher *>(ctx);
   std::vector<double> values;
   const std::size_t   before = w.result.x.size();
+  bool                late   = false;
   PetscFunctionBegin;
   if (step <= 0) PetscFunctionReturn(0);
   if (step == w.settings.save_at && !w.settings.save.empty())
@@ -158,7 +163,14 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec, void *ctx
   }
   if (w.laws && (w.result.x.size() > before || step < 20)) PetscCall(JudgeLaws(w, ts, t));
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
-  if (step % 16 == 0 && CpuSeconds() > w.deadline) {
+  if (step % 16 == 0) {
+    PetscInt         unknowns;
+    TSHHT3Statistics cost;
+    PetscCall(VecGetSize(X, &unknowns));
+    PetscCall(TSHHT3GetStatistics(ts, &cost));
+    late = WorkOf(cost.residuals, unknowns) > w.settings.work;
+  }
+  if (late) {
     w.result.failure = hhtbench::Text("took longer than the limit, at t = %g of %g", t, w.end);
     PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   }
@@ -194,7 +206,7 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
     result->x.assign(s.until->x.begin(), s.until->x.begin() + (long)s.until->x.size());
     result->steps_at = s.until->steps_at;
   }
-  Watcher watcher{*m.scene, m.end, CpuSeconds() + s.seconds, s, m.observed.size(), laws.get(), *result};
+  Watcher watcher{*m.scene, m.end, s, m.observed.size(), laws.get(), *result};
   PetscCall(TSMonitorSet(ts, WatchRun, &watcher, nullptr));
   const double         start  = CpuSeconds();
   const PetscErrorCode failed = m.scene->solve(ts);
