@@ -187,7 +187,7 @@ if(HHTDAE_PROGRAMS)
   endif()
   hhtdae_script(tutorial ${PROJECT_SOURCE_DIR} ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/tutorial ${with_python})
   if(NOT page_lacks)
-    hhtdae_script(page ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/page)
+    hhtdae_script(page ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/page ${with_python})
   endif()
   # A slice of "make kill9", and every example resumed in its middle
   hhtdae_script(kill9 ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/kill9 10)
