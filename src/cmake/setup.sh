@@ -1,5 +1,6 @@
 #!/bin/sh
-# setup.sh PACKAGE... [--optional PACKAGE...]: installs the Debian packages that are missing.
+# setup.sh PACKAGE... [--optional PACKAGE...] [--later PACKAGE...]: installs the Debian packages that are missing, but for those that only other
+# targets need: they are part of the command for those who have to ask somebody else to install.
 # Silent and fast when there are none; touches no package lists then. Optional packages may be unknown to the system.
 set -eu
 
@@ -11,10 +12,11 @@ missing() {
   done
 }
 
-required='' optional='' kind=required
+required='' optional='' later='' kind=required
 for package; do
   case $package in
     --optional) kind=optional ;;
+    --later) kind=later ;;
     *) eval "$kind=\"\$$kind $package\"" ;;
   esac
 done
@@ -30,7 +32,8 @@ elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
   root=sudo
 elif [ -n "$required" ]; then
   echo 'setup: Debian packages are missing, and only root may install them; once:' >&2
-  install="apt-get update && apt-get install -y --no-install-recommends$required$optional"
+  # shellcheck disable=SC2086
+  install="apt-get update && apt-get install -y --no-install-recommends$required$optional$(missing $later)"
   if command -v sudo >/dev/null; then echo "sudo sh -c '$install'"; else echo "su -c '$install'"; fi
   exit 1
 else
