@@ -68,7 +68,7 @@ function(hhtdae_python_module name library)
   target_compile_options(python_${name} PRIVATE -O1 -g1 -fno-math-errno)
   target_link_libraries(python_${name} PRIVATE ${library})
   if(HHTDAE_PRECOMPILE)
-    target_precompile_headers(python_${name} PRIVATE ${HHTDAE_PRECOMPILED} <pybind11/pybind11.h> <pybind11/numpy.h>)
+    target_precompile_headers(python_${name} PRIVATE ${HHTDAE_PRECOMPILED} <hhtdae/scene.h> <pybind11/pybind11.h> <pybind11/numpy.h>)
   endif()
   set_target_properties(python_${name} PROPERTIES OUTPUT_NAME ${name} PREFIX "" SUFFIX "${python_suffix}" CXX_VISIBILITY_PRESET hidden
                         LIBRARY_OUTPUT_DIRECTORY ${package_build} INSTALL_RPATH "$ORIGIN/lib;$ORIGIN/${from_package}") # of a wheel, and of a prefix

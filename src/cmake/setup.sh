@@ -1,5 +1,6 @@
 #!/bin/sh
-# setup.sh PACKAGE... [--optional PACKAGE...]: installs the Debian packages that are missing.
+# setup.sh PACKAGE... [--optional PACKAGE...] [--later PACKAGE...]: installs the Debian packages that are missing, but for those that only other
+# targets need: they are part of the command for those who have to ask somebody else to install.
 # Silent and fast when there are none; touches no package lists then. Optional packages may be unknown to the system.
 set -eu
 
@@ -11,10 +12,11 @@ missing() {
   done
 }
 
-required='' optional='' kind=required
+required='' optional='' later='' kind=required
 for package; do
   case $package in
     --optional) kind=optional ;;
+    --later) kind=later ;;
     *) eval "$kind=\"\$$kind $package\"" ;;
   esac
 done
@@ -29,13 +31,23 @@ if [ "$(id -u)" = 0 ]; then
 elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
   root=sudo
 elif [ -n "$required" ]; then
-  echo "sudo apt-get update && sudo apt-get install -y --no-install-recommends$required$optional"
+  echo 'setup: Debian packages are missing, and only root may install them; once:' >&2
+  # shellcheck disable=SC2086
+  install="apt-get update && apt-get install -y --no-install-recommends$required$optional$(missing $later)"
+  if command -v sudo >/dev/null; then echo "sudo sh -c '$install'"; else echo "su -c '$install'"; fi
   exit 1
 else
+  echo "setup: not installed, what needs them is left out:$optional" >&2
   exit 0
 fi
 
-apt() { $root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+apt() { $root env DEBIAN_FRONTEND=noninteractive apt-get -q -o Dpkg::Use-Pty=0 "$@" </dev/null; }
+
+# A line for every tenth part of: packages fetched, unpacked, set up
+progress() {
+  awk '/ newly installed, / { all = 3 * ($1 + $3) }
+       /^(Get:|Unpacking |Setting up )/ { if (all && int(10 * ++n / all) > part) { part = int(10 * n / all); if (part < 10) { print "setup: " 10 * part " %"; fflush() } } }'
+}
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
@@ -51,5 +63,11 @@ for package in $optional; do
 done
 [ -n "$required" ] || exit 0
 echo "setup: installing$required"
-# shellcheck disable=SC2086
-apt install -y --no-install-recommends $required >"$log" 2>&1 || { cat "$log"; exit 1; }
+{
+  # shellcheck disable=SC2086
+  apt install -y --no-install-recommends $required 2>&1 || echo 'setup: apt-get has failed'
+} | tee "$log" | progress
+if [ "$(tail -n 1 "$log")" = 'setup: apt-get has failed' ]; then
+  cat "$log"
+  exit 1
+fi

@@ -184,6 +184,12 @@ void BindReduced(py::module_ &m)
     return body;
   });
   m.def("add_stress_modes", [](const FeModel &model, ReducedBody &b) { Check(AddStressModes(model, &b)); });
+  m.def("show", [](Scene &scene, py::object body, const ReducedBody &shown, const std::string &unit) {
+    auto surface = std::make_shared<Surface>();
+    Check(MakeSurface(shown, surface.get()));
+    surface->stress_unit = unit;
+    scene.surface(ToHandle<Body>(body, "the body of a surface"), surface);
+  });
   m.def("load_modal_body", [](py::object comm, const std::string &file) {
     auto body = std::make_shared<ModalBody>();
     Check(LoadModalBody(ToComm(comm), file, body.get()));

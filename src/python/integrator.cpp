@@ -31,7 +31,7 @@ py::dict Statistics(py::object ts)
   return py::dict("steps"_a = s.steps, "rejected"_a = s.rejected, "newton"_a = s.newton, "residuals"_a = s.residuals, "jacobians"_a = s.jacobians,
                   "factorizations"_a = s.factorizations, "solves"_a = s.solves, "time"_a = s.time, "cpu"_a = s.cpu, "corrector_fails"_a = s.corrector_fails,
                   "retries"_a = s.retries, "restarts"_a = s.restarts, "changes"_a = s.changes, "tiny_steps"_a = s.tiny_steps,
-                  "h_min"_a = s.h_min, "h_max"_a = s.h_max);
+                  "h_min"_a = s.h_min, "h_max"_a = s.h_max, "of_order"_a = py::make_tuple(s.of_order[2], s.of_order[3], s.of_order[4], s.of_order[5]));
 }
 
 /* (U, U', U'') at time t as new vectors, by one of two functions */
@@ -78,6 +78,12 @@ void BindIntegrator(py::module_ &m)
     return (double)alpha;
   });
   m.def("set_radius", [](py::object ts, double radius) { Check(TSHHT3SetRadius(ToTS(ts), radius)); });
+  m.def("set_order", [](py::object ts, PetscInt order) { Check(TSHHT3SetOrder(ToTS(ts), order ? order : TSHHT3_ORDER_AUTO)); });
+  m.def("get_order", [](py::object ts) {
+    PetscInt order = 2;
+    Check(TSHHT3GetOrder(ToTS(ts), &order));
+    return order == TSHHT3_ORDER_AUTO ? 0 : order;
+  });
   m.def("set_corrector_tolerance", [](py::object ts, double c) { Check(TSHHT3SetCorrectorTolerance(ToTS(ts), c)); });
   m.def("set_predictor_degree", [](py::object ts, PetscInt degree) { Check(TSHHT3SetPredictorDegree(ToTS(ts), degree)); });
   m.def("set_reuse", [](py::object ts, double slow, double low, double high) { Check(TSHHT3SetReuse(ToTS(ts), slow, low, high)); });
@@ -86,6 +92,9 @@ void BindIntegrator(py::module_ &m)
     IS is = nullptr;
     Check(TSHHT3GetIS(ToTS(ts), Role(role), &is));
     return is ? FromIS(is) : py::none();
+  });
+  m.def("set_nodes", [](py::object ts, py::object nodes, py::object reference) {
+    Check(TSHHT3SetNodes(ToTS(ts), nodes.is_none() ? nullptr : ToIS(nodes), reference.is_none() ? nullptr : ToVec(reference)));
   });
   m.def("set_start", [](py::object ts, const std::string &start) {
     Check(TSHHT3SetStart(ToTS(ts), (TSHHT3Start)Choice(TSHHT3Starts, 3, start, "start")));

@@ -183,10 +183,10 @@ void SetOutput(Scene &s, const std::string &file, const std::string &csv, double
   o.balance_file    = py::isinstance<py::str>(balance) ? balance.cast<std::string>() : "";
 }
 
-Shape ToShape(const std::string &kind, py::object size, py::object position, py::object axes)
+Shape ToShape(const std::string &kind, py::object size, py::object position, py::object axes, int colour)
 {
   return {kind == "box" ? Shape::Box : kind == "cylinder" ? Shape::Cylinder : Shape::Sphere, ToVector(size, "a shape's size"),
-          ToVector(position, "a shape's position"), ToMatrix(axes, "a shape's axes")};
+          ToVector(position, "a shape's position"), ToMatrix(axes, "a shape's axes"), colour};
 }
 
 } // namespace
@@ -226,8 +226,8 @@ void BindScene(py::module_ &m)
     .def("parameter", [](Scene &s, const std::string &name, double value) { return s.parameter(name, value); })
     .def("set", [](Scene &s, const std::string &name, double value) { Check(s.set(name, value)); })
     .def("channel", [](Scene &s, const std::string &name, py::object e, const std::string &unit) { s.channel(name, ToExpression(e), unit); })
-    .def("shape", [](Scene &s, py::object b, const std::string &kind, py::object size, py::object position, py::object axes) {
-      s.shape(ToHandle<Body>(b, "a shape's body"), ToShape(kind, size, position, axes));
+    .def("shape", [](Scene &s, py::object b, const std::string &kind, py::object size, py::object position, py::object axes, int colour) {
+      s.shape(ToHandle<Body>(b, "a shape's body"), ToShape(kind, size, position, axes, colour));
     })
     .def("line", [](Scene &s, py::list markers) {
       std::vector<Marker> all;

@@ -125,6 +125,8 @@ public:
            "position:relative;left:50%;transform:translateX(-50%)}iframe{display:block;width:min(72em,calc(100vw - 3em));height:min(46em,92vh);"
            "border:1px solid #ccc;border-radius:8px}"
            "figure{margin:1.5em 0}figcaption{color:#555;font-size:.9em}img,svg{max-width:100%;height:auto}pre{background:#f4f4f4;padding:.6em;overflow-x:auto}"
+           "@media(prefers-color-scheme:dark){body{background:#14181f;color:#e6e9ee}h2,th,td,iframe{border-color:#3a424d}a{color:#7ab0ff}tr.bad td{background:#5a2020}"
+           "figcaption{color:#aab2bd}pre{background:#232a33}img,svg{background:#fff;border-radius:4px}}"
            "</style></head>\n<body><h1>"
         << escaped(title_) << "</h1>\n"
         << body_.str() << "</body></html>\n";

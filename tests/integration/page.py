@@ -1,6 +1,6 @@
 """The page of a run in a real browser without a screen: it reads its data, draws, plays, has plots, and says nothing on the console.
 
-usage: page.py BIN DIRECTORY
+usage: page.py BIN DIRECTORY [PYTHON PACKAGES]
 """
 
 import base64
@@ -103,3 +103,35 @@ check(result["visible"] == 2 and result["errors"] == [] and result["frames"] == 
 # Without WebGL the plots are left
 result = look(file, "--disable-gpu", "--disable-3d-apis")
 check(not result["webgl"] and result["plots"] == 4, "without WebGL: %s" % result)
+
+# What a notebook shows of a run: the same page, in a frame of the notebook's own
+if len(sys.argv) > 4:
+    program = """
+import sys
+import hhtdae
+scene = hhtdae.Scene(gravity=(0, 0, -9.81))
+ball = scene.add("ball", hhtdae.PointMass(velocity=(1, 0, 3))).shape(hhtdae.Shape.sphere(0.1))
+scene.channel("height", hhtdae.displacement(ball.marker(), "z"), "m")
+with open(sys.argv[1], "w") as out:
+    out.write(scene.solve(0.5, page=True).page()._repr_html_())
+"""
+    cell = os.path.join(os.path.abspath(directory), "cell.html")
+    run([sys.argv[3], "-c", program, cell], PYTHONPATH=sys.argv[4])
+    with open(cell) as text:
+        frame = text.read()
+    notebook = cell.replace("cell", "notebook")
+    with open(notebook, "w") as out:
+        out.write("""<!DOCTYPE html><title>a notebook</title><p>A cell</p>%s
+<script>
+const page = document.querySelector('iframe');
+page.onload = async () => {
+  const inside = page.contentWindow;
+  while (inside.document.querySelectorAll('.plot').length < 1) await new Promise(done => setTimeout(done, 50));
+  await inside.testSelf();
+  document.documentElement.dataset.selftest = inside.document.documentElement.dataset.selftest;
+};
+</script>""" % frame)
+    result = look(notebook)
+    print("in a notebook", result)
+    check([result[key] for key in ("frames", "bodies", "visible", "channels", "errors")] == [501, 1, 1, 1, []], "in a notebook: %s" % result)
+    check(result["webgl"] and result["drawn"] > 100 and result["played"], "nothing to be seen in a notebook: %s" % result)

@@ -245,6 +245,58 @@ class OnTS(unittest.TestCase):
         ts.solve(u)
         self.assertAlmostEqual(u[0], 0.1 * math.cos(math.sqrt(100 / 3.)), delta=1e-5)
 
+    def test_order(self):
+        """Steps of higher order, fewer of them, and counted by their order"""
+        steps = {}
+        for order in (2, 4, "auto"):
+            ts, u = self.make()
+            integrator.set_order(ts, order)
+            self.assertEqual(integrator.get_order(ts), order)
+            ts.solve(u)
+            self.assertAlmostEqual(u[0], 0.1 * math.cos(math.sqrt(100 / 3.)), delta=1e-5)
+            s = h.statistics(ts)
+            self.assertEqual(sum(s.of_order), s.steps)
+            steps[order] = s
+        self.assertEqual(steps[2].of_order[1:], (0, 0, 0))
+        self.assertGreater(steps[4].of_order[2], 0.5 * steps[4].steps)
+        self.assertLess(max(steps[4].steps, steps["auto"].steps), 0.5 * steps[2].steps)
+        with self.assertRaisesRegex(ValueError, "'auto'"):
+            integrator.set_order(ts, 6)
+
+    def test_nodes(self):
+        """Three masses on springs, said to be the unknowns of one node, under the preconditioner for nodes and constraints"""
+        A = PETSc.Mat().createAIJ([3, 3], nnz=3, comm=PETSc.COMM_SELF)
+        A.setValues(range(3), range(3), np.zeros(9))
+        A.assemble()
+        k = np.diag([1., 4., 9.])
+
+        def J(ts, t, u, v, a, sv, sa, J, P):
+            P.setValues(range(3), range(3), sa * np.eye(3) + k)
+            P.assemble()
+            return True
+
+        def f(ts, t, u, v, a, out):
+            out.array = a.array_r + k @ u.array_r
+
+        u, v, X = (A.createVecRight() for _ in range(3))
+        u.array = 1.
+        ts = PETSc.TS().create(comm=PETSc.COMM_SELF)
+        ts.setType("hhtdae")
+        ts.setI2Function(f, u.duplicate())
+        ts.setI2Jacobian(J, A)
+        ts.setSolution2(u, v)
+        integrator.set_nodes(ts, [[0, 1, 2]], X)
+        integrator.set_nodes(ts, None)
+        integrator.set_nodes(ts, [[0, 1, 2]])
+        ts.setMaxTime(1.)
+        ts.setTolerances(rtol=1e-7, atol=1e-7)
+        ts.getSNES().getKSP().setType("cg")
+        ts.getSNES().getKSP().getPC().setType("hhtconstraint")
+        ts.solve(u)
+        np.testing.assert_allclose(integrator.interpolate(ts, 1.)[0].array, np.cos([1., 2., 3.]), atol=1e-4)
+        with self.assertRaises(h.Error):
+            integrator.set_nodes(ts, [[0, 1]], X)
+
     def test_rotations(self):
         """A sphere that turns freely: its attitude after two turns and a bit, gathered by the functions that take references"""
         def turn(x):

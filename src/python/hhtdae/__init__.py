@@ -29,7 +29,7 @@ from . import _core
 
 _core.initialize()
 
-from . import bodies, elements, expressions, integrator, measures, mechanism, query, run, scene
+from . import bodies, elements, expressions, integrator, measures, mechanism, query, recipe, results, run, scene
 from ._errors import Error
 from .bodies import *
 from .elements import *
@@ -38,11 +38,13 @@ from .integrator import Statistics, statistics
 from .measures import *
 from .mechanism import MechanismResult, solve_mechanism
 from .query import *
+from .recipe import *
+from .results import *
 from .run import Run
 from .scene import *
 
 __all__ = ["Error", "MechanismResult", "Run", "Statistics", "flexible", "integrator", "solve_mechanism", "statistics"]
-for _module in (bodies, elements, expressions, measures, query, scene):
+for _module in (bodies, elements, expressions, measures, query, recipe, results, scene):
     __all__ += _module.__all__
 
 

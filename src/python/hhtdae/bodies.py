@@ -1,7 +1,7 @@
 """Bodies, moments of inertia, axes, shapes."""
 
 from dataclasses import dataclass, field
-from typing import Any, Optional, Sequence, Tuple
+from typing import Any, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -108,26 +108,42 @@ class FlexibleBody(Spec):
 
 @dataclass(eq=False)
 class Shape:
-    """What a body looks like in animations: made by `Shape.box`, `Shape.cylinder` and `Shape.sphere`."""
+    """What a body looks like in animations and pages: made by `Shape.box`, `Shape.cylinder` and `Shape.sphere`.
+
+    colour : in the page, a number 0xRRGGBB or "#rrggbb"; default: one of its own for each body
+    """
     kind: str
     size: Tuple[float, float, float]
     position: Vector = (0., 0., 0.)
     axes: Any = _identity()
+    colour: Union[int, str, None] = None
 
     @classmethod
-    def box(cls, half, position=(0., 0., 0.), axes=None):
+    def box(cls, half, position=(0., 0., 0.), axes=None, colour=None):
         """A box by half of its edges."""
-        return cls("box", tuple(half), position, np.eye(3) if axes is None else axes)
+        return cls("box", tuple(half), position, np.eye(3) if axes is None else axes, colour)
 
     @classmethod
-    def cylinder(cls, radius, length, position=(0., 0., 0.), axes=None):
+    def cylinder(cls, radius, length, position=(0., 0., 0.), axes=None, colour=None):
         """A cylinder along z."""
-        return cls("cylinder", (radius, radius, 0.5 * length), position, np.eye(3) if axes is None else axes)
+        return cls("cylinder", (radius, radius, 0.5 * length), position, np.eye(3) if axes is None else axes, colour)
 
     @classmethod
-    def sphere(cls, radius, position=(0., 0., 0.)):
+    def sphere(cls, radius, position=(0., 0., 0.), colour=None):
         """A sphere."""
-        return cls("sphere", (radius, radius, radius), position)
+        return cls("sphere", (radius, radius, radius), position, colour=colour)
+
+    def _rgb(self):
+        if self.colour is None:
+            return -1
+        if isinstance(self.colour, str) and len(self.colour) == 7 and self.colour[0] == "#":
+            try:
+                return int(self.colour[1:], 16)
+            except ValueError:
+                pass
+        elif isinstance(self.colour, int) and 0 <= self.colour <= 0xffffff:
+            return self.colour
+        raise ValueError("colour is %r, must be a number 0xRRGGBB or '#rrggbb'" % (self.colour,))
 
 
 def axes_along(z, x=None):

@@ -125,8 +125,15 @@ class Parameter(Expression):
         """Gives it another value, for runs made from now on and, in formulas of the state, at once. Collective."""
         self._scene.set(**{self.name: value})
 
+    def __reduce__(self):
+        return _parameter, (self._scene, self.name)
+
     def __repr__(self):
         return "<parameter %s = %.12g>" % (self.name, self.get())
+
+
+def _parameter(scene, name):
+    return scene._parameters[name]
 
 
 class TimeFunction:

@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core
+from .results import optional
 
 try:
     from . import _flexible
@@ -142,6 +143,11 @@ class FeModel:
         x = self.coordinates
         return self.first + np.flatnonzero(where(x[:, 0], x[:, 1], x[:, 2]))
 
+    def to_meshio(self):
+        """A meshio.Mesh of the own nodes, with the elements' materials by number, the nodes' labels and the named sets. On one rank."""
+        return _mesh(self.comm, self.coordinates, self.elements, {"label": self.label},
+                     {name: np.asarray(nodes) for name, nodes in self.sets.items()})
+
     nodes = property(lambda self: self._core.nodes)
     own = property(lambda self: self._core.own)
     first = property(lambda self: self._core.first)
@@ -239,11 +245,27 @@ class ReducedBody:
         self._core.write_field(eta, str(file), origin, np.eye(3) if axes is None else axes)
 
     def to_meshio(self, eta=None):
-        """A meshio.Mesh of the own nodes, with the displacement for modal coordinates. On one rank."""
-        import meshio
+        """A meshio.Mesh of the own nodes; for modal coordinates (modes,) with the displacement there, and the stress (nan where it is not known) and its
+        von Mises value if there are stress modes. On one rank."""
+        data = {"label": self.label}
+        if eta is not None:
+            eta = np.asarray(eta, dtype=float)
+            data["displacement"] = self.shape @ eta
+            if len(self.stress_nodes):
+                for name, values in (("stress", self.stress @ eta), ("von Mises", self.von_mises(eta))):
+                    data[name] = np.full((len(self.label),) + values.shape[1:], np.nan)
+                    data[name][self.stress_nodes] = values
+        return _mesh(PETSc.COMM_WORLD, self.coordinates, self.elements, data)
 
-        data = {} if eta is None else {"displacement": self.shape @ np.asarray(eta, dtype=float)}
-        return meshio.Mesh(self.coordinates, list(self.elements.cells().items()), point_data=data)
+
+def _mesh(comm, points, elements, point_data, sets=None):
+    """A meshio.Mesh of all cells, a block for each kind"""
+    meshio = optional("meshio", "to_meshio()")
+    if comm.size > 1:
+        raise ValueError("to_meshio(): the mesh is distributed over %d ranks" % comm.size)
+    types = np.array(elements.types)
+    materials = [np.asarray(elements.material)[types == t] for t in dict.fromkeys(elements.types)]
+    return meshio.Mesh(points, list(elements.cells().items()), point_data=point_data, cell_data={"material": materials}, point_sets=sets)
 
 
 def _unpickled(whole):
@@ -351,12 +373,16 @@ class FullBody:
 
 
 class FullFeBody:
-    """A whole FE model in a scene; call it on all ranks in the same order as the scene's other parts."""
+    """A whole FE model in a scene; call it on all ranks in the same order as the scene's other parts. Pages show its surface, coloured by stress where its
+    elements have materials.
+    """
 
     def __init__(self, scene, name, model, body=FullBody()):
         if body.law not in ("small", "large"):
             raise ValueError("%s: law is %r, must be 'small' or 'large'" % (name, body.law))
         self._scene, self._model, self._core, self.name = scene, model, _flexible.FullFeBody(), name
+        self._placed = body.position, body.rotation
+        scene._describe()
         fields = dict(vars(body), attachments=[a._fields() for a in body.attachments])
         self._core.add(scene._core, name, model._core, fields)
         scene._keep.append(model)
@@ -372,3 +398,9 @@ class FullFeBody:
     def write_field(self, run, file, time=None):
         """Displacements as a .vtu file."""
         self._core.write_field(run._open(), run.time if time is None else time, str(file))
+
+    def to_meshio(self, run, time=None):
+        """A meshio.Mesh of the body at a time within the last step: its undeformed nodes with their displacements. On one rank."""
+        m = self._model
+        placed = np.asarray(self._placed[0]) + m.coordinates @ np.asarray(self._placed[1]).T
+        return _mesh(m.comm, placed, m.elements, {"label": m.label, "displacement": self.positions(run, time) - placed})

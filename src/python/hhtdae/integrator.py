@@ -5,13 +5,14 @@ After ``import hhtdae`` the type is known to petsc4py. The problem is given by `
 """
 
 from dataclasses import dataclass
+from typing import Tuple
 
 from . import _core
 
-__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_role",
-           "get_rotation_factor", "interpolate", "move_back", "set_alpha", "set_checkpoint_vec", "set_coordinate_change",
-           "set_corrector_tolerance", "set_form", "set_predictor_degree", "set_radius", "set_reuse", "set_role", "set_rotations", "set_start",
-           "set_step_limit", "statistics"]
+__all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_order",
+           "get_role", "get_rotation_factor", "interpolate", "move_back", "set_alpha", "set_checkpoint_vec", "set_coordinate_change",
+           "set_corrector_tolerance", "set_form", "set_nodes", "set_order", "set_predictor_degree", "set_radius", "set_reuse", "set_role",
+           "set_rotations", "set_start", "set_step_limit", "statistics"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Statistics:
     tiny_steps: int       #: steps shorter than rounding allows the corrector
     h_min: float          #: smallest accepted step
     h_max: float          #: largest accepted step
+    of_order: Tuple[int, int, int, int] = (0, 0, 0, 0)  #: accepted steps of order 2, 3, 4, 5
 
 
 def set_form(ts, form):
@@ -58,6 +60,19 @@ def get_alpha(ts):
 def set_radius(ts, radius):
     """The generalized-alpha method of a spectral radius at infinity, 0 to 1, in place of HHT."""
     _core.set_radius(ts, radius)
+
+
+def set_order(ts, order):
+    """Order 2, HHT (the default); 3, 4 or 5, backward differentiation, for smooth or well damped motion alone; or "auto", from step to step the order
+    with which the next one may be longest, where the motion is smooth. Orders above 2 need the form "second_order"."""
+    if order != "auto" and order not in (2, 3, 4, 5):
+        raise ValueError("order is %r, must be 2, 3, 4, 5 or 'auto'" % (order,))
+    _core.set_order(ts, 0 if order == "auto" else order)
+
+
+def get_order(ts):
+    """The order, 2 to 5 or "auto"."""
+    return _core.get_order(ts) or "auto"
 
 
 def set_corrector_tolerance(ts, factor):
@@ -94,6 +109,27 @@ def set_role(ts, role, unknowns):
 def get_role(ts, role):
     """The index set of a role."""
     return _core.get_is(ts, role)
+
+
+def set_nodes(ts, nodes, reference=None):
+    """Says which unknowns belong to nodes of finite elements, for ``-pc_type hhtconstraint``; scenes do it themselves. Collective, after the Jacobian.
+
+    Parameters
+    ----------
+    nodes : petsc4py.PETSc.IS, (n, 3) array of int or None
+        Own unknowns by global number, those of a node one after the other (the block size of the IS); None takes back what was said.
+    reference : petsc4py.PETSc.Vec, optional
+        Where the nodes are when these unknowns are zero, in their rows.
+    """
+    import numpy as np
+    from petsc4py import PETSc
+
+    if nodes is not None and not isinstance(nodes, PETSc.IS):
+        nodes = np.atleast_2d(np.asarray(nodes, dtype=PETSc.IntType))
+        own = PETSc.IS().createGeneral(nodes.ravel(), comm=ts.getComm())
+        own.setBlockSize(nodes.shape[1])
+        nodes = own
+    _core.set_nodes(ts, nodes, reference)
 
 
 def set_start(ts, start):

@@ -1,8 +1,12 @@
 """Runs of a scene: everything that changes."""
 
+import os
+import shutil
+import tempfile
 import warnings
+import weakref
 from contextlib import contextmanager
-from typing import Any, Callable, Dict, Iterator
+from typing import Any, Callable, Dict, Iterator, Optional, Union
 
 import numpy as np
 from petsc4py import PETSc
@@ -10,6 +14,7 @@ from petsc4py import PETSc
 from . import _core, integrator
 from .events import Signs
 from .query import Linearization, Snapshot
+from .results import Channels, Page, Results
 
 __all__ = ["Run"]
 
@@ -37,12 +42,13 @@ def collect_garbage(comm):
         PETSc.garbage_cleanup(comm)
 
 
-class Run:
+class Run(Channels):
     """A run of a scene, made by `Scene.run` or `Scene.solve`.
 
     It is a PETSc time stepper, `ts`, with all of petsc4py: ``run.ts.getSNES().getKSP()``. Channels are arrays by name: ``run["tip"]`` at
     the times ``run.times``. Runs are independent of each other, and outlive changes of their scene. As a context manager the run is closed at the
-    end of the block, which frees its memory; that of a run which is dropped is freed when the next one is made.
+    end of the block, which frees its memory; that of a run which is dropped is freed when the next one is made. What it leaves, `results`, can be
+    pickled; a run that is pickled comes back as that.
 
     Attributes
     ----------
@@ -50,8 +56,10 @@ class Run:
     scene : Scene
     """
 
-    def __init__(self, scene, tolerance=None, sample=0., after=None, options=None):
-        self.scene, self.ts, self._recorder = scene, None, None
+    def __init__(self, scene, tolerance=None, sample=0., after=None, options=None, page=False):
+        self.scene, self.ts, self._recorder, self._left = scene, None, None, None
+        self._signature = list(scene._channels)
+        self._page = _PageFile(scene, page)
         if sample is not None and not sample >= 0:
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
         if tolerance is not None and not tolerance > 0:
@@ -70,7 +78,6 @@ class Run:
             else:
                 _core.attach_signals(self.ts)
             self.ts.setFromOptions()
-        self._names = [name for name, _ in scene._channels]
 
     def _open(self):
         if self.ts is None:
@@ -85,7 +92,7 @@ class Run:
         if until == ts.getTime():
             return self
         ts.setMaxTime(until)
-        with temporary_options(self._options):
+        with temporary_options(self._options), self._page.settings():
             if self._events:
                 self._solve_with_events(ts)
             else:
@@ -104,6 +111,7 @@ class Run:
         ...     torque.set(-gain * run.snapshot().value(error))
         """
         begin = self._open().getTime()
+        self._page.span = until - begin
         count = int(np.ceil((until - begin) / dt * (1 - 1e-12)))
         for k in range(1, count + 1):
             self.solve(until if k == count else begin + k * dt)
@@ -218,49 +226,37 @@ class Run:
     def values(self) -> np.ndarray:
         """All samples, (n, channels)."""
         values = self._recorder.values if self._recorder else np.empty(0)
-        return values if len(values) else np.empty((0, len(self._names)))
-
-    @property
-    def channels(self) -> Dict[str, np.ndarray]:
-        """All channels by name, with "time"."""
-        values = self.values
-        return {"time": self.times, **{name: values[:, k].copy() for k, name in enumerate(self._names)}}
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self._names:
-            raise KeyError("no channel is called %r; there are %s" % (name, ", ".join(self._names) or "none"))
-        return self.values[:, self._names.index(name)].copy()
+        return values if len(values) else np.empty((0, len(self._signature)))
 
     def sample(self, time: Any = None) -> Dict[str, float]:
         """Values of all channels at a time of the last step (default: its end), by name."""
         x = self.scene._core.sample(self._open(), self.time if time is None else time)
-        return dict(zip(self._names, x))
+        return dict(zip([name for name, _ in self._signature], x))
 
-    def frame(self):
-        """The channels as a pandas data frame over time."""
-        import pandas
+    @property
+    def results(self) -> Results:
+        """What the run has left until now, as arrays of its own: also of a closed run."""
+        time, steps, statistics = (self.time, self.steps, self.statistics) if self.ts is not None else self._left
+        return Results(self.times, self.values, time, steps, statistics, list(self._signature), self._page.text())
 
-        return pandas.DataFrame(self.values, columns=self._names, index=pandas.Index(self.times, name="time"))
+    def __reduce__(self):
+        left = self.results
+        return Results, tuple(vars(left).values())
 
-    def plot(self, *names: str, axes: Any = None) -> np.ndarray:
-        """Channels over time by matplotlib, all if none are named; returns the axes, one for each unit."""
-        import matplotlib.pyplot as plt
+    def page(self, height: int = 600) -> Page:
+        """The run until now in three dimensions, if frames were asked for by ``Scene.run(page=True)``: a notebook shows it below the cell.
 
-        chosen = [(n, u) for n, u in self.scene._channels if not names or n in names]
-        unknown = set(names) - {n for n, _ in chosen}
-        if unknown:
-            raise KeyError("no channel is called %s" % ", ".join(sorted(unknown)))
-        units = list(dict.fromkeys(u for _, u in chosen))
-        if axes is None:
-            _, axes = plt.subplots(max(1, len(units)), 1, sharex=True, squeeze=False)
-        axes = np.ravel(axes)
-        for name, unit in chosen:
-            axes[units.index(unit)].plot(self.times, self[name], label=name)
-        for a, unit in zip(axes, units):
-            a.set_ylabel(unit)
-            a.legend()
-        axes[-1].set_xlabel("time")
-        return axes
+        >>> scene.solve(2., page=True).page()
+
+        Parameters
+        ----------
+        height : int
+            In a notebook, pixels.
+        """
+        text = self._page.text()
+        if text is None:
+            raise ValueError("the run has no page, frames are recorded while it goes: Scene.run(page=True), or a file, before it; and only the first rank has it")
+        return Page(text, height)
 
     def snapshot(self, time: Any = None) -> Snapshot:
         """What the run is doing at a time of its last step, see `Snapshot`. Collective."""
@@ -286,6 +282,7 @@ class Run:
     def close(self) -> None:
         """Frees what PETSc has for the run; its samples stay."""
         if self.ts is not None:
+            self._left = self.time, self.steps, self.statistics
             self.ts.destroy()
             self.ts = None
 
@@ -297,3 +294,48 @@ class Run:
 
     def __repr__(self):
         return "<closed run>" if self.ts is None else "<run at t = %.6g, %d steps, %d samples>" % (self.time, self.steps, len(self.times))
+
+
+def _remove(folder, process):
+    """Not in copies of the process, which have a copy of the run"""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class _PageFile:
+    """Where a run writes its page: the user's file, or one of its own that goes with the run"""
+
+    def __init__(self, scene, page: Union[bool, str]):
+        self.scene, self.span, self.begun, self.temporary = scene, None, False, page is True
+        self.file: Optional[str] = None
+        if self.temporary:
+            folder = tempfile.mkdtemp(prefix="hhtdae-")
+            weakref.finalize(self, _remove, folder, os.getpid())
+            self.file = os.path.join(folder, "run.html")
+        elif page:
+            self.file = os.path.abspath(os.fspath(page))
+
+    @contextmanager
+    def settings(self):
+        """The scene's, with this file, where the run is first solved; options of the command line come after them"""
+        given = self.scene._output
+        own = dict(given)
+        if self.file:
+            own.update(page=self.file, page_title=given["page_title"] or ("run" if self.temporary else ""))
+        if self.span and not own["page_dt"]:
+            own["page_dt"] = self.span / own["page_frames"]
+        if not self.begun:
+            self.file = PETSc.Options().getString("scene_page", own["page"])
+        self.begun = True
+        try:
+            self.scene._set_page(own)
+            yield
+        finally:
+            self.scene._set_page(given)
+
+    def text(self) -> Optional[str]:
+        """None: there is none, or not on this rank"""
+        if not self.begun or not self.file or self.scene.comm.rank or not os.path.exists(self.file):
+            return None
+        with open(self.file, encoding="utf-8") as page:
+            return page.read()

@@ -11,6 +11,7 @@ from .elements import ELEMENTS
 from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
+from .recipe import Recipe
 from .spec import Formula, Spec, has_formula, plain
 from .tracing import time_function
 
@@ -29,6 +30,14 @@ class _Handle:
     def __repr__(self):
         return "<%s %s>" % (type(self).__name__, self.name)
 
+    def __reduce__(self):
+        return type(self)._of, (self._scene, self._id, self.name)
+
+    @classmethod
+    def _of(cls, scene, number, name):
+        """Where the scene has come from another process: scenes are numbered anew there"""
+        return cls(scene, (number, scene.ground._number), name)
+
 
 class Body(_Handle):
     """A body of a scene, the ground, or the frame of an attachment."""
@@ -46,16 +55,27 @@ class Body(_Handle):
 
     def attachment(self, name: str) -> "Body":
         """The frame of an attachment of a flexible body: a body for markers and shapes. It has no unknowns."""
+        self._scene._describe()
         return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
 
     def node(self, label: int) -> "Body":
         """The same at a node that the reduction has kept, by its number in the FE model."""
+        self._scene._describe()
         return Body(self._scene, self._scene._core.node(self, label), "%s.node %d" % (self.name, label))
 
     def shape(self, shape: Shape) -> "Body":
-        """Draws the body in animations."""
-        self._scene._begun = True
-        self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes)
+        """Draws the body in animations and pages."""
+        self._scene._describe()
+        self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes, shape._rgb())
+        return self
+
+    def surface(self, body: Any, stress_unit: str = "") -> "Body":
+        """Draws a flexible body in pages by the surface of its mesh, deformed, and coloured by stress where the `hhtdae.flexible.ReducedBody` has stress
+        modes; it must have kept its elements and the modes at all nodes. Collective."""
+        from . import flexible
+
+        self._scene._describe()
+        flexible._flexible.show(self._scene._core, self, body._core, stress_unit)
         return self
 
 
@@ -121,12 +141,23 @@ class Scene:
         self._parameters = {}
         self._states = 0
         self._begun = False  # whether there is more than parameters
+        self._edits = 0  # calls that have described something
+        self._recipe: Optional[Recipe] = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False, page="", page_title="", page_dt=0.,
                             page_frames=500, page_nodes=6000)
         self.ground = Body(self, self._core.ground(), "ground")
         if gravity is not None:
             self.set_gravity(gravity)
+
+    def _describe(self):
+        self._begun = True
+        self._edits += 1
+
+    def __reduce__(self):
+        if self._recipe is None:
+            raise TypeError("a scene refers to functions and objects of PETSc, which cannot be pickled: let a function of a module describe it, marked by @hhtdae.model")
+        return self._recipe.again, (self._recipe.state(self),)
 
     # ---- description ----
 
@@ -135,6 +166,7 @@ class Scene:
         number anywhere in the description."""
         if self._begun:
             raise ValueError("parameter %s came too late: parameters are made before everything else but gravity" % name)
+        self._edits += 1
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
         return p
 
@@ -145,10 +177,12 @@ class Scene:
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
+        self._edits += 1
         self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
 
     def ground_acceleration(self, x=0., y=0., z=0.) -> None:
         """Base excitation: the ground's acceleration along the space axes, functions of time. All coordinates are relative to the ground."""
+        self._describe()
         self._core.ground_acceleration(*(time_function(f, self._keep) for f in (x, y, z)))
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
@@ -190,7 +224,7 @@ class Scene:
         return what._fields(converted)
 
     def _enter(self, name, kind, given):
-        self._begun = True
+        self._describe()
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
                 return Body(self, enter(name, given), name)
@@ -204,7 +238,7 @@ class Scene:
         return function
 
     def _marker(self, body, position, axes, name, at):
-        self._begun = True
+        self._describe()
         place = lambda: (plain(position), np.eye(3) if axes is None else plain(axes))
         given = self._later(place) if has_formula(position) or has_formula(axes) else place()
         return Marker(self, self._core.marker(body, given, name, at), name or "on " + body.name)
@@ -228,13 +262,13 @@ class Scene:
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula."""
         _number(initial, "variable " + name)
-        self._begun = True
+        self._describe()
         return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
         _number(initial, "state " + name)
-        self._begun = True
+        self._describe()
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
@@ -244,12 +278,13 @@ class Scene:
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
-        self._begun = True
+        self._describe()
         self._core.channel(name, description(value, self._keep), unit)
         self._channels.append((name, unit))
 
     def line(self, *markers: Marker) -> None:
-        """A line through markers in animations, a spring for example."""
+        """A line through markers in animations and pages, a spring for example."""
+        self._edits += 1
         self._core.line(list(markers))
 
     def start(self, **policy):
@@ -303,7 +338,10 @@ class Scene:
         """
         self._choose(self._output, settings, "output")
         self._core.output(*[self._output[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
-        self._core.page(*[self._output[k] for k in ("page", "page_title", "page_dt", "page_frames", "page_nodes")])
+        self._set_page(self._output)
+
+    def _set_page(self, output):
+        self._core.page(*[output[k] for k in ("page", "page_title", "page_dt", "page_frames", "page_nodes")])
 
     @staticmethod
     def _choose(present, given, what, **choices):
@@ -326,7 +364,7 @@ class Scene:
         self._core.set_up()
 
     def run(self, tolerance: Optional[float] = None, sample: Optional[float] = 0., after: Optional[Run] = None,
-            options: Optional[Dict[str, Any]] = None) -> Run:
+            options: Optional[Dict[str, Any]] = None, page: Union[bool, str] = False) -> Run:
         """A run that has not begun: see `Run`. Collective.
 
         Parameters
@@ -339,12 +377,16 @@ class Scene:
             The run goes on where that one is, with parameters as they are now.
         options : dict, optional
             PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``; those of the command line win.
+        page : bool or str
+            Records frames for `Run.page`; a string names the file that they are written to, else it is a temporary one. Title, and number of frames or
+            time between them, are those of `output`.
         """
-        return Run(self, tolerance, sample, after, options)
+        return Run(self, tolerance, sample, after, options, page)
 
-    def solve(self, until: float, tolerance: Optional[float] = None, sample: Optional[float] = 0., options: Optional[Dict[str, Any]] = None) -> Run:
+    def solve(self, until: float, tolerance: Optional[float] = None, sample: Optional[float] = 0., options: Optional[Dict[str, Any]] = None,
+              page: Union[bool, str] = False) -> Run:
         """A run from the start to the time `until`: ``scene.run(...).solve(until)``."""
-        return self.run(tolerance, sample, None, options).solve(until)
+        return self.run(tolerance, sample, None, options, page).solve(until)
 
     def view(self, file: str = "") -> None:
         """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""

@@ -1,0 +1,80 @@
+"""How a scene comes into another process: the function that has described it is called there with the same arguments."""
+
+import functools
+from typing import Any, Callable, NamedTuple, Tuple, TypeVar
+
+__all__ = ["model"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def model(function: Function) -> Function:
+    """Marks a function of a module that describes a scene, so that the scene can be pickled: for processes of `multiprocessing`, for files.
+
+    The function returns the scene, or a tuple with the scene in it. Pickled are its arguments, present values of parameters, and the settings of
+    `Scene.start` and `Scene.output`; the scene is described anew where it is unpickled. Bodies, markers, elements and formulas of it can be pickled along.
+
+    >>> @hhtdae.model
+    ... def oscillator(mass=1.):
+    ...     scene = hhtdae.Scene()
+    ...     stiffness = scene.parameter("stiffness", 40.)
+    ...     ...
+    ...     return scene
+
+    >>> def job(scene):              # a run comes back as its Results
+    ...     return scene.solve(2., tolerance=1e-6)
+
+    >>> with multiprocessing.Pool() as pool:
+    ...     results = pool.map(job, [oscillator(mass) for mass in (1., 2., 3.)])
+    """
+
+    @functools.wraps(function)
+    def describe(*args, **keywords):
+        result = function(*args, **keywords)
+        Recipe(describe, args, keywords).mark(result)
+        return result
+
+    return describe
+
+
+class State(NamedTuple):
+    """What changes of a scene that is described"""
+    describe: Callable[..., Any]
+    args: Tuple[Any, ...]
+    keywords: dict
+    parameters: dict
+    start: dict
+    output: dict
+
+
+class Recipe:
+    """Kept by the scene that it has made"""
+
+    def __init__(self, describe, args, keywords):
+        self.describe, self.args, self.keywords = describe, args, keywords
+
+    def mark(self, result):
+        scene = _scene_of(result, self.describe)
+        scene._recipe, self.edits = self, scene._edits
+
+    def state(self, scene):
+        if scene._edits != self.edits:
+            raise TypeError("the scene of %s() cannot be pickled: it has been described further since then; let the function do it" % self.describe.__name__)
+        return State(self.describe, self.args, self.keywords, {name: p.get() for name, p in scene._parameters.items()}, dict(scene._start), dict(scene._output))
+
+    @staticmethod
+    def again(state):
+        scene = _scene_of(state.describe(*state.args, **state.keywords), state.describe)
+        scene.set(**state.parameters)
+        scene.start(**state.start)
+        scene.output(**state.output)
+        return scene
+
+
+def _scene_of(result, describe):
+    from .scene import Scene
+
+    found = [x for x in (result if isinstance(result, tuple) else (result,)) if isinstance(x, Scene)]
+    if len(found) != 1:
+        raise TypeError("%s() is marked by @hhtdae.model: it must return a scene, or a tuple with one, but returned %r" % (describe.__name__, result))
+    return found[0]
