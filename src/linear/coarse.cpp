@@ -27,28 +27,14 @@ PetscErrorCode Positions(Vec positions, CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-/* Nodes of three unknowns that nothing but nodes is coupled to; the rows of all others stand apart */
 PetscErrorCode Sort(const CoarseNodes &of, CoarseLevel *c)
 {
-  PetscInt begin, end;
+  PetscInt begin;
 
   PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(of.P, &begin, &end));
-  for (PetscInt i = begin, last; i < end; i = last) {
-    const PetscInt first = of.node[(size_t)(i - begin)];
-    bool           alone = first == i;
-    for (last = i + 1; alone && last < end && of.node[(size_t)(last - begin)] == first;) last++;
-    alone = alone && last == i + 3;
-    for (PetscInt k = i; alone && k < last; k++) {
-      PetscInt n;
-      PetscCall(MatGetRow(of.P, k, &n, NULL, NULL));
-      alone = n <= 3;
-      PetscCall(MatRestoreRow(of.P, k, &n, NULL, NULL));
-    }
-    if (alone) c->nodes.push_back({i, {0, 0, 0}});
-    else
-      for (PetscInt k = i; k < last; k++) c->apart.push_back(k);
-  }
+  PetscCall(MatGetOwnershipRange(of.A, &begin, NULL));
+  for (PetscInt first : of.nodes.alone) c->nodes.push_back({begin + first, {0, 0, 0}});
+  for (PetscInt row : of.nodes.apart) c->apart.push_back(begin + row);
   PetscFunctionReturn(0);
 }
 
@@ -223,9 +209,9 @@ PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c
   if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), most);
   Dissolve(c);
   PetscCall(FindMultipliers(of.multipliers, c));
-  PetscCall(MatGetLocalSize(of.P, &n, NULL));
+  PetscCall(MatGetLocalSize(of.A, &n, NULL));
   columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
-  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.P), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.A), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
   PetscCall(MatSetOption(c->R, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   PetscCall(MatCreateVecs(c->R, &c->residual, NULL));
   PetscCall(VecDuplicate(c->residual, &c->answer));

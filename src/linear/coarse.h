@@ -11,6 +11,7 @@
 #define HHTDAE_LINEAR_COARSE_H
 
 #include "inner.h"
+#include "matrix_nodes.h"
 #include <vector>
 
 struct CoarseLevel {
@@ -30,10 +31,10 @@ struct CoarseLevel {
 
 /* What is known of the unknowns of the matrix A */
 struct CoarseNodes {
-  const std::vector<PetscInt> &node;        /* of own rows the first row of their node, or -1 */
-  Mat                          P;           /* A without couplings among nodes */
-  Vec                          positions;   /* of nodes, in the rows of their unknowns */
-  IS                           multipliers; /* or NULL */
+  const MatrixNodes &nodes;
+  Mat                A;
+  Vec                positions;   /* of nodes, in the rows of their unknowns */
+  IS                 multipliers; /* or NULL */
 };
 
 /* Aggregates of at most so many nodes, each of nodes of one rank. Collective, as all of these. */
