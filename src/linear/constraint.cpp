@@ -23,6 +23,9 @@ struct Constraint {
   NodeProduct      product;
   PetscBool        single  = PETSC_TRUE;  /* wanted */
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
+  Vec              last_b = nullptr, last_x = nullptr; /* of the last solve with the matrix in its state `last` */
+  PetscObjectState last = -1;
+  PetscBool        had_guess = PETSC_FALSE; /* the user's initial guess, while a solve has ours */
   PetscInt         aggregate = in_aggregate;
   PetscObjectId    matrix    = 0;
   PetscObjectState pattern   = -1;
@@ -127,23 +130,58 @@ PetscErrorCode Apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(0);
 }
 
-/* Conjugate gradients need a first iterate on the constraints. A few digits take products of single precision. */
-PetscErrorCode PreSolve(PC pc, KSP ksp, Vec, Vec)
+/* Whether b is what was last solved for: a correction that has been looked at is then made (AskNextCorrection() of the integrator) */
+PetscErrorCode AsBefore(PC pc, const Constraint &c, Vec b, PetscBool *yes)
 {
-  const Constraint &c = Of(pc);
-  PetscBool         cg;
+  PetscObjectState state;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &state));
+  if (c.last_b && c.last == state) PetscCall(VecEqual(b, c.last_b, yes));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Remember(PC pc, Constraint &c, Vec b, Vec x)
+{
+  PetscFunctionBegin;
+  if (!c.last_b) {
+    PetscCall(VecDuplicate(b, &c.last_b));
+    PetscCall(VecDuplicate(x, &c.last_x));
+  }
+  PetscCall(VecCopy(b, c.last_b));
+  PetscCall(VecCopy(x, c.last_x));
+  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &c.last));
+  PetscFunctionReturn(0);
+}
+
+/* Conjugate gradients need a first iterate on the constraints: P^-1 b, or the answer to the same b. A few digits take products of single precision. */
+PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
+{
+  Constraint &c = Of(pc);
+  PetscBool   cg, as_before;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &cg, KSPCG, KSPFCG, KSPPIPECG, ""));
-  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_TRUE));
+  PetscCall(AsBefore(pc, c, b, &as_before));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &c.had_guess));
+  if (as_before) {
+    PetscCall(VecCopy(c.last_x, x));
+    PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
+  }
+  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, (PetscBool)!as_before));
   if (c.in_range && pc->mat == pc->pmat && ksp->rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode PostSolve(PC pc, KSP, Vec, Vec)
+PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
 {
+  Constraint &c = Of(pc);
+
   PetscFunctionBegin;
-  if (pc->mat == Of(pc).product.shell) PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, c.had_guess));
+  if (pc->mat == c.product.shell) PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
+  PetscCall(Remember(pc, c, b, x));
   PetscFunctionReturn(0);
 }
 
@@ -177,6 +215,8 @@ PetscErrorCode Reset(PC pc)
   PetscCall(FineDestroy(&c.fine));
   PetscCall(CoarseDestroy(&c.coarse));
   PetscCall(NodeProductDestroy(&c.product));
+  PetscCall(VecDestroy(&c.last_b));
+  PetscCall(VecDestroy(&c.last_x));
   c.matrix = 0;
   PetscFunctionReturn(0);
 }
