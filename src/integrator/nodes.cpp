@@ -72,37 +72,14 @@ PetscErrorCode TSHHT3SetNodes(TS ts, IS nodes, Vec reference)
 namespace hht3
 {
 
-namespace
-{
-
-PetscErrorCode TellMultipliers(TS ts, Mat P)
-{
-  const Integrator     &I = Get(ts);
-  std::vector<PetscInt> rows;
-  PetscInt              start;
-  IS                    multipliers;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(P, &start, NULL));
-  for (size_t i = 0; i < I.role.size(); i++)
-    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) rows.push_back(start + (PetscInt)i);
-  PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &multipliers));
-  PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
-  PetscCall(ISDestroy(&multipliers));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-} // namespace
-
 /* The matrix P has been evaluated at U: positions of its nodes, where they are asked for */
-PetscErrorCode TellPositions(TS ts, Mat P, Vec U)
+PetscErrorCode TellPositions(Mat P, Vec U)
 {
   Vec reference, positions;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)P, reference_name, (PetscObject *)&reference));
   if (!reference) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TellMultipliers(ts, P));
   PetscCall(PetscObjectQuery((PetscObject)P, LINEAR_POSITIONS, (PetscObject *)&positions));
   if (!positions) {
     PetscCall(VecDuplicate(U, &positions));

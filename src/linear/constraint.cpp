@@ -75,15 +75,13 @@ PetscErrorCode ReadOptions(PC pc, Constraint &c)
 PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *failed)
 {
   Vec positions;
-  IS  multipliers;
 
   PetscFunctionBegin;
   *failed = PETSC_FALSE;
   PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_POSITIONS, (PetscObject *)&positions));
-  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_MULTIPLIERS, (PetscObject *)&multipliers));
   if (c.aggregate <= 0 || !positions) PetscCall(CoarseDestroy(&c.coarse));
   else {
-    if (fresh || !c.coarse.R) PetscCall(CoarseCreate({c.nodes, pc->pmat, positions, multipliers}, c.aggregate, &c.coarse));
+    if (fresh || !c.coarse.R) PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate, &c.coarse));
     PetscCall(CoarseFill(pc, positions, &c.coarse, failed));
   }
   PetscFunctionReturn(0);
@@ -111,8 +109,8 @@ PetscErrorCode SetUp(PC pc)
   PetscCall(CheckType(pc));
   PetscCall(ReadOptions(pc, c));
   PetscCall(FindNodes(pc, c, &fresh));
-  PetscCall(FineFill(pc, c.nodes, fresh, &c.fine, &fine));
   PetscCall(SetUpCoarse(pc, c, fresh, &coarse));
+  PetscCall(FineFill(pc, c.nodes, (PetscBool)!!c.coarse.R, fresh, &c.fine, &fine));
   PetscCall(SetUpProduct(pc, c, fresh));
   pc->failedreason = fine || coarse ? PC_SUBPC_ERROR : PC_NOERROR;
   PetscFunctionReturn(0);

@@ -22,9 +22,8 @@
    Where there is none, consecutive rows with a diagonal entry and the same pattern are a node. */
 #define LINEAR_NODES "hhtdae_nodes"
 
-/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these, and an IS of the multipliers */
-#define LINEAR_POSITIONS   "hhtdae_positions"
-#define LINEAR_MULTIPLIERS "hhtdae_multipliers"
+/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these */
+#define LINEAR_POSITIONS "hhtdae_positions"
 
 PetscErrorCode LinearRegisterConstraint(void);
 

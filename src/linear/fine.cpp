@@ -78,6 +78,16 @@ template <class Use> PetscErrorCode ForRows(const LocalRows &A, const MatrixNode
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode DestroyApart(FineLevel *f)
+{
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&f->apart));
+  PetscCall(VecDestroy(&f->b));
+  PetscCall(VecDestroy(&f->x));
+  PetscCall(InnerDestroy(&f->inner));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode CreateApart(Mat A, const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
 {
   const PetscInt        n = (PetscInt)nodes.apart.size();
@@ -85,9 +95,7 @@ PetscErrorCode CreateApart(Mat A, const LocalRows &rows, const MatrixNodes &node
   std::vector<PetscInt> diagonal, off;
 
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&f->apart));
-  PetscCall(VecDestroy(&f->b));
-  PetscCall(VecDestroy(&f->x));
+  PetscCall(DestroyApart(f));
   PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)A)));
   if (!all) PetscFunctionReturn(0);
   PetscCall(Number(A, rows, nodes, f));
@@ -123,23 +131,21 @@ PetscErrorCode FillApart(const LocalRows &rows, const MatrixNodes &nodes, FineLe
 PetscErrorCode FineDestroy(FineLevel *f)
 {
   PetscFunctionBegin;
-  PetscCall(InnerDestroy(&f->inner));
-  PetscCall(MatDestroy(&f->apart));
-  PetscCall(VecDestroy(&f->b));
-  PetscCall(VecDestroy(&f->x));
+  PetscCall(DestroyApart(f));
   *f = FineLevel();
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool fresh, FineLevel *f, PetscBool *failed)
+PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, PetscBool fresh, FineLevel *f, PetscBool *failed)
 {
   LocalRows rows;
   PetscBool apart_failed = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(LinearLocalRows(pc->pmat, &rows));
-  if (fresh) PetscCall(CreateApart(pc->pmat, rows, nodes, f));
   PetscCall(FillInverses(rows, nodes, f, failed));
+  if (nodes_alone) PetscCall(DestroyApart(f));
+  else if (fresh || !f->apart) PetscCall(CreateApart(pc->pmat, rows, nodes, f));
   if (!f->apart) PetscFunctionReturn(0);
   PetscCall(FillApart(rows, nodes, f));
   PetscCall(InnerSetUp(pc, "constraint_", f->apart, fresh, &f->inner, &apart_failed));
@@ -171,7 +177,8 @@ PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, P
     PetscCall(VecGetArrayRead(f->x, &solved));
     for (size_t k = 0; k < nodes.apart.size(); k++) to[nodes.apart[k]] = solved[k];
     PetscCall(VecRestoreArrayRead(f->x, &solved));
-  }
+  } else
+    for (PetscInt row : nodes.apart) to[row] = 0;
   PetscCall(VecRestoreArrayWrite(y, &to));
   PetscCall(VecRestoreArrayRead(x, &from));
   PetscFunctionReturn(0);

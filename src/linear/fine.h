@@ -10,14 +10,14 @@
 
 struct FineLevel {
   std::vector<float>    inverse;      /* of each node of MatrixNodes::alone, 3 x 3 by rows */
-  Mat                   apart = nullptr; /* of the unknowns MatrixNodes::apart; NULL where there are none on any rank */
+  Mat                   apart = nullptr; /* of the unknowns MatrixNodes::apart; NULL where there are none on any rank, or another level has them */
   std::vector<PetscInt> number;       /* of columns (local_rows.h): their row of `apart`, or -1 */
   Vec                   b = nullptr, x = nullptr;
   InnerSolver           inner;
 };
 
-/* After each change of the values of pc->pmat. fresh: or of its pattern. *failed: it is singular, of this rank or all. Collective. */
-PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool fresh, FineLevel *f, PetscBool *failed);
+/* After each change of the values of pc->pmat. fresh: or of its pattern. nodes_alone: another level answers all else. *failed: it is singular, of this rank or all. Collective. */
+PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, PetscBool fresh, FineLevel *f, PetscBool *failed);
 PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, PetscBool *failed);
 PetscErrorCode FineDestroy(FineLevel *f);
 

@@ -48,16 +48,12 @@ protected:
   {
     Vec          positions;
     PetscScalar *place;
-    IS           multipliers;
     OK(MatCreateVecs(A, &positions, NULL));
     OK(VecGetArray(positions, &place));
     for (PetscInt i = 0; i < coordinates; i += 3) at(i / 3, place + i);
     OK(VecRestoreArray(positions, &place));
-    OK(ISCreateStride(PETSC_COMM_SELF, n - coordinates, coordinates, 1, &multipliers));
     OK(PetscObjectCompose((PetscObject)A, LINEAR_POSITIONS, (PetscObject)positions));
-    OK(PetscObjectCompose((PetscObject)A, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
     OK(VecDestroy(&positions));
-    OK(ISDestroy(&multipliers));
   }
   PetscInt iterationsWith(const char aggregate[])
   {
@@ -279,7 +275,7 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
   solver(KSPCG, 1e-6);
   OK(KSPGetPC(ksp, &pc));
   OK(PetscObjectQuery((PetscObject)A, LINEAR_POSITIONS, &positions));
-  OK(CoarseCreate({nodes, A, (Vec)positions, NULL}, n, &coarse));
+  OK(CoarseCreate({nodes, A, (Vec)positions}, n, &coarse));
   OK(CoarseFill(pc, (Vec)positions, &coarse, &failed));
   EXPECT_FALSE(failed);
   for (PetscInt i = 0; i < 6; i++)
