@@ -14,7 +14,8 @@ namespace
 {
 
 constexpr PetscInt  in_aggregate = 200;  /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
-constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision, whose rounding the condition of the preconditioned matrix, 1e3, multiplies */
+constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
+constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
 struct Constraint {
   MatrixNodes      nodes;
@@ -23,6 +24,7 @@ struct Constraint {
   NodeProduct      product;
   PetscBool        single  = PETSC_TRUE;  /* wanted */
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
+  PetscBool        measured = PETSC_FALSE; /* what it leaves of this matrix' solves */
   Vec              last_b = nullptr, last_x = nullptr; /* of the last solve with the matrix in its state `last` */
   PetscObjectState last = -1;
   PetscBool        had_guess = PETSC_FALSE; /* the user's initial guess, while a solve has ours */
@@ -68,7 +70,7 @@ PetscErrorCode ReadOptions(PC pc, Constraint &c)
   PetscFunctionBegin;
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
   PetscCall(PetscOptionsGetInt(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_aggregate", &c.aggregate, NULL));
-  PetscCall(PetscOptionsGetBool(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_single", &c.single, NULL));
+  if (!pc->setupcalled) PetscCall(PetscOptionsGetBool(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_single", &c.single, NULL));
   PetscFunctionReturn(0);
 }
 
@@ -90,7 +92,7 @@ PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *fai
 PetscErrorCode SetUpProduct(PC pc, Constraint &c, PetscBool fresh)
 {
   PetscFunctionBegin;
-  c.in_range = PETSC_FALSE;
+  c.in_range = c.measured = PETSC_FALSE;
   if (!c.single || !c.nodes.threes || pc->mat != pc->pmat) {
     PetscCall(NodeProductDestroy(&c.product));
     PetscFunctionReturn(0);
@@ -160,6 +162,7 @@ PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
   PetscBool   cg, as_before;
 
   PetscFunctionBegin;
+  PetscCall(PCSetUp(pc)); /* KSPSetUp() leaves it to the first PCApply() where nobody has set the operators again */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &cg, KSPCG, KSPFCG, KSPPIPECG, ""));
   PetscCall(AsBefore(pc, c, b, &as_before));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &c.had_guess));
@@ -172,13 +175,42 @@ PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(0);
 }
 
+/* After the first solve with a matrix, and one that failed: where rounding of the products in single precision is what is left, double precision from now on */
+PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
+{
+  Vec       in_single, in_double;
+  PetscReal left, rounding;
+
+  PetscFunctionBegin;
+  if (c.measured && ksp->reason > 0) PetscFunctionReturn(0);
+  c.measured = PETSC_TRUE;
+  PetscCall(VecDuplicate(b, &in_single));
+  PetscCall(VecDuplicate(b, &in_double));
+  PetscCall(MatMult(c.product.shell, x, in_single));
+  PetscCall(MatMult(pc->pmat, x, in_double));
+  PetscCall(VecAXPY(in_double, -1, in_single));
+  PetscCall(VecAYPX(in_single, -1, b));
+  PetscCall(VecNorm(in_double, NORM_2, &rounding));
+  PetscCall(VecNorm(in_single, NORM_2, &left));
+  PetscCall(VecDestroy(&in_single));
+  PetscCall(VecDestroy(&in_double));
+  if (ksp->reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
+  c.single = c.in_range = PETSC_FALSE;
+  PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
+                      KSPConvergedReasons[ksp->reason]));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
 {
   Constraint &c = Of(pc);
 
   PetscFunctionBegin;
   PetscCall(KSPSetInitialGuessNonzero(ksp, c.had_guess));
-  if (pc->mat == c.product.shell) PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
+  if (pc->mat == c.product.shell) {
+    PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
+    PetscCall(Measure(pc, ksp, c, b, x));
+  }
   PetscCall(Remember(pc, c, b, x));
   PetscFunctionReturn(0);
 }
@@ -198,7 +230,7 @@ PetscErrorCode View(PC pc, PetscViewer viewer)
   PetscCall(MatGetInfo(pc->pmat, MAT_GLOBAL_SUM, &all));
   if (c.fine.apart) PetscCall(MatGetInfo(c.fine.apart, MAT_GLOBAL_SUM, &kept));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g\n", nodes, (double)kept.nz_used + 9. * (double)alone, (double)all.nz_used));
-  if (c.in_range) PetscCall(PetscViewerASCIIPrintf(viewer, "  products with nodes in single precision, at relative tolerances from %g on\n", (double)few_digits));
+  PetscCall(PetscViewerASCIIPrintf(viewer, c.in_range ? "  products with nodes in single precision, at relative tolerances from %g on\n" : "  products in double precision\n", (double)few_digits));
   if (c.fine.apart) PetscCall(PetscViewerASCIIPrintf(viewer, "  inverses of %" PetscInt_FMT " nodes; all else: %s\n", alone, c.fine.inner.choice.text));
   if (c.fine.apart) PetscCall(InnerView(c.fine.inner, viewer));
   if (c.coarse.A) PetscCall(CoarseView(c.coarse, viewer));
