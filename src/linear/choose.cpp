@@ -473,7 +473,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
-  PetscCall(LinearLoosen(ksp));
+  PetscCall(LinearLoosen(ksp, choice));
   PetscCall(NoteRefinement(pc, choice));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);

@@ -210,6 +210,10 @@ static PetscErrorCode Run()
   FullFeBody fe;
   PetscCall(ReadSolidBeam(c.block, &model));
   PetscCall(Build(c, model, scene, &fe));
+  if (c.law == FeLaw::Large && !c.blocks) { /* the body has its elements */
+    PetscCall(MatDestroy(&model.K));
+    PetscCall(MatDestroy(&model.M));
+  }
   PetscCall(scene.createTS(&ts));
   if (c.blocks && c.held == FREE) PetscCall(TellBlocks(ts, model.K));
   PetscCall(TSSetMaxTime(ts, 100 * c.steps * c.part * Period(c)));
