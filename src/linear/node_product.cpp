@@ -162,19 +162,26 @@ PetscErrorCode InRange(Mat A, const NodeProduct &p, PetscBool *yes)
 /* Whether couplings between own nodes are symmetric: z^T A w = w^T A z for pseudo-random z and w */
 PetscErrorCode NodesAreSymmetric(const LocalRows &A, const std::vector<PetscInt> &node, bool *yes)
 {
-  double one = 0, other = 0, size = 0;
+  double              one = 0, other = 0, size = 0;
+  std::vector<double> z((size_t)A.own), w((size_t)A.own);
 
   PetscFunctionBegin;
+  for (size_t i = 0; i < z.size(); i++) {
+    z[i] = LinearPseudoRandomValue((uint64_t)i, 1);
+    w[i] = LinearPseudoRandomValue((uint64_t)i, 2);
+  }
   for (PetscInt i = 0; i < A.own; i++) {
     if (node[(size_t)i] < 0) continue;
-    const double zi = LinearPseudoRandomValue((uint64_t)i, 1), wi = LinearPseudoRandomValue((uint64_t)i, 2);
+    double zA = 0, wA = 0;
     PetscCall(A.forRow(i, [&](PetscInt c, PetscScalar v) {
       if (c >= A.own || node[(size_t)c] < 0) return;
       const double a = PetscRealPart(v);
-      one += zi * a * LinearPseudoRandomValue((uint64_t)c, 2);
-      other += wi * a * LinearPseudoRandomValue((uint64_t)c, 1);
+      zA += a * w[(size_t)c];
+      wA += a * z[(size_t)c];
       size += std::abs(a);
     }));
+    one += z[(size_t)i] * zA;
+    other += w[(size_t)i] * wA;
   }
   *yes = std::abs(one - other) <= rounding * size;
   PetscFunctionReturn(0);

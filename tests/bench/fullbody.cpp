@@ -110,8 +110,17 @@ static PetscErrorCode TellBlocks(TS ts, Mat K)
 /* ---- results ---- */
 
 struct Clock {
-  PetscLogDouble   run = 0, start = 0; /* the run, its second step */
+  PetscLogDouble   run = 0, start = 0;         /* the run, its second step */
+  double           run_cpu = 0, start_cpu = 0; /* the same in processor time of the rank */
   TSHHT3Statistics first = {};
+
+  static double cpu()
+  {
+    rusage use;
+    getrusage(RUSAGE_SELF, &use);
+    return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) +
+           1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
+  }
 
   /* the first step has ended */
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal, Vec, void *ctx)
@@ -120,6 +129,7 @@ struct Clock {
     PetscFunctionBegin;
     if (step != 1) PetscFunctionReturn(0);
     PetscCall(PetscTime(&c->start));
+    c->start_cpu = cpu();
     PetscCall(TSHHT3GetStatistics(ts, &c->first));
     PetscFunctionReturn(0);
   }
@@ -168,9 +178,10 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   Mat              P;
   MatInfo          info;
   std::string      solver;
-  double           most, all;
+  double           most, all, cpu[2] = {clock.start_cpu - clock.run_cpu, Clock::cpu() - clock.start_cpu};
   PetscFunctionBeginUser;
   PetscCall(PetscTime(&now));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, cpu, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &ranks));
   PetscCall(TSHHT3GetStatistics(ts, &s));
   PetscCall(TSGetSolution(ts, &U));
@@ -186,13 +197,14 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
       "%d rank(s), %" PetscInt_FMT " unknowns, %.3g entries of the matrix, %s; law %s\n"
       "  reading, assembly and set-up %.2f s, first step %.2f s\n"
       "  %.3f s per step (%g steps); per 100 steps: %.0f corrector iterations, %.0f matrices, %.0f factorizations\n"
+      "  processor time of a rank: first step %.2f s, then %.3f s per step\n"
       "  iterations of the linear solver per solve %.1f; rejected %" PetscInt_FMT ", corrector failures %" PetscInt_FMT
       "\n  memory at most %.0f MB on a rank, %.0f MB on all\n",
       ranks, unknowns, info.nz_used, solver.c_str(), c.law == FeLaw::Small ? "small" : "large", building,
       clock.start - clock.run, (now - clock.start) / n, (double)n, 100 * (double)(s.newton - clock.first.newton) / n,
       100 * (double)(s.jacobians - clock.first.jacobians) / n,
       100 * (double)(s.factorizations - clock.first.factorizations) / n,
-      (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
+      cpu[0], cpu[1] / n, (double)iterations / (double)PetscMax(s.solves, 1), s.rejected, s.corrector_fails, most, all));
   PetscFunctionReturn(0);
 }
 
@@ -226,7 +238,8 @@ static PetscErrorCode Run()
   PetscCall(TSSetFromOptions(ts));
   PetscCall(TSMonitorSet(ts, Clock::monitor, &clock, nullptr));
   PetscCall(PetscTime(&built));
-  clock.run = built;
+  clock.run     = built;
+  clock.run_cpu = Clock::cpu();
   PetscCall(scene.solve(ts));
   PetscCall(Report(ts, c, clock, built - start));
   PetscCall(TSDestroy(&ts));
