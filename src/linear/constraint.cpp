@@ -1,5 +1,5 @@
 /*
-  The preconditioner "hhtconstraint", constraint.h. Its solver of P has the prefix "constraint_" after that of the preconditioner's own options,
+  The preconditioner "hhtconstraint", constraint.h. The solver of its fine level has the prefix "constraint_" after that of the preconditioner's own options,
   and is chosen as any other direct solver where the user chooses none.
 */
 #include "constraint.h"
@@ -7,13 +7,13 @@
 #include "fine.h"
 #include "linear.h"
 #include "node_product.h"
-#include <petsc/private/kspimpl.h>
 #include <petsc/private/pcimpl.h>
 
 namespace
 {
 
 constexpr PetscInt  in_aggregate = 200;  /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
+constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good as 200 at 100,000, and half the time of coarse solves at 350,000 */
 constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
 constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
@@ -28,7 +28,7 @@ struct Constraint {
   Vec              last_b = nullptr, last_x = nullptr; /* of the last solve with the matrix in its state `last` */
   PetscObjectState last = -1;
   PetscBool        had_guess = PETSC_FALSE; /* the user's initial guess, while a solve has ours */
-  PetscInt         aggregate = in_aggregate;
+  PetscInt         aggregate = PETSC_DECIDE;
   PetscObjectId    matrix    = 0;
   PetscObjectState pattern   = -1;
 };
@@ -57,7 +57,10 @@ PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
   *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern);
-  if (*fresh) PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
+  if (*fresh) {
+    PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
+    c.last = -1;
+  }
   c.matrix  = id;
   c.pattern = pattern;
   PetscFunctionReturn(0);
@@ -76,14 +79,19 @@ PetscErrorCode ReadOptions(PC pc, Constraint &c)
 
 PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *failed)
 {
-  Vec positions;
+  Vec      positions;
+  PetscInt nodes;
 
   PetscFunctionBegin;
   *failed = PETSC_FALSE;
   PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_POSITIONS, (PetscObject *)&positions));
-  if (c.aggregate <= 0 || !positions) PetscCall(CoarseDestroy(&c.coarse));
+  if (!c.aggregate || !positions) PetscCall(CoarseDestroy(&c.coarse));
   else {
-    if (fresh || !c.coarse.R) PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate, &c.coarse));
+    if (fresh || !c.coarse.R) {
+      nodes = c.nodes.count;
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
+      PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate > 0 ? c.aggregate : nodes < large ? in_aggregate : in_large, &c.coarse));
+    }
     PetscCall(CoarseFill(pc, positions, &c.coarse, failed));
   }
   PetscFunctionReturn(0);
@@ -142,9 +150,14 @@ PetscErrorCode AsBefore(PC pc, const Constraint &c, Vec b, PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Remember(PC pc, Constraint &c, Vec b, Vec x)
+PetscErrorCode Remember(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
 {
+  KSPConvergedReason reason;
+
   PetscFunctionBegin;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  c.last = -1;
+  if (reason < 0) PetscFunctionReturn(0);
   if (!c.last_b) {
     PetscCall(VecDuplicate(b, &c.last_b));
     PetscCall(VecDuplicate(x, &c.last_x));
@@ -159,6 +172,7 @@ PetscErrorCode Remember(PC pc, Constraint &c, Vec b, Vec x)
 PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
 {
   Constraint &c = Of(pc);
+  PetscReal   rtol;
   PetscBool   cg, as_before;
 
   PetscFunctionBegin;
@@ -171,18 +185,21 @@ PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
     PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
   }
   if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, (PetscBool)!as_before));
-  if (c.in_range && pc->mat == pc->pmat && ksp->rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
+  PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
+  if (c.in_range && pc->mat == pc->pmat && rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
   PetscFunctionReturn(0);
 }
 
 /* After the first solve with a matrix, and one that failed: where rounding of the products in single precision is what is left, double precision from now on */
 PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
 {
-  Vec       in_single, in_double;
-  PetscReal left, rounding;
+  Vec                in_single, in_double;
+  PetscReal          left, rounding;
+  KSPConvergedReason reason;
 
   PetscFunctionBegin;
-  if (c.measured && ksp->reason > 0) PetscFunctionReturn(0);
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (c.measured && reason > 0) PetscFunctionReturn(0);
   c.measured = PETSC_TRUE;
   PetscCall(VecDuplicate(b, &in_single));
   PetscCall(VecDuplicate(b, &in_double));
@@ -194,10 +211,10 @@ PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
   PetscCall(VecNorm(in_single, NORM_2, &left));
   PetscCall(VecDestroy(&in_single));
   PetscCall(VecDestroy(&in_double));
-  if (ksp->reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
+  if (reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
   c.single = c.in_range = PETSC_FALSE;
   PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
-                      KSPConvergedReasons[ksp->reason]));
+                      KSPConvergedReasons[reason]));
   PetscFunctionReturn(0);
 }
 
@@ -211,7 +228,7 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
     PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
     PetscCall(Measure(pc, ksp, c, b, x));
   }
-  PetscCall(Remember(pc, c, b, x));
+  PetscCall(Remember(pc, ksp, c, b, x));
   PetscFunctionReturn(0);
 }
 

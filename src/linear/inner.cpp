@@ -18,6 +18,7 @@ PetscErrorCode Create(PC pc, const char name[], InnerSolver *s)
   PetscCall(KSPAppendOptionsPrefix(s->ksp, name));
   PetscCall(KSPSetErrorIfNotConverged(s->ksp, PETSC_FALSE));
   PetscCall(LinearDefaults(s->ksp, &s->choice));
+  s->choice.many_solves = PETSC_TRUE;
   PetscCall(KSPSetFromOptions(s->ksp));
   PetscFunctionReturn(0);
 }
