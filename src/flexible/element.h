@@ -9,7 +9,7 @@
 #ifndef HHTDAE_FLEXIBLE_ELEMENT_H
 #define HHTDAE_FLEXIBLE_ELEMENT_H
 
-#include "flexible/element_shapes.h"
+#include "flexible/element_points.h"
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -236,12 +236,17 @@ double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, cons
   constexpr int                             n     = Shape::nodes;
   const auto                               &table = Table<Shape, Rule>::get();
   double                                    least = std::numeric_limits<double>::infinity();
+  if (!tangent) {
+    double W;
+    least = InternalForce<Shape>(X.data(), u.data(), lame.lambda, lame.mu, force.data(), &W);
+    if (energy) *energy = W;
+    return least * InverseExtent<Shape>(X);
+  }
   Eigen::Matrix<double, 3 * n, Rule::count> all;
   std::array<Mass<Shape>, 6>                symmetric; /* xx, yy, zz, xy, yz, zx */
   force.setZero();
   if (energy) *energy = 0;
-  if (tangent)
-    for (Mass<Shape> &C : symmetric) C.setZero();
+  for (Mass<Shape> &C : symmetric) C.setZero();
   for (int q = 0; q < Rule::count; q++) {
     Gradients<n> G;
     const double det = SpatialGradients<Shape, Rule>(X, q, G), w = std::max(det, 0.) * table.points.weight[q];
@@ -253,7 +258,6 @@ double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, cons
     const Eigen::Matrix3d P = w * F * S;
     force.noalias() += P * G;
     if (energy) *energy += w * (lame.lambda / 2 * E.trace() * E.trace() + lame.mu * E.squaredNorm());
-    if (!tangent) continue;
     const Gradients<n> h = std::sqrt(w) * F * G, SG = w * S * G;
     all.col(q)               = Eigen::Map<const Eigen::Matrix<double, 3 * n, 1>>(h.data());
     const Eigen::Matrix3d FF = w * lame.mu * F * F.transpose();
@@ -263,7 +267,6 @@ double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, cons
       symmetric[3 + d] += FF(d, (d + 1) % 3) * GG;
     }
   }
-  if (!tangent) return least * InverseExtent<Shape>(X);
   tangent->noalias() = all * all.transpose();
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {

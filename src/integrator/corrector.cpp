@@ -38,7 +38,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
     PetscCall(Predict(ts, I.X));
     PetscCall(Iterate(ts, converged));
   }
-  c.matrix.learn(*converged, retry, c.xi_max, c);
+  c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
     /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what steps since the last
        failure have shown to work */

@@ -198,7 +198,7 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
   Get(ts).stat.jacobians++;
   if (Get(ts).differences) PetscCall(DifferencesJacobian(ts, t, U, V, A, sv, sa, P));
   else PetscCall(TSComputeI2Jacobian(ts, t, U, V, A, sv, sa, J, P));
-  PetscCall(TellPositions(ts, P, U));
+  PetscCall(TellPositions(P, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -268,7 +268,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
                                    tol < c.c ? " (small, as little of the multipliers' oscillation is damped)" : "", c.max_it));
   if (I.constraints() && p.rho == 1) PetscCall(PetscViewerASCIIPrintf(viewer, "the multipliers' oscillation is not damped at all\n"));
   if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
-  else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.slow_rate, (double)c.hold));
+  else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.of(I.linear.constraint).slow_rate, (double)c.hold));
   PetscCall(ViewClaims(ts, viewer));
   PetscCall(ViewDriven(ts, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));

@@ -390,7 +390,7 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 /* nodes.cpp */
-PetscErrorCode TellPositions(TS ts, Mat P, Vec U);
+PetscErrorCode TellPositions(Mat P, Vec U);
 /* verify.cpp */
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
 /* driven.cpp */

@@ -47,8 +47,11 @@ PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
   where a factorization of the whole matrix has no room. Its own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
   but for multipliers, are taken for a node. Scenes make the call themselves.
 
-  Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, move together as a rigid body on a coarse level, whose solver has the prefix
+  Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, 400 where there are more than 200,000, move together as a rigid body on a coarse level, whose solver has the prefix
   `coarse_`; with 0 there is none.
+
+  At relative tolerances (`-ksp_rtol`) from 1e-4 on the Krylov method's products are of single precision in what couples nodes of three unknowns, `-pc_hhtconstraint_single <true>`; where
+  rounding would be a tenth of what a solve leaves they are of double precision.
 
 .seealso: `TSHHT3`, `TSSetI2Jacobian()`
 @*/
@@ -72,37 +75,14 @@ PetscErrorCode TSHHT3SetNodes(TS ts, IS nodes, Vec reference)
 namespace hht3
 {
 
-namespace
-{
-
-PetscErrorCode TellMultipliers(TS ts, Mat P)
-{
-  const Integrator     &I = Get(ts);
-  std::vector<PetscInt> rows;
-  PetscInt              start;
-  IS                    multipliers;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(P, &start, NULL));
-  for (size_t i = 0; i < I.role.size(); i++)
-    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) rows.push_back(start + (PetscInt)i);
-  PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &multipliers));
-  PetscCall(PetscObjectCompose((PetscObject)P, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
-  PetscCall(ISDestroy(&multipliers));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-} // namespace
-
 /* The matrix P has been evaluated at U: positions of its nodes, where they are asked for */
-PetscErrorCode TellPositions(TS ts, Mat P, Vec U)
+PetscErrorCode TellPositions(Mat P, Vec U)
 {
   Vec reference, positions;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)P, reference_name, (PetscObject *)&reference));
   if (!reference) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TellMultipliers(ts, P));
   PetscCall(PetscObjectQuery((PetscObject)P, LINEAR_POSITIONS, (PetscObject *)&positions));
   if (!positions) {
     PetscCall(VecDuplicate(U, &positions));

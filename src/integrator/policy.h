@@ -12,6 +12,16 @@ struct ReuseOptions {
   PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
   PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
   PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
+  PetscBool given     = PETSC_FALSE; /* by the user */
+
+  /* The same where a matrix costs no factorization, but as much as a few solves: with 0.25 a step of fullbody of tests/bench takes 9 corrections in place of 5 */
+  static constexpr PetscReal slow_rate_without_factor = 0.1;
+  ReuseOptions of(bool without_factor) const
+  {
+    ReuseOptions o = *this;
+    if (without_factor && !given) o.slow_rate = slow_rate_without_factor;
+    return o;
+  }
 };
 
 /* The Newton matrix, what its use has shown, and whether the next correction gets another one */

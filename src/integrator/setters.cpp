@@ -106,6 +106,7 @@ PetscErrorCode SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal hold)
   c.ratio     = ratio;
   c.slow_rate = rate;
   c.hold      = hold;
+  c.given     = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

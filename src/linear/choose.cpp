@@ -20,6 +20,9 @@ static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6;
 #endif
 static const double LARGE_PER_ENTRY = 40;
 
+/* Where hundreds of solves follow a factorization the time of a solve counts, in which MUMPS has the greater overhead: coarse matrices of 308,028 and 1,043,130 unknowns (README.md) */
+static const double MANY_SOLVES = 30;
+
 /*
   Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.
   Both are weighed by operations on one rank, in units of KLU's, of one factorization and three solves: dense ones cost a
@@ -169,7 +172,7 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, Size *size)
 }
 
 /* By counting; with rows elsewhere only the packages for distributed matrices come into question */
-static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
+static PetscErrorCode Measure(Mat P, PetscBool symmetric, PetscBool many_solves, Size *size)
 {
   PetscMPIInt     processes;
   MatInfo         info;
@@ -205,7 +208,7 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, Size *size)
   PetscCall(ISRestoreIndices(row, &order));
   PetscCall(ISDestroy(&row));
   PetscCall(ISDestroy(&col));
-  const double threshold = symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC;
+  const double threshold = (symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC) * (many_solves ? MANY_SOLVES : 1);
   const double per_entry = size->work.flops / PetscMax(size->work.factor, 1.0);
   size->single = (PetscBool)!bounded;
   size->large = !bounded || (size->work.flops > threshold && per_entry > LARGE_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
@@ -381,7 +384,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
     PetscFunctionReturn(0);
   }
-  PetscCall(Measure(P, symmetric, &size));
+  PetscCall(Measure(P, symmetric, choice->many_solves, &size));
   if (!choice->user_pc) {
     /* LDL^T where it halves a large work and a package for indefinite matrices is there */
     PetscBool indefinite = PETSC_FALSE;
@@ -477,7 +480,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
-  PetscCall(LinearLoosen(ksp));
+  PetscCall(LinearLoosen(ksp, choice));
   PetscCall(NoteRefinement(pc, choice));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);

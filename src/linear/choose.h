@@ -6,8 +6,8 @@
 
 PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given);
 
-/* The tolerance of a Krylov method with hhtconstraint, where nobody has set one */
-PetscErrorCode LinearLoosen(KSP ksp);
+/* Whether hhtconstraint is in use, and the tolerance of its Krylov method where nobody has set one */
+PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice);
 
 /* The Krylov method in place of a factor, where no option names one */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice);

@@ -27,28 +27,14 @@ PetscErrorCode Positions(Vec positions, CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-/* Nodes of three unknowns that nothing but nodes is coupled to; the rows of all others stand apart */
 PetscErrorCode Sort(const CoarseNodes &of, CoarseLevel *c)
 {
-  PetscInt begin, end;
+  PetscInt begin;
 
   PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(of.P, &begin, &end));
-  for (PetscInt i = begin, last; i < end; i = last) {
-    const PetscInt first = of.node[(size_t)(i - begin)];
-    bool           alone = first == i;
-    for (last = i + 1; alone && last < end && of.node[(size_t)(last - begin)] == first;) last++;
-    alone = alone && last == i + 3;
-    for (PetscInt k = i; alone && k < last; k++) {
-      PetscInt n;
-      PetscCall(MatGetRow(of.P, k, &n, NULL, NULL));
-      alone = n <= 3;
-      PetscCall(MatRestoreRow(of.P, k, &n, NULL, NULL));
-    }
-    if (alone) c->nodes.push_back({i, {0, 0, 0}});
-    else
-      for (PetscInt k = i; k < last; k++) c->apart.push_back(k);
-  }
+  PetscCall(MatGetOwnershipRange(of.A, &begin, NULL));
+  for (PetscInt first : of.nodes.alone) c->nodes.push_back({begin + first, {0, 0, 0}});
+  for (PetscInt row : of.nodes.apart) c->apart.push_back(begin + row);
   PetscFunctionReturn(0);
 }
 
@@ -133,20 +119,6 @@ void Dissolve(CoarseLevel *c)
   c->first.swap(first);
 }
 
-PetscErrorCode FindMultipliers(IS multipliers, CoarseLevel *c)
-{
-  const PetscInt *row;
-  PetscInt        n;
-
-  PetscFunctionBegin;
-  if (!multipliers) PetscFunctionReturn(0);
-  PetscCall(ISGetLocalSize(multipliers, &n));
-  PetscCall(ISGetIndices(multipliers, &row));
-  for (PetscInt k = 0; k < n; k++) c->multipliers.push_back((PetscInt)(std::lower_bound(c->apart.begin(), c->apart.end(), row[k]) - c->apart.begin()));
-  PetscCall(ISRestoreIndices(multipliers, &row));
-  PetscFunctionReturn(0);
-}
-
 /* ---- the matrices ---- */
 
 /* Rows of R of an aggregate whose columns begin with `column`: its translations, and its rotations about the centre in units of its size */
@@ -185,18 +157,6 @@ PetscErrorCode FillR(CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-/* Zeros in the places of multipliers */
-PetscErrorCode WithoutMultipliers(const CoarseLevel &c, Vec x)
-{
-  PetscScalar *entry;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArray(x, &entry));
-  for (PetscInt i : c.multipliers) entry[i] = 0;
-  PetscCall(VecRestoreArray(x, &entry));
-  PetscFunctionReturn(0);
-}
-
 } // namespace
 
 PetscErrorCode CoarseDestroy(CoarseLevel *c)
@@ -222,10 +182,9 @@ PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c
   c->first.push_back(0);
   if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), most);
   Dissolve(c);
-  PetscCall(FindMultipliers(of.multipliers, c));
-  PetscCall(MatGetLocalSize(of.P, &n, NULL));
+  PetscCall(MatGetLocalSize(of.A, &n, NULL));
   columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
-  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.P), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.A), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
   PetscCall(MatSetOption(c->R, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   PetscCall(MatCreateVecs(c->R, &c->residual, NULL));
   PetscCall(VecDuplicate(c->residual, &c->answer));
@@ -248,9 +207,7 @@ PetscErrorCode CoarseAdd(CoarseLevel *c, Vec x, Vec y, PetscBool *failed)
 {
   PetscFunctionBegin;
   PetscCall(MatMultTranspose(c->R, x, c->residual));
-  PetscCall(WithoutMultipliers(*c, c->residual));
   PetscCall(InnerSolve(&c->inner, c->residual, c->answer, failed));
-  PetscCall(WithoutMultipliers(*c, c->answer));
   PetscCall(MatMultAdd(c->R, c->answer, y, y));
   PetscFunctionReturn(0);
 }

@@ -4,13 +4,14 @@
     R A_c^-1 R^T,    A_c = R^T A R.
 
   Columns of R are three translations and three rotations of each aggregate of nodes, and one for every unknown that belongs to none: rigid bodies,
-  modes, multipliers, and nodes that are coupled to these. So constraints keep their full rank, and what the level adds satisfies them. A motion of
+  modes, multipliers, and nodes that are coupled to these. So constraints keep their full rank, what the level answers satisfies them, and the fine level has nothing to do there. A motion of
   the whole body, which the other level brings along by one node in an iteration, it finds at once (Nicolaides, SIAM J. Numer. Anal. 24, 1987, 355-365).
 */
 #ifndef HHTDAE_LINEAR_COARSE_H
 #define HHTDAE_LINEAR_COARSE_H
 
 #include "inner.h"
+#include "matrix_nodes.h"
 #include <vector>
 
 struct CoarseLevel {
@@ -25,22 +26,20 @@ struct CoarseLevel {
   std::vector<Node>     nodes;       /* that move with an aggregate, one aggregate after the other */
   std::vector<PetscInt> first;       /* node of each aggregate, and the number of nodes */
   std::vector<PetscInt> apart;       /* rows of all other unknowns, ascending: the first columns of R of this rank */
-  std::vector<PetscInt> multipliers; /* among them, counted from the first */
 };
 
 /* What is known of the unknowns of the matrix A */
 struct CoarseNodes {
-  const std::vector<PetscInt> &node;        /* of own rows the first row of their node, or -1 */
-  Mat                          P;           /* A without couplings among nodes */
-  Vec                          positions;   /* of nodes, in the rows of their unknowns */
-  IS                           multipliers; /* or NULL */
+  const MatrixNodes &nodes;
+  Mat                A;
+  Vec                positions; /* of nodes, in the rows of their unknowns */
 };
 
 /* Aggregates of at most so many nodes, each of nodes of one rank. Collective, as all of these. */
 PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c);
 /* After each change of A's values; *failed where A_c is singular */
 PetscErrorCode CoarseFill(PC pc, Vec positions, CoarseLevel *c, PetscBool *failed);
-/* y += R A_c^-1 R^T x, but for multipliers, which the other level answers */
+/* y += R A_c^-1 R^T x */
 PetscErrorCode CoarseAdd(CoarseLevel *c, Vec x, Vec y, PetscBool *failed);
 PetscErrorCode CoarseView(const CoarseLevel &c, PetscViewer viewer);
 PetscErrorCode CoarseDestroy(CoarseLevel *c);

@@ -1,220 +1,39 @@
 /*
-  The preconditioner "hhtconstraint", constraint.h. Its solver of P has the prefix "constraint_" after that of the preconditioner's own options,
+  The preconditioner "hhtconstraint", constraint.h. The solver of its fine level has the prefix "constraint_" after that of the preconditioner's own options,
   and is chosen as any other direct solver where the user chooses none.
 */
 #include "constraint.h"
 #include "coarse.h"
+#include "fine.h"
 #include "linear.h"
-#include <algorithm>
+#include "node_product.h"
 #include <petsc/private/pcimpl.h>
-#include <vector>
 
 namespace
 {
 
-constexpr PetscInt in_aggregate = 200; /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
+constexpr PetscInt  in_aggregate = 200;  /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
+constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good as 200 at 100,000, and half the time of coarse solves at 350,000 */
+constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
+constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
 struct Constraint {
-  InnerSolver           inner;
-  Mat                   P = nullptr;
-  std::vector<PetscInt> node;    /* of own rows: the first row of their node, or -1 */
-  std::vector<PetscInt> columns; /* of other ranks, ascending, and the nodes of these */
-  std::vector<PetscInt> of_columns;
-  PetscInt              nodes = 0; /* of this rank */
-  PetscInt              aggregate = in_aggregate;
-  CoarseLevel           coarse;
-  PetscObjectId         matrix  = 0;
-  PetscObjectState      pattern = -1;
+  MatrixNodes      nodes;
+  FineLevel        fine;
+  CoarseLevel      coarse;
+  NodeProduct      product;
+  PetscBool        single  = PETSC_TRUE;  /* wanted */
+  PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
+  PetscBool        measured = PETSC_FALSE; /* what it leaves of this matrix' solves */
+  Vec              last_b = nullptr, last_x = nullptr; /* of the last solve with the matrix in its state `last` */
+  PetscObjectState last = -1;
+  PetscBool        had_guess = PETSC_FALSE; /* the user's initial guess, while a solve has ours */
+  PetscInt         aggregate = PETSC_DECIDE;
+  PetscObjectId    matrix    = 0;
+  PetscObjectState pattern   = -1;
 };
 
 Constraint &Of(PC pc) { return *static_cast<Constraint *>(pc->data); }
-
-/* ---- nodes ---- */
-
-PetscErrorCode NodesGiven(Mat A, IS is, Constraint &c)
-{
-  PetscInt        begin, end, n, size, least, most;
-  const PetscInt *row;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  PetscCall(ISGetLocalSize(is, &n));
-  PetscCall(ISGetBlockSize(is, &size));
-  PetscCall(ISGetIndices(is, &row));
-  least = n ? *std::min_element(row, row + n) : begin;
-  most  = n ? *std::max_element(row, row + n) : begin;
-  for (PetscInt k = 0; k < n && least >= begin && most < end; k++) c.node[(size_t)(row[k] - begin)] = row[k - k % size];
-  c.nodes = n / size;
-  PetscCall(ISRestoreIndices(is, &row));
-  PetscCheck(!n || (least >= begin && most < end), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-             "The nodes of the matrix (" LINEAR_NODES ") have rows %" PetscInt_FMT " to %" PetscInt_FMT ", this rank has rows %" PetscInt_FMT " to %" PetscInt_FMT, least, most, begin,
-             end - 1);
-  PetscFunctionReturn(0);
-}
-
-/* Unknowns of a node are coupled to the same others; multipliers have no diagonal entry */
-PetscErrorCode NodesByPattern(Mat A, Constraint &c)
-{
-  std::vector<PetscInt> last;
-  PetscInt              begin, end, first = -1;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  for (PetscInt i = begin; i < end; i++) {
-    const PetscInt    *col;
-    const PetscScalar *value;
-    PetscInt           n;
-    PetscBool          diagonal = PETSC_FALSE;
-    PetscCall(MatGetRow(A, i, &n, &col, &value));
-    for (PetscInt k = 0; k < n; k++)
-      if (col[k] == i && value[k] != 0) diagonal = PETSC_TRUE;
-    const bool same = first >= 0 && (PetscInt)last.size() == n && std::equal(last.begin(), last.end(), col);
-    if (!diagonal) first = -1;
-    else if (!same) {
-      first = i;
-      c.nodes++;
-    }
-    c.node[(size_t)(i - begin)] = first;
-    last.assign(col, col + n);
-    PetscCall(MatRestoreRow(A, i, &n, &col, &value));
-  }
-  PetscFunctionReturn(0);
-}
-
-/* The nodes of columns that other ranks own */
-PetscErrorCode FetchNodes(Mat A, Constraint &c)
-{
-  const PetscInt *garray;
-  PetscInt        begin, n;
-  Mat             off;
-  Vec             mine, theirs;
-  IS              from;
-  VecScatter      scatter;
-  PetscBool       mpi;
-
-  PetscFunctionBegin;
-  c.columns.clear();
-  PetscCall(PetscObjectBaseTypeCompare((PetscObject)A, MATMPIAIJ, &mpi));
-  if (!mpi) PetscFunctionReturn(0);
-  PetscCall(MatMPIAIJGetSeqAIJ(A, NULL, &off, &garray));
-  PetscCall(MatGetLocalSize(off, NULL, &n));
-  c.columns.assign(garray, garray + n);
-  PetscCall(MatCreateVecs(A, &mine, NULL));
-  PetscCall(VecGetOwnershipRange(mine, &begin, NULL));
-  for (size_t i = 0; i < c.node.size(); i++) PetscCall(VecSetValue(mine, begin + (PetscInt)i, (PetscScalar)c.node[i], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(mine));
-  PetscCall(VecAssemblyEnd(mine));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, n, &theirs));
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, garray, PETSC_USE_POINTER, &from));
-  PetscCall(VecScatterCreate(mine, from, theirs, NULL, &scatter));
-  PetscCall(VecScatterBegin(scatter, mine, theirs, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, mine, theirs, INSERT_VALUES, SCATTER_FORWARD));
-  const PetscScalar *node;
-  PetscCall(VecGetArrayRead(theirs, &node));
-  c.of_columns.resize((size_t)n);
-  for (PetscInt k = 0; k < n; k++) c.of_columns[(size_t)k] = (PetscInt)PetscRealPart(node[k]);
-  PetscCall(VecRestoreArrayRead(theirs, &node));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(ISDestroy(&from));
-  PetscCall(VecDestroy(&theirs));
-  PetscCall(VecDestroy(&mine));
-  PetscFunctionReturn(0);
-}
-
-/* ---- the matrix P ---- */
-
-/* Whether the entry of a row of node `of_row` stays; begin, end: own columns */
-bool Stays(const Constraint &c, PetscInt begin, PetscInt end, PetscInt of_row, PetscInt col)
-{
-  if (of_row < 0) return true;
-  if (col >= begin && col < end) {
-    const PetscInt other = c.node[(size_t)(col - begin)];
-    return other < 0 || other == of_row;
-  }
-  const auto at = std::lower_bound(c.columns.begin(), c.columns.end(), col);
-  return c.of_columns[(size_t)(at - c.columns.begin())] < 0; /* a node has one owner */
-}
-
-/* use(row, entries that stay of it) for every own row */
-template <class Use>
-PetscErrorCode ForRows(Mat A, const Constraint &c, Use use)
-{
-  std::vector<PetscInt>    cols;
-  std::vector<PetscScalar> values;
-  PetscInt                 begin, end;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  for (PetscInt i = begin; i < end; i++) {
-    const PetscInt    *col;
-    const PetscScalar *value;
-    PetscInt           n;
-    PetscCall(MatGetRow(A, i, &n, &col, &value));
-    cols.clear();
-    values.clear();
-    for (PetscInt k = 0; k < n; k++)
-      if (Stays(c, begin, end, c.node[(size_t)(i - begin)], col[k])) {
-        cols.push_back(col[k]);
-        values.push_back(value[k]);
-      }
-    PetscCall(MatRestoreRow(A, i, &n, &col, &value));
-    PetscCall(use(i, cols, values));
-  }
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode CreateP(PC pc, Constraint &c)
-{
-  PetscInt              begin, end, n, N;
-  std::vector<PetscInt> diagonal, off;
-
-  PetscFunctionBegin;
-  PetscCall(MatDestroy(&c.P));
-  PetscCall(MatGetOwnershipRange(pc->pmat, &begin, &end));
-  n = end - begin;
-  PetscCall(MatGetSize(pc->pmat, &N, NULL));
-  PetscCall(ForRows(pc->pmat, c, [&](PetscInt, const std::vector<PetscInt> &col, const std::vector<PetscScalar> &) -> PetscErrorCode {
-    PetscInt own = 0;
-    for (PetscInt j : col) own += j >= begin && j < end;
-    diagonal.push_back(own);
-    off.push_back((PetscInt)col.size() - own);
-    return 0;
-  }));
-  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)pc), n, n, N, N, 0, diagonal.data(), 0, off.data(), &c.P));
-  PetscCall(MatSetOption(c.P, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode FillP(PC pc, Constraint &c)
-{
-  PetscFunctionBegin;
-  PetscCall(ForRows(pc->pmat, c, [&](PetscInt i, const std::vector<PetscInt> &col, const std::vector<PetscScalar> &value) -> PetscErrorCode {
-    PetscFunctionBegin;
-    PetscCall(MatSetValues(c.P, 1, &i, (PetscInt)col.size(), col.data(), value.data(), INSERT_VALUES));
-    PetscFunctionReturn(0);
-  }));
-  PetscCall(MatAssemblyBegin(c.P, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(c.P, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(0);
-}
-
-/* ---- the preconditioner ---- */
-
-PetscErrorCode FindNodes(PC pc, Constraint &c)
-{
-  PetscInt begin, end;
-  IS       is;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(pc->pmat, &begin, &end));
-  c.node.assign((size_t)(end - begin), -1);
-  c.nodes = 0;
-  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_NODES, (PetscObject *)&is));
-  if (is) PetscCall(NodesGiven(pc->pmat, is, c));
-  else PetscCall(NodesByPattern(pc->pmat, c));
-  PetscCall(FetchNodes(pc->pmat, c));
-  PetscFunctionReturn(0);
-}
 
 PetscErrorCode CheckType(PC pc)
 {
@@ -229,7 +48,7 @@ PetscErrorCode CheckType(PC pc)
 }
 
 /* *fresh: another matrix or another pattern than before */
-PetscErrorCode SetUpP(PC pc, Constraint &c, PetscBool *fresh)
+PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
 {
   PetscObjectId    id;
   PetscObjectState pattern;
@@ -237,34 +56,57 @@ PetscErrorCode SetUpP(PC pc, Constraint &c, PetscBool *fresh)
   PetscFunctionBegin;
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
-  *fresh = (PetscBool)(!c.P || id != c.matrix || pattern != c.pattern);
+  *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern);
   if (*fresh) {
-    PetscCall(FindNodes(pc, c));
-    PetscCall(CreateP(pc, c));
-    c.matrix  = id;
-    c.pattern = pattern;
+    PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
+    c.last = -1;
   }
-  PetscCall(FillP(pc, c));
+  c.matrix  = id;
+  c.pattern = pattern;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ReadOptions(PC pc, Constraint &c)
+{
+  const char *prefix;
+
+  PetscFunctionBegin;
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PetscOptionsGetInt(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_aggregate", &c.aggregate, NULL));
+  if (!pc->setupcalled) PetscCall(PetscOptionsGetBool(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_single", &c.single, NULL));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *failed)
 {
-  Vec         positions;
-  IS          multipliers;
-  const char *prefix;
+  Vec      positions;
+  PetscInt nodes;
 
   PetscFunctionBegin;
   *failed = PETSC_FALSE;
-  PetscCall(PCGetOptionsPrefix(pc, &prefix));
-  PetscCall(PetscOptionsGetInt(((PetscObject)pc)->options, prefix, "-pc_hhtconstraint_aggregate", &c.aggregate, NULL));
   PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_POSITIONS, (PetscObject *)&positions));
-  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_MULTIPLIERS, (PetscObject *)&multipliers));
-  if (c.aggregate <= 0 || !positions) PetscCall(CoarseDestroy(&c.coarse));
+  if (!c.aggregate || !positions) PetscCall(CoarseDestroy(&c.coarse));
   else {
-    if (fresh || !c.coarse.R) PetscCall(CoarseCreate({c.node, c.P, positions, multipliers}, c.aggregate, &c.coarse));
+    if (fresh || !c.coarse.R) {
+      nodes = c.nodes.count;
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
+      PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate > 0 ? c.aggregate : nodes < large ? in_aggregate : in_large, &c.coarse));
+    }
     PetscCall(CoarseFill(pc, positions, &c.coarse, failed));
   }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SetUpProduct(PC pc, Constraint &c, PetscBool fresh)
+{
+  PetscFunctionBegin;
+  c.in_range = c.measured = PETSC_FALSE;
+  if (!c.single || !c.nodes.threes || pc->mat != pc->pmat) {
+    PetscCall(NodeProductDestroy(&c.product));
+    PetscFunctionReturn(0);
+  }
+  PetscCall(NodeProductFill(pc->pmat, c.nodes.node, !fresh, &c.product, &c.in_range));
+  if (!c.in_range) PetscCall(PetscInfo(pc, "products in double precision: single precision has no room for the entries of this matrix\n"));
   PetscFunctionReturn(0);
 }
 
@@ -275,9 +117,11 @@ PetscErrorCode SetUp(PC pc)
 
   PetscFunctionBegin;
   PetscCall(CheckType(pc));
-  PetscCall(SetUpP(pc, c, &fresh));
-  PetscCall(InnerSetUp(pc, "constraint_", c.P, fresh, &c.inner, &fine));
+  PetscCall(ReadOptions(pc, c));
+  PetscCall(FindNodes(pc, c, &fresh));
   PetscCall(SetUpCoarse(pc, c, fresh, &coarse));
+  PetscCall(FineFill(pc, c.nodes, (PetscBool)!!c.coarse.R, fresh, &c.fine, &fine));
+  PetscCall(SetUpProduct(pc, c, fresh));
   pc->failedreason = fine || coarse ? PC_SUBPC_ERROR : PC_NOERROR;
   PetscFunctionReturn(0);
 }
@@ -288,20 +132,103 @@ PetscErrorCode Apply(PC pc, Vec x, Vec y)
   PetscBool   fine, coarse = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(InnerSolve(&c.inner, x, y, &fine));
+  PetscCall(FineSolve(&c.fine, c.nodes, x, y, &fine));
   if (c.coarse.R) PetscCall(CoarseAdd(&c.coarse, x, y, &coarse));
   if (fine || coarse) pc->failedreason = PC_SUBPC_ERROR;
   PetscFunctionReturn(0);
 }
 
-/* Conjugate gradients need a first iterate on the constraints */
-PetscErrorCode PreSolve(PC, KSP ksp, Vec, Vec)
+/* Whether b is what was last solved for: a correction that has been looked at is then made (AskNextCorrection() of the integrator) */
+PetscErrorCode AsBefore(PC pc, const Constraint &c, Vec b, PetscBool *yes)
 {
-  PetscBool cg;
+  PetscObjectState state;
 
   PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &state));
+  if (c.last_b && c.last == state) PetscCall(VecEqual(b, c.last_b, yes));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Remember(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
+{
+  KSPConvergedReason reason;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  c.last = -1;
+  if (reason < 0) PetscFunctionReturn(0);
+  if (!c.last_b) {
+    PetscCall(VecDuplicate(b, &c.last_b));
+    PetscCall(VecDuplicate(x, &c.last_x));
+  }
+  PetscCall(VecCopy(b, c.last_b));
+  PetscCall(VecCopy(x, c.last_x));
+  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &c.last));
+  PetscFunctionReturn(0);
+}
+
+/* Conjugate gradients need a first iterate on the constraints: P^-1 b, or the answer to the same b. A few digits take products of single precision. */
+PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
+{
+  Constraint &c = Of(pc);
+  PetscReal   rtol;
+  PetscBool   cg, as_before;
+
+  PetscFunctionBegin;
+  PetscCall(PCSetUp(pc)); /* KSPSetUp() leaves it to the first PCApply() where nobody has set the operators again */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &cg, KSPCG, KSPFCG, KSPPIPECG, ""));
-  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_TRUE));
+  PetscCall(AsBefore(pc, c, b, &as_before));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &c.had_guess));
+  if (as_before) {
+    PetscCall(VecCopy(c.last_x, x));
+    PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
+  }
+  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, (PetscBool)!as_before));
+  PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
+  if (c.in_range && pc->mat == pc->pmat && rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
+  PetscFunctionReturn(0);
+}
+
+/* After the first solve with a matrix, and one that failed: where rounding of the products in single precision is what is left, double precision from now on */
+PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
+{
+  Vec                in_single, in_double;
+  PetscReal          left, rounding;
+  KSPConvergedReason reason;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (c.measured && reason > 0) PetscFunctionReturn(0);
+  c.measured = PETSC_TRUE;
+  PetscCall(VecDuplicate(b, &in_single));
+  PetscCall(VecDuplicate(b, &in_double));
+  PetscCall(MatMult(c.product.shell, x, in_single));
+  PetscCall(MatMult(pc->pmat, x, in_double));
+  PetscCall(VecAXPY(in_double, -1, in_single));
+  PetscCall(VecAYPX(in_single, -1, b));
+  PetscCall(VecNorm(in_double, NORM_2, &rounding));
+  PetscCall(VecNorm(in_single, NORM_2, &left));
+  PetscCall(VecDestroy(&in_single));
+  PetscCall(VecDestroy(&in_double));
+  if (reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
+  c.single = c.in_range = PETSC_FALSE;
+  PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
+                      KSPConvergedReasons[reason]));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
+{
+  Constraint &c = Of(pc);
+
+  PetscFunctionBegin;
+  PetscCall(KSPSetInitialGuessNonzero(ksp, c.had_guess));
+  if (pc->mat == c.product.shell) {
+    PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
+    PetscCall(Measure(pc, ksp, c, b, x));
+  }
+  PetscCall(Remember(pc, ksp, c, b, x));
   PetscFunctionReturn(0);
 }
 
@@ -309,17 +236,20 @@ PetscErrorCode View(PC pc, PetscViewer viewer)
 {
   const Constraint &c = Of(pc);
   PetscBool         ascii;
-  PetscInt          nodes = c.nodes;
-  MatInfo           all, kept;
+  PetscInt          nodes = c.nodes.count, alone = (PetscInt)c.nodes.alone.size();
+  MatInfo           all, kept = {};
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
-  if (!ascii || !c.P) PetscFunctionReturn(0);
+  if (!ascii || !pc->setupcalled) PetscFunctionReturn(0);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &alone, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
   PetscCall(MatGetInfo(pc->pmat, MAT_GLOBAL_SUM, &all));
-  PetscCall(MatGetInfo(c.P, MAT_GLOBAL_SUM, &kept));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g; %s\n", nodes, (double)kept.nz_used, (double)all.nz_used, c.inner.choice.text));
-  PetscCall(InnerView(c.inner, viewer));
+  if (c.fine.apart) PetscCall(MatGetInfo(c.fine.apart, MAT_GLOBAL_SUM, &kept));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g\n", nodes, (double)kept.nz_used + 9. * (double)alone, (double)all.nz_used));
+  PetscCall(PetscViewerASCIIPrintf(viewer, c.in_range ? "  products with nodes in single precision, at relative tolerances from %g on\n" : "  products in double precision\n", (double)few_digits));
+  if (c.fine.apart) PetscCall(PetscViewerASCIIPrintf(viewer, "  inverses of %" PetscInt_FMT " nodes; all else: %s\n", alone, c.fine.inner.choice.text));
+  if (c.fine.apart) PetscCall(InnerView(c.fine.inner, viewer));
   if (c.coarse.A) PetscCall(CoarseView(c.coarse, viewer));
   PetscFunctionReturn(0);
 }
@@ -329,9 +259,12 @@ PetscErrorCode Reset(PC pc)
   Constraint &c = Of(pc);
 
   PetscFunctionBegin;
-  PetscCall(InnerDestroy(&c.inner));
+  PetscCall(FineDestroy(&c.fine));
   PetscCall(CoarseDestroy(&c.coarse));
-  PetscCall(MatDestroy(&c.P));
+  PetscCall(NodeProductDestroy(&c.product));
+  PetscCall(VecDestroy(&c.last_b));
+  PetscCall(VecDestroy(&c.last_x));
+  c.matrix = 0;
   PetscFunctionReturn(0);
 }
 
@@ -351,6 +284,7 @@ PetscErrorCode Create(PC pc)
   pc->ops->setup    = SetUp;
   pc->ops->apply    = Apply;
   pc->ops->presolve = PreSolve;
+  pc->ops->postsolve = PostSolve;
   pc->ops->view     = View;
   pc->ops->reset    = Reset;
   pc->ops->destroy  = Destroy;

@@ -3,13 +3,14 @@
 
     P = [D B^T; B 0],    D = A without the couplings between different nodes of finite-element bodies
 
-  What is not a node, as rigid bodies, modes and multipliers, stays whole, with everything that couples it to nodes. P is factored; where
-  few unknowns are not nodes that costs as many operations as there are nodes. Each solve with P satisfies the constraints exactly, so that
-  conjugate gradients, which begin at P^-1 b, move along them from then on and do not meet the indefiniteness of the whole matrix (Gould,
+  What is not a node, as rigid bodies, modes and multipliers, stays whole, with everything that couples it to nodes, and is factored (fine.h). Each solve with P satisfies the
+  constraints exactly, so that conjugate gradients, which begin at P^-1 b, move along them from then on and do not meet the indefiniteness of the whole matrix (Gould,
   Hribar, Nocedal, SIAM J. Sci. Comput. 23, 2001, 1376-1395, algorithm 6.2). Without multipliers D alone is block Jacobi.
 
-  Where positions of nodes are known, a coarse level (coarse.h) is added: iterations no longer grow with the size of a body in elements.
+  Where positions of nodes are known, a coarse level (coarse.h) is added, which has all that is no node, too: iterations no longer grow with the size of a body in elements.
   -pc_hhtconstraint_aggregate says how many nodes it takes together, 0: no such level.
+
+  Where a few digits are asked for, the Krylov method's products are made in single precision (node_product.h), unless -pc_hhtconstraint_single 0.
 */
 #ifndef HHTDAE_LINEAR_CONSTRAINT_H
 #define HHTDAE_LINEAR_CONSTRAINT_H
@@ -22,9 +23,8 @@
    Where there is none, consecutive rows with a diagonal entry and the same pattern are a node. */
 #define LINEAR_NODES "hhtdae_nodes"
 
-/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these, and an IS of the multipliers */
-#define LINEAR_POSITIONS   "hhtdae_positions"
-#define LINEAR_MULTIPLIERS "hhtdae_multipliers"
+/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these */
+#define LINEAR_POSITIONS "hhtdae_positions"
 
 PetscErrorCode LinearRegisterConstraint(void);
 

@@ -1,21 +1,74 @@
 #include "inner.h"
+#include <algorithm>
 
 namespace
 {
+
+constexpr PetscInt small = 30000; /* rows of a matrix that each rank factors by itself: some 5e6 entries of its factor */
 
 PetscErrorCode Create(PC pc, const char name[], InnerSolver *s)
 {
   const char *prefix;
 
   PetscFunctionBegin;
-  PetscCall(KSPCreate(PetscObjectComm((PetscObject)pc), &s->ksp));
+  PetscCall(KSPCreate(s->whole ? PETSC_COMM_SELF : PetscObjectComm((PetscObject)pc), &s->ksp));
   PetscCall(PetscObjectIncrementTabLevel((PetscObject)s->ksp, (PetscObject)pc, 1));
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
   PetscCall(KSPSetOptionsPrefix(s->ksp, prefix));
   PetscCall(KSPAppendOptionsPrefix(s->ksp, name));
   PetscCall(KSPSetErrorIfNotConverged(s->ksp, PETSC_FALSE));
   PetscCall(LinearDefaults(s->ksp, &s->choice));
+  s->choice.many_solves = PETSC_TRUE;
   PetscCall(KSPSetFromOptions(s->ksp));
+  PetscFunctionReturn(0);
+}
+
+/* A on each rank, if it is small and distributed */
+PetscErrorCode GatherMatrix(Mat A, PetscBool again, InnerSolver *s)
+{
+  PetscInt    rows;
+  PetscMPIInt size;
+  Vec         b;
+  IS          all;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(A, &rows, NULL));
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)A), &size));
+  if (size == 1 || rows > small) PetscFunctionReturn(0);
+  if (!again) {
+    if (s->whole) PetscCall(MatDestroySubMatrices(1, &s->whole));
+    PetscCall(VecDestroy(&s->b));
+    PetscCall(VecDestroy(&s->x));
+    PetscCall(VecScatterDestroy(&s->gather));
+    PetscCall(MatCreateVecs(A, NULL, &b));
+    PetscCall(VecScatterCreateToAll(b, &s->gather, &s->b));
+    PetscCall(VecDuplicate(s->b, &s->x));
+    PetscCall(VecDestroy(&b));
+  }
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, &all));
+  PetscCall(MatCreateSubMatrices(A, 1, &all, &all, again ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &s->whole));
+  PetscCall(ISDestroy(&all));
+  PetscCall(PetscObjectStateIncrease((PetscObject)s->whole[0])); /* PETSc 3.18 copies new values without a word */
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode SolveGathered(InnerSolver *s, Vec b, Vec x)
+{
+  const PetscScalar *from;
+  PetscScalar       *to;
+  PetscInt           begin, n;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(s->gather, b, s->b, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(s->gather, b, s->b, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(KSPSolve(s->ksp, s->b, s->x));
+  PetscCall(VecGetOwnershipRange(x, &begin, NULL));
+  PetscCall(VecGetLocalSize(x, &n));
+  PetscCall(VecGetArrayRead(s->x, &from));
+  PetscCall(VecGetArrayWrite(x, &to));
+  std::copy_n(from + begin, n, to);
+  PetscCall(VecRestoreArrayWrite(x, &to));
+  PetscCall(VecRestoreArrayRead(s->x, &from));
   PetscFunctionReturn(0);
 }
 
@@ -29,6 +82,8 @@ PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, In
   PCFailedReason reason;
 
   PetscFunctionBegin;
+  PetscCall(GatherMatrix(A, (PetscBool)(s->whole && !another), s));
+  if (s->whole) A = s->whole[0];
   if (first) PetscCall(Create(pc, name, s));
   PetscCall(KSPSetOperators(s->ksp, A, A));
   if (first || another || s->choice.cholesky) {
@@ -47,7 +102,8 @@ PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed)
   KSPConvergedReason reason;
 
   PetscFunctionBegin;
-  PetscCall(KSPSolve(s->ksp, b, x));
+  if (s->whole) PetscCall(SolveGathered(s, b, x));
+  else PetscCall(KSPSolve(s->ksp, b, x));
   PetscCall(KSPGetConvergedReason(s->ksp, &reason));
   *failed = (PetscBool)(reason < 0);
   PetscFunctionReturn(0);
@@ -55,9 +111,18 @@ PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed)
 
 PetscErrorCode InnerView(const InnerSolver &s, PetscViewer viewer)
 {
+  PetscViewer one = viewer;
+
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPushTab(viewer));
-  PetscCall(KSPView(s.ksp, viewer));
+  if (s.whole) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "each rank by itself, rank 0:\n"));
+    PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &one));
+  }
+  PetscMPIInt rank;
+  PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)viewer), &rank));
+  if (!s.whole || !rank) PetscCall(KSPView(s.ksp, one));
+  if (s.whole) PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &one));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(0);
 }
@@ -66,6 +131,10 @@ PetscErrorCode InnerDestroy(InnerSolver *s)
 {
   PetscFunctionBegin;
   PetscCall(KSPDestroy(&s->ksp));
+  if (s->whole) PetscCall(MatDestroySubMatrices(1, &s->whole));
+  PetscCall(VecScatterDestroy(&s->gather));
+  PetscCall(VecDestroy(&s->b));
+  PetscCall(VecDestroy(&s->x));
   *s = InnerSolver();
   PetscFunctionReturn(0);
 }

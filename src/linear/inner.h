@@ -1,4 +1,7 @@
-/* A direct solver inside a preconditioner, chosen as any other where the user chooses none: its options have the prefix of the preconditioner's own, and a name. */
+/*
+  A direct solver inside a preconditioner, chosen as any other where the user chooses none: its options have the prefix of the preconditioner's own, and a name.
+  On several ranks each factors a small matrix by itself: to gather its right-hand side takes less time than messages at each level of an elimination.
+*/
 #ifndef HHTDAE_LINEAR_INNER_H
 #define HHTDAE_LINEAR_INNER_H
 
@@ -6,6 +9,9 @@
 
 struct InnerSolver {
   KSP          ksp = nullptr;
+  Mat         *whole = nullptr; /* one, on each rank; NULL where the matrix stays distributed */
+  VecScatter   gather = nullptr;
+  Vec          b = nullptr, x = nullptr; /* of `whole` */
   LinearChoice choice;
 };
 

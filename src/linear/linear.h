@@ -15,6 +15,8 @@ struct LinearChoice {
   PetscBool may_be_rough = PETSC_FALSE; /* the caller has LinearSolveRoughly() for most solves: factors in single precision pay */
   PetscBool refines      = PETSC_FALSE; /* solves with the factor are refined unless they may be rough */
   PetscBool iterative    = PETSC_FALSE; /* there was no room for a factor: a Krylov method with the constraint preconditioner */
+  PetscBool constraint   = PETSC_FALSE; /* hhtconstraint behind a Krylov method, chosen or the user's: a matrix costs as much as a few solves */
+  PetscBool many_solves  = PETSC_FALSE; /* hundreds follow each factorization: the caller is a preconditioner */
   PetscBool cholesky     = PETSC_FALSE; /* LDL^T was chosen, which stands on the symmetry of the matrix */
   char      text[256]    = "";          /* for -ts_view and -info: what was chosen, and why */
 };

@@ -4,7 +4,7 @@
 
 /* A correction is followed by the next one, which makes up for what the Krylov method leaves: with PETSc's 1e-5 a step of a finite-element body takes
    twice the iterations. */
-PetscErrorCode LinearLoosen(KSP ksp)
+PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice)
 {
   const PetscReal petscs = 1e-5, loose = 1e-2;
   PetscReal       rtol;
@@ -14,6 +14,7 @@ PetscErrorCode LinearLoosen(KSP ksp)
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCHHTCONSTRAINT, &constraint));
+  choice->constraint = constraint;
   PetscCall(LinearOptionGiven(ksp, "-ksp_rtol", &given));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
   if (!constraint || given || rtol != petscs) PetscFunctionReturn(0);
@@ -49,7 +50,7 @@ PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBo
   PetscCall(PCSetType(pc, PCHHTCONSTRAINT));
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
-  PetscCall(LinearLoosen(ksp));
+  PetscCall(LinearLoosen(ksp, choice));
   PetscCall(PetscInfo(ksp, "Linear solver: %s\n", choice->text));
   PetscFunctionReturn(0);
 }

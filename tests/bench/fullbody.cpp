@@ -274,6 +274,10 @@ static PetscErrorCode Run()
   scene.gravity({0, 0, -9.81});
   if (c.held == ROD) PetscCall(BuildSliderCrank(c, model, scene, &fe));
   else PetscCall(Build(c, model, scene, &fe));
+  if (c.law == FeLaw::Large && !c.blocks) { /* the body has its elements */
+    PetscCall(MatDestroy(&model.K));
+    PetscCall(MatDestroy(&model.M));
+  }
   PetscCall(scene.createTS(&ts));
   if (c.blocks && c.held == FREE) PetscCall(TellBlocks(ts, model.K));
   PetscCall(TSSetMaxTime(ts, 100 * c.steps * c.part * Period(c)));

@@ -314,6 +314,24 @@ TYPED_TEST(FeElements, ForceIsDerivativeOfEnergyAndTangentOfForce)
   EXPECT_EQ((any(T) - any(T).transpose()).norm(), 0);
 }
 
+/* The force alone takes four points at a time */
+TYPED_TEST(FeElements, ForceAloneIsThatOfTheTangent)
+{
+  using S                    = TypeParam;
+  const fe::NodeVectors<S> X = element<S>(.08, .02);
+  std::srand(6);
+  const fe::NodeVectors<S> u = .3 * fe::NodeVectors<S>::Random();
+  fe::NodeVectors<S>       with, alone;
+  fe::Stiffness<S>         T;
+  double                   energy, of_force;
+  const double             least = fe::LargeForce<S>(X, u, fe::Lame(steel), with, &T, &energy);
+  EXPECT_NEAR(fe::LargeForce<S>(X, u, fe::Lame(steel), alone, nullptr, &of_force), least, 1e-13 * least);
+  EXPECT_LT((any(with) - any(alone)).norm(), 1e-13 * any(with).norm());
+  EXPECT_NEAR(of_force, energy, 1e-13 * energy);
+  const fe::NodeVectors<S> flat = fe::NodeVectors<S>::Zero();
+  EXPECT_EQ(fe::LargeForce<S>(flat, u, fe::Lame(steel), alone) > fe::degenerate, false);
+}
+
 TYPED_TEST(FeElements, RotationAtLargeMakesNoForce)
 {
   using S                    = TypeParam;

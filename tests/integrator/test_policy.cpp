@@ -92,6 +92,17 @@ TEST(Policy, MatrixServesManySteps)
   EXPECT_TRUE(m.due(1., o));
 }
 
+/* Where a matrix costs no factorization a slower rate than by default is not worth its corrections, unless the user says so */
+TEST(Policy, RateWithoutFactor)
+{
+  ReuseOptions o;
+  EXPECT_EQ(o.of(false).slow_rate, o.slow_rate);
+  EXPECT_LT(o.of(true).slow_rate, o.slow_rate);
+  EXPECT_EQ(o.of(true).ratio, o.ratio);
+  o.given = PETSC_TRUE;
+  EXPECT_EQ(o.of(true).slow_rate, o.slow_rate);
+}
+
 /* Old matrices that fail again and again are tried less and less often, and as before once one has held */
 TEST(Policy, ReuseBacksOff)
 {

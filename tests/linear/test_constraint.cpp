@@ -48,16 +48,12 @@ protected:
   {
     Vec          positions;
     PetscScalar *place;
-    IS           multipliers;
     OK(MatCreateVecs(A, &positions, NULL));
     OK(VecGetArray(positions, &place));
     for (PetscInt i = 0; i < coordinates; i += 3) at(i / 3, place + i);
     OK(VecRestoreArray(positions, &place));
-    OK(ISCreateStride(PETSC_COMM_SELF, n - coordinates, coordinates, 1, &multipliers));
     OK(PetscObjectCompose((PetscObject)A, LINEAR_POSITIONS, (PetscObject)positions));
-    OK(PetscObjectCompose((PetscObject)A, LINEAR_MULTIPLIERS, (PetscObject)multipliers));
     OK(VecDestroy(&positions));
-    OK(ISDestroy(&multipliers));
   }
   PetscInt iterationsWith(const char aggregate[])
   {
@@ -274,18 +270,12 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
   PetscBool      failed;
   PetscObject    positions;
   bar(size[0], size[1], size[2], false);
-  std::vector<PetscInt> node((size_t)n);
-  for (PetscInt i = 0; i < n; i++) node[(size_t)i] = i - i % 3;
+  MatrixNodes nodes; /* nothing but nodes */
+  for (PetscInt i = 0; i < n; i += 3) nodes.alone.push_back(i);
   solver(KSPCG, 1e-6);
   OK(KSPGetPC(ksp, &pc));
   OK(PetscObjectQuery((PetscObject)A, LINEAR_POSITIONS, &positions));
-  Mat P; /* three entries in each row: nothing but nodes */
-  OK(MatCreateSeqAIJ(PETSC_COMM_SELF, n, n, 3, NULL, &P));
-  for (PetscInt i = 0; i < n; i++)
-    for (PetscInt k = 0; k < 3; k++) OK(MatSetValue(P, i, node[(size_t)i] + k, 1, INSERT_VALUES));
-  OK(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
-  OK(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
-  OK(CoarseCreate({node, P, (Vec)positions, NULL}, n, &coarse));
+  OK(CoarseCreate({nodes, A, (Vec)positions}, n, &coarse));
   OK(CoarseFill(pc, (Vec)positions, &coarse, &failed));
   EXPECT_FALSE(failed);
   for (PetscInt i = 0; i < 6; i++)
@@ -297,7 +287,6 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
       EXPECT_NEAR(a, i != j ? 0 : i < 3 ? mass : moment, 1e-10 * mass) << i << ' ' << j;
     }
   OK(CoarseDestroy(&coarse));
-  OK(MatDestroy(&P));
 }
 
 /* Nodes on a line are no rigid body: each keeps its own unknowns */
