@@ -25,9 +25,6 @@ struct Constraint {
   PetscBool        single  = PETSC_TRUE;  /* wanted */
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
   PetscBool        measured = PETSC_FALSE; /* what it leaves of this matrix' solves */
-  Vec              last_b = nullptr, last_x = nullptr; /* of the last solve with the matrix in its state `last` */
-  PetscObjectState last = -1;
-  PetscBool        had_guess = PETSC_FALSE; /* the user's initial guess, while a solve has ours */
   PetscInt         aggregate = PETSC_DECIDE;
   PetscObjectId    matrix    = 0;
   PetscObjectState pattern   = -1;
@@ -57,10 +54,7 @@ PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
   *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern);
-  if (*fresh) {
-    PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
-    c.last = -1;
-  }
+  if (*fresh) PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
   c.matrix  = id;
   c.pattern = pattern;
   PetscFunctionReturn(0);
@@ -138,53 +132,17 @@ PetscErrorCode Apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(0);
 }
 
-/* Whether b is what was last solved for: a correction that has been looked at is then made (AskNextCorrection() of the integrator) */
-PetscErrorCode AsBefore(PC pc, const Constraint &c, Vec b, PetscBool *yes)
-{
-  PetscObjectState state;
-
-  PetscFunctionBegin;
-  *yes = PETSC_FALSE;
-  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &state));
-  if (c.last_b && c.last == state) PetscCall(VecEqual(b, c.last_b, yes));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Remember(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
-{
-  KSPConvergedReason reason;
-
-  PetscFunctionBegin;
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
-  c.last = -1;
-  if (reason < 0) PetscFunctionReturn(0);
-  if (!c.last_b) {
-    PetscCall(VecDuplicate(b, &c.last_b));
-    PetscCall(VecDuplicate(x, &c.last_x));
-  }
-  PetscCall(VecCopy(b, c.last_b));
-  PetscCall(VecCopy(x, c.last_x));
-  PetscCall(PetscObjectStateGet((PetscObject)pc->pmat, &c.last));
-  PetscFunctionReturn(0);
-}
-
-/* Conjugate gradients need a first iterate on the constraints: P^-1 b, or the answer to the same b. A few digits take products of single precision. */
-PetscErrorCode PreSolve(PC pc, KSP ksp, Vec b, Vec x)
+/* Conjugate gradients need a first iterate on the constraints: P^-1 b. A few digits take products of single precision. */
+PetscErrorCode PreSolve(PC pc, KSP ksp, Vec, Vec)
 {
   Constraint &c = Of(pc);
   PetscReal   rtol;
-  PetscBool   cg, as_before;
+  PetscBool   cg;
 
   PetscFunctionBegin;
   PetscCall(PCSetUp(pc)); /* KSPSetUp() leaves it to the first PCApply() where nobody has set the operators again */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &cg, KSPCG, KSPFCG, KSPPIPECG, ""));
-  PetscCall(AsBefore(pc, c, b, &as_before));
-  PetscCall(KSPGetInitialGuessNonzero(ksp, &c.had_guess));
-  if (as_before) {
-    PetscCall(VecCopy(c.last_x, x));
-    PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
-  }
-  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, (PetscBool)!as_before));
+  if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_TRUE));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
   if (c.in_range && pc->mat == pc->pmat && rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
   PetscFunctionReturn(0);
@@ -223,12 +181,10 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
   Constraint &c = Of(pc);
 
   PetscFunctionBegin;
-  PetscCall(KSPSetInitialGuessNonzero(ksp, c.had_guess));
   if (pc->mat == c.product.shell) {
     PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
     PetscCall(Measure(pc, ksp, c, b, x));
   }
-  PetscCall(Remember(pc, ksp, c, b, x));
   PetscFunctionReturn(0);
 }
 
@@ -262,8 +218,6 @@ PetscErrorCode Reset(PC pc)
   PetscCall(FineDestroy(&c.fine));
   PetscCall(CoarseDestroy(&c.coarse));
   PetscCall(NodeProductDestroy(&c.product));
-  PetscCall(VecDestroy(&c.last_b));
-  PetscCall(VecDestroy(&c.last_x));
   c.matrix = 0;
   PetscFunctionReturn(0);
 }

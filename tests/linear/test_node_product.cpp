@@ -155,21 +155,6 @@ TEST_F(NodeProductTest, ServesFewDigits)
   EXPECT_TRUE(says("products in double precision"));
 }
 
-/* What was solved for last is answered at once, unless the matrix has changed */
-TEST_F(NodeProductTest, TheSameRightHandSide)
-{
-  solver(1e-2);
-  EXPECT_GT(solve(), 1);
-  EXPECT_LE(solve(), 1);
-  EXPECT_LT(left(), 0.1);
-  OK(MatScale(A, 2));
-  EXPECT_GT(solve(), 1);
-  EXPECT_LT(left(), 0.1);
-  OK(VecScale(b, 2));
-  EXPECT_GT(solve(), 1);
-  EXPECT_LT(left(), 0.1);
-}
-
 /* Entries beyond the range of single precision */
 TEST_F(NodeProductTest, OutOfRange)
 {
