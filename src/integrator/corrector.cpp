@@ -6,6 +6,7 @@
     reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
     renew      before a correction otherwise; within a correction when it is slow, a few times
     retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
+    start over at fixed steps, where h is not for us to cut: from the last values, where an extrapolation led astray
     fail       with a matrix of this very correction: TSAdapt cuts h
   Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) reuse costs a
   correction each time, and one that passes by chance after its first iteration may be far off: after a retry the next step
@@ -20,6 +21,27 @@
 namespace hht3
 {
 
+namespace
+{
+
+/* Once more with a matrix of its own, from the prediction of this degree */
+PetscErrorCode Again(TS ts, PetscInt degree, PetscBool *converged)
+{
+  Integrator    &I    = Get(ts);
+  const PetscInt kept = I.predictor.degree;
+
+  PetscFunctionBegin;
+  I.stat.retries++;
+  I.corrector.matrix.want = PETSC_TRUE;
+  I.predictor.degree      = degree;
+  PetscCall(Predict(ts, I.X));
+  I.predictor.degree = kept;
+  PetscCall(Iterate(ts, converged));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
 /* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
 PetscErrorCode Correct(TS ts, PetscBool *converged)
 {
@@ -33,10 +55,11 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
-    I.stat.retries++;
-    c.matrix.want = PETSC_TRUE;
-    PetscCall(Predict(ts, I.X));
-    PetscCall(Iterate(ts, converged));
+    PetscCall(Again(ts, I.predictor.degree, converged));
+  }
+  if (!*converged && I.fixed_h && I.predictor.degree > 0 && !c.no_solve && !c.user_lag) {
+    PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from the last values\n", I.failure));
+    PetscCall(Again(ts, 0, converged));
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
