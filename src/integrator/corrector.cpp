@@ -57,7 +57,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
     PetscCall(Again(ts, I.predictor.degree, converged));
   }
-  if (!*converged && I.fixed_h && I.predictor.degree > 0 && !c.no_solve && !c.user_lag) {
+  if (!*converged && I.fixed_h && I.order.now == 2 && I.predictor.degree > 0 && !c.no_solve && !c.user_lag) { /* higher orders fall to two first */
     PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from the last values\n", I.failure));
     PetscCall(Again(ts, 0, converged));
   }
