@@ -18,7 +18,8 @@
   takes some tenth of (h w)^3; where the depth v/w is below the tolerance, all of it. It is asked for as long as the
   right-hand side is below 1: later the tolerance does not determine the solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
   error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
-  (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. And where the
+  (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. One that is right from
+  a first step in which nothing moves has missed the blow of what holds it at once at the start: it is counted by itself. And where the
   first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that
   of a run at eps / 1000 has to be smaller than both the first and the third, or a sharper reference nearer to it.
 
@@ -32,46 +33,11 @@
 #define HHTDAE_SOAK_MODEL_JUDGE_H
 
 #include "model_laws.h"
+#include "model_outcome.h"
 #include "model_reference.h"
 
 namespace soak
 {
-
-enum Verdict { Right, Wrong, Failed, Unknown, Crashed, Hung, verdicts };
-constexpr const char *verdict_name[] = {"right", "wrong", "failed", "no reference", "crashed", "hung"};
-enum Stage { Building, Default, Finer, Referring, Judging, Laws, Again, Done };
-constexpr const char *stage_name[] = {"building the scene",
-                                      "the run with defaults",
-                                      "the run at a smaller tolerance",
-                                      "the reference",
-                                      "the verdict",
-                                      "the balance of bodies",
-                                      "the runs again",
-                                      "done"};
-enum By { ByNobody, ByIDA, ByHHT };
-constexpr const char *by_name[] = {"none", "IDA", "hhtdae"};
-
-/* Plain data: it comes through a pipe */
-struct Outcome {
-  long number = 0;
-  int  stage = Building, verdict = Unknown, by = ByNobody, bodies = 0, planar = 0, window = 0, finest_window = 0,
-      legs = 0, disturbed = 0, conservative = 0;
-  long steps = 0, rejected = 0, newton = 0, jacobians = 0, factorizations = 0, changes = 0, fails = 0,
-       reference_steps = 0, finer_steps = 0;
-  double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
-  double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
-         doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of what is allowed */
-  double balance = -1, between = -1; /* of every body, relative to its loads: at ends of steps, between them */
-  double unsolved = -1;              /* residual of a body, relative to its loads */
-  int  unjudged = 0, switched = 0, repeated = 0, resumed = 0;
-  char message[600] = "", types[2000] = "";
-};
-
-inline void SetText(char *to, std::size_t room, const std::string &s)
-{
-  std::strncpy(to, s.c_str(), room - 1);
-  to[room - 1] = 0;
-}
 
 class Judge
 {
@@ -105,6 +71,7 @@ public:
 
 private:
   static constexpr double per_step = 10, per_growth = 3, undetermined = 1, reference_eps = 1e-7;
+  static constexpr double no_motion   = 1e-14; /* first step, in periods */
   static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
 
   std::uint64_t                             seed_;
@@ -322,10 +289,27 @@ private:
         o_.disturbed = 1;
         return true;
       }
+      if (rightFromASmallStep(eps, n)) {
+        o_.blow = 1;
+        return true;
+      }
       complain(hhtbench::Text("%s: error %.2e at t = %g, allowed %.2e", which, e, SampleTime(model_.end, k + 1), most));
       return false;
     }
     return true;
+  }
+  /* Whether the model is right where the first step is one in which nothing moves: then the blow at its start is what was missed */
+  bool rightFromASmallStep(double eps, int n)
+  {
+    Settings small;
+    small.eps          = eps;
+    small.first        = no_motion * model_.period;
+    o_.stage           = Finer;
+    const Trajectory b = RunHHT(build(), small);
+    o_.stage           = Judging;
+    for (int k = 0; b.arrived() && k < n; k++)
+      if (error(b, k) > allowed(eps, b, k)) return false;
+    return b.arrived();
   }
   /* How far the reference moves until sample k if gravity, bodies and points are moved */
   double disturbance(double by, int k)
@@ -390,7 +374,7 @@ private:
       return fail(Wrong, hhtbench::Text("constraints are off by %.2e", a.misfit));
     if (!right(default_eps, a, "defaults") || !right(finer.eps, b, "a tenth of the tolerance")) return;
     const double first = largest(a, o_.window), second = largest(b, o_.window);
-    const bool   falls = o_.disturbed || first < 1e-3 || second < 0.7 * first;
+    const bool   falls = o_.disturbed || o_.blow || first < 1e-3 || second < 0.7 * first;
     if (o_.window == samples && falls) return;
     finest();
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first)) stillFalls(first, second);
@@ -431,7 +415,7 @@ private:
     tight.radius  = 0.8;
     tight.eps     = reference_eps;
     tight.work    = patience(10);
-    tight.first   = 1e-14 * model_.period;
+    tight.first   = no_motion * model_.period;
     return RunHHT(build(), tight);
   }
   bool judgeByItself()

@@ -117,13 +117,14 @@ private:
   {
     const auto             percent = [&](int n) { return Text("%d (%.2f %%)", n, 100. * n / (double)all_.size()); };
     std::vector<Page::Row> r;
-    int whole = 0, finest = 0, part = 0, disturbed = 0, kept = 0, switched = 0, balanced = 0, repeated = 0, resumed = 0;
+    int whole = 0, finest = 0, part = 0, disturbed = 0, blow = 0, kept = 0, switched = 0, balanced = 0, repeated = 0, resumed = 0;
     for (const Outcome &o : all_) {
       switched += o.switched;
       balanced += o.balance >= 0 && o.balance <= allowed_imbalance;
       repeated += o.repeated;
       resumed += o.resumed;
       disturbed += o.verdict == Right && o.disturbed;
+      blow += o.verdict == Right && o.blow;
       whole += o.verdict == Right && o.window == samples;
       finest += o.verdict == Right && o.window < samples && o.finest_window == samples;
       part += o.verdict == Right && o.window < samples && o.finest_window < samples;
@@ -136,6 +137,7 @@ private:
     r.push_back({"  at eps/100 over the whole span", percent(finest)});
     r.push_back({"  over a part of it, chaotic beyond", percent(part)});
     r.push_back({"  of these, as far as a disturbance lets them be", percent(disturbed)});
+    r.push_back({"  of these, from a first step in which nothing moves", percent(blow)});
     r.push_back({"wrong", percent(with(Wrong))});
     r.push_back({"failed with a message", percent(with(Failed))});
     r.push_back({"crashed", percent(with(Crashed))});
@@ -210,7 +212,7 @@ private:
     std::ofstream f(file);
     f << "number,verdict,reference,bodies,planar,end,length,mass,speed,stiffest,steps,rejected,newton,jacobians,"
          "factorizations,corrector_fails,changes,cpu,total,error,finer,finest,"
-         "velocity,finer_velocity,reaction,finer_reaction,doubt,misfit,slip,energy,finest_window,disturbed,window,used,"
+         "velocity,finer_velocity,reaction,finer_reaction,doubt,misfit,slip,energy,finest_window,disturbed,blow,window,used,"
          "legs,"
          "reference_steps,switched,balance,between,unsolved,unjudged,repeated,resumed,message,types\n";
     for (const Outcome &o : all_) {
@@ -223,7 +225,7 @@ private:
         << ',' << o.changes << ',' << o.cpu << ',' << o.total << ',' << o.error << ',' << o.finer << ',' << o.finest
         << ',' << o.velocity << ',' << o.finer_velocity << ',' << o.reaction << ',' << o.finer_reaction << ','
         << o.doubt << ',' << o.misfit << ',' << o.slip << ',' << o.energy << ',' << o.finest_window << ','
-        << o.disturbed << ',' << o.window << ',' << o.used << ',' << o.legs << ',' << o.reference_steps << ','
+        << o.disturbed << ',' << o.blow << ',' << o.window << ',' << o.used << ',' << o.legs << ',' << o.reference_steps << ','
         << o.switched << ',' << o.balance << ',' << o.between << ',' << o.unsolved << ',' << o.unjudged << ',' << o.repeated << ','
         << o.resumed << ",\"" << message << "\"," << o.types << '\n';
     }
