@@ -52,7 +52,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   c.ksp_its += its;
   failed = reason < 0;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
-  PetscCall(VecAXPY(c.X, -1, c.d));
+  if (!failed) PetscCall(VecAXPY(c.X, -1, c.d));
   PetscCall(VecNorm(c.d, NORM_2, &d));
   PetscCall(VecNorm(c.X, NORM_2, &x));
   PetscCall(TakeUnknowns(Get(ts), c));
@@ -124,7 +124,7 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
   PetscReal e = 0, last;
-  PetscBool renew = (PetscBool)!have_matrix;
+  PetscBool renew = (PetscBool)!have_matrix, other;
 
   PetscFunctionBegin;
   *ok = PETSC_TRUE;
@@ -139,6 +139,11 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
     last = e;
     PetscCall(CorrectUnknowns(ts, c, &e, ok));
+    PetscCall(LinearGiveUpKrylov(c.ksp, c.P, c.linear, &other));
+    if (other) {
+      *ok = renew = PETSC_TRUE;
+      continue;
+    }
     *why = "the matrix is singular there, or the solver failed";
     if (!*ok) *c.failed = PC_SUBPC_ERROR;
     const bool known = c.its > 1 && !fresh, falls = e <= slow * last;

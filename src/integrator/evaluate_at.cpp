@@ -72,6 +72,7 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   }
   PetscCall(LinearDefaults(S.at.ksp, &S.linear));
   PetscCall(KSPSetFromOptions(S.at.ksp));
+  S.linear.may_be_rough = I.linear.iterative; /* where the run has no factor its samples make none */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,6 +92,7 @@ PetscErrorCode GetSampler(TS ts, Sampler **S)
   *S = I.sampler = new Sampler;
   Consistent &c = I.sampler->at;
   PetscCall(MatDuplicate(P, MAT_DO_NOT_COPY_VALUES, &c.P));
+  PetscCall(CopyNodes(P, c.P));
   for (Vec *v : {&c.U, &c.V, &c.A, &c.X, &c.F, &c.d}) PetscCall(VecDuplicate(I.U0, v));
   if (I.constraints()) PetscCall(VecDuplicate(I.U0, &c.gamma));
   c.linear = &I.sampler->linear;

@@ -70,7 +70,7 @@ PetscErrorCode SolverDefaults(TS ts, KSP ksp)
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed)
 {
   PC        pc;
-  PetscBool smaller = PETSC_FALSE, numbers;
+  PetscBool other = PETSC_FALSE, numbers;
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
@@ -81,16 +81,29 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFail
   if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
   PetscCall(KSPSetUp(ksp));
   PetscCall(FailedReason(pc, failed));
-  if (*failed == PC_FACTOR_OUTMEMORY) {
+  for (int attempt = 0; *failed && attempt < 2; attempt++) { /* no Krylov method, then no room */
     PetscCall(MatrixHasNumbers(P, &numbers));
-    if (numbers) PetscCall(LinearChooseSmaller(ksp, P, linear, &smaller));
-  }
-  if (smaller) {
+    if (numbers && *failed == PC_FACTOR_OUTMEMORY) PetscCall(LinearChooseSmaller(ksp, P, linear, &other));
+    else if (numbers) PetscCall(LinearGiveUpKrylov(ksp, P, linear, &other));
+    if (!numbers || !other) break;
     PetscCall(KSPSetOperators(ksp, J, P));
     PetscCall(KSPSetUp(ksp));
     PetscCall(FailedReason(pc, failed));
   }
   PetscCall(CheckMemory(ts, pc, P, *failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a solve by the run's solver; *other: another one takes its place, which has no factor yet */
+PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other)
+{
+  KSP ksp;
+  Mat P;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(LinearGiveUpKrylov(ksp, P, &Get(ts).linear, other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

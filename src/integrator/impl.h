@@ -358,6 +358,7 @@ PetscErrorCode SolverDefaults(TS ts, KSP ksp);
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed);
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);
+PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
 /* equations.cpp */
 PetscErrorCode FormFunction(SNES snes, Vec X, Vec F, TS ts);
@@ -390,6 +391,7 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P);
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
 /* nodes.cpp */
+PetscErrorCode CopyNodes(Mat from, Mat to);
 PetscErrorCode TellPositions(Mat P, Vec U);
 /* verify.cpp */
 PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);

@@ -226,6 +226,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   SNESConvergedReason reason;
   Mat                 P;
   PetscInt            its;
+  PetscBool           other;
 
   PetscFunctionBegin;
   BeginIteration(I);
@@ -242,6 +243,11 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
   ts->ksp_its += its;
+  PetscCall(GiveUpKrylov(ts, &other));
+  if (other) {
+    c.matrix.forget();
+    c.matrix.fresh = PETSC_FALSE;
+  }
   const bool foreign = !c.it;
   *ok                = (PetscBool)(reason > 0);
   if (foreign && *ok) PetscCall(CheckJudged(ts));

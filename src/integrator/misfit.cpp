@@ -60,12 +60,16 @@ PetscErrorCode TrySolve(TS ts, Vec dV, PetscBool *ok)
   KSP                ksp;
   KSPConvergedReason reason;
   PetscReal          norm;
+  PetscBool          other = PETSC_TRUE;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
-  PetscCall(KSPSolve(ksp, I.gamma, dV));
-  I.stat.solves++;
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  while (other) { /* a factor is made in the solve */
+    PetscCall(KSPSolve(ksp, I.gamma, dV));
+    I.stat.solves++;
+    PetscCall(KSPGetConvergedReason(ksp, &reason));
+    PetscCall(GiveUpKrylov(ts, &other));
+  }
   PetscCall(VecNorm(dV, NORM_INFINITY, &norm));
   *ok = (PetscBool)(reason >= 0 && !PetscIsInfOrNanReal(norm));
   PetscFunctionReturn(PETSC_SUCCESS);

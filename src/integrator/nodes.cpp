@@ -93,4 +93,17 @@ PetscErrorCode TellPositions(Mat P, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What TSHHT3SetNodes() has told of the rows of one matrix, for another one of the same rows */
+PetscErrorCode CopyNodes(Mat from, Mat to)
+{
+  PetscObject told;
+
+  PetscFunctionBegin;
+  for (const char *name : {(const char *)LINEAR_NODES, reference_name}) {
+    PetscCall(PetscObjectQuery((PetscObject)from, name, &told));
+    PetscCall(PetscObjectCompose((PetscObject)to, name, told));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace hht3

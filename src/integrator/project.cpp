@@ -51,15 +51,19 @@ PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
   KSP                ksp;
   Mat                P;
   KSPConvergedReason reason;
+  PetscBool          other = PETSC_TRUE;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, NULL, &P, NULL, NULL));
   if (Get(ts).unfactored) PetscCall(NameRedundant(ts));
   PetscCall(KSPSetOperators(ksp, P, P));
-  PetscCall(KSPSolve(ksp, rhs, d));
-  Get(ts).stat.solves++;
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  while (other) { /* a factor is made in the solve */
+    PetscCall(KSPSolve(ksp, rhs, d));
+    Get(ts).stat.solves++;
+    PetscCall(KSPGetConvergedReason(ksp, &reason));
+    PetscCall(GiveUpKrylov(ts, &other));
+  }
   if (reason < 0) PetscCall(NameRedundant(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -110,6 +110,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 
   PetscFunctionBegin;
   *choice = LinearChoice();
+  PetscCall(LinearTakeFactor(ksp, choice));
   PetscCall(KSPGetType(ksp, &ksp_type));
   if (!ksp_type) PetscCall(KSPSetType(ksp, KSPPREONLY));
 
@@ -374,8 +375,9 @@ static PetscErrorCode PreferSingle(KSP ksp, Mat P, MatFactorType type, const cha
 static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
 {
   Size        size;
+  MatInfo     info;
   const char *package = NULL;
-  PetscBool   lu, cholesky;
+  PetscBool   lu, cholesky, krylov = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCLU, &lu));
@@ -384,7 +386,11 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
     PetscFunctionReturn(0);
   }
-  PetscCall(Measure(P, symmetric, choice->many_solves, &size));
+  PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
+  if (symmetric && info.nz_used > MANY_ENTRIES) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov)); /* without ordering it */
+  if (!krylov) PetscCall(Measure(P, symmetric, choice->many_solves, &size));
+  if (!krylov && symmetric && size.single) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov));
+  if (krylov) PetscFunctionReturn(0);
   if (!choice->user_pc) {
     /* LDL^T where it halves a large work and a package for indefinite matrices is there */
     PetscBool indefinite = PETSC_FALSE;
@@ -471,6 +477,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
+  if (choice->iterative && !choice->no_room && !symmetric) PetscCall(LinearTakeFactor(ksp, choice)); /* LU takes less time than FGMRES (tests/bench/whole_bodies.md) */
   if (choice->iterative)
     PetscCall(LinearSetKrylov(ksp, choice->cholesky = symmetric, choice));
   else if (choice->user_pc && choice->user_package)

@@ -14,7 +14,9 @@ struct LinearChoice {
   PetscBool user_package = PETSC_FALSE; /* ... or the package that factors the matrix */
   PetscBool may_be_rough = PETSC_FALSE; /* the caller has LinearSolveRoughly() for most solves: factors in single precision pay */
   PetscBool refines      = PETSC_FALSE; /* solves with the factor are refined unless they may be rough */
-  PetscBool iterative    = PETSC_FALSE; /* there was no room for a factor: a Krylov method with the constraint preconditioner */
+  PetscBool iterative    = PETSC_FALSE; /* a Krylov method with the constraint preconditioner was chosen */
+  PetscBool no_room      = PETSC_FALSE; /* ... as there was no room for a factor */
+  PetscBool slow         = PETSC_FALSE; /* ... and given up: it took too many iterations, or failed */
   PetscBool constraint   = PETSC_FALSE; /* hhtconstraint behind a Krylov method, chosen or the user's: a matrix costs as much as a few solves */
   PetscBool many_solves  = PETSC_FALSE; /* hundreds follow each factorization: the caller is a preconditioner */
   PetscBool cholesky     = PETSC_FALSE; /* LDL^T was chosen, which stands on the symmetry of the matrix */
@@ -35,7 +37,11 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
    (constraint.h). *changed = PETSC_FALSE if the choice was the user's, or is this one already. */
 PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBool *changed);
 
-/* The same where a run goes on with the solver that it had: package and factorization are not looked for anew. */
+/* After a solve, or a set-up that failed, with the Krylov method that LinearChoose() took in place of a factor: *changed, if it failed or took more iterations than
+   the factor is worth, which P gets from now on. Collective. */
+PetscErrorCode LinearGiveUpKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *changed);
+
+/* LinearChoose() where a run goes on with the solver that it had: package and factorization are not looked for anew. */
 PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice);
 
 /*
