@@ -55,7 +55,7 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   PetscCall(KSPGetOptionsPrefix(run, &prefix));
   PetscCall(KSPSetOptionsPrefix(S.at.ksp, prefix));
   PetscCall(KSPGetType(run, &type));
-  if (type) PetscCall(KSPSetType(S.at.ksp, type));
+  if (type && !I.linear.iterative) PetscCall(KSPSetType(S.at.ksp, type)); /* conjugate gradients of our choice are chosen again */
   PetscCall(KSPGetTolerances(run, &rtol, &atol, &dtol, &its));
   PetscCall(KSPSetTolerances(S.at.ksp, rtol, atol, dtol, its));
   PetscCall(KSPSetOperators(S.at.ksp, S.at.P, S.at.P));

@@ -69,6 +69,7 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
   PetscCall(PCSetType(pc, PCHHTCONSTRAINT));
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
+  PetscCall(KSPSetFromOptions(ksp)); /* of "preonly" it has read none */
   PetscFunctionReturn(0);
 }
 

@@ -1,6 +1,7 @@
 /* The preconditioner "hhtconstraint": what it leaves out, its coarse level, conjugate gradients on the constraints, what it refuses */
 #include "linear/coarse.h"
 #include "linear/constraint.h"
+#include "linear/linear.h"
 #include "bench/linear_matrices.h"
 #include "view_text.h"
 #include <gtest/gtest.h>
@@ -323,3 +324,92 @@ TEST_F(ConstraintPC, Refusals)
   EXPECT_EQ(KSPSetUp(ksp), PETSC_ERR_ARG_OUTOFRANGE);
   OK(PetscPopErrorHandler());
 }
+
+/* A body whose factor is large: the choice, and the way back where conjugate gradients do not serve, or symmetry is lost */
+class LargeBody : public ConstraintPC
+{
+protected:
+  LinearChoice choice;
+
+  void choose(bool positions, const char *options = NULL, bool rough = true)
+  {
+    create(block(20, 20, 20, true), 3 * 21 * 21 * 21);
+    nodes(3);
+    if (positions) {
+      place([&](PetscInt node, double place[3]) {
+        place[0] = node % 21;
+        place[1] = node / 21 % 21;
+        place[2] = node / 21 / 21;
+      });
+    }
+    if (options) { OK(PetscOptionsInsertString(NULL, options)); }
+    OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+    OK(LinearDefaults(ksp, &choice));
+    choice.may_be_rough = (PetscBool)rough;
+    OK(KSPSetFromOptions(ksp));
+    OK(KSPSetOperators(ksp, A, A));
+    OK(LinearChoose(ksp, A, PETSC_TRUE, &choice));
+    if (options) { OK(PetscOptionsClear(NULL)); }
+  }
+  bool isConstraint()
+  {
+    PC        pc;
+    PetscBool is = PETSC_FALSE;
+    EXPECT_EQ(KSPGetPC(ksp, &pc), 0);
+    EXPECT_EQ(PetscObjectTypeCompare((PetscObject)pc, PCHHTCONSTRAINT, &is), 0);
+    return is;
+  }
+  /* b - A x relative to b */
+  double leftOf()
+  {
+    PetscReal all = 0;
+    double    forces = 0, constraints = 0;
+    EXPECT_EQ(VecNorm(b, NORM_INFINITY, &all), 0);
+    left(x, &forces, &constraints);
+    return std::max(forces, constraints) / all;
+  }
+};
+
+TEST_F(LargeBody, ConjugateGradientsTakeThePlaceOfItsFactor)
+{
+  PetscBool changed = PETSC_TRUE;
+  choose(true);
+  EXPECT_TRUE(isConstraint()) << choice.text;
+  EXPECT_GT(solve(), 0);
+  EXPECT_LT(iterations(), 30);
+  OK(LinearGiveUpKrylov(ksp, A, &choice, &changed));
+  EXPECT_FALSE(changed);
+  LinearChoice anew;
+  OK(LinearDefaults(ksp, &anew)); /* another set-up: what was chosen is not taken for the user's */
+  EXPECT_FALSE(anew.user_pc);
+}
+
+TEST_F(LargeBody, AFactorWhereTheyDoNotServe)
+{
+  PetscBool changed = PETSC_FALSE;
+  choose(true, "-ksp_max_it 3 -ksp_rtol 1e-8");
+  ASSERT_TRUE(isConstraint()) << choice.text;
+  EXPECT_LT(solve(), 0);
+  OK(LinearGiveUpKrylov(ksp, A, &choice, &changed));
+  EXPECT_TRUE(changed);
+  EXPECT_FALSE(isConstraint()) << choice.text;
+  EXPECT_GT(solve(), 0);
+  EXPECT_LT(leftOf(), 1e-3); /* of a factor in single precision at least */
+  OK(LinearChoose(ksp, A, PETSC_TRUE, &choice));
+  EXPECT_FALSE(isConstraint()) << "they are not tried again";
+}
+
+TEST_F(LargeBody, AFactorWhereSymmetryIsLost)
+{
+  choose(true);
+  ASSERT_TRUE(isConstraint()) << choice.text;
+  OK(LinearChoose(ksp, A, PETSC_FALSE, &choice));
+  EXPECT_FALSE(isConstraint()) << choice.text;
+  EXPECT_GT(solve(), 0);
+  EXPECT_LT(leftOf(), 1e-3);
+}
+
+TEST_F(LargeBody, AFactorWithoutPositions) { choose(false); EXPECT_FALSE(isConstraint()) << choice.text; }
+TEST_F(LargeBody, AFactorWhereNobodyRefinesSolves) { choose(true, NULL, false); EXPECT_FALSE(isConstraint()) << choice.text; }
+TEST_F(LargeBody, TheUsersFactor) { choose(true, "-pc_type cholesky"); EXPECT_FALSE(isConstraint()) << choice.text; }
+TEST_F(LargeBody, TheUsersPreonly) { choose(true, "-ksp_type preonly"); EXPECT_FALSE(isConstraint()) << choice.text; }

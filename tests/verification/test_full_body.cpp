@@ -150,6 +150,52 @@ TEST(FullBodyDynamics, FixedStepsOfManyNodesKeepTheirMatrix)
   EXPECT_LE(all.jacobians - first.jacobians, 4);
 }
 
+/* By default and by a factor: the same motion and, between steps, accelerations; the solvers that made them show themselves */
+TEST(FullBodyDynamics, LargeBodyByConjugateGradientsAsByAFactor)
+{
+  hhtex::SolidBeam rubber;
+  rubber.n[0] = 30;
+  rubber.n[1] = rubber.n[2] = 7;
+  rubber.length             = 0.6;
+  rubber.depth = rubber.width = 0.14;
+  rubber.element              = hhtex::BeamElement::Brick20;
+  rubber.material             = {5e6, 0.4, 1100};
+  const BeamMesh m(rubber);
+  double         tip[2], between[2];
+  for (int factor = 0; factor < 2; factor++) {
+    Scene               scene(PETSC_COMM_SELF);
+    FullFeBody          fe;
+    FullBody            b;
+    std::vector<double> values;
+    PetscReal           t;
+    SNES                snes;
+    KSP                 ksp;
+    PetscBool           cg;
+    b.law         = FeLaw::Large;
+    b.attachments = hhtex::BeamAttachments();
+    scene.gravity({0, 0, -9.81});
+    must(fe.add(scene, "beam", m.model, b));
+    scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
+    const Marker end = scene.marker(fe.attachment("tip"));
+    scene.channel("z", Measure::displacement(end, 2));
+    scene.channel("a", Measure::acceleration(end, 2));
+    SceneRun run(scene, 1, std::string(" -ts_dt 0.005 -ts_adapt_type none -ts_max_steps 2 -ts_rtol 1e-6 -ts_atol 1e-6 ") + (factor ? "-pc_type cholesky " : ""));
+    must(run.solve());
+    must(TSGetTime(run.ts, &t));
+    must(scene.sample(run.ts, t, values));
+    tip[factor] = values[0];
+    must(scene.sample(run.ts, t - 0.0025, values));
+    between[factor] = values[1];
+    must(TSGetSNES(run.ts, &snes));
+    must(SNESGetKSP(snes, &ksp));
+    must(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
+    EXPECT_EQ((bool)cg, !factor);
+  }
+  MEASURED("tip %.8g, %.8g, acceleration between steps %.8g, %.8g", tip[0], tip[1], between[0], between[1]);
+  EXPECT_NEAR(tip[0], tip[1], 2e-6);
+  EXPECT_NEAR(between[0], between[1], 1e-4 * std::abs(between[1]));
+}
+
 /* A load that sets in within four steps: what the rates at the start predict for the end of the first step is far from it, and Newton's method goes astray there. From the last
    values it does not; otherwise h would be cut, and stay short. */
 TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
