@@ -7,8 +7,6 @@ static char help[] =
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscReal end = 0.03;
 
   PetscFunctionBeginUser;
@@ -16,17 +14,7 @@ int main(int argc, char **argv)
   PetscCall(TSHHT3Initialize());
   PetscCall(hhtex::SummaryByDefault());
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::Andrews problem(end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::Andrews(end), 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

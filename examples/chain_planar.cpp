@@ -8,8 +8,6 @@ static char help[] = "Planar chain of pinned rods that falls; no reference.\n"
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscInt  rods  = 10;
   PetscReal angle = 0., end = 1.;
 
@@ -20,17 +18,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-n", &rods, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-angle", &angle, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::Chain problem(rods, angle, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::Chain(rods, angle, end), 1e-4));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -8,8 +8,6 @@ static char help[] =
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscInt  windows = 2;
   PetscReal end     = 10.;
 
@@ -19,17 +17,7 @@ int main(int argc, char **argv)
   PetscCall(hhtex::SummaryByDefault());
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-n", &windows, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::FourBar problem(windows, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::FourBar(windows, end), 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -9,8 +9,6 @@ static char help[] = "Linear oscillators with given frequencies and damping rati
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscReal frequency[100] = {1., 5., 25.}, damping[100] = {0.}, end = 10.;
   PetscInt  nf = 100, nd = 100;
   PetscBool couple = PETSC_FALSE, given;
@@ -24,17 +22,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetRealArray(nullptr, nullptr, "-damping", damping, &nd, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-couple", &couple, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::Oscillators problem({frequency, frequency + nf}, {damping, damping + nf}, couple, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::Oscillators({frequency, frequency + nf}, {damping, damping + nf}, couple, end), 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -9,8 +9,6 @@ static char help[] =
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscReal angle = -90., spin = 0., end = 10.;
 
   PetscFunctionBeginUser;
@@ -20,17 +18,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-angle", &angle, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-spin", &spin, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::Pendulum problem(angle, spin, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::Pendulum(angle, spin, end), 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -354,6 +354,24 @@ PetscErrorCode ProblemReport(TS ts, const Problem &problem, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode ProblemSolve(const Problem &problem, PetscReal tolerance)
+{
+  TS  ts;
+  Vec U, V;
+
+  PetscFunctionBegin;
+  PetscCall(ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
+  PetscCall(TSSetType(ts, TSHHT3));
+  PetscCall(TSSetTolerances(ts, tolerance, nullptr, tolerance, nullptr));
+  PetscCall(TSSetFromOptions(ts));
+  PetscCall(TSSolve(ts, U));
+  PetscCall(ProblemReport(ts, problem, U, V));
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&V));
+  PetscCall(TSDestroy(&ts));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode SummaryByDefault(void)
 {
   PetscBool given;

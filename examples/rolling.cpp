@@ -10,8 +10,6 @@ static char help[] =
 
 int main(int argc, char **argv)
 {
-  TS                              ts;
-  Vec                             U, V;
   PetscBool                       disc = PETSC_FALSE;
   PetscReal                       end  = 10.;
   std::unique_ptr<hhtex::Problem> system;
@@ -26,17 +24,7 @@ int main(int argc, char **argv)
     system.reset(new hhtex::RollingDisc(end));
   else
     system.reset(new hhtex::Sleigh(end));
-  const hhtex::Problem &problem = *system;
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(*system, 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

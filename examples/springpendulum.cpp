@@ -7,8 +7,6 @@ static char help[] = "Stiff spring pendulum: a fast stretching frequency above a
 
 int main(int argc, char **argv)
 {
-  TS        ts;
-  Vec       U, V;
   PetscReal k = 1e4, end = 2.;
 
   PetscFunctionBeginUser;
@@ -17,17 +15,7 @@ int main(int argc, char **argv)
   PetscCall(hhtex::SummaryByDefault());
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-k", &k, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
-  const hhtex::SpringPendulum problem(k, end);
-  PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_WORLD, problem, &ts, &U, &V));
-  PetscCall(TSSetType(ts, TSHHT3));
-  PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
-  PetscCall(TSSetFromOptions(ts));
-  PetscCall(TSSolve(ts, U));
-  PetscCall(hhtex::ProblemReport(ts, problem, U, V));
-
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&V));
-  PetscCall(TSDestroy(&ts));
+  PetscCall(hhtex::ProblemSolve(hhtex::SpringPendulum(k, end), 1e-6));
   PetscCall(PetscFinalize());
   return 0;
 }

@@ -1,5 +1,6 @@
 #include "inner.h"
 #include <algorithm>
+#include <petsc/private/petscimpl.h>
 
 namespace
 {

@@ -7,7 +7,7 @@ namespace
 {
 
 constexpr float  smallest = 1e-20f, largest = 1e20f; /* of single precision's 1e-38 to 1e38: products with vectors have room, too */
-constexpr double rounding = 1e-10; /* of entries: blocks that differ by less from their transposes are symmetric */
+constexpr double rounding = 1e-10; /* of the Frobenius norm: what differs by less from its transpose is symmetric */
 
 /* ---- the pattern ---- */
 
@@ -159,10 +159,11 @@ PetscErrorCode InRange(Mat A, const NodeProduct &p, PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-/* Whether couplings between own nodes are symmetric: z^T A w = w^T A z for pseudo-random z and w */
+/* Whether couplings between own nodes are symmetric: z^T A w = w^T A z for pseudo-random z and w. The difference of the two has about the size of the
+   Frobenius norm of what is not symmetric; the sum of all entries would hide a part that is far above the rounding of single precision. */
 PetscErrorCode NodesAreSymmetric(const LocalRows &A, const std::vector<PetscInt> &node, bool *yes)
 {
-  double              one = 0, other = 0, size = 0;
+  double              one = 0, other = 0, squares = 0;
   std::vector<double> z((size_t)A.own), w((size_t)A.own);
 
   PetscFunctionBegin;
@@ -178,12 +179,12 @@ PetscErrorCode NodesAreSymmetric(const LocalRows &A, const std::vector<PetscInt>
       const double a = PetscRealPart(v);
       zA += a * w[(size_t)c];
       wA += a * z[(size_t)c];
-      size += std::abs(a);
+      squares += a * a;
     }));
     one += z[(size_t)i] * zA;
     other += w[(size_t)i] * wA;
   }
-  *yes = std::abs(one - other) <= rounding * size;
+  *yes = std::abs(one - other) <= rounding * std::sqrt(squares);
   PetscFunctionReturn(0);
 }
 

@@ -4,7 +4,7 @@ static char help[] =
     "counters, hot spots of the frame, a reaction, the engine's pitch rate, error against run time; one HTML page.\n"
     "  -frame <frame.h5>: the reduced frame, by atv_frame\n"
     "  -o <atv.html>: the page\n"
-    "  -end <2>: s;  -repeats <3>: of the timed runs;  -sweep <true>: error against run time too\n"
+    "  -end <2>: s, a multiple of 0.02;  -repeats <3>: of the timed runs;  -sweep <true>: error against run time too\n"
     "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n";
 
 #include "atv_page.h"
@@ -58,7 +58,8 @@ static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector
   PetscFunctionReturn(0);
 }
 
-/* Their errors at every fifth time of the reference */
+constexpr int sweep_samples = 5; /* errors at every fifth time of the reference: samples cost more than steps */
+
 static PetscErrorCode RunSweep(AtvRuns runs, std::vector<AtvRun> *all)
 {
   struct Method {
@@ -72,7 +73,7 @@ static PetscErrorCode RunSweep(AtvRuns runs, std::vector<AtvRun> *all)
       {"hhtdae, steps limited", nullptr, {{1e-5, 2e-3}, {1e-5, 1e-3}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}}};
 
   PetscFunctionBegin;
-  runs.dt *= 5;
+  runs.dt *= sweep_samples;
   for (const Method &m : methods)
     for (const auto &[eps, step] : m.grid) {
       all->emplace_back();
@@ -116,7 +117,10 @@ static PetscErrorCode Run()
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-limit", &limit, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-repeats", &repeats, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
+  const double intervals = end / (sweep_samples * runs.dt); /* of the sweep's samples, which are some of the reference's */
   PetscCheck(end > 0 && repeats > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end and -repeats must be positive");
+  PetscCheck(std::fabs(intervals - std::round(intervals)) < 1e-9, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end is %g s and must be a multiple of %g s",
+             (double)end, sweep_samples * runs.dt);
   PetscCall(body.load(PETSC_COMM_SELF, frame));
   runs.model = std::make_shared<ModalBody>(body.modal);
   runs.end   = end;

@@ -12,13 +12,15 @@
   and -ts_hhtdae_ option holds.
 */
 #include "beam_bodies.h"
+#include "process_use.h"
 
 #include <hhtdae/hhtdae.h>
 #include <petsctime.h>
 #include <slepcsys.h>
-#include <sys/resource.h>
 
 using namespace hhtdae;
+using hhtbench::PeakMegabytes;
+using hhtbench::ProcessorSeconds;
 
 enum { CLAMP, HINGE, FREE, ROD };
 
@@ -153,14 +155,6 @@ static PetscErrorCode TellBlocks(TS ts, Mat K)
 
 /* ---- results ---- */
 
-/* Processor time of this rank so far, s */
-static double Processor()
-{
-  rusage use;
-  getrusage(RUSAGE_SELF, &use);
-  return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) + 1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
-}
-
 struct Clock {
   PetscLogDouble   run = 0, start = 0; /* the run, its second step */
   double           processor[2] = {};  /* likewise */
@@ -174,7 +168,7 @@ struct Clock {
     PetscFunctionBegin;
     if (step != 1) PetscFunctionReturn(0);
     PetscCall(PetscTime(&c->start));
-    c->processor[1] = Processor();
+    c->processor[1] = ProcessorSeconds();
     PetscCall(TSHHT3GetStatistics(ts, &c->first));
     PetscCall(PetscLogStagePush(c->stage));
     PetscFunctionReturn(0);
@@ -184,10 +178,8 @@ struct Clock {
 /* Peaks of resident memory, MB: the largest of a rank and the sum */
 static PetscErrorCode Memory(double *most, double *all)
 {
-  rusage use;
   PetscFunctionBeginUser;
-  getrusage(RUSAGE_SELF, &use);
-  *most = *all = 1024. * (double)use.ru_maxrss / 1e6;
+  *most = *all = PeakMegabytes();
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, all, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));
   PetscFunctionReturn(0);
@@ -238,7 +230,7 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   PetscCall(Solver(ts, &solver));
   PetscCall(Memory(&most, &all));
   const double n          = (double)PetscMax(s.steps - clock.first.steps, 1);
-  double       processor[2] = {clock.processor[1] - clock.processor[0], (Processor() - clock.processor[1]) / n}; /* first step, a further one */
+  double       processor[2] = {clock.processor[1] - clock.processor[0], (ProcessorSeconds() - clock.processor[1]) / n}; /* first step, a further one */
   char         turned[64] = "";
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, processor, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(TSGetTime(ts, &end));
@@ -291,7 +283,7 @@ static PetscErrorCode Run()
   PetscCall(TSMonitorSet(ts, Clock::monitor, &clock, nullptr));
   PetscCall(PetscTime(&built));
   clock.run          = built;
-  clock.processor[0] = Processor();
+  clock.processor[0] = ProcessorSeconds();
   PetscCall(PetscLogStageRegister("Further steps", &clock.stage));
   PetscCall(scene.solve(ts));
   PetscCall(PetscLogStagePop());

@@ -16,13 +16,15 @@
   the ends of steps, interpolated within hhtdae's steps.
 */
 #include "beam_mesh.h"
+#include "process_use.h"
 #include "solidbeam_history.h"
 
 #include <hhtdae/hhtdae.h>
 #include <slepcsys.h>
-#include <sys/resource.h>
 
 using namespace hhtdae;
+using hhtbench::PeakMegabytes;
+using hhtbench::ProcessorSeconds;
 
 namespace
 {
@@ -140,14 +142,6 @@ PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBo
   PetscFunctionReturn(0);
 }
 
-/* Processor time of this rank so far, s */
-double Processor()
-{
-  rusage use;
-  getrusage(RUSAGE_SELF, &use);
-  return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) + 1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
-}
-
 struct Counts {
   PetscInt steps = 0, iterations = 0, matrices = 0, factorizations = 0;
   double   begun = 0, first = 0, ended = 0; /* processor time: before the first step, after it, after the last one */
@@ -166,7 +160,7 @@ struct Watcher {
     Watcher *w = static_cast<Watcher *>(ctx);
     PetscFunctionBeginUser;
     if (step <= 0) PetscFunctionReturn(0);
-    if (step == 1) w->counts->first = Processor();
+    if (step == 1) w->counts->first = ProcessorSeconds();
     if (w->every > 0) PetscCall(w->within(ts, t, U));
     else PetscCall(w->history->write(t, U));
     PetscFunctionReturn(0);
@@ -201,9 +195,9 @@ PetscErrorCode RunHHT(const Case &c, Scene &scene, TS ts, History &history, Coun
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
   PetscCall(TSSetFromOptions(ts));
   PetscCall(TSMonitorSet(ts, Watcher::monitor, &watcher, nullptr));
-  counts.begun = Processor();
+  counts.begun = ProcessorSeconds();
   PetscCall(scene.solve(ts));
-  counts.ended = Processor();
+  counts.ended = ProcessorSeconds();
   PetscCall(TSHHT3GetStatistics(ts, &s));
   counts.steps          = s.steps;
   counts.iterations     = s.newton;
@@ -337,7 +331,7 @@ PetscErrorCode RunEuler(const Case &c, TS ts, History &history, Counts &counts)
   PetscCall(VecZeroEntries(e.V));
   PetscCall(VecZeroEntries(e.A));
   PetscCall(CreateSNES(e, c.by == STATIC ? "static_" : "euler_", c.load.norm(), &snes));
-  counts.begun = Processor();
+  counts.begun = ProcessorSeconds();
   PetscCall(TSGetI2Jacobian(ts, nullptr, &J, nullptr, nullptr));
   PetscCall(e.findScale(x, J));
   for (PetscInt n = 1; n <= steps; n++) {
@@ -354,9 +348,9 @@ PetscErrorCode RunEuler(const Case &c, TS ts, History &history, Counts &counts)
     PetscCall(e.motion(x));
     PetscCall(VecCopy(e.V, e.Vn));
     PetscCall(history.write(e.t, x));
-    if (n == 1) counts.first = Processor();
+    if (n == 1) counts.first = ProcessorSeconds();
   }
-  counts.ended = Processor();
+  counts.ended = ProcessorSeconds();
   counts.factorizations = counts.matrices;
   PetscCall(SNESDestroy(&snes));
   for (Vec *v : {&x, &e.Un, &e.Vn, &e.V, &e.A, &e.scale, &e.U}) PetscCall(VecDestroy(v));
@@ -369,12 +363,10 @@ PetscErrorCode Report(const Case &c, const FeModel &model, TS ts, const History 
 {
   const char *const kinds[] = {"hhtdae", "euler", "static"};
   double            time[3] = {k.begun, k.first - k.begun, (k.ended - k.first) / (double)PetscMax(k.steps - 1, 1)};
-  rusage            use;
   PetscInt          unknowns;
   Vec               U;
   PetscFunctionBeginUser;
-  getrusage(RUSAGE_SELF, &use);
-  double memory = 1024. * (double)use.ru_maxrss / 1e6;
+  double memory = PeakMegabytes();
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &memory, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, time, 3, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(TSGetSolution(ts, &U));

@@ -175,15 +175,15 @@ static PetscErrorCode RunAll(Results &r, Results &sweep, const Grid &grid, const
   for (Results *x : {&r, &sweep}) x->curve.resize(r.cases.size());
   r.origin.resize(r.cases.size());
   for (size_t i = 0; i < r.cases.size(); i++) {
-    const double             start = cpuSeconds();
+    const double             start = ProcessorSeconds();
     std::unique_ptr<Problem> problem;
     PetscCall(r.cases[i].make(&problem, &r.origin[i]));
-    const double found = cpuSeconds() - start;
+    const double found = ProcessorSeconds() - start;
     if (r.origin[i].failure.empty()) {
       if (!r.solvers.empty()) PetscCall(RunCase(r.cases[i], *problem, grid, r.solvers, r.curve[i]));
       if (!sweep.solvers.empty()) PetscCall(RunCase(r.cases[i], *problem, coarse, sweep.solvers, sweep.curve[i]));
     }
-    fprintf(stderr, "%s: %d unknowns, %.1f s%s%s%s\n", r.cases[i].name.c_str(), (int)problem->n, cpuSeconds() - start,
+    fprintf(stderr, "%s: %d unknowns, %.1f s%s%s%s\n", r.cases[i].name.c_str(), (int)problem->n, ProcessorSeconds() - start,
             r.cases[i].scene ? Text(", reference %.1f s", found).c_str() : "",
             r.origin[i].failure.empty() ? "" : ", left out: ", r.origin[i].failure.c_str());
   }
@@ -290,7 +290,7 @@ int main(int argc, char **argv)
   PetscCall(RunAll(r, sweep, grid, coarse));
   page.repeats = (int)grid.repeats;
   page.limit   = grid.limits.seconds;
-  page.seconds = cpuSeconds();
+  page.seconds = ProcessorSeconds();
   PetscCall(Report(r, sweep, page));
   PetscCall(SlepcFinalize());
   return 0;

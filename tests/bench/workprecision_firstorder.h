@@ -53,9 +53,9 @@ public:
     std::vector<double> u(n_), v(n_);
     p_.p.initial(u.data(), v.data());
     evaluate(p_.p, p_.t0, u.data(), v.data(), 1., 1., gradient_);
-    const double start = cpuSeconds();
+    const double start = ProcessorSeconds();
     for (int k = 0; k < n; k++) evaluate(p_.p, p_.t0, u.data(), v.data(), 1., 1., gradient_);
-    return (double)extra * (cpuSeconds() - start) / n;
+    return (double)extra * (ProcessorSeconds() - start) / n;
   }
 
   /* Consistent start: the reference knows lambda and the accelerations at t0 wherever there is one */

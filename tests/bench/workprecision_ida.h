@@ -166,14 +166,14 @@ private:
   void solve(const Limits &limits, Run &run)
   {
     std::vector<double> u(counted_.n), v(counted_.n), a(counted_.n);
-    const double        start = cpuSeconds();
+    const double        start = ProcessorSeconds();
     system_.extra             = 0;
     counted_.deadline         = start + limits.seconds;
     counted_.most             = limits.residuals;
     while (!recorder_.done()) {
       realtype  t;
       const int code = IDASolve(memory_, recorder_.next(), &t, y_, yp_, IDA_NORMAL);
-      run.time       = cpuSeconds() - start;
+      run.time       = ProcessorSeconds() - start;
       if (counted_.late) throw Failure{tooLong};
       if (code != IDA_TOO_MUCH_WORK) check(code, "IDASolve");
       if (code == IDA_TOO_MUCH_WORK) continue;
@@ -183,7 +183,7 @@ private:
       system_.accelerations(N_VGetArrayPointer(yp_), a.data());
       settings_.look(t, u.data(), v.data(), a.data());
     }
-    run.time = cpuSeconds() - start;
+    run.time = ProcessorSeconds() - start;
   }
 
   void statistics(Run &run)

@@ -6,10 +6,10 @@
 #define WORKPRECISION_RUN_H
 
 #include "problem.h"
+#include "process_use.h"
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <memory>
 #include <string>
@@ -18,15 +18,9 @@
 namespace wp
 {
 
+using hhtbench::ProcessorSeconds;
 using hhtex::Entries;
 using hhtex::Problem;
-
-inline double cpuSeconds()
-{
-  timespec t = {};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return t.tv_sec + 1e-9 * t.tv_nsec;
-}
 
 inline bool isMultiplier(TSHHT3Role r) { return r == TSHHT3_HOLONOMIC || r == TSHHT3_NONHOLONOMIC; }
 
@@ -65,7 +59,7 @@ struct CountedProblem : Problem {
   void initial(double *u, double *v) const override { p.initial(u, v); }
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
-    if (++residuals > most || (residuals % 256 == 0 && cpuSeconds() > deadline)) late = true;
+    if (++residuals > most || (residuals % 256 == 0 && ProcessorSeconds() > deadline)) late = true;
     if (late)
       std::fill_n(f, n, std::nan(""));
     else

@@ -260,7 +260,7 @@ inline PetscErrorCode NativeFunction(TS ts, PetscReal t, Vec U, Vec V, Vec A, Ve
   const CountedProblem &c = r.counted;
 
   PetscFunctionBegin;
-  if (++c.residuals % 256 == 0 && !c.late) c.late = cpuSeconds() > c.deadline;
+  if (++c.residuals % 256 == 0 && !c.late) c.late = ProcessorSeconds() > c.deadline;
   if (c.late)
     PetscCall(VecSet(F, std::nan("")));
   else
@@ -329,10 +329,10 @@ inline PetscErrorCode SolveTS(TSRun &r, Run &run)
   PetscFunctionBegin;
   if (r.system) r.system->extra = 0;
   r.counted.residuals = r.counted.jacobians = 0;
-  const double start                        = cpuSeconds();
+  const double start                        = ProcessorSeconds();
   r.counted.deadline                        = start + r.limits.seconds;
   const PetscErrorCode e                    = TSSolve(r.ts, r.U);
-  run.time                                  = cpuSeconds() - start;
+  run.time                                  = ProcessorSeconds() - start;
   if (r.system) run.extra = r.system->extraSeconds();
   PetscCall(e);
   PetscFunctionReturn(0);

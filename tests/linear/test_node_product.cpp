@@ -135,6 +135,43 @@ TEST_F(NodeProductTest, AgreesWithTheMatrix)
   OK(NodeProductDestroy(&p));
 }
 
+/* In a matrix of two million entries a single one that is not symmetric, small, but far above the rounding of single precision */
+TEST(NodeProduct, OneUnsymmetricEntry)
+{
+  Mat                   A;
+  Vec                   x, y;
+  NodeProduct           p;
+  PetscBool             usable;
+  PetscScalar           entry;
+  const PetscInt        first = 3 * 10 * 21 * 21, second = first + 3;
+  const Entries         e = block(20, 20, 20, false);
+  std::vector<PetscInt> node;
+  OK(TSHHT3Initialize());
+  OK(create_matrix(e, &A));
+  for (PetscInt i = 0; i < e.n; i++) node.push_back(i - i % 3);
+  OK(NodeProductFill(A, node, false, &p, &usable));
+  EXPECT_TRUE(p.symmetric);
+  OK(MatGetValue(A, first, first, &entry));
+  OK(MatSetValue(A, first, second, 2e-6 * entry, ADD_VALUES));
+  OK(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  OK(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  OK(NodeProductFill(A, node, true, &p, &usable));
+  EXPECT_FALSE(p.symmetric);
+  OK(MatCreateVecs(A, &x, &y));
+  OK(VecSetValue(x, first, 1, INSERT_VALUES)); /* its column: not a part of the transposed entry */
+  OK(VecAssemblyBegin(x));
+  OK(VecAssemblyEnd(x));
+  OK(MatMult(p.shell, x, y));
+  PetscScalar of_product, of_matrix;
+  OK(VecGetValues(y, 1, &second, &of_product));
+  OK(MatGetValue(A, second, first, &of_matrix));
+  EXPECT_NEAR(of_product, of_matrix, 2e-7 * entry);
+  OK(NodeProductDestroy(&p));
+  OK(VecDestroy(&x));
+  OK(VecDestroy(&y));
+  OK(MatDestroy(&A));
+}
+
 /* A few digits are a matter of single precision, many are not; and the operator of the user is the same as before */
 TEST_F(NodeProductTest, ServesFewDigits)
 {

@@ -8,14 +8,10 @@
 namespace hhtest
 {
 
-/* All rows but few on the first ranks, so that one of three has next to nothing */
-inline Mat distributed(const ::Entries &e)
+/* Rows begin to end - 1 on this rank */
+inline Mat distributed(const ::Entries &e, PetscInt begin, PetscInt end)
 {
-  Mat         A;
-  PetscMPIInt rank, size;
-  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  const PetscInt begin = rank == 0 ? 0 : e.n * 2 / 3 + rank - 1, end = rank == size - 1 ? e.n : e.n * 2 / 3 + rank;
+  Mat                      A;
   std::vector<PetscInt>    row, col;
   std::vector<PetscScalar> val;
   for (std::size_t k = 0; k < e.row.size(); k++)
@@ -30,6 +26,15 @@ inline Mat distributed(const ::Entries &e)
   must(MatSetPreallocationCOO(A, (PetscCount)row.size(), row.data(), col.data()));
   must(MatSetValuesCOO(A, val.data(), INSERT_VALUES));
   return A;
+}
+
+/* All rows but few on the first ranks, so that one of three has next to nothing */
+inline Mat distributed(const ::Entries &e)
+{
+  PetscMPIInt rank, size;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  return distributed(e, rank == 0 ? 0 : e.n * 2 / 3 + rank - 1, rank == size - 1 ? e.n : e.n * 2 / 3 + rank);
 }
 
 } // namespace hhtest

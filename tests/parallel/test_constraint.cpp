@@ -1,9 +1,8 @@
 /* The preconditioner "hhtconstraint" over all ranks: products in single precision, its coarse level, a matrix whose values change */
-#include "bench/linear_matrices.h"
+#include "distributed_matrix.h"
 #include "linear/constraint.h"
 #include "linear/matrix_nodes.h"
 #include "linear/node_product.h"
-#include "support.h"
 #include <hhtdae/hhtdae.h>
 #include <petscksp.h>
 
@@ -31,19 +30,7 @@ protected:
     const ::Entries e = block(NX - 1, NY - 1, NZ - 1, true);
     begin           = 3 * (nodes * rank / size);
     end             = rank == size - 1 ? e.n : 3 * (nodes * (rank + 1) / size);
-    std::vector<PetscInt>    row, col;
-    std::vector<PetscScalar> val;
-    for (std::size_t k = 0; k < e.row.size(); k++)
-      if (e.row[k] >= begin && e.row[k] < end) {
-        row.push_back(e.row[k]);
-        col.push_back(e.col[k]);
-        val.push_back(e.val[k]);
-      }
-    must(MatCreate(PETSC_COMM_WORLD, &A));
-    must(MatSetSizes(A, end - begin, end - begin, e.n, e.n));
-    must(MatSetType(A, MATAIJ));
-    must(MatSetPreallocationCOO(A, (PetscCount)row.size(), row.data(), col.data()));
-    must(MatSetValuesCOO(A, val.data(), INSERT_VALUES));
+    A               = distributed(e, begin, end);
     must(MatCreateVecs(A, &x, &b));
     must(VecDuplicate(b, &y));
     must(VecSetRandom(x, nullptr));

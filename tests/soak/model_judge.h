@@ -51,7 +51,7 @@ public:
 
   void run()
   {
-    const double start = CpuSeconds();
+    const double start = ProcessorSeconds();
     model_             = build();
     describe();
     Settings defaults;
@@ -65,7 +65,7 @@ public:
       judge(a);
       if (o_.verdict == Right || o_.verdict == Unknown) again(a);
     }
-    o_.total = CpuSeconds() - start;
+    o_.total = ProcessorSeconds() - start;
     o_.stage = Done;
   }
 

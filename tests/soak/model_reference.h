@@ -185,7 +185,7 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, dou
   leg.a0.resize(leg.n);
   r.problem->initial(leg.u0.data(), leg.v0.data());
   r.problem->reference(leg.t0, leg.u0.data(), leg.v0.data(), leg.a0.data());
-  const double start = CpuSeconds();
+  const double start = ProcessorSeconds();
   for (int point = 0, stuck = 0, way = 0; point < samples * fine;) {
     const int before = point;
     PetscCall(RunLeg(r, leg, point, way, eps, newton, work - r.work, &failure));
@@ -201,7 +201,7 @@ inline PetscErrorCode SolveByIDA(ReferenceRun &r, double eps, double newton, dou
       break;
     }
   }
-  r.result.cpu = CpuSeconds() - start;
+  r.result.cpu = ProcessorSeconds() - start;
   PetscFunctionReturn(0);
 }
 

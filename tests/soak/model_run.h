@@ -4,12 +4,14 @@
 
 #include "balance/newton_euler.h"
 #include "bench/page.h"
+#include "bench/process_use.h"
 #include "model.h"
 #include "model_residual.h"
-#include <ctime>
 
 namespace soak
 {
+
+using hhtbench::ProcessorSeconds;
 
 constexpr int samples = 24; /* after the start */
 
@@ -29,13 +31,6 @@ struct Trajectory {
 };
 
 inline double SampleTime(double end, int k) { return k == samples ? end : end * k / samples; }
-
-inline double CpuSeconds()
-{
-  timespec t = {};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* The first message of an error, in place of PETSc's printed trace */
 class Quiet
@@ -208,9 +203,9 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
   }
   Watcher watcher{*m.scene, m.end, s, m.observed.size(), laws.get(), *result};
   PetscCall(TSMonitorSet(ts, WatchRun, &watcher, nullptr));
-  const double         start  = CpuSeconds();
+  const double         start  = ProcessorSeconds();
   const PetscErrorCode failed = m.scene->solve(ts);
-  result->cpu                 = CpuSeconds() - start;
+  result->cpu                 = ProcessorSeconds() - start;
   PetscCall(TSHHT3GetStatistics(ts, &result->cost));
   result->steps = (long)result->cost.steps;
   PetscCall(failed);
