@@ -12,6 +12,7 @@ what MUMPS sends if it is the solver on a coarser level. --iterations of the lin
 """
 
 import argparse
+import collections
 import math
 import os
 import re
@@ -33,9 +34,10 @@ SOLVE, SOLVED = 0.155, 119898  # s of one solve by MUMPS on one rank with so man
 
 def count(path):
     """Of the ranks' steps after the first, for each product: largest and mean operations, largest messages, bytes and reductions"""
-    names = {}
-    with open(path) as file:
-        exec(compile(file.read(), path, "exec"), names)  # PETSc writes Python
+    tree = lambda: collections.defaultdict(tree)
+    names = {"tree": tree}
+    with open(path) as file:  # PETSc writes Python; versions from 3.22 on leave out that an event has entries
+        exec(compile(file.read().replace("= {}", "= tree()"), path, "exec"), names)
     events = names["Stages"]["Further steps"]
     step, products = events["TSStep"], events["MatMult"][0]["count"]
     of = lambda what: [step[r][what] / products for r in range(len(step))]
