@@ -1,5 +1,6 @@
 /* The interior of a body whose attachments are held: K and M of the free dofs, bordered by the averages. */
 #include "interior.h"
+#include <algorithm>
 #include <cmath>
 
 namespace hhtdae
@@ -86,7 +87,7 @@ static PetscErrorCode ScaleRows(const FeModel &model, const std::vector<Tied> &t
 static PetscErrorCode CreateCt(const FeModel &model, const std::vector<Tied> &tied, const Interior &in, PetscInt mine,
                                const std::vector<PetscInt> &global, Mat *Ct)
 {
-  std::vector<PetscInt> place(3 * model.own, -1), entries(in.dof.size(), 0);
+  std::vector<PetscInt> place(3 * model.own, -1), entries(in.dof.size(), 0), off(in.dof.size());
   PetscInt              begin, average = 0;
 
   PetscFunctionBegin;
@@ -95,8 +96,12 @@ static PetscErrorCode CreateCt(const FeModel &model, const std::vector<Tied> &ti
     for (PetscInt n : t.node)
       for (int c = 0; c < 3 && t.tie == Tie::Average; c++) entries[place[3 * n + c]] += 6;
   PetscCall(CreateEmpty(model.comm, (PetscInt)in.dof.size(), mine, Ct));
+  for (std::size_t i = 0; i < entries.size(); i++) { /* PETSc refuses more than there are columns */
+    off[i]     = std::min(entries[i], (PetscInt)global.size() - mine);
+    entries[i] = std::min(entries[i], mine);
+  }
   PetscCall(MatSeqAIJSetPreallocation(*Ct, 0, entries.data()));
-  PetscCall(MatMPIAIJSetPreallocation(*Ct, 0, entries.data(), 0, entries.data()));
+  PetscCall(MatMPIAIJSetPreallocation(*Ct, 0, entries.data(), 0, off.data()));
   PetscCall(MatSetOption(*Ct, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   PetscCall(MatGetOwnershipRange(*Ct, &begin, nullptr));
   for (const Tied &t : tied) {
