@@ -17,7 +17,8 @@
   multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
   (h fell to 1e-6). A c that the user has set stands.
 
-  A last correction that proves nothing (verify.cpp), turns back (between.cpp) or leaves forces of what is driven (driven.cpp) goes on.
+  A last correction that proves nothing (verify.cpp), turns back (between.cpp), is followed by another one or leaves forces of what is driven
+  (driven.cpp) goes on.
 */
 #include "impl.h"
 
@@ -32,6 +33,9 @@ constexpr PetscReal fixed = 0.02;
 
 /* A rate below it may be an old matrix' fault, above it the iteration diverges */
 constexpr PetscReal slow = 0.8;
+
+/* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
+constexpr PetscReal stagnant = 0.5;
 
 /* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
 constexpr PetscInt max_renewals = 3;
@@ -191,6 +195,45 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the correction `next` goes on in the direction of dX */
+PetscErrorCode GoesOn(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
+{
+  PetscScalar dot, square;
+
+  PetscFunctionBegin;
+  PetscCall(WeightCorrection(I, dX, work));
+  PetscCall(VecDot(dX, work, &square));
+  PetscCall(VecDot(next, work, &dot));
+  *yes = (PetscBool)(PetscRealPart(dot) >= stagnant * PetscRealPart(square));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual F has followed the last correction, but may stand in other directions than those in which the matrix has answered it: turned
+   about the direction of a stiff spring it is a soft force, which a matrix that is a little off takes for a stiff one, correction after
+   correction. So the next correction is asked for: that it is small is no proof if it goes on in the direction of the last one. */
+PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
+{
+  Integrator     &I    = Get(ts);
+  Corrector      &c    = I.corrector;
+  const Vec       next = I.verify.work, work = I.verify.model; /* the proof has done with them */
+  const PetscReal tol  = Tolerance(I);
+  PetscReal       e;
+  PetscBool       goes_on = PETSC_TRUE, rounding = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(SizeOfAnswer(ts, F, next, &e));
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+  if (CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e <= at_once * tol) PetscCall(GoesOn(I, dX, next, work, &goes_on));
+  if (goes_on && c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
+  if (!goes_on || rounding) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g\n", (double)c.e, (double)e));
+  c.reason = SNES_CONVERGED_ITERATING;
+  if (c.it >= c.limit()) PetscCall(Diverge(ts, "needs too many iterations"));
+  else if (xi >= stagnant) PetscCall(FreshMatrices(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Forces of driven coordinates are not among what has been judged so far; with an old matrix they may not converge */
 PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 {
@@ -227,6 +270,7 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   if (I.corrector.reason > 0) {
     PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
     if (!proved) PetscCall(GoOnUnproved(ts));
+    else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
     if (I.corrector.reason > 0 && !I.corrector.rounding) PetscCall(AskForces(ts, X, F, evaluated));
   } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
     PetscCall(GoOnBetween(ts, X, dX, F, evaluated));

@@ -189,7 +189,8 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   Imbalance     left;
 
   PetscFunctionBegin;
-  *proved = PETSC_TRUE;
+  *proved  = PETSC_TRUE;
+  v.looked = PETSC_FALSE;
   if (!Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1);
   PetscCall(Claimed(ts, dX, &claimed));
@@ -198,7 +199,7 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
-  *evaluated = PETSC_TRUE;
+  *evaluated = v.looked = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
     PetscCall(Compare(ts, F, &left));
