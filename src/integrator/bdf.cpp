@@ -10,7 +10,6 @@
 */
 #include "entries.h"
 #include "impl.h"
-#include "sweeps.h"
 #include <utility>
 
 namespace hht3
@@ -27,58 +26,6 @@ constexpr PetscReal too_short = 0.2;
 void Spans(const Order &o, PetscReal t1, PetscReal tau[])
 {
   for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
-}
-
-template <int k>
-struct BaseOfBDF {
-  PetscReal          c[k], gh, misfit;
-  const PetscScalar *u[k], *v[k], *dV;
-  const float       *moves; /* null where everything is a coordinate */
-  PetscScalar       *to[3];
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const
-  {
-    const Four zero = {0, 0, 0, 0};
-    Four       psi_u = zero, psi_v = dV ? -misfit * at.get(dV) : zero;
-    for (int j = 0; j < k; j++) psi_u += c[j] * at.get(u[j]);
-    for (int j = 0; j < k; j++) psi_v += c[j] * at.get(v[j]);
-    psi_u += gh * psi_v;
-    if (moves) {
-      const auto moving = at.get(moves) != 0;
-      psi_u             = moving ? psi_u : zero;
-      psi_v             = moving ? psi_v : zero;
-    }
-    at.put(to[0], psi_u);
-    at.put(to[1], psi_v);
-    at.put(to[2], zero);
-  }
-};
-
-template <int k>
-void Base(const Integrator &I, const BDF &b, const PetscScalar *const u[], const PetscScalar *const v[], const PetscScalar *dV, PetscReal misfit, PetscScalar *const to[])
-{
-  BaseOfBDF<k> base;
-  for (int j = 0; j < k; j++) {
-    base.c[j] = b.c[j];
-    base.u[j] = u[j];
-    base.v[j] = v[j];
-  }
-  base.gh     = b.gh;
-  base.misfit = misfit;
-  base.dV     = dV;
-  base.moves  = I.moves.empty() ? nullptr : I.moves.data();
-  for (int s = 0; s < 3; s++) base.to[s] = to[s];
-  Sweep((PetscInt)I.local_size, base);
-  for (PetscInt i : I.states) {
-    to[0][i] = to[1][i] = 0;
-    for (int j = 0; j < k; j++) to[0][i] += b.c[j] * u[j][i];
-  }
-  for (PetscInt i : I.rotations.at) /* psi_q alone: StageOfRotations() */
-    for (int c = 0; c < 3; c++) {
-      to[0][i + c] = 0;
-      for (int j = 0; j < k; j++) to[0][i + c] += b.c[j] * u[j][i + c];
-    }
 }
 
 /* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
@@ -261,34 +208,39 @@ PetscErrorCode UseOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As PrepareStage() does it for order two */
+/* As PrepareStage() does it for order two: psi_q + gamma h psi_v of coordinates, psi_q of states and of rotation vectors, see StageOfRotations() */
 PetscErrorCode PrepareBDF(TS ts)
 {
-  Integrator        &I = Get(ts);
-  Order             &o = I.order;
-  const PetscScalar *u[max_order], *v[max_order], *dV = nullptr;
-  PetscScalar       *to[3];
-  PetscReal          tau[max_order + 1];
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  PetscReal   tau[max_order + 1];
+  ReadEach    u, v;
 
   PetscFunctionBegin;
   Spans(o, I.t1, tau);
   const BDF       b      = BDFOf(o.now, tau);
   const PetscReal misfit = MisfitOfHistory(o, b);
   for (PetscInt j = 0; j < o.now; j++) {
-    PetscCall(VecGetArrayRead(j ? o.U[j - 1] : I.U0, &u[j]));
-    PetscCall(VecGetArrayRead(j ? o.V[j - 1] : I.V0, &v[j]));
+    u.add(j ? o.U[j - 1] : I.U0);
+    v.add(j ? o.V[j - 1] : I.V0);
   }
-  if (misfit != 0) PetscCall(VecGetArrayRead(I.dV, &dV));
-  for (int s = 0; s < 3; s++) PetscCall(VecGetArray(I.base[s], &to[s]));
-  if (o.now == 3) Base<3>(I, b, u, v, dV, misfit, to);
-  else if (o.now == 4) Base<4>(I, b, u, v, dV, misfit, to);
-  else Base<5>(I, b, u, v, dV, misfit, to);
-  for (int s = 0; s < 3; s++) PetscCall(VecRestoreArray(I.base[s], &to[s]));
-  if (dV) PetscCall(VecRestoreArrayRead(I.dV, &dV));
-  for (PetscInt j = 0; j < o.now; j++) {
-    PetscCall(VecRestoreArrayRead(j ? o.U[j - 1] : I.U0, &u[j]));
-    PetscCall(VecRestoreArrayRead(j ? o.V[j - 1] : I.V0, &v[j]));
-  }
+  const auto psi = [&](const ReadEach::Entries &x, PetscScalar sum) {
+    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j];
+    return sum;
+  };
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar &bu, PetscScalar &bv, PetscScalar &ba, PetscScalar dV, ReadEach::Entries ui, ReadEach::Entries vi) {
+      bv = IsCoordinate(I, i) ? psi(vi, -misfit * dV) : 0;
+      bu = IsDifferential(RoleOf(I, i)) ? psi(ui, 0) + b.gh * bv : 0;
+      ba = 0;
+    },
+    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */), u, v));
+  PetscCall(ForSome(
+    I.rotations.at,
+    [&](PetscInt, PetscScalar &bu, ReadEach::Entries ui) {
+      for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi({ui.x, ui.i + k}, 0);
+    },
+    Write(I.base[0]), u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,6 +3,7 @@
 #define HHTDAE_ENTRIES_H
 
 #include "compat.h"
+#include <vector>
 
 namespace hht3
 {
@@ -26,21 +27,54 @@ struct Write {
   PetscScalar   &operator[](PetscInt i) const { return x[i]; }
 };
 
-template <class First, class... Rest>
-PetscErrorCode GetArrays(First &first, Rest &...rest)
+/* Several vectors that are read: x[j] is the entry of the j-th one */
+struct ReadEach {
+  static constexpr int most = 8;
+  int                  n    = 0;
+  Vec                  vec[most];
+  const PetscScalar   *x[most];
+
+  struct Entries {
+    const PetscScalar *const *x;
+    PetscInt                  i;
+    const PetscScalar        &operator[](int j) const { return x[j][i]; }
+  };
+  void           add(Vec v) { vec[n++] = v; }
+  Entries        operator[](PetscInt i) const { return {x, i}; }
+  PetscErrorCode get()
+  {
+    PetscFunctionBegin;
+    for (int j = 0; j < n; j++) PetscCall(VecGetArrayRead(vec[j], &x[j]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscErrorCode restore()
+  {
+    PetscFunctionBegin;
+    for (int j = 0; j < n; j++) PetscCall(VecRestoreArrayRead(vec[j], &x[j]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
+
+/* get() or restore() of all arrays */
+template <class Call, class... Arrays>
+PetscErrorCode ForArrays(Call call, Arrays &...arrays)
 {
+  PetscErrorCode failed = PETSC_SUCCESS;
+
   PetscFunctionBegin;
-  PetscCall(first.get());
-  if constexpr (sizeof...(rest) > 0) PetscCall(GetArrays(rest...));
+  (void)(... && !(failed = call(arrays)));
+  PetscCall(failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-template <class First, class... Rest>
-PetscErrorCode RestoreArrays(First &first, Rest &...rest)
+/* loop(), which has the arrays */
+template <class Loop, class... Arrays>
+PetscErrorCode WithArrays(Loop loop, Arrays &...arrays)
 {
   PetscFunctionBegin;
-  if constexpr (sizeof...(rest) > 0) PetscCall(RestoreArrays(rest...));
-  PetscCall(first.restore());
+  PetscCall(ForArrays([](auto &a) { return a.get(); }, arrays...));
+  loop();
+  PetscCall(ForArrays([](auto &a) { return a.restore(); }, arrays...));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,11 +86,29 @@ PetscErrorCode ForEntries(F f, First first, Rest... rest)
 
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(first.vec, &n));
-  PetscCall(GetArrays(first, rest...));
-  for (PetscInt i = 0; i < n; i++) f(i, first[i], rest[i]...);
-  PetscCall(RestoreArrays(first, rest...));
+  PetscCall(WithArrays([&] { for (PetscInt i = 0; i < n; i++) f(i, first[i], rest[i]...); }, first, rest...));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* The same for the local entries that are listed */
+template <class F, class... Arrays>
+PetscErrorCode ForSome(const std::vector<PetscInt> &list, F f, Arrays... arrays)
+{
+  PetscFunctionBegin;
+  PetscCall(WithArrays([&] { for (PetscInt i : list) f(i, arrays[i]...); }, arrays...));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sum over entries in four parts, which need not wait for one another and lose less to rounding */
+class Sum
+{
+public:
+  void      add(PetscInt i, PetscReal x) { part[i & 3] += x; }
+  PetscReal total() const { return (part[0] + part[1]) + (part[2] + part[3]); }
+
+private:
+  PetscReal part[4] = {};
+};
 
 } // namespace hht3
 

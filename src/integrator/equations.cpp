@@ -18,7 +18,6 @@
 */
 #include "entries.h"
 #include "impl.h"
-#include "sweeps.h"
 
 namespace hht3
 {
@@ -57,80 +56,34 @@ PetscErrorCode TrueAccelerationRows(TS ts, Vec X, Vec F)
 }
 
 /* d[i] = value of the role of i */
-PetscErrorCode FillByRole(const Integrator &I, const PetscReal value[], Vec d)
+PetscErrorCode FillByRole(const Integrator &I, const PetscReal (&value)[TSHHT3_NUM_ROLES], Vec d)
 {
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x = value[I.role[i]]; }, Write(d)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D_r */
-PetscErrorCode FillRows(const Integrator &I, const Scales &s)
-{
-  PetscReal value[TSHHT3_NUM_ROLES];
-
-  PetscFunctionBegin;
-  for (PetscReal &v : value) v = 1;
-  value[TSHHT3_HOLONOMIC]    = s.holonomic;
-  value[TSHHT3_NONHOLONOMIC] = s.velocity;
-  PetscCall(FillByRole(I, value, I.row));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* D_r; roles in the order of TSHHT3Role */
+PetscErrorCode FillRows(const Integrator &I, const Scales &s) { return FillByRole(I, {1, 1, s.holonomic, s.velocity, 1, 1}, I.row); }
 
 /* D_c = dU/dX */
-PetscErrorCode FillColumns(const Integrator &I, const Scales &s)
-{
-  PetscReal value[TSHHT3_NUM_ROLES];
-
-  PetscFunctionBegin;
-  for (PetscReal &v : value) v = 1;
-  value[TSHHT3_COORDINATE] = s.coordinate;
-  value[TSHHT3_STATE]      = s.state;
-  PetscCall(FillByRole(I, value, I.col));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+PetscErrorCode FillColumns(const Integrator &I, const Scales &s) { return FillByRole(I, {s.coordinate, s.state, 1, 1, 1, 1}, I.col); }
 
 /* (9b) and its velocity-level sibling: F times D_r, which has one value in the rows of all constraints where there is nothing but
-   coordinates and holonomic ones */
-struct ScaledRows {
-  const PetscScalar *row;
-  PetscScalar       *f;
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const { at.put(f, at.get(f) * at.get(row)); }
-};
-
-struct ScaledConstraints {
-  const float *moves;
-  PetscReal    factor;
-  PetscScalar *f;
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const
-  {
-    const Four x = at.get(f);
-    at.put(f, at.get(moves) != 0 ? x : factor * x);
-  }
-};
-
+   coordinates and holonomic ones. To fill it at every h and read it takes 3 % of the instructions of a step of a chain of 1,000 rods. */
 PetscErrorCode ScaleResidual(Integrator &I, Vec F)
 {
-  const PetscScalar *row;
-  PetscScalar       *f;
-  PetscInt           n;
+  const PetscReal holonomic = StepScales(I).holonomic;
+  const float    *moves     = I.moves.data();
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(F, &n));
-  PetscCall(VecGetArray(F, &f));
-  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) Sweep(n, ScaledConstraints{I.moves.data(), StepScales(I).holonomic, f});
-  else {
-    if (I.scaled_h != I.h) PetscCall(FillRows(I, StepScales(I)));
-    I.scaled_h = I.h;
-    PetscCall(VecGetArrayRead(I.row, &row));
-    Sweep(n, ScaledRows{row, f});
-    PetscCall(VecRestoreArrayRead(I.row, &row));
+  if (I.coordinatesAnd(TSHHT3_HOLONOMIC)) {
+    PetscCall(ForEntries([=](PetscInt i, PetscScalar &f) { f *= moves[i] + (1 - moves[i]) * holonomic; }, Write(F)));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecRestoreArray(F, &f));
+  if (I.scaled_h != I.h) PetscCall(FillRows(I, StepScales(I)));
+  I.scaled_h = I.h;
+  PetscCall(VecPointwiseMult(F, F, I.row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

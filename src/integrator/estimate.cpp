@@ -6,8 +6,8 @@
   of |q_i| over accepted steps. The local error is of third order, which makes TSADAPTBASIC with its safety factor 0.9 the
   controller (41), h_new = 0.9 h / Theta^(1/6).
 */
+#include "entries.h"
 #include "impl.h"
-#include "sweeps.h"
 
 namespace hht3
 {
@@ -15,76 +15,15 @@ namespace hht3
 namespace
 {
 
-struct Tolerances { /* scalar, or vector where the user gave vectors */
-  const PetscScalar *va = nullptr, *vr = nullptr;
+/* 1/max(atol, rtol y), entry by entry where the user gave vectors */
+struct Tolerances {
   PetscReal          a, r;
-  PetscReal          weight(PetscInt i, PetscReal y) const
+  const PetscScalar *va = nullptr, *vr = nullptr;
+
+  PetscReal weight(PetscInt i, PetscReal y) const
   {
     const PetscReal tol = PetscMax(va ? PetscRealPart(va[i]) : a, (vr ? PetscRealPart(vr[i]) : r) * y);
     return tol > 0 ? 1 / tol : 0;
-  }
-};
-
-PetscErrorCode GetTolerances(TS ts, Tolerances *t)
-{
-  PetscFunctionBegin;
-  t->a = ts->atol;
-  t->r = ts->rtol;
-  if (ts->vatol) PetscCall(VecGetArrayRead(ts->vatol, &t->va));
-  if (ts->vrtol) PetscCall(VecGetArrayRead(ts->vrtol, &t->vr));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode RestoreTolerances(TS ts, Tolerances *t)
-{
-  PetscFunctionBegin;
-  if (ts->vatol) PetscCall(VecRestoreArrayRead(ts->vatol, &t->va));
-  if (ts->vrtol) PetscCall(VecRestoreArrayRead(ts->vrtol, &t->vr));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Running maxima y of |u| and weights w of entries that u exceeds; tolerances as in Tolerances::weight() */
-struct Raise {
-  Tolerances         tol;
-  const PetscScalar *u;
-  PetscScalar       *y, *w;
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const
-  {
-    const Four zero = {0, 0, 0, 0}, size = Absolute(at.get(u)), old = at.get(y);
-    const Four a = tol.va ? at.get(tol.va) : zero + tol.a, r = tol.vr ? at.get(tol.vr) : zero + tol.r, t = Larger(a, r * size);
-    at.put(w, size > old ? (t > 0 ? 1 / t : zero) : at.get(w));
-    at.put(y, Larger(size, old));
-  }
-};
-
-struct Squares {
-  const PetscScalar *d, *w;
-  Four               sum = {0, 0, 0, 0};
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at)
-  {
-    const Four x = at.get(d) * at.get(w);
-    sum += x * x;
-  }
-};
-
-/* a_{n+1} - a_n by the weights of coordinates, for the sum of squares or the largest; a_n as in BaseOfCoordinates */
-template <bool largest>
-struct Jumps {
-  PetscReal          r;
-  const PetscScalar *x, *x0, *a0, *w;
-  const float       *moves; /* if there are states, whose weights are not meant */
-  Four               result = {0, 0, 0, 0};
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at)
-  {
-    const Four a = at.get(a0), weight = moves ? at.get(w) * at.get(moves) : at.get(w), d = weight * (at.get(x) - (a + r * (at.get(x0) - a)));
-    if (largest) result = Larger(Absolute(d), result);
-    else result += d * d;
   }
 };
 
@@ -103,23 +42,25 @@ PetscErrorCode Reduce(TS ts, NormType type, PetscInt size, PetscReal local, Pets
 
 /* The first weights. Also the size below which a correction is rounding of q, and the number of entries that enter the norm
    (p in (27)). What does not enter has a Y_i that it never exceeds, and so keeps its weight 0. */
-static PetscErrorCode FirstWeights(TS ts, PetscInt n, const Raise &all)
+static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
 {
   Integrator &I        = Get(ts);
   PetscReal   local[2] = {0, 0}, global[2];
 
   PetscFunctionBegin;
-  for (PetscInt i : I.rotations.at) std::fill_n(all.y + i, 3, 1); /* a turn is rounded as the attitude is */
-  for (PetscInt i = 0; i < n; i++) {
-    if (!IsDifferential(RoleOf(I, i))) {
-      all.y[i] = PETSC_MAX_REAL;
-      continue;
-    }
-    all.y[i] = PetscMax(all.y[i], PetscAbsScalar(all.u[i]));
-    all.w[i] = all.tol.weight(i, all.y[i]);
-    local[0] += PetscSqr(all.y[i] * all.w[i]);
-    if (all.w[i] > 0) local[1] += 1;
-  }
+  PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* a turn is rounded as the attitude is */
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar &y, PetscScalar &w) {
+      if (!IsDifferential(RoleOf(I, i))) {
+        y = PETSC_MAX_REAL;
+        return;
+      }
+      y = PetscMax(y, PetscAbsScalar(u));
+      w = tol.weight(i, y);
+      local[0] += PetscSqr(y * w);
+      if (w > 0) local[1] += 1;
+    },
+    Read(U), Write(I.ymax), Write(I.weight)));
   PetscCallMPI(MPI_Allreduce(local, global, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   I.norm_size = (PetscInt)(global[1] + 0.5);
   PetscCheck(I.norm_size > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
@@ -134,22 +75,43 @@ static PetscErrorCode FirstWeights(TS ts, PetscInt n, const Raise &all)
 /* Y_i and the weights after U has been accepted */
 PetscErrorCode UpdateWeights(TS ts, Vec U)
 {
-  Integrator &I = Get(ts);
-  Raise       all;
-  PetscInt    n;
+  Integrator &I   = Get(ts);
+  Tolerances  tol = {ts->atol, ts->rtol};
 
   PetscFunctionBegin;
-  PetscCall(GetTolerances(ts, &all.tol));
-  PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(VecGetArrayRead(U, &all.u));
-  PetscCall(VecGetArray(I.ymax, &all.y));
-  PetscCall(VecGetArray(I.weight, &all.w));
-  if (I.norm_size) Sweep(n, all);
-  else PetscCall(FirstWeights(ts, n, all));
-  PetscCall(VecRestoreArray(I.weight, &all.w));
-  PetscCall(VecRestoreArray(I.ymax, &all.y));
-  PetscCall(VecRestoreArrayRead(U, &all.u));
-  PetscCall(RestoreTolerances(ts, &all.tol));
+  if (ts->vatol) PetscCall(VecGetArrayRead(ts->vatol, &tol.va));
+  if (ts->vrtol) PetscCall(VecGetArrayRead(ts->vrtol, &tol.vr));
+  if (!I.norm_size) PetscCall(FirstWeights(ts, tol, U));
+  else
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar u, PetscScalar &y, PetscScalar &w) {
+        if (!(PetscAbsScalar(u) > y)) return;
+        y = PetscAbsScalar(u);
+        w = tol.weight(i, y);
+      },
+      Read(U), Write(I.ymax), Write(I.weight)));
+  if (ts->vatol) PetscCall(VecRestoreArrayRead(ts->vatol, &tol.va));
+  if (ts->vrtol) PetscCall(VecRestoreArrayRead(ts->vrtol, &tol.vr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sum of the squares of d by the weights on this rank, in four parts: they need not wait for one another, and lose less to rounding */
+PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum)
+{
+  const PetscScalar *x, *w;
+  PetscReal          part[4] = {};
+  PetscInt           n, i = 0;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(d, &n));
+  PetscCall(VecGetArrayRead(d, &x));
+  PetscCall(VecGetArrayRead(I.weight, &w));
+  for (; i + 4 <= n; i += 4)
+    for (int k = 0; k < 4; k++) part[k] += PetscSqr(x[i + k] * w[i + k]);
+  for (; i < n; i++) part[i % 4] += PetscSqr(x[i] * w[i]);
+  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(VecRestoreArrayRead(d, &x));
+  *sum = (part[0] + part[1]) + (part[2] + part[3]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,17 +119,12 @@ PetscErrorCode UpdateWeights(TS ts, Vec U)
    times Inf or NaN is NaN. */
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
 {
-  Integrator        &I = Get(ts);
-  const PetscReal    q = PetscAbsReal(I.p.k) * I.h * I.h, s = I.p.gamma_s * I.h;
-  PetscReal          states = 0;
-  const PetscScalar *d, *w;
+  Integrator     &I = Get(ts);
+  const PetscReal q = PetscAbsReal(I.p.k) * I.h * I.h, s = I.p.gamma_s * I.h;
+  PetscReal       states = 0;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(dX, &d));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i : I.states) states += PetscSqr(d[i] * w[i]);
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(dX, &d));
+  PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar d, PetscScalar w) { states += PetscSqr(d * w); }, Read(dX), Read(I.weight)));
   PetscCall(Reduce(ts, NORM_2, I.norm_size, PetscMax(sum - states, 0) * q * q + states * s * s, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,18 +132,11 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
 /* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
 {
-  Integrator &I = Get(ts);
-  Squares     all;
-  PetscInt    n;
+  PetscReal sum;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(dX, &n));
-  PetscCall(VecGetArrayRead(dX, &all.d));
-  PetscCall(VecGetArrayRead(I.weight, &all.w));
-  all = Sweep(n, all);
-  PetscCall(VecRestoreArrayRead(I.weight, &all.w));
-  PetscCall(VecRestoreArrayRead(dX, &all.d));
-  PetscCall(ReduceCorrection(ts, dX, Total(all.sum), e));
+  PetscCall(WeightedSquares(Get(ts), dX, &sum));
+  PetscCall(ReduceCorrection(ts, dX, sum, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,54 +149,41 @@ PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (26) of the coordinates: the sum of squares, or the largest, on this rank */
+/* (26) of the coordinates: the sum of squares, or the largest, on this rank. a_n as in PrepareStage(). */
 static PetscErrorCode CoordinateErrors(const Integrator &I, NormType type, PetscReal *result)
 {
-  const PetscReal h = I.h, k = PetscAbsReal(I.p.k) * h * h;
-  Jumps<false>    sum;
-  PetscInt        n;
+  const PetscReal h = I.h, k = PetscAbsReal(I.p.k) * h * h, r = I.h_last > 0 ? h / I.h_last : 1;
+  PetscReal       largest = 0;
+  Sum             sum;
 
   PetscFunctionBegin;
-  sum.r     = I.h_last > 0 ? h / I.h_last : 1;
-  sum.moves = I.states.empty() ? nullptr : I.moves.data();
-  PetscCall(VecGetLocalSize(I.X, &n));
-  PetscCall(VecGetArrayRead(I.X, &sum.x));
-  PetscCall(VecGetArrayRead(I.X0, &sum.x0));
-  PetscCall(VecGetArrayRead(I.A0, &sum.a0));
-  PetscCall(VecGetArrayRead(I.weight, &sum.w));
-  if (type == NORM_2) *result = k * k * Total(Sweep(n, sum).result);
-  else {
-    const Four x = Sweep(n, Jumps<true>{sum.r, sum.x, sum.x0, sum.a0, sum.w, sum.moves}).result;
-    *result      = k * PetscMax(PetscMax(x[0], x[1]), PetscMax(x[2], x[3]));
-  }
-  PetscCall(VecRestoreArrayRead(I.weight, &sum.w));
-  PetscCall(VecRestoreArrayRead(I.A0, &sum.a0));
-  PetscCall(VecRestoreArrayRead(I.X0, &sum.x0));
-  PetscCall(VecRestoreArrayRead(I.X, &sum.x));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar x0, PetscScalar a0, PetscScalar w) {
+      if (!IsCoordinate(I, i)) return;
+      const PetscReal d = PetscRealPart(w * (x - (a0 + r * (x0 - a0))));
+      sum.add(i, d * d);
+      largest = PetscMax(largest, PetscAbsReal(d));
+    },
+    Read(I.X), Read(I.X0), Read(I.A0), Read(I.weight)));
+  *result = type == NORM_2 ? k * k * sum.total() : k * largest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same of first-order states, added; their third derivative wants the step before the last */
 static PetscErrorCode AddStateErrors(const Integrator &I, NormType type, PetscReal *result)
 {
-  const PetscReal    h = I.h;
-  const PetscScalar *w, *v0, *v1, *d1;
+  const PetscReal h = I.h;
 
   PetscFunctionBegin;
   if (!I.count[TSHHT3_STATE] || I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal span = I.predictor.t[0] + h - I.predictor.t[1], k = I.p.k_s * h * h * h * 2 / span;
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  PetscCall(VecGetArrayRead(I.V1, &v1));
-  PetscCall(VecGetArrayRead(I.predictor.D[1], &d1));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt i : I.states) {
-    const PetscReal delta = PetscAbsReal(w[i] * k * ((v1[i] - v0[i]) / h - d1[i]));
-    *result               = type == NORM_2 ? *result + delta * delta : PetscMax(*result, delta);
-  }
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(I.predictor.D[1], &d1));
-  PetscCall(VecRestoreArrayRead(I.V1, &v1));
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  PetscCall(ForSome(
+    I.states,
+    [&](PetscInt, PetscScalar w, PetscScalar v0, PetscScalar v1, PetscScalar d1) {
+      const PetscReal delta = PetscAbsReal(w * k * ((v1 - v0) / h - d1));
+      *result               = type == NORM_2 ? *result + delta * delta : PetscMax(*result, delta);
+    },
+    Read(I.weight), Read(I.V0), Read(I.V1), Read(I.predictor.D[1])));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -85,7 +85,7 @@ struct PredictorState {
 /* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
    time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
 struct Predictor : PredictorOptions, PredictorState {
-  Vec D[max_degree + 1] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used */
+  Vec D[max_degree + 2] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used. One beyond them is work space. */
 };
 
 /* What the choice of the order knows of the steps before */
@@ -229,7 +229,7 @@ struct Integrator : StepState {
   IS                         is[TSHHT3_NUM_ROLES] = {};
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
-  std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for sweeps without branches */
+  std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
   std::vector<PetscInt>      states; /* local unknowns that are first-order states */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  follow = PETSC_FALSE; /* constraints of velocities depend on variables, see variables.cpp */
@@ -407,6 +407,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);
 PetscErrorCode UpdateWeights(TS ts, Vec U);
+PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum);
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
 PetscErrorCode NoteError(TS ts);
@@ -469,7 +470,7 @@ PetscErrorCode SetUpRotations(TS ts);
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result);
 PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor, Vec *begin);
 PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
-PetscErrorCode StageOfRotations(const Integrator &I, const PetscScalar *base, const PetscScalar *v1, PetscScalar *u1);
+PetscErrorCode StageOfRotations(const Integrator &I);
 PetscReal      RotationFactor(const Integrator &I);
 void           InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 PetscErrorCode ReferToState(TS ts);

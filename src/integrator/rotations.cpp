@@ -76,27 +76,27 @@ PetscErrorCode ViewRotations(TS ts, PetscViewer viewer)
 }
 
 /* Rotation vectors in U1, V1 being that of the stage: at order two what (2a) has left there and the commutator, above it from their base */
-PetscErrorCode StageOfRotations(const Integrator &I, const PetscScalar *base, const PetscScalar *v1, PetscScalar *u1)
+PetscErrorCode StageOfRotations(const Integrator &I)
 {
-  const PetscScalar *v0;
-
   PetscFunctionBegin;
-  if (I.rotations.at.empty()) PetscFunctionReturn(PETSC_SUCCESS);
-  if (I.order.now > 2) {
-    for (PetscInt i : I.rotations.at) {
-      PetscScalar turn[3];
-      for (int k = 0; k < 3; k++) turn[k] = EffectiveStep(I) * v1[i + k];
-      ImplicitRotation(base + i, turn, u1 + i);
-    }
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  for (PetscInt i : I.rotations.at) {
-    PetscScalar c[3];
-    Commutator(I.h, v0 + i, v1 + i, c);
-    for (int k = 0; k < 3; k++) u1[i + k] += c[k];
-  }
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  if (I.order.now > 2)
+    PetscCall(ForSome(
+      I.rotations.at,
+      [&](PetscInt, const PetscScalar &base, const PetscScalar &v1, PetscScalar &u1) {
+        PetscScalar turn[3];
+        for (int k = 0; k < 3; k++) turn[k] = EffectiveStep(I) * (&v1)[k];
+        ImplicitRotation(&base, turn, &u1);
+      },
+      Read(I.base[0]), Read(I.V1), Write(I.U1)));
+  else
+    PetscCall(ForSome(
+      I.rotations.at,
+      [&](PetscInt, const PetscScalar &v0, const PetscScalar &v1, PetscScalar &u1) {
+        PetscScalar c[3];
+        Commutator(I.h, &v0, &v1, c);
+        for (int k = 0; k < 3; k++) (&u1)[k] += c[k];
+      },
+      Read(I.V0), Read(I.V1), Write(I.U1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,26 +121,20 @@ PetscReal RotationFactor(const Integrator &I)
    h^2 |w|^2/60 of the second one. Added to the sum of squares, or to the largest, on this rank. */
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result)
 {
-  const PetscScalar *v0, *v1, *weight;
-
   PetscFunctionBegin;
-  if (I.rotations.at.empty()) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  PetscCall(VecGetArrayRead(I.V1, &v1));
-  PetscCall(VecGetArrayRead(I.weight, &weight));
-  for (PetscInt i : I.rotations.at) {
-    PetscScalar c[3];
-    PetscReal   z = 0;
-    Commutator(I.h, v0 + i, v1 + i, c);
-    for (int k = 0; k < 3; k++) z += PetscSqr(I.h * PetscAbsScalar(v1[i + k]));
-    for (int k = 0; k < 3; k++) {
-      const PetscReal delta = PetscAbsScalar(c[k] * weight[i + k]) * z / 60;
-      *result               = type == NORM_2 ? *result + delta * delta : PetscMax(*result, delta);
-    }
-  }
-  PetscCall(VecRestoreArrayRead(I.weight, &weight));
-  PetscCall(VecRestoreArrayRead(I.V1, &v1));
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
+  PetscCall(ForSome(
+    I.rotations.at,
+    [&](PetscInt, const PetscScalar &v0, const PetscScalar &v1, const PetscScalar &weight) {
+      PetscScalar c[3];
+      PetscReal   z = 0;
+      Commutator(I.h, &v0, &v1, c);
+      for (int k = 0; k < 3; k++) z += PetscSqr(I.h * PetscAbsScalar((&v1)[k]));
+      for (int k = 0; k < 3; k++) {
+        const PetscReal delta = PetscAbsScalar(c[k] * (&weight)[k]) * z / 60;
+        *result               = type == NORM_2 ? *result + delta * delta : PetscMax(*result, delta);
+      }
+    },
+    Read(I.V0), Read(I.V1), Read(I.weight)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

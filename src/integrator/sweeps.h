@@ -1,6 +1,6 @@
 /*
-  Sweeps over the entries of vectors that every iteration or step makes. A chain of bodies whose functions cost little spends
-  a quarter of its time in them.
+  Sweeps over the entries of vectors that pay more than 2 % of a step of a chain of 1,000 rods against plain loops (entries.h): the stage of every
+  iteration (stage.cpp), 10 % of the instructions, and scaled differences of orders above two (order.cpp), about 20 %.
 
   The body of a sweep is an object with pointers and factors that is called for four entries at a time. The compiler uses
   the instructions that it is told to, which are those of the oldest processor where a library is made for many: bodies
