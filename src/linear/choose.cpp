@@ -387,9 +387,9 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscFunctionReturn(0);
   }
   PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
-  if (symmetric && info.nz_used > MANY_ENTRIES) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov)); /* without ordering it */
+  if (info.nz_used > MANY_ENTRIES) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov)); /* without ordering it */
   if (!krylov) PetscCall(Measure(P, symmetric, choice->many_solves, &size));
-  if (!krylov && symmetric && size.single) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov));
+  if (!krylov && size.single) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov));
   if (krylov) PetscFunctionReturn(0);
   if (!choice->user_pc) {
     /* LDL^T where it halves a large work and a package for indefinite matrices is there */
@@ -477,7 +477,6 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  if (choice->iterative && !choice->no_room && !symmetric) PetscCall(LinearTakeFactor(ksp, choice)); /* LU takes less time than FGMRES (tests/bench/whole_bodies.md) */
   if (choice->iterative)
     PetscCall(LinearSetKrylov(ksp, choice->cholesky = symmetric, choice));
   else if (choice->user_pc && choice->user_package)
