@@ -8,7 +8,6 @@
   with the new difference, so that one sweep over the differences both updates them and tells which degree would have
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
-#include "entries.h"
 #include "impl.h"
 #include "sweeps.h"
 
@@ -171,17 +170,6 @@ PetscErrorCode Predict(TS ts, Vec X)
   }
   if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Positions stay: the unknowns of coordinates for which the step ends where it begins, all others as predicted. A static state is near where a load
-   that comes at once meets what is far stiffer than inertia, and where the ends of such a load ring from step to step. */
-PetscErrorCode PredictRest(const Integrator &I, Vec X)
-{
-  const PetscReal k = ScalePosition(I.p, I.h);
-
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar u0, PetscScalar base, PetscScalar &x) { if (RoleOf(I, i) == TSHHT3_COORDINATE) x = (u0 - base) / k; }, Read(I.U0), Read(I.base[0]), Write(X)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
