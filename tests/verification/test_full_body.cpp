@@ -234,8 +234,8 @@ TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
   EXPECT_EQ(s.h_min, 5e-3);
 }
 
-/* A load that comes at once, in steps that do not resolve how the ends of the body ring. Conjugate gradients stop at the extrapolated values, where the matrix is
-   indefinite, and leave more of the first correction in the positions than it has; neither is a reason for another matrix. */
+/* A load that comes at once, in steps that do not resolve how the ends of the body ring. What conjugate gradients leave of a first correction is more in the positions than
+   the correction has, which is no reason for another matrix. */
 TEST(FullBodyDynamics, LoadThatComesAtOnce)
 {
   hhtex::SolidBeam block;
@@ -272,14 +272,14 @@ TEST(FullBodyDynamics, LoadThatComesAtOnce)
     PetscReal t;
     must(TSGetTime(run.ts, &t));
     must(scene.sample(run.ts, t, values));
-    end[factor] = values[0];
+    end[factor] = values[0] - block.length;
     MEASURED("%d steps, %d matrices, %d failed corrections, %d retries; tip %.8g", (int)s.steps, (int)s.jacobians, (int)s.corrector_fails, (int)s.retries, (double)end[factor]);
     EXPECT_EQ(s.corrector_fails, 0);
-    EXPECT_LE(s.retries, 0);
-    EXPECT_LE(s.jacobians, 6);
+    EXPECT_EQ(s.retries, 0);
+    EXPECT_LE(s.jacobians, 4);
     EXPECT_EQ(s.steps, 30);
   }
-  EXPECT_NEAR(end[0], end[1], 1e-3 * std::abs(end[1]));
+  EXPECT_NEAR(end[0], end[1], 1e-5 * std::abs(end[1]));
 }
 
 /* Free flight with spin, which pulls the body apart, so that it vibrates: errors go with the square of the step */
