@@ -17,15 +17,19 @@ constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good
 constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
 constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
-struct Constraint {
+/* Saved and restored as it is, with what the levels keep */
+struct ConstraintState {
+  PetscBool single    = PETSC_TRUE;  /* products in single precision are wanted */
+  PetscBool measured  = PETSC_FALSE; /* what they leave of this matrix' solves */
+  PetscInt  aggregate = PETSC_DECIDE;
+};
+
+struct Constraint : ConstraintState {
   MatrixNodes      nodes;
   FineLevel        fine;
   CoarseLevel      coarse;
   NodeProduct      product;
-  PetscBool        single  = PETSC_TRUE;  /* wanted */
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
-  PetscBool        measured = PETSC_FALSE; /* what it leaves of this matrix' solves */
-  PetscInt         aggregate = PETSC_DECIDE;
   PetscObjectId    matrix    = 0;
   PetscObjectState pattern   = -1;
 };
@@ -188,6 +192,50 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
   PetscFunctionReturn(0);
 }
 
+/* ---- state ---- */
+
+/* Nodes and positions are in P^-1 as they were when the matrix was made, aggregates as with the first one of its pattern */
+PetscErrorCode SaveState(PC pc, Archive *archive)
+{
+  Constraint           &c     = Of(pc);
+  ConstraintState       state = c;
+  bool                  coarse = c.coarse.R != nullptr;
+  std::vector<PetscInt> node  = c.nodes.node;
+
+  PetscFunctionBegin;
+  archive->plain(state);
+  archive->plain(coarse);
+  archive->list(node);
+  if (coarse) PetscCall(CoarseSaveState(c.coarse, archive));
+  else PetscCall(FineSaveState(c.fine, archive));
+  PetscFunctionReturn(0);
+}
+
+/* Another level than before, or other aggregates, are the user's wish: then the preconditioner stays as it was set up. */
+PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
+{
+  Constraint           &c = Of(pc);
+  ConstraintState       was;
+  bool                  coarse = false;
+  PetscBool             failed = PETSC_FALSE;
+  std::vector<PetscInt> node;
+
+  PetscFunctionBegin;
+  archive->plain(was);
+  archive->plain(coarse);
+  archive->list(node);
+  *same = (PetscBool)(archive->good && was.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
+  if (!*same) PetscFunctionReturn(0);
+  if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));
+  else PetscCall(FineLoadState(pc, &c.fine, archive, same, &failed));
+  if (failed) pc->failedreason = PC_SUBPC_ERROR;
+  c.single   = (PetscBool)(c.single && was.single);
+  c.in_range = (PetscBool)(c.in_range && c.single);
+  c.measured = was.measured;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode View(PC pc, PetscViewer viewer)
 {
   const Constraint &c = Of(pc);
@@ -228,6 +276,7 @@ PetscErrorCode Destroy(PC pc)
   PetscCall(Reset(pc));
   delete static_cast<Constraint *>(pc->data);
   pc->data = NULL;
+  for (const char *name : {LINEAR_SAVE_STATE, LINEAR_LOAD_STATE}) PetscCall(PetscObjectComposeFunction((PetscObject)pc, name, NULL));
   PetscFunctionReturn(0);
 }
 
@@ -242,6 +291,8 @@ PetscErrorCode Create(PC pc)
   pc->ops->view     = View;
   pc->ops->reset    = Reset;
   pc->ops->destroy  = Destroy;
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, LINEAR_SAVE_STATE, SaveState));
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, LINEAR_LOAD_STATE, LoadState));
   PetscFunctionReturn(0);
 }
 

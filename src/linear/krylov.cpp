@@ -58,6 +58,7 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
 {
   PC             pc;
   PetscContainer mark;
+  PetscBool      given;
 
   PetscFunctionBegin;
   choice->iterative = PETSC_TRUE;
@@ -70,6 +71,8 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
   PetscCall(KSPSetFromOptions(ksp)); /* of "preonly" it has read none */
+  PetscCall(LinearOptionGiven(ksp, "-ksp_max_it", &given));
+  if (!given && !choice->no_room) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, END));
   PetscFunctionReturn(0);
 }
 
@@ -110,23 +113,50 @@ static PetscErrorCode HasNodes(Mat P, PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *taken)
+/* Whether the choice of the faster solver is left to us, and the matrix gives its rows */
+static PetscErrorCode IsFree(KSP ksp, Mat P, const LinearChoice &choice, PetscBool *yes)
 {
-  PetscBool nodes, rows, preonly, given;
+  PetscBool rows, preonly, given;
 
   PetscFunctionBegin;
-  *taken = PETSC_FALSE;
-  if (!choice->may_be_rough || choice->slow || choice->user_pc || choice->user_package) PetscFunctionReturn(0);
   PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)P, &rows, MATSEQAIJ, MATMPIAIJ, ""));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &preonly));
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &given));
-  if (!rows || !preonly || given) PetscFunctionReturn(0);
+  *yes = (PetscBool)(!choice.user_pc && !choice.user_package && rows && (choice.no_room || (preonly && !given)));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *taken)
+{
+  PetscBool nodes;
+
+  PetscFunctionBegin;
+  *taken = PETSC_FALSE;
+  if (!choice->may_be_rough || choice->slow) PetscFunctionReturn(0);
+  PetscCall(IsFree(ksp, P, *choice, taken));
+  if (!*taken) PetscFunctionReturn(0);
   PetscCall(HasNodes(P, &nodes));
-  if (!nodes) PetscFunctionReturn(0);
-  PetscCall(TakeKrylov(ksp, PETSC_TRUE, choice));
-  PetscCall(LinearOptionGiven(ksp, "-ksp_max_it", &given));
-  if (!given) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, END));
-  *taken = PETSC_TRUE;
+  *taken = nodes;
+  if (nodes) PetscCall(TakeKrylov(ksp, PETSC_TRUE, choice));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearTakeKrylovAgain(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken)
+{
+  PetscFunctionBegin;
+  PetscCall(IsFree(ksp, P, *choice, taken));
+  if (*taken) PetscCall(TakeKrylov(ksp, symmetric, choice));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearUsersMethod(KSP ksp, const LinearChoice &choice, KSPType *type)
+{
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetType(ksp, type));
+  PetscCall(LinearOptionGiven(ksp, "-ksp_type", &given));
+  if (choice.iterative && !given) *type = KSPPREONLY;
   PetscFunctionReturn(0);
 }
 

@@ -1,0 +1,145 @@
+/* Finite-element bodies solved by conjugate gradients behind "hhtconstraint": a run that is resumed in its middle repeats the uninterrupted one bit for bit, on any number of ranks */
+#include "box_model.h"
+#include "hhtdae/flexible.h"
+#include "scene/model.h"
+#include "scene_output.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* The same name on all ranks, and one file of each name, which rank 0 removes */
+struct SharedFile {
+  std::string name;
+  explicit SharedFile(const char *end)
+  {
+    int pid = getpid();
+    MPI_Bcast(&pid, 1, MPI_INT, 0, PETSC_COMM_WORLD);
+    name = testing::TempDir() + "hhtdae-full-" + std::to_string(pid) + end;
+  }
+  ~SharedFile()
+  {
+    int rank;
+    MPI_Barrier(PETSC_COMM_WORLD);
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    if (!rank) std::remove(name.c_str());
+  }
+  std::string text() const
+  {
+    std::ifstream     in(name);
+    std::stringstream all;
+    MPI_Barrier(PETSC_COMM_WORLD);
+    all << in.rdbuf();
+    return all.str();
+  }
+};
+
+struct Case {
+  Box         box;
+  FeLaw       law  = FeLaw::Large;
+  bool        free = false; /* a spinning flight; otherwise it hangs on a ball joint, with a load at its end */
+  std::string options;
+};
+
+struct End {
+  Array            u, v;
+  TSHHT3Statistics s;
+  std::string      solver; /* -ksp_view */
+};
+
+End run(const Case &c, const std::string &options)
+{
+  const SharedFile view(".view");
+  FeModel          model(PETSC_COMM_WORLD);
+  BoxBuilder(c.box, &model);
+  Scene      scene(PETSC_COMM_WORLD);
+  FullFeBody fe;
+  FullBody   b;
+  b.law = c.law;
+  if (c.free) b.angular_velocity = {5, 20, -10};
+  else b.attachments = {{"left"}, {"right", "", Tie::Average}};
+  scene.gravity({0, 0, -9.81});
+  must(fe.add(scene, "beam", model, b));
+  if (!c.free) {
+    const Marker left = scene.marker(fe.attachment("left")), right = scene.marker(fe.attachment("right"));
+    const auto   l = DataOf(scene).frame(left), r = DataOf(scene).frame(right);
+    scene.add("hinge", Spherical{left, scene.marker(scene.ground(), l.x)});
+    RigidBody load;
+    load.position = r.x;
+    scene.add("weld", Fixed{right, scene.marker(scene.add("load", load))});
+  }
+  SceneRun    in(scene, 100, c.options + options);
+  End         e;
+  Vec         U, V;
+  SNES        snes;
+  KSP         ksp;
+  PetscViewer viewer;
+  must(in.solve());
+  must(TS2GetSolution(in.ts, &U, &V));
+  must(TSHHT3GetStatistics(in.ts, &e.s));
+  e.u = whole(U);
+  e.v = whole(V);
+  must(TSGetSNES(in.ts, &snes));
+  must(SNESGetKSP(snes, &ksp));
+  must(PetscViewerASCIIOpen(PETSC_COMM_WORLD, view.name.c_str(), &viewer));
+  must(KSPView(ksp, viewer));
+  must(PetscViewerDestroy(&viewer));
+  e.solver = view.text();
+  return e;
+}
+
+bool has(const End &e, const char *words) { return e.solver.find(words) != std::string::npos; }
+
+/* Stopped after each of some steps and gone on with; a run that writes a checkpoint at every step is not changed by it. What the solver shows at the stops, for the caller to look at. */
+std::vector<End> repeats(const Case &c, int steps, const std::vector<int> &stops)
+{
+  SCOPED_TRACE(c.options);
+  const SharedFile  file(".checkpoint");
+  std::vector<End>  at;
+  const auto        until = [](int n) { return " -ts_max_steps " + std::to_string(n) + " "; };
+  const std::string every = " -ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every ";
+  const End         plain = run(c, until(steps));
+  const End         writing = run(c, until(steps) + every + "1 ");
+  EXPECT_TRUE(plain.u == writing.u);
+  EXPECT_TRUE(plain.v == writing.v);
+  for (int stop : stops) {
+    SCOPED_TRACE(stop);
+    at.push_back(run(c, until(stop) + every + std::to_string(stop)));
+    const End resumed = run(c, until(steps) + "-ts_hhtdae_resume " + file.name);
+    EXPECT_TRUE(plain.u == resumed.u);
+    EXPECT_TRUE(plain.v == resumed.v);
+    EXPECT_EQ(plain.s.newton, resumed.s.newton);
+    EXPECT_EQ(plain.s.factorizations, resumed.s.factorizations);
+    EXPECT_GT(resumed.s.steps, stop);
+  }
+  at.push_back(plain);
+  return at;
+}
+
+const std::string cg = " -ksp_type cg -pc_type hhtconstraint -pc_hhtconstraint_aggregate 12 ", fgmres = " -ksp_type fgmres -pc_type hhtconstraint -pc_hhtconstraint_aggregate 12 ";
+const Box         beam{{8, 3, 2}, {2, 0.6, 0.3}, {2e6, 0.3, 1000}};
+
+} // namespace
+
+TEST(FullBodyResume, ByConjugateGradients)
+{
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg}, 40, {1, 7, 20});
+}
+
+TEST(FullBodyResume, ByMinimalResiduals)
+{
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + fgmres}, 30, {11});
+}
+
+/* Without a coarse level the multipliers and what they hold are factored by the fine one */
+TEST(FullBodyResume, WithoutACoarseLevel)
+{
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg + "-pc_hhtconstraint_aggregate 0 "}, 30, {11});
+}
+
+/* A body that has turned: with the positions at the stop its nodes would be taken together in another way */
+TEST(FullBodyResume, AfterTurns)
+{
+  repeats({beam, FeLaw::Large, true, tolerance(1e-4) + cg + "-ts_adapt_type none -ts_dt 0.005 "}, 40, {25});
+}
