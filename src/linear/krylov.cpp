@@ -42,6 +42,15 @@ PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice)
   PetscFunctionReturn(0);
 }
 
+/* hhtconstraint sets both for conjugate gradients, whose successor shall not depend on them */
+static PetscErrorCode ForgetGuess(KSP ksp)
+{
+  PetscFunctionBegin;
+  PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_FALSE));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice)
 {
   PetscBool by_option;
@@ -49,6 +58,7 @@ PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choic
   PetscFunctionBegin;
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
   if (!by_option) PetscCall(KSPSetType(ksp, symmetric ? KSPCG : KSPFGMRES));
+  if (!by_option && !symmetric) PetscCall(ForgetGuess(ksp));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", symmetric ? "conjugate gradients" : "FGMRES", PCHHTCONSTRAINT,
                           choice->no_room ? "there is no room for a factor (-mat_mumps_memory)" : "most unknowns are those of nodes of finite elements (a factor by -pc_type lu or cholesky)"));
   PetscFunctionReturn(0);
@@ -175,8 +185,7 @@ PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
   PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_FALSE)); /* hhtconstraint sets both */
-  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscCall(ForgetGuess(ksp));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, &end));
   PetscCall(KSPSetTolerances(ksp, rtol == LOOSE ? PETSCS : rtol, PETSC_DEFAULT, PETSC_DEFAULT, end == END ? 10000 : end));
   PetscFunctionReturn(0);

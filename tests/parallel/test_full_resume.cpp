@@ -143,3 +143,64 @@ TEST(FullBodyResume, AfterTurns)
 {
   repeats({beam, FeLaw::Large, true, tolerance(1e-4) + cg + "-ts_adapt_type none -ts_dt 0.005 "}, 40, {25});
 }
+
+/* Rounding of products in single precision was a part of what a solve has left: they are of double precision after the stop as well */
+TEST(FullBodyResume, AfterProductsHaveFallenBack)
+{
+  const Box              stiff{{8, 3, 2}, {2, 0.6, 0.3}, {2e11, 0.3, 1000}};
+  const std::vector<End> at = repeats({stiff, FeLaw::Large, false, tolerance(1e-4) + cg + "-ksp_rtol 1e-4 "}, 30, {15});
+  for (const End &e : at) EXPECT_TRUE(has(e, "products in double precision")) << e.solver;
+}
+
+namespace
+{
+
+/* No room for the factor of a thick body */
+const Case block{{{9, 9, 9}, {1, 1, 1}, {2e6, 0.3, 1000}}, FeLaw::Small, false, tolerance(1e-4)};
+
+} // namespace
+
+TEST(FullBodyResume, ChosenForWantOfRoom)
+{
+  Case c = block;
+  c.options += "-mat_mumps_memory 1 ";
+  for (const End &e : repeats(c, 12, {5})) EXPECT_TRUE(has(e, "hhtconstraint")) << e.solver;
+}
+
+namespace
+{
+
+/* So large that conjugate gradients are the default, on one rank: on several its matrix is too small for that, and the factor would be one of MUMPS, which repeats runs to rounding only */
+Case large(const std::string &options)
+{
+  Case c;
+  c.box     = {{20, 20, 20}, {1, 1, 1}, {2e6, 0.3, 1000}};
+  c.free    = true;
+  c.law     = FeLaw::Small;
+  c.options = tolerance(1e-4) + "-ts_adapt_type none " + options;
+  return c;
+}
+
+bool several()
+{
+  int size;
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  return size > 1;
+}
+
+} // namespace
+
+TEST(FullBodyResume, ChosenByDefault)
+{
+  if (several()) GTEST_SKIP();
+  for (const End &e : repeats(large("-ts_dt 0.001 "), 4, {2})) EXPECT_TRUE(has(e, "hhtconstraint")) << e.solver;
+}
+
+/* Conjugate gradients of many iterations make way for a factor, which the first stop finds chosen and not made yet */
+TEST(FullBodyResume, AfterAFactorHasTakenTheirPlace)
+{
+  if (several()) GTEST_SKIP();
+  const std::vector<End> at = repeats(large("-ts_dt 0.05 -ksp_rtol 1e-8 -pc_hhtconstraint_aggregate 0 "), 5, {1, 3});
+  for (const End &e : at) EXPECT_FALSE(has(e, "hhtconstraint")) << e.solver;
+  EXPECT_TRUE(has(at[0], "has not been set up")) << at[0].solver;
+}
