@@ -3,37 +3,12 @@
 #include "hhtdae/flexible.h"
 #include "scene/model.h"
 #include "scene_output.h"
+#include "shared_file.h"
 
 using namespace hhtest;
 
 namespace
 {
-
-/* The same name on all ranks, and one file of each name, which rank 0 removes */
-struct SharedFile {
-  std::string name;
-  explicit SharedFile(const char *end)
-  {
-    int pid = getpid();
-    MPI_Bcast(&pid, 1, MPI_INT, 0, PETSC_COMM_WORLD);
-    name = testing::TempDir() + "hhtdae-full-" + std::to_string(pid) + end;
-  }
-  ~SharedFile()
-  {
-    int rank;
-    MPI_Barrier(PETSC_COMM_WORLD);
-    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    if (!rank) std::remove(name.c_str());
-  }
-  std::string text() const
-  {
-    std::ifstream     in(name);
-    std::stringstream all;
-    MPI_Barrier(PETSC_COMM_WORLD);
-    all << in.rdbuf();
-    return all.str();
-  }
-};
 
 struct Case {
   Box         box;
@@ -106,7 +81,9 @@ std::vector<End> repeats(const Case &c, int steps, const std::vector<int> &stops
   for (int stop : stops) {
     SCOPED_TRACE(stop);
     at.push_back(run(c, until(stop) + every + std::to_string(stop)));
-    const End resumed = run(c, until(steps) + "-ts_hhtdae_resume " + file.name);
+    const Printed said;
+    const End     resumed = run(c, until(steps) + "-ts_hhtdae_resume " + file.name);
+    EXPECT_FALSE(said.says("other options")) << said.text();
     EXPECT_TRUE(plain.u == resumed.u);
     EXPECT_TRUE(plain.v == resumed.v);
     EXPECT_EQ(plain.s.newton, resumed.s.newton);
