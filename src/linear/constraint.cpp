@@ -17,14 +17,18 @@ constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good
 constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
 constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
-/* Saved and restored as it is, with what the levels keep */
-struct ConstraintState {
-  PetscBool single    = PETSC_TRUE;  /* products in single precision are wanted */
-  PetscBool measured  = PETSC_FALSE; /* what they leave of this matrix' solves */
+struct ConstraintOptions {
+  PetscBool single    = PETSC_TRUE; /* products in single precision */
   PetscInt  aggregate = PETSC_DECIDE;
 };
 
-struct Constraint : ConstraintState {
+/* Saved and restored as it is, with what the levels keep */
+struct ConstraintState {
+  PetscBool fallen   = PETSC_FALSE; /* back to double precision, for good */
+  PetscBool measured = PETSC_FALSE; /* what products in single precision leave of this matrix' solves */
+};
+
+struct Constraint : ConstraintOptions, ConstraintState {
   MatrixNodes      nodes;
   FineLevel        fine;
   CoarseLevel      coarse;
@@ -99,7 +103,7 @@ PetscErrorCode SetUpProduct(PC pc, Constraint &c, PetscBool fresh)
 {
   PetscFunctionBegin;
   c.in_range = c.measured = PETSC_FALSE;
-  if (!c.single || !c.nodes.threes || pc->mat != pc->pmat) {
+  if (!c.single || c.fallen || !c.nodes.threes || pc->mat != pc->pmat) {
     PetscCall(NodeProductDestroy(&c.product));
     PetscFunctionReturn(0);
   }
@@ -174,7 +178,8 @@ PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
   PetscCall(VecDestroy(&in_single));
   PetscCall(VecDestroy(&in_double));
   if (reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
-  c.single = c.in_range = PETSC_FALSE;
+  c.fallen   = PETSC_TRUE;
+  c.in_range = PETSC_FALSE;
   PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
                       KSPConvergedReasons[reason]));
   PetscFunctionReturn(0);
@@ -197,12 +202,14 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
 /* Nodes and positions are in P^-1 as they were when the matrix was made, aggregates as with the first one of its pattern */
 PetscErrorCode SaveState(PC pc, Archive *archive)
 {
-  Constraint           &c     = Of(pc);
-  ConstraintState       state = c;
-  bool                  coarse = c.coarse.R != nullptr;
-  std::vector<PetscInt> node  = c.nodes.node;
+  Constraint           &c       = Of(pc);
+  ConstraintOptions     options = c;
+  ConstraintState       state   = c;
+  bool                  coarse  = c.coarse.R != nullptr;
+  std::vector<PetscInt> node    = c.nodes.node;
 
   PetscFunctionBegin;
+  archive->plain(options);
   archive->plain(state);
   archive->plain(coarse);
   archive->list(node);
@@ -211,27 +218,29 @@ PetscErrorCode SaveState(PC pc, Archive *archive)
   PetscFunctionReturn(0);
 }
 
-/* Another level than before, or other aggregates, are the user's wish: then the preconditioner stays as it was set up. */
+/* Where the user wishes otherwise now, or nodes are others, the preconditioner stays as it was set up. */
 PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
 {
   Constraint           &c = Of(pc);
+  ConstraintOptions     options;
   ConstraintState       was;
   bool                  coarse = false;
   PetscBool             failed = PETSC_FALSE;
   std::vector<PetscInt> node;
 
   PetscFunctionBegin;
+  archive->plain(options);
   archive->plain(was);
   archive->plain(coarse);
   archive->list(node);
-  *same = (PetscBool)(archive->good && was.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
+  *same = (PetscBool)(archive->good && options.single == c.single && options.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
   if (!*same) PetscFunctionReturn(0);
   if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));
   else PetscCall(FineLoadState(pc, &c.fine, archive, same, &failed));
   if (failed) pc->failedreason = PC_SUBPC_ERROR;
-  c.single   = (PetscBool)(c.single && was.single);
-  c.in_range = (PetscBool)(c.in_range && c.single);
+  c.fallen = was.fallen;
+  PetscCall(SetUpProduct(pc, c, PETSC_FALSE));
   c.measured = was.measured;
   PetscFunctionReturn(0);
 }

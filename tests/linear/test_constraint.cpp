@@ -6,6 +6,7 @@
 #include "view_text.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
+#include <cstring>
 #include <petscksp.h>
 #include <string>
 #include <vector>
@@ -506,6 +507,13 @@ TEST_F(SolverState, ProductsThatWereMeasured)
   solver(KSPCG, 1e-4);
   EXPECT_GT(solve(), 0);
   EXPECT_NE(view().find("double precision"), std::string::npos) << "the test shows nothing";
+  /* into one that has fallen back */
+  Archive again;
+  again.data    = archive.data;
+  again.reading = true;
+  OK(LinearLoadState(ksp, A, &of, &again, &same, &usable));
+  EXPECT_TRUE(same && usable);
+  expectSameSolve();
 }
 
 /* Conjugate gradients that were given up are not tried again; a solver that has gone on with either takes the other one as well */
@@ -587,20 +595,25 @@ TEST_F(SolverState, NodesOfOtherValues)
   EXPECT_GT(solve(), 0);
 }
 
-/* Aggregates of another size now: the user's wish */
-TEST_F(SolverState, OtherAggregates)
+/* The user wishes otherwise now */
+TEST_F(SolverState, OtherOptions)
 {
-  LinearChoice of;
   bar(8, 4, 4);
   first(KSPCG, 1e-6);
   EXPECT_GT(solve(), 0);
-  save();
-  OK(PetscOptionsSetValue(NULL, "-pc_hhtconstraint_aggregate", "30"));
-  load(KSPCG, 1e-6, &of);
-  OK(PetscOptionsClearValue(NULL, "-pc_hhtconstraint_aggregate"));
-  EXPECT_FALSE(same);
-  EXPECT_TRUE(usable);
-  EXPECT_NE(viewOf(other).find("8 aggregates"), std::string::npos) << viewOf(other);
+  for (const char *option : {"-pc_hhtconstraint_aggregate 30", "-pc_hhtconstraint_single 0", "-pc_hhtconstraint_aggregate 0"}) {
+    LinearChoice of;
+    archive = Archive();
+    save();
+    OK(PetscOptionsInsertString(NULL, option));
+    load(KSPCG, 1e-6, &of);
+    OK(PetscOptionsClear(NULL));
+    EXPECT_FALSE(same) << option;
+    EXPECT_TRUE(usable) << option;
+    const std::string shown = viewOf(other);
+    EXPECT_NE(shown.find(strstr(option, "30") ? "8 aggregates" : strstr(option, "single") ? "double precision" : "all else"), std::string::npos) << shown;
+    OK(KSPDestroy(&other));
+  }
 }
 
 /* Bytes that say something else, or end early: solved with what is taken, or said not to be usable */
