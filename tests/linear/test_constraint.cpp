@@ -548,6 +548,23 @@ TEST_F(SolverState, AFactorInPlaceOfConjugateGradients)
   expectSameSolve();
 }
 
+/* Where there was no room for a factor there is none later, whatever the matrix becomes */
+TEST_F(SolverState, WantOfRoom)
+{
+  PetscBool    changed = PETSC_FALSE;
+  LinearChoice of;
+  bar(8, 4, 4);
+  first("", 0);
+  OK(LinearChooseSmaller(ksp, A, &choice, &changed));
+  ASSERT_TRUE(changed);
+  EXPECT_GT(solve(), 0);
+  goOn("", 0, &of);
+  expectSameSolve();
+  OK(LinearChoose(other, A, PETSC_FALSE, &of));
+  std::swap(ksp, other);
+  EXPECT_TRUE(isConstraint());
+}
+
 /* A coarse matrix whose first values were not symmetric keeps the LU of the user's package */
 TEST_F(SolverState, FactorizationOfTheCoarseLevel)
 {

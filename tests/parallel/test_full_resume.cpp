@@ -66,7 +66,7 @@ End run(const Case &c, const std::string &options)
 
 bool has(const End &e, const char *words) { return e.solver.find(words) != std::string::npos; }
 
-/* Stopped after each of some steps and gone on with; a run that writes a checkpoint at every step is not changed by it. What the solver shows at the stops, for the caller to look at. */
+/* Stopped after each of some steps and gone on with. What the solver shows at the stops and at the end, for the caller to look at. */
 std::vector<End> repeats(const Case &c, int steps, const std::vector<int> &stops)
 {
   SCOPED_TRACE(c.options);
@@ -75,9 +75,6 @@ std::vector<End> repeats(const Case &c, int steps, const std::vector<int> &stops
   const auto        until = [](int n) { return " -ts_max_steps " + std::to_string(n) + " "; };
   const std::string every = " -ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every ";
   const End         plain = run(c, until(steps));
-  const End         writing = run(c, until(steps) + every + "1 ");
-  EXPECT_TRUE(plain.u == writing.u);
-  EXPECT_TRUE(plain.v == writing.v);
   for (int stop : stops) {
     SCOPED_TRACE(stop);
     at.push_back(run(c, until(stop) + every + std::to_string(stop)));
@@ -101,31 +98,42 @@ const Box         beam{{8, 3, 2}, {2, 0.6, 0.3}, {2e6, 0.3, 1000}};
 
 TEST(FullBodyResume, ByConjugateGradients)
 {
-  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg}, 40, {1, 7, 20});
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg}, 20, {1, 12});
+}
+
+/* With a checkpoint after every step */
+TEST(FullBodyResume, WritingChangesNothing)
+{
+  const SharedFile  file(".checkpoint");
+  const Case        c{beam, FeLaw::Large, false, tolerance(1e-4) + cg + "-ts_max_steps 12 "};
+  const End         plain = run(c, ""), writing = run(c, "-ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every 1 ");
+  EXPECT_TRUE(plain.u == writing.u);
+  EXPECT_TRUE(plain.v == writing.v);
+  EXPECT_EQ(plain.s.newton, writing.s.newton);
 }
 
 TEST(FullBodyResume, ByMinimalResiduals)
 {
-  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + fgmres}, 30, {11});
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + fgmres}, 16, {9});
 }
 
 /* Without a coarse level the multipliers and what they hold are factored by the fine one */
 TEST(FullBodyResume, WithoutACoarseLevel)
 {
-  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg + "-pc_hhtconstraint_aggregate 0 "}, 30, {11});
+  repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg + "-pc_hhtconstraint_aggregate 0 "}, 16, {9});
 }
 
 /* A body that has turned: with the positions at the stop its nodes would be taken together in another way */
 TEST(FullBodyResume, AfterTurns)
 {
-  repeats({beam, FeLaw::Large, true, tolerance(1e-4) + cg + "-ts_adapt_type none -ts_dt 0.005 "}, 40, {25});
+  repeats({beam, FeLaw::Large, true, tolerance(1e-4) + cg + "-ts_adapt_type none -ts_dt 0.01 "}, 16, {10});
 }
 
 /* Rounding of products in single precision was a part of what a solve has left: they are of double precision after the stop as well */
 TEST(FullBodyResume, AfterProductsHaveFallenBack)
 {
   const Box              stiff{{8, 3, 2}, {2, 0.6, 0.3}, {2e11, 0.3, 1000}};
-  const std::vector<End> at = repeats({stiff, FeLaw::Large, false, tolerance(1e-4) + cg + "-ksp_rtol 1e-4 "}, 30, {15});
+  const std::vector<End> at = repeats({stiff, FeLaw::Large, false, tolerance(1e-4) + cg + "-ksp_rtol 1e-4 "}, 12, {6});
   for (const End &e : at) EXPECT_TRUE(has(e, "products in double precision")) << e.solver;
 }
 
@@ -141,7 +149,7 @@ TEST(FullBodyResume, ChosenForWantOfRoom)
 {
   Case c = block;
   c.options += "-mat_mumps_memory 1 ";
-  for (const End &e : repeats(c, 12, {5})) EXPECT_TRUE(has(e, "hhtconstraint")) << e.solver;
+  for (const End &e : repeats(c, 6, {3})) EXPECT_TRUE(has(e, "hhtconstraint")) << e.solver;
 }
 
 namespace
@@ -177,7 +185,7 @@ TEST(FullBodyResume, ChosenByDefault)
 TEST(FullBodyResume, AfterAFactorHasTakenTheirPlace)
 {
   if (several()) GTEST_SKIP();
-  const std::vector<End> at = repeats(large("-ts_dt 0.05 -ksp_rtol 1e-8 -pc_hhtconstraint_aggregate 0 "), 5, {1, 3});
+  const std::vector<End> at = repeats(large("-ts_dt 0.05 -ksp_rtol 1e-8 -pc_hhtconstraint_aggregate 0 "), 3, {1, 2});
   for (const End &e : at) EXPECT_FALSE(has(e, "hhtconstraint")) << e.solver;
   EXPECT_TRUE(has(at[0], "has not been set up")) << at[0].solver;
 }
