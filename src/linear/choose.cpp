@@ -492,27 +492,30 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice)
+PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, LinearChoice *choice)
 {
   PC        pc;
-  PetscBool available;
+  PetscBool available = (PetscBool)(was.package[0] != 0), krylov = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(NoteRefinement(pc, choice));
-  if (choice->user_pc && choice->user_package) PetscFunctionReturn(0);
-  available = (PetscBool)(package[0] != 0);
-  if (available) PetscCall(MatGetFactorAvailable(P, package, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
-  if (!available || choice->user_package) {
-    PetscCall(LinearChoose(ksp, P, cholesky, choice));
+  PetscCall(LinearTakeFactor(ksp, choice)); /* of a KSP that has solved for another run before */
+  choice->slow    = was.slow;
+  choice->no_room = was.no_room;
+  if (was.iterative) PetscCall(LinearTakeKrylovAgain(ksp, P, was.cholesky, choice, &krylov));
+  if (available) PetscCall(MatGetFactorAvailable(P, was.package, was.cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
+  const bool by_user = choice->user_pc && choice->user_package;
+  if (!krylov && !by_user && (!available || choice->user_package)) {
+    PetscCall(LinearChoose(ksp, P, was.cholesky, choice));
     PetscFunctionReturn(0);
   }
-  if (choice->user_pc)
-    PetscCall(SetPackage(pc, package));
-  else
-    PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
+  if (!krylov && !by_user) {
+    if (choice->user_pc) PetscCall(SetPackage(pc, was.package));
+    else PetscCall(SetFactorization(ksp, pc, was.cholesky ? PCCHOLESKY : PCLU, was.package));
+    choice->cholesky = (PetscBool)(was.cholesky && !choice->user_pc);
+    PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", was.cholesky ? "LDL^T" : "LU", was.package));
+  }
+  PetscCall(LinearLoosen(ksp, choice));
   PetscCall(NoteRefinement(pc, choice));
-  choice->cholesky = (PetscBool)(cholesky && !choice->user_pc);
-  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", cholesky ? "LDL^T" : "LU", package));
   PetscFunctionReturn(0);
 }
