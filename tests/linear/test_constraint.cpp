@@ -407,6 +407,9 @@ TEST_F(LargeBody, ConjugateGradientsWhereSymmetryIsLost)
   PetscBool changed = PETSC_TRUE;
   choose(true);
   ASSERT_TRUE(isConstraint()) << choice.text;
+  EXPECT_GT(solve(), 0);
+  const PetscInt its  = iterations();
+  const double   left = leftOf();
   OK(VecDuplicate(b, &scale));
   OK(VecSet(scale, 1));
   for (PetscInt row = coordinates; row < n; row += 7) { OK(VecSetValue(scale, row, 0.5, INSERT_VALUES)); }
@@ -417,8 +420,9 @@ TEST_F(LargeBody, ConjugateGradientsWhereSymmetryIsLost)
   OK(LinearChoose(ksp, A, PETSC_FALSE, &choice));
   EXPECT_TRUE(isConstraint()) << choice.text;
   EXPECT_GT(solve(), 0);
-  EXPECT_LT(iterations(), 30);
-  EXPECT_LT(leftOf(), 0.05);
+  std::printf("its %d %d left %g %g\n", (int)its, (int)iterations(), left, leftOf());
+  EXPECT_LE(iterations(), its + 3);
+  EXPECT_LT(leftOf(), 1.5 * left);
   OK(LinearGiveUpKrylov(ksp, A, &choice, &changed));
   EXPECT_FALSE(changed);
 }
