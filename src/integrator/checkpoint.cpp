@@ -3,7 +3,7 @@
   changes nothing in the run that writes.
 
   The plain structs of impl.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
-  the coordinates and the memory that it was made in), and what the factor has taken over from the matrices before it, LinearSaveState().
+  the coordinates and the memory that it was made in), and what its solver has taken over from the matrices before it, LinearSaveState().
   It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
 
   Whether a file belongs to the run: checkpoint_identity.cpp.
@@ -269,11 +269,12 @@ PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
   Level: intermediate
 
   Note:
-  Writing changes nothing in the run that writes, and one that resumes repeats it bit for bit: the Newton matrix and what its factor has
+  Writing changes nothing in the run that writes, and one that resumes repeats it bit for bit: the Newton matrix and what its solver has
   taken over from earlier ones are part of the file. Where that cannot be had the matrix is made anew in the run that resumes, which
   then agrees to the accuracy of the tolerance, and -info says so: matrices that give no rows (shell, nest), and preconditioners that
-  keep something of which nothing is known. These are all but the direct solvers that are chosen by default; "mumpsnd" on several ranks
-  repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of their own (dsp) start anew. The file carries a checksum.
+  keep something of which nothing is known. These are all but `hhtconstraint` and the direct solvers that are chosen by default, also where they are
+  the solvers within `hhtconstraint`; "mumpsnd" on several ranks repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of
+  their own (dsp) start anew. The file carries a checksum.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
 @*/

@@ -97,7 +97,7 @@ PetscErrorCode OptionsInWords(TS ts, std::string *text)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(TSAdaptGetType(ts->adapt, &adapt));
   PetscCall(SNESGetType(ts->snes, &snes));
-  PetscCall(KSPGetType(ksp, &method));
+  PetscCall(LinearUsersMethod(ksp, I.linear, &method));
   PetscCall(PCGetType(pc, &preconditioner));
   if (I.linear.user_package) PetscCall(PCFactorGetMatSolverType(pc, &package));
   PetscCall(PetscSNPrintf(words, sizeof(words), "rtol %g%s, atol %g%s, adapt %s, corrector %g, %" PetscInt_FMT " iterations, reuse %g,%g,%g%s, predictor %" PetscInt_FMT "%s, %s, %s, %s%s%s",

@@ -13,10 +13,8 @@ namespace
 {
 
 struct MatrixState {
-  PetscBool there      = PETSC_FALSE; /* its values are in the file */
-  PetscBool cholesky   = PETSC_FALSE;
-  PetscBool chosen     = PETSC_FALSE; /* a linear solver was */
-  char      package[64] = "";
+  PetscBool there  = PETSC_FALSE; /* its values are in the file */
+  PetscBool chosen = PETSC_FALSE; /* a linear solver was */
 };
 
 PetscErrorCode GivesRows(Mat A, PetscBool *yes)
@@ -121,29 +119,19 @@ PetscErrorCode MakePattern(TS ts, Mat J, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The factor of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
-PetscErrorCode LoadFactor(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
+/* The solver of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
+PetscErrorCode LoadSolver(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
 {
-  Integrator    &I = Get(ts);
-  PC             pc;
-  PCFailedReason reason;
-  PetscBool      usable = PETSC_TRUE;
+  Integrator &I = Get(ts);
+  PetscBool   usable;
 
   PetscFunctionBegin;
   *same = PETSC_FALSE;
   if (!m.chosen) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(ksp, J, P));
-  PetscCall(LinearChooseAgain(ksp, P, m.package, m.cholesky, &I.linear));
+  PetscCall(LinearLoadState(ksp, P, &I.linear, &a, same, &usable));
   I.linear_chosen = PETSC_TRUE;
-  PetscCall(KSPSetUp(ksp));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCGetFailedReason(pc, &reason));
-  int factored = !reason;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &factored, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  *good = factored;
-  if (!factored) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(LinearLoadState(ksp, P, &a, same, &usable));
-  *good = usable;
+  *good           = usable;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,29 +139,23 @@ PetscErrorCode LoadFactor(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Ar
 
 PetscErrorCode SaveMatrix(TS ts, Archive &a)
 {
-  Integrator   &I = Get(ts);
-  MatrixState   m;
-  Mat           J, P;
-  KSP           ksp;
-  PC            pc;
-  MatSolverType package = NULL;
-  PetscBool     rows;
+  Integrator &I = Get(ts);
+  MatrixState m;
+  Mat         J, P;
+  KSP         ksp;
+  PetscBool   rows;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(P, &m.there));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCFactorGetMatSolverType(pc, &package));
-  if (package) PetscCall(PetscStrncpy(m.package, package, sizeof(m.package)));
-  m.chosen   = I.linear_chosen;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &m.cholesky));
+  m.chosen = I.linear_chosen;
   a.plain(m);
   if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SaveRows(P, a));
   PetscCall(GivesRows(J, &rows));
   if (J != P && rows) PetscCall(SaveRows(J, a));
-  PetscCall(LinearSaveState(ksp, &a));
+  if (m.chosen) PetscCall(LinearSaveState(ksp, I.linear, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,7 +170,6 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
 
   PetscFunctionBegin;
   a.plain(m);
-  m.package[sizeof(m.package) - 1] = 0;
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
@@ -198,7 +179,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
-    if (good) PetscCall(LoadFactor(ts, ksp, J, P, m, a, &same, &good));
+    if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();
   if (!same)

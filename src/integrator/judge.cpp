@@ -101,7 +101,7 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
 {
   Integrator       &I      = Get(ts);
   Corrector        &c      = I.corrector;
-  const Corrections so_far = {e, c.e, c.it - c.base, c.limit() - c.it};
+  const Corrections so_far = {e, c.e, c.it - c.base, c.limit() - c.it, (bool)I.linear.constraint};
 
   PetscFunctionBegin;
   c.e        = e;
@@ -111,7 +111,8 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, Tolerance(I), c.floor);
-  if (so_far.with_matrix >= 2 && e > c.floor) {
+  const bool fast = so_far.with_matrix == 2 && so_far.rate() < c.of(I.linear.constraint).slow_rate;
+  if ((so_far.tells() || fast) && e > c.floor) {
     c.matrix.rate = so_far.rate();
     c.xi_max      = PetscMax(c.xi_max, c.matrix.rate);
   }

@@ -42,7 +42,7 @@ PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
   The preconditioner `hhtconstraint` leaves out of the Newton matrix what couples different nodes, and factors the rest, with rigid bodies, modes and multipliers whole. So it
   satisfies the constraints exactly, at a cost that grows as the number of nodes, and a Krylov method does what it leaves to do,
 .vb
-  -ksp_type cg -pc_type hhtconstraint         (fgmres where the matrix is not symmetric)
+  -ksp_type cg -pc_type hhtconstraint         (fgmres where so much is not symmetric that these do not serve)
 .ve
   where a factorization of the whole matrix has no room. Its own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
   but for multipliers, are taken for a node. Scenes make the call themselves.

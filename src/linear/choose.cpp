@@ -387,9 +387,9 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscFunctionReturn(0);
   }
   PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
-  if (symmetric && info.nz_used > MANY_ENTRIES) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov)); /* without ordering it */
+  if (info.nz_used > MANY_ENTRIES) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov)); /* without ordering it */
   if (!krylov) PetscCall(Measure(P, symmetric, choice->many_solves, &size));
-  if (!krylov && symmetric && size.single) PetscCall(LinearPreferKrylov(ksp, P, choice, &krylov));
+  if (!krylov && size.single) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov));
   if (krylov) PetscFunctionReturn(0);
   if (!choice->user_pc) {
     /* LDL^T where it halves a large work and a package for indefinite matrices is there */
@@ -477,7 +477,6 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  if (choice->iterative && !choice->no_room && !symmetric) PetscCall(LinearTakeFactor(ksp, choice)); /* LU takes less time than FGMRES (tests/bench/whole_bodies.md) */
   if (choice->iterative)
     PetscCall(LinearSetKrylov(ksp, choice->cholesky = symmetric, choice));
   else if (choice->user_pc && choice->user_package)
@@ -493,27 +492,30 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice)
+PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, LinearChoice *choice)
 {
   PC        pc;
-  PetscBool available;
+  PetscBool available = (PetscBool)(was.package[0] != 0), krylov = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(NoteRefinement(pc, choice));
-  if (choice->user_pc && choice->user_package) PetscFunctionReturn(0);
-  available = (PetscBool)(package[0] != 0);
-  if (available) PetscCall(MatGetFactorAvailable(P, package, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
-  if (!available || choice->user_package) {
-    PetscCall(LinearChoose(ksp, P, cholesky, choice));
+  PetscCall(LinearTakeFactor(ksp, choice)); /* of a KSP that has solved for another run before */
+  choice->slow    = was.slow;
+  choice->no_room = was.no_room;
+  if (was.iterative) PetscCall(LinearTakeKrylovAgain(ksp, P, was.cholesky, choice, &krylov));
+  if (available) PetscCall(MatGetFactorAvailable(P, was.package, was.cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
+  const bool by_user = choice->user_pc && choice->user_package;
+  if (!krylov && !by_user && (!available || choice->user_package)) {
+    PetscCall(LinearChoose(ksp, P, was.cholesky, choice));
     PetscFunctionReturn(0);
   }
-  if (choice->user_pc)
-    PetscCall(SetPackage(pc, package));
-  else
-    PetscCall(SetFactorization(ksp, pc, cholesky ? PCCHOLESKY : PCLU, package));
+  if (!krylov && !by_user) {
+    if (choice->user_pc) PetscCall(SetPackage(pc, was.package));
+    else PetscCall(SetFactorization(ksp, pc, was.cholesky ? PCCHOLESKY : PCLU, was.package));
+    choice->cholesky = (PetscBool)(was.cholesky && !choice->user_pc);
+    PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", was.cholesky ? "LDL^T" : "LU", was.package));
+  }
+  PetscCall(LinearLoosen(ksp, choice));
   PetscCall(NoteRefinement(pc, choice));
-  choice->cholesky = (PetscBool)(cholesky && !choice->user_pc);
-  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s, as before", cholesky ? "LDL^T" : "LU", package));
   PetscFunctionReturn(0);
 }

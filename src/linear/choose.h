@@ -12,8 +12,22 @@ PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice);
 /* The Krylov method in place of a factor, where no option names one */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice);
 
-/* For a symmetric matrix whose factor is large, by default: *taken, where most unknowns are those of nodes of finite elements */
-PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *taken);
+/* For a matrix whose factor is large, by default: *taken, where most unknowns are those of nodes of finite elements */
+PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken);
+
+/* What has been chosen, for a run that goes on with it */
+struct LinearChosen {
+  PetscBool cholesky    = PETSC_FALSE; /* LDL^T, or the Krylov method for a symmetric matrix */
+  PetscBool iterative   = PETSC_FALSE, no_room = PETSC_FALSE, slow = PETSC_FALSE; /* as in LinearChoice */
+  PetscBool set_up      = PETSC_FALSE; /* the preconditioner was, and may have a state of its own */
+  char      package[64] = "";
+};
+
+/* LinearChoose() where a run goes on with the solver that it had: nothing is looked for anew, but for what the user chooses otherwise now */
+PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, LinearChoice *choice);
+
+/* The Krylov method that the run had by choice->no_room or as the faster one: *taken, unless the user chooses a solver now */
+PetscErrorCode LinearTakeKrylovAgain(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken);
 
 /* Types that were set for a Krylov method, back to those of a factor; nothing where they are the user's */
 PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice);

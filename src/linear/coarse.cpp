@@ -119,7 +119,59 @@ void Dissolve(CoarseLevel *c)
   c->first.swap(first);
 }
 
+/* What a file has of them: each own row belongs to one node or stands apart, and aggregates are rigid bodies */
+bool IsDivision(const CoarseLevel &c, PetscInt begin, PetscInt end)
+{
+  std::vector<bool> seen((size_t)(end - begin), false);
+  const auto        isNew = [&](PetscInt row) {
+    if (row < begin || row >= end || seen[(size_t)(row - begin)]) return false;
+    return (bool)(seen[(size_t)(row - begin)] = true);
+  };
+  if (c.first.empty() || c.first[0] != 0 || c.first.back() != (PetscInt)c.nodes.size() || 3 * c.nodes.size() + c.apart.size() != seen.size()) return false;
+  for (const Node &n : c.nodes)
+    for (PetscInt k = 0; k < 3; k++)
+      if (!std::isfinite(n.x[k]) || n.row > end - 3 || !isNew(n.row + k)) return false;
+  for (PetscInt row : c.apart)
+    if (!isNew(row)) return false;
+  for (size_t a = 0; a + 1 < c.first.size(); a++) /* ascending from 0 to the number of nodes: in range */
+    if (c.first[a] >= c.first[a + 1] || c.first[a + 1] > (PetscInt)c.nodes.size() || OnALine(c, c.first[a], c.first[a + 1])) return false;
+  return true;
+}
+
+/* The rows and the places of nodes, without the padding of the struct */
+void TransferDivision(CoarseLevel *c, Archive *archive)
+{
+  std::vector<PetscInt> row;
+  std::vector<double>   x;
+  for (const Node &n : c->nodes) {
+    row.push_back(n.row);
+    x.insert(x.end(), n.x, n.x + 3);
+  }
+  archive->list(row);
+  archive->list(x);
+  archive->list(c->first);
+  archive->list(c->apart);
+  if (!archive->reading) return;
+  archive->good = archive->good && x.size() == 3 * row.size();
+  c->nodes.clear();
+  for (size_t i = 0; i < row.size() && archive->good; i++) c->nodes.push_back({row[i], {x[3 * i], x[3 * i + 1], x[3 * i + 2]}});
+}
+
 /* ---- the matrices ---- */
+
+PetscErrorCode CreateR(Mat A, CoarseLevel *c)
+{
+  PetscInt       n;
+  const PetscInt columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(A, &n, NULL));
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)A), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
+  PetscCall(MatSetOption(c->R, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  PetscCall(MatCreateVecs(c->R, &c->residual, NULL));
+  PetscCall(VecDuplicate(c->residual, &c->answer));
+  PetscFunctionReturn(0);
+}
 
 /* Rows of R of an aggregate whose columns begin with `column`: its translations, and its rotations about the centre in units of its size */
 PetscErrorCode FillAggregate(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt column)
@@ -173,8 +225,6 @@ PetscErrorCode CoarseDestroy(CoarseLevel *c)
 
 PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c)
 {
-  PetscInt n, columns;
-
   PetscFunctionBegin;
   PetscCall(CoarseDestroy(c));
   PetscCall(Sort(of, c));
@@ -182,12 +232,7 @@ PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c
   c->first.push_back(0);
   if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), most);
   Dissolve(c);
-  PetscCall(MatGetLocalSize(of.A, &n, NULL));
-  columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
-  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)of.A), n, columns, PETSC_DETERMINE, PETSC_DETERMINE, 3, NULL, 0, NULL, &c->R));
-  PetscCall(MatSetOption(c->R, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
-  PetscCall(MatCreateVecs(c->R, &c->residual, NULL));
-  PetscCall(VecDuplicate(c->residual, &c->answer));
+  PetscCall(CreateR(of.A, c));
   PetscFunctionReturn(0);
 }
 
@@ -200,6 +245,40 @@ PetscErrorCode CoarseFill(PC pc, Vec positions, CoarseLevel *c, PetscBool *faile
   PetscCall(FillR(c));
   PetscCall(MatPtAP(pc->pmat, c->R, first ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, 1, &c->A));
   PetscCall(InnerSetUp(pc, "coarse_", c->A, first, &c->inner, failed));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseSaveState(const CoarseLevel &c, Archive *archive)
+{
+  CoarseLevel division;
+
+  PetscFunctionBegin;
+  division.nodes = c.nodes;
+  division.first = c.first;
+  division.apart = c.apart;
+  TransferDivision(&division, archive);
+  PetscCall(InnerSaveState(c.inner, archive));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CoarseLoadState(PC pc, CoarseLevel *c, Archive *archive, PetscBool *same, PetscBool *failed)
+{
+  CoarseLevel was;
+  PetscInt    begin, end;
+
+  PetscFunctionBegin;
+  *failed = PETSC_FALSE;
+  PetscCall(MatGetOwnershipRange(pc->pmat, &begin, &end));
+  TransferDivision(&was, archive);
+  *same = (PetscBool)(archive->good && IsDivision(was, begin, end));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
+  if (!*same) PetscFunctionReturn(0);
+  PetscCall(CoarseDestroy(c));
+  *c = was;
+  PetscCall(CreateR(pc->pmat, c));
+  PetscCall(FillR(c));
+  PetscCall(MatPtAP(pc->pmat, c->R, MAT_INITIAL_MATRIX, 1, &c->A));
+  PetscCall(InnerLoadState(pc, "coarse_", c->A, &c->inner, archive, same, failed));
   PetscFunctionReturn(0);
 }
 

@@ -41,6 +41,9 @@ PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c
 PetscErrorCode CoarseFill(PC pc, Vec positions, CoarseLevel *c, PetscBool *failed);
 /* y += R A_c^-1 R^T x */
 PetscErrorCode CoarseAdd(CoarseLevel *c, Vec x, Vec y, PetscBool *failed);
+/* Aggregates, positions and solver as they were for the values that A has. Each rank's own answers; without *same the level may be the one that there was before. */
+PetscErrorCode CoarseSaveState(const CoarseLevel &c, Archive *archive);
+PetscErrorCode CoarseLoadState(PC pc, CoarseLevel *c, Archive *archive, PetscBool *same, PetscBool *failed);
 PetscErrorCode CoarseView(const CoarseLevel &c, PetscViewer viewer);
 PetscErrorCode CoarseDestroy(CoarseLevel *c);
 

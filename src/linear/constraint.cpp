@@ -17,15 +17,23 @@ constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good
 constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
 constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
 
-struct Constraint {
+struct ConstraintOptions {
+  PetscBool single    = PETSC_TRUE; /* products in single precision */
+  PetscInt  aggregate = PETSC_DECIDE;
+};
+
+/* Saved and restored as it is, with what the levels keep */
+struct ConstraintState {
+  PetscBool fallen   = PETSC_FALSE; /* back to double precision, for good */
+  PetscBool measured = PETSC_FALSE; /* what products in single precision leave of this matrix' solves */
+};
+
+struct Constraint : ConstraintOptions, ConstraintState {
   MatrixNodes      nodes;
   FineLevel        fine;
   CoarseLevel      coarse;
   NodeProduct      product;
-  PetscBool        single  = PETSC_TRUE;  /* wanted */
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
-  PetscBool        measured = PETSC_FALSE; /* what it leaves of this matrix' solves */
-  PetscInt         aggregate = PETSC_DECIDE;
   PetscObjectId    matrix    = 0;
   PetscObjectState pattern   = -1;
 };
@@ -95,7 +103,7 @@ PetscErrorCode SetUpProduct(PC pc, Constraint &c, PetscBool fresh)
 {
   PetscFunctionBegin;
   c.in_range = c.measured = PETSC_FALSE;
-  if (!c.single || !c.nodes.threes || pc->mat != pc->pmat) {
+  if (!c.single || c.fallen || !c.nodes.threes || pc->mat != pc->pmat) {
     PetscCall(NodeProductDestroy(&c.product));
     PetscFunctionReturn(0);
   }
@@ -170,7 +178,8 @@ PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
   PetscCall(VecDestroy(&in_single));
   PetscCall(VecDestroy(&in_double));
   if (reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
-  c.single = c.in_range = PETSC_FALSE;
+  c.fallen   = PETSC_TRUE;
+  c.in_range = PETSC_FALSE;
   PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
                       KSPConvergedReasons[reason]));
   PetscFunctionReturn(0);
@@ -185,6 +194,54 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
     PetscCall(PCSetOperators(pc, pc->pmat, pc->pmat));
     PetscCall(Measure(pc, ksp, c, b, x));
   }
+  PetscFunctionReturn(0);
+}
+
+/* ---- state ---- */
+
+/* Nodes and positions are in P^-1 as they were when the matrix was made, aggregates as with the first one of its pattern */
+PetscErrorCode SaveState(PC pc, Archive *archive)
+{
+  Constraint           &c       = Of(pc);
+  ConstraintOptions     options = c;
+  ConstraintState       state   = c;
+  bool                  coarse  = c.coarse.R != nullptr;
+  std::vector<PetscInt> node    = c.nodes.node;
+
+  PetscFunctionBegin;
+  archive->plain(options);
+  archive->plain(state);
+  archive->plain(coarse);
+  archive->list(node);
+  if (coarse) PetscCall(CoarseSaveState(c.coarse, archive));
+  else PetscCall(FineSaveState(c.fine, archive));
+  PetscFunctionReturn(0);
+}
+
+/* Where the user wishes otherwise now, or nodes are others, the preconditioner stays as it was set up. */
+PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
+{
+  Constraint           &c = Of(pc);
+  ConstraintOptions     options;
+  ConstraintState       was;
+  bool                  coarse = false;
+  PetscBool             failed = PETSC_FALSE;
+  std::vector<PetscInt> node;
+
+  PetscFunctionBegin;
+  archive->plain(options);
+  archive->plain(was);
+  archive->plain(coarse);
+  archive->list(node);
+  *same = (PetscBool)(archive->good && options.single == c.single && options.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
+  if (!*same) PetscFunctionReturn(0);
+  if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));
+  else PetscCall(FineLoadState(pc, &c.fine, archive, same, &failed));
+  if (failed) pc->failedreason = PC_SUBPC_ERROR;
+  c.fallen = was.fallen;
+  PetscCall(SetUpProduct(pc, c, PETSC_FALSE));
+  c.measured = was.measured;
   PetscFunctionReturn(0);
 }
 
@@ -228,6 +285,7 @@ PetscErrorCode Destroy(PC pc)
   PetscCall(Reset(pc));
   delete static_cast<Constraint *>(pc->data);
   pc->data = NULL;
+  for (const char *name : {LINEAR_SAVE_STATE, LINEAR_LOAD_STATE}) PetscCall(PetscObjectComposeFunction((PetscObject)pc, name, NULL));
   PetscFunctionReturn(0);
 }
 
@@ -242,6 +300,8 @@ PetscErrorCode Create(PC pc)
   pc->ops->view     = View;
   pc->ops->reset    = Reset;
   pc->ops->destroy  = Destroy;
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, LINEAR_SAVE_STATE, SaveState));
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, LINEAR_LOAD_STATE, LoadState));
   PetscFunctionReturn(0);
 }
 

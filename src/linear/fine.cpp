@@ -153,6 +153,22 @@ PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, 
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode FineSaveState(const FineLevel &f, Archive *archive)
+{
+  PetscFunctionBegin;
+  if (f.apart) PetscCall(InnerSaveState(f.inner, archive));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FineLoadState(PC pc, FineLevel *f, Archive *archive, PetscBool *same, PetscBool *failed)
+{
+  PetscFunctionBegin;
+  *same   = PETSC_TRUE;
+  *failed = PETSC_FALSE;
+  if (f->apart) PetscCall(InnerLoadState(pc, "constraint_", f->apart, &f->inner, archive, same, failed));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, PetscBool *failed)
 {
   const PetscScalar *from, *solved;

@@ -19,6 +19,9 @@ struct FineLevel {
 /* After each change of the values of pc->pmat. fresh: or of its pattern. nodes_alone: another level answers all else. *failed: it is singular, of this rank or all. Collective. */
 PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, PetscBool fresh, FineLevel *f, PetscBool *failed);
 PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, PetscBool *failed);
+/* After FineFill(); each rank its own answers, collective all the same */
+PetscErrorCode FineSaveState(const FineLevel &f, Archive *archive);
+PetscErrorCode FineLoadState(PC pc, FineLevel *f, Archive *archive, PetscBool *same, PetscBool *failed);
 PetscErrorCode FineDestroy(FineLevel *f);
 
 #endif

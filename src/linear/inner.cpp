@@ -98,6 +98,29 @@ PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, In
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode InnerSaveState(const InnerSolver &s, Archive *archive)
+{
+  PetscFunctionBegin;
+  PetscCall(LinearSaveState(s.ksp, s.choice, archive));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode InnerLoadState(PC pc, const char name[], Mat A, InnerSolver *s, Archive *archive, PetscBool *same, PetscBool *failed)
+{
+  PetscBool usable;
+
+  PetscFunctionBegin;
+  if (!s->ksp) {
+    PetscCall(GatherMatrix(A, PETSC_FALSE, s));
+    PetscCall(Create(pc, name, s));
+  }
+  if (s->whole) A = s->whole[0];
+  PetscCall(KSPSetOperators(s->ksp, A, A));
+  PetscCall(LinearLoadState(s->ksp, A, &s->choice, archive, same, &usable));
+  *failed = (PetscBool)!usable;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed)
 {
   KSPConvergedReason reason;

@@ -42,14 +42,27 @@ PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice)
   PetscFunctionReturn(0);
 }
 
+/* hhtconstraint sets both for conjugate gradients, whose successor shall not depend on them */
+static PetscErrorCode ForgetGuess(KSP ksp)
+{
+  PetscFunctionBegin;
+  PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_FALSE));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscFunctionReturn(0);
+}
+
+/* Joints and motions make a few rows unsymmetric, which the preconditioner solves exactly: conjugate gradients take as many iterations then as FGMRES, at two
+   thirds of its time (tests/bench/whole_bodies.md), and where they do not serve a factor follows. Where there is no room for one, FGMRES is the safe way. */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice)
 {
-  PetscBool by_option;
+  const bool cg = symmetric || !choice->no_room;
+  PetscBool  by_option;
 
   PetscFunctionBegin;
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
-  if (!by_option) PetscCall(KSPSetType(ksp, symmetric ? KSPCG : KSPFGMRES));
-  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", symmetric ? "conjugate gradients" : "FGMRES", PCHHTCONSTRAINT,
+  if (!by_option) PetscCall(KSPSetType(ksp, cg ? KSPCG : KSPFGMRES));
+  if (!by_option && !cg) PetscCall(ForgetGuess(ksp));
+  PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", cg ? "conjugate gradients" : "FGMRES", PCHHTCONSTRAINT,
                           choice->no_room ? "there is no room for a factor (-mat_mumps_memory)" : "most unknowns are those of nodes of finite elements (a factor by -pc_type lu or cholesky)"));
   PetscFunctionReturn(0);
 }
@@ -58,6 +71,7 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
 {
   PC             pc;
   PetscContainer mark;
+  PetscBool      given;
 
   PetscFunctionBegin;
   choice->iterative = PETSC_TRUE;
@@ -70,6 +84,8 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
   PetscCall(KSPSetFromOptions(ksp)); /* of "preonly" it has read none */
+  PetscCall(LinearOptionGiven(ksp, "-ksp_max_it", &given));
+  if (!given && !choice->no_room) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, END));
   PetscFunctionReturn(0);
 }
 
@@ -110,23 +126,50 @@ static PetscErrorCode HasNodes(Mat P, PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *taken)
+/* Whether the choice of the faster solver is left to us, and the matrix gives its rows */
+static PetscErrorCode IsFree(KSP ksp, Mat P, const LinearChoice &choice, PetscBool *yes)
 {
-  PetscBool nodes, rows, preonly, given;
+  PetscBool rows, preonly, given;
 
   PetscFunctionBegin;
-  *taken = PETSC_FALSE;
-  if (!choice->may_be_rough || choice->slow || choice->user_pc || choice->user_package) PetscFunctionReturn(0);
   PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)P, &rows, MATSEQAIJ, MATMPIAIJ, ""));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &preonly));
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &given));
-  if (!rows || !preonly || given) PetscFunctionReturn(0);
+  *yes = (PetscBool)(!choice.user_pc && !choice.user_package && rows && (choice.no_room || (preonly && !given)));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken)
+{
+  PetscBool nodes;
+
+  PetscFunctionBegin;
+  *taken = PETSC_FALSE;
+  if (!choice->may_be_rough || choice->slow) PetscFunctionReturn(0);
+  PetscCall(IsFree(ksp, P, *choice, taken));
+  if (!*taken) PetscFunctionReturn(0);
   PetscCall(HasNodes(P, &nodes));
-  if (!nodes) PetscFunctionReturn(0);
-  PetscCall(TakeKrylov(ksp, PETSC_TRUE, choice));
-  PetscCall(LinearOptionGiven(ksp, "-ksp_max_it", &given));
-  if (!given) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, END));
-  *taken = PETSC_TRUE;
+  *taken = nodes;
+  if (nodes) PetscCall(TakeKrylov(ksp, symmetric, choice));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearTakeKrylovAgain(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken)
+{
+  PetscFunctionBegin;
+  PetscCall(IsFree(ksp, P, *choice, taken));
+  if (*taken) PetscCall(TakeKrylov(ksp, symmetric, choice));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearUsersMethod(KSP ksp, const LinearChoice &choice, KSPType *type)
+{
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetType(ksp, type));
+  PetscCall(LinearOptionGiven(ksp, "-ksp_type", &given));
+  if (choice.iterative && !given) *type = KSPPREONLY;
   PetscFunctionReturn(0);
 }
 
@@ -145,8 +188,7 @@ PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
   PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_FALSE)); /* hhtconstraint sets both */
-  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscCall(ForgetGuess(ksp));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, &end));
   PetscCall(KSPSetTolerances(ksp, rtol == LOOSE ? PETSCS : rtol, PETSC_DEFAULT, PETSC_DEFAULT, end == END ? 10000 : end));
   PetscFunctionReturn(0);

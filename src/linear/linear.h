@@ -41,17 +41,18 @@ PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBo
    the factor is worth, which P gets from now on. Collective. */
 PetscErrorCode LinearGiveUpKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBool *changed);
 
-/* LinearChoose() where a run goes on with the solver that it had: package and factorization are not looked for anew. */
-PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const char package[], PetscBool cholesky, LinearChoice *choice);
+/* The type of the KSP if the user has set it, by options or by program; KSPPREONLY if the Krylov method was chosen here */
+PetscErrorCode LinearUsersMethod(KSP ksp, const LinearChoice &choice, KSPType *type);
 
 /*
-  What a factor takes over from the matrices before: pivots and orderings that were chosen for their values. LinearSaveState() notes
-  it, each rank its own. LinearLoadState() puts a factor that was set up with P into that state, so that it has the same bits and will
-  choose alike with the matrices to come; *same = PETSC_FALSE where this cannot be had: PETSc's own packages and preconditioners, of which
-  it is not known what they keep, and MUMPS on several ranks (mumpsnd.h). Without *usable the factor has to be made anew. Both collective.
+  What a solver takes over from the matrices before: the choice itself, pivots and orderings of factors that were chosen for other values, aggregates of "hhtconstraint" that
+  were made at other positions. LinearSaveState() notes it, each rank its own. LinearLoadState() puts a KSP that has the operator P and the defaults of LinearDefaults() into that
+  state, so that its solves have the same bits and it will choose alike with the matrices to come; *same = PETSC_FALSE where this cannot be had: PETSc's own packages and
+  preconditioners, of which it is not known what they keep, and MUMPS on several ranks (mumpsnd.h). Without *usable the matrix has to be factored anew, as it has where the
+  run had chosen a solver and not set it up yet. Both collective.
 */
-PetscErrorCode LinearSaveState(KSP ksp, Archive *archive);
-PetscErrorCode LinearLoadState(KSP ksp, Mat P, Archive *archive, PetscBool *same, PetscBool *usable);
+PetscErrorCode LinearSaveState(KSP ksp, const LinearChoice &choice, Archive *archive);
+PetscErrorCode LinearLoadState(KSP ksp, Mat P, LinearChoice *choice, Archive *archive, PetscBool *same, PetscBool *usable);
 
 /*
   Solves with the matrix P may be rough from now on, or may no longer be: those of a caller whose own iteration removes their error. A package
@@ -60,7 +61,8 @@ PetscErrorCode LinearLoadState(KSP ksp, Mat P, Archive *archive, PetscBool *same
 PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough);
 PetscErrorCode LinearSolvesRoughly(Mat P, PetscBool *rough);
 
-/* Functions of a factor by these names, (Mat F, Archive *) and (Mat F, Mat P, Archive *, PetscBool *same) */
+/* Functions by these names: of a factor, (Mat F, Archive *) and (Mat F, Mat P, Archive *, PetscBool *same); of a preconditioner that was set up with its operators,
+   (PC, Archive *) and (PC, Archive *, PetscBool *same) */
 #define LINEAR_SAVE_STATE "LinearSaveState_C"
 #define LINEAR_LOAD_STATE "LinearLoadState_C"
 

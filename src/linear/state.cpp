@@ -1,6 +1,6 @@
-/* What a preconditioner takes over from one matrix to the next, asked of the factor that it holds; and what its solves are for */
-#include "linear.h"
-#include <petsc/private/petscimpl.h>
+/* What a solver takes over from one matrix to the next, asked of the preconditioner or the factor that it holds; and what its solves are for */
+#include "choose.h"
+#include <petsc/private/pcimpl.h>
 
 /* NULL where there is none */
 static PetscErrorCode FactorOf(KSP ksp, Mat *F)
@@ -16,28 +16,73 @@ static PetscErrorCode FactorOf(KSP ksp, Mat *F)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearSaveState(KSP ksp, Archive *archive)
+PetscErrorCode LinearSaveState(KSP ksp, const LinearChoice &choice, Archive *archive)
 {
-  Mat F;
+  PC            pc;
+  Mat           F;
+  MatSolverType package = NULL;
+  LinearChosen  chosen;
 
   PetscFunctionBegin;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (package) PetscCall(PetscStrncpy(chosen.package, package, sizeof chosen.package));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &chosen.cholesky));
+  if (choice.iterative) chosen.cholesky = choice.cholesky;
+  chosen.iterative = choice.iterative;
+  chosen.no_room   = choice.no_room;
+  chosen.slow      = choice.slow;
+  chosen.set_up    = (PetscBool)!!pc->setupcalled;
+  archive->plain(chosen);
+  if (!chosen.set_up) PetscFunctionReturn(0);
   PetscCall(FactorOf(ksp, &F));
   if (F) PetscTryMethod(F, LINEAR_SAVE_STATE, (Mat, Archive *), (F, archive));
+  else PetscTryMethod(pc, LINEAR_SAVE_STATE, (PC, Archive *), (pc, archive));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearLoadState(KSP ksp, Mat P, Archive *archive, PetscBool *same, PetscBool *usable)
+/* The same choice on all ranks; none where a part of the file is not what it should be */
+static PetscErrorCode LoadChosen(MPI_Comm comm, Archive *archive, LinearChosen *was, PetscBool *good)
 {
+  PetscFunctionBegin;
+  archive->plain(*was);
+  *good = (PetscBool)archive->good;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, good, 1, MPIU_BOOL, MPI_LAND, comm));
+  if (!*good) *was = LinearChosen();
+  PetscCallMPI(MPI_Bcast(was, sizeof *was, MPI_BYTE, 0, comm));
+  was->package[sizeof was->package - 1] = 0;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearLoadState(KSP ksp, Mat P, LinearChoice *choice, Archive *archive, PetscBool *same, PetscBool *usable)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)ksp);
+  PC             pc;
   Mat            F;
   MatFactorError error = MAT_FACTOR_NOERROR;
+  PCFailedReason reason;
+  LinearChosen   was;
 
   PetscFunctionBegin;
+  *usable = PETSC_FALSE;
+  PetscCall(LoadChosen(comm, archive, &was, same));
+  PetscCall(LinearChooseAgain(ksp, P, was, choice));
+  if (!was.set_up) PetscFunctionReturn(0);
   *same = PETSC_FALSE;
+  PetscCall(KSPSetUp(ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetFailedReason(pc, &reason));
+  *usable = (PetscBool)!reason;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, usable, 1, MPIU_BOOL, MPI_LAND, comm));
+  if (!*usable) PetscFunctionReturn(0);
   PetscCall(FactorOf(ksp, &F));
   if (F) PetscTryMethod(F, LINEAR_LOAD_STATE, (Mat, Mat, Archive *, PetscBool *), (F, P, archive, same));
+  else PetscTryMethod(pc, LINEAR_LOAD_STATE, (PC, Archive *, PetscBool *), (pc, archive, same));
   if (F) PetscCall(MatFactorGetError(F, &error));
-  *usable = (PetscBool)!error;
-  for (PetscBool *answer : {same, usable}) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, answer, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ksp)));
+  PetscCall(PCGetFailedReason(pc, &reason));
+  *usable = (PetscBool)(!error && !reason);
+  for (PetscBool *answer : {same, usable}) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, answer, 1, MPIU_BOOL, MPI_LAND, comm));
+  if (!*usable) PetscCall(PCReset(pc)); /* a factor keeps its error */
   PetscFunctionReturn(0);
 }
 

@@ -72,6 +72,15 @@ TEST(Policy, WhatCannotConverge)
   EXPECT_EQ(JudgeCorrections({1., .5, 5, 3}, -1., tol, 1.), Verdict::Converged); /* rounding of q */
 }
 
+/* What a Krylov method leaves of the first correction may be larger than the correction in positions: the third one tells */
+TEST(Policy, RoughSolves)
+{
+  EXPECT_EQ(JudgeCorrections({2., 1., 2, 8, true}, -1., 1e-3, 0.), Verdict::GoOn);
+  EXPECT_EQ(JudgeCorrections({2., 1., 3, 7, true}, -1., 1e-3, 0.), Verdict::Stalled);
+  EXPECT_EQ(JudgeCorrections({2., 1., 2, 0, true}, -1., 1e-3, 0.), Verdict::Stalled);
+  EXPECT_EQ(JudgeCorrections({1e-6, 1., 2, 8, true}, -1., 1e-3, 0.), Verdict::Converged);
+}
+
 /* While h is about the matrix' own and corrections converge, there is one matrix */
 TEST(Policy, MatrixServesManySteps)
 {

@@ -1,29 +1,12 @@
 /* Checkpoints on several ranks: the run that writes is not changed, the one that resumes repeats it bit for bit, another number of ranks is refused */
 #include "hhtdae/scene.h"
 #include "scene_output.h"
+#include "shared_file.h"
 
 using namespace hhtest;
 
 namespace
 {
-
-/* The same name on all ranks, and one file */
-struct SharedFile {
-  std::string name;
-  SharedFile()
-  {
-    int pid = getpid();
-    MPI_Bcast(&pid, 1, MPI_INT, 0, PETSC_COMM_WORLD);
-    name = testing::TempDir() + "hhtdae-ranks-" + std::to_string(pid) + ".checkpoint";
-  }
-  ~SharedFile()
-  {
-    int rank;
-    MPI_Barrier(PETSC_COMM_WORLD);
-    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    if (!rank) std::remove(name.c_str());
-  }
-};
 
 struct End {
   Array            u, v;
@@ -47,7 +30,7 @@ End fall(MPI_Comm comm, const std::string &options, int bodies = 12)
 void repeat(const std::string &options)
 {
   SCOPED_TRACE(options);
-  const SharedFile  file;
+  const SharedFile  file(".checkpoint");
   const std::string every = " -ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every ";
   const End         plain = fall(PETSC_COMM_WORLD, options);
   ASSERT_GT(plain.s.steps, 30);
@@ -74,7 +57,7 @@ TEST(Checkpoint, RunsRepeatBitForBit)
 
 TEST(Checkpoint, OtherNumbersOfRanksAreRefused)
 {
-  const SharedFile file;
+  const SharedFile file(".checkpoint");
   int              size;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
   if (size == 1) GTEST_SKIP();
