@@ -91,10 +91,7 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
   PetscCall(MapPast(ts));
   PetscCall(Publish(ts));
   PetscCall(UpdateWeights(ts, I.U0));
-  if (I.F0) {
-    PetscCall(VecZeroEntries(I.A1));
-    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
-  }
+  PetscCall(HistoryForces(ts, ts->ptime));
   I.corrector.matrix.forget();
   I.change.stale = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

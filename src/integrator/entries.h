@@ -90,6 +90,20 @@ PetscErrorCode ForEntries(F f, First first, Rest... rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first entry of all ranks for which f(i, x_i, ...), by its global index; -1 if there is none */
+template <class F, class First, class... Rest>
+PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
+{
+  PetscInt start, mine = HHT3_INT_MAX;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(a.vec, &start, NULL));
+  PetscCall(ForEntries([&](PetscInt i, auto... x) { if (mine == HHT3_INT_MAX && f(i, x...)) mine = start + i; }, a, rest...));
+  PetscCallMPI(MPI_Allreduce(&mine, first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)a.vec)));
+  if (*first == HHT3_INT_MAX) *first = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The same for the local entries that are listed */
 template <class F, class... Arrays>
 PetscErrorCode ForSome(const std::vector<PetscInt> &list, F f, Arrays... arrays)

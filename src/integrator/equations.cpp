@@ -155,6 +155,18 @@ PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* f_n of (9a), everything but the inertia forces at t_n, if the form needs it. A1 serves as work space. */
+PetscErrorCode HistoryForces(TS ts, PetscReal t)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (!I.F0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecZeroEntries(I.A1));
+  PetscCall(EvaluateResidual(ts, t, I.U0, I.V0, I.A1, I.F0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
 {
   Integrator &I = Get(ts);

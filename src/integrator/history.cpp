@@ -272,14 +272,11 @@ PetscErrorCode MapState(TS ts, Mapping &map)
 PetscErrorCode CheckRoles(TS ts, const Mapping &map)
 {
   Integrator &I = Get(ts);
-  PetscInt    start, bad = HHT3_INT_MAX, first;
+  PetscInt    first;
 
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(I.U0, &start, NULL));
-  for (size_t i = map.changed.size(); i-- > 0;)
-    if (map.changed[i] && !IsCoordinate(I, (PetscInt)i)) bad = start + (PetscInt)i;
-  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  PetscCheck(first == HHT3_INT_MAX, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+  PetscCall(FirstWhere([&](PetscInt i, PetscScalar) { return map.changed[i] && !IsCoordinate(I, i); }, &first, Read(I.U0)));
+  PetscCheck(first < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
              "The map of TSHHT3SetCoordinateChange() has changed unknown %" PetscInt_FMT
              " at t = %g, which is not a coordinate: it may change U, U', U'' of coordinates only",
              first, (double)ts->ptime);

@@ -11,13 +11,6 @@ namespace hht3
 namespace
 {
 
-PetscErrorCode OptionGiven(SNES snes, const char name[], PetscBool *given)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscOptionsHasName(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, name, given));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The test stands in the SNES of ts, put there by HooksInstall(): neither by the user since nor for another TS */
 bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == ConvergenceTest && snes->cnvP == (void *)ts; }
 
@@ -25,7 +18,7 @@ bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == ConvergenceTe
 PetscErrorCode UserHasTest(SNES snes, PetscBool *has)
 {
   PetscFunctionBegin;
-  PetscCall(OptionGiven(snes, "-snes_convergence_test", has));
+  PetscCall(OptionGiven((PetscObject)snes, "-snes_convergence_test", has));
   if (snes->ops->converged != SNESConvergedDefault) *has = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -199,12 +192,12 @@ PetscErrorCode HooksInstall(TS ts)
     H.snes = snes;
     H.lag          = snes->lagjacobian;
     H.check_domain = snes->checkjacdomainerror;
-    PetscCall(OptionGiven(snes, "-snes_lag_jacobian", &I.corrector.user_lag));
+    PetscCall(OptionGiven((PetscObject)snes, "-snes_lag_jacobian", &I.corrector.user_lag));
     if (snes->lagjacobian != 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
     if (!I.corrector.user_lag) PetscCall(SNESSetLagJacobian(snes, -2));
   }
   if (!TestIsOurs(ts, snes)) PetscCall(InstallTest(ts, snes));
-  PetscCall(OptionGiven(snes, "-snes_check_jacobian_domain_error", &given));
+  PetscCall(OptionGiven((PetscObject)snes, "-snes_check_jacobian_domain_error", &given));
   if (!given) PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* FormJacobian() says so of a singular matrix */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -329,6 +329,7 @@ PetscErrorCode SetUpJacobian(TS ts);
 PetscErrorCode SetUpSolvers(TS ts);
 PetscErrorCode TakeSNES(TS ts);
 /* settings.cpp */
+PetscErrorCode OptionGiven(PetscObject object, const char name[], PetscBool *given);
 PetscErrorCode CheckSettings(TS ts);
 PetscErrorCode TakeSNESSettings(TS ts);
 /* setters.cpp */
@@ -352,6 +353,7 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 /* equations.cpp */
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
+PetscErrorCode HistoryForces(TS ts, PetscReal t);
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);
 /* factor.cpp */

@@ -23,16 +23,15 @@ const char *RoleName(const Integrator &I, PetscInt local)
 PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F)
 {
   Integrator &I = Get(ts);
-  PetscInt    start, bad = HHT3_INT_MAX, first;
+  PetscInt    start, end, row;
 
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(F, &start, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { if (PetscIsInfOrNanScalar(f)) bad = PetscMin(bad, start + i); }, Read(F)));
-  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  if (first < HHT3_INT_MAX) {
-    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
-                            "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s",
-                            (double)t, first, bad == first ? ", " : "", bad == first ? RoleName(I, first - start) : ""));
+  PetscCall(VecGetOwnershipRange(F, &start, &end));
+  PetscCall(FirstWhere([](PetscInt, PetscScalar f) { return PetscIsInfOrNanScalar(f); }, &row, Read(F)));
+  if (row >= 0) {
+    const bool mine = row >= start && row < end;
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s", (double)t, row,
+                            mine ? ", " : "", mine ? RoleName(I, row - start) : ""));
   } else {
     PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)t));
   }

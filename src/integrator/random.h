@@ -2,7 +2,7 @@
 #ifndef HHTDAE_RANDOM_H
 #define HHTDAE_RANDOM_H
 
-#include <petscsys.h>
+#include "entries.h"
 
 namespace hht3
 {
@@ -15,6 +15,20 @@ inline PetscReal RandomNumber(PetscInt i, unsigned salt)
   x          = (x ^ (x >> 13)) * 3266489917u;
   return (x >> 8) / (PetscReal)(1 << 23) - 1;
 }
+
+/* Entries of x for which which(i) moved by pseudo-random amounts of relative size r */
+template <class Which>
+PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt, const Which &which)
+{
+  PetscInt start;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(x, &start, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &a) { if (which(i)) a += r * (1 + PetscAbsScalar(a)) * RandomNumber(start + i, salt); }, Write(x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+inline PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt) { return Shake(x, r, salt, [](PetscInt) { return true; }); }
 
 inline PetscReal RandomSign(PetscInt i, unsigned salt) { return RandomNumber(i, salt) < 0 ? -1 : 1; }
 

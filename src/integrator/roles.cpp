@@ -131,17 +131,6 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x moved by a fixed pseudo-random amount, of relative size r, that depends on the global index alone */
-PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt)
-{
-  PetscInt start;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(x, &start, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &a) { a += r * (1 + PetscAbsScalar(a)) * RandomNumber(start + i, salt); }, Write(x)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One triangle does not show whether the rows of multipliers depend on q': the residual does, with U and A as they are */
 PetscErrorCode ProbeRates(TS ts, Vec U, Vec V, Vec A, Probe &probe)
 {

@@ -11,19 +11,12 @@ namespace hht3
 namespace
 {
 
-PetscErrorCode OptionGiven(PetscObject object, const char name[], PetscBool *given)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscOptionsHasName(object->options, object->prefix, name, given));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 bool IsTolerance(PetscReal x) { return x >= 0 && !PetscIsInfReal(x); } /* NaN is not */
 
 /* The first entry that is no tolerance, of a vector where the user gave one */
 PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
 {
-  PetscInt start, bad = HHT3_INT_MAX, first;
+  PetscInt first;
 
   PetscFunctionBegin;
   if (!v) {
@@ -31,10 +24,8 @@ PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
                "The %s tolerance %g must be a number from 0 on (-ts_%ctol, TSSetTolerances())", name, (double)x, name[0]);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(VecGetOwnershipRange(v, &start, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar a) { if (!IsTolerance(PetscRealPart(a))) bad = PetscMin(bad, start + i); }, Read(v)));
-  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  PetscCheck(first == HHT3_INT_MAX, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+  PetscCall(FirstWhere([](PetscInt, PetscScalar a) { return !IsTolerance(PetscRealPart(a)); }, &first, Read(v)));
+  PetscCheck(first < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "The %s tolerance of unknown %" PetscInt_FMT " must be a number from 0 on (TSSetTolerances())", name, first);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -134,6 +125,13 @@ PetscErrorCode ReportUnread(TS ts, bool own_test, bool own_line_search)
 }
 
 } // namespace
+
+PetscErrorCode OptionGiven(PetscObject object, const char name[], PetscBool *given)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsHasName(object->options, object->prefix, name, given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Whatever may change between two runs, too */
 PetscErrorCode CheckSettings(TS ts)

@@ -355,10 +355,7 @@ PetscErrorCode StartFromState(TS ts, Prepared have)
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(MakeHistory(ts, rate));
-  if (I.F0) {
-    PetscCall(VecZeroEntries(I.A1));
-    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.F0));
-  }
+  PetscCall(HistoryForces(ts, ts->ptime));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -48,17 +48,6 @@ PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f_n of (9a): everything but the inertia forces. A1 serves as work space. */
-PetscErrorCode HistoryForces(TS ts, PetscReal t)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(VecZeroEntries(I.A1));
-  PetscCall(EvaluateResidual(ts, t, I.U0, I.V0, I.A1, I.F0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* An application that failed when f_n was evaluated would spoil every attempt from t_n: it is asked again */
 PetscErrorCode RenewHistoryForces(TS ts)
 {
@@ -88,7 +77,7 @@ PetscErrorCode Commit(TS ts)
   I.have_misfit = PETSC_FALSE;
   I.bent        = Bend::None;
   I.repaired    = PETSC_FALSE;
-  if (I.F0) PetscCall(HistoryForces(ts, I.t1));
+  PetscCall(HistoryForces(ts, I.t1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

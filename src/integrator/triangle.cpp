@@ -8,29 +8,11 @@
   and with h^2 for beta h^2 in the start. Rows of states, velocity-level constraints, variables and force states are scaled
   otherwise, or are no transposes of their columns in the first place: then such a matrix is refused.
 */
+#include "entries.h"
 #include "impl.h"
 
 namespace hht3
 {
-
-namespace
-{
-
-/* The least unknown of a role; the same on every rank */
-PetscErrorCode FirstOf(TS ts, TSHHT3Role role, PetscInt *first)
-{
-  const Integrator &I = Get(ts);
-  PetscInt          start, mine = PETSC_MAX_INT;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
-  for (size_t i = 0; i < I.role.size() && mine == PETSC_MAX_INT; i++)
-    if (I.role[i] == role) mine = start + (PetscInt)i;
-  PetscCallMPI(MPI_Allreduce(&mine, first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-} // namespace
 
 /* Once the roles are known */
 PetscErrorCode CheckTriangle(TS ts)
@@ -56,7 +38,7 @@ PetscErrorCode CheckTriangle(TS ts)
   PetscCall(MatGetType(triangle[1] ? P : J, &type));
   for (const auto &u : unfit) {
     if (!I.count[u.role]) continue;
-    PetscCall(FirstOf(ts, u.role, &first));
+    PetscCall(FirstWhere([&](PetscInt i, PetscScalar) { return I.role[i] == u.role; }, &first, Read(ts->vec_sol)));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
             "The Jacobian's type %s holds one triangle, but the Newton matrix is not symmetric: unknown %" PetscInt_FMT " is a %s (of %" PetscInt_FMT "), %s. "
             "Use a matrix of type %s; one triangle serves coordinates and holonomic constraints alone",

@@ -35,21 +35,10 @@ struct Dependence {
     PetscCall(VecCopy(ts->vec_sol, U));
     PetscCall(VecCopy(ts->vec_dot, V));
     PetscCall(VecZeroEntries(A));
-    PetscCall(shake(U, 1e-4, 11, [](PetscInt) { return true; }));
-    PetscCall(shake(V, 1e-3, 12, [](PetscInt) { return true; }));
-    PetscCall(shake(A, 1e-3, 13, [](PetscInt) { return true; }));
+    PetscCall(Shake(U, 1e-4, 11));
+    PetscCall(Shake(V, 1e-3, 12));
+    PetscCall(Shake(A, 1e-3, 13));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-
-  template <class Which>
-  PetscErrorCode shake(Vec x, PetscReal by, unsigned salt, const Which &which)
-  {
-    PetscInt start;
-
-    PetscFunctionBegin;
-    PetscCall(VecGetOwnershipRange(x, &start, NULL));
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar &a) { if (which(i)) a += by * (1 + PetscAbsScalar(a)) * RandomNumber(start + i, salt); }, Write(x)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
@@ -59,7 +48,7 @@ struct Dependence {
   {
     PetscFunctionBegin;
     PetscCall(VecCopy(x, moved));
-    PetscCall(shake(moved, 1e-3, 14, which));
+    PetscCall(Shake(moved, 1e-3, 14, which));
     PetscCall(EvaluateResidual(ts, ts->ptime, x == (Vec)U ? moved : U, x == (Vec)V ? moved : V, x == (Vec)A ? moved : A, other));
     PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar g) { if (f != g && !PetscIsInfOrNanScalar(f) && !PetscIsInfOrNanScalar(g)) changed(i); }, Read(F), Read(other)));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -69,14 +58,8 @@ struct Dependence {
 /* The first of rows marked on any rank, or -1 */
 PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
 {
-  PetscInt start, mine = HHT3_INT_MAX;
-
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
-  for (size_t i = 0; i < mark.size() && mine == HHT3_INT_MAX; i++)
-    if (mark[i]) mine = start + (PetscInt)i;
-  PetscCallMPI(MPI_Allreduce(&mine, row, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  if (*row == HHT3_INT_MAX) *row = -1;
+  PetscCall(FirstWhere([&](PetscInt i, PetscScalar) { return (size_t)i < mark.size() && mark[(size_t)i]; }, row, Read(ts->vec_sol)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
