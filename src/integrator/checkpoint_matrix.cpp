@@ -50,7 +50,7 @@ PetscErrorCode Rows(Mat A, std::vector<PetscScalar> &values, std::vector<PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-std::uint64_t Hash(const std::vector<PetscInt> &x)
+std::uint64_t PatternHash(const std::vector<PetscInt> &x)
 {
   std::uint64_t sum = 14695981039346656037ull;
   for (const PetscInt i : x) sum = (sum ^ (std::uint64_t)i) * 1099511628211ull;
@@ -83,7 +83,7 @@ PetscErrorCode SaveRows(Mat A, Archive &a)
 
   PetscFunctionBegin;
   PetscCall(Rows(A, values, columns));
-  std::uint64_t pattern = Hash(columns);
+  std::uint64_t pattern = PatternHash(columns);
   a.plain(pattern);
   a.list(values);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,7 +100,7 @@ PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
   PetscCall(Rows(A, now, columns));
   a.plain(pattern);
   a.list(values);
-  int same = a.good && values.size() == now.size() && pattern == Hash(columns);
+  int same = a.good && values.size() == now.size() && pattern == PatternHash(columns);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
   *good = same;
   if (same) PetscCall(SetRows(A, values, columns));

@@ -80,7 +80,7 @@ PetscErrorCode WorstRow(TS ts, Vec R, PetscInt *row, PetscReal *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Report(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
+PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
 {
   Integrator &I = Get(ts);
 
@@ -124,7 +124,7 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     PetscCall(Move(I, I.U0, I.X));
     *current = PETSC_FALSE;
   }
-  PetscCall(Report(ts, "positions", "", e0, worst_row, worst, project));
+  PetscCall(ReportMisfit(ts, "positions", "", e0, worst_row, worst, project));
   if (project && e > 1e-3)
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
             "The initial positions cannot be projected on the constraints: after the last correction row %" PetscInt_FMT
@@ -191,7 +191,7 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
   PetscCall(CheckPositions(ts, &matrix));
   if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
   PetscCall(CheckVelocities(ts, project, &e, &row, &value));
-  PetscCall(Report(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
+  PetscCall(ReportMisfit(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
   *prepared = PreparedBy(I, project);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,7 +33,7 @@ const char *const names[] = {"ts_hhtdae_",
                              nullptr};
 
 /* Where the name of an option begins behind the prefix of its object; npos if it is of another family */
-size_t Begin(const std::string &option, const std::string &stem)
+size_t StemBegin(const std::string &option, const std::string &stem)
 {
   size_t at = option.find(stem);
   while (at != std::string::npos && at > 0 && option[at - 1] != '_') at = option.find(stem, at + 1);
@@ -41,7 +41,7 @@ size_t Begin(const std::string &option, const std::string &stem)
 }
 
 /* Letters to insert, delete or replace to make b of a */
-size_t Distance(const std::string &a, const std::string &b)
+size_t EditDistance(const std::string &a, const std::string &b)
 {
   std::vector<size_t> row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); j++) row[j] = j;
@@ -61,13 +61,13 @@ size_t Distance(const std::string &a, const std::string &b)
 std::string Remark(const std::string &option)
 {
   for (const char *const *family : families) {
-    const size_t at = family ? Begin(option, family[0]) : std::string::npos;
+    const size_t at = family ? StemBegin(option, family[0]) : std::string::npos;
     if (at == std::string::npos) continue;
     const std::string prefix = option.substr(0, at), name = option.substr(at);
     const char       *nearest = nullptr;
     size_t            least   = SIZE_MAX;
     for (const char *const *n = family + 1; *n; n++) {
-      const size_t d = Distance(name, *n);
+      const size_t d = EditDistance(name, *n);
       if (d < least) {
         least   = d;
         nearest = *n;
