@@ -14,6 +14,7 @@
 
   Entries that the map leaves alone keep their bits.
 */
+#include "entries.h"
 #include "impl.h"
 #include <utility>
 
