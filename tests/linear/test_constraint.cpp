@@ -420,7 +420,6 @@ TEST_F(LargeBody, ConjugateGradientsWhereSymmetryIsLost)
   OK(LinearChoose(ksp, A, PETSC_FALSE, &choice));
   EXPECT_TRUE(isConstraint()) << choice.text;
   EXPECT_GT(solve(), 0);
-  std::printf("its %d %d left %g %g\n", (int)its, (int)iterations(), left, leftOf());
   EXPECT_LE(iterations(), its + 3);
   EXPECT_LT(leftOf(), 1.5 * left);
   OK(LinearGiveUpKrylov(ksp, A, &choice, &changed));

@@ -196,6 +196,21 @@ TEST(FullBodyDynamics, LargeBodyByConjugateGradientsAsByAFactor)
   EXPECT_NEAR(between[0], between[1], 1e-4 * std::abs(between[1]));
 }
 
+/* 3 x 2 x 1 m of 10-node tetrahedra */
+static hhtex::SolidBeam tetrahedra()
+{
+  hhtex::SolidBeam block;
+  block.n[0]     = 9;
+  block.n[1]     = 6;
+  block.n[2]     = 3;
+  block.length   = 3;
+  block.depth    = 2;
+  block.width    = 1;
+  block.element  = hhtex::BeamElement::Tetrahedron10;
+  block.material = {7e8, 0.33, 2700};
+  return block;
+}
+
 /* A load that sets in within four steps: what the rates at the start predict for the end of the first step is far from it, and Newton's method goes astray there. From the last
    values it does not; otherwise h would be cut, and stay short. */
 TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
@@ -238,16 +253,8 @@ TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
    the correction has, which is no reason for another matrix. */
 TEST(FullBodyDynamics, LoadThatComesAtOnce)
 {
-  hhtex::SolidBeam block;
-  block.n[0]     = 9;
-  block.n[1]     = 6;
-  block.n[2]     = 3;
-  block.length   = 3;
-  block.depth    = 2;
-  block.width    = 1;
-  block.element  = hhtex::BeamElement::Tetrahedron10;
-  block.material = {7e8, 0.33, 2700};
-  const BeamMesh m(block);
+  const hhtex::SolidBeam block = tetrahedra();
+  const BeamMesh         m(block);
   PetscReal      end[2];
   for (int factor = 0; factor < 2; factor++) {
     Scene               scene(PETSC_COMM_SELF);
