@@ -6,7 +6,7 @@
     reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
     renew      before a correction otherwise; within a correction when it is slow, a few times
     retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
-    start over at fixed steps, where h is not for us to cut: from the last values, where an extrapolation led astray
+    start over at fixed steps, where h is not for us to cut: from where the step begins, where a prediction led astray
     fail       with a matrix of this very correction: TSAdapt cuts h
   Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) reuse costs a
   correction each time, and one that passes by chance after its first iteration may be far off: after a retry the next step
@@ -17,6 +17,7 @@
   or convergence test stands.
 */
 #include "impl.h"
+#include "work_vec.h"
 
 namespace hht3
 {
@@ -24,19 +25,40 @@ namespace hht3
 namespace
 {
 
-/* Once more with a matrix of its own, from the prediction of this degree */
-PetscErrorCode Again(TS ts, PetscInt degree, PetscBool *converged)
+/* Once more with a matrix of its own, from the prediction or from where the step begins */
+PetscErrorCode Again(TS ts, bool from_rest, PetscBool *converged)
 {
-  Integrator    &I    = Get(ts);
-  const PetscInt kept = I.predictor.degree;
+  Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   I.stat.retries++;
   I.corrector.matrix.want = PETSC_TRUE;
-  I.predictor.degree      = degree;
   PetscCall(Predict(ts, I.X));
-  I.predictor.degree = kept;
+  if (from_rest) PetscCall(PredictRest(I, I.X));
   PetscCall(Iterate(ts, converged));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Accelerations of a start may be those of a load that has come at once, under which stiff elements would go far in a step: then positions stay. Without a history no other
+   prediction tells; the smaller residual does. */
+PetscErrorCode BetterStart(TS ts)
+{
+  Integrator &I = Get(ts);
+  WorkVec     rest, F;
+  PetscReal   norm[2];
+
+  PetscFunctionBegin;
+  PetscCall(rest.like(I.X));
+  PetscCall(F.like(I.X));
+  PetscCall(VecCopy(I.X, rest));
+  PetscCall(PredictRest(I, rest));
+  PetscCall(SNESComputeFunction(ts->snes, I.X, F));
+  PetscCall(VecNorm(F, NORM_2, &norm[0]));
+  PetscCall(SNESComputeFunction(ts->snes, rest, F));
+  PetscCall(VecNorm(F, NORM_2, &norm[1]));
+  if (norm[0] <= norm[1] || PetscIsInfOrNanReal(norm[1])) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: positions of t = %g predicted, residual %g, with accelerations at the start %g\n", (double)I.t0, (double)norm[1], (double)norm[0]));
+  PetscCall(VecCopy(rest, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,15 +73,16 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   PetscFunctionBegin;
   c.matrix.want = (PetscBool)c.matrix.due(EffectiveStep(I), c);
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
+  if (!I.predictor.available && I.predictor.degree_max > 0) PetscCall(BetterStart(ts));
   PetscCall(Iterate(ts, converged));
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
-    PetscCall(Again(ts, I.predictor.degree, converged));
+    PetscCall(Again(ts, false, converged));
   }
-  if (!*converged && I.fixed_h && I.order.now == 2 && I.predictor.degree > 0 && !c.no_solve && !c.user_lag) { /* higher orders fall to two first */
-    PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from the last values\n", I.failure));
-    PetscCall(Again(ts, 0, converged));
+  if (!*converged && I.fixed_h && I.order.now == 2 && !c.no_solve && !c.user_lag) { /* higher orders fall to two first */
+    PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from where the step begins\n", I.failure));
+    PetscCall(Again(ts, true, converged));
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {

@@ -432,6 +432,7 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next);
 /* predictor.cpp */
 PetscErrorCode PredictorReset(TS ts);
 PetscErrorCode Predict(TS ts, Vec X);
+PetscErrorCode PredictRest(const Integrator &, Vec X);
 PetscErrorCode PredictorUpdate(TS ts);
 /* start.cpp */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);

@@ -84,6 +84,17 @@ PetscErrorCode Predict(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Positions stay: the unknowns of coordinates for which the step ends where it begins, all others as predicted. A static state is near where a load
+   that comes at once meets what is far stiffer than inertia, and where the ends of such a load ring from step to step. */
+PetscErrorCode PredictRest(const Integrator &I, Vec X)
+{
+  const PetscReal k = ScalePosition(I.p, I.h);
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u0, PetscScalar base, PetscScalar &x) { if (RoleOf(I, i) == TSHHT3_COORDINATE) x = (u0 - base) / k; }, Read(I.U0), Read(I.base[0]), Write(X)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The step at t1 is accepted: it becomes D_0, and the degree for the next step is chosen */
 PetscErrorCode PredictorUpdate(TS ts)
 {
