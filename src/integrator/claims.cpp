@@ -85,10 +85,10 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* noise = |F(x + dx) - F| for the residual F at X and dx of random signs: rounding of all that the residual is made of, the unknowns, and
-   positions, states and velocities as sums of terms; of one unknown with one sign, lest they cancel. (By changes of X alone, rounding of
+/* |F(x + dx) - F| for the residual F at X and dx of pseudo-random signs and sizes: rounding of all that the residual is made of, the unknowns, and
+   positions, states and velocities as sums of terms; of one unknown with one factor, lest they cancel. (By changes of X alone, rounding of
    positions would be one of velocities too, far above theirs where h is small: what stands still in a steep brake would have no force.) */
-PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
 {
   Integrator &I = Get(ts);
   WorkVec     near;
@@ -98,21 +98,36 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
   PetscCall(near.like(X));
   PetscCall(VecCopy(X, near));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x += rounding_of_sums * RandomSign(first + i, 1) * PetscAbsScalar(x); }, Write(near)));
+  const auto rounding = [=](PetscInt i) { return rounding_of_sums * RandomRounding(first + i, salt); };
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x += rounding(i) * PetscAbsScalar(x); }, Write(near)));
   PetscCall(StageVectors(ts, near));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar y, PetscScalar a, PetscScalar &u, PetscScalar &v) {
       const TSHHT3Role r = RoleOf(I, i);
       if (!IsDifferential(r)) return;
       const PetscReal way = I.h * PetscAbsScalar(v), turn = r == TSHHT3_STATE ? 0 : I.h * PetscAbsScalar(a);
-      u += rounding_of_sums * RandomSign(first + i, 1) * (PetscRealPart(y) + way);
-      v += rounding_of_sums * RandomSign(first + i, 1) * (PetscAbsScalar(v) + turn);
+      u += rounding(i) * (PetscRealPart(y) + way);
+      v += rounding(i) * (PetscAbsScalar(v) + turn);
     },
     Read(I.ymax), Read(I.A1), Write(I.U1), Write(I.V1)));
   PetscCall(SNESComputeFunction(ts->snes, near, noise));
   PetscCall(VecAXPY(noise, -1, F));
   PetscCall(VecAbs(noise));
   PetscCall(StageVectors(ts, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The larger of two samples: in one of them the unknowns of a stiff spring may move with each other, which leaves its force as it is
+   (Stiff.FastModeBesideASlowOne) */
+PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+{
+  WorkVec other;
+
+  PetscFunctionBegin;
+  PetscCall(other.like(noise));
+  PetscCall(SampleRounding(ts, X, F, 1, noise));
+  PetscCall(SampleRounding(ts, X, F, 2, other));
+  PetscCall(VecPointwiseMax(noise, noise, other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -32,6 +32,9 @@ inline PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt) { return Shake(x,
 
 inline PetscReal RandomSign(PetscInt i, unsigned salt) { return RandomNumber(i, salt) < 0 ? -1 : 1; }
 
+/* Of either sign, between a half and one: rounding that neither vanishes by chance nor is the same for all */
+inline PetscReal RandomRounding(PetscInt i, unsigned salt) { return (RandomSign(i, salt) + RandomNumber(i, salt)) / 2; }
+
 } // namespace hht3
 
 #endif
