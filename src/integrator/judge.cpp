@@ -111,8 +111,8 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, Tolerance(I), c.floor);
-  const bool fast = so_far.with_matrix == 2 && so_far.rate() < c.of(I.linear.constraint).slow_rate;
-  if ((so_far.tells() || fast) && e > c.floor) {
+  const bool slow_too_early = so_far.tooEarly() && so_far.rate() >= c.of(I.linear.constraint).slow_rate;
+  if (so_far.with_matrix >= 2 && !slow_too_early && e > c.floor) {
     c.matrix.rate = so_far.rate();
     c.xi_max      = PetscMax(c.xi_max, c.matrix.rate);
   }

@@ -81,10 +81,10 @@ struct Corrections {
   PetscReal last = 0, before = 0;
   PetscInt  with_matrix = 0; /* that were made with the present matrix in this iteration */
   PetscInt  left        = 0; /* that may follow */
-  bool      rough       = false; /* a Krylov method leaves a part of each */
+  bool      rough       = false; /* each solve leaves a part, as Krylov methods do */
   PetscReal rate() const { return last / before; }
-  /* What the first solve has left of other directions may be the larger part of the second correction: only the third tells a rate */
-  bool tells() const { return with_matrix > (rough ? 2 : 1); }
+  /* What the first solve has left in other directions may be more than the first correction: a second one that is slow says nothing, the third tells the rate */
+  bool tooEarly() const { return rough && with_matrix == 2; }
 };
 
 /* (40), (41b): converged as soon as the error left, rate/(1-rate) times the last correction, is below tol. A rate of earlier steps (-1: none)
@@ -98,7 +98,7 @@ inline Verdict JudgeCorrections(const Corrections &c, PetscReal known_rate, Pets
   }
   const PetscReal xi = c.rate(), error = CorrectorError(xi, c.last);
   if (error <= tol) return Verdict::Converged;
-  if (!c.tells() && c.left > 0) return Verdict::GoOn;
+  if (c.tooEarly() && c.left > 0) return Verdict::GoOn;
   return xi >= 1 || c.left <= 0 || PetscPowReal(xi, c.left) * error > tol ? Verdict::Stalled : Verdict::GoOn;
 }
 
