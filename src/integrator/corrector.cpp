@@ -39,26 +39,25 @@ PetscErrorCode Again(TS ts, bool from_rest, PetscBool *converged)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Accelerations of a start may be those of a load that has come at once, under which stiff elements would go far in a step: then positions stay. Without a history no other
-   prediction tells; the smaller residual does. */
-PetscErrorCode BetterStart(TS ts)
+/* After a step that went from where it began and not from its prediction: the smaller residual tells which to take for this one */
+PetscErrorCode ChoosePrediction(TS ts)
 {
   Integrator &I = Get(ts);
   WorkVec     rest, F;
-  PetscReal   norm[2];
+  PetscReal   predicted, at_rest;
 
   PetscFunctionBegin;
   PetscCall(rest.like(I.X));
   PetscCall(F.like(I.X));
+  PetscCall(SNESComputeFunction(ts->snes, I.X, F));
+  PetscCall(VecNorm(F, NORM_2, &predicted));
   PetscCall(VecCopy(I.X, rest));
   PetscCall(PredictRest(I, rest));
-  PetscCall(SNESComputeFunction(ts->snes, I.X, F));
-  PetscCall(VecNorm(F, NORM_2, &norm[0]));
   PetscCall(SNESComputeFunction(ts->snes, rest, F));
-  PetscCall(VecNorm(F, NORM_2, &norm[1]));
-  if (norm[0] <= norm[1] || PetscIsInfOrNanReal(norm[1])) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "corrector: positions of t = %g predicted, residual %g, with accelerations at the start %g\n", (double)I.t0, (double)norm[1], (double)norm[0]));
-  PetscCall(VecCopy(rest, I.X));
+  PetscCall(VecNorm(F, NORM_2, &at_rest));
+  I.corrector.from_rest = (PetscBool)(at_rest < predicted);
+  if (I.corrector.from_rest) PetscCall(VecCopy(rest, I.X));
+  PetscCall(PetscInfo(ts, "corrector: residual %g of the prediction, %g where the step begins\n", (double)predicted, (double)at_rest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -73,16 +72,17 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   PetscFunctionBegin;
   c.matrix.want = (PetscBool)c.matrix.due(EffectiveStep(I), c);
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
-  if (!I.predictor.available && I.predictor.degree_max > 0) PetscCall(BetterStart(ts));
+  if (c.from_rest) PetscCall(ChoosePrediction(ts));
   PetscCall(Iterate(ts, converged));
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
     PetscCall(Again(ts, false, converged));
   }
-  if (!*converged && I.fixed_h && I.order.now == 2 && !c.no_solve && !c.user_lag) { /* higher orders fall to two first */
+  if (!*converged && I.fixed_h && I.order.now == 2 && !c.user_lag) { /* higher orders fall to two first */
     PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from where the step begins\n", I.failure));
     PetscCall(Again(ts, true, converged));
+    c.from_rest = *converged;
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {

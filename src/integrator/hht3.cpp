@@ -132,6 +132,7 @@ PetscErrorCode Reset(TS ts)
   I.role.clear();
   I.moves.clear();
   I.states.clear();
+  I.holonomic.clear();
   if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* it is chosen again, unless the user has set one since */
   static_cast<StepState &>(I)                = StepState();
   static_cast<CorrectorState &>(I.corrector) = CorrectorState();

@@ -34,6 +34,7 @@ struct CorrectorOptions : ReuseOptions {
 struct CorrectorState {
   MatrixPolicy matrix;
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
+  PetscBool from_rest   = PETSC_FALSE; /* the last step went from where it began: at fixed steps a prediction may lead astray */
   PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
   PetscBool rounding    = PETSC_FALSE; /* what is left of it is rounding */
   PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
@@ -230,7 +231,7 @@ struct Integrator : StepState {
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
-  std::vector<PetscInt>      states; /* local unknowns that are first-order states */
+  std::vector<PetscInt>      states, holonomic; /* local unknowns that are first-order states, multipliers of holonomic constraints */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  follow = PETSC_FALSE; /* constraints of velocities depend on variables, see variables.cpp */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */

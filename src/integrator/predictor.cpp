@@ -41,7 +41,7 @@ PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, 
 
   PetscFunctionBegin;
   PetscCall(VecCopy(I.X, fresh)); /* a, lambda, V, F as they are, of states s' */
-  PetscCall(ForSome(I.states, [](PetscInt, PetscScalar v, PetscScalar &x) { x = v; }, Read(I.V1), Write(fresh)));
+  if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [](PetscInt, PetscScalar v, PetscScalar &x) { x = v; }, Read(I.V1), Write(fresh)));
   for (PetscInt k = 0; k <= have; k++) {
     const PetscReal inverse = 1 / (I.t1 - p.t[k]);
     std::swap(p.D[k], fresh);
@@ -79,7 +79,7 @@ PetscErrorCode Predict(TS ts, Vec X)
     factor *= I.t1 - p.t[k - 1];
     PetscCall(ForEntries([=](PetscInt, PetscScalar d, PetscScalar &x) { x += factor * d; }, Read(p.D[k]), Write(X)));
   }
-  PetscCall(StatesToUnknowns(I, X));
+  if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
