@@ -235,12 +235,13 @@ PetscErrorCode PrepareBDF(TS ts)
       ba = 0;
     },
     Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */), u, v));
-  PetscCall(ForSome(
-    I.rotations.at,
-    [&](PetscInt, PetscScalar &bu, ReadEach::Entries ui) {
-      for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi({ui.x, ui.i + k}, 0);
-    },
-    Write(I.base[0]), u));
+  if (I.rotations.is)
+    PetscCall(ForSome(
+      I.rotations.at,
+      [&](PetscInt, PetscScalar &bu, ReadEach::Entries ui) {
+        for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi({ui.x, ui.i + k}, 0);
+      },
+      Write(I.base[0]), u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -124,7 +124,7 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
   PetscReal       states = 0;
 
   PetscFunctionBegin;
-  PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar d, PetscScalar w) { states += PetscSqr(d * w); }, Read(dX), Read(I.weight)));
+  if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar d, PetscScalar w) { states += PetscSqr(d * w); }, Read(dX), Read(I.weight)));
   PetscCall(Reduce(ts, NORM_2, I.norm_size, PetscMax(sum - states, 0) * q * q + states * s * s, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,13 +153,14 @@ PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
 static PetscErrorCode CoordinateErrors(const Integrator &I, NormType type, PetscReal *result)
 {
   const PetscReal h = I.h, k = PetscAbsReal(I.p.k) * h * h, r = I.h_last > 0 ? h / I.h_last : 1;
+  const bool      states  = I.count[TSHHT3_STATE]; /* whose weights are not meant; others have none */
   PetscReal       largest = 0;
   Sum             sum;
 
   PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar x, PetscScalar x0, PetscScalar a0, PetscScalar w) {
-      if (!IsCoordinate(I, i)) return;
+      if (states && !IsCoordinate(I, i)) return;
       const PetscReal d = PetscRealPart(w * (x - (a0 + r * (x0 - a0))));
       sum.add(i, d * d);
       largest = PetscMax(largest, PetscAbsReal(d));

@@ -122,6 +122,7 @@ PetscReal RotationFactor(const Integrator &I)
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result)
 {
   PetscFunctionBegin;
+  if (!I.rotations.is) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ForSome(
     I.rotations.at,
     [&](PetscInt, const PetscScalar &v0, const PetscScalar &v1, const PetscScalar &weight) {

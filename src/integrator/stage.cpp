@@ -147,8 +147,7 @@ Stage<all> MakeStage(const Integrator &I, const StageArrays &s, const PetscScala
   return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, {s.base[0], s.base[1], s.base[2]}, I.moves.data(), {s.to[0], s.to[1], s.to[2]}};
 }
 
-/* After the sweep: states, rotation vectors, and a note that U1, V1, A1 belong to X */
-PetscErrorCode FinishStage(Integrator &I, Vec X)
+PetscErrorCode StageOfStates(const Integrator &I, Vec X)
 {
   const Parameters &p  = I.p;
   const PetscReal   ks = ScaleState(p, I.h), cs = (1 - p.am_s) / (1 - p.af_s);
@@ -161,7 +160,15 @@ PetscErrorCode FinishStage(Integrator &I, Vec X)
       v = v0 + cs * x;
     },
     Read(X), Read(I.base[0]), Read(I.base[1]), Write(I.U1), Write(I.V1)));
-  PetscCall(StageOfRotations(I));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the sweep: states, rotation vectors, and a note that U1, V1, A1 belong to X */
+PetscErrorCode FinishStage(Integrator &I, Vec X)
+{
+  PetscFunctionBegin;
+  if (I.count[TSHHT3_STATE]) PetscCall(StageOfStates(I, X));
+  if (I.rotations.is) PetscCall(StageOfRotations(I));
   PetscCall(PetscObjectGetId((PetscObject)X, &I.stage_id));
   PetscCall(PetscObjectStateGet((PetscObject)X, &I.stage_state));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -262,7 +269,7 @@ PetscErrorCode PrepareStage(TS ts)
   PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
   PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
   PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
-  PetscCall(BaseOfStates(I));
+  if (I.count[TSHHT3_STATE]) PetscCall(BaseOfStates(I));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
