@@ -51,8 +51,8 @@ static PetscErrorCode ForgetGuess(KSP ksp)
   PetscFunctionReturn(0);
 }
 
-/* Joints and motions make a few rows unsymmetric, which the preconditioner solves exactly: conjugate gradients take as many iterations then as FGMRES, at two
-   thirds of its time (tests/bench/whole_bodies.md), and where they do not serve a factor follows. Where there is no room for one, FGMRES is the safe way. */
+/* Joints and motions make a few rows unsymmetric, which the preconditioner solves exactly: conjugate gradients take as many iterations then as FGMRES, in less time
+   and without its basis (tests/bench/whole_bodies.md), and where they do not serve a factor follows. Where there is no room for one, FGMRES is the safe way. */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice)
 {
   const bool cg = symmetric || !choice->no_room;
