@@ -98,7 +98,6 @@ PetscErrorCode SetUpOrder(TS ts)
   PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
   if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
-  PetscCall(VecGetLocalSize(ts->vec_sol, &I.local_size));
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt j = 0; j < o.max; j++) {
     if (!o.U[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.U[j]));

@@ -10,6 +10,8 @@ namespace
 constexpr PetscReal stayed   = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
 constexpr PetscReal hopeless = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
+bool Followed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= followed * PetscAbsReal(was) * s.answer + s.rounding; }
+
 /* How much of the change that the matrix expects on a part `way` of dX, from where the matrix was made, the residual shows: 1 if the Jacobian
    is right there. In the rows that have not followed dX, as far as they stand out of rounding; the constraint `forces` of dX are taken as the
    matrix has them. -1: there are no such rows. */

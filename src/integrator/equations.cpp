@@ -125,16 +125,6 @@ PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
-{
-  PetscReal norm;
-
-  PetscFunctionBegin;
-  PetscCall(MatNorm(P, NORM_FROBENIUS, &norm));
-  *numbers = (PetscBool)!PetscIsInfOrNanReal(norm);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F)
 {
   PetscFunctionBegin;

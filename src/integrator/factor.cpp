@@ -44,6 +44,16 @@ PetscErrorCode CheckMemory(TS ts, PC pc, Mat P, PCFailedReason failed)
 
 } // namespace
 
+PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
+{
+  PetscReal norm;
+
+  PetscFunctionBegin;
+  PetscCall(MatNorm(P, NORM_FROBENIUS, &norm));
+  *numbers = (PetscBool)!PetscIsInfOrNanReal(norm);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen)
 {

@@ -80,6 +80,20 @@ PetscErrorCode CheckProblem(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode UpdateParameters(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.radius >= 0) {
+    PetscCheck(I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+               "A spectral radius (%g) belongs to the second-order form; the paper's form takes alpha (-ts_hhtdae_alpha)", (double)I.radius);
+    I.p = RadiusParameters(I.radius);
+  } else I.p = HHTParameters(I.alpha, I.form == TSHHT3_FORM_PAPER);
+  I.hht = I.p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SetUp(TS ts)
 {
   Integrator &I = Get(ts);
@@ -297,20 +311,6 @@ static PetscErrorCode Finalize(void)
   PetscCall(ReportUnusedOptions());
   PetscCall(ForgetOptions());
   registered = cited = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode UpdateParameters(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  if (I.radius >= 0) {
-    PetscCheck(I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
-               "A spectral radius (%g) belongs to the second-order form; the paper's form takes alpha (-ts_hhtdae_alpha)", (double)I.radius);
-    I.p = RadiusParameters(I.radius);
-  } else I.p = HHTParameters(I.alpha, I.form == TSHHT3_FORM_PAPER);
-  I.hht = I.p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -120,9 +120,6 @@ struct Order : OrderState {
   Vec      V[max_order] = {};
 };
 
-/* Of h from one step to the next above order two: coefficients of variable steps grow with it */
-constexpr PetscReal longest_growth = 2;
-
 /* Of a body from a past attitude to that of the reference, rad: a rotation vector knows no more than half a turn */
 constexpr PetscReal longest_turn = 3;
 
@@ -223,7 +220,6 @@ struct Integrator : StepState {
   Corrector   corrector;
   Predictor   predictor;
   Order       order;
-  PetscInt    local_size = 0; /* unknowns of this rank */
   Verification verify;
 
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
@@ -323,8 +319,6 @@ struct Events {
 };
 extern Events events;
 
-/* hht3.cpp */
-PetscErrorCode UpdateParameters(TS ts);
 /* jacobian.cpp */
 PetscErrorCode SetUpJacobian(TS ts);
 PetscErrorCode SetUpSolvers(TS ts);
@@ -355,13 +349,13 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 PetscErrorCode EvaluateResidual(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode EvaluateJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P);
 PetscErrorCode HistoryForces(TS ts, PetscReal t);
-PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);
 /* factor.cpp */
 PetscErrorCode SolverDefaults(TS ts, KSP ksp);
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed);
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);
+PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
 /* equations.cpp */
@@ -376,7 +370,6 @@ PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, 
 PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal xnorm, PetscReal ynorm, PetscReal fnorm, SNESConvergedReason *reason, void *ctx);
 /* judge.cpp */
 PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated);
-PetscErrorCode FreshMatrixNextIteration(TS ts);
 /* hooks.cpp */
 PetscErrorCode HooksLineSearch(TS ts);
 PetscErrorCode HooksJacobian(TS ts);
@@ -488,7 +481,6 @@ PetscErrorCode SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx);
 PetscErrorCode NoteState(TS ts);
 PetscErrorCode Step(TS ts);
 PetscErrorCode RollBack(TS ts);
-PetscErrorCode Fail(TS ts, const char *what);
 /* dense.cpp */
 PetscReal      StepFraction(const Integrator &I, PetscReal t);
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);

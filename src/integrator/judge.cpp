@@ -56,6 +56,21 @@ PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A slow correction goes on with a matrix made at its present iterate */
+PetscErrorCode FreshMatrixNextIteration(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.matrix.rate, I.corrector.it));
+  PetscCall(SNESSetLagJacobian(ts->snes, -2));
+  I.corrector.renewals++;
+  I.corrector.base = I.corrector.it;
+  I.corrector.matrix.rate = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode Diverge(TS ts, const char *why)
 {
   Integrator &I = Get(ts);
@@ -279,21 +294,6 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
     PetscCall(BlameJacobian(ts, X, dX, F, evaluated));
     if (I.corrector.wrong_jacobian) PetscCall(FailUnproved(ts));
   } else if (!I.corrector.reason && I.corrector.met && I.corrector.it - I.corrector.base == 1) PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A slow correction goes on with a matrix made at its present iterate */
-PetscErrorCode FreshMatrixNextIteration(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.matrix.rate, I.corrector.it));
-  PetscCall(SNESSetLagJacobian(ts->snes, -2));
-  I.corrector.renewals++;
-  I.corrector.base = I.corrector.it;
-  I.corrector.matrix.rate = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -35,6 +35,9 @@ constexpr PetscReal forgets = 0.8;
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
 constexpr PetscReal silent = 0.5;
 
+/* Of h from one step to the next above order two: coefficients of variable steps grow with it */
+constexpr PetscReal longest_growth = 2;
+
 constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
 
 /* Scaled differences as sums of squares or largest entries */

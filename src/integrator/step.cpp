@@ -199,6 +199,25 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
+PetscErrorCode Fail(TS ts, const char *what)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
+  if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
+  ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
+  PetscCall(VecCopy(I.repaired ? I.accepted[0] : I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.repaired ? I.accepted[1] : I.V0, ts->vec_dot));
+  PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
+             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
+             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime, hint);
+  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After a rejection: is there a point in another attempt? */
 PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 {
@@ -225,25 +244,6 @@ PetscErrorCode NoteState(TS ts)
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
   PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
-PetscErrorCode Fail(TS ts, const char *what)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
-  if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
-  ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
-  PetscCall(VecCopy(I.repaired ? I.accepted[0] : I.U0, ts->vec_sol));
-  PetscCall(VecCopy(I.repaired ? I.accepted[1] : I.V0, ts->vec_dot));
-  PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
-             "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
-             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
-             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime, hint);
-  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -63,11 +63,6 @@ struct Imbalance {
   PetscReal part = 0; /* of the residual that is as it was */
 };
 
-inline bool Followed(const RowScale &s, PetscReal now, PetscReal was)
-{
-  return PetscAbsReal(now) * s.answer <= followed * PetscAbsReal(was) * s.answer + s.rounding;
-}
-
 /* claims.cpp */
 bool           Claims(const Integrator &I);
 PetscErrorCode MeasureRows(TS ts, Vec X, Vec F);
