@@ -1,6 +1,7 @@
 /* Setters and getters. As in every PETSc type that may be loaded as a plugin, each one reaches its type through the object's
    function list (setters.cpp), so that it does nothing when the TS is of another type. */
-#include "impl.h"
+#include "compat.h"
+#include "hhtdae/hhtdae.h"
 
 /*@
   TSHHT3SetForm - Chooses how `TSHHT3` averages inertia forces over a step

@@ -5,7 +5,9 @@
   next correction with the same matrix would be (the natural level function of Deuflhard, Newton Methods for Nonlinear Problems, 2004,
   section 3.3); there a new matrix sees the steep part.
 */
-#include "impl.h"
+#include "corrector.h"
+#include "estimate.h"
+#include "work_vec.h"
 
 namespace hht3
 {

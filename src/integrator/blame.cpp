@@ -1,5 +1,8 @@
 /* Is it the model that the residual does not follow a correction, or is the application's Jacobian wrong? See verify.cpp */
+#include "entries.h"
+#include "proofs.h"
 #include "verify.h"
+#include "work_vec.h"
 
 namespace hht3
 {

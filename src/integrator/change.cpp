@@ -15,7 +15,14 @@
   F0        of the paper's form: evaluated anew, after commit
   dV        of misfit.cpp belongs to a step, and is measured in the new coordinates if h changes
 */
-#include "impl.h"
+#include "change.h"
+#include "compat.h"
+#include "equations.h"
+#include "estimate.h"
+#include "order.h"
+#include "predictor.h"
+#include "stage.h"
+#include "step.h"
 
 namespace hht3
 {

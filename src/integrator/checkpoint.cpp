@@ -2,15 +2,24 @@
   Checkpoints: all that the next step depends on, so that a run that is resumed repeats the uninterrupted one bit for bit, and writing
   changes nothing in the run that writes.
 
-  The plain structs of impl.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
+  The plain structs of state.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
   the coordinates and the memory that it was made in), and what its solver has taken over from the matrices before it, LinearSaveState().
   It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
 
   Whether a file belongs to the run: checkpoint_identity.cpp.
 */
+#include "bdf.h"
+#include "change.h"
+#include "checkpoint.h"
 #include "checkpoint_file.h"
 #include "checkpoint_identity.h"
+#include "checkpoint_matrix.h"
+#include "compat.h"
 #include "linear/archive.h"
+#include "step.h"
+#include "work_vec.h"
+#include <string>
+#include <vector>
 
 namespace hht3
 {

@@ -3,7 +3,12 @@
   its own, at which it would be zero.
 */
 #include "checkpoint_identity.h"
+#include "compat.h"
+#include "corrector.h"
 #include "entries.h"
+#include "equations.h"
+#include "linear/linear.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -2,7 +2,8 @@
 #ifndef HHTDAE_CHECKPOINT_IDENTITY_H
 #define HHTDAE_CHECKPOINT_IDENTITY_H
 
-#include "impl.h"
+#include "formulas.h"
+#include "state.h"
 #include <cstdint>
 #include <string>
 #include <vector>

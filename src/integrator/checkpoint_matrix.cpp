@@ -2,9 +2,13 @@
   The Newton matrix in a checkpoint: the values of its rows, and what the solver keeps. It is not evaluated again, because the application
   may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
 */
-#include "impl.h"
+#include "checkpoint_matrix.h"
+#include "equations.h"
+#include "formulas.h"
 #include "linear/archive.h"
+#include "linear/linear.h"
 #include <cstdint>
+#include <vector>
 
 namespace hht3
 {

@@ -1,7 +1,11 @@
 /* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
 #include "entries.h"
+#include "equations.h"
+#include "proofs.h"
 #include "random.h"
+#include "stage.h"
 #include "verify.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -11,7 +11,12 @@
   With h > 0 the velocities and positions follow from the accelerations, by the implicit Euler method (settle.cpp).
 */
 #include "consistent.h"
+#include "corrector.h"
 #include "entries.h"
+#include "equations.h"
+#include "formulas.h"
+#include "linear/linear.h"
+#include "solver.h"
 
 namespace hht3
 {

@@ -1,8 +1,10 @@
-/* Accelerations and multipliers at given positions and velocities, consistent.cpp; and the matrix of the run for them, start.cpp. */
+/* Accelerations and multipliers at given positions and velocities, consistent.cpp, and the derivatives of the constraints in time that stand on the right-hand side
+   of their equations, differentiate.cpp. */
 #ifndef HHTDAE_CONSISTENT_H
 #define HHTDAE_CONSISTENT_H
 
-#include "impl.h"
+#include "linear/linear.h"
+#include "state.h"
 
 namespace hht3
 {
@@ -30,10 +32,19 @@ struct Consistent {
 /* Where the unknown of a role stands in U, U', U'' */
 inline PetscScalar &UnknownOf(TSHHT3Role r, PetscScalar &u, PetscScalar &v, PetscScalar &a) { return r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u; }
 
-/* consistent.cpp */
+/* U, V, A from X, as far as X has them */
 PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
+
+/* The matrix at U, V, factored; the solve, with a new matrix unless there is one. why: what has gone wrong if not `ok` */
 PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why);
+
+/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: the time scale of the motion.
+   again: with the differences that were the best ones at the last call, near by. */
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second);
+
+/* A time over which the motion changes q by as much as its tolerance refers to, project.cpp */
+PetscErrorCode TimeScale(TS ts, PetscReal *T);
 
 } // namespace hht3
 

@@ -16,7 +16,8 @@
   All of it goes through SNESSetLagJacobian(): -2 is "once, now", -1 is "not again". A user's -snes_lag_jacobian, line search
   or convergence test stands.
 */
-#include "impl.h"
+#include "corrector.h"
+#include "predictor.h"
 #include "work_vec.h"
 
 namespace hht3

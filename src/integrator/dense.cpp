@@ -8,7 +8,9 @@
 
   Both ends give back the step's own values.
 */
-#include "impl.h"
+#include "bdf.h"
+#include "dense.h"
+#include "rotations.h"
 
 namespace hht3
 {

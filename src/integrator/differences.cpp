@@ -3,7 +3,12 @@
   own scale and by MatFDColoring, then combined with the shifts. The pattern is the DM's matrix or is found by moving one
   unknown at a time, which takes as many evaluations as there are unknowns; both are said with -info.
 */
-#include "impl.h"
+#include "compat.h"
+#include "equations.h"
+#include "jacobian.h"
+#include "linear/linear.h"
+#include "work_vec.h"
+#include <vector>
 
 namespace hht3
 {

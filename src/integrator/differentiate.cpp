@@ -3,8 +3,11 @@
   q'' by construction, blind to what happened before t (a motion may start there), and each row takes the step tau at which it is most accurate:
   where its derivative changes least from one tau to the next.
 */
+#include "consistent.h"
 #include "entries.h"
-#include "impl.h"
+#include "roles.h"
+#include "work_vec.h"
+#include <vector>
 
 namespace hht3
 {

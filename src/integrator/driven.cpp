@@ -8,8 +8,12 @@
   To see that takes a residual more, unless the one before the last correction was as good, as where directions do not turn: the vehicle of the
   examples, whose wheels stand on posts that go up and down, takes 22 of them in 4,000 steps, in place of 2,834.
 */
+#include "corrector.h"
+#include "entries.h"
+#include "proofs.h"
 #include "random.h"
 #include "verify.h"
+#include "work_vec.h"
 
 namespace hht3
 {

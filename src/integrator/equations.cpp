@@ -17,7 +17,15 @@
   by X in D_c. Nothing is divided by h: for h -> 0 it tends to [M Phi_q^T; Phi_q 0], the matrix of consistent.cpp.
 */
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
+#include "events.h"
+#include "formulas.h"
+#include "jacobian.h"
+#include "linear/linear.h"
+#include "proofs.h"
+#include "rotations.h"
+#include "solver.h"
+#include "stage.h"
 
 namespace hht3
 {

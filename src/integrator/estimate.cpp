@@ -6,8 +6,12 @@
   of |q_i| over accepted steps. The local error is of third order, which makes TSADAPTBASIC with its safety factor 0.9 the
   controller (41), h_new = 0.9 h / Theta^(1/6).
 */
+#include "corrector.h"
 #include "entries.h"
-#include "impl.h"
+#include "estimate.h"
+#include "events.h"
+#include "order.h"
+#include "rotations.h"
 
 namespace hht3
 {

@@ -12,7 +12,14 @@
   not counted in the statistics; -log_view shows them as HHT3Sample.
 */
 #include "consistent.h"
+#include "dense.h"
 #include "entries.h"
+#include "events.h"
+#include "linear/linear.h"
+#include "roles.h"
+#include "rotations.h"
+#include "solver.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -14,9 +14,11 @@
 
   Entries that the map leaves alone keep their bits.
 */
+#include "change.h"
 #include "entries.h"
-#include "impl.h"
+#include "work_vec.h"
 #include <utility>
+#include <vector>
 
 namespace hht3
 {

@@ -3,7 +3,9 @@
   of the Jacobian, the check of its domain error and the function that fills a matrix made from differences. All of it points to
   this TS. It goes with TSReset(), TSDestroy() and a change of type, and what the user had set there before comes back.
 */
-#include "impl.h"
+#include "corrector.h"
+#include "hooks.h"
+#include "settings.h"
 
 namespace hht3
 {

@@ -20,7 +20,11 @@
   A last correction that proves nothing (verify.cpp), turns back (between.cpp), is followed by another one or leaves forces of what is driven
   (driven.cpp) goes on.
 */
-#include "impl.h"
+#include "corrector.h"
+#include "estimate.h"
+#include "formulas.h"
+#include "policy.h"
+#include "proofs.h"
 
 namespace hht3
 {

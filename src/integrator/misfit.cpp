@@ -19,7 +19,11 @@
   spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
+#include "formulas.h"
+#include "solver.h"
+#include "stage.h"
+#include "start.h"
 
 namespace hht3
 {

@@ -1,6 +1,6 @@
 /* Which unknowns belong to the nodes of finite elements, for the preconditioner "hhtconstraint" (src/linear/constraint.h) */
-#include "impl.h"
 #include "linear/constraint.h"
+#include "solver.h"
 
 namespace
 {

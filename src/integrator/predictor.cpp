@@ -9,7 +9,10 @@
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
 #include "entries.h"
-#include "impl.h"
+#include "estimate.h"
+#include "events.h"
+#include "formulas.h"
+#include "predictor.h"
 #include <utility>
 
 namespace hht3

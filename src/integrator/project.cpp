@@ -7,8 +7,11 @@
 
   which has the units of q and so can be held against the tolerances. Time derivatives: differentiate.cpp.
 */
+#include "consistent.h"
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
+#include "solver.h"
+#include "start.h"
 
 namespace hht3
 {

@@ -1,5 +1,13 @@
 /* Steps so short that the corrector could not make them from where the last one ended, or not at all. */
-#include "impl.h"
+#include "consistent.h"
+#include "corrector.h"
+#include "equations.h"
+#include "estimate.h"
+#include "events.h"
+#include "formulas.h"
+#include "order.h"
+#include "start.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -1,5 +1,6 @@
 /* What a run says about itself: the summary line and the progress line. Both are TS monitors. */
-#include "impl.h"
+#include "report.h"
+#include "step.h"
 #include <ctime>
 
 namespace hht3

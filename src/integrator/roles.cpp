@@ -10,9 +10,14 @@
   moved off it, since at rest or in a symmetric position entries may vanish that are there otherwise.
 */
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
+#include "jacobian.h"
+#include "linear/linear.h"
 #include "random.h"
+#include "roles.h"
+#include "work_vec.h"
 #include <algorithm>
+#include <vector>
 
 namespace hht3
 {

@@ -2,9 +2,13 @@
   The size of a correction that is nothing but rounding. Only the residual knows how its terms cancel, and only the matrix how much of
   that arrives in the unknowns: where Phi_q nearly loses rank, that is far more than rounding of q, and a step later it is not.
 */
+#include "corrector.h"
 #include "entries.h"
-#include "impl.h"
+#include "estimate.h"
+#include "linear/linear.h"
+#include "proofs.h"
 #include "random.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -1,7 +1,13 @@
 /*
   What the setters and getters of api.cpp do to a TS of our type, and the list of functions by which they find it.
 */
-#include "impl.h"
+#include "bdf.h"
+#include "change.h"
+#include "checkpoint.h"
+#include "dense.h"
+#include "estimate.h"
+#include "rotations.h"
+#include "settings.h"
 
 namespace hht3
 {

@@ -3,7 +3,8 @@
   otherwise.
 */
 #include "entries.h"
-#include "impl.h"
+#include "hooks.h"
+#include "settings.h"
 
 namespace hht3
 {

@@ -11,7 +11,9 @@
   gone; those of an oscillation would be as before.
 */
 #include "entries.h"
-#include "impl.h"
+#include "estimate.h"
+#include "start.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -5,7 +5,11 @@
   VecAXPY() and three plain loops they take 10 % of the instructions of a step more, and 3 % of its time, for a chain of 1,000 rods.
 */
 #include "entries.h"
-#include "impl.h"
+#include "estimate.h"
+#include "formulas.h"
+#include "order.h"
+#include "rotations.h"
+#include "stage.h"
 #include "sweeps.h"
 
 namespace hht3

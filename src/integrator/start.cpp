@@ -5,8 +5,24 @@
   value of the algorithmic acceleration, a_0 = q''(t_0 + lag h): with a_0 = q''_0 the first steps excite an oscillation of
   the multipliers and an error of second order in q' (Arnold, Bruels 2007).
 */
+#include "change.h"
+#include "compat.h"
 #include "consistent.h"
 #include "entries.h"
+#include "equations.h"
+#include "estimate.h"
+#include "events.h"
+#include "linear/linear.h"
+#include "order.h"
+#include "predictor.h"
+#include "proofs.h"
+#include "rotations.h"
+#include "settings.h"
+#include "solver.h"
+#include "stage.h"
+#include "start.h"
+#include "work_vec.h"
+#include <vector>
 
 namespace hht3
 {

@@ -5,8 +5,22 @@
   one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
   whatever happens in between.
 */
+#include "change.h"
+#include "checkpoint.h"
+#include "compat.h"
+#include "corrector.h"
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
+#include "estimate.h"
+#include "formulas.h"
+#include "jacobian.h"
+#include "order.h"
+#include "predictor.h"
+#include "report.h"
+#include "rotations.h"
+#include "stage.h"
+#include "start.h"
+#include "step.h"
 #include <utility>
 
 namespace hht3

@@ -9,7 +9,9 @@
   otherwise, or are no transposes of their columns in the first place: then such a matrix is refused.
 */
 #include "entries.h"
-#include "impl.h"
+#include "jacobian.h"
+#include "linear/linear.h"
+#include "work_vec.h"
 
 namespace hht3
 {

@@ -8,8 +8,11 @@
   The residual tells what depends on what, at the set-up and where there are such unknowns beside constraints.
 */
 #include "entries.h"
-#include "impl.h"
+#include "equations.h"
 #include "random.h"
+#include "roles.h"
+#include "work_vec.h"
+#include <vector>
 
 namespace hht3
 {

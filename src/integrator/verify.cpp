@@ -17,7 +17,10 @@
 
   Otherwise the iteration goes on; the rate that it then measures, or a new matrix, settles the matter.
 */
+#include "entries.h"
+#include "proofs.h"
 #include "verify.h"
+#include "work_vec.h"
 
 namespace hht3
 {

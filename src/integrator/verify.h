@@ -3,7 +3,8 @@
 #define HHTDAE_VERIFY_H
 
 #include "entries.h"
-#include "impl.h"
+#include "formulas.h"
+#include "state.h"
 
 namespace hht3
 {

@@ -1,5 +1,4 @@
 /* A package says through its preconditioner that it cannot factor a matrix; every other error goes up as it is */
-#include "integrator/impl.h"
 #include "support.h"
 
 #include <petsc/private/matimpl.h>

@@ -1,5 +1,5 @@
 /* Setters and options: what they take, what they refuse, and that PETSc's own options win over the defaults */
-#include "integrator/impl.h"
+#include "integrator/state.h"
 #include "support.h"
 
 using namespace hhtest;

@@ -1,5 +1,5 @@
 /* Roles of unknowns: detected equal set ones for every example, refused where they make no sense */
-#include "integrator/impl.h"
+#include "integrator/state.h"
 #include "support.h"
 
 using namespace hhtest;

@@ -1,5 +1,5 @@
 /* What the user sets in TS, TSAdapt and SNES rules: option by option, with the effect that it must have, or the word that it has none */
-#include "integrator/impl.h"
+#include "integrator/state.h"
 #include "support.h"
 
 #include <functional>

@@ -1,5 +1,4 @@
 /* What cannot be factored on one rank is known on all: nobody waits for ever, and the message is the same */
-#include "integrator/impl.h"
 #include "support.h"
 
 using namespace hhtest;

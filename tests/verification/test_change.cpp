@@ -1,5 +1,5 @@
 /* Changes of coordinates in the course of a run: order, error, rejections, predictor, checkpoints, roll-back */
-#include "integrator/impl.h"
+#include "integrator/state.h"
 #include "tumbling.h"
 
 #include <fstream>

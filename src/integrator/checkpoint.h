@@ -1,0 +1,22 @@
+/* Checkpoints of a run, checkpoint.cpp: what may be asked of them. */
+#ifndef HHTDAE_CHECKPOINT_H
+#define HHTDAE_CHECKPOINT_H
+
+#include "state.h"
+
+namespace hht3
+{
+
+PetscErrorCode SetCheckpointVec(TS ts, Vec extra);
+PetscErrorCode CheckpointSave(TS ts, const char file[]);
+
+/* Before the set-up it is only noted, and read at its end */
+PetscErrorCode CheckpointLoad(TS ts, const char file[]);
+
+/* At the beginning of a step; the monitor does it after the last one */
+PetscErrorCode CheckpointIfDue(TS ts);
+PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+
+} // namespace hht3
+
+#endif

@@ -1,0 +1,36 @@
+/* Weights and norms of the error test, (26) (estimate.cpp), and the length of the next step: the default TSAdapt (adapt.cpp) and the application's longest step
+   (limit.cpp). */
+#ifndef HHTDAE_ESTIMATE_H
+#define HHTDAE_ESTIMATE_H
+
+#include "state.h"
+
+namespace hht3
+{
+
+/* Y_i and the weights after U has been accepted */
+PetscErrorCode UpdateWeights(TS ts, Vec U);
+
+/* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
+PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
+
+/* The same in two parts: this rank's sum of squares by the weights, and the norm from it */
+PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum);
+PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
+
+/* to = dX times the squares of its weights: a product with it is that of corrections, whose norm is CorrectionNorm() but for a factor */
+PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);
+
+/* The error of the attempt, as TSAdapt asks for it. NoteError() keeps that of the accepted step for the corrector's tolerance in the next one. */
+PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
+PetscErrorCode NoteError(TS ts);
+
+PetscErrorCode CreateAdapt(TSAdapt adapt);
+
+/* Before an attempt from t_n */
+PetscErrorCode ApplyStepLimit(TS ts);
+PetscErrorCode SetStepLimit(TS ts, TSHHT3StepLimit limit, void *ctx);
+
+} // namespace hht3
+
+#endif

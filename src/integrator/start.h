@@ -1,0 +1,62 @@
+/* A consistent state at t_n: at the beginning of a run (start.cpp, project.cpp, settle.cpp), and where h has fallen by much or is too short for the corrector
+   (repair.cpp). */
+#ifndef HHTDAE_START_H
+#define HHTDAE_START_H
+
+#include "state.h"
+
+namespace hht3
+{
+
+/* ts->time_step as TSCreate() makes it, and what stands for "not set": a rounding error less, so that a 0.1 of the user's differs */
+constexpr PetscReal petsc_step = 0.1;
+constexpr PetscReal unset_step = petsc_step * (1 - PETSC_MACHINE_EPSILON);
+
+/* Second derivatives of the constraints in time, gamma of (6c): to be made; to be made where they were a moment ago, by the same differences; made */
+enum class Gamma { New, Near, Made };
+
+/* What a consistent solve finds: its matrix, and gamma */
+struct Prepared {
+  bool  matrix = false;
+  Gamma gamma  = Gamma::New;
+};
+
+/* From vec_sol and vec_dot at ptime; history is forgotten */
+PetscErrorCode Start(TS ts);
+
+/* V0 projected on the constraints and a consistent start from there, before a step far shorter than the last one */
+PetscErrorCode Repair(TS ts);
+
+/* Whether a step of length h is so short that rounding would drown its accelerations; such a step by Taylor series: U1, V1, A1 and X as a corrected one would
+   leave them */
+PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
+PetscErrorCode TinyStep(TS ts, PetscBool *ok);
+
+/* The matrix of the start, [M Phi_q^T; Phi_q 0] at U, V, factored */
+PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
+
+/* Of use to the files of the start alone, from here on. Where no solve with that matrix is possible, NameRedundant() is the error that says why. */
+PetscErrorCode NameRedundant(TS ts);
+
+/* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
+PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
+
+/* V0 to the nearest velocities that the constraints allow */
+PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared);
+
+/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+PetscErrorCode StartFromState(TS ts, Prepared have);
+
+/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok);
+
+/* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where a transient of time constant *tau is over long before the
+   step ends, V0 is what it `leaves`, and the rest is to be made anew. */
+PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
+
+/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
+PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V);
+
+} // namespace hht3
+
+#endif

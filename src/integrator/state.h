@@ -1,0 +1,188 @@
+/*
+  The state of a run, which every part of the integrator reads and writes: struct Integrator, and what it is made of.
+
+  What a run is at any time is kept in plain structs, ...State, here and in corrector_state.h and history_state.h: checkpoint.cpp writes them as
+  they are, so that a field added to one of them is saved and restored without another line. What the user has set is kept apart,
+  ...Options: it belongs to the run that resumes.
+*/
+#ifndef HHTDAE_STATE_H
+#define HHTDAE_STATE_H
+
+#include "compat.h"
+#include "corrector_state.h"
+#include "formulas.h"
+#include "hhtdae/hhtdae.h"
+#include "history_state.h"
+#include "linear/linear.h"
+#include <vector>
+
+namespace hht3
+{
+
+struct ChangeState {
+  PetscBool stale = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */
+  PetscReal t     = 0;           /* of the last change */
+  PetscInt  step  = 0;
+};
+
+/* New coordinates in the course of a run, change.cpp */
+struct Change : ChangeState {
+  TSHHT3ChangeTest   test   = nullptr;
+  TSHHT3ChangeMap    map    = nullptr;
+  TSHHT3ChangeCommit commit = nullptr;
+  void              *ctx    = nullptr;
+};
+
+/* Local rotation vectors, rotations.cpp */
+struct Rotations {
+  IS                    is    = nullptr;
+  TSHHT3Refer           refer = nullptr;
+  TSHHT3ReferBack       back  = nullptr;
+  void                 *ctx   = nullptr;
+  std::vector<PetscInt> at;         /* local indices of first components */
+  PetscReal             factor = 0; /* RotationFactor() while the matrix of a step is made */
+};
+
+/* The longest step that the application allows, limit.cpp */
+struct StepLimit {
+  TSHHT3StepLimit limit = nullptr;
+  void           *ctx   = nullptr;
+};
+
+/* hooks.cpp: what stands in the SNES, and what stood there before */
+struct Hooks {
+  SNES      snes        = nullptr;     /* that has them */
+  PetscBool test        = PETSC_FALSE; /* the convergence test is ours, or was before the user set another */
+  PetscBool line_search = PETSC_FALSE; /* the type of the line search was ours to choose */
+  PetscBool jacobian    = PETSC_FALSE; /* the matrix is filled by our differences */
+  Mat       J = nullptr, P = nullptr;  /* the matrices before, and who filled them */
+  decltype(_DMSNESOps::computejacobian) computejacobian = nullptr;
+  PetscContainer jacobianctx = nullptr;
+  void     *cnvP        = nullptr;     /* of the test before, with the function that destroys it */
+  PetscErrorCode (*convergeddestroy)(void *) = nullptr;
+  PetscInt  lag          = 1;
+  PetscBool check_domain = PETSC_FALSE;
+};
+
+/* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
+enum class Bend { None, Rates, Velocities };
+
+/* Of the step and of the bookkeeping about steps */
+struct StepState {
+  PetscReal        t0 = 0, t1 = 0, h = 0; /* of the last accepted step, or of the attempt */
+  PetscReal        h_last      = 0;       /* length of the step that led to t_n */
+  PetscReal        t_begin     = 0;       /* of the run */
+  TSStepStatus     status      = TS_STEP_INCOMPLETE;
+  PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
+  PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
+  PetscBool        have_misfit = PETSC_FALSE; /* dV belongs to t_n */
+  Bend             bent        = Bend::None;
+  PetscBool        repaired    = PETSC_FALSE; /* U0, V0 have been changed by Repair() */
+  PetscInt         norm_size   = 0;           /* entries that enter the error test, global */
+  PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
+  PetscReal        h_regular   = 0;   /* running maximum of steps that went through the corrector, forgetting a tenth in each */
+  PetscReal        h_proven    = 0;   /* largest step accepted since the last failed correction */
+  PetscReal        h_limit     = 0;   /* what h may grow to after a failed correction; 0: no limit */
+  PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
+  PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
+  PetscBool        h_chosen    = PETSC_FALSE; /* it was */
+  PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
+  PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
+  PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
+  TSHHT3Statistics stat        = {};
+};
+
+struct Integrator : StepState {
+  /* the method */
+  TSHHT3Form  form   = TSHHT3_FORM_SECOND_ORDER;
+  PetscReal   alpha  = -0.3;
+  PetscReal   radius = -1; /* set: Chung and Hulbert's parameters in the second-order form */
+  Parameters  hht;         /* of order two */
+  Parameters  p;           /* of the step at hand */
+  TSHHT3Start start_policy = TSHHT3_START_REPORT;
+  Corrector   corrector;
+  Predictor   predictor;
+  Order       order;
+  Verification verify;
+
+  /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
+  IS                         is[TSHHT3_NUM_ROLES] = {};
+  PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
+  std::vector<unsigned char> role;
+  std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
+  std::vector<PetscInt>      states, holonomic; /* local unknowns that are first-order states, multipliers of holonomic constraints */
+  PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
+  PetscBool                  follow = PETSC_FALSE; /* constraints of velocities depend on variables, see variables.cpp */
+  PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
+  PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
+  /* the same answer on every rank, also on one without unknowns, whose list of roles is empty too */
+  bool coordinatesAnd(TSHHT3Role other) const
+  {
+    for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
+      if (r != TSHHT3_COORDINATE && r != other && count[r]) return false;
+    return true;
+  }
+  bool coordinatesAlone() const { return coordinatesAnd(TSHHT3_COORDINATE); }
+
+  /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
+  Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
+  Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp */
+  Vec       bend = nullptr; /* change of that misfit over k h^2 by a change of coordinates at t_n */
+  Vec       accepted[2] = {}; /* U, U' as accepted, when Repair() has changed U0, V0 since */
+  Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
+  /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
+  Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
+  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see BaseOfCoordinates */
+  PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
+  PetscObjectState stage_state = 0;
+  Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
+  Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
+  Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
+  std::vector<signed char> levels[2]; /* of differences in time that were the best ones of each row, differentiate.cpp */
+
+  /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
+  Vec       ymax = nullptr, weight = nullptr;
+
+  /* the matrix */
+  Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
+  PetscReal     scaled_h = 0;                 /* for which row stands */
+  Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
+  struct Differences *differences = nullptr;  /* the application has no Jacobian */
+  struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */
+  LinearChoice  linear;
+  PetscBool     linear_chosen = PETSC_FALSE;
+  PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
+
+  Change    change;
+  StepLimit limit;
+  Rotations rotations;
+  Hooks     hooks;
+  PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
+  PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */
+
+  /* bookkeeping: vec_sol and vec_dot as the integrator left them */
+  PetscObjectState sol_state = 0, dot_state = 0;
+  PetscObjectId    sol_id = 0;
+  char             failure[512] = "";
+  char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
+  char             resume_file[PETSC_MAX_PATH_LEN] = "";
+  PetscInt         checkpoint_every = 0;
+  PetscInt         checkpoint_steps = 0; /* accepted steps when the last one was written or read */
+  Vec              checkpoint_vec = nullptr; /* the application's, saved and restored with the state */
+  PetscReal        wall0 = 0, cpu0 = 0;
+  PetscReal        progress_t0 = 0;
+  PetscReal        progress_last = 0;
+};
+
+inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
+inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
+inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
+inline bool IsConstraint(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC; }
+inline bool IsDifferential(TSHHT3Role r) { return r == TSHHT3_COORDINATE || r == TSHHT3_STATE; }
+
+/* The step size that stands in the matrix (10), which is M + (gamma h)^2 K above order two */
+inline PetscReal EffectiveStep(const Integrator &I) { return I.order.now > 2 ? I.p.gamma * I.h : I.h; }
+
+} // namespace hht3
+
+#endif
