@@ -11,7 +11,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int    most_iterations = 100, most_named = 10;
+constexpr int    assembly_iterations = 100, most_named = 10;
 constexpr double largest_turn = 0.3, largest_move = 0.3; /* in one iteration: radians, parts of the scene's size */
 
 /* Misfit of an element in its own units, and relative to the size of the scene */
@@ -197,7 +197,7 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok)
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
   PetscFunctionBegin;
-  for (int it = 0, stuck = 0; it < most_iterations && misfit > 1e-15 && stuck < 5; it++) {
+  for (int it = 0, stuck = 0; it < assembly_iterations && misfit > 1e-15 && stuck < 5; it++) {
     PetscCall(system.factor(blocks));
     RightHandSide(blocks, &RowBlock::value, rhs);
     PetscCall(system.solve(blocks, rhs, nullptr, d));

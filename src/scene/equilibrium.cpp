@@ -22,7 +22,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int    most_iterations = 2000;
+constexpr int    equilibrium_iterations = 2000;
 constexpr double balanced       = 1e-10; /* of forces, times the largest of the scene; of constraints, times its size */
 constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and from its first value */
 constexpr double downhill_growth = 2, hollow = 0.999; /* of h in a hollow: where forces fall to this part in a step */
@@ -191,7 +191,7 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
   first  = h;
   before = at.force = E.scale;
   *found = false;
-  while (E.iterations < most_iterations && !*found && h > 1e-12 * first) {
+  while (E.iterations < equilibrium_iterations && !*found && h > 1e-12 * first) {
     PetscCall(Step(E, h, before, a, at));
     PetscCall(PetscInfo(nullptr, "scene: equilibrium %d: h = %g%s, unbalanced %g of %g, constraints %g, step %g with %d corrections more\n",
                         (int)E.iterations, h, a.good ? "" : " refused", at.force, E.scale, at.misfit, a.reach * largest_turn,

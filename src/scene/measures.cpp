@@ -18,7 +18,7 @@ bool IsScalar(Measure::Kind k)
 
 /* ---- motion of a marker ---- */
 
-MarkerMotion<double> Motion(const Evaluation &e, PetscInt marker, bool accelerations)
+MarkerMotion<double> MotionOfMarker(const Evaluation &e, PetscInt marker, bool accelerations)
 {
   const LocalMarker   &k = e.bodies.marker[marker];
   const LocalBody     &l = e.bodies.body[k.body];
@@ -108,7 +108,7 @@ template <int N> MarkerMotion<Dual<N>> FrameMotion(const Evaluation &e, PetscInt
 
 /* Directions first..: coordinate c with its rate and acceleration, as du = 1, du' = sv, du'' = sa. Frames of attachments take one order at a time, and the
    coordinates of other bodies belong to the first. */
-template <int N> MarkerMotion<Dual<N>> Motion(const Evaluation &e, PetscInt marker, int first, int order)
+template <int N> MarkerMotion<Dual<N>> MotionOfMarker(const Evaluation &e, PetscInt marker, int first, int order)
 {
   using T              = Dual<N>;
   const LocalMarker &k = e.bodies.marker[marker];
@@ -361,9 +361,9 @@ double MeasureValue(const LocalMeasure &m, const Evaluation &e)
   if (IsJoint(m.kind) || IsLoad(m.kind)) return AxisOf(m, e).dot(ReactionOf(m, e));
   if (m.i < 0) return 0;
   const bool           a = Accelerates(m.kind);
-  MarkerMotion<double> i = Motion(e, m.i, a), j, frame;
-  if (m.j >= 0) j = Motion(e, m.j, a);
-  if (m.frame >= 0) frame = Motion(e, m.frame, false);
+  MarkerMotion<double> i = MotionOfMarker(e, m.i, a), j, frame;
+  if (m.j >= 0) j = MotionOfMarker(e, m.j, a);
+  if (m.frame >= 0) frame = MotionOfMarker(e, m.frame, false);
   return MarkerMeasure<double>(m.kind, m.component, m.angle, i, m.j < 0 ? nullptr : &j, m.frame < 0 ? nullptr : &frame);
 }
 
@@ -376,7 +376,7 @@ void LocalMeasure::accept(const Bodies &B)
 double LocalMeasure::longestStep(const Evaluation &e) const
 {
   if (kind != Measure::Angle) return std::numeric_limits<double>::infinity();
-  const MarkerMotion<double> a = Motion(e, i, true), b = Motion(e, j, true);
+  const MarkerMotion<double> a = MotionOfMarker(e, i, true), b = MotionOfMarker(e, j, true);
   return LongestTurn(AngleRate<double>(a.f, b.f, a.w, b.w), (a.alpha - b.alpha).norm());
 }
 
@@ -469,7 +469,7 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
   const int       orders   = !attached(0) && !attached(1) && !attached(2) ? 1 : Accelerates(m.kind) ? 3 : 2;
   for (int order = 0; order < orders; order++) {
     for (int i = 0; i < 3; i++)
-      if (marker[i] >= 0) motion[i] = Motion<N>(e, marker[i], i * max_coordinates, order);
+      if (marker[i] >= 0) motion[i] = MotionOfMarker<N>(e, marker[i], i * max_coordinates, order);
     const T x = MarkerMeasure<T>(m.kind, m.component, m.angle, motion[0], m.j < 0 ? nullptr : &motion[1], m.frame < 0 ? nullptr : &motion[2]);
     for (int i = 0; i < 3; i++) {
       if (at[i] < 0 || (order && !attached(i))) continue;

@@ -40,7 +40,7 @@ Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
 }
 
 /* The columns of a block's k-th body, rows that are not active cleared */
-Eigen::MatrixXd Columns(const RowBlock &b, std::size_t k)
+Eigen::MatrixXd ColumnsOf(const RowBlock &b, std::size_t k)
 {
   Eigen::MatrixXd J = b.J.middleCols(b.column[k], b.column[k + 1] - b.column[k]);
   for (int r = 0; r < b.rows; r++)
@@ -108,12 +108,12 @@ PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
     if (at[b].empty()) continue;
     const Eigen::MatrixXd W = Mobility(s, s.bodies[b]);
     for (const At &p : at[b]) {
-      const Eigen::MatrixXd JW = Columns(blocks[p.block], p.body) * W;
+      const Eigen::MatrixXd JW = ColumnsOf(blocks[p.block], p.body) * W;
       for (int r = 0; r < blocks[p.block].rows; r++)
-        weight_[first[p.block] + r] += JW.row(r).dot(Columns(blocks[p.block], p.body).row(r));
+        weight_[first[p.block] + r] += JW.row(r).dot(ColumnsOf(blocks[p.block], p.body).row(r));
       if (!mine(row_[p.block])) continue;
       for (const At &q : at[b]) {
-        const Eigen::MatrixXd B = JW * Columns(blocks[q.block], q.body).transpose();
+        const Eigen::MatrixXd B = JW * ColumnsOf(blocks[q.block], q.body).transpose();
         for (int r = 0; r < B.rows(); r++)
           for (int c = 0; c < B.cols(); c++) {
             I.push_back(row_[p.block] + r);
@@ -181,7 +181,7 @@ PetscErrorCode NearestSystem::solve(const std::vector<RowBlock> &blocks, const s
     for (std::size_t m = 0; m < blocks[k].body.size() && from; m++) {
       const PetscInt          body      = blocks[k].body[m];
       const std::vector<int> &direction = Directions(KindOf(s, s.bodies[body]));
-      const Eigen::MatrixXd   J         = Columns(blocks[k], m);
+      const Eigen::MatrixXd   J         = ColumnsOf(blocks[k], m);
       for (std::size_t c = 0; c < direction.size(); c++) f -= J.col(c) * d[6 * body + direction[c]];
     }
     for (int r = 0; r < blocks[k].rows; r++) b[row_[k] + r - start_] = blocks[k].has(r) ? f(r) : 0;
@@ -199,7 +199,7 @@ PetscErrorCode NearestSystem::solve(const std::vector<RowBlock> &blocks, const s
   for (std::size_t k = 0; k < blocks.size(); k++) {
     const Eigen::Map<const Eigen::VectorXd> mu(x + row_[k], blocks[k].rows);
     for (std::size_t m = 0; m < blocks[k].body.size(); m++) {
-      const Eigen::MatrixXd J = Columns(blocks[k], m);
+      const Eigen::MatrixXd J = ColumnsOf(blocks[k], m);
       load[blocks[k].body[m]].head(J.cols()) += J.transpose() * mu;
     }
   }

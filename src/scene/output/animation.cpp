@@ -14,7 +14,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int pose_size = 13; /* r, A by columns, |v| */
+constexpr int animated_pose = 13; /* r, A by columns, |v| */
 
 class Animation : public Task
 {
@@ -95,7 +95,7 @@ private:
       mine.push_back(m.v.norm());
     }
     for (PetscMPIInt r = 0; r < R.size; r++) {
-      count[r]     = pose_size * (int)own_[r].size();
+      count[r]     = animated_pose * (int)own_[r].size();
       start[r + 1] = start[r] + count[r];
     }
     if (R.rank == 0) all.resize(start[R.size]);
@@ -105,8 +105,8 @@ private:
     if (R.rank == 0)
       for (const auto &bodies : own_)
         for (PetscInt id : bodies) {
-          std::copy(x, x + pose_size, pose.data() + pose_size * id);
-          x += pose_size;
+          std::copy(x, x + animated_pose, pose.data() + animated_pose * id);
+          x += animated_pose;
         }
     PetscFunctionReturn(0);
   }
@@ -117,7 +117,7 @@ private:
     for (const Mesh::Point &p : mesh_.point) {
       Vector3 x = p.s;
       if (p.body >= 0) {
-        const double *b = pose.data() + pose_size * p.body;
+        const double *b = pose.data() + animated_pose * p.body;
         x               = Eigen::Map<const Vector3>(b) + Eigen::Map<const Matrix3>(b + 3) * p.s;
       }
       for (int i = 0; i < 3; i++) d.points.push_back((float)x(i));
@@ -128,7 +128,7 @@ private:
       out.end.assign(c->end.begin(), c->end.end());
       for (PetscInt b : c->body) { /* lines before polygons, as VTK counts its cells */
         d.body.push_back((int)b);
-        d.speed.push_back(b < 0 ? 0.f : (float)pose[pose_size * b + pose_size - 1]);
+        d.speed.push_back(b < 0 ? 0.f : (float)pose[animated_pose * b + animated_pose - 1]);
       }
     }
     return d;

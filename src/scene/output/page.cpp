@@ -21,7 +21,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t pose_size = 7; /* position of the centre of mass, quaternion x, y, z, w */
+constexpr std::size_t page_pose = 7; /* position of the centre of mass, quaternion x, y, z, w */
 
 class Page : public Task
 {
@@ -130,7 +130,7 @@ private:
     PetscFunctionBegin;
     if (!there_) PetscCall(writeHead(s));
     for (std::size_t m = 0, at = tracks_ + s.channels.size(); m < meshes_.size(); at += meshes_[m]->perNode() * (std::size_t)rest_[m].cols(), m++)
-      takeRigidMotion(rest_[m], &frame[at], &frame[pose_size * (s.bodies.size() + m)]);
+      takeRigidMotion(rest_[m], &frame[at], &frame[page_pose * (s.bodies.size() + m)]);
     continueQuaternions(frame, s.bodies.size() + meshes_.size());
     frames_.add(t, frame.data(), frame.data() + tracks_, frame.data() + tracks_ + s.channels.size());
     if (frames_.full()) PetscCall(writeFrames());
@@ -180,8 +180,8 @@ private:
     const auto put = [&](PetscMPIInt rank, std::size_t n) {
       for (std::size_t k = 0; k < n; k++) place_[rank].push_back(tracks_++);
     };
-    for (std::size_t b = 0; b < bodies.size(); b++) put(ownerOf(R, b), pose_size);
-    tracks_ += pose_size * meshes_.size();
+    for (std::size_t b = 0; b < bodies.size(); b++) put(ownerOf(R, b), page_pose);
+    tracks_ += page_pose * meshes_.size();
     for (std::size_t b = 0; b < bodies.size(); b++) {
       modal_.push_back(tracks_);
       if (bodies[b].flexible) put(ownerOf(R, b), (std::size_t)bodies[b].flexible->model->modes());
@@ -245,7 +245,7 @@ private:
   {
     last_.resize(4 * bodies, 0);
     for (std::size_t b = 0; b < bodies; b++) {
-      Eigen::Map<Eigen::Vector4d> now(&frame[pose_size * b + 3]), last(&last_[4 * b]);
+      Eigen::Map<Eigen::Vector4d> now(&frame[page_pose * b + 3]), last(&last_[4 * b]);
       if (now.dot(last) < 0) now = -now;
       last = now;
     }
