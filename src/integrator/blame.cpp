@@ -76,9 +76,8 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   if (!I.corrector.matrix.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
-  PetscCall(MeasureRows(ts, X, F));
   PetscCall(Model(ts, dX));
-  PetscCall(Compare(ts, F, &left));
+  PetscCall(CompareMeasured(ts, X, F, 0, &left));
   if (left.all > 0 && PetscAbsReal(left.part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -117,7 +117,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
-  for (Vec *x : {&I.dV, &I.bend, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
+  for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,7 +125,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
 bool HasItsVectors(const Integrator &I)
 {
   const Verification &v = I.verify;
-  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) &&
+  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) && (I.fastest >= PETSC_MAX_REAL || I.excitation) &&
          (v.largest == 0 || (v.inertia && v.claim && v.noise && v.unproved));
 }
 

@@ -121,17 +121,25 @@ static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The larger of two samples: in one of them the unknowns of a stiff spring may move with each other, which leaves its force as it is
+/* noise = the larger of it and of another sample: in one of them the unknowns of a stiff spring may move with each other, which leaves its force as it is
    (Stiff.FastModeBesideASlowOne) */
-PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
 {
   WorkVec other;
 
   PetscFunctionBegin;
   PetscCall(other.like(noise));
-  PetscCall(SampleRounding(ts, X, F, 1, noise));
-  PetscCall(SampleRounding(ts, X, F, 2, other));
+  PetscCall(SampleRounding(ts, X, F, salt, other));
   PetscCall(VecPointwiseMax(noise, noise, other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rounding of the residual F at X, by two samples */
+PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+{
+  PetscFunctionBegin;
+  PetscCall(SampleRounding(ts, X, F, 1, noise));
+  PetscCall(AddRounding(ts, X, F, 2, noise));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

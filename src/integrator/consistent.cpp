@@ -116,6 +116,7 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
     PetscCall(PetscObjectStateGet((PetscObject)c.P, c.scaled));
     PetscCall(MatrixHasNumbers(c.P, &numbers));
   }
+  if (c.near && numbers) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChooseSolver(c.ksp, c.P, c.linear, c.chosen));
   PetscCall(Factor(ts, c.ksp, c.P, c.P, c.linear, c.failed));
   I.stat.factorizations++;
@@ -125,10 +126,19 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From now on */
+static PetscErrorCode WithOwnFactors(Consistent &c)
+{
+  PetscFunctionBegin;
+  if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_FALSE));
+  c.near = false;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.failed, where that was the linear solver. */
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
-  PetscReal e = 0, last;
+  PetscReal e = 0, last, first = 0;
   PetscBool renew = (PetscBool)!have_matrix, other;
 
   PetscFunctionBegin;
@@ -147,13 +157,17 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     PetscCall(LinearGiveUpKrylov(c.ksp, c.P, c.linear, &other));
     if (other) {
       *ok = renew = PETSC_TRUE;
+      PetscCall(WithOwnFactors(c));
       continue;
     }
     *why = "the matrix is singular there, or the solver failed";
     if (!*ok) *c.failed = PC_SUBPC_ERROR;
+    if (c.its == 1) first = e;
+    else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
     const bool known = c.its > 1 && !fresh, falls = e <= slow * last;
     if (!*ok || e <= converged || (known && (falls ? CorrectorError(e / last, e) <= converged : e <= rounding))) PetscFunctionReturn(PETSC_SUCCESS);
     renew = (PetscBool)(c.its > 1 && !falls);
+    if (renew) PetscCall(WithOwnFactors(c));
   }
   *ok  = PETSC_FALSE;
   *why = "the iteration does not converge";

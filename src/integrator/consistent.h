@@ -26,6 +26,8 @@ struct Consistent {
   PetscObjectState *scaled = nullptr; /* of P when it was scaled last */
   PCFailedReason   *failed = nullptr; /* of the last factorization */
   PetscReal         T      = 0;       /* gamma is to be made again, for this time scale, once s' is known; 0: it need not */
+  PetscReal         enough = 0;       /* part of the first correction below which no other one is needed; 0: to rounding */
+  bool              near   = false;   /* the factors at hand, of a matrix near by, serve as well */
   PetscInt          its = 0, ksp_its = 0;
 };
 
@@ -42,6 +44,9 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
 /* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: the time scale of the motion.
    again: with the differences that were the best ones at the last call, near by. */
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second);
+
+/* Whether neither velocities nor time move what stands still */
+PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);
 
 /* A time over which the motion changes q by as much as its tolerance refers to, project.cpp */
 PetscErrorCode TimeScale(TS ts, PetscReal *T);

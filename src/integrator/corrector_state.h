@@ -45,6 +45,7 @@ struct VerificationState {
   PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
   PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
   PetscBool looked   = PETSC_FALSE; /* the residual after the last correction was needed for its proof */
+  unsigned  sample = 3;              /* of rounding, the next one of its own random numbers */
   PetscReal since = 0;              /* time since the residual was looked at last: forces may have been missing for so long */
 };
 

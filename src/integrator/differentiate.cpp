@@ -1,10 +1,11 @@
 /*
   Time derivatives of the constraints, where the application gives none: one-sided differences of its residual along q + tau q'. They are exact in
   q'' by construction, blind to what happened before t (a motion may start there), and each row takes the step tau at which it is most accurate:
-  where its derivative changes least from one tau to the next.
+  where its derivative changes least from one tau to the next. A row that depends on time itself begins with a tau that resolves this (excitation.cpp).
 */
 #include "consistent.h"
 #include "entries.h"
+#include "equations.h"
 #include "roles.h"
 #include "work_vec.h"
 #include <vector>
@@ -15,7 +16,18 @@ namespace hht3
 namespace
 {
 
-constexpr int       levels = 9, points = 6; /* tau = T/10, T/40, ...; of fourth order in tau */
+constexpr int       levels = 9, points = 6; /* of a row: tau = T/10, T/40, ...; of fourth order in tau */
+constexpr int       max_levels = 32;        /* of all rows */
+
+PetscReal Tau(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
+
+/* The first level of a row that follows time within `excitation` */
+int FirstLevel(PetscReal T, PetscReal excitation)
+{
+  int level = 0;
+  while (level < max_levels - levels && Tau(T, level) > excitation) level++;
+  return level;
+}
 constexpr PetscReal first_weights[points]  = {-25. / 12, 4, -3, 4. / 3, -1. / 4, 0};
 constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -13, 61. / 12, -10. / 12};
 
@@ -23,15 +35,18 @@ constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -
 struct Best {
   std::vector<PetscReal> last, value, change;
   std::vector<signed char> &level;
+  const std::vector<signed char> &from; /* first levels; empty: all rows begin with 0 */
   bool                      known; /* the levels are those of an earlier call */
-  Best(std::vector<signed char> &at, PetscInt n, bool again) : last(n, 0), value(n, 0), change(n, PETSC_MAX_REAL), level(at), known(again)
+  Best(std::vector<signed char> &at, const std::vector<signed char> &begin, PetscInt n, bool again)
+    : last(n, 0), value(n, 0), change(n, PETSC_MAX_REAL), level(at), from(begin), known(again)
   {
     if (!known) level.assign((size_t)n, -1);
   }
   void take(PetscInt i, int l, PetscReal x)
   {
-    const PetscReal d = PetscAbsReal(x - last[i]);
-    if (known ? l == level[i] : l > 0 && d < change[i]) { /* false for NaN */
+    const PetscReal d  = PetscAbsReal(x - last[i]);
+    const int       nth = from.empty() ? l : l - from[i];
+    if (known ? l == level[i] : nth > 0 && nth < levels && d < change[i]) { /* false for NaN */
       change[i] = d;
       value[i]  = x;
       level[i]  = (signed char)l;
@@ -41,9 +56,9 @@ struct Best {
 };
 
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
-PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[levels])
+PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[max_levels])
 {
-  PetscBool any[levels] = {};
+  PetscBool any[max_levels] = {};
 
   PetscFunctionBegin;
   for (size_t i = 0; i < I.role.size(); i++) {
@@ -53,12 +68,55 @@ PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, 
     if (one >= 0) any[one] = PETSC_TRUE;
     if (two >= 0) any[two] = PETSC_TRUE;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
-  for (int l = 0; l < levels; l++) used[l] = any[l];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, max_levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+  for (int l = 0; l < max_levels; l++) used[l] = any[l];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* First levels of rows that follow time, and which levels are to be looked at */
+PetscErrorCode LevelsToTry(const Integrator &I, PetscReal T, std::vector<signed char> &from, bool (&used)[max_levels])
+{
+  const int last = I.excitation ? FirstLevel(T, I.fastest) : 0;
+
+  PetscFunctionBegin;
+  for (int l = 0; l < max_levels; l++) used[l] = l < last + levels;
+  if (last == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForEntries([&](PetscInt, PetscScalar x) { from.push_back((signed char)FirstLevel(T, PetscRealPart(x))); }, Read(I.excitation)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of what does not move: constraints do not change, and those of velocities are what they are */
+PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Vec second)
+{
+  Integrator &I = Get(ts);
+  WorkVec     F;
+
+  PetscFunctionBegin;
+  I.levels_known = PETSC_FALSE;
+  if (second) PetscCall(VecZeroEntries(second));
+  if (!first) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecZeroEntries(first));
+  if (!I.count[TSHHT3_NONHOLONOMIC]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(F.like(U));
+  PetscCall(EvaluateResidual(ts, t, U, V, first, F)); /* `first` is zero yet */
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &x) { if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) x = f; }, Read(F), Write(first)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
+
+/* Whether neither velocities nor time move what stands still */
+PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
+{
+  PetscReal v;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (I.excitation) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(V, NORM_INFINITY, &v));
+  *yes = (PetscBool)(v == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of
    holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. T: the time scale of the motion.
@@ -68,25 +126,33 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   Integrator            &I = Get(ts);
   WorkVec                Ut, F, zero;
   PetscInt               n;
-  bool                   used[levels];
+  PetscBool              rest;
+  bool                   used[max_levels];
   std::vector<PetscReal> f0, s1, s2;
+  std::vector<signed char> from;
 
   PetscFunctionBegin;
+  PetscCall(IsAtRest(I, V, &rest));
+  if (rest) {
+    PetscCall(DerivativesAtRest(ts, t, U, V, first, second));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetLocalSize(U, &n));
   PetscCall(Ut.like(U));
   PetscCall(F.like(U));
   PetscCall(zero.like(U));
   PetscCall(VecZeroEntries(zero));
-  for (bool &u : used) u = true;
+  again = again && I.levels_known;
   if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
+  else PetscCall(LevelsToTry(I, T, from, used));
   f0.resize(n);
-  Best d1(I.levels[0], n, again), d2(I.levels[1], n, again);
+  Best d1(I.levels[0], from, n, again), d2(I.levels[1], from, n, again);
   PetscCall(VecCopy(U, Ut));
   PetscCall(ResidualAlong(ts, t, Ut, V, zero, F));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
-  for (int level = 0; level < levels; level++) {
+  for (int level = 0; level < max_levels; level++) {
     if (!used[level]) continue;
-    const PetscReal tau = 0.1 * T * PetscPowRealInt(0.25, level);
+    const PetscReal tau = Tau(T, level);
     s1 = s2 = f0;
     for (PetscInt i = 0; i < n; i++) {
       s1[i] *= first_weights[0];
@@ -108,6 +174,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
       d2.take(i, level, s2[i] / (tau * tau));
     }
   }
+  I.levels_known = PETSC_TRUE;
   for (int order = 1; order <= 2; order++) {
     Vec out = order == 1 ? first : second;
     if (!out) continue;

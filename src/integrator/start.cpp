@@ -30,6 +30,8 @@ namespace hht3
 namespace
 {
 
+constexpr PetscReal four_digits = 1e-4; /* of the rates */
+
 /* In the vectors, the matrix and the solver of the run. A matrix-free operator has nothing to differentiate before SNESSolve(): P alone. */
 PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 {
@@ -71,18 +73,20 @@ PetscErrorCode Rates(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscReal   T;
-  PetscBool   ok;
+  PetscBool   ok, rest;
   WorkVec     X0, U, V;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  const PetscReal d = 1e-5 * T;
+  PetscCall(IsAtRest(I, I.V0, &rest));
+  const PetscReal d = PetscMin(1e-5 * T, four_digits * I.fastest);
   PetscCall(X0.like(I.X));
   PetscCall(U.like(I.X));
   PetscCall(V.like(I.X));
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {false, Gamma::Near}, &ok));
+  /* from rest gamma grows with d^2, so that it has no part in the rates */
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {false, rest ? Gamma::Made : Gamma::Near, true}, &ok));
   PetscCall(VecZeroEntries(rate));
   if (ok) {
     PetscCall(VecWAXPY(rate, -1, X0, I.X));
@@ -92,7 +96,8 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run */
+/* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run. Not longer than loads and motions allow
+   that depend on time alone: of their period the error of a longer one might know nothing (Excitation.TheFirstStepFollowsTheLoad). */
 PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
 {
   Integrator &I = Get(ts);
@@ -105,7 +110,7 @@ PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
   const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
   PetscReal       h3 = e3 > 0 ? 0.5 * PetscPowReal(e3, (PetscReal)-1 / 3) : PETSC_MAX_REAL;
   if (e3 <= 0 && e2 > 0) h3 = PetscPowReal(e2, -0.5);
-  *h = PetscMin(h3, span / 10);
+  *h = PetscMin(h3, PetscMin(span / 10, I.fastest));
   *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -260,10 +265,15 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   Integrator &I = Get(ts);
   Consistent  c;
   const char *why;
+  PetscBool   reuse; /* the user's */
   WorkVec     before, F, d;
 
   PetscFunctionBegin;
   PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(KSPGetReusePreconditioner(c.ksp, &reuse));
+  c.near   = have.near && !reuse;
+  c.enough = have.near ? four_digits : 0;
+  if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_TRUE));
   if (h == 0) PetscCall(ReferTo(ts, c.U, before));
   c.h        = h;
   c.begin[0] = I.base[0];
@@ -281,7 +291,8 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   c.F = F;
   c.d = d;
   PetscCall(SolveConsistent(ts, c, have.matrix, ok, &why));
-  if (!have.matrix && h == 0) PetscCall(NoteInertia(ts, c.P));
+  PetscCall(KSPSetReusePreconditioner(c.ksp, reuse));
+  if (!have.matrix && !have.near && h == 0) PetscCall(NoteInertia(ts, c.P));
   PetscCall(ReferBack(ts, c.U, before));
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
@@ -395,6 +406,7 @@ PetscErrorCode Start(TS ts)
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
   PetscCall(UpdateWeights(ts, I.U0));
+  PetscCall(NoteExcitation(ts));
   PetscCall(CheckInitialState(ts, &have));
   if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
     PetscCall(ReferToState(ts));

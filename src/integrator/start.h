@@ -15,14 +15,18 @@ constexpr PetscReal unset_step = petsc_step * (1 - PETSC_MACHINE_EPSILON);
 /* Second derivatives of the constraints in time, gamma of (6c): to be made; to be made where they were a moment ago, by the same differences; made */
 enum class Gamma { New, Near, Made };
 
-/* What a consistent solve finds: its matrix, and gamma */
+/* What a consistent solve finds: its matrix, and gamma; or the factors of a matrix near by, and a need of four digits alone */
 struct Prepared {
   bool  matrix = false;
   Gamma gamma  = Gamma::New;
+  bool  near   = false;
 };
 
 /* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode Start(TS ts);
+
+/* How fast loads and motions are that depend on time alone, excitation.cpp */
+PetscErrorCode NoteExcitation(TS ts);
 
 /* V0 projected on the constraints and a consistent start from there, before a step far shorter than the last one */
 PetscErrorCode Repair(TS ts);

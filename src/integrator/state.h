@@ -87,6 +87,7 @@ struct StepState {
   PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
+  PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
   PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
   TSHHT3Statistics stat        = {};
@@ -138,7 +139,9 @@ struct Integrator : StepState {
   Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
+  Vec       excitation = nullptr; /* time within which each row follows loads and motions that depend on time alone, excitation.cpp; none: no row does */
   std::vector<signed char> levels[2]; /* of differences in time that were the best ones of each row, differentiate.cpp */
+  PetscBool levels_known = PETSC_FALSE;
 
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;

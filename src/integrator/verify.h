@@ -67,10 +67,12 @@ struct Imbalance {
 /* claims.cpp */
 bool           Claims(const Integrator &I);
 PetscErrorCode MeasureRows(TS ts, Vec X, Vec F);
+PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise);
 /* verify.cpp */
 PetscErrorCode PassDefinitionsOn(TS ts, Vec R);
 PetscErrorCode Model(TS ts, Vec dX);
 PetscErrorCode Compare(TS ts, Vec F, Imbalance *left);
+PetscErrorCode CompareMeasured(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left);
 /* blame.cpp */
 PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong);
 

@@ -260,14 +260,15 @@ TEST(HigherOrder, MultipliersWhereTheOrderRises)
 namespace
 {
 
-/* Its residual is not a number for an attempt, and for the next one with a new matrix */
+/* Once it has begun, its residual is not a number for an attempt, and for the next one with a new matrix */
 struct Hiccup : Pendulum {
   mutable int done = 0;
+  bool        begun = false; /* the start looks at times far ahead */
   Hiccup() : Pendulum(-60., 2., 1.) {}
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
     Pendulum::residual(t, u, v, a, f);
-    if (done == 2 || t < .5) return;
+    if (done == 2 || !begun || t < .5) return;
     done++;
     f[0] = std::nan("");
   }
@@ -280,10 +281,11 @@ TEST(HigherOrder, MultipliersWhereTheOrderFalls)
 {
   double worst[2] = {0., 0.};
   for (int fine = 0; fine < 2; fine++) {
-    const Hiccup p;
+    Hiccup       p;
     Simulation   run(p, fixedSteps(fine ? .0025 : .005) + ofOrder(5));
     while (run.t() < .6) {
       must(run.step());
+      p.begun = true;
       if (p.done) widen(worst[fine], run.errors().lambda);
     }
     const TSHHT3Statistics s = run.statistics();

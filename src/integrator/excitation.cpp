@@ -1,0 +1,77 @@
+/*
+  How fast loads and motions are that depend on time alone. Velocities tell the time scale of what moves. Of what is at rest they tell nothing, and the
+  length of the run is no measure for a load of 100 Hz in a run of 100 s: differences over parts of it meet whole periods, and so does a first step.
+
+  The residual is sampled at t + tau with everything else as it is, for ever shorter parts tau of the run. A row follows time within the shortest tau
+  up to which it changes by a tenth of its largest change from one sample to the next: of sin(w t) some 0.3/w. (From t itself a load that sets in there would change within nothing.)
+*/
+#include "consistent.h"
+#include "entries.h"
+#include "equations.h"
+#include "start.h"
+#include "work_vec.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* The first sample's part of what is left of the run, and a sample's of the one before: powers of the golden section, since simple fractions meet whole
+   periods one after the other (Excitation.ManyFrequencies) */
+constexpr PetscReal longest = 0.618034, shorter = 0.236068;
+constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
+constexpr int       at_least = 9, at_most = 30; /* samples */
+constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
+
+/* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; whether any row does */
+PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, Vec largest, Vec T, PetscBool *any)
+{
+  PetscMPIInt changes = 0;
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &shortest) {
+      const PetscReal change = PetscAbsScalar(f - f0);
+      if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
+      most     = PetscMax(change, PetscRealPart(most));
+      shortest = tau;
+      changes  = 1;
+    },
+    Read(before), Read(after), Write(largest), Write(T)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changes, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)before)));
+  *any = (PetscBool)changes;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* At U0, V0, t_n: I.excitation has the time within which each row follows time, PETSC_MAX_REAL where it does not depend on it; none: no row does */
+PetscErrorCode NoteExcitation(TS ts)
+{
+  Integrator     &I    = Get(ts);
+  const PetscReal stop = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > ts->ptime ? ts->max_time - ts->ptime : 1;
+  PetscBool       any = PETSC_FALSE;
+  WorkVec         zero, F[2], largest;
+
+  PetscFunctionBegin;
+  for (WorkVec *v : {&zero, &F[0], &F[1], &largest}) PetscCall(v->like(I.U0));
+  if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
+  PetscCall(VecZeroEntries(zero));
+  PetscCall(VecZeroEntries(largest));
+  PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
+  PetscCall(EvaluateResidual(ts, ts->ptime + longest * stop, I.U0, I.V0, zero, F[0]));
+  PetscReal tau = longest * stop;
+  for (int sample = 1, still = 0; sample < at_least || (sample < at_most && still < quiet); sample++) {
+    tau *= shorter;
+    PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
+    PetscCall(NoteChanges(tau, F[0], F[1], largest, I.excitation, &any));
+    still = any ? 0 : still + 1;
+  }
+  PetscCall(VecMin(I.excitation, NULL, &I.fastest));
+  if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
+  else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

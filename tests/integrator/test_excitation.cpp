@@ -1,0 +1,124 @@
+/* Starts from rest of runs that are long for the loads and motions that set in: 100 Hz in 100 s, periods that parts of the run hold wholly */
+#include "integrator/start.h"
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A mass of 2 kg on a rail, driven by q = s(t), beside a free one of 1 kg with the load s(t): at rest at first */
+struct Shaken : Problem {
+  const double w, phase;
+  Shaken(double frequency, double end, bool cosine) : w(2. * M_PI * frequency), phase(cosine ? M_PI / 2. : 0.)
+  {
+    name = "shaken";
+    n    = 3;
+    t1   = end;
+    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  double motion(double t) const { return 1e-3 * (1. - std::cos(w * t)); }
+  double load(double t) const { return std::sin(w * t + phase); }
+  void   initial(double *u, double *v) const override { std::fill_n(u, 3, 0.), std::fill_n(v, 3, 0.); }
+  void   residual(double t, const double *u, const double *, const double *a, double *f) const override
+  {
+    f[0] = 2. * a[0] + u[2];
+    f[1] = a[1] - load(t);
+    f[2] = u[0] - motion(t);
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    J.add(0, 0, 2. * sa);
+    J.add(0, 2, 1.);
+    J.add(1, 1, sa);
+    J.add(2, 0, 1.);
+  }
+};
+
+Array accelerations(Simulation &run)
+{
+  Vec A;
+  must(VecDuplicate(run.U, &A));
+  must(TSHHT3Interpolate(run.ts, run.problem.t0, nullptr, nullptr, A));
+  const Array a = whole(A);
+  must(VecDestroy(&A));
+  return a;
+}
+
+} // namespace
+
+/* Differences over parts of the run met whole periods: no acceleration at the start, and a false alarm about the velocities */
+TEST(Excitation, FastForTheRun)
+{
+  for (double end : {1., 100., 1000.})
+    for (double frequency : {100., 1000.})
+      for (const char *start : {"", "-ts_hhtdae_start project"}) {
+        const Shaken p(frequency, end, true);
+        Printed      out;
+        Simulation   run(p, tolerance(1e-5) + start);
+        must(run.step());
+        const Array a = accelerations(run);
+        EXPECT_NEAR(a[0] / (1e-3 * p.w * p.w), 1., 1e-4) << frequency << " Hz in " << end << " s " << start;
+        EXPECT_NEAR(a[1], 1., 1e-8);
+        EXPECT_EQ(out.text(), "");
+      }
+}
+
+/* The first step, a part of the run where nothing else tells how long it may be, was far longer than the period */
+TEST(Excitation, TheFirstStepFollowsTheLoad)
+{
+  for (double end : {10., 1000.})
+    for (double frequency : {1., 100., 1000.})
+      for (bool cosine : {false, true}) {
+        const Shaken p(frequency, end, cosine);
+        Simulation   run(p, tolerance(1e-3));
+        must(TSSetTimeStep(run.ts, hht3::unset_step));
+        must(run.step());
+        EXPECT_LT(run.t(), .25 / frequency) << frequency << " Hz in " << end << " s";
+      }
+}
+
+/* No frequency has its periods in all samples */
+TEST(Excitation, ManyFrequencies)
+{
+  for (double end : {1., 100., 1e4})
+    for (int k = 0; k < 200; k++) {
+      const Shaken p(80. + .37 * k, end, true);
+      Simulation   run(p, tolerance(1e-5));
+      must(run.step());
+      const Array a = accelerations(run);
+      EXPECT_NEAR(a[0] / (1e-3 * p.w * p.w), 1., 1e-4) << p.w / (2. * M_PI) << " Hz in " << end << " s";
+    }
+}
+
+namespace
+{
+
+/* The same driven by a single pulse at the start, one period long, and nothing afterwards */
+struct Pushed : Shaken {
+  Pushed(double duration, double end) : Shaken(1. / duration, end, true) {}
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override { Shaken::residual(std::min(t, 2. * M_PI / w), u, v, a, f); }
+};
+
+} // namespace
+
+TEST(Excitation, APulseAtTheStart)
+{
+  for (double part : {.5, .1, 1e-2, 1e-3, 1e-4}) {
+    const Pushed p(part * 20., 20.);
+    Simulation   run(p, tolerance(1e-5));
+    must(run.step());
+    const Array a = accelerations(run);
+    EXPECT_NEAR(a[0] / (1e-3 * p.w * p.w), 1., 1e-4) << part << " of the run";
+  }
+}
+
+/* What depends on nothing but the state pays a few residuals, and at rest no differences of constraints */
+TEST(Excitation, NoneAtRest)
+{
+  const Pendulum p(0., 0., 10.);
+  Simulation     run(p, tolerance(1e-4) + "-ts_max_steps 1");
+  must(run.step());
+  MEASURED("pendulum from rest: %d residuals, %d factorizations in the first step", (int)run.statistics().residuals, (int)run.statistics().factorizations);
+  EXPECT_LT(run.statistics().residuals, 25);
+}
