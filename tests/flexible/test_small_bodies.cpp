@@ -152,3 +152,36 @@ TEST(SmallBodies, StateSpace)
     }
   }
 }
+
+/* Clamped at both ends no row follows from the others, whatever the size and how many modes there are */
+TEST(SmallBodies, Attachments)
+{
+  for (Tie tie : {Tie::Rigid, Tie::Average})
+    for (double l : lengths)
+      for (int modes : {0, 6}) {
+        Cantilever    beam(l, both(modes, tie), true);
+        Printed out;
+        TS      ts;
+        must(beam.scene.createTS(&ts));
+        must(TSDestroy(&ts));
+        EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << l << " with " << modes << ": " << out.text();
+      }
+}
+
+/* And in a large scene */
+TEST(SmallBodies, AttachmentsInALargeScene)
+{
+  Cantilever beam(1e-4, both(0), true);
+  for (double x : {-5., 5.}) {
+    RigidBody b;
+    b.mass     = 100;
+    b.inertia  = Matrix3::Identity();
+    b.position = {x, 0, 0};
+    beam.scene.add(text("block %g", x), b);
+  }
+  Printed out;
+  TS      ts;
+  must(beam.scene.createTS(&ts));
+  must(TSDestroy(&ts));
+  EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << out.text();
+}
