@@ -102,6 +102,23 @@ TEST(SmallBodies, Reduction)
   }
 }
 
+/* Most of the modes that there are, whose Krylov spaces come to an end */
+TEST(SmallBodies, ManyModes)
+{
+  for (Method method : {Method::CraigBampton, Method::FreeFree})
+    for (PetscInt modes : {20, 30, 60}) {
+      Eigen::VectorXd one;
+      for (double l : {1., 1e-3, 5e-4, 1e-4, 1e-6}) {
+        Reduction r = both(modes, Tie::Average);
+        r.method    = method;
+        r.all_nodes = false;
+        const ReducedBody b = reduced(l, r);
+        if (l == 1) one = b.modal.omega;
+        expectEqual((l * b.modal.omega).eval(), one, 1e-8, text("%d modes at %g", (int)modes, l));
+      }
+    }
+}
+
 TEST(SmallBodies, Modes)
 {
   Eigen::VectorXcd one;
