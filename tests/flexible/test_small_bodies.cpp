@@ -137,6 +137,64 @@ TEST(SmallBodies, Modes)
   }
 }
 
+/* About a shift of the default, which is far below, and of others */
+TEST(SmallBodies, SlowestModes)
+{
+  for (double l : lengths) {
+    Cantilever              beam(l);
+    const Taken       t(beam.scene);
+    std::vector<Mode> all, slow;
+    must(t.small.modes(&all));
+    for (double shift : {1., 0.1 / l, 300 / l}) {
+      must(SlowestModes(t.small, 3, &slow, shift));
+      for (int k = 0; k < 3; k++) EXPECT_LT(std::abs(slow[k].value - all[k].value), 1e-8 * std::abs(all[k].value)) << l << ": mode " << k << " from " << shift;
+    }
+  }
+}
+
+/* Six rigid motions beside elastic ones, or alone: in modal coordinates, and of the whole model, whose stiffness leaves rounding of rigid motions */
+TEST(SmallBodies, SlowestModesOfAFreeBody)
+{
+  for (bool whole : {false, true}) {
+    std::vector<double> one;
+    for (double l : lengths) {
+      Scene             scene(PETSC_COMM_SELF);
+      Made              made({{8, 2, 1}, {l, width * l, depth * l}});
+      FullFeBody        fe;
+      FlexibleBody      b;
+      if (whole) {
+        must(fe.add(scene, "beam", made.model, FullBody()));
+      } else {
+        b.model = std::make_shared<ModalBody>(reduced(l, both(30)).modal);
+        scene.add("beam", b);
+      }
+      const Taken         t(scene);
+      std::vector<Mode>   slow;
+      std::vector<double> elastic;
+      must(SlowestModes(t.small, 16, &slow)); /* rigid motions have twelve values */
+      for (const Mode &m : slow)
+        if (std::abs(m.value) > 100 / l) elastic.push_back(std::abs(m.value) * l);
+      if (l == 1) one = elastic;
+      ASSERT_GE(elastic.size(), 4u) << l;
+      for (std::size_t k = 0; k < 4; k++) EXPECT_NEAR(elastic[k], one[k], 1e-5 * one[k]) << l; /* beside rigid motions the shift stays */
+      must(SlowestModes(t.small, 3, &slow, l < 1 ? 300 / l : 1));
+      for (const Mode &m : slow) EXPECT_LT(std::abs(m.value), 1 / l) << l;
+    }
+  }
+}
+
+/* With options that lose all digits an error, no wrong modes */
+TEST(SmallBodies, SlowestModesAreChecked)
+{
+  Options           options("-scene_modes_pep_scale none -scene_modes_pep_target 1");
+  Cantilever              beam(1e-4);
+  const Taken       t(beam.scene);
+  std::vector<Mode> slow;
+  ErrorTrap         trap;
+  EXPECT_NE(SlowestModes(t.small, 3, &slow), 0);
+  EXPECT_TRUE(trap.says("without balance")) << trap.message;
+}
+
 /* Transfer functions by minimal coordinates and by the sparse system, at rest and beside the first modes; force and moment at the tip to displacement, speed,
    acceleration and rotation there */
 TEST(SmallBodies, StateSpace)
