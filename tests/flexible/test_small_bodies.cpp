@@ -260,3 +260,26 @@ TEST(SmallBodies, AttachmentsInALargeScene)
   must(TSDestroy(&ts));
   EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << out.text();
 }
+
+/* Bent by a force at the tip: as far, and found as soon */
+TEST(SmallBodies, Equilibrium)
+{
+  double   one        = 0;
+  PetscInt iterations = 0;
+  for (double l : lengths) {
+    Cantilever beam(l);
+    UserForce  f;
+    f.i = beam.tip;
+    for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = k < 2 ? 0 : -1e3 * l * l](const Real *t) -> Real { return 0. * t[0] + x; }));
+    beam.scene.add("load", f);
+    beam.scene.start().equilibrium = true;
+    must(beam.scene.setUp());
+    const double down = (DataOf(beam.scene).frame(beam.tip).x - middle(1, l)).z() / l;
+    if (l == 1) {
+      one        = down;
+      iterations = DataOf(beam.scene).started.equilibrium_iterations;
+    }
+    EXPECT_NEAR(down, one, 1e-9 * std::abs(one)) << l;
+    EXPECT_EQ(DataOf(beam.scene).started.equilibrium_iterations, iterations) << l;
+  }
+}
