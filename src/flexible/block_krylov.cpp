@@ -94,9 +94,9 @@ static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov 
   PetscCall(Gram(eps, b->W, b->MW, &G));
   const PetscInt n     = (PetscInt)G.cols();
   VectorXd       scale = G.diagonal().cwiseMax(0.).cwiseSqrt();
-  for (double &s : scale)
-    if (!scaled || !(s > PETSC_MACHINE_EPSILON * PETSC_MACHINE_EPSILON)) s = 1; /* or nothing of it is left */
-  const VectorXd                                inverse = scale.cwiseInverse();
+  if (!scaled) scale.setOnes();
+  /* W has the size of 1/frequency^2, so that no size is small in itself (SmallBodies.ManyModes) */
+  const VectorXd                                inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 1; });
   const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(inverse.asDiagonal() * (0.5 * (G + G.transpose())) *
                                                      inverse.asDiagonal());
   PetscInt                                      from = 0;

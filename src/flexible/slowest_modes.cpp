@@ -2,9 +2,13 @@
   Slowest modes of a linearization: SLEPc's quadratic eigenvalue problem (value^2 M + value C + K) x = 0 over all unknowns, by TOAR (Lu, Su and
   Bai, SIAM J. Matrix Anal. Appl. 37, 2016) with shift and invert. Constraints and definitions have no rates, so that M is singular: their
   eigenvalues are infinite, farthest from any shift.
+
+  Time is taken in a unit in which stiffness and masses are of one size, and the shift has to be of the size of the values: next to a shift far below them
+  slow modes and infinite ones look alike. So the search is repeated about what it has found, and the modes are held against the equations.
 */
 #include "hhtdae/modes.h"
 #include <algorithm>
+#include <cmath>
 #include <slepcpep.h>
 
 namespace hhtdae
@@ -14,6 +18,9 @@ namespace
 {
 
 constexpr PetscReal accuracy = 1e-10;
+constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes) */
+constexpr PetscReal at_rest  = 1e-3; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
+constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
 constexpr int       sweeps   = 6; /* of balancing: each takes the root of how far rows are from a size of 1 */
 
 /* The operators of D y = x, where D makes all rows of the matrix that is factored about as large (Ruiz, RAL-TR-2001-034): constraints have entries of 1
@@ -67,6 +74,7 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscCall(PEPSetType(pep, PEPTOAR));
   PetscCall(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
   PetscCall(PEPSetTarget(pep, shift));
+  PetscCall(PEPSetScale(pep, PEP_SCALE_SCALAR, PETSC_DEFAULT, nullptr, nullptr, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(PEPSetTolerances(pep, accuracy, PETSC_DEFAULT));
   const PetscInt wanted = 2 * count; /* pairs count twice */
   PetscCall(PEPSetDimensions(pep, PetscMin(wanted, n), PetscMin(2 * wanted + 20, n), PETSC_DEFAULT));
@@ -84,12 +92,87 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscFunctionReturn(0);
 }
 
-/* Of pairs the one with a positive imaginary part */
-PetscErrorCode Collect(const Linearization &of, PEP pep, Vec D, PetscInt converged, std::vector<Mode> *modes)
+/* || (value^2 M + value C + K) x || of the balanced operators, relative to the forces of rates: of inertia and damping, and the rates of states */
+PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, PetscReal *part)
 {
-  Vec      re, im;
-  PetscInt n;
+  const std::complex<double> power[3] = {1, m.value, m.value * m.value};
+  Vec                        x[2], sum[2], product;
+  PetscReal                  norm, left = 0, rates = 0;
   PetscFunctionBegin;
+  PetscCall(VecDuplicate(by.D, &product));
+  for (int imaginary = 0; imaginary < 2; imaginary++) {
+    PetscScalar *put;
+    PetscCall(VecDuplicate(by.D, &x[imaginary]));
+    PetscCall(VecDuplicate(by.D, &sum[imaginary]));
+    PetscCall(VecSet(sum[imaginary], 0));
+    PetscCall(VecGetArrayWrite(x[imaginary], &put));
+    for (std::size_t i = 0; i < m.shape.size(); i++) put[i] = imaginary ? m.shape[i].imag() : m.shape[i].real();
+    PetscCall(VecRestoreArrayWrite(x[imaginary], &put));
+    PetscCall(VecPointwiseDivide(x[imaginary], x[imaginary], by.D));
+  }
+  for (int k = 0; k < 3; k++)
+    for (int imaginary = 0; imaginary < 2; imaginary++) {
+      PetscCall(MatMult(by.operators[k], x[imaginary], product));
+      PetscCall(VecAXPY(sum[imaginary], power[k].real(), product));
+      PetscCall(VecAXPY(sum[1 - imaginary], imaginary ? -power[k].imag() : power[k].imag(), product));
+      PetscCall(VecNorm(product, NORM_2, &norm));
+      if (k > 0) rates += std::norm(power[k]) * norm * norm;
+    }
+  for (int imaginary = 0; imaginary < 2; imaginary++) {
+    PetscCall(VecNorm(sum[imaginary], NORM_2, &norm));
+    left += norm * norm;
+    PetscCall(VecDestroy(&sum[imaginary]));
+    PetscCall(VecDestroy(&x[imaginary]));
+  }
+  PetscCall(VecDestroy(&product));
+  *part = PetscSqrtReal(left / rates);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Destroy(Balanced *b)
+{
+  PetscFunctionBegin;
+  for (Mat &x : b->operators) PetscCall(MatDestroy(&x));
+  PetscCall(VecDestroy(&b->D));
+  PetscFunctionReturn(0);
+}
+
+/* Motions that nothing drives back, as far as this can be told beside other modes and the shift */
+bool AtRest(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { return std::abs(m.value) < at_rest * std::max(std::abs(modes.back().value), std::abs(shift)); }
+
+/* Each mode that is no rigid motion in the equations, balanced as they are where it is: next to a shift far from it rigid motions weigh too much */
+PetscErrorCode Worst(const Mat given[3], PetscReal shift, const std::vector<Mode> &modes, PetscReal *worst, PetscReal *frequency)
+{
+  Balanced  by;
+  PetscReal at = 0, left = 0;
+  PetscFunctionBegin;
+  *worst = *frequency = 0;
+  for (const Mode &m : modes) {
+    const PetscReal here = std::abs(m.value);
+    if (AtRest(m, modes, shift)) continue;
+    if (!(here <= beside * at)) {
+      PetscCall(Destroy(&by));
+      PetscCall(Balance(given, here, &by));
+      at = here;
+    }
+    PetscCall(Unbalanced(by, m, &left));
+    if (left <= *worst) continue;
+    *worst     = left;
+    *frequency = m.frequency();
+  }
+  PetscCall(Destroy(&by));
+  PetscFunctionReturn(0);
+}
+
+/* Of pairs the one with a positive imaginary part; the `count` slowest of all */
+PetscErrorCode Collect(const Linearization &of, PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
+{
+  const Vec D = by.D;
+  Vec       re, im;
+  PetscInt  n, converged;
+  PetscFunctionBegin;
+  modes->clear();
+  PetscCall(PEPGetConverged(pep, &converged));
   PetscCall(VecDuplicate(D, &re));
   PetscCall(VecDuplicate(D, &im));
   PetscCall(VecGetLocalSize(re, &n));
@@ -114,6 +197,30 @@ PetscErrorCode Collect(const Linearization &of, PEP pep, Vec D, PetscInt converg
   PetscCall(VecDestroy(&re));
   PetscCall(VecDestroy(&im));
   std::stable_sort(modes->begin(), modes->end(), [](const Mode &a, const Mode &b) { return std::abs(a.value) < std::abs(b.value); });
+  if ((PetscInt)modes->size() > count) modes->resize(count);
+  PetscFunctionReturn(0);
+}
+
+/* The value of the slowest mode that is no rigid motion, 0: there is none */
+PetscReal Slowest(const std::vector<Mode> &modes, PetscReal shift)
+{
+  for (const Mode &m : modes)
+    if (!AtRest(m, modes, shift)) return std::abs(m.value);
+  return 0;
+}
+
+PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shift, PetscInt count, std::vector<Mode> *modes)
+{
+  Balanced b;
+  PEP      pep;
+  PetscFunctionBegin;
+  PetscCall(PEPCreate(PetscObjectComm((PetscObject)given[0]), &pep));
+  PetscCall(Balance(given, shift, &b));
+  PetscCall(SetUp(pep, b.operators, count, shift));
+  PetscCall(PEPSolve(pep));
+  PetscCall(Collect(of, pep, b, count, modes));
+  PetscCall(PEPDestroy(&pep));
+  PetscCall(Destroy(&b));
   PetscFunctionReturn(0);
 }
 
@@ -122,9 +229,7 @@ PetscErrorCode Collect(const Linearization &of, PEP pep, Vec D, PetscInt converg
 PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector<Mode> *modes, PetscReal shift)
 {
   Mat       given[3];
-  Balanced  b;
-  PEP       pep;
-  PetscInt  converged;
+  PetscReal left, frequency;
   PetscBool ready;
   PetscFunctionBegin;
   PetscCall(of.operators(&given[2], &given[1], &given[0]));
@@ -132,20 +237,20 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCheck(count > 0, comm, PETSC_ERR_ARG_OUTOFRANGE, "SlowestModes(): the number of modes is %" PetscInt_FMT ", it must be positive", count);
   PetscCall(SlepcInitialized(&ready));
   if (!ready) PetscCall(SlepcInitializeNoArguments());
-  modes->clear();
-  PetscCall(PEPCreate(comm, &pep));
-  PetscCall(Balance(given, shift, &b));
-  PetscCall(SetUp(pep, b.operators, count, shift));
-  PetscCall(PEPSolve(pep));
-  PetscCall(PEPGetConverged(pep, &converged));
-  PetscCall(Collect(of, pep, b.D, converged, modes));
-  PetscCall(PEPDestroy(&pep));
-  for (Mat &x : b.operators) PetscCall(MatDestroy(&x));
-  PetscCall(VecDestroy(&b.D));
+  PetscCall(Search(of, given, shift, count, modes));
+  PetscCall(Worst(given, shift, *modes, &left, &frequency));  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
+  const PetscReal slowest = Slowest(*modes, shift);
+  if (slowest > beside * std::abs(shift) && (left > balanced || slowest == std::abs(modes->front().value))) { /* about rigid motions only where need be */
+    shift = std::copysign(slowest, shift);
+    PetscCall(Search(of, given, shift, count, modes));
+    PetscCall(Worst(given, shift, *modes, &left, &frequency));  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
+  }
   PetscCheck((PetscInt)modes->size() >= count, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): %d of %" PetscInt_FMT " modes about %g 1/s were found; a scene of few unknowns has all of them by Linearization::modes(), else try another shift or -scene_modes_pep_ncv",
              (int)modes->size(), count, (double)shift);
-  modes->resize(count);
+  PetscCheck(left <= balanced, comm, PETSC_ERR_NOT_CONVERGED,
+             "SlowestModes(): the mode of %g Hz leaves %g of its inertia and damping without balance: it is none; try another shift than %g 1/s, or Linearization::modes() if there are few unknowns",
+             (double)frequency, (double)left, (double)shift);
   PetscFunctionReturn(0);
 }
 

@@ -20,6 +20,7 @@ struct Linearization::Work {
   Mat                        M = nullptr, C = nullptr, K = nullptr;
   Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
   std::vector<unsigned char> role;         /* of own unknowns */
+  std::vector<double>        unit;         /* of own unknowns: amounts of coordinates that have the kinetic energy of a mass of 1 at a speed of 1; else 1 */
   mutable Snapshot           moved;
 
   ~Work() { clear(); }
@@ -29,6 +30,7 @@ struct Linearization::Work {
 
   PetscErrorCode check(const char *call) const;
   PetscErrorCode differentiate();
+  PetscErrorCode chooseUnits();
   PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double *x) const; /* how a measure changes */
   PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
   PetscErrorCode drive(Element e, std::vector<double> *b) const;

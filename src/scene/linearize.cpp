@@ -152,6 +152,39 @@ PetscErrorCode Linearization::Work::differentiate()
   PetscFunctionReturn(0);
 }
 
+/* By the masses, where these are missing by what stands for them in assembly; coordinates without any are those of other libraries, which bring such
+   bodies' masses or have none: the lightest coordinate's unit is theirs */
+PetscErrorCode Linearization::Work::chooseUnits()
+{
+  Vec           diagonal;
+  const double *mass;
+  double        largest = 0;
+  PetscFunctionBegin;
+  unit.assign(R->n, 0);
+  PetscCall(MatCreateVecs(M, &diagonal, nullptr));
+  PetscCall(MatGetDiagonal(M, diagonal));
+  PetscCall(VecGetArrayRead(diagonal, &mass));
+  for (PetscInt i = 0; i < R->n; i++) unit[i] = std::max(0., mass[i]);
+  PetscCall(VecRestoreArrayRead(diagonal, &mass));
+  PetscCall(VecDestroy(&diagonal));
+  for (PetscInt b = 0; b < R->bodies.own; b++) {
+    const LocalBody &k = R->bodies.body[b];
+    const BodyData  &d = R->scene.bodies[k.id];
+    for (int c = 0; c < Coordinates(k.kind); c++) {
+      double &x = unit[k.first + c];
+      x         = std::max(x, c < GroupSize(k.kind, 0) ? d.light_mass : d.light_inertia);
+    }
+  }
+  for (PetscInt i = 0; i < R->n; i++) {
+    unit[i] = coordinate(i) && unit[i] > 0 ? 1 / std::sqrt(unit[i]) : 0;
+    largest = std::max(largest, unit[i]);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
+  for (PetscInt i = 0; i < R->n; i++)
+    if (!(unit[i] > 0)) unit[i] = coordinate(i) && largest > 0 ? largest : 1;
+  PetscFunctionReturn(0);
+}
+
 Linearization::Linearization() : work_(std::make_unique<Work>()) {}
 Linearization::~Linearization() = default;
 
@@ -181,6 +214,7 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   if (!(w.size > 0)) w.size = 1;
   PetscCall(RolesOf(*w.R, w.role));
   PetscCall(w.differentiate());
+  PetscCall(w.chooseUnits());
   PetscFunctionReturn(0);
 }
 

@@ -10,9 +10,13 @@
   ones for which Psi_v v = -Psi_q q - Psi_s s. So
 
     z' = N^T v,    y' = L^T q'',    s' from above.
+
+  All of this is in coordinates for which masses are 1 (Work::unit) and with rows of constraints of length 1: metres, radians and modal coordinates are not
+  of one size, the less so the smaller the bodies are, and what is orthonormal in them loses digits (SmallBodies.StateSpace).
 */
 #include "linearization.h"
 #include <Eigen/Dense>
+#include <petscblaslapack.h>
 #include <algorithm>
 #include <numeric>
 
@@ -100,6 +104,7 @@ struct Subspace {
 
 struct Minimal {
   std::vector<PetscInt> q, holonomic, velocity, s, rest; /* global numbers; rest: what is algebraic, constraints' multipliers first */
+  Eigen::VectorXd      unit; /* of all unknowns: what is below is in these units */
   Dense                N, L, P, S;
   Dense                y; /* (q'', s', rest) from (z, y, s, f) */
   Dense                A, B;
@@ -127,10 +132,25 @@ Dense Scaled(Dense W, Dense right)
   return column.asDiagonal() * W.partialPivLu().solve(right);
 }
 
+/* Matrices to units in which masses are 1 and rows of constraints have length 1, with the multipliers that belong to them */
+void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K)
+{
+  for (Dense *X : {&M, &C, &K}) *X = m.unit.asDiagonal() * *X * m.unit.asDiagonal();
+  Eigen::VectorXd row = Eigen::VectorXd::Ones(m.unit.size());
+  for (const auto *rows : {&m.holonomic, &m.velocity})
+    for (PetscInt i : *rows) {
+      const double length = Block(rows == &m.holonomic ? K : C, {i}, m.q).norm();
+      row(i)              = length > 0 ? 1 / length : 1;
+    }
+  for (Dense *X : {&M, &C, &K}) *X = row.asDiagonal() * *X * row.asDiagonal();
+  m.unit.array() *= row.array();
+}
+
 PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation> &in, Minimal &m)
 {
   Dense                     M, C, K;
   std::vector<unsigned char> role;
+  std::vector<double>        unit;
   PetscInt                   n;
   PetscFunctionBegin;
   PetscCall(MatGetSize(w.M, &n, nullptr));
@@ -139,12 +159,15 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   PetscCall(Whole(w.C, C));
   PetscCall(Whole(w.K, K));
   PetscCall(Gather(w, MPI_UNSIGNED_CHAR, w.role, role));
+  PetscCall(Gather(w, MPI_DOUBLE, w.unit, unit));
   std::vector<PetscInt> definitions;
   for (PetscInt i = 0; i < n; i++)
     (role[i] == TSHHT3_COORDINATE ? m.q : role[i] == TSHHT3_STATE ? m.s : role[i] == TSHHT3_HOLONOMIC ? m.holonomic : role[i] == TSHHT3_NONHOLONOMIC ? m.velocity : definitions).push_back(i);
   m.rest = m.holonomic;
   m.rest.insert(m.rest.end(), m.velocity.begin(), m.velocity.end());
   m.rest.insert(m.rest.end(), definitions.begin(), definitions.end());
+  m.unit = Eigen::Map<const Eigen::VectorXd>(unit.data(), n);
+  ToUnits(m, M, C, K);
 
   const Subspace position(Block(K, m.holonomic, m.q));
   std::vector<PetscInt> both = m.holonomic;
@@ -172,7 +195,7 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
     std::vector<double> own, all;
     PetscCall(w.load(in[f], &own));
     PetscCall(Gather(w, MPI_DOUBLE, own, all));
-    for (PetscInt i = 0; i < n; i++) right(i, 2 * nq + ns + f) = all[i];
+    for (PetscInt i = 0; i < n; i++) right(i, 2 * nq + ns + f) = m.unit(i) * all[i];
     for (PetscInt i : both)
       PetscCheck(all[i] == 0, w.comm(), PETSC_ERR_SUP,
                  "Linearization::stateSpace(): input %d is a motion of a displacement or velocity, whose derivatives would be inputs, too: make it one of an acceleration, "
@@ -217,7 +240,7 @@ template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m,
   const Vector   q = m.N * z, v = m.L * y + m.P * q + m.S * s, other = m.y * state;
   for (auto &c : x) c.assign(n, 0);
   auto put = [&](int order, PetscInt i, T value) {
-    if (i >= start && i < start + n) x[order][i - start] = value;
+    if (i >= start && i < start + n) x[order][i - start] = m.unit(i) * value;
   };
   for (std::size_t k = 0; k < m.q.size(); k++) {
     put(0, m.q[k], q((Eigen::Index)k));
@@ -231,29 +254,54 @@ template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m,
   for (std::size_t k = 0; k < m.rest.size(); k++) put(0, m.rest[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
 }
 
+/* Eigenvalues whose imaginary parts are not negative, and their vectors. LAPACK balances A: rates of positions have the size of velocities, rates of velocities
+   that of stiffness, 1e15 times as large in a steel part of 1 mm, and slow modes would be lost between the two (SmallBodies.Modes). */
+PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, Eigen::MatrixXcd *vector)
+{
+  const PetscBLASInt n = (PetscBLASInt)A.rows(), one = 1, ask = -1;
+  Eigen::VectorXd    re(n), im(n);
+  Dense              V(n, n);
+  double             none = 0, best = 0;
+  PetscBLASInt       info = 0;
+  PetscFunctionBegin;
+  LAPACKgeev_("N", "V", &n, A.data(), &n, re.data(), im.data(), &none, &one, V.data(), &n, &best, &ask, &info);
+  std::vector<double> work((std::size_t)best);
+  const PetscBLASInt  size = (PetscBLASInt)work.size();
+  LAPACKgeev_("N", "V", &n, A.data(), &n, re.data(), im.data(), &none, &one, V.data(), &n, work.data(), &size, &info);
+  PetscCheck(!info, comm, PETSC_ERR_CONV_FAILED, "Linearization::modes(): the eigenvalues of the matrix of %d states were not found", (int)n);
+  value->clear();
+  vector->resize(n, n);
+  for (Eigen::Index k = 0; k < n; k++) {
+    if (im(k) < 0) continue; /* of a pair the one before it */
+    vector->col((Eigen::Index)value->size()) = V.col(k);
+    if (im(k) > 0) vector->col((Eigen::Index)value->size()) += Complex(0, 1) * V.col(k + 1);
+    value->push_back({re(k), im(k)});
+  }
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode Linearization::modes(std::vector<Mode> *all) const
 {
-  const Work &w = *work_;
-  Minimal     m;
+  const Work          &w = *work_;
+  Minimal              m;
+  std::vector<Complex> value;
+  Eigen::MatrixXcd     vector;
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::modes()"));
   PetscCall(Reduce(w, {}, m));
   all->clear();
   if (!m.states()) PetscFunctionReturn(0); /* all motions are given */
-  const Eigen::EigenSolver<Dense> solver(m.A);
-  PetscCheck(solver.info() == Eigen::Success, w.comm(), PETSC_ERR_CONV_FAILED, "Linearization::modes(): the eigenvalues of the matrix of %d states were not found", (int)m.states());
-  std::vector<int> order;
-  for (int k = 0; k < (int)m.states(); k++)
-    if (solver.eigenvalues()(k).imag() >= 0) order.push_back(k);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(solver.eigenvalues()(a)) < std::abs(solver.eigenvalues()(b)); });
+  PetscCall(Eigenpairs(w.comm(), m.A, &value, &vector));
+  std::vector<int> order(value.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(value[a]) < std::abs(value[b]); });
   for (int k : order) {
     Mode                                 mode;
     std::array<std::vector<Complex>, 3>  x;
-    const Eigen::VectorXcd               vector = solver.eigenvectors().col(k);
-    Unknowns<Complex>(w, m, vector, x);
-    mode.value = solver.eigenvalues()(k);
+    Unknowns<Complex>(w, m, vector.col(k), x);
+    mode.value = value[k];
     mode.shape = x[0];
     PetscCall(normalize(&mode));
     all->push_back(mode);

@@ -7,7 +7,8 @@
   redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the description and computes the
   same.
 
-  Rows are made comparable: lengths in units of the scene's size, each row of norm one.
+  Rows are made comparable: lengths in units of the scene's size, modal coordinates in the same by the body's mass (SmallBodies.Attachments), each row of
+  norm one.
 
   At a singular position rows are dependent that are not elsewhere. So where redundant rows are found they are looked
   for again at a neighbouring position that satisfies the constraints, and only those that are redundant there too are
@@ -40,14 +41,17 @@ struct RowRef {
   int         row;
 };
 
-/* Scaled rows: lengths in units of the scene's size, norm one */
+/* Scaled rows: lengths in units of the scene's size, modal coordinates in those in which they move the body's mass as far, norm one */
 void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
 {
   for (RowBlock &b : blocks) {
     for (std::size_t k = 0; k < b.body.size(); k++) {
-      const std::vector<int> &d = Directions(KindOf(s, s.bodies[b.body[k]]));
-      for (int c = b.column[k]; c < b.column[k + 1]; c++)
-        if (c - b.column[k] < (int)d.size() && d[c - b.column[k]] < 3) b.J.col(c) *= size;
+      const BodyData         &body = s.bodies[b.body[k]];
+      const std::vector<int> &d    = Directions(KindOf(s, body));
+      for (int c = b.column[k]; c < b.column[k + 1]; c++) {
+        if (c - b.column[k] >= (int)d.size()) b.J.col(c) *= size * std::sqrt(body.mass);
+        else if (d[c - b.column[k]] < 3) b.J.col(c) *= size;
+      }
     }
     for (int r = 0; r < b.rows; r++) {
       const double norm = b.J.row(r).norm();

@@ -62,9 +62,10 @@ PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
   PetscCall(VecGetArrayRead(x, &f));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k          = R.bodies.body[b];
-    const int        directions = PlanarScene(k.kind) ? 2 : 3;
+    const int        directions = PlanarScene(k.kind) ? 2 : 3, whole = Coordinates(k.kind);
+    const double     modal      = std::sqrt(R.scene.bodies[k.id].mass); /* of modal forces, as if the modes moved all mass (SmallBodies.Equilibrium) */
     for (int c = 0; c < R.bodies.coordinates(b); c++) {
-      const double y = std::abs(f[k.first + c]) / (c < directions ? 1 : size);
+      const double y = std::abs(f[k.first + c]) * (c < directions ? 1 : c < whole ? 1 / size : modal);
       if (y > mine.value || std::isnan(y)) mine = {y, (int)k.id};
     }
   }

@@ -349,6 +349,26 @@ TEST(Linearize, SlowestModesOfAChain)
   }
 }
 
+/* What has no inertia, or next to none beside its damping: a lag, and a mass that creeps back */
+TEST(Linearize, SlowestModesWithoutInertia)
+{
+  const double tau = 20, damping = 1e6;
+  Slider       s(damping);
+  s.scene.state("lag", Expression{{Measure::value(State{0}), Measure::distance(s.at, s.ground)}, [=](const Real *x) { return (x[1] - x[0]) / tau; }}, 2);
+  const Started     start(s.scene);
+  std::vector<Mode> slow;
+  for (double shift : {1., 0.3}) {
+    must(SlowestModes(start.small, 2, &slow, shift));
+    double lag = INFINITY, creeps = INFINITY;
+    for (const Mode &mode : slow) {
+      lag    = std::min(lag, std::abs(mode.value + 1 / tau));
+      creeps = std::min(creeps, std::abs(mode.value + k / damping));
+    }
+    EXPECT_LT(lag, 1e-6);
+    EXPECT_LT(creeps, 1e-8);
+  }
+}
+
 /* Before the first step and after it, and of the same run later */
 TEST(Linearize, StartOfARun)
 {

@@ -1,0 +1,285 @@
+/* The same steel body at lengths from 0.1 mm to 100 m: in units of its length, wave speed and mass nothing tells one from the other. */
+#include "hhtdae/helpers.h"
+#include "hhtdae/linearize.h"
+#include "hhtdae/modes.h"
+#include "reduction_cases.h"
+#include "scene/model.h"
+#include "scene_output.h"
+#include <Eigen/Dense>
+
+using namespace hhtest;
+using Complex  = std::complex<double>;
+using Complexs = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+namespace
+{
+
+constexpr double lengths[] = {1, 100, 2e-2, 1e-3, 1e-4};
+constexpr double width = 0.1, depth = 0.05; /* of the length */
+
+ReducedBody reduced(double l, const Reduction &r)
+{
+  Made        made({{8, 2, 1}, {l, width * l, depth * l}});
+  ReducedBody body;
+  must(Reduce(made.model, r, &body));
+  if (body.shape.size()) must(AddStressModes(made.model, &body));
+  return body;
+}
+
+Vector3 middle(double x, double l) { return {x * l, width * l / 2, depth * l / 2}; }
+
+/* Clamped at its left end and, if asked for, at its right one; 1 % damping */
+struct Cantilever {
+  Scene  scene{PETSC_COMM_SELF};
+  Body   body;
+  Marker tip;
+  explicit Cantilever(double l, const Reduction &r = both(4), bool both_ends = false)
+  {
+    FlexibleBody b;
+    b.model   = std::make_shared<ModalBody>(reduced(l, r).modal);
+    b.damping = {{0., 0.01}};
+    body      = scene.add("beam", b);
+    tip       = scene.marker(scene.attachment(body, "right"));
+    scene.add("clamp", Fixed{scene.marker(scene.attachment(body, "left")), scene.marker(scene.ground(), middle(0, l))});
+    if (both_ends) scene.add("other", Fixed{tip, scene.marker(scene.ground(), middle(1, l))});
+  }
+};
+
+struct Taken {
+  SceneRun      run;
+  Linearization small;
+  explicit Taken(Scene &s) : run(s, 1, tolerance(1e-8)) { must(small.take(run.ts)); }
+};
+
+/* |a - b| <= part |b| */
+template <class A, class B> void expectEqual(const A &a, const B &b, double part, const std::string &what)
+{
+  ASSERT_EQ(a.rows(), b.rows()) << what;
+  ASSERT_EQ(a.cols(), b.cols()) << what;
+  EXPECT_LE((a - b).norm(), part * b.norm()) << what;
+}
+
+/* Values times the length */
+Eigen::VectorXcd values(const std::vector<Mode> &modes, double l)
+{
+  Eigen::VectorXcd v(modes.size());
+  for (std::size_t k = 0; k < modes.size(); k++) v(k) = modes[k].value * l;
+  return v;
+}
+
+Complexs complexOf(const std::vector<double> &x, PetscInt rows, PetscInt columns)
+{
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(x.data(), rows, columns).cast<Complex>();
+}
+
+} // namespace
+
+/* What a reduction knows. Modes are orthonormal in the mass, which goes with l^3. */
+TEST(SmallBodies, Reduction)
+{
+  for (Tie tie : {Tie::Rigid, Tie::Average}) {
+    Reduction r  = both(6, tie);
+    r.stiffening = true;
+    ReducedBody one;
+    for (double l : lengths) {
+      ReducedBody       b = reduced(l, r);
+      const std::string at = text("length %g", l);
+      if (l == 1) {
+        one = b;
+        continue;
+      }
+      expectEqual(l * b.modal.omega, one.modal.omega, 1e-8, at);
+      for (std::size_t k = 0; k < b.mode.size(); k++) EXPECT_NEAR(b.mode[k].residual, one.mode[k].residual, 1e-6) << at;
+      for (int a = 0; a < 2; a++) {
+        const ModalAttachment &x = b.modal.attachments[a], &y = one.modal.attachments[a];
+        expectEqual(std::pow(l, 1.5) * x.translation, y.translation, 1e-6, at);
+        expectEqual(std::pow(l, 2.5) * x.rotation, y.rotation, 1e-6, at);
+        for (int c = 0; c < 6; c++) expectEqual(std::pow(l, c < 3 ? 4 : 5) * x.stiffening[c], y.stiffening[c], 1e-6, at + text(" load %d", c));
+      }
+      for (int c = 0; c < 6; c++) expectEqual(b.modal.stiffening[c], one.modal.stiffening[c], 1e-6, at);
+      expectEqual(std::pow(l, 2.5) * b.stress.values, one.stress.values, 1e-6, at);
+    }
+  }
+}
+
+/* Most of the modes that there are, whose Krylov spaces come to an end */
+TEST(SmallBodies, ManyModes)
+{
+  for (Method method : {Method::CraigBampton, Method::FreeFree})
+    for (PetscInt modes : {20, 30, 60}) {
+      Eigen::VectorXd one;
+      for (double l : {1., 1e-3, 5e-4, 1e-4, 1e-6}) {
+        Reduction r = both(modes, Tie::Average);
+        r.method    = method;
+        r.all_nodes = false;
+        const ReducedBody b = reduced(l, r);
+        if (l == 1) one = b.modal.omega;
+        expectEqual((l * b.modal.omega).eval(), one, 1e-8, text("%d modes at %g", (int)modes, l));
+      }
+    }
+}
+
+TEST(SmallBodies, Modes)
+{
+  Eigen::VectorXcd one;
+  for (double l : lengths) {
+    Cantilever              beam(l);
+    const Taken       t(beam.scene);
+    std::vector<Mode> modes;
+    must(t.small.modes(&modes));
+    const Eigen::VectorXcd v = values(modes, l);
+    if (l == 1) one = v;
+    ASSERT_EQ(v.size(), one.size()) << l;
+    for (Eigen::Index k = 0; k < v.size(); k++) {
+      EXPECT_LT(std::abs(v(k) - one(k)), 1e-9 * std::abs(one(k))) << l << ": mode " << k;
+      EXPECT_NEAR(modes[k].dampingRatio(), -one(k).real() / std::abs(one(k)), 1e-9) << l << ": mode " << k;
+    }
+  }
+}
+
+/* About a shift of the default, which is far below, and of others */
+TEST(SmallBodies, SlowestModes)
+{
+  for (double l : lengths) {
+    Cantilever              beam(l);
+    const Taken       t(beam.scene);
+    std::vector<Mode> all, slow;
+    must(t.small.modes(&all));
+    for (double shift : {1., 0.1 / l, 300 / l}) {
+      must(SlowestModes(t.small, 3, &slow, shift));
+      for (int k = 0; k < 3; k++) EXPECT_LT(std::abs(slow[k].value - all[k].value), 1e-8 * std::abs(all[k].value)) << l << ": mode " << k << " from " << shift;
+    }
+  }
+}
+
+/* Six rigid motions beside elastic ones, or alone: in modal coordinates, and of the whole model, whose stiffness leaves rounding of rigid motions */
+TEST(SmallBodies, SlowestModesOfAFreeBody)
+{
+  for (bool whole : {false, true}) {
+    std::vector<double> one;
+    for (double l : lengths) {
+      Scene             scene(PETSC_COMM_SELF);
+      Made              made({{8, 2, 1}, {l, width * l, depth * l}});
+      FullFeBody        fe;
+      FlexibleBody      b;
+      if (whole) {
+        must(fe.add(scene, "beam", made.model, FullBody()));
+      } else {
+        b.model = std::make_shared<ModalBody>(reduced(l, both(30)).modal);
+        scene.add("beam", b);
+      }
+      const Taken         t(scene);
+      std::vector<Mode>   slow;
+      std::vector<double> elastic;
+      must(SlowestModes(t.small, 16, &slow)); /* rigid motions have twelve values */
+      for (const Mode &m : slow)
+        if (std::abs(m.value) > 100 / l) elastic.push_back(std::abs(m.value) * l);
+      if (l == 1) one = elastic;
+      ASSERT_GE(elastic.size(), 4u) << l;
+      for (std::size_t k = 0; k < 4; k++) EXPECT_NEAR(elastic[k], one[k], 1e-5 * one[k]) << l; /* beside rigid motions the shift stays */
+      must(SlowestModes(t.small, 3, &slow, l < 1 ? 300 / l : 1));
+      for (const Mode &m : slow) EXPECT_LT(std::abs(m.value), 1 / l) << l;
+    }
+  }
+}
+
+/* With options that lose all digits an error, no wrong modes */
+TEST(SmallBodies, SlowestModesAreChecked)
+{
+  Options           options("-scene_modes_pep_scale none -scene_modes_pep_target 1");
+  Cantilever              beam(1e-4);
+  const Taken       t(beam.scene);
+  std::vector<Mode> slow;
+  ErrorTrap         trap;
+  EXPECT_NE(SlowestModes(t.small, 3, &slow), 0);
+  EXPECT_TRUE(trap.says("without balance")) << trap.message;
+}
+
+/* Transfer functions by minimal coordinates and by the sparse system, at rest and beside the first modes; force and moment at the tip to displacement, speed,
+   acceleration and rotation there */
+TEST(SmallBodies, StateSpace)
+{
+  const double speeds[] = {0, 400, 3000};
+  Complexs     one[3];
+  for (double l : lengths) {
+    Cantilever                       beam(l);
+    const Taken                t(beam.scene);
+    const Marker               ground = beam.scene.marker(beam.scene.ground());
+    const std::vector<Measure> out    = {Measure::displacement(beam.tip, 2), Measure::velocity(beam.tip, 2), Measure::acceleration(beam.tip, 2), Measure::angle(beam.tip, ground)};
+    const std::vector<Excitation> in  = {Excitation::force(beam.tip, {0, 1, 1}), Excitation::torque(beam.tip, {1, 1, 1})};
+    StateSpace                    z;
+    must(t.small.stateSpace(in, out, &z));
+    const Complexs A = complexOf(z.A, z.states, z.states), B = complexOf(z.B, z.states, 2), C = complexOf(z.C, 4, z.states), D = complexOf(z.D, 4, 2);
+    for (int w = 0; w < 3; w++) {
+      Complexs h = C * (Complex(0, speeds[w] / l) * Complexs::Identity(z.states, z.states) - A).partialPivLu().solve(B) + D;
+      for (int o = 0; o < 4; o++)
+        for (int i = 0; i < 2; i++) {
+          std::vector<Complex> x;
+          must(t.small.response(in[i], out[o], {speeds[w] / l}, &x));
+          if (speeds[w] > 0 || o % 3 == 0) {
+            EXPECT_LT(std::abs(x[0] - h(o, i)), 1e-6 * std::abs(x[0])) << l << ": " << i << " to " << o << " at " << speeds[w];
+          }
+          h(o, i) *= std::pow(l, o < 3 ? 1 + o : 2) * (i ? l : 1);
+        }
+      if (l == 1) one[w] = h;
+      for (int o = 0; o < 4; o++)
+        if (speeds[w] > 0 || o % 3 == 0) expectEqual(h.row(o).eval(), one[w].row(o).eval(), 1e-6, text("length %g, output %d at %g", l, o, speeds[w]));
+    }
+  }
+}
+
+/* Clamped at both ends no row follows from the others, whatever the size and how many modes there are */
+TEST(SmallBodies, Attachments)
+{
+  for (Tie tie : {Tie::Rigid, Tie::Average})
+    for (double l : lengths)
+      for (int modes : {0, 6}) {
+        Cantilever    beam(l, both(modes, tie), true);
+        Printed out;
+        TS      ts;
+        must(beam.scene.createTS(&ts));
+        must(TSDestroy(&ts));
+        EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << l << " with " << modes << ": " << out.text();
+      }
+}
+
+/* And in a large scene */
+TEST(SmallBodies, AttachmentsInALargeScene)
+{
+  Cantilever beam(1e-4, both(0), true);
+  for (double x : {-5., 5.}) {
+    RigidBody b;
+    b.mass     = 100;
+    b.inertia  = Matrix3::Identity();
+    b.position = {x, 0, 0};
+    beam.scene.add(text("block %g", x), b);
+  }
+  Printed out;
+  TS      ts;
+  must(beam.scene.createTS(&ts));
+  must(TSDestroy(&ts));
+  EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << out.text();
+}
+
+/* Bent by a force at the tip: as far, and found as soon */
+TEST(SmallBodies, Equilibrium)
+{
+  double   one        = 0;
+  PetscInt iterations = 0;
+  for (double l : lengths) {
+    Cantilever beam(l);
+    UserForce  f;
+    f.i = beam.tip;
+    for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = k < 2 ? 0 : -1e3 * l * l](const Real *t) -> Real { return 0. * t[0] + x; }));
+    beam.scene.add("load", f);
+    beam.scene.start().equilibrium = true;
+    must(beam.scene.setUp());
+    const double down = (DataOf(beam.scene).frame(beam.tip).x - middle(1, l)).z() / l;
+    if (l == 1) {
+      one        = down;
+      iterations = DataOf(beam.scene).started.equilibrium_iterations;
+    }
+    EXPECT_NEAR(down, one, 1e-9 * std::abs(one)) << l;
+    EXPECT_EQ(DataOf(beam.scene).started.equilibrium_iterations, iterations) << l;
+  }
+}
