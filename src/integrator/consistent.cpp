@@ -24,7 +24,7 @@ namespace hht3
 namespace
 {
 
-/* Corrections relative to the unknowns: converged; and the largest that may be rounding where they no longer fall */
+/* Corrections relative to the unknowns, or what forces leave relative to these: converged; and the largest that may be rounding where they no longer fall */
 constexpr PetscReal converged = 1e-13, rounding = 1e-8;
 constexpr PetscReal slow      = 0.3; /* rate beyond which the matrix is made again at the iterate */
 constexpr PetscInt  max_it    = 20;
@@ -63,6 +63,26 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   PetscCall(TakeUnknowns(Get(ts), c));
   *e  = x > 0 ? d / x : d;
   *ok = (PetscBool)(!failed && !PetscIsInfOrNanReal(d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual in the equations of motion, in parts of the forces there: where accelerations are nothing but rounding of these, corrections are as large as the
+   unknowns (SmallBodies.StartFromEquilibrium) */
+PetscErrorCode ForcesLeft(const Integrator &I, Consistent &c, PetscReal *part)
+{
+  PetscReal sum[2] = {0, 0};
+
+  PetscFunctionBegin;
+  PetscCall(MatMult(c.P, c.X, I.work));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f, PetscScalar of) {
+      if (!IsCoordinate(I, i)) return;
+      sum[0] += PetscRealPart(f * f);
+      sum[1] += PetscRealPart(of * of);
+    },
+    Read(c.F), Read(I.work)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
+  *part = sum[1] > 0 ? PetscSqrtReal(sum[0] / sum[1]) : 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,7 +158,7 @@ static PetscErrorCode WithOwnFactors(Consistent &c)
 /* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.failed, where that was the linear solver. */
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
-  PetscReal e = 0, last, first = 0;
+  PetscReal e = 0, last, first = 0, forces;
   PetscBool renew = (PetscBool)!have_matrix, other;
 
   PetscFunctionBegin;
@@ -166,6 +186,10 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
     const bool known = c.its > 1 && !fresh, falls = e <= slow * last;
     if (!*ok || e <= converged || (known && (falls ? CorrectorError(e / last, e) <= converged : e <= rounding))) PetscFunctionReturn(PETSC_SUCCESS);
+    if (known && !falls) {
+      PetscCall(ForcesLeft(Get(ts), c, &forces));
+      if (forces <= rounding) PetscFunctionReturn(PETSC_SUCCESS);
+    }
     renew = (PetscBool)(c.its > 1 && !falls);
     if (renew) PetscCall(WithOwnFactors(c));
   }
