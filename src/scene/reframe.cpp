@@ -64,20 +64,6 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Motion of the bodies in the state (U, V), with others' bodies */
-PetscErrorCode Move(Runtime &R, Vec U, Vec V)
-{
-  const double *u, *v, *local[3];
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(U, &u));
-  PetscCall(VecGetArrayRead(V, &v));
-  PetscCall(LocalState(R, u, v, v, local));
-  R.bodies.move(local[0], local[1]);
-  PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCall(VecRestoreArrayRead(V, &v));
-  PetscFunctionReturn(0);
-}
-
 /* Own bodies that need other axes, and which */
 PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
 {
@@ -287,14 +273,33 @@ PetscErrorCode Prepare(TS ts)
 
 } // namespace
 
-/* Elements remember the accepted state */
+/* Motion of the bodies in the state (U, V), with others' bodies */
+PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)
+{
+  const double *u, *v, *local[3];
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(LocalState(R, u, v, v, local));
+  R.bodies.move(local[0], local[1]);
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscFunctionReturn(0);
+}
+
+/* Elements and questions remember the accepted state */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
 {
+  const double *u;
   PetscFunctionBegin;
-  if (!R.remembers) PetscFunctionReturn(0);
-  PetscCall(Move(R, U, V));
+  R.accepts++;
+  if (!R.remembers && R.asked.empty()) PetscFunctionReturn(0);
+  PetscCall(MoveBodies(R, U, V));
   for (auto &b : R.batches) b->accept(R.bodies);
   PetscCall(KeepMemories(R));
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(CountAngles(R, u, R.asked));
+  PetscCall(VecRestoreArrayRead(U, &u));
   PetscFunctionReturn(0);
 }
 
