@@ -198,7 +198,14 @@ template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move
     PetscCall(VecCopy(now[k], kept[k]));
   }
   const std::vector<CountedAngle> asked  = R->asked;
-  const PetscErrorCode            failed = Guarded([&] { return move(*R, now[0], now[1]); });
+  const PetscErrorCode            failed = Guarded([&] {
+    PetscReal t;
+    PetscFunctionBegin;
+    PetscCall(move(*R, now[0], now[1]));
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(CheckDropped(*R, t, now[0], now[1]));
+    PetscFunctionReturn(PetscErrorCode(0));
+  });
   if (failed) {
     R->asked = asked;
     for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));

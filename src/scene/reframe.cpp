@@ -113,6 +113,7 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
   PetscCall(CheckTime(R, t));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
+  PetscCall(CheckDropped(R, t, U, V));
   PetscCall(ChooseNext(R, U, V));
   *change = R.changing ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);

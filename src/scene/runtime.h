@@ -11,6 +11,7 @@
 namespace hhtdae
 {
 
+struct DroppedRows; /* dropped_rows.cpp */
 struct Recorder;    /* output/recorder.h */
 struct ChannelWork; /* output/channels.h */
 
@@ -69,6 +70,7 @@ struct Runtime {
   std::map<PetscInt, std::vector<std::unique_ptr<Probe>>> readers; /* of elements that were asked for, ReadersOf() */
   std::vector<CountedAngle>    asked;
   long                         accepts = 0; /* accepted states that `asked` and the memories have seen */
+  std::shared_ptr<DroppedRows> dropped;     /* none unless rows were dropped as redundant, on any rank */
   std::shared_ptr<ChannelWork> channels;
   std::shared_ptr<Recorder>    recorder; /* none unless output was asked for */
 
@@ -118,6 +120,9 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
 PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y); /* to a run that goes on in another vector */
 /* reframe.cpp: others' bodies too */
 PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V);
+/* dropped_rows.cpp: an error where one is violated */
+PetscErrorCode LocalizeDropped(Runtime &R, Localizer &l);
+PetscErrorCode CheckDropped(Runtime &R, PetscReal t, Vec U, Vec V);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
 constexpr PetscInt kept = 72;
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
