@@ -307,7 +307,8 @@ PetscErrorCode Snapshot::Work::checkMemory(PetscInt element)
     for (const auto &p : ReadersOf(*R, element)) *y += (double)p->memory();
   }));
   PetscCheck(n == 0, scene().comm, PETSC_ERR_ARG_WRONGSTATE,
-             "Snapshot: the run has gone on since its state at t = %g was taken, and %s %s counts full turns or follows a curve, which it does for the present state alone; ask earlier, or take() again",
+             "Snapshot: the run has gone on since its state at t = %g was taken, and %s %s counts full turns or follows a curve, which it does for the "
+             "present state alone; ask earlier, or take() again",
              t, e.type, e.name.c_str());
   PetscFunctionReturn(0);
 }

@@ -394,7 +394,13 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
   Vec       vatol, vrtol, U;
   PetscFunctionBegin;
   PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
-  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) PetscFunctionReturn(0); /* the user's own */
+  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) { /* the user's own, by the largest of which dropped rows are judged */
+    R.tolerance_of[0] = atol;
+    R.tolerance_of[1] = rtol;
+    if (R.dropped && vatol) PetscCall(VecMax(vatol, nullptr, &R.tolerance_of[0]));
+    if (R.dropped && vrtol) PetscCall(VecMax(vrtol, nullptr, &R.tolerance_of[1]));
+    PetscFunctionReturn(0);
+  }
   if (vrtol && R.tolerance_of[0] == atol && R.tolerance_of[1] == rtol) PetscFunctionReturn(0);
   PetscCall(TSGetSolution(ts, &U));
   const double whole[2] = {atol, rtol}, angles[2] = {R.scene.start.angle_tol, 0};

@@ -68,6 +68,22 @@ TEST(DroppedRows, ANetAndBricardsMechanism)
   }
 }
 
+/* Judged by the tolerances of the user's own vectors, too */
+TEST(DroppedRows, LooseTolerancesByVectors)
+{
+  Scene   s(PETSC_COMM_SELF);
+  Printed quiet;
+  Vec     U, tolerance;
+  bricard(s);
+  SceneRun run(s, 3, "-ts_rtol 1e-9 -ts_atol 1e-9");
+  must(TSGetSolution(run.ts, &U));
+  must(VecDuplicate(U, &tolerance));
+  must(VecSet(tolerance, 1e-2));
+  must(TSSetTolerances(run.ts, 1e-9, tolerance, 1e-9, tolerance));
+  must(VecDestroy(&tolerance));
+  must(run.solve());
+}
+
 TEST(DroppedRows, MotionsThatPart)
 {
   for (MotionOf of : {MotionOf::Displacement, MotionOf::Velocity}) {
