@@ -71,6 +71,8 @@ public:
      axes of another marker (default: space axes). Zero if it does not touch that body. */
   PetscErrorCode load(Element e, Marker on, Load *x, Marker axes = {});
 
+  /* An angle counts full turns: from the start in planar scenes and where an element, a channel or an expression reads it, else from the first
+     question for it on */
   PetscErrorCode value(const Measure &m, double *x);
   /* kinetic, potential energy of the scene; the momenta are those about the space origin */
   PetscErrorCode energy(double *kinetic, double *potential);

@@ -50,7 +50,7 @@ struct RigidBody { /* without mass, or moments of inertia, where joints and moti
   bool    fixed_start = false;            /* the assembly phase leaves pose and velocities as given */
 };
 
-struct PointMass { /* 3 coordinates, no rotation; planar 2 */
+struct PointMass { /* 3 coordinates, planar 2; no rotation: what would act on it with a moment is refused */
   double  mass     = 1;
   Vector3 position = Vector3::Zero();
   Vector3 velocity = Vector3::Zero();

@@ -19,6 +19,7 @@ namespace
 
 constexpr double heavy = 1099511627776.; /* 2^40: masses against stiffnesses */
 constexpr int    most_iterations = 100, most_cuts = 6;
+constexpr double largest_part = 1; /* rad, of a motion between two assemblies: far enough from half a turn; CountedAngles.KinematicsOverManyTurns */
 constexpr double still = 1e-13; /* parts of the scene's size, radians: a move that is rounding */
 
 struct Assembling : StillSystem {
@@ -108,6 +109,33 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
+/* The most that a motion turns an angle by between two times */
+double TurnOfMotions(const SceneData &s, double from, double to)
+{
+  double most = 0, a = 0, b = 0;
+  for (const StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++)
+      if (store->drivenAngle(e, from, &a) && store->drivenAngle(e, to, &b) && store->unknowns(e)) most = std::max(most, std::abs(b - a));
+  return most;
+}
+
+/* The same in parts in which no motion turns far: the nearest positions that meet a motion are right up to full turns, and count fewer */
+PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  for (double at = from; at != t;) {
+    double next = t, middle = at + (t - at) / 2;
+    while (TurnOfMotions(R.scene, at, next) > largest_part && middle != at && middle != next) {
+      next   = middle;
+      middle = at + (next - at) / 2;
+    }
+    if (next != t) PetscCall(MeetConstraints(R, next, U, V));
+    at = next;
+  }
+  PetscCall(MeetConstraints(R, t, U, V));
+  PetscFunctionReturn(0);
+}
+
 /* The consistent state nearest to where ts is, with the axes of its angles */
 PetscErrorCode Complete(TS ts, Runtime &R)
 {
@@ -130,8 +158,10 @@ PetscErrorCode Complete(TS ts, Runtime &R)
 
 PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
+  PetscReal from;
   PetscFunctionBegin;
-  PetscCall(MeetConstraints(R, t, U, V));
+  PetscCall(TSGetTime(ts, &from));
+  PetscCall(FollowMotions(R, from, t, U, V));
   PetscCall(TSSetTime(ts, t));
   PetscCall(Complete(ts, R));
   PetscFunctionReturn(0);
@@ -140,10 +170,12 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 /* Motions may have taken bodies far from where they were: these go there first */
 PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
-  PetscInt iterations;
+  PetscInt  iterations;
+  PetscReal from;
   PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &from));
   PetscCall(VecZeroEntries(V));
-  PetscCall(MeetConstraints(R, t, U, V));
+  PetscCall(FollowMotions(R, from, t, U, V));
   PetscCall(RelaxAt(R, t, U, &iterations));
   PetscCall(TSSetTime(ts, t));
   PetscCall(KeepStart(ts, V)); /* accelerations are zero as velocities are */
@@ -165,8 +197,17 @@ template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move
     PetscCall(VecDuplicate(now[k], &kept[k]));
     PetscCall(VecCopy(now[k], kept[k]));
   }
-  const PetscErrorCode failed = Guarded([&] { return move(*R, now[0], now[1]); });
+  const std::vector<CountedAngle> asked  = R->asked;
+  const PetscErrorCode            failed = Guarded([&] {
+    PetscReal t;
+    PetscFunctionBegin;
+    PetscCall(move(*R, now[0], now[1]));
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(CheckDropped(*R, t, now[0], now[1]));
+    PetscFunctionReturn(PetscErrorCode(0));
+  });
   if (failed) {
+    R->asked = asked;
     for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));
     PetscCall(UseAxes(*R));
     PetscCall(TSSetTime(ts, before));

@@ -58,6 +58,7 @@ PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
   PetscCall(VecCopy(V, Y));
   PetscCall(VecCopy(from.axes, to.axes));
   PetscCall(UseAxes(to));
+  to.asked = from.asked;
   PetscFunctionReturn(0);
 }
 
@@ -153,6 +154,9 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     journal_->stale = true; /* this model is of this run alone; the next one from the start is described anew */
     PetscCall(failed);
     PetscCall(CarryMemories(*old, *RunOf(*ts)));
+    Vec X, Y;
+    PetscCall(TS2GetSolution(*ts, &X, &Y));
+    PetscCall(CarryAngles(*old, U, V, *RunOf(*ts), X, Y));
     PetscFunctionReturn(0);
   }
   PetscCall(createTS(ts));

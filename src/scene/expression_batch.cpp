@@ -92,6 +92,11 @@ void ExpressionBatch::accept(Bodies &B)
   for (Row &r : all_) r.f.arguments.accept(B);
 }
 
+bool ExpressionBatch::countedAngle(PetscInt i, PetscInt j, double, double *x) const
+{
+  return std::any_of(all_.begin(), all_.end(), [&](const Row &r) { return r.f.arguments.countedAngle(i, j, x); });
+}
+
 bool ExpressionBatch::limitsSteps() const
 {
   return std::any_of(all_.begin(), all_.end(), [](const Row &r) { return r.f.arguments.limitsSteps(); });

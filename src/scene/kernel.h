@@ -37,7 +37,8 @@
   `damped`: components() uses the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) that it uses.
 
   Memory of accepted steps (unwinding of angles, say): `static constexpr int memory = 1`, Data begins with `double memory[1]`, and
-  accept(Data &, frames) updates it after each accepted step.
+  accept(Data &, frames) updates it after each accepted step. `angles`: so many numbers at its beginning are angles of marker 2k about
+  the z axis of marker 2k+1, counted over full turns, which questions to a run are answered by.
 */
 #ifndef HHTDAE_SCENE_KERNEL_H
 #define HHTDAE_SCENE_KERNEL_H
@@ -73,10 +74,11 @@ template <int N, int M> void SeedAll(const Frame<double> *f, Frame<Dual<N>> *s)
 /* What constraints of both kinds share */
 template <class K, int M, int R> struct ConstraintBase {
   static constexpr int      markers = M, rows = R, size = 6 * M;
-  static constexpr int      memory = 0, inputs = 0;
+  static constexpr int      memory = 0, inputs = 0, angles = 0;
   static constexpr unsigned depends = Everything(M);
   static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
   static constexpr bool     own_units = false;     /* rows are in units of the user's own, neither lengths nor sines */
+  static constexpr bool     says_angle = false;    /* countedAngle() tells the angle of marker 0 about z of marker 1 at any time */
   static constexpr bool     translates = false;    /* row r is component r of the second marker's position less that of the first, and nothing else */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;
@@ -216,10 +218,10 @@ template <int M, int Z> struct ForceJacobian {
 };
 
 template <class K, int M, int C> struct Force {
-  static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0;
+  static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0, angles = 0;
   static constexpr unsigned depends = Everything(M); /* what components() and apply() use */
   static constexpr unsigned acts    = Everything(M); /* Position(k): a force at k, Rotation(k): a moment at k */
-  static constexpr bool     damped = true, symmetric = false, needs_rotation = true;
+  static constexpr bool     damped = true, symmetric = false, needs_rotation = true, says_angle = false;
   static constexpr bool     carriable = true; /* its description lets the user carry the components as force states */
   using Data = Empty;
 

@@ -137,6 +137,7 @@ PetscErrorCode Localize(Runtime &R, Localizer &l)
   for (auto &x : R.scene.extensions) x->localize(l, R.batches);
   PetscCall(LocalizeExpressions(R, l));
   PetscCall(LocalizeChannels(R, l));
+  PetscCall(LocalizeDropped(R, l));
   PetscFunctionReturn(0);
 }
 

@@ -230,17 +230,6 @@ void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor,
 
 /* ---- where things are ---- */
 
-/* The part of an element that has row or component `row`, which becomes the part's own */
-const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row)
-{
-  for (const Part &p : s.elements[element].parts) {
-    if (p.store->isConstraint() != constraint) continue;
-    if (row < p.store->rows()) return &p;
-    row -= p.store->rows();
-  }
-  return nullptr;
-}
-
 void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
 {
   const SceneData   &s = l.run->scene;
@@ -275,6 +264,16 @@ void PlaceLoad(Localizer &l, const Measure &m, LocalMeasure &k)
 constexpr int kComponents = 12; /* of a force, at most */
 
 } // namespace
+
+const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row)
+{
+  for (const Part &p : s.elements[element].parts) {
+    if (p.store->isConstraint() != constraint) continue;
+    if (row < p.store->rows()) return &p;
+    row -= p.store->rows();
+  }
+  return nullptr;
+}
 
 bool NeedsAcceleration(const Measure &m) { return Accelerates(m.kind); }
 
@@ -344,7 +343,10 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
     k.i = l.marker(m.i.id);
     if (s.valid(m.j)) k.j = l.marker(m.j.id);
     if (s.valid(m.frame)) k.frame = l.marker(m.frame.id);
-    if (m.kind == Measure::Angle) k.angle = PrincipalAngle<double>(s.frame(m.i), s.frame(m.j));
+    if (m.kind != Measure::Angle) break;
+    k.angle = PrincipalAngle<double>(s.frame(m.i), s.frame(m.j));
+    k.of[0] = m.i.id;
+    k.of[1] = m.j.id;
   }
   return k;
 }
@@ -482,6 +484,11 @@ void MeasureSet::addGradient(int k, const Evaluation &e, double factor, double *
 void MeasureSet::accept(const Bodies &B)
 {
   for (LocalMeasure &m : all_) m.accept(B);
+}
+
+bool MeasureSet::countedAngle(PetscInt i, PetscInt j, double *x) const
+{
+  return std::any_of(all_.begin(), all_.end(), [&](const LocalMeasure &m) { return m.countedAngle(i, j, x); });
 }
 
 bool MeasureSet::limitsSteps() const

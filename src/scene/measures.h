@@ -20,9 +20,16 @@ struct LocalMeasure {
   PetscInt                            i = -1, j = -1, frame = -1; /* local markers; -1: the space origin, space axes */
   Input                               input;                      /* a scalar unknown */
   double                              angle = 0; /* counted over full turns, at the last accepted step */
+  PetscInt                            of[2] = {-1, -1}; /* markers of an angle, in the scene */
   std::vector<std::unique_ptr<Probe>> probes;
 
   void     accept(const Bodies &B);
+  bool     countedAngle(PetscInt marker, PetscInt about, double *x) const
+  {
+    if (kind != Measure::Angle || of[0] != marker || of[1] != about) return false;
+    *x = angle;
+    return true;
+  }
   double   longestStep(const Evaluation &e) const; /* for angles */
   PetscInt memory() const;
   void     copyMemory(double *x, bool in);
@@ -33,6 +40,9 @@ struct LocalMeasure {
 LocalMeasure PlaceMeasure(Localizer &l, const Measure &m);
 
 double MeasureValue(const LocalMeasure &m, const Evaluation &e);
+
+/* The part of an element that has row or component `row`, which becomes the part's own; null if none has */
+const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row);
 
 bool NeedsAcceleration(const Measure &m);
 /* Whether positions, velocities and states do not determine it, but accelerations, multipliers, variables or force states */
@@ -81,6 +91,7 @@ public:
   void addGradient(int k, const Evaluation &e, double factor, double *row) const;
 
   void     accept(const Bodies &B);
+  bool     countedAngle(PetscInt i, PetscInt j, double *x) const;
   bool     limitsSteps() const;
   double   longestStep(const Evaluation &e) const;
   PetscInt memory() const;

@@ -7,6 +7,7 @@
 #define HHTDAE_SCENE_PROBE_H
 
 #include "constraint_batch.h"
+#include "described_rows.h"
 #include "force_batch.h"
 
 namespace hhtdae
@@ -26,6 +27,9 @@ public:
   /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 a marker) and
      by the multipliers. The reactions of the kernels that have inputs do not depend on them. */
   virtual void reactionGradient(const Evaluation &, const double *, double *, double *) const {}
+
+  /* Its rows, dropped ones too, in the state of e: values as of a description, at velocity level Psi; speed: what Psi is the difference of */
+  virtual void rows(const Evaluation &, DescribedRows &, double *speed) const { (void)speed; }
 
   /* of a force */
   virtual void components(const Evaluation &, double *) const {}
@@ -99,8 +103,40 @@ public:
     for (int i = 0; i < rows_; i++) lambda[i] = rows(row_[i]);
   }
 
+  void rows(const Evaluation &ev, DescribedRows &d, double *speed) const override
+  {
+    State s;
+    gather(ev, s);
+    d.name   = K::name;
+    d.length = false;
+    for (int k = 0; k < M; k++) d.length |= Depends(K::depends, 2 * k);
+    std::fill(d.rate, d.rate + R, 0.0);
+    if constexpr (K::holonomic)
+      K::value(this->e.data, s.f, ev.t, d.value);
+    else {
+      Twist<double> still[M];
+      for (Twist<double> &w : still) w = {Vec3<double>::Zero(), Vec3<double>::Zero()};
+      value(s.f, s.w, ev.t, s.z, d.value);
+      value(s.f, still, ev.t, s.z, d.rate);
+    }
+    d.J.template topLeftCorner<R, 6 * M>() = s.J;
+    if constexpr (K::own_units) MakeLengths<R, M>(d);
+    for (int r = 0; r < R && !K::holonomic; r++) {
+      speed[r] = std::abs(d.rate[r]);
+      for (int k = 0; k < M; k++) speed[r] += std::abs(d.J.template block<1, 3>(r, 6 * k).dot(s.w[k].v)) + std::abs(d.J.template block<1, 3>(r, 6 * k + 3).dot(s.w[k].w));
+    }
+  }
+
 private:
   int row_[R], rows_ = 0; /* that are not redundant */
+
+  void value(const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi) const
+  {
+    if constexpr (K::holonomic) return;
+    else if constexpr (Z > 0) K::template value<double>(this->e.data, f, w, t, z, psi);
+    else K::template value<double>(this->e.data, f, w, t, psi);
+    (void)f, (void)w, (void)t, (void)z, (void)psi;
+  }
 
   void gather(const Evaluation &ev, State &s) const
   {

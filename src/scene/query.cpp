@@ -33,14 +33,23 @@ struct Snapshot::Work {
   double              t = 0;
   std::vector<double> u, v, a;
   long                moved = -1; /* which move of the bodies was to this state */
+  std::vector<CountedAngle> counted; /* as the run had them when the state was taken, after so many accepted states */
+  long                      accepts = 0;
+  std::vector<Matrix3>      references; /* of the bodies' rotations then; the run has others once it has gone on */
 
   Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
   /* The bodies, where somebody else may have moved them */
   void move()
   {
     if (moved == R->bodies.moves) return;
+    exchangeReferences();
     R->bodies.move(u.data(), v.data());
+    exchangeReferences();
     moved = R->bodies.moves;
+  }
+  void exchangeReferences()
+  {
+    for (std::size_t b = 0; b < references.size(); b++) std::swap(R->bodies.body[b].C, references[b]);
   }
   const SceneData &scene() const { return R->scene; }
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
@@ -51,6 +60,8 @@ struct Snapshot::Work {
   PetscErrorCode scalar(PetscMPIInt owner, PetscInt global, double *x);
   PetscErrorCode component(const ElementData &e, PetscInt row, bool constraint, double *x);
   PetscErrorCode ofMarkers(const Measure &m, double *x);
+  PetscErrorCode angle(PetscInt i, PetscInt j, double *x);
+  PetscErrorCode checkMemory(PetscInt element);
 };
 
 Snapshot::Snapshot() : work_(std::make_unique<Work>()) {}
@@ -178,6 +189,10 @@ PetscErrorCode Snapshot::take(Runtime &run, PetscReal t, Vec state[3])
   w.R                         = &run;
   w.t                         = t;
   w.moved                     = -1;
+  w.counted                   = run.asked;
+  w.accepts                   = run.accepts;
+  w.references.clear();
+  for (const LocalBody &b : run.bodies.body) w.references.push_back(b.C);
   std::vector<double> *out[3] = {&w.u, &w.v, &w.a};
   PetscCall(Localize(run, state, out));
   PetscFunctionReturn(0);
@@ -281,12 +296,30 @@ PetscErrorCode Snapshot::modes(Body b, std::vector<double> *coordinates)
 
 /* ---- loads ---- */
 
+/* What elements remember is that of the run as it is now */
+PetscErrorCode Snapshot::Work::checkMemory(PetscInt element)
+{
+  const ElementData &e = scene().elements[element];
+  double             n;
+  PetscFunctionBegin;
+  if (accepts == R->accepts) PetscFunctionReturn(0);
+  PetscCall(FromOwner(*R, ownerOfElement(e), &n, 1, [&](double *y) {
+    for (const auto &p : ReadersOf(*R, element)) *y += (double)p->memory();
+  }));
+  PetscCheck(n == 0, scene().comm, PETSC_ERR_ARG_WRONGSTATE,
+             "Snapshot: the run has gone on since its state at t = %g was taken, and %s %s counts full turns or follows a curve, which it does for the "
+             "present state alone; ask earlier, or take() again",
+             t, e.type, e.name.c_str());
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
 {
   const ElementData &e = scene().elements[element];
   double             numbers[6];
   Motion             at_marker;
   PetscFunctionBegin;
+  PetscCall(checkMemory(element));
   PetscCall(motion(on, &at_marker));
   PetscCall(FromOwner(*R, ownerOfElement(e), numbers, 6, [&](double *y) {
     Vector3 f = Vector3::Zero(), m = f;
@@ -358,6 +391,7 @@ PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, boo
     } else if (p.store->carried(p.index)) {
       PetscCall(scalar(owner, p.store->start[p.index] + row, x));
     } else {
+      PetscCall(checkMemory(p.store->element(p.index)));
       PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) {
         std::vector<double> c(p.store->rows());
         move();
@@ -386,11 +420,31 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
   case Measure::Velocity: *x = axis.dot(v); break;
   case Measure::Rate: *x = d.dot(v) / d.norm(); break;
   case Measure::Acceleration: *x = axis.dot(i.acceleration - j.acceleration); break;
-  case Measure::Angle: *x = std::atan2(j.axes.col(1).dot(i.axes.col(0)), j.axes.col(0).dot(i.axes.col(0))); break;
   case Measure::AngularVelocity: *x = axis.dot(i.angular_velocity - j.angular_velocity); break;
   case Measure::AngularAcceleration: *x = axis.dot(i.angular_acceleration - j.angular_acceleration); break;
   default: *x = 0;
   }
+  PetscFunctionReturn(0);
+}
+
+/* The run counts the turns of an angle from the first question for it on */
+PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
+{
+  const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
+  const auto                mine = std::find_if(counted.begin(), counted.end(), same);
+  std::vector<CountedAngle> now(1);
+  PetscFunctionBegin;
+  move();
+  if (mine != counted.end()) {
+    now[0] = *mine;
+  } else {
+    PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
+    const bool here = accepts == R->accepts; /* else the run has gone on since the state was taken */
+    if (here && std::none_of(R->asked.begin(), R->asked.end(), same)) R->asked.push_back(now[0]);
+    counted.push_back(now[0]);
+  }
+  PetscCall(CountAngles(*R, u.data(), now));
+  *x = now[0].angle;
   PetscFunctionReturn(0);
 }
 
@@ -431,6 +485,7 @@ PetscErrorCode Snapshot::value(const Measure &m, double *x)
     PetscCall(load(Element{m.target}, m.i, &l, m.frame));
     *x = m.kind == Measure::ElementForce ? l.force(m.component) : l.moment(m.component);
     break;
+  case Measure::Angle: PetscCall(w.angle(m.i.id, m.j.id, x)); break;
   default: PetscCall(w.ofMarkers(m, x));
   }
   PetscFunctionReturn(0);

@@ -64,20 +64,6 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Motion of the bodies in the state (U, V), with others' bodies */
-PetscErrorCode Move(Runtime &R, Vec U, Vec V)
-{
-  const double *u, *v, *local[3];
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(U, &u));
-  PetscCall(VecGetArrayRead(V, &v));
-  PetscCall(LocalState(R, u, v, v, local));
-  R.bodies.move(local[0], local[1]);
-  PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCall(VecRestoreArrayRead(V, &v));
-  PetscFunctionReturn(0);
-}
-
 /* Own bodies that need other axes, and which */
 PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
 {
@@ -127,6 +113,7 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
   PetscCall(CheckTime(R, t));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
+  PetscCall(CheckDropped(R, t, U, V));
   PetscCall(ChooseNext(R, U, V));
   *change = R.changing ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
@@ -287,14 +274,33 @@ PetscErrorCode Prepare(TS ts)
 
 } // namespace
 
-/* Elements remember the accepted state */
+/* Motion of the bodies in the state (U, V), with others' bodies */
+PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)
+{
+  const double *u, *v, *local[3];
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArrayRead(V, &v));
+  PetscCall(LocalState(R, u, v, v, local));
+  R.bodies.move(local[0], local[1]);
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(V, &v));
+  PetscFunctionReturn(0);
+}
+
+/* Elements and questions remember the accepted state */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
 {
+  const double *u;
   PetscFunctionBegin;
-  if (!R.remembers) PetscFunctionReturn(0);
-  PetscCall(Move(R, U, V));
+  R.accepts++;
+  if (!R.remembers && R.asked.empty()) PetscFunctionReturn(0);
+  PetscCall(MoveBodies(R, U, V));
   for (auto &b : R.batches) b->accept(R.bodies);
   PetscCall(KeepMemories(R));
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(CountAngles(R, u, R.asked));
+  PetscCall(VecRestoreArrayRead(U, &u));
   PetscFunctionReturn(0);
 }
 
@@ -388,7 +394,13 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
   Vec       vatol, vrtol, U;
   PetscFunctionBegin;
   PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
-  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) PetscFunctionReturn(0); /* the user's own */
+  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) { /* the user's own, by the largest of which dropped rows are judged */
+    R.tolerance_of[0] = atol;
+    R.tolerance_of[1] = rtol;
+    if (R.dropped && vatol) PetscCall(VecMax(vatol, nullptr, &R.tolerance_of[0]));
+    if (R.dropped && vrtol) PetscCall(VecMax(vrtol, nullptr, &R.tolerance_of[1]));
+    PetscFunctionReturn(0);
+  }
   if (vrtol && R.tolerance_of[0] == atol && R.tolerance_of[1] == rtol) PetscFunctionReturn(0);
   PetscCall(TSGetSolution(ts, &U));
   const double whole[2] = {atol, rtol}, angles[2] = {R.scene.start.angle_tol, 0};

@@ -11,8 +11,16 @@
 namespace hhtdae
 {
 
+struct DroppedRows; /* dropped_rows.cpp */
 struct Recorder;    /* output/recorder.h */
 struct ChannelWork; /* output/channels.h */
+
+/* An angle that a question has asked for, over full turns, at the last accepted step or where it was asked for first */
+struct CountedAngle {
+  PetscInt i, j; /* markers, in the scene */
+  double   angle;
+  double   turned; /* planar scenes: by the bodies' own angles, which count turns whatever the length of a step */
+};
 
 struct Runtime {
   const std::shared_ptr<const Model> model;
@@ -60,6 +68,9 @@ struct Runtime {
   PetscInt              reframed = 0; /* changes of axes so far, own bodies */
 
   std::map<PetscInt, std::vector<std::unique_ptr<Probe>>> readers; /* of elements that were asked for, ReadersOf() */
+  std::vector<CountedAngle>    asked;
+  long                         accepts = 0; /* accepted states that `asked` and the memories have seen */
+  std::shared_ptr<DroppedRows> dropped;     /* none unless rows were dropped as redundant, on any rank */
   std::shared_ptr<ChannelWork> channels;
   std::shared_ptr<Recorder>    recorder; /* none unless output was asked for */
 
@@ -102,6 +113,16 @@ PetscErrorCode KeepMemories(Runtime &R);
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V);
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
+/* counted_angles.cpp: the angles at the state where the bodies have been moved to, which u is the own unknowns of; one more of them: its
+   turns are those that a spring, a motion, a channel count, or in a planar scene those from the start, else it is in (-pi, pi]. Collective */
+PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all);
+PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first);
+PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y); /* to a run that goes on in another vector */
+/* reframe.cpp: others' bodies too */
+PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V);
+/* dropped_rows.cpp: an error where one is violated */
+PetscErrorCode LocalizeDropped(Runtime &R, Localizer &l);
+PetscErrorCode CheckDropped(Runtime &R, PetscReal t, Vec U, Vec V);
 /* kept.cpp: the end of the vector of checkpoints, of that many entries */
 constexpr PetscInt kept = 72;
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */

@@ -46,6 +46,7 @@ public:
   virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
   virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
   virtual bool          symmetric(PetscInt) const { return false; } /* its part of the matrix, where nothing else breaks that */
+  virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
@@ -110,6 +111,12 @@ public:
   int           rows() const override { return K::rows; }
   unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
+  bool          drivenAngle(PetscInt e, double t, double *x) const override
+  {
+    if constexpr (K::says_angle) *x = K::angleAt(this->all[e].data, t);
+    (void)e, (void)t, (void)x;
+    return K::says_angle;
+  }
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override { DescribeRows<K>(s, this->all[e], t, rows); }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
@@ -125,7 +132,7 @@ public:
       i.lambda = l.local(this->start[e]);
       i.group  = l.group(this->start[e], this->unknowns(e));
       batch->all.push_back(i);
-      if constexpr (K::memory > 0) batch->of.add(e);
+      if constexpr (K::memory > 0 || K::says_angle) batch->of.add(e);
     }
     batch->all.shrink_to_fit();
     if (!batch->all.empty()) batches.push_back(std::move(batch));

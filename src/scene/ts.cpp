@@ -67,6 +67,18 @@ PetscErrorCode ViewWithTS(const Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
+/* The end of the last step, which no other begins at */
+PetscErrorCode CheckEnd(Runtime &R, TS ts)
+{
+  PetscReal t;
+  Vec       U, V;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(Guarded([&] { return CheckDropped(R, t, U, V); }));
+  PetscFunctionReturn(0);
+}
+
 /* With -ts_exact_final_time interpolate PETSc writes the solution at the final time into a vector of the caller's, and nowhere
    without one. Here the TS itself has it at the end, with its velocities and time. */
 PetscErrorCode Solve(TS ts)
@@ -210,6 +222,7 @@ PetscErrorCode Scene::solve(TS ts)
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
   if (!failed || R->size == 1) PetscCall(FinishOutput(*R));
   PetscCall(failed);
+  PetscCall(CheckEnd(*R, ts));
   PetscCall(ViewWithTS(*R, ts));
   PetscFunctionReturn(0);
 }

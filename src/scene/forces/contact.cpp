@@ -12,10 +12,15 @@ namespace hhtdae
 namespace
 {
 
-ElementBuilder Entry(Scene &scene, const std::string &name, const char *type, Marker i, Marker j)
+enum class Round { No, I, Both }; /* which shapes are spheres about their markers' origins */
+
+ElementBuilder Entry(Scene &scene, const std::string &name, const char *type, Marker i, Marker j, const ContactLaw &law, Round round)
 {
   ElementBuilder e(scene, name, type, ElementData::Force, i, j);
   RequireTwoBodies(e, i, j);
+  /* the normal force alone, on a sphere alone, has no moment about the marker's origin */
+  if (law.friction != 0 || round == Round::No) RequireNoPoint(e, i, "i");
+  if (law.friction != 0 || round != Round::Both) RequireNoPoint(e, j, "j");
   return e;
 }
 
@@ -25,7 +30,7 @@ int PlaneNormal(const ElementBuilder &e) { return e.planar() ? 1 : 2; }
 
 template <> Element Scene::enter(const std::string &name, const SpherePlane &s)
 {
-  ElementBuilder e = Entry(*this, name, "sphere-plane contact", s.i, s.j);
+  ElementBuilder e = Entry(*this, name, "sphere-plane contact", s.i, s.j, s.law, Round::I);
   RequirePositive(e, "radius", s.radius);
   e.load<Contact<SpherePlaneShape>>({s.i, s.j}, {{s.radius, PlaneNormal(e)}, CheckedLaw(e, s.law, s.radius)}, {},
                                     s.state);
@@ -34,7 +39,7 @@ template <> Element Scene::enter(const std::string &name, const SpherePlane &s)
 
 template <> Element Scene::enter(const std::string &name, const EllipsoidPlane &s)
 {
-  ElementBuilder e = Entry(*this, name, "ellipsoid-plane contact", s.i, s.j);
+  ElementBuilder e = Entry(*this, name, "ellipsoid-plane contact", s.i, s.j, s.law, Round::No);
   for (int k = 0; k < 3; k++) RequirePositive(e, Component("semiaxis", k), s.semiaxes(k));
   const EllipsoidPlaneShape::Data shape{{s.semiaxes(0), s.semiaxes(1), s.semiaxes(2)}, PlaneNormal(e)};
   e.load<Contact<EllipsoidPlaneShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law, s.semiaxes.minCoeff())}, {}, s.state);
@@ -43,7 +48,7 @@ template <> Element Scene::enter(const std::string &name, const EllipsoidPlane &
 
 template <> Element Scene::enter(const std::string &name, const TorusPlane &s)
 {
-  ElementBuilder e = Entry(*this, name, "torus-plane contact", s.i, s.j);
+  ElementBuilder e = Entry(*this, name, "torus-plane contact", s.i, s.j, s.law, Round::No);
   e.require(!e.planar(), "a planar scene has no torus; a wheel is a SpherePlane with the outer radius");
   RequirePositive(e, "radius", s.radius);
   RequirePositive(e, "tube radius", s.tube);
@@ -54,7 +59,7 @@ template <> Element Scene::enter(const std::string &name, const TorusPlane &s)
 
 template <> Element Scene::enter(const std::string &name, const SphereSphere &s)
 {
-  ElementBuilder e = Entry(*this, name, "sphere-sphere contact", s.i, s.j);
+  ElementBuilder e = Entry(*this, name, "sphere-sphere contact", s.i, s.j, s.law, Round::Both);
   RequirePositive(e, "radius of i", s.radius_i);
   RequirePositive(e, "radius of j", s.radius_j);
   const double size = std::min(s.radius_i, s.radius_j);
@@ -64,7 +69,7 @@ template <> Element Scene::enter(const std::string &name, const SphereSphere &s)
 
 template <> Element Scene::enter(const std::string &name, const SphereBox &s)
 {
-  ElementBuilder e = Entry(*this, name, "sphere-box contact", s.i, s.j);
+  ElementBuilder e = Entry(*this, name, "sphere-box contact", s.i, s.j, s.law, Round::I);
   RequirePositive(e, "radius", s.radius);
   SphereBoxShape::Data shape{s.radius, {s.half(0), s.half(1), s.half(2)}};
   if (e.planar())

@@ -134,6 +134,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
   if (!e.good()) return e.done();
   const PetscInt other = s.markers[x.j.id].body;
   e.require(other < 0 || s.bodies[other].carrier != x.body.id, "marker j is on the same flexible body " + s.bodyName(x.body.id));
+  if (x.radius_j == 0 || x.law.friction != 0) RequireNoPoint(e, x.j, "j"); /* a sphere without friction alone takes no moment */
   if (x.radius_j == 0) RequireNotNegative(e, "radius", x.radius);
   else RequirePositive(e, "radius", x.radius);
   if (x.radius_j != 0) RequirePositive(e, "radius_j", x.radius_j);

@@ -64,6 +64,13 @@ inline void RequireTurning(ElementBuilder &e, Marker m, const char *marker)
                        ", which takes no moment; use a rigid body");
 }
 
+/* The same of a contact, whose shape at a node of a flexible body turns with the body's floating frame */
+inline void RequireNoPoint(ElementBuilder &e, Marker m, const char *marker)
+{
+  const PetscInt b = e.good() ? e.scene().markers[m.id].body : -1;
+  if (b >= 0 && e.scene().bodies[b].point) RequireTurning(e, m, marker);
+}
+
 /* no distance but rounding */
 inline bool Coincident(const Frame<double> &i, const Frame<double> &j)
 {

@@ -51,6 +51,7 @@ template <> Element Scene::enter(const std::string &name, const TranslationalSto
 {
   ElementBuilder e(*this, name, "translational stop", ElementData::Force, s.i, s.j);
   RequireTwoBodies(e, s.i, s.j);
+  RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
   e.require(s.axis >= 0 && s.axis < 3, "axis is " + std::to_string(s.axis) + ", must be 0, 1 or 2");
   e.require(!e.planar() || s.axis < 2, "axis is 2, which is normal to the plane of a planar scene");
   StopData d = CheckedStop(e, s.lower, s.upper, s.law, Size(e, s.i, s.j, s.lower, s.upper));

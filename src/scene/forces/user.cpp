@@ -3,6 +3,7 @@
   read; with `state = true` carried as force states with rows F - f(...) = 0. Components that read accelerations are
   always carried, because an equation of motion has to be affine in q'', which is what the integrator makes use of.
 */
+#include "requirements.h"
 #include "scene/expression_batch.h"
 #include "scene/kernels/user_force.h"
 #include "scene/runtime.h"
@@ -80,6 +81,10 @@ public:
   void accept(Bodies &B) override
   {
     for (LocalFunction &f : functions) f.arguments.accept(B);
+  }
+  bool countedAngle(PetscInt i, PetscInt j, double, double *x) const override
+  {
+    return std::any_of(functions.begin(), functions.end(), [&](const LocalFunction &f) { return f.arguments.countedAngle(i, j, x); });
   }
   bool limitsSteps() const override
   {
@@ -248,19 +253,6 @@ void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename
 
 } // namespace
 
-namespace
-{
-
-void RefuseMoment(ElementBuilder &e, Marker m)
-{
-  const SceneData &s = e.scene();
-  if (!e.good() || m.id < 0) return;
-  const PetscInt b = s.markers[m.id].body;
-  if (b >= 0 && s.bodies[b].forces_alone) e.require(false, "a moment acts on " + s.turnlessName(b) + ", which takes forces alone");
-}
-
-} // namespace
-
 /* Components as measures and force states: forces first, then moments. */
 template <> Element Scene::enter(const std::string &name, const UserForce &s)
 {
@@ -274,8 +266,8 @@ template <> Element Scene::enter(const std::string &name, const UserForce &s)
                   ", must be none or three");
   e.require(!s.force.empty() || !s.moment.empty(), "neither force nor moment is given");
   if (framed) e.require(s.frame, "marker `frame`");
-  for (Marker m : {s.i, s.j})
-    if (!s.moment.empty()) RefuseMoment(e, m);
+  if (!s.moment.empty()) RequireTurning(e, s.i, "i");
+  if (reaction) RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
   if (!e.good()) return e.done();
   std::vector<Expression> f = s.force;
   f.insert(f.end(), s.moment.begin(), s.moment.end());
@@ -299,8 +291,10 @@ template <> Element Scene::enter(const std::string &name, const UserScalarForce 
   if (e.good() && !s.rotational)
     e.require((e.frame(s.i).x - e.frame(s.j).x).norm() > 0,
               "the origins of markers i and j coincide, the line between them has no direction");
-  for (Marker m : {s.i, s.j})
-    if (s.rotational) RefuseMoment(e, m);
+  if (s.rotational) {
+    RequireTurning(e, s.i, "i");
+    RequireTurning(e, s.j, "j");
+  }
   if (!e.good()) return e.done();
   if (s.rotational)
     Enter<UserAboutAxis>(e, {s.i, s.j}, {}, {s.value}, s.state);

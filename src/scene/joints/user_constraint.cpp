@@ -64,7 +64,22 @@ private:
       else
         require(kind == Measure::Time || OfPositions(kind) || UserRow::ofVelocities(kind),
                 what + ": a constraint reads displacements, distances, angles, velocities, rates, angular velocities and time");
+      mayTurn(given_.arguments[k], what);
     }
+  }
+
+  /* The load of a row on what it turns with is a moment */
+  void mayTurn(const Measure &m, const std::string &what)
+  {
+    const SceneData &s      = e_.scene();
+    const bool       angles = m.kind == Measure::Angle || m.kind == Measure::AngularVelocity;
+    const auto       check  = [&](Marker k, const char *marker) {
+      if (!s.valid(k) || !s.turnless(s.markers[k.id].body)) return;
+      require(false, what + ": marker " + marker + " is on " + s.turnlessName(s.markers[k.id].body) + ", which takes no moment; use a rigid body");
+    };
+    if (angles) check(m.i, "i");
+    if (angles) check(m.j, "j");
+    check(m.frame, "`frame`");
   }
 
   int number(Marker m)

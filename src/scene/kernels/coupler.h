@@ -17,7 +17,7 @@ namespace hhtdae
 template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 1> {
   static_assert(N >= 1 && R >= 0 && R <= N, "R of the N terms are angles");
   static constexpr const char *name   = "coupler";
-  static constexpr int         memory = N;
+  static constexpr int         memory = N, angles = R;
   using Base                          = Constraint<CouplerRow<N, R>, 2 * N, 1>;
   using Gradient                      = typename Base::Gradient;
   using Hessian                       = typename Base::Hessian;
@@ -100,7 +100,7 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
    beside which goes the moment -pitch/(2 pi) times that about z_j. */
 struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   static constexpr const char *name   = "screw";
-  static constexpr int         memory = 1;
+  static constexpr int         memory = 1, angles = 1;
   using Base                          = Constraint<ScrewRow, 2, 1>;
   struct Data {
     double memory[1] = {};

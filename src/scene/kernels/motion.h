@@ -95,7 +95,9 @@ template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> 
 };
 
 struct DrivenAngle : DrivenDisplacement<DrivenAngle, TurnAboutZ> {
-  static constexpr const char *name = "driven angle";
+  static constexpr const char *name       = "driven angle";
+  static constexpr bool        says_angle = true;
+  static double                angleAt(const Data &d, double t) { return d.function(t).f; }
 };
 struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
   static constexpr const char *name = "driven advance";

@@ -14,7 +14,7 @@ namespace hhtdae
 {
 
 template <class K> struct TurnForce : Force<K, 2, 1> {
-  static constexpr int      memory  = 1;
+  static constexpr int      memory = 1, angles = 1;
   static constexpr unsigned depends = Rotation(0) | Rotation(1), acts = depends;
 
   template <class T, class Data> static void apply(const Data &, const Frame<T> *f, const T *c, Wrench<T> *on)

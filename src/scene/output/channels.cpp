@@ -29,6 +29,10 @@ public:
   {
     for (LocalMeasure &m : work_->own) m.accept(B);
   }
+  bool countedAngle(PetscInt i, PetscInt j, double, double *x) const override
+  {
+    return std::any_of(work_->own.begin(), work_->own.end(), [&](const LocalMeasure &m) { return m.countedAngle(i, j, x); });
+  }
   bool limitsSteps() const override
   {
     return std::any_of(work_->own.begin(), work_->own.end(), [](const LocalMeasure &m) { return m.kind == Measure::Angle; });

@@ -1,0 +1,113 @@
+/*
+  Angles that questions have asked a run for, counted over full turns. Every accepted state brings each of them up to date, Remember(),
+  whether the step was the integrator's or that of an analysis.
+*/
+#include "kernels/angle.h"
+#include "runtime.h"
+#include <array>
+
+namespace hhtdae
+{
+
+namespace
+{
+
+/* x_i, x_j and y_j, and by what their bodies have turned in a planar scene */
+using Axes = std::array<double, 10>;
+
+/* What this rank knows of it, zero elsewhere; the first rank knows the ground */
+void AddAxes(const Runtime &R, const double *u, PetscInt marker, bool about, Axes &sum)
+{
+  const MarkerData &m  = R.scene.markers[marker];
+  const PetscInt    id = m.body;
+  if (R.rank != (id < 0 || R.number.owner.empty() ? 0 : R.number.owner[id])) return;
+  const LocalBody *body = id < 0 ? nullptr : &R.bodies.body[R.local_body[id]];
+  const Matrix3    axes = body ? Matrix3(R.bodies.now[R.local_body[id]].A * m.R) : m.R;
+  for (int c = 0; c < 3; c++) {
+    sum[about ? 3 + c : c] = axes(c, 0);
+    if (about) sum[6 + c] = axes(c, 1);
+  }
+  if (body && body->kind == BodyKind::Planar) sum[9] += (about ? -1 : 1) * u[body->first + 2];
+}
+
+PetscErrorCode GatherAxes(const Runtime &R, const double *u, const std::vector<CountedAngle> &all, std::vector<Axes> &axes)
+{
+  PetscFunctionBegin;
+  axes.assign(all.size(), Axes{});
+  for (std::size_t k = 0; k < all.size(); k++) {
+    AddAxes(R, u, all[k].i, false, axes[k]);
+    AddAxes(R, u, all[k].j, true, axes[k]);
+  }
+  if (R.size > 1 && !all.empty()) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, axes[0].data(), (PetscMPIInt)(axes.size() * axes[0].size()), MPI_DOUBLE, MPI_SUM, R.scene.comm));
+  PetscFunctionReturn(0);
+}
+
+double PrincipalOf(const Axes &x)
+{
+  const Eigen::Map<const Vector3> xi(x.data()), xj(x.data() + 3), yj(x.data() + 6);
+  return std::atan2(yj.dot(xi), xj.dot(xi));
+}
+
+/* The angle of a planar body at the start, as its unknown has it */
+double StartOf(const SceneData &s, PetscInt marker)
+{
+  const PetscInt b = s.markers[marker].body;
+  return b < 0 || s.bodies[b].point ? 0 : std::atan2(s.bodies[b].A(1, 0), s.bodies[b].A(0, 0));
+}
+
+} // namespace
+
+bool InstancesOf::joins(std::size_t n, int k, PetscInt i, PetscInt j) const { return store->marker(number[n], 2 * k) == i && store->marker(number[n], 2 * k + 1) == j; }
+
+PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all)
+{
+  std::vector<Axes> axes;
+  PetscFunctionBegin;
+  PetscCall(GatherAxes(R, u, all, axes));
+  for (std::size_t k = 0; k < all.size(); k++) {
+    CountedAngle &c = all[k];
+    c.angle         = Unwind<double>(PrincipalOf(axes[k]), c.angle + (R.scene.planar ? axes[k][9] - c.turned : 0));
+    c.turned        = axes[k][9];
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first)
+{
+  const SceneData          &s    = R.scene;
+  double                    most = PETSC_NINFINITY, x;
+  std::vector<CountedAngle> now{{i, j, 0, 0}};
+  PetscFunctionBegin;
+  if (s.planar) {
+    now[0].angle  = PrincipalAngle<double>(s.frame(Marker{i}), s.frame(Marker{j}));
+    now[0].turned = StartOf(s, i) - StartOf(s, j);
+  } else {
+    for (const auto &b : R.batches)
+      if (b->countedAngle(i, j, t, &x)) most = std::max(most, x);
+    if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
+    if (most > PETSC_NINFINITY) now[0].angle = most;
+  }
+  PetscCall(CountAngles(R, u, now));
+  *first = now[0];
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y)
+{
+  const double     *u;
+  std::vector<Axes> axes;
+  PetscFunctionBegin;
+  to.asked = from.asked;
+  PetscCall(MoveBodies(from, U, V));
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(CountAngles(from, u, to.asked));
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(MoveBodies(to, X, Y));
+  PetscCall(VecGetArrayRead(X, &u));
+  PetscCall(GatherAxes(to, u, to.asked, axes));
+  PetscCall(VecRestoreArrayRead(X, &u));
+  for (std::size_t k = 0; k < axes.size(); k++) to.asked[k].turned = axes[k][9];
+  PetscFunctionReturn(0);
+}
+
+} // namespace hhtdae

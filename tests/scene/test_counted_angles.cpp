@@ -1,0 +1,206 @@
+/* Angles over full turns in questions to a run, in PETSc's events, in kinematics and in runs that go on from others. */
+#include "hhtdae/analyses.h"
+#include "hhtdae/query.h"
+#include "scene_output.h"
+#include <cmath>
+
+using namespace hhtest;
+
+namespace
+{
+
+constexpr double turn = 2 * M_PI;
+
+/* A wheel on an axle that is inclined in space */
+struct Wheel {
+  Scene   scene;
+  Body    wheel;
+  Marker  i, j;
+  Element axle;
+
+  explicit Wheel(double speed = 0, Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
+  {
+    const Vector3 z = space == Space::Planar ? Vector3(0, 0, 1) : Vector3(Vector3(1, 2, 2) / 3);
+    const Matrix3 R = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), z).toRotationMatrix();
+    RigidBody     b;
+    b.rotation         = R;
+    b.angular_velocity = speed * z;
+    wheel              = scene.add("wheel", b);
+    i                  = scene.marker(wheel);
+    j                  = scene.markerAt(scene.ground(), Vector3::Zero(), R);
+    axle               = scene.add("axle", Revolute{i, j});
+  }
+};
+
+double angleAt(TS ts, double t, Marker i, Marker j)
+{
+  Snapshot now;
+  double   x;
+  must(now.take(ts, t));
+  must(now.value(Measure::angle(i, j), &x));
+  return x;
+}
+double angleOf(TS ts, Marker i, Marker j)
+{
+  PetscReal t;
+  must(TSGetTime(ts, &t));
+  return angleAt(ts, t, i, j);
+}
+
+} // namespace
+
+/* Asked for when all is over: the motion, the spring, a channel, in the plane the body itself know the turns */
+TEST(CountedAngles, AfterTheRunByWhatCounts)
+{
+  const double end = 5.3;
+  for (int how = 0; how < 5; how++) {
+    Wheel w(how == 0 ? 0 : turn, how == 4 ? Space::Planar : Space::Spatial);
+    if (how == 0) w.scene.add("drive", RotationalMotion{w.i, w.j, TimeFunction::polynomial({0, 0, turn})});
+    if (how == 1) w.scene.add("spring", TorsionalSpringDamper{w.i, w.j});
+    if (how == 2) w.scene.channel("angle", Measure::angle(w.i, w.j));
+    if (how == 3) w.scene.variable("angle", Measure::angle(w.i, w.j));
+    SceneRun run(w.scene, end, "-ts_rtol 1e-6 -ts_atol 1e-6");
+    must(run.solve());
+    EXPECT_NEAR(angleOf(run.ts, w.i, w.j), how == 0 ? turn * end * end : turn * end, 1e-4) << how;
+  }
+}
+
+/* Nothing else counts: from the first question on */
+TEST(CountedAngles, FromTheFirstQuestion)
+{
+  Wheel    w(turn);
+  SceneRun run(w.scene, 2.3, "");
+  EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 0, 1e-12);
+  must(run.solve());
+  Snapshot  old;
+  PetscReal before;
+  double    x;
+  must(old.take(run.ts));
+  must(TSGetPrevTime(run.ts, &before));
+  EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 2.3 * turn, 1e-6);
+  EXPECT_NEAR(angleAt(run.ts, (before + 2.3) / 2, w.i, w.j), (before + 2.3) / 2 * turn, 1e-6);
+  EXPECT_NEAR(angleOf(run.ts, w.j, w.i), -0.3 * turn, 1e-6); /* the other way round is another angle */
+  must(TSSetMaxTime(run.ts, 7.2));
+  must(run.solve());
+  EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 7.2 * turn, 1e-6);
+  EXPECT_NEAR(angleOf(run.ts, w.j, w.i), -5.2 * turn, 1e-6); /* from -0.3 turns at 2.3 */
+  must(old.value(Measure::angle(w.i, w.j), &x));
+  EXPECT_NEAR(x, 2.3 * turn, 1e-6);
+}
+
+/* What was taken before the run went on is what it was, and what elements remember of it is not asked for any more */
+TEST(CountedAngles, OldSnapshots)
+{
+  Wheel         w(turn);
+  const Marker  rim    = w.scene.marker(w.wheel, {1, 0, 0});
+  const Element spring = w.scene.add("spring", TorsionalSpringDamper{w.i, w.j, 1e-3});
+  SceneRun      run(w.scene, 0.4, "");
+  Snapshot      old;
+  Motion        before, after;
+  Load          load;
+  must(run.solve());
+  must(old.take(run.ts));
+  must(old.motion(rim, &before));
+  must(old.load(spring, w.i, &load));
+  must(TSSetMaxTime(run.ts, 1));
+  must(run.solve());
+  Snapshot now;
+  must(now.take(run.ts));
+  must(now.motion(rim, &after));
+  EXPECT_GT((after.position - before.position).norm(), 0.5);
+  must(old.motion(rim, &after));
+  EXPECT_EQ((after.position - before.position).norm(), 0);
+  EXPECT_EQ((after.velocity - before.velocity).norm(), 0);
+  ErrorTrap trap;
+  EXPECT_NE(old.load(spring, w.i, &load), 0);
+  EXPECT_TRUE(trap.says("the run has gone on since its state at t = 0.4 was taken, and torsional spring-damper spring counts full turns")) << trap.message;
+}
+
+/* In the plane steps may turn bodies further than half a turn */
+TEST(CountedAngles, InThePlaneWhateverTheStep)
+{
+  Wheel    w(40 * turn, Space::Planar);
+  SceneRun run(w.scene, 1.3, "-ts_adapt_type none -ts_dt 0.1");
+  must(run.solve());
+  EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 52 * turn, 1e-6);
+}
+
+/* TSSetEventHandler() ends the run after five turns, not where the angle is zero again for the first time */
+TEST(CountedAngles, InEvents)
+{
+  Wheel    w(1);
+  SceneRun run(w.scene, 100, "");
+  struct Event {
+    Marker    i, j;
+    Snapshot  now;
+    PetscReal at = -1;
+  } event;
+  event.i                   = w.i;
+  event.j                   = w.j;
+  PetscInt        direction = 0;
+  PetscBool       terminate = PETSC_TRUE;
+  const auto      value     = [](TS ts, PetscReal t, Vec, PetscScalar f[], void *ctx) {
+    Event &e = *static_cast<Event *>(ctx);
+    PetscCall(e.now.take(ts, t));
+    PetscCall(e.now.value(Measure::angle(e.i, e.j), f));
+    f[0] -= 5 * turn;
+    return PetscErrorCode(0);
+  };
+  const auto done = [](TS, PetscInt, PetscInt[], PetscReal t, Vec, PetscBool, void *ctx) {
+    static_cast<Event *>(ctx)->at = t;
+    return PetscErrorCode(0);
+  };
+  must(TSSetEventHandler(run.ts, 1, &direction, &terminate, value, done, &event));
+  must(run.solve());
+  EXPECT_NEAR(event.at, 5 * turn, 1e-5);
+}
+
+/* One call over many turns: the wheel of the gear is where they bring it */
+TEST(CountedAngles, KinematicsOverManyTurns)
+{
+  for (Space space : {Space::Spatial, Space::Planar}) {
+    Wheel        w(0, space);
+    const Body   other = w.scene.add("other", RigidBody());
+    const Marker k     = w.scene.marker(other), ground = w.scene.marker(w.scene.ground());
+    w.scene.add("axle of other", Revolute{k, ground});
+    w.scene.add("gear", Gear{w.i, w.j, k, ground, 3});
+    w.scene.add("drive", RotationalMotion{w.i, w.j, TimeFunction::polynomial({0, turn})});
+    w.scene.start().assembly = Assembly::Project;
+    SceneRun run(w.scene, 1, "");
+    for (double t : {5.2, -3.1, 0.4}) {
+      must(Kinematics(run.ts, t));
+      EXPECT_NEAR(angleOf(run.ts, w.i, w.j), t * turn, 1e-9) << t;
+      EXPECT_NEAR(angleOf(run.ts, k, ground), -t * turn / 3, 1e-9) << t;
+      Snapshot now;
+      Motion   m;
+      must(now.take(run.ts));
+      must(now.motion(other, &m));
+      EXPECT_NEAR(std::remainder(std::atan2(m.axes(1, 0), m.axes(0, 0)) + t * turn / 3, turn), 0, 1e-9) << t;
+    }
+  }
+}
+
+/* To a run that goes on, with the same model or with other parameters */
+TEST(CountedAngles, GoOnWithTheRun)
+{
+  for (bool parameters : {false, true})
+    for (Space space : {Space::Spatial, Space::Planar}) {
+      Scene           scene(PETSC_COMM_SELF, space);
+      const Parameter mass = parameters ? scene.parameter("mass", 1) : Parameter();
+      RigidBody       b;
+      b.angular_velocity = {0, 0, turn};
+      const Body   wheel = scene.add("wheel", b);
+      const Marker i = scene.marker(wheel), j = scene.marker(scene.ground());
+      scene.add("axle", Revolute{i, j});
+      SceneRun run(scene, 2.3, "");
+      EXPECT_NEAR(angleOf(run.ts, i, j), 0, 1e-12);
+      must(run.solve());
+      if (parameters) must(scene.set("mass", 2));
+      TS next;
+      must(scene.createTS(&next, run.ts));
+      must(TSSetMaxTime(next, 4.4));
+      must(scene.solve(next));
+      EXPECT_NEAR(angleOf(next, i, j), 4.4 * turn, 1e-6) << parameters;
+      must(TSDestroy(&next));
+    }
+}
