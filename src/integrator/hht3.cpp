@@ -134,6 +134,7 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(SetUpRotations(ts));
   PetscCall(SetUpOrder(ts));
   PetscCall(AllocateForRoles(ts));
+  PetscCall(CheckMatrices(ts));
   PetscCall(SetUpSolvers(ts));
   I.auto_h = (PetscBool)(ts->time_step == unset_step);
   if (I.constraints() && I.p.rho == 1)
@@ -182,6 +183,7 @@ PetscErrorCode Reset(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+  I.scaled_operator = 0;
 PetscErrorCode Destroy(TS ts)
 {
   PetscFunctionBegin;
@@ -379,6 +381,10 @@ static PetscErrorCode Finalize(void)
 
   Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
   this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.
+  The Newton matrix is scaled by rows and columns, and so is an operator (Amat) beside it, also a `MATSHELL`, which the integrator assembles for that
+  purpose: its product is that of the Jacobian as `TSSetI2Jacobian()` defines it. The matrix beside it (Pmat) has to give its rows (`MatGetRow()`): `MATAIJ`,
+  `MATBAIJ`, `MATSBAIJ`, `MATDENSE`.
+
 
   References:
 + * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007

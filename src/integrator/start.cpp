@@ -34,10 +34,13 @@ namespace
 PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 {
   Integrator &I = Get(ts);
+  PetscBool   mffd;
 
   PetscFunctionBegin;
   PetscCall(SNESSetUp(ts->snes));
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &c->P, NULL, NULL));
+  PetscCall(SNESGetJacobian(ts->snes, &c->J, &c->P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)c->J, MATMFFD, &mffd));
+  if (mffd) c->J = NULL;
   PetscCall(SNESGetKSP(ts->snes, &c->ksp));
   PetscCall(TimeScale(ts, &c->tiny));
   c->tiny *= 1e-28; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
