@@ -378,6 +378,22 @@ PetscErrorCode StartFromState(TS ts, Prepared have)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Initial values that are no numbers end up in a matrix, where nobody can tell where they came from */
+static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
+{
+  PetscReal value = 0, found;
+  PetscInt  row, first;
+
+  PetscFunctionBegin;
+  PetscCall(FirstWhere([](PetscInt, PetscScalar v) { return PetscIsInfOrNanScalar(v); }, &row, Read(x)));
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetOwnershipRange(x, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar v) { if (first + i == row) value = PetscIsNanScalar(v) ? 2 : PetscRealPart(v) > 0 ? 1 : -1; }, Read(x)));
+  PetscCallMPI(MPI_Allreduce(&value, &found, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %" PetscInt_FMT " is %s at t = %g: set it (TS2SetSolution())", what, row,
+          found > 1 ? "not a number (NaN)" : found > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
+}
+
 /* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode Start(TS ts)
 {
@@ -395,6 +411,8 @@ PetscErrorCode Start(TS ts)
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &v) { if (!IsDifferential(RoleOf(I, i))) v = 0; }, Write(I.V0)));
+  PetscCall(CheckInitialNumbers(ts, I.U0, "value"));
+  PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
   PetscCall(UpdateWeights(ts, I.U0));
