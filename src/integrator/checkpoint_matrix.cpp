@@ -169,10 +169,10 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(J, &rows));
   if (m.there) {
-    PetscCall(MakePattern(ts, rows ? J : P, P));
+    PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
+    PetscCall(MakePattern(ts, mffd ? P : J, P));
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
-    PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
     good = good && (rows || mffd); /* the application's product has no values to restore */
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
     if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));

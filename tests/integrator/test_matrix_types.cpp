@@ -1,6 +1,8 @@
 /* The types of matrices that an application may give: the same run as with MATAIJ, or a refusal that names the type */
 #include "matrix_types.h"
 #include "triangle.h"
+#include <cstdio>
+#include <unistd.h>
 
 using namespace hhtest;
 
@@ -38,6 +40,24 @@ TEST(MatrixTypes, Operators)
   expectOperators(ShortNet(NetRods::None), false);
   expectOperators(UserVars(.2), false);
   expectOperators(Sleigh(.2), false);
+}
+
+/* Products have no values that a checkpoint could keep: the matrix is made anew */
+TEST(MatrixTypes, OperatorsResume)
+{
+  const ShortNet    p;
+  const std::string file = "matrix_types_" + std::to_string(getpid()) + ".cp", half = krylov + "-ts_max_time .05 -ts_hhtdae_checkpoint " + file, rest = krylov + "-ts_hhtdae_resume " + file;
+  const Matrices    shell{MATAIJ, 1, Matrices::Shell};
+  ASSERT_EQ(MatrixRun(PETSC_COMM_SELF, p, {}, half).error, 0);
+  const MatrixRun reference(PETSC_COMM_SELF, p, {}, rest);
+  ASSERT_EQ(MatrixRun(PETSC_COMM_SELF, p, shell, half).error, 0);
+  const MatrixRun run(PETSC_COMM_SELF, p, shell, rest);
+  std::remove(file.c_str());
+  ASSERT_EQ(run.error, 0) << run.said;
+  EXPECT_EQ(run.s.steps, reference.s.steps);
+  EXPECT_EQ(run.s.corrector_fails, 0);
+  EXPECT_EQ(run.other, 0);
+  EXPECT_LT(relativeDifference(run.u, reference.u), 1e-3); /* the multipliers' */
 }
 
 TEST(MatrixTypes, AssembledTypes)
