@@ -252,11 +252,23 @@ PetscErrorCode CheckpointIfDue(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the last step there is no other one: TSSolve() calls its monitors then with the reason set */
-PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
+PetscErrorCode CheckCheckpointFile(TS ts)
 {
   PetscFunctionBegin;
-  if (ts->reason > 0 && step >= 0) PetscCall(CheckpointIfDue(ts));
+  if (Get(ts).checkpoint_file[0]) PetscCall(CheckpointFileCheck(PetscObjectComm((PetscObject)ts), Get(ts).checkpoint_file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the last step there is no other one: TSSolve() calls its monitors then with the reason set. A file without a number of steps is
+   written here alone. */
+PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.checkpoint_every > 0) PetscCall(CheckpointIfDue(ts));
+  else if (I.checkpoint_file[0] && I.have_step) PetscCall(CheckpointSave(ts, I.checkpoint_file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,8 +284,8 @@ PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
 - file - name of the file; written beside and renamed when complete
 
   Options Database Keys:
-+ -ts_hhtdae_checkpoint <file>    - write checkpoints to the file
-- -ts_hhtdae_checkpoint_every <n> - after every n accepted steps
++ -ts_hhtdae_checkpoint <file>    - write checkpoints to the file, whose directory has to exist when the run begins
+- -ts_hhtdae_checkpoint_every <n> - after every n accepted steps; without it one is written at the end of `TSSolve()`
 
   Level: intermediate
 

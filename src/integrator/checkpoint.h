@@ -14,6 +14,7 @@ PetscErrorCode CheckpointSave(TS ts, const char file[]);
 PetscErrorCode CheckpointLoad(TS ts, const char file[]);
 
 /* At the beginning of a step; the monitor does it after the last one */
+PetscErrorCode CheckCheckpointFile(TS ts); /* before the run: whether it can be written */
 PetscErrorCode CheckpointIfDue(TS ts);
 PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 

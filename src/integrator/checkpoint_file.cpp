@@ -68,12 +68,17 @@ struct Stream {
   }
 };
 
+std::string Directory(const std::string &file)
+{
+  const size_t slash = file.find_last_of('/');
+  return slash == std::string::npos ? "." : slash ? file.substr(0, slash) : "/";
+}
+
 /* A rename is on the disk when the directory is */
 void SyncDirectory(const std::string &file)
 {
-  const size_t      slash = file.find_last_of('/');
-  const std::string dir   = slash == std::string::npos ? "." : slash ? file.substr(0, slash) : "/";
-  const int         d     = open(dir.c_str(), O_RDONLY | O_DIRECTORY);
+  const std::string dir = Directory(file);
+  const int         d   = open(dir.c_str(), O_RDONLY | O_DIRECTORY);
   if (d < 0) return; /* not every file system lets itself be asked */
   (void)fsync(d);
   close(d);
@@ -213,6 +218,27 @@ PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const
   PetscCallMPI(MPI_Bcast(&out.error, 1, MPI_INT, 0, comm));
   PetscCheck(!out.error, comm, PETSC_ERR_FILE_WRITE, "Cannot write the checkpoint %s: %s", file.c_str(),
              out.error == EINVAL ? "it exists and is not a regular file" : std::strerror(out.error));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckpointFileCheck(MPI_Comm comm, const std::string &file)
+{
+  const std::string dir = Directory(file);
+  PetscMPIInt       rank;
+  int               error = 0;
+  struct stat       info;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (rank == 0) {
+    if (!stat(file.c_str(), &info) && !S_ISREG(info.st_mode)) error = EINVAL;
+    else if (stat(dir.c_str(), &info)) error = errno;
+    else if (!S_ISDIR(info.st_mode)) error = ENOTDIR;
+    else if (access(dir.c_str(), W_OK | X_OK)) error = errno;
+  }
+  PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
+  PetscCheck(!error, comm, PETSC_ERR_FILE_OPEN, "No checkpoint can be written to %s (-ts_hhtdae_checkpoint): %s %s", file.c_str(), error == EINVAL ? "it" : ("directory " + dir + ":").c_str(),
+             error == EINVAL ? "exists and is not a regular file" : std::strerror(error));
   PetscFunctionReturn(0);
 }
 

@@ -5,6 +5,7 @@
 #include "checkpoint_matrix.h"
 #include "equations.h"
 #include "formulas.h"
+#include "jacobian.h"
 #include "linear/archive.h"
 #include "linear/linear.h"
 #include <cstdint>
@@ -20,17 +21,6 @@ struct MatrixState {
   PetscBool there  = PETSC_FALSE; /* its values are in the file */
   PetscBool chosen = PETSC_FALSE; /* a linear solver was */
 };
-
-PetscErrorCode GivesRows(Mat A, PetscBool *yes)
-{
-  PetscBool foreign;
-
-  PetscFunctionBegin;
-  PetscCall(MatHasOperation(A, MATOP_GET_ROW, yes));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, ""));
-  if (foreign) *yes = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode Rows(Mat A, std::vector<PetscScalar> &values, std::vector<PetscInt> &columns)
 {
@@ -169,7 +159,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   MatrixState m;
   Mat         J, P;
   KSP         ksp;
-  PetscBool   rows, same = PETSC_FALSE;
+  PetscBool   rows, mffd, same = PETSC_FALSE;
   bool        good = true;
 
   PetscFunctionBegin;
@@ -179,9 +169,11 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(J, &rows));
   if (m.there) {
-    PetscCall(MakePattern(ts, rows ? J : P, P));
+    PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
+    PetscCall(MakePattern(ts, mffd ? P : J, P));
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
+    good = good && (rows || mffd); /* the application's product has no values to restore */
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
     if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;

@@ -130,7 +130,7 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
 
   PetscFunctionBegin;
   for (int attempt = 0; attempt < 2 && !numbers; attempt++) { /* there is no h to cut: an application whose Jacobian is not a number is asked once more */
-    PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.P, c.P));
+    PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.J ? c.J : c.P, c.P));
     PetscCall(PetscObjectStateGet((PetscObject)c.P, &state));
     if (state != *c.scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
     PetscCall(PetscObjectStateGet((PetscObject)c.P, c.scaled));

@@ -12,6 +12,7 @@ namespace hht3
 /* Where they are solved for: in the vectors, matrix and solver of the run, or in those of samples between steps */
 struct Consistent {
   Mat P   = nullptr; /* [M Phi_q^T; Phi_q 0] */
+  Mat J   = nullptr; /* the application's operator beside it, which its Jacobian gets; null: P */
   KSP ksp = nullptr;
   Vec U = nullptr, V = nullptr, A = nullptr; /* the state; of it X has q'', s' and what is algebraic */
   Vec X = nullptr;

@@ -113,13 +113,14 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 
 } // namespace
 
-/* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already */
+/* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already (MATMFFD). Products of the
+   application's (MATSHELL) are not. */
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
 {
   PetscBool mffd, triangle;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &mffd, MATMFFD, MATSHELL, ""));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMFFD, &mffd));
   if (mffd) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LinearStoresTriangle(A, &triangle));
   if (I.coordinatesAlone()) PetscCall(MatScale(A, s.coordinate));
@@ -130,6 +131,26 @@ PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
     if (triangle) PetscCall(ScaleTriangle(I, A));
     else PetscCall(MatDiagonalScale(A, I.row, I.col));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An operator J beside P. A shell multiplies with all the scalings that it was given since it was assembled last, which an application
+   need not do: so it is assembled here (MatrixTypes.Operators). */
+static PetscErrorCode ScaleOperator(Integrator &I, const Scales &s, Mat J)
+{
+  PetscObjectState state;
+  PetscBool        shell;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSHELL, &shell));
+  PetscCall(PetscObjectStateGet((PetscObject)J, &state));
+  if (!shell && state == I.scaled_operator) PetscFunctionReturn(PETSC_SUCCESS); /* one that never changes */
+  if (shell) {
+    PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(ScaleMatrix(I, s, J));
+  PetscCall(PetscObjectStateGet((PetscObject)J, &I.scaled_operator));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -195,9 +216,9 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
     if (I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
     PetscCall(ScaleMatrix(I, s, P));
-    if (J != P) PetscCall(ScaleMatrix(I, s, J));
     PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
   }
+  if (J != P) PetscCall(ScaleOperator(I, s, J));
   I.rotations.factor = 0;
   PetscCall(NoteClaims(ts, X, P));
   I.corrector.matrix.made(EffectiveStep(I));

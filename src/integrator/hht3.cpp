@@ -81,16 +81,20 @@ PetscErrorCode CheckProblem(TS ts)
 {
   HHT3I2Function f;
   HHT3IFunction  f1;
+  HHT3RHSFunction rhs;
   DM             dm;
 
   PetscFunctionBegin;
   PetscCall(TSGetDM(ts, &dm));
+  PetscCall(DMTSGetRHSFunction(dm, &rhs, NULL));
   PetscCall(DMTSGetI2Function(dm, &f, NULL));
   PetscCall(DMTSGetIFunction(dm, &f1, NULL)); /* PETSc's convention for second-order types: then it is F(t,U,U'') */
   PetscCheck(f || f1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
-             "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none");
+             "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none%s",
+             rhs ? ", but a first-order one U' = G(t,U) of TSSetRHSFunction(): give it as U' - G(t,U) = 0 of first-order states, or take another -ts_type" : "");
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
-             "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors");
+             "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors%s",
+             f ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
   PetscInt n, m;
   PetscCall(VecGetSize(ts->vec_sol, &n));
   PetscCall(VecGetSize(ts->vec_dot, &m));
@@ -126,9 +130,11 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(CheckProblem(ts));
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(CheckSettings(ts));
+  PetscCall(CheckCheckpointFile(ts));
   PetscCall(UpdateParameters(ts));
   PetscCall(DuplicateAll(ts));
   PetscCall(SetUpJacobian(ts));
+  PetscCall(CheckMatrices(ts));
   PetscCall(SetUpRoles(ts));
   PetscCall(CheckDependence(ts));
   PetscCall(SetUpRotations(ts));
@@ -177,6 +183,7 @@ PetscErrorCode Reset(TS ts)
   I.linear_chosen = PETSC_FALSE;
   I.scaled_h      = 0;
   I.scaled_state  = 0;
+  I.scaled_operator = 0;
   I.stage_id      = 0;
   I.wall0         = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -351,7 +358,7 @@ static PetscErrorCode Finalize(void)
 . -ts_hhtdae_summary                     - print the counters at the end of the run
 . -ts_hhtdae_progress                    - show the progress of the run on the terminal
 . -ts_hhtdae_checkpoint <file>           - write checkpoints, `TSHHT3CheckpointSave()`
-. -ts_hhtdae_checkpoint_every <n>        - ... every n steps
+. -ts_hhtdae_checkpoint_every <n>        - ... every n steps; without it one at the end of `TSSolve()`
 - -ts_hhtdae_resume <file>               - go on from a checkpoint, `TSHHT3CheckpointLoad()`
 
   Level: beginner
@@ -373,6 +380,10 @@ static PetscErrorCode Finalize(void)
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
+
+  The Newton matrix is scaled by rows and columns, and so is an operator (Amat) beside it, also a `MATSHELL`, which the integrator assembles for that
+  purpose: its product is that of the Jacobian as `TSSetI2Jacobian()` defines it. The matrix beside it (Pmat) has to give its rows (`MatGetRow()`): `MATAIJ`,
+  `MATBAIJ`, `MATSBAIJ`, `MATDENSE`.
 
   Constraints of positions depend on coordinates and time alone, those of velocities also on first-order states, and on variables and force
   states V - v(...) = 0 of positions, states and time. Others are refused at the set-up: consistent accelerations need their derivatives.

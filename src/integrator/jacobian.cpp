@@ -86,6 +86,43 @@ PetscErrorCode SetUpJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode GivesRows(Mat A, PetscBool *yes)
+{
+  PetscBool foreign;
+
+  PetscFunctionBegin;
+  PetscCall(MatHasOperation(A, MATOP_GET_ROW, yes));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, MATNEST, ""));
+  if (foreign) *yes = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of P tell roles, symmetry and what a factorization costs; an operator has to take the scalings of rows and columns */
+PetscErrorCode CheckMatrices(TS ts)
+{
+  Mat       J, P;
+  MatType   type;
+  PetscBool rows, mffd, scales, scales_all;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  if (!P) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetType(P, &type));
+  PetscCall(GivesRows(P, &rows));
+  PetscCheck(rows, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+             "The matrix (Pmat of TSSetI2Jacobian()) is of type %s, which gives no rows: TSHHT3 needs an assembled one there, of type %s, %s, %s or %s. A matrix-free product may be the operator (Amat) beside it",
+             type, MATAIJ, MATBAIJ, MATSBAIJ, MATDENSE);
+  if (!J || J == P) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetType(J, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
+  PetscCall(MatHasOperation(J, MATOP_DIAGONAL_SCALE, &scales));
+  PetscCall(MatHasOperation(J, MATOP_SCALE, &scales_all));
+  PetscCheck(mffd || (scales && scales_all), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+             "The operator (Amat of TSSetI2Jacobian()) is of type %s without MatScale() and MatDiagonalScale(), by which TSHHT3 scales the Newton matrix: leave out MatShellSetManageScalingShifts(), or give the assembled matrix twice",
+             type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What the SNES needs to solve with the matrix */
 PetscErrorCode SetUpSolvers(TS ts)
 {
@@ -108,9 +145,11 @@ PetscErrorCode TakeSNES(TS ts)
   PetscCall(SNESSetDM(ts->snes, ts->dm));
   I.linear_chosen         = PETSC_FALSE;
   I.scaled_state          = 0;
+  I.scaled_operator       = 0;
   I.corrector.matrix.have = PETSC_FALSE;
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SetUpJacobian(ts));
+  PetscCall(CheckMatrices(ts));
   PetscCall(SetUpSolvers(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,6 +12,10 @@ PetscErrorCode SetUpJacobian(TS ts);
 PetscErrorCode SetUpSolvers(TS ts);
 PetscErrorCode TakeSNES(TS ts);
 
+/* Refuses matrices without rows and operators that cannot be scaled */
+PetscErrorCode CheckMatrices(TS ts);
+PetscErrorCode GivesRows(Mat A, PetscBool *yes);
+
 /* triangle.cpp: refuses a matrix of one triangle where the Newton matrix is not symmetric; D A D with the scalings of the present h */
 PetscErrorCode CheckTriangle(TS ts);
 PetscErrorCode ScaleTriangle(Integrator &I, Mat A);

@@ -36,10 +36,13 @@ constexpr PetscReal four_digits = 1e-4; /* of the rates */
 PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 {
   Integrator &I = Get(ts);
+  PetscBool   mffd;
 
   PetscFunctionBegin;
   PetscCall(SNESSetUp(ts->snes));
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &c->P, NULL, NULL));
+  PetscCall(SNESGetJacobian(ts->snes, &c->J, &c->P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)c->J, MATMFFD, &mffd));
+  if (mffd) c->J = NULL;
   PetscCall(SNESGetKSP(ts->snes, &c->ksp));
   PetscCall(TimeScale(ts, &c->tiny));
   c->tiny *= 1e-28; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
@@ -386,6 +389,22 @@ PetscErrorCode StartFromState(TS ts, Prepared have)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Initial values that are no numbers end up in a matrix, where nobody can tell where they came from */
+static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
+{
+  PetscReal value = 0, found;
+  PetscInt  row, first;
+
+  PetscFunctionBegin;
+  PetscCall(FirstWhere([](PetscInt, PetscScalar v) { return PetscIsInfOrNanScalar(v); }, &row, Read(x)));
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetOwnershipRange(x, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar v) { if (first + i == row) value = PetscIsNanScalar(v) ? 2 : PetscRealPart(v) > 0 ? 1 : -1; }, Read(x)));
+  PetscCallMPI(MPI_Allreduce(&value, &found, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %" PetscInt_FMT " is %s at t = %g: set it (TS2SetSolution())", what, row,
+          found > 1 ? "not a number (NaN)" : found > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
+}
+
 /* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode Start(TS ts)
 {
@@ -403,6 +422,8 @@ PetscErrorCode Start(TS ts)
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(VecCopy(ts->vec_dot, I.V0));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &v) { if (!IsDifferential(RoleOf(I, i))) v = 0; }, Write(I.V0)));
+  PetscCall(CheckInitialNumbers(ts, I.U0, "value"));
+  PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
   PetscCall(UpdateWeights(ts, I.U0));

@@ -155,6 +155,7 @@ struct Integrator : StepState {
   LinearChoice  linear;
   PetscBool     linear_chosen = PETSC_FALSE;
   PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
+  PetscObjectState scaled_operator = 0; /* the same of an operator beside the matrix */
 
   Change    change;
   StepLimit limit;

@@ -220,13 +220,26 @@ static PetscErrorCode Measure(Mat P, PetscBool symmetric, PetscBool many_solves,
 
 /* ---- the package ---- */
 
+/* What PETSc says is there, but for LDL^T of matrices of blocks by MUMPS: its interface announces it and then refuses them (MatrixTypesRanks.SameRunAsWithAIJ) */
+static PetscErrorCode FactorAvailable(Mat P, const char name[], MatFactorType type, PetscBool *available)
+{
+  PetscBool blocks, mumps;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetFactorAvailable(P, name, type, available));
+  PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)P, &blocks, MATSEQBAIJ, MATMPIBAIJ, ""));
+  PetscCall(PetscStrcmp(name, MATSOLVERMUMPS, &mumps));
+  if (type == MAT_FACTOR_CHOLESKY && blocks && mumps) *available = PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
 /* *package stays as it is if the one asked for does not factor P in this way */
 static PetscErrorCode IfAvailable(Mat P, const char name[], MatFactorType type, const char **package)
 {
   PetscBool available;
 
   PetscFunctionBegin;
-  PetscCall(MatGetFactorAvailable(P, name, type, &available));
+  PetscCall(FactorAvailable(P, name, type, &available));
   if (available)
     *package = name;
   else
@@ -432,7 +445,7 @@ static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   PetscCall(PCFactorGetMatSolverType(pc, &package));
   if (!package) PetscFunctionReturn(0);
   PetscCall(MatGetFactorAvailable(P, package, MAT_FACTOR_LU, &lu));
-  PetscCall(MatGetFactorAvailable(P, package, MAT_FACTOR_CHOLESKY, &cholesky));
+  PetscCall(FactorAvailable(P, package, MAT_FACTOR_CHOLESKY, &cholesky));
   if (symmetric && cholesky) PetscCall(FactorsIndefinite(package, &indefinite));
   choice->cholesky = indefinite || (cholesky && !lu) ? PETSC_TRUE : PETSC_FALSE;
   char name[64];
@@ -503,7 +516,7 @@ PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, Linear
   choice->slow    = was.slow;
   choice->no_room = was.no_room;
   if (was.iterative) PetscCall(LinearTakeKrylovAgain(ksp, P, was.cholesky, choice, &krylov));
-  if (available) PetscCall(MatGetFactorAvailable(P, was.package, was.cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
+  if (available) PetscCall(FactorAvailable(P, was.package, was.cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
   const bool by_user = choice->user_pc && choice->user_package;
   if (!krylov && !by_user && (!available || choice->user_package)) {
     PetscCall(LinearChoose(ksp, P, was.cholesky, choice));

@@ -54,15 +54,18 @@ static void Transposed(PetscInt n, const PetscInt ia[], const PetscInt ja[], std
     for (PetscInt k = ia[i]; k < ia[i + 1]; ++k) (*row)[next[ja[k]]++] = i;
 }
 
-/* Rows of SEQAIJ are sorted: they and those of the transpose are merged, and nothing is sorted */
+/* Rows of SEQAIJ are sorted: they and those of the transpose are merged, and nothing is sorted. Matrices of blocks are factored block by block, and
+   their orderings are of blocks (MatrixTypes.OrderingsOfBlocks). */
 PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
 {
   PetscInt              n;
   const PetscInt       *ia, *ja;
   std::vector<PetscInt> start, row;
+  PetscBool             blocks;
 
   PetscFunctionBegin;
-  PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
+  PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)A, &blocks, MATSEQBAIJ, MATSEQSBAIJ, ""));
+  PetscCall(MatGetRowIJ(A, 0, PETSC_FALSE, blocks, &n, &ia, &ja, done));
   if (!*done) PetscFunctionReturn(0);
   Transposed(n, ia, ja, &start, &row);
   graph->n = n;
@@ -78,7 +81,7 @@ PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
     graph->xadj[i + 1] = (PetscInt)(to - graph->adj.data());
   }
   graph->adj.resize(graph->xadj[n]);
-  PetscCall(MatRestoreRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, done));
+  PetscCall(MatRestoreRowIJ(A, 0, PETSC_FALSE, blocks, &n, &ia, &ja, done));
   *done = PETSC_TRUE;
   PetscFunctionReturn(0);
 }

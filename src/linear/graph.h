@@ -19,7 +19,7 @@ template <typename Index>
 void LinearGraphFromEntries(PetscInt n, size_t count, const Index row[], const Index col[], Index base,
                             LinearGraph *graph);
 
-/* Of a SEQAIJ matrix; *done = PETSC_FALSE if its type gives no rows */
+/* Of a SEQAIJ matrix, or of the blocks of a SEQBAIJ or SEQSBAIJ matrix; *done = PETSC_FALSE if its type gives no rows */
 PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done);
 
 /*

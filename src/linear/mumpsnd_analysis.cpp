@@ -99,11 +99,14 @@ static PetscErrorCode GatherToFirst(const MumpsND<P> *m, const std::vector<int> 
   PetscFunctionReturn(0);
 }
 
-/* PERM_IN wants the position of each unknown, an ordering lists the unknowns by position */
-template <class P> static void SetPositions(const PetscInt order[], MumpsND<P> *m)
+/* PERM_IN wants the position of each unknown, an ordering lists the unknowns by position, or blocks of them: PETSc orders the blocks of MATSBAIJ
+   (MatrixTypes.OrderingsOfBlocks) */
+template <class P> static void SetPositions(const PetscInt order[], PetscInt count, MumpsND<P> *m)
 {
+  const PetscInt block = m->id.n / PetscMax(count, 1);
   m->position.resize(m->id.n);
-  for (MUMPS_INT k = 0; k < m->id.n; ++k) m->position[order[k]] = k + 1;
+  for (PetscInt k = 0; k < count; ++k)
+    for (PetscInt b = 0; b < block; ++b) m->position[block * order[k] + b] = (MUMPS_INT)(block * k + b + 1);
 }
 
 template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
@@ -120,7 +123,7 @@ template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
   if (m->rank) PetscFunctionReturn(0);
   LinearGraphFromEntries<int>(m->id.n, row.size(), row.data(), col.data(), 1, &graph);
   PetscCall(LinearMetisOrder(graph, std::vector<PetscInt>(partners.begin(), partners.end()), &order));
-  SetPositions(order.data(), m);
+  SetPositions(order.data(), (PetscInt)order.size(), m);
   PetscFunctionReturn(0);
 }
 
@@ -170,8 +173,10 @@ template <class P> PetscErrorCode MumpsNDAnalyse(Mat A, IS given, MumpsND<P> *m)
   PetscFunctionBegin;
   if (given) {
     const PetscInt *order;
+    PetscInt        count;
+    PetscCall(ISGetLocalSize(given, &count));
     PetscCall(ISGetIndices(given, &order));
-    SetPositions(order, m);
+    SetPositions(order, count, m);
     PetscCall(ISRestoreIndices(given, &order));
     AnalyseGiven(m, "given by PETSc");
   } else if (m->user_ordering)

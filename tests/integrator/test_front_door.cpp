@@ -1,0 +1,67 @@
+/* What a program may have forgotten is told before the run */
+#include "support.h"
+#include <unistd.h>
+
+using namespace hhtest;
+
+TEST(FrontDoor, InitialValuesThatAreNoNumbers)
+{
+  const Oscillators p({1., 2.}, {.1, .1}, false, 1.);
+  for (double bad : {(double)NAN, (double)INFINITY})
+    for (bool velocity : {false, true}) {
+      Simulation run(p, tolerance(1e-5));
+      Vec        x = velocity ? run.V : run.U;
+      must(VecSetValue(x, 1, bad, INSERT_VALUES));
+      must(VecAssemblyBegin(x));
+      must(VecAssemblyEnd(x));
+      ErrorTrap trap;
+      EXPECT_EQ(run.solve(), PETSC_ERR_FP);
+      EXPECT_TRUE(trap.says(std::string("initial ") + (velocity ? "velocity" : "value") + " of unknown 1 is " + (std::isnan(bad) ? "not a number" : "infinite"))) << trap.message;
+    }
+}
+
+TEST(FrontDoor, FirstOrderPrograms)
+{
+  for (bool implicit : {false, true}) {
+    TS  ts;
+    Vec U;
+    must(VecCreateSeq(PETSC_COMM_SELF, 1, &U));
+    must(VecSet(U, 1));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetType(ts, TSHHT3));
+    if (implicit) must(TSSetIFunction(ts, nullptr, [](TS, PetscReal, Vec X, Vec V, Vec F, void *) -> PetscErrorCode { return VecWAXPY(F, 1, X, V); }, nullptr));
+    else must(TSSetRHSFunction(ts, nullptr, [](TS, PetscReal, Vec X, Vec F, void *) -> PetscErrorCode { return VecCopy(X, F); }, nullptr));
+    must(TSSetMaxTime(ts, 1));
+    ErrorTrap trap;
+    EXPECT_NE(TSSolve(ts, U), 0);
+    EXPECT_TRUE(trap.says("TSSetI2Function()")) << trap.message;
+    EXPECT_TRUE(trap.says(implicit ? "TSSetIFunction() alone" : "TSSetRHSFunction()")) << trap.message;
+    must(TSDestroy(&ts));
+    must(VecDestroy(&U));
+  }
+}
+
+TEST(FrontDoor, CheckpointAtTheEnd)
+{
+  const Oscillators p({1., 2.}, {.1, .1}, false, 1.);
+  const std::string file = "front_door_" + std::to_string(getpid()) + ".cp";
+  Simulation        run(p, tolerance(1e-5) + "-ts_hhtdae_checkpoint " + file);
+  must(run.solve());
+  ASSERT_EQ(access(file.c_str(), R_OK), 0);
+  Simulation again(p, tolerance(1e-5) + "-ts_max_time 1.5 -ts_hhtdae_resume " + file);
+  must(again.solve());
+  EXPECT_GT(again.statistics().steps, run.statistics().steps);
+  std::remove(file.c_str());
+}
+
+TEST(FrontDoor, CheckpointsThatCannotBeWritten)
+{
+  const Oscillators p({1., 2.}, {.1, .1}, false, 1.);
+  for (const char *file : {"/no/such/directory/file", "/dev/null", "/dev/null/file"}) {
+    Simulation run(p, tolerance(1e-5) + "-ts_hhtdae_checkpoint " + file);
+    ErrorTrap  trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_FILE_OPEN);
+    EXPECT_TRUE(trap.says("No checkpoint can be written to " + std::string(file))) << trap.message;
+    EXPECT_EQ(run.statistics().steps, 0);
+  }
+}

@@ -1,0 +1,103 @@
+/* The types of matrices that an application may give: the same run as with MATAIJ, or a refusal that names the type */
+#include "matrix_types.h"
+#include "triangle.h"
+#include <cstdio>
+#include <unistd.h>
+
+using namespace hhtest;
+
+namespace
+{
+
+const std::string tight = tolerance(1e-5), krylov = tight + "-ksp_type gmres -ksp_rtol 1e-12 ";
+
+void expectSameRun(const MatrixRun &run, const MatrixRun &reference, const std::string &what)
+{
+  ASSERT_EQ(run.error, 0) << what << ": " << run.said;
+  EXPECT_EQ(run.s.steps, reference.s.steps) << what;
+  EXPECT_EQ(run.s.newton, reference.s.newton) << what;
+  EXPECT_LT(relativeDifference(run.u, reference.u), 1e-7) << what;
+  EXPECT_EQ(run.other, 0) << what << ": the application's Jacobian got another operator than its own";
+}
+
+void expectOperators(const Problem &p, bool setRoles)
+{
+  const MatrixRun reference(PETSC_COMM_SELF, p, {}, tight, setRoles);
+  for (bool assembles : {true, false}) expectSameRun(MatrixRun(PETSC_COMM_SELF, p, {MATAIJ, 1, Matrices::Shell, assembles}, krylov, setRoles), reference, p.name + (assembles ? "" : ", not assembled"));
+  expectSameRun(MatrixRun(PETSC_COMM_SELF, p, {MATAIJ, 1, Matrices::Second}, krylov, setRoles), reference, p.name + ", another matrix");
+}
+
+struct ShortNet : Net {
+  explicit ShortNet(NetRods rods = NetRods::Independent) : Net(rods) { t1 = .1; }
+};
+
+} // namespace
+
+/* Rows and columns of an operator are scaled as those of the matrix beside it */
+TEST(MatrixTypes, Operators)
+{
+  for (bool setRoles : {true, false}) expectOperators(ShortNet(), setRoles);
+  expectOperators(ShortNet(NetRods::None), false);
+  expectOperators(UserVars(.2), false);
+  expectOperators(Sleigh(.2), false);
+}
+
+/* Products have no values that a checkpoint could keep: the matrix is made anew */
+TEST(MatrixTypes, OperatorsResume)
+{
+  const ShortNet    p;
+  const std::string file = "matrix_types_" + std::to_string(getpid()) + ".cp", half = krylov + "-ts_max_time .05 -ts_hhtdae_checkpoint " + file, rest = krylov + "-ts_hhtdae_resume " + file;
+  const Matrices    shell{MATAIJ, 1, Matrices::Shell};
+  ASSERT_EQ(MatrixRun(PETSC_COMM_SELF, p, {}, half).error, 0);
+  const MatrixRun reference(PETSC_COMM_SELF, p, {}, rest);
+  ASSERT_EQ(MatrixRun(PETSC_COMM_SELF, p, shell, half).error, 0);
+  const MatrixRun run(PETSC_COMM_SELF, p, shell, rest);
+  std::remove(file.c_str());
+  ASSERT_EQ(run.error, 0) << run.said;
+  EXPECT_EQ(run.s.steps, reference.s.steps);
+  EXPECT_EQ(run.s.corrector_fails, 0);
+  EXPECT_EQ(run.other, 0);
+  EXPECT_LT(relativeDifference(run.u, reference.u), 1e-3); /* the multipliers' */
+}
+
+TEST(MatrixTypes, AssembledTypes)
+{
+  const ShortNet  p;
+  const MatrixRun reference(PETSC_COMM_SELF, p, {}, tight);
+  expectSameRun(MatrixRun(PETSC_COMM_SELF, p, {MATDENSE}, tight), reference, "dense");
+  for (PetscInt block : {1, 2, 3}) {
+    const std::string what = "blocks of " + std::to_string((int)block);
+    const MatrixRun   run(PETSC_COMM_SELF, p, {MATBAIJ, block}, tight);
+    if (run.package != MATSOLVERMUMPS) GTEST_SKIP() << "this PETSc was built without MUMPS";
+    expectSameRun(run, reference, what);
+    for (const char *options : {"", "-pc_type cholesky "}) expectSameRun(MatrixRun(PETSC_COMM_SELF, p, {MATSBAIJ, block}, tight + options), reference, what + ", one triangle " + options);
+  }
+}
+
+/* PETSc's orderings of matrices of blocks are of blocks, as ours has to be */
+TEST(MatrixTypes, OrderingsOfBlocks)
+{
+  const ShortNet  p, free(NetRods::None);
+  const MatrixRun reference(PETSC_COMM_SELF, p, {}, tight), unheld(PETSC_COMM_SELF, free, {}, tight);
+  if (MatrixRun(PETSC_COMM_SELF, p, {MATSBAIJ}, tight).package != "mumpsnd") GTEST_SKIP() << "this PETSc was built without MUMPS";
+  for (PetscInt block : {1, 2, 3})
+    for (const char *ordering : {"nd", "rcm", "metisnd"}) {
+      const std::string options = tight + "-pc_type cholesky -pc_factor_mat_solver_type mumpsnd -pc_factor_mat_ordering_type " + ordering, what = std::string(ordering) + " of blocks of " + std::to_string((int)block);
+      expectSameRun(MatrixRun(PETSC_COMM_SELF, p, {MATSBAIJ, block}, options), reference, what);
+    }
+  expectSameRun(MatrixRun(PETSC_COMM_SELF, free, {MATBAIJ, 3}, tight + "-pc_type lu -pc_factor_mat_solver_type petsc -pc_factor_mat_ordering_type metisnd"), unheld, "LU of blocks of 3");
+}
+
+TEST(MatrixTypes, Refusals)
+{
+  const ShortNet  p;
+  const MatrixRun managed(PETSC_COMM_SELF, p, {MATAIJ, 1, Matrices::Managed}, krylov);
+  EXPECT_NE(managed.error, 0);
+  EXPECT_TRUE(managed.says("type shell without MatScale()")) << managed.said;
+  for (bool setRoles : {true, false})
+    for (MatType type : {MATSHELL, MATNEST}) {
+      const MatrixRun run(PETSC_COMM_SELF, p, {type}, krylov, setRoles);
+      EXPECT_NE(run.error, 0);
+      EXPECT_TRUE(run.says(std::string("is of type ") + type + ", which gives no rows")) << run.said;
+    }
+}
