@@ -362,12 +362,11 @@ class _Output:
         ts.setMonitor(self.monitor)
         if self.events:
             self.signs = Signs([getattr(e, "direction", 0) for e in self.events])
-            self.signs.begin(self.p.t0, [e(self.p.t0, self.p.q0, self.p.v0, *self.p.args) for e in self.events])
             ts.setPostStep(self.look)
 
     def look(self, ts):
         """After a step: passages are found on the method's own polynomials; the first terminal one ends the run"""
-        for t, k in self.signs.passed(ts.getTime(), self.event_values(ts, ts.getTime()), lambda k, t: self.event_values(ts, t, k)):
+        for t, k in self.signs.passed(ts.getPrevTime(), ts.getTime(), lambda k, t: self.event_value(ts, t, k)):
             self.found[k][0].append(t)
             self.found[k][1].append(self.positions(ts, t)[0])
             if getattr(self.events[k], "terminal", False):
@@ -375,11 +374,12 @@ class _Output:
                 ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
                 return
 
-    def event_values(self, ts, t, only=None):
+    def event_value(self, ts, t, k):
         q, v = self.positions(ts, t)
-        chosen = self.events if only is None else [self.events[only]]
-        values = [float(e(t, q, v, *self.p.args)) for e in chosen]
-        return values if only is None else values[0]
+        x = float(self.events[k](t, q, v, *self.p.args))
+        if np.isnan(x):
+            raise ValueError("event %d is not a number at t = %g" % (k, t))
+        return x
 
     def positions(self, ts, t):
         u, v, a = integrator.interpolate(ts, t)

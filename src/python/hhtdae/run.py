@@ -65,6 +65,7 @@ class Run(Channels):
         if tolerance is not None and not tolerance > 0:
             raise ValueError("tolerance is %r, must be positive" % (tolerance,))
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
+        self._ended = False  # by a terminal event in the last solve()
         collect_garbage(scene.comm)
         with temporary_options(self._options):
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
@@ -92,6 +93,7 @@ class Run(Channels):
         if until == ts.getTime():
             return self
         ts.setMaxTime(until)
+        self._ended = False
         with temporary_options(self._options), self._page.settings():
             if self._events:
                 self._solve_with_events(ts)
@@ -105,7 +107,8 @@ class Run(Channels):
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
-        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them.
+        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them. A terminal
+        event ends it, after its time.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
@@ -114,8 +117,11 @@ class Run(Channels):
         self._page.span = until - begin
         count = int(np.ceil((until - begin) / dt * (1 - 1e-12)))
         for k in range(1, count + 1):
-            self.solve(until if k == count else begin + k * dt)
+            end = until if k == count else begin + k * dt
+            self.solve(end)
             yield self.time
+            if self._ended or self.time < end:
+                return
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
         """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew; velocities that joints
@@ -138,38 +144,34 @@ class Run(Channels):
             self._now = Snapshot(self, later=True)
             self._open().setPostStep(self._look)
 
-    def _event_values(self, time=None):
+    def _event_value(self, k, time):
         self._now.take(time)
-        return [self._now.value(formula) for formula, _, _ in self._events]
+        return self._now.value(self._events[k][0])
 
     def _look(self, ts):
-        """After a step: a passage ends TSSolve()"""
-        values = self._event_values()
-        self._passed = self._signs.passed(ts.getTime(), values, lambda k, t: self._event_values(t)[k])
+        """After a step, before monitors see it: where something passes zero the step is taken back to the first passage, which ends TSSolve(). So outputs
+        see it end there."""
+        self._passed = self._signs.passed(ts.getPrevTime(), ts.getTime(), self._event_value)
         if self._passed:
+            integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
     def _solve_with_events(self, ts):
-        """A step in which something passes zero is taken back to the first passage, as the final time of a run by interpolation would be"""
-        if self._signs.time is None:
-            self._signs.begin(ts.getTime(), self._event_values())
         while True:
             self._passed = []
             self.scene._core.solve(ts)
-            if not self._passed:
+            if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
-            if self._recorder:
-                self._recorder.cut(ts, time)
-            integrator.move_back(ts, time)
             if not PETSc.Options().hasName("ts_hhtdae_start"):
                 integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
-            self._signs.begin(time, self._event_values(), here)
             for k in here:
+                self._signs.note(k, time)
                 if self._events[k][1] is not None:
                     self._events[k][1](self)
-            if any(self._events[k][2] for k in here):
+            self._ended = any(self._events[k][2] for k in here)
+            if self._ended or time >= ts.getMaxTime():
                 return
 
     def restart(self) -> None:
