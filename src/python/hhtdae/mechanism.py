@@ -4,6 +4,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from .differences import differences, scales, slopes
 from .events import Signs
 from .expressions import Expression, _expression
 from .run import collect_garbage, temporary_options
@@ -80,7 +81,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central differences, 6 n + 1 calls of
         `residual` for each Newton matrix.
     constraint_jacobian : callable, optional
-        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences.
+        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
         Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3).
     t_eval : sequence of float, optional
@@ -117,7 +118,10 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     >>> solution = hhtdae.solve_mechanism(residual, (0, 2), [1, 0], [0, 0], constraints=rod)
     >>> solution.q[:, -1]
     """
-    problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args)
+    problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace)
+    rtol, atol = positive(rtol, "rtol"), positive(atol, "atol")
+    max_step = positive(max_step, "max_step", np.inf)
+    first_step = None if first_step is None else positive(first_step, "first_step")
     collect_garbage(PETSc.COMM_SELF)
     with temporary_options(options):
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
@@ -131,15 +135,24 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
             ts.destroy()
 
 
+def positive(x, name, most=np.finfo(float).max):
+    """A positive number as a float"""
+    if isinstance(x, (str, bytes)) or np.ndim(x) or not isinstance(x, (int, float, np.number)) or isinstance(x, bool) or not 0 < x <= most:
+        raise ValueError("%s is %r, must be a positive number" % (name, x))
+    return float(x)
+
+
 class _Problem:
     """The user's functions with their sizes, checked"""
 
-    def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args):
+    def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace):
         self.t0, self.t1 = map(float, t_span)
         self.q0, self.v0 = (np.array(x, dtype=float).reshape(-1) for x in (q0, v0))
         self.n, self.args = len(self.q0), tuple(args)
         if not self.t1 > self.t0:
             raise ValueError("t_span is (%g, %g): its end must come after its begin" % (self.t0, self.t1))
+        if not np.all(np.isfinite(self.q0)) or not np.all(np.isfinite(self.v0)):
+            raise ValueError("q0 and v0 must be finite, are %s and %s" % (self.q0, self.v0))
         if len(self.v0) != self.n:
             raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
         self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
@@ -148,32 +161,47 @@ class _Problem:
         self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
         self.k = 0 if velocity_constraints is None else np.size(velocity_constraints(self.t0, self.q0.copy(), self.v0.copy(), *self.args))
         self.size = self.n + self.m + self.k
-        self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))
+        for what, x in (("residual", self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))), ("constraints", self.constraints(self.t0, self.q0)),
+                        ("velocity_constraints", self.rates(self.t0, self.q0, self.v0))):
+            if not np.all(np.isfinite(x)):
+                row = int(np.argmin(np.isfinite(x)))
+                raise ValueError("%s() returns %g in row %d at the begin, t = %g" % (what, x[row], row, self.t0))
+        self.seen = np.full(self.n, -1.), np.full(self.n, -1.)
+        if not trace:
+            self.find_scales(self.t0, self.q0, self.v0, np.zeros(self.n))
+            if self.m and constraint_jacobian is not None:
+                self.check_gradient()
 
     def _shaped(self, x, shape, what):
-        x = np.asarray(x, dtype=float)
-        if x.size != np.prod(shape, dtype=int):
+        if np.iscomplexobj(x):
+            raise ValueError("%s is complex, must be real" % what)
+        try:
+            x = np.asarray(x, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ValueError("%s must be numbers, is %r: %s" % (what, x, error)) from error
+        plain = lambda s: tuple(k for k in s if k != 1)  # (n, 1) and (1, n) are as good as (n,)
+        if plain(x.shape) != plain(shape):
             raise ValueError("%s has the shape %s, must be %s" % (what, x.shape, shape))
         return x.reshape(shape)
 
     def residual(self, t, q, v, a):
-        return self._shaped(self._residual(t, q, v, a, *self.args), (self.n,), "what residual() returns")
+        return self._shaped(self._residual(t, q.copy(), v.copy(), a.copy(), *self.args), (self.n,), "what residual() returns")
 
     def constraints(self, t, q):
-        return self._shaped(self._constraints(t, q, *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
+        return self._shaped(self._constraints(t, q.copy(), *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
 
     def rates(self, t, q, v):
-        return self._shaped(self._rates(t, q, v, *self.args), (self.k,), "what velocity_constraints() returns") if self.k else np.empty(0)
+        return self._shaped(self._rates(t, q.copy(), v.copy(), *self.args), (self.k,), "what velocity_constraints() returns") if self.k else np.empty(0)
 
     def gradient(self, t, q):
         if not self.m:
             return np.empty((0, self.n))
         if self._gradient is not None:
-            return self._shaped(self._gradient(t, q, *self.args), (self.m, self.n), "what constraint_jacobian() returns")
-        return _differences(lambda x: self.constraints(t, x), q, self.m)
+            return self._shaped(self._gradient(t, q.copy(), *self.args), (self.m, self.n), "what constraint_jacobian() returns")
+        return differences(lambda x: self.constraints(t, x), q, self.m, self.scale_q)
 
     def rate_gradient(self, t, q, v):
-        return _differences(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
+        return slopes(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
 
     def reactions(self, t, q, v, multipliers):
         """Forces of the constraints"""
@@ -182,28 +210,34 @@ class _Problem:
     def forces(self, t, q, v, a, multipliers):
         return self.residual(t, q, v, a) + self.reactions(t, q, v, multipliers)
 
+    def find_scales(self, t, q, v, a):
+        """Of differences, where a number has become ten times as large as all before"""
+        if np.all(np.abs(q) <= 10 * self.seen[0]) and np.all(np.abs(v) <= 10 * self.seen[1]):
+            return
+        self.seen = np.maximum(self.seen[0], np.abs(q)), np.maximum(self.seen[1], np.abs(v))
+        self.scale_q = scales(lambda x: np.concatenate([self.residual(t, x, v, a), self.constraints(t, x), self.rates(t, x, v)]), q)
+        self.scale_v = scales(lambda x: self.residual(t, q, x, a), v)
+
+    def check_gradient(self):
+        """A given Jacobian of the constraints beside differences at the begin: a wrong one makes wrong forces, which nothing else would show"""
+        given, found = self.gradient(self.t0, self.q0), differences(lambda x: self.constraints(self.t0, x), self.q0, self.m, self.scale_q)
+        error = np.abs(given - found) * self.scale_q
+        wrong = error > 1e-4 * np.max(np.maximum(np.abs(given), np.abs(found)) * self.scale_q, axis=1, keepdims=True)
+        if np.any(wrong) or not np.all(np.isfinite(given)):
+            row, column = np.unravel_index(np.argmax(np.where(np.isfinite(error), error, np.inf)), error.shape)
+            raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
+                             % (self.t0, row, column, given[row, column], found[row, column]))
+
     def matrices(self, t, q, v, a, multipliers):
         """Derivatives of the residual with the constraints' forces, by q, v, a"""
+        self.find_scales(t, q, v, a)
         if self._jacobian is None:
-            return (_differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n), _differences(lambda x: self.residual(t, q, x, a), v, self.n),
-                    _differences(lambda x: self.residual(t, q, v, x), a, self.n))
+            return (differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n, self.scale_q),
+                    differences(lambda x: self.residual(t, q, x, a), v, self.n, self.scale_v), slopes(lambda x: self.residual(t, q, v, x), a, self.n))
         K, C, M = (self._shaped(x, (self.n, self.n), "a matrix that jacobian() returns") for x in self._jacobian(t, q, v, a, *self.args))
         if self.m + self.k:
-            K = K + _differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n)
+            K = K + differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n, self.scale_q)
         return K, C, M
-
-
-def _differences(f, x, rows):
-    """Central differences over 6e-6 of each number, or of 1"""
-    J, x = np.empty((rows, len(x))), np.array(x, dtype=float)
-    for k, at in enumerate(x.copy()):
-        h = 6e-6 * max(1., abs(at))
-        x[k] = at + h
-        up = f(x)
-        x[k] = at - h
-        J[:, k] = (up - f(x)) / (2 * h)
-        x[k] = at
-    return J
 
 
 # ---- the TS ----
@@ -269,7 +303,7 @@ def _call(ts, p, keep):
         full[:n, :n], full[:n, n:m], full[:n, m:] = K + shift_v * C + shift_a * M, G.T, R.T
         full[n:m, :n] = G
         if p.k:
-            full[m:, :n] = _differences(lambda x: p.rates(t, x, w), q, p.k) + shift_v * R
+            full[m:, :n] = differences(lambda x: p.rates(t, x, w), q, p.k, p.scale_q) + shift_v * R
         P.setValues(rows, rows, full)
         P.assemble()
         if J != P:
@@ -352,7 +386,7 @@ class _Output:
     def __init__(self, problem, t_eval, dense, events):
         self.p, self.dense, self.stopped = problem, dense, None
         self.wanted = None if t_eval is None else np.array(t_eval, dtype=float).reshape(-1)
-        if self.wanted is not None and len(self.wanted) and (np.any(np.diff(self.wanted) <= 0) or self.wanted[0] < problem.t0 or self.wanted[-1] > problem.t1):
+        if self.wanted is not None and len(self.wanted) and (not np.all(np.diff(self.wanted) > 0) or not problem.t0 <= self.wanted[0] <= self.wanted[-1] <= problem.t1):
             raise ValueError("t_eval must increase, within t_span")
         self.events = [] if events is None else [events] if callable(events) else list(events)
         self.next, self.rows, self.ends = 0, [], []
