@@ -2,6 +2,7 @@
 
 import math
 import unittest
+import warnings
 
 import numpy as np
 
@@ -44,6 +45,37 @@ class Arguments(unittest.TestCase):
                 with self.assertRaisesRegex(ValueError, name + " is .*positive"):
                     stone(**{name: wrong})
         self.assertTrue(stone(rtol=np.float32(1e-5), max_step=np.int64(1)).success)
+
+    def test_options_nobody_asks_for(self):
+        scene = h.Scene()
+        scene.add("mass", h.PointMass())
+        for solve in (lambda **k: stone(**k), lambda **k: scene.solve(1., **k)):
+            with self.assertWarnsRegex(RuntimeWarning, "-ts_hhtdae_alhpa"):
+                solve(options={"ts_hhtdae_alhpa": -0.1})
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                solve(options={"-ts_hhtdae_alpha": -0.1, "ts_max_steps": 1000, "snes_max_it": 20})
+
+    def test_of_runs(self):
+        scene = h.Scene()
+        x = h.displacement(scene.add("mass", h.PointMass()).marker(), 0)
+        run, seen = scene.run(), []
+        for dt in (0, -0.1, float("nan"), "a"):
+            with self.assertRaisesRegex(ValueError, "dt is"):
+                list(run.step_by(dt, 1.))
+        with self.assertRaisesRegex(ValueError, "in parts"):
+            list(run.step_by(0.1, -1.))
+        for tolerance in ("1e-3", float("inf"), 0):
+            with self.assertRaisesRegex(ValueError, "tolerance is"):
+                scene.run(tolerance=tolerance)
+        with self.assertRaisesRegex(ValueError, "direction"):
+            run.event(x, direction="up")
+        with self.assertRaisesRegex(TypeError, "action"):
+            run.event(x, action=3)
+        run.on_step(lambda r: seen.append((r.steps, r.time)))
+        list(run.step_by(np.float32(0.25), np.int64(1)))
+        self.assertEqual(len(seen), run.steps)
+        self.assertEqual(seen[-1], (run.steps, 1.))
 
     def test_values(self):
         with self.assertRaisesRegex(ValueError, "t_eval"):

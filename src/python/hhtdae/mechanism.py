@@ -7,7 +7,7 @@ from . import _core, integrator
 from .differences import differences, scales, slopes
 from .events import Signs
 from .expressions import Expression, _expression
-from .run import collect_garbage, temporary_options
+from .run import collect_garbage, positive, temporary_options, tell_unused
 from .tracing import compile_tape, differentiate
 
 __all__ = ["MechanismResult", "solve_mechanism"]
@@ -120,26 +120,21 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     """
     problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace)
     rtol, atol = positive(rtol, "rtol"), positive(atol, "atol")
-    max_step = positive(max_step, "max_step", np.inf)
+    max_step = np.inf if np.ndim(max_step) == 0 and max_step == np.inf else positive(max_step, "max_step")
     first_step = None if first_step is None else positive(first_step, "first_step")
     collect_garbage(PETSc.COMM_SELF)
-    with temporary_options(options):
+    with temporary_options(options) as unused:
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
         output = _Output(problem, t_eval, dense_output, events)
         output.attach(ts)
         ts.setFromOptions()
         try:
             status, message = _solve(ts, problem, output)
-            return output.result(ts, status, message)
+            result = output.result(ts, status, message)
         finally:
             ts.destroy()
-
-
-def positive(x, name, most=np.finfo(float).max):
-    """A positive number as a float"""
-    if isinstance(x, (str, bytes)) or np.ndim(x) or not isinstance(x, (int, float, np.number)) or isinstance(x, bool) or not 0 < x <= most:
-        raise ValueError("%s is %r, must be a positive number" % (name, x))
-    return float(x)
+    tell_unused(unused, 2)
+    return result
 
 
 class _Problem:

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .events import Signs
+from .expressions import _expression
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
 
@@ -21,18 +22,33 @@ __all__ = ["Run"]
 
 @contextmanager
 def temporary_options(given):
-    """PETSc's options while something is done; what the user has set already stays"""
-    database, own = PETSc.Options(), []
+    """PETSc's options while something is done; what the user has set already stays. Yields a list that has the names of those that were not asked for after it."""
+    database, own, unused = PETSc.Options(), [], []
     try:
         for name, value in (given or {}).items():
             name = name.lstrip("-")
             if not database.hasName(name):
                 database.setValue(name, value)
                 own.append(name)
-        yield
+        yield unused
     finally:
         for name in own:
+            if not _core.option_used(name):
+                unused.append(name)
             database.delValue(name)
+
+
+def tell_unused(names, level):
+    """A warning about given options that nothing has asked for: misspelt ones as a rule"""
+    if names:
+        warnings.warn("nobody has asked for the options %s: are their names right?" % ", ".join("-" + name for name in names), RuntimeWarning, level + 1)
+
+
+def positive(x, name):
+    """A positive number as a float"""
+    if isinstance(x, bool) or not isinstance(x, (int, float, np.number)) or not 0 < x < np.inf:
+        raise ValueError("%s is %r, must be a positive number" % (name, x))
+    return float(x)
 
 
 def collect_garbage(comm):
@@ -62,12 +78,13 @@ class Run(Channels):
         self._page = _PageFile(scene, page)
         if sample is not None and not sample >= 0:
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
-        if tolerance is not None and not tolerance > 0:
-            raise ValueError("tolerance is %r, must be positive" % (tolerance,))
+        if tolerance is not None:
+            tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
         self._ended = False  # by a terminal event in the last solve()
+        self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
         collect_garbage(scene.comm)
-        with temporary_options(self._options):
+        with temporary_options(self._options) as self._unused:
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
             self.ts.setAttr("hhtdae", scene._keep)
             if tolerance is not None:
@@ -94,11 +111,15 @@ class Run(Channels):
             return self
         ts.setMaxTime(until)
         self._ended = False
-        with temporary_options(self._options), self._page.settings():
+        with temporary_options(self._options) as unused, self._page.settings():
             if self._events:
                 self._solve_with_events(ts)
             else:
+                self._serial += 1
                 self.scene._core.solve(ts)
+        if self._unused:
+            tell_unused([name for name in unused if name in self._unused], 2)
+            self._unused = []
         reached = ts.getTime()
         if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
             warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
@@ -113,7 +134,9 @@ class Run(Channels):
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
         """
-        begin = self._open().getTime()
+        begin, dt = self._open().getTime(), positive(dt, "dt")
+        if not begin <= until < np.inf:
+            raise ValueError("the run is at t = %g and cannot go to %r in parts" % (begin, until))
         self._page.span = until - begin
         count = int(np.ceil((until - begin) / dt * (1 - 1e-12)))
         for k in range(1, count + 1):
@@ -138,7 +161,11 @@ class Run(Channels):
         direction : {0, 1, -1}
             Passages of both kinds, upwards, or downwards alone.
         """
-        self._events.append((formula, action, terminal))
+        if direction not in (-1, 0, 1):
+            raise ValueError("event(): direction is %r, must be 0, 1 or -1" % (direction,))
+        if action is not None and not callable(action):
+            raise TypeError("event(): action is %r, must be a function of the run" % (action,))
+        self._events.append((_expression(formula), action, terminal))
         self._signs = Signs((self._signs.directions if self._signs else []) + [direction])
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
@@ -159,6 +186,7 @@ class Run(Channels):
     def _solve_with_events(self, ts):
         while True:
             self._passed = []
+            self._serial += 1
             self.scene._core.solve(ts)
             if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
@@ -180,8 +208,12 @@ class Run(Channels):
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step."""
+        begun = 0
+
         def monitor(ts, step, t, u):
-            if step > 0:
+            nonlocal begun
+            first, begun = begun != self._serial, self._serial  # the state that a part of the run begins with
+            if step > 0 and not first:
                 function(self)
         self._open().setMonitor(monitor)
 
