@@ -83,6 +83,16 @@ class Arguments(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "finite"):
             stone(q0=[np.nan, 0])
 
+    def test_messages(self):
+        """Those of the library come as hhtdae.Error, and name the acceleration without mass; those of arguments which one it is"""
+        with self.assertRaisesRegex(h.Error, r"without mass.* not depend on a\[1\]$") as caught:
+            stone(lambda t, q, v, a: [a[0], 0 * a[1]])
+        self.assertNotIn("TSSolve", str(caught.exception))
+        for call, kind, text in ((lambda: stone(events=[3]), TypeError, "event 0 is 3"), (lambda: stone(args=3), TypeError, r"args is 3.*\(3,\)"),
+                                 (lambda: h.solve_mechanism(lambda t, q, v, a: a, (0, 1, 2), [1], [0]), ValueError, "t_span")):
+            with self.assertRaisesRegex(kind, text):
+                call()
+
     def test_functions(self):
         for residual, text in ((lambda t, q, v, a: [a[0], np.nan], "residual.* row 1"), (lambda t, q, v, a: None, "residual"),
                                (lambda t, q, v, a: [a[0], "x"], "residual"), (lambda t, q, v, a: a + 1j, "residual.*complex")):

@@ -4,6 +4,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from ._errors import Error
 from .differences import differences, scales, slopes
 from .events import Signs
 from .expressions import Expression, _expression
@@ -141,6 +142,10 @@ class _Problem:
     """The user's functions with their sizes, checked"""
 
     def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace):
+        if np.shape(t_span) != (2,):
+            raise ValueError("t_span is %r, must be two numbers, begin and end" % (t_span,))
+        if not isinstance(args, (tuple, list)):
+            raise TypeError("args is %r, must be a tuple: (%r,)" % (args, args))
         self.t0, self.t1 = map(float, t_span)
         self.q0, self.v0 = (np.array(x, dtype=float).reshape(-1) for x in (q0, v0))
         self.n, self.args = len(self.q0), tuple(args)
@@ -222,6 +227,12 @@ class _Problem:
             row, column = np.unravel_index(np.argmax(np.where(np.isfinite(error), error, np.inf)), error.shape)
             raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
                              % (self.t0, row, column, given[row, column], found[row, column]))
+
+    def massless(self):
+        """A remark about accelerations that the residual does not know at the begin, for messages"""
+        M = slopes(lambda x: self.residual(self.t0, self.q0, self.v0, x), np.zeros(self.n), self.n)
+        names = ", ".join("a[%d]" % k for k in range(self.n) if not np.any(M[:, k]))
+        return names and "; residual() does not depend on %s" % names
 
     def matrices(self, t, q, v, a, multipliers):
         """Derivatives of the residual with the constraints' forces, by q, v, a"""
@@ -355,9 +366,10 @@ def _solve(ts, p, output):
             raise p.error from None
         if error.__cause__ is not None:  # newer versions of petsc4py put their own error around one in a monitor of the user's
             raise error.__cause__
+        lines = [line.split("] ", 1)[-1] for line in str(error).splitlines()]
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
-            raise
-        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), str(error).splitlines()[-1].split("] ", 1)[-1])
+            raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:
@@ -384,6 +396,11 @@ class _Output:
         if self.wanted is not None and len(self.wanted) and (not np.all(np.diff(self.wanted) > 0) or not problem.t0 <= self.wanted[0] <= self.wanted[-1] <= problem.t1):
             raise ValueError("t_eval must increase, within t_span")
         self.events = [] if events is None else [events] if callable(events) else list(events)
+        for k, event in enumerate(self.events):
+            if not callable(event):
+                raise TypeError("event %d is %r, must be a function of t, q, v" % (k, event))
+            if getattr(event, "direction", 0) not in (-1, 0, 1):
+                raise ValueError("event %d: its direction is %r, must be -1, 0 or 1" % (k, event.direction))
         self.next, self.rows, self.ends = 0, [], []
         self.found = [([], []) for _ in self.events]
 
