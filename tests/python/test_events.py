@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import tempfile
 import unittest
 
@@ -73,6 +74,15 @@ class Bounces(unittest.TestCase):
             np.testing.assert_allclose([x[1] for x in seen], 0, atol=1e-12)
             self.assertLess(max(x[2] for x in seen), 0)
 
+    def test_without_end(self):
+        """Bounces pile up at a time, behind which there is no motion; the ball does not fall through the floor"""
+        scene, z, _ = ball()
+        run = scene.run(tolerance=1e-6)
+        run.event(z, lambda r: r.ts.getSolution2()[1].scale(-0.5), direction=-1)
+        with self.assertRaisesRegex(RuntimeError, "event 0 comes again and again at t = 1.35"):
+            run.solve(3.)
+        self.assertGreater(run["z"].min(), -1e-9)
+
     def test_jump_of_a_velocity(self):
         """The velocity is zero at the top of the flight; the impact, where it jumps from one sign to the other, is no passage"""
         scene, z, w = ball()
@@ -86,11 +96,11 @@ class Bounces(unittest.TestCase):
 
 class Outputs(unittest.TestCase):
     def test_nothing_that_was_taken_back(self):
-        """CSV, balance, on_step and samples end at an event and go on behind it"""
+        """CSV, balance, animation, on_step and samples end at an event and go on behind it"""
         for dt in (0., 0.05):
             with tempfile.TemporaryDirectory() as folder:
                 scene, z, _ = ball()
-                scene.output(csv=os.path.join(folder, "x.csv"), balance=os.path.join(folder, "b.csv"), dt=dt)
+                scene.output(csv=os.path.join(folder, "x.csv"), balance=os.path.join(folder, "b.csv"), dt=dt, animation=os.path.join(folder, "a"))
                 with scene.run(tolerance=1e-6) as run:
                     seen = []
                     run.on_step(lambda r: seen.append(r.time))
@@ -105,6 +115,10 @@ class Outputs(unittest.TestCase):
                         self.assertGreater(table[:, 1].min(), -1e-9)
                         if dt:
                             np.testing.assert_allclose(table[:, 0], np.arange(31) * dt, atol=1e-9)
+                with open(os.path.join(folder, "a.pvd")) as index:
+                    frames = [float(t) for t in re.findall('timestep="([^"]*)"', index.read())]
+                self.assertTrue(np.all(np.diff(frames) > 0))
+                self.assertTrue(np.any(np.abs(np.array(frames) - math.sqrt(2 / G)) < 1e-5))
                 self.assertTrue(np.all(np.diff(samples) > 0))
                 self.assertTrue(np.all(np.diff(seen) >= 0))
                 self.assertTrue(np.any(np.abs(np.array(seen) - math.sqrt(2 / G)) < 1e-5))

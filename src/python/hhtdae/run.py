@@ -148,7 +148,8 @@ class Run(Channels):
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
         """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew; velocities that joints
-        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise.
+        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise. Channels, files and `on_step` see the step end there, before
+        the action; that an action makes a velocity jump through zero is no passage.
 
         Parameters
         ----------
@@ -196,6 +197,8 @@ class Run(Channels):
                 integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
             for k in here:
                 self._signs.note(k, time)
+                if self._events[k][1] is not None and self._signs.last[k][1] < 1e-12 * abs(time):  # Bounces.test_without_end
+                    raise RuntimeError("event %d comes again and again at t = %.9g, in times that rounding cannot tell apart: let its action hold what it throws back, or make it terminal" % (k, time))
                 if self._events[k][1] is not None:
                     self._events[k][1](self)
             self._ended = any(self._events[k][2] for k in here)
