@@ -108,6 +108,11 @@ void BindIntegrator(py::module_ &m)
   m.def("set_max_step", SetMaxStep);
   m.def("evaluate_at", [](py::object ts, double t) { return StateAt(ts, t, TSHHT3EvaluateAt); });
   m.def("statistics", Statistics);
+  m.def("option_used", [](const std::string &name) {
+    PetscBool used = PETSC_FALSE;
+    Check(PetscOptionsUsed(nullptr, name.c_str(), &used));
+    return used == PETSC_TRUE;
+  });
   m.def("checkpoint_save", [](py::object ts, const std::string &file) { Check(TSHHT3CheckpointSave(ToTS(ts), file.c_str())); });
   m.def("checkpoint_load", [](py::object ts, const std::string &file) { Check(TSHHT3CheckpointLoad(ToTS(ts), file.c_str())); });
   m.def("set_checkpoint_vec", [](py::object ts, py::object x) { Check(TSHHT3SetCheckpointVec(ToTS(ts), x.is_none() ? nullptr : ToVec(x))); });

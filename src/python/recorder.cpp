@@ -59,25 +59,12 @@ PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Recorder::cut(TS ts, PetscReal t)
-{
-  PetscFunctionBegin;
-  while (!times_.empty() && times_.back() > t) {
-    times_.pop_back();
-    values_.resize(values_.size() - one_.size());
-  }
-  if (dt_ > 0) next_ = (PetscInt)std::floor(t / dt_ * (1 + 1e-12)) + 1;
-  else PetscCall(add(ts, t));
-  PetscFunctionReturn(0);
-}
-
 void BindRecorder(py::module_ &m)
 {
   py::class_<Recorder, RecorderPointer>(m, "Recorder")
     .def(py::init([](std::shared_ptr<Scene> scene, double dt) { return std::make_shared<Recorder>(std::move(scene), dt); }))
     .def("attach", [](RecorderPointer r, py::object ts) { Check(TSMonitorSet(ToTS(ts), Monitor, new RecorderPointer(std::move(r)), Destroy)); })
     .def("resume", &Recorder::resume)
-    .def("cut", [](Recorder &r, py::object ts, double t) { Check(r.cut(ToTS(ts), t)); })
     .def_property_readonly("times", [](const Recorder &r) { return FromDoubles(r.times().data(), {(py::ssize_t)r.times().size()}); })
     .def_property_readonly("values", [](const Recorder &r) {
       const py::ssize_t n = (py::ssize_t)r.times().size();

@@ -17,7 +17,6 @@ public:
   Recorder(std::shared_ptr<Scene> scene, double dt) : scene_(std::move(scene)), dt_(dt) {}
 
   void                        resume() { resumed_ = true; } /* the first state that is seen is not the end of a step, but where a checkpoint begins */
-  PetscErrorCode              cut(TS ts, PetscReal t); /* the run will go back to a time of its last step: samples end there */
   PetscErrorCode              look(TS ts, PetscInt step, PetscReal t);
   const std::vector<double>  &times() const { return times_; }
   const std::vector<double>  &values() const { return values_; } /* all channels of a time behind one another */

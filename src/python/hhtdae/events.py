@@ -2,54 +2,64 @@
 
 import math
 
+import numpy as np
+
 
 def zero(f, a, fa, b, fb):
-    """Where f changes its sign between a and b, to rounding, from the side of b: secants, halved values at an end that stays (Illinois), and
-    bisection where these are slow."""
-    side = 0
+    """Where f leaves the sign that it has at a, to rounding, from the side of b > a: secants, halved values at an end that stays (Illinois), and bisection
+    where these are slow or f is zero in a whole part."""
+    side, sign = 0, math.copysign(1, fa)
     for k in range(200):
-        if abs(b - a) <= 4e-16 * max(abs(a), abs(b)):
+        near = 4e-16 * max(abs(a), abs(b))
+        if b - a <= near:
             break
-        t = 0.5 * (a + b) if k % 4 == 3 else b - fb * (b - a) / (fb - fa)
-        if not min(a, b) < t < max(a, b):
-            break
-        ft = f(t)
-        if ft == 0:
-            return t
-        if math.copysign(1, ft) == math.copysign(1, fb):
-            b, fb = t, ft
-            fa, side = (0.5 * fa if side == 1 else fa), 1
+        if fb == 0 and side == 2:  # met exactly: ends here if f has its sign just before
+            t = b - near
         else:
+            t = 0.5 * (a + b) if k % 4 == 3 or fb == 0 else b - fb * (b - a) / (fb - fa)
+        if not math.isfinite(t):
+            t = 0.5 * (a + b)
+        t = float(min(max(t, np.nextafter(a, b)), np.nextafter(b, a)))  # a zero within rounding of an end
+        ft = f(t)
+        if ft * sign > 0:
             a, fa = t, ft
             fb, side = (0.5 * fb if side == -1 else fb), -1
+        elif ft == 0:
+            side = 2 if fb != 0 else 1
+            b, fb = t, ft
+        else:
+            b, fb = t, ft
+            fa, side = (0.5 * fa if side == 1 else fa), 1
     return b
 
 
 class Signs:
-    """Values at the end of the last step of functions whose zeros are sought.
+    """Finds passages of functions through zero, each in the step in which it happens, from their values at both ends. What happens between two steps, a
+    jump of the velocities by an action, is no passage.
 
-    A function that is zero where a step begins, as it is after an event, is looked at from a thousandth of that step on.
+    A function that is zero where a step begins, as it is after an event, is looked at from a thousandth of that step on, or of the time since
+    its last event where that is shorter: bounces become as short as one likes.
     """
 
     def __init__(self, directions):
         self.directions = [int(d) for d in directions]
-        self.values = [0.] * len(self.directions)
-        self.time = None
+        self.last = [(-math.inf, math.inf)] * len(self.directions)  # of each: time of its last passage, and since the one before
 
-    def begin(self, time, values, zeros=()):
-        """The values at a time; those of `zeros`, by number, are zero there"""
-        self.time, self.values = time, [0. if k in zeros else v for k, v in enumerate(values)]
+    def note(self, k, time):
+        """A passage has happened, and the next step begins there"""
+        before = self.last[k][0]
+        self.last[k] = time, time - before
 
-    def passed(self, time, values, at):
-        """(time, number) of all passages of the step that ends at a time, in order of time; at(k, t) is function k inside of the step"""
+    def passed(self, begin, end, at):
+        """(time, number) of all passages between two times of one step, in order of time; at(k, t) is function k there"""
         found = []
-        for k, (before, after, direction) in enumerate(zip(self.values, values, self.directions)):
-            begin = self.time
-            if before == 0:
-                begin = self.time + 1e-3 * (time - self.time)
-                before = at(k, begin)
+        for k, direction in enumerate(self.directions):
+            start, before, after = begin, at(k, begin), at(k, end)
+            last, pause = self.last[k]
+            if before == 0 or last == begin:
+                start = begin + 1e-3 * (min(end - begin, pause) if last == begin else end - begin)
+                before = at(k, start)
             if before * after < 0 or (after == 0 and before != 0):
                 if direction == 0 or (direction > 0) == (before < 0):
-                    found.append((zero(lambda t: at(k, t), begin, before, time, after) if after != 0 else time, k))
-        self.begin(time, values)
+                    found.append((zero(lambda t: at(k, t), start, before, end, after), k))
         return sorted(found)

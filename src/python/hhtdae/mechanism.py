@@ -4,9 +4,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from ._errors import Error
+from .differences import differences, scales, slopes
 from .events import Signs
 from .expressions import Expression, _expression
-from .run import collect_garbage, temporary_options
+from .run import collect_garbage, positive, temporary_options, tell_unused
 from .tracing import compile_tape, differentiate
 
 __all__ = ["MechanismResult", "solve_mechanism"]
@@ -80,7 +82,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central differences, 6 n + 1 calls of
         `residual` for each Newton matrix.
     constraint_jacobian : callable, optional
-        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences.
+        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
         Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3).
     t_eval : sequence of float, optional
@@ -117,29 +119,40 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     >>> solution = hhtdae.solve_mechanism(residual, (0, 2), [1, 0], [0, 0], constraints=rod)
     >>> solution.q[:, -1]
     """
-    problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args)
+    problem = _Problem(residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace)
+    rtol, atol = positive(rtol, "rtol"), positive(atol, "atol")
+    max_step = np.inf if np.ndim(max_step) == 0 and max_step == np.inf else positive(max_step, "max_step")
+    first_step = None if first_step is None else positive(first_step, "first_step")
     collect_garbage(PETSc.COMM_SELF)
-    with temporary_options(options):
+    with temporary_options(options) as unused:
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
         output = _Output(problem, t_eval, dense_output, events)
         output.attach(ts)
         ts.setFromOptions()
         try:
             status, message = _solve(ts, problem, output)
-            return output.result(ts, status, message)
+            result = output.result(ts, status, message)
         finally:
             ts.destroy()
+    tell_unused(unused, 2)
+    return result
 
 
 class _Problem:
     """The user's functions with their sizes, checked"""
 
-    def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args):
+    def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace):
+        if np.shape(t_span) != (2,):
+            raise ValueError("t_span is %r, must be two numbers, begin and end" % (t_span,))
+        if not isinstance(args, (tuple, list)):
+            raise TypeError("args is %r, must be a tuple: (%r,)" % (args, args))
         self.t0, self.t1 = map(float, t_span)
         self.q0, self.v0 = (np.array(x, dtype=float).reshape(-1) for x in (q0, v0))
         self.n, self.args = len(self.q0), tuple(args)
         if not self.t1 > self.t0:
             raise ValueError("t_span is (%g, %g): its end must come after its begin" % (self.t0, self.t1))
+        if not np.all(np.isfinite(self.q0)) or not np.all(np.isfinite(self.v0)):
+            raise ValueError("q0 and v0 must be finite, are %s and %s" % (self.q0, self.v0))
         if len(self.v0) != self.n:
             raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
         self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
@@ -148,32 +161,47 @@ class _Problem:
         self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
         self.k = 0 if velocity_constraints is None else np.size(velocity_constraints(self.t0, self.q0.copy(), self.v0.copy(), *self.args))
         self.size = self.n + self.m + self.k
-        self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))
+        for what, x in (("residual", self.residual(self.t0, self.q0, self.v0, np.zeros(self.n))), ("constraints", self.constraints(self.t0, self.q0)),
+                        ("velocity_constraints", self.rates(self.t0, self.q0, self.v0))):
+            if not np.all(np.isfinite(x)):
+                row = int(np.argmin(np.isfinite(x)))
+                raise ValueError("%s() returns %g in row %d at the begin, t = %g" % (what, x[row], row, self.t0))
+        self.seen = np.full(self.n, -1.), np.full(self.n, -1.)
+        if not trace:
+            self.find_scales(self.t0, self.q0, self.v0, np.zeros(self.n))
+            if self.m and constraint_jacobian is not None:
+                self.check_gradient()
 
     def _shaped(self, x, shape, what):
-        x = np.asarray(x, dtype=float)
-        if x.size != np.prod(shape, dtype=int):
+        if np.iscomplexobj(x):
+            raise ValueError("%s is complex, must be real" % what)
+        try:
+            x = np.asarray(x, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ValueError("%s must be numbers, is %r: %s" % (what, x, error)) from error
+        plain = lambda s: tuple(k for k in s if k != 1)  # (n, 1) and (1, n) are as good as (n,)
+        if plain(x.shape) != plain(shape):
             raise ValueError("%s has the shape %s, must be %s" % (what, x.shape, shape))
         return x.reshape(shape)
 
     def residual(self, t, q, v, a):
-        return self._shaped(self._residual(t, q, v, a, *self.args), (self.n,), "what residual() returns")
+        return self._shaped(self._residual(t, q.copy(), v.copy(), a.copy(), *self.args), (self.n,), "what residual() returns")
 
     def constraints(self, t, q):
-        return self._shaped(self._constraints(t, q, *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
+        return self._shaped(self._constraints(t, q.copy(), *self.args), (self.m,), "what constraints() returns") if self.m else np.empty(0)
 
     def rates(self, t, q, v):
-        return self._shaped(self._rates(t, q, v, *self.args), (self.k,), "what velocity_constraints() returns") if self.k else np.empty(0)
+        return self._shaped(self._rates(t, q.copy(), v.copy(), *self.args), (self.k,), "what velocity_constraints() returns") if self.k else np.empty(0)
 
     def gradient(self, t, q):
         if not self.m:
             return np.empty((0, self.n))
         if self._gradient is not None:
-            return self._shaped(self._gradient(t, q, *self.args), (self.m, self.n), "what constraint_jacobian() returns")
-        return _differences(lambda x: self.constraints(t, x), q, self.m)
+            return self._shaped(self._gradient(t, q.copy(), *self.args), (self.m, self.n), "what constraint_jacobian() returns")
+        return differences(lambda x: self.constraints(t, x), q, self.m, self.scale_q)
 
     def rate_gradient(self, t, q, v):
-        return _differences(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
+        return slopes(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
 
     def reactions(self, t, q, v, multipliers):
         """Forces of the constraints"""
@@ -182,28 +210,40 @@ class _Problem:
     def forces(self, t, q, v, a, multipliers):
         return self.residual(t, q, v, a) + self.reactions(t, q, v, multipliers)
 
+    def find_scales(self, t, q, v, a):
+        """Of differences, where a number has become ten times as large as all before"""
+        if np.all(np.abs(q) <= 10 * self.seen[0]) and np.all(np.abs(v) <= 10 * self.seen[1]):
+            return
+        self.seen = np.maximum(self.seen[0], np.abs(q)), np.maximum(self.seen[1], np.abs(v))
+        self.scale_q = scales(lambda x: np.concatenate([self.residual(t, x, v, a), self.constraints(t, x), self.rates(t, x, v)]), q)
+        self.scale_v = scales(lambda x: self.residual(t, q, x, a), v)
+
+    def check_gradient(self):
+        """A given Jacobian of the constraints beside differences at the begin: a wrong one makes wrong forces, which nothing else would show"""
+        given, found = self.gradient(self.t0, self.q0), differences(lambda x: self.constraints(self.t0, x), self.q0, self.m, self.scale_q)
+        error = np.abs(given - found) * self.scale_q
+        wrong = error > 1e-4 * np.max(np.maximum(np.abs(given), np.abs(found)) * self.scale_q, axis=1, keepdims=True)
+        if np.any(wrong) or not np.all(np.isfinite(given)):
+            row, column = np.unravel_index(np.argmax(np.where(np.isfinite(error), error, np.inf)), error.shape)
+            raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
+                             % (self.t0, row, column, given[row, column], found[row, column]))
+
+    def massless(self):
+        """A remark about accelerations that the residual does not know at the begin, for messages"""
+        M = slopes(lambda x: self.residual(self.t0, self.q0, self.v0, x), np.zeros(self.n), self.n)
+        names = ", ".join("a[%d]" % k for k in range(self.n) if not np.any(M[:, k]))
+        return names and "; residual() does not depend on %s" % names
+
     def matrices(self, t, q, v, a, multipliers):
         """Derivatives of the residual with the constraints' forces, by q, v, a"""
+        self.find_scales(t, q, v, a)
         if self._jacobian is None:
-            return (_differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n), _differences(lambda x: self.residual(t, q, x, a), v, self.n),
-                    _differences(lambda x: self.residual(t, q, v, x), a, self.n))
+            return (differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n, self.scale_q),
+                    differences(lambda x: self.residual(t, q, x, a), v, self.n, self.scale_v), slopes(lambda x: self.residual(t, q, v, x), a, self.n))
         K, C, M = (self._shaped(x, (self.n, self.n), "a matrix that jacobian() returns") for x in self._jacobian(t, q, v, a, *self.args))
         if self.m + self.k:
-            K = K + _differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n)
+            K = K + differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n, self.scale_q)
         return K, C, M
-
-
-def _differences(f, x, rows):
-    """Central differences over 6e-6 of each number, or of 1"""
-    J, x = np.empty((rows, len(x))), np.array(x, dtype=float)
-    for k, at in enumerate(x.copy()):
-        h = 6e-6 * max(1., abs(at))
-        x[k] = at + h
-        up = f(x)
-        x[k] = at - h
-        J[:, k] = (up - f(x)) / (2 * h)
-        x[k] = at
-    return J
 
 
 # ---- the TS ----
@@ -269,7 +309,7 @@ def _call(ts, p, keep):
         full[:n, :n], full[:n, n:m], full[:n, m:] = K + shift_v * C + shift_a * M, G.T, R.T
         full[n:m, :n] = G
         if p.k:
-            full[m:, :n] = _differences(lambda x: p.rates(t, x, w), q, p.k) + shift_v * R
+            full[m:, :n] = differences(lambda x: p.rates(t, x, w), q, p.k, p.scale_q) + shift_v * R
         P.setValues(rows, rows, full)
         P.assemble()
         if J != P:
@@ -326,9 +366,10 @@ def _solve(ts, p, output):
             raise p.error from None
         if error.__cause__ is not None:  # newer versions of petsc4py put their own error around one in a monitor of the user's
             raise error.__cause__
+        lines = [line.split("] ", 1)[-1] for line in str(error).splitlines()]
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
-            raise
-        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), str(error).splitlines()[-1].split("] ", 1)[-1])
+            raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:
@@ -352,9 +393,14 @@ class _Output:
     def __init__(self, problem, t_eval, dense, events):
         self.p, self.dense, self.stopped = problem, dense, None
         self.wanted = None if t_eval is None else np.array(t_eval, dtype=float).reshape(-1)
-        if self.wanted is not None and len(self.wanted) and (np.any(np.diff(self.wanted) <= 0) or self.wanted[0] < problem.t0 or self.wanted[-1] > problem.t1):
+        if self.wanted is not None and len(self.wanted) and (not np.all(np.diff(self.wanted) > 0) or not problem.t0 <= self.wanted[0] <= self.wanted[-1] <= problem.t1):
             raise ValueError("t_eval must increase, within t_span")
         self.events = [] if events is None else [events] if callable(events) else list(events)
+        for k, event in enumerate(self.events):
+            if not callable(event):
+                raise TypeError("event %d is %r, must be a function of t, q, v" % (k, event))
+            if getattr(event, "direction", 0) not in (-1, 0, 1):
+                raise ValueError("event %d: its direction is %r, must be -1, 0 or 1" % (k, event.direction))
         self.next, self.rows, self.ends = 0, [], []
         self.found = [([], []) for _ in self.events]
 
@@ -362,12 +408,11 @@ class _Output:
         ts.setMonitor(self.monitor)
         if self.events:
             self.signs = Signs([getattr(e, "direction", 0) for e in self.events])
-            self.signs.begin(self.p.t0, [e(self.p.t0, self.p.q0, self.p.v0, *self.p.args) for e in self.events])
             ts.setPostStep(self.look)
 
     def look(self, ts):
         """After a step: passages are found on the method's own polynomials; the first terminal one ends the run"""
-        for t, k in self.signs.passed(ts.getTime(), self.event_values(ts, ts.getTime()), lambda k, t: self.event_values(ts, t, k)):
+        for t, k in self.signs.passed(ts.getPrevTime(), ts.getTime(), lambda k, t: self.event_value(ts, t, k)):
             self.found[k][0].append(t)
             self.found[k][1].append(self.positions(ts, t)[0])
             if getattr(self.events[k], "terminal", False):
@@ -375,11 +420,12 @@ class _Output:
                 ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
                 return
 
-    def event_values(self, ts, t, only=None):
+    def event_value(self, ts, t, k):
         q, v = self.positions(ts, t)
-        chosen = self.events if only is None else [self.events[only]]
-        values = [float(e(t, q, v, *self.p.args)) for e in chosen]
-        return values if only is None else values[0]
+        x = float(self.events[k](t, q, v, *self.p.args))
+        if np.isnan(x):
+            raise ValueError("event %d is not a number at t = %g" % (k, t))
+        return x
 
     def positions(self, ts, t):
         u, v, a = integrator.interpolate(ts, t)

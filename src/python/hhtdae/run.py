@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .events import Signs
+from .expressions import _expression
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
 
@@ -21,18 +22,33 @@ __all__ = ["Run"]
 
 @contextmanager
 def temporary_options(given):
-    """PETSc's options while something is done; what the user has set already stays"""
-    database, own = PETSc.Options(), []
+    """PETSc's options while something is done; what the user has set already stays. Yields a list that has the names of those that were not asked for after it."""
+    database, own, unused = PETSc.Options(), [], []
     try:
         for name, value in (given or {}).items():
             name = name.lstrip("-")
             if not database.hasName(name):
                 database.setValue(name, value)
                 own.append(name)
-        yield
+        yield unused
     finally:
         for name in own:
+            if not _core.option_used(name):
+                unused.append(name)
             database.delValue(name)
+
+
+def tell_unused(names, level):
+    """A warning about given options that nothing has asked for: misspelt ones as a rule"""
+    if names:
+        warnings.warn("nobody has asked for the options %s: are their names right?" % ", ".join("-" + name for name in names), RuntimeWarning, level + 1)
+
+
+def positive(x, name):
+    """A positive number as a float"""
+    if isinstance(x, bool) or not isinstance(x, (int, float, np.number)) or not 0 < x < np.inf:
+        raise ValueError("%s is %r, must be a positive number" % (name, x))
+    return float(x)
 
 
 def collect_garbage(comm):
@@ -62,11 +78,13 @@ class Run(Channels):
         self._page = _PageFile(scene, page)
         if sample is not None and not sample >= 0:
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
-        if tolerance is not None and not tolerance > 0:
-            raise ValueError("tolerance is %r, must be positive" % (tolerance,))
+        if tolerance is not None:
+            tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
+        self._ended = False  # by a terminal event in the last solve()
+        self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
         collect_garbage(scene.comm)
-        with temporary_options(self._options):
+        with temporary_options(self._options) as self._unused:
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
             self.ts.setAttr("hhtdae", scene._keep)
             if tolerance is not None:
@@ -92,11 +110,16 @@ class Run(Channels):
         if until == ts.getTime():
             return self
         ts.setMaxTime(until)
-        with temporary_options(self._options), self._page.settings():
+        self._ended = False
+        with temporary_options(self._options) as unused, self._page.settings():
             if self._events:
                 self._solve_with_events(ts)
             else:
+                self._serial += 1
                 self.scene._core.solve(ts)
+        if self._unused:
+            tell_unused([name for name in unused if name in self._unused], 2)
+            self._unused = []
         reached = ts.getTime()
         if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
             warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
@@ -105,21 +128,28 @@ class Run(Channels):
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
-        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them.
+        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them. A terminal
+        event ends it, after its time.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
         """
-        begin = self._open().getTime()
+        begin, dt = self._open().getTime(), positive(dt, "dt")
+        if not begin <= until < np.inf:
+            raise ValueError("the run is at t = %g and cannot go to %r in parts" % (begin, until))
         self._page.span = until - begin
         count = int(np.ceil((until - begin) / dt * (1 - 1e-12)))
         for k in range(1, count + 1):
-            self.solve(until if k == count else begin + k * dt)
+            end = until if k == count else begin + k * dt
+            self.solve(end)
             yield self.time
+            if self._ended or self.time < end:
+                return
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
         """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew; velocities that joints
-        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise.
+        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise. Channels, files and `on_step` see the step end there, before
+        the action; that an action makes a velocity jump through zero is no passage.
 
         Parameters
         ----------
@@ -132,44 +162,47 @@ class Run(Channels):
         direction : {0, 1, -1}
             Passages of both kinds, upwards, or downwards alone.
         """
-        self._events.append((formula, action, terminal))
+        if direction not in (-1, 0, 1):
+            raise ValueError("event(): direction is %r, must be 0, 1 or -1" % (direction,))
+        if action is not None and not callable(action):
+            raise TypeError("event(): action is %r, must be a function of the run" % (action,))
+        self._events.append((_expression(formula), action, terminal))
         self._signs = Signs((self._signs.directions if self._signs else []) + [direction])
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
             self._open().setPostStep(self._look)
 
-    def _event_values(self, time=None):
+    def _event_value(self, k, time):
         self._now.take(time)
-        return [self._now.value(formula) for formula, _, _ in self._events]
+        return self._now.value(self._events[k][0])
 
     def _look(self, ts):
-        """After a step: a passage ends TSSolve()"""
-        values = self._event_values()
-        self._passed = self._signs.passed(ts.getTime(), values, lambda k, t: self._event_values(t)[k])
+        """After a step, before monitors see it: where something passes zero the step is taken back to the first passage, which ends TSSolve(). So outputs
+        see it end there."""
+        self._passed = self._signs.passed(ts.getPrevTime(), ts.getTime(), self._event_value)
         if self._passed:
+            integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
     def _solve_with_events(self, ts):
-        """A step in which something passes zero is taken back to the first passage, as the final time of a run by interpolation would be"""
-        if self._signs.time is None:
-            self._signs.begin(ts.getTime(), self._event_values())
         while True:
             self._passed = []
+            self._serial += 1
             self.scene._core.solve(ts)
-            if not self._passed:
+            if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
-            if self._recorder:
-                self._recorder.cut(ts, time)
-            integrator.move_back(ts, time)
             if not PETSc.Options().hasName("ts_hhtdae_start"):
                 integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
-            self._signs.begin(time, self._event_values(), here)
             for k in here:
+                self._signs.note(k, time)
+                if self._events[k][1] is not None and self._signs.last[k][1] < 1e-12 * abs(time):  # Bounces.test_without_end
+                    raise RuntimeError("event %d comes again and again at t = %.9g, in times that rounding cannot tell apart: let its action hold what it throws back, or make it terminal" % (k, time))
                 if self._events[k][1] is not None:
                     self._events[k][1](self)
-            if any(self._events[k][2] for k in here):
+            self._ended = any(self._events[k][2] for k in here)
+            if self._ended or time >= ts.getMaxTime():
                 return
 
     def restart(self) -> None:
@@ -178,8 +211,12 @@ class Run(Channels):
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step."""
+        begun = 0
+
         def monitor(ts, step, t, u):
-            if step > 0:
+            nonlocal begun
+            first, begun = begun != self._serial, self._serial  # the state that a part of the run begins with
+            if step > 0 and not first:
                 function(self)
         self._open().setMonitor(monitor)
 

@@ -1,0 +1,64 @@
+"""Derivatives of the user's functions by central differences, and the scale of the numbers that they are taken over."""
+
+import numpy as np
+
+
+def differences(f, x, rows, scale):
+    """Central differences over 6e-6 of the scale of each number: error of truncation and of rounding are about the same, 1e-10"""
+    return _over(f, x, rows, 6e-6 * scale)
+
+
+def slopes(f, x, rows):
+    """The same of a function that is linear: over 1, or the number itself, where rounding is least"""
+    return _over(f, x, rows, np.maximum(1., np.abs(x)))
+
+
+def _over(f, x, rows, increments):
+    J, x = np.empty((rows, len(x))), np.array(x, dtype=float)
+    for k, (at, h) in enumerate(zip(x.copy(), increments)):
+        up, down = at + h, at - h  # what rounding leaves of the increments
+        x[k] = up
+        above = f(x)
+        x[k] = down
+        J[:, k] = (above - f(x)) / (up - down)
+        x[k] = at
+    return J
+
+
+def scales(f, x):
+    """The scale of each number: its size or 1, or by how many powers of ten less f has to be looked at to be a parabola over a hundredth of a scale. Rows of f
+    that never are, where they have a kink, are passed over. Test: Scales of tests/python/test_mistakes.py."""
+    return np.array([_scale(f, np.array(x, dtype=float), k) for k in range(len(x))])
+
+
+def _scale(f, x, k):
+    begin = max(1., abs(x[k]))
+    judged = []
+    for decade in range(11):
+        s = begin * 10.**-decade
+        if s < 1e-9 * abs(x[k]):  # rounding of the number itself
+            break
+        good, small = _parabola(f, x, k, 1e-3 * s)
+        judged.append((s, good, small))
+        if decade == 0 and np.all(good | small):
+            return begin
+    ever = np.any([good for _, good, _ in judged], axis=0)
+    return next((s for s, good, small in judged if np.all(good | small | ~ever)), begin)
+
+
+def _parabola(f, x, k, d):
+    """Which rows of f are parabolas over x_k - 2 d to x_k + 2 d, and which do not depend on x_k to rounding. A place where f fails is too far away."""
+    y = []
+    with np.errstate(all="ignore"):
+        for step in (0, d, -d, 2 * d, -2 * d):
+            at = x.copy()
+            at[k] += step
+            try:
+                y.append(f(at))
+            except Exception:
+                y.append(np.full(len(f(x)), np.nan))
+        y0, a, b, c, e = y
+        change = np.max(np.abs(np.array(y) - y0), axis=0)
+        cubic = np.abs((c - e) / 4 - (a - b) / 2) + np.abs((c - 2 * y0 + e) / 4 - (a - 2 * y0 + b))
+        small = change <= 1e-14 * np.max(np.abs(np.array(y)), axis=0)
+        return ~small & (cubic <= 1e-4 * change), small

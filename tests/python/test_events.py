@@ -1,0 +1,139 @@
+"""Events: each at its zero, and nothing sees what an event has taken back."""
+
+import math
+import os
+import re
+import tempfile
+import unittest
+
+import numpy as np
+
+import hhtdae as h
+from hhtdae.events import zero
+
+G = 9.81
+
+
+def ball(height=1.):
+    scene = h.Scene(gravity=(0, 0, -G))
+    b = scene.add("ball", h.PointMass(position=(0, 0, height)))
+    z = h.displacement(b.marker(), 2)
+    scene.channel("z", z)
+    return scene, z, h.velocity(b.marker(), 2)
+
+
+def bounces(height, part, count):
+    """Times of the bounces of a ball that falls from a height"""
+    t, v = math.sqrt(2 * height / G), math.sqrt(2 * height * G)
+    times = []
+    for _ in range(count):
+        times.append(t)
+        v *= part
+        t += 2 * v / G
+    return np.array(times)
+
+
+class Zeros(unittest.TestCase):
+    def test_close_to_an_end(self):
+        for root in (1e-17, 1e-12, 1e-3, 0.5, 1 - 1e-12):
+            for f in (lambda t: t - root, lambda t: (t - root)**3, lambda t: 1e8 * (t - root), lambda t: math.expm1(20 * (t - root))):
+                t = zero(f, 0., f(0.), 1., f(1.))
+                self.assertAlmostEqual(t, root, delta=1e-15)
+
+    def test_zero_from_there_on(self):
+        f = lambda t: max(0., 0.3 - t)
+        self.assertAlmostEqual(zero(f, 0., f(0.), 1., f(1.)), 0.3, delta=1e-15)
+
+    def test_of_equations(self):
+        """Heights of a swing, where several are passed in one step, with those that lie next to its ends"""
+        places = np.random.default_rng(1).uniform(-.9, .9, 60)
+        s = h.solve_mechanism(lambda t, q, v, a: [a[0], a[1] + G], (0, 2), [1, 0], [0, 0], constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1],
+                              events=[(lambda t, q, v, x=x: q[0] - x) for x in places], trace=True)
+        for x, q in zip(places, s.q_events):
+            self.assertGreater(len(q), 0)
+            np.testing.assert_allclose(q[:, 0], x, rtol=0, atol=1e-13)
+
+
+class Bounces(unittest.TestCase):
+    def test_at_the_floor(self):
+        """All bounces at height zero, also those of which the next step would hold thousands"""
+        for height, part, count in ((5., 0.9, 2), (0.1, 0.9, 10), (1., 0.8, 12), (0.1, 0.5, 20)):
+            scene, z, _ = ball(height)
+            run, seen = scene.run(tolerance=1e-6), []
+
+            def bounce(r):
+                U, V = r.ts.getSolution2()
+                seen.append((r.time, U[2], V[2]))
+                V.scale(-part)
+                V.assemble()
+            times = bounces(height, part, count + 1)
+            run.event(z, bounce, direction=-1)
+            run.solve(0.5 * (times[-1] + times[-2]))
+            self.assertEqual(len(seen), count, (height, part))
+            np.testing.assert_allclose([x[0] for x in seen], times[:-1], atol=2e-5)
+            np.testing.assert_allclose([x[1] for x in seen], 0, atol=1e-12)
+            self.assertLess(max(x[2] for x in seen), 0)
+
+    def test_without_end(self):
+        """Bounces pile up at a time, behind which there is no motion; the ball does not fall through the floor"""
+        scene, z, _ = ball()
+        run = scene.run(tolerance=1e-6)
+        run.event(z, lambda r: r.ts.getSolution2()[1].scale(-0.5), direction=-1)
+        with self.assertRaisesRegex(RuntimeError, "event 0 comes again and again at t = 1.35"):
+            run.solve(3.)
+        self.assertGreater(run["z"].min(), -1e-9)
+
+    def test_jump_of_a_velocity(self):
+        """The velocity is zero at the top of the flight; the impact, where it jumps from one sign to the other, is no passage"""
+        scene, z, w = ball()
+        run, tops = scene.run(tolerance=1e-7), []
+        run.event(z, lambda r: r.ts.getSolution2()[1].scale(-0.8), direction=-1)
+        run.event(w, lambda r: tops.append(r.time))
+        run.solve(1.)
+        fall = math.sqrt(2 / G)
+        np.testing.assert_allclose(tops, [fall * 1.8], atol=1e-5)
+
+
+class Outputs(unittest.TestCase):
+    def test_nothing_that_was_taken_back(self):
+        """CSV, balance, animation, on_step and samples end at an event and go on behind it"""
+        for dt in (0., 0.05):
+            with tempfile.TemporaryDirectory() as folder:
+                scene, z, _ = ball()
+                scene.output(csv=os.path.join(folder, "x.csv"), balance=os.path.join(folder, "b.csv"), dt=dt, animation=os.path.join(folder, "a"))
+                with scene.run(tolerance=1e-6) as run:
+                    seen = []
+                    run.on_step(lambda r: seen.append(r.time))
+                    run.event(z, lambda r: r.ts.getSolution2()[1].scale(-0.8), direction=-1)
+                    run.solve(1.5)
+                    samples = run.times
+                for name in ("x.csv", "b.csv"):
+                    table = np.loadtxt(os.path.join(folder, name), delimiter=",", skiprows=1, usecols=range(2))
+                    self.assertTrue(np.all(np.diff(table[:, 0]) > 0), name)
+                    self.assertEqual(table[0, 0], 0)
+                    if name == "x.csv":
+                        self.assertGreater(table[:, 1].min(), -1e-9)
+                        if dt:
+                            np.testing.assert_allclose(table[:, 0], np.arange(31) * dt, atol=1e-9)
+                with open(os.path.join(folder, "a.pvd")) as index:
+                    frames = [float(t) for t in re.findall('timestep="([^"]*)"', index.read())]
+                self.assertTrue(np.all(np.diff(frames) > 0))
+                self.assertTrue(np.any(np.abs(np.array(frames) - math.sqrt(2 / G)) < 1e-5))
+                self.assertTrue(np.all(np.diff(samples) > 0))
+                self.assertTrue(np.all(np.diff(seen) >= 0))
+                self.assertTrue(np.any(np.abs(np.array(seen) - math.sqrt(2 / G)) < 1e-5))
+
+    def test_terminal_event_ends_step_by(self):
+        scene, z, _ = ball()
+        run = scene.run(tolerance=1e-7)
+        run.event(z - 0.5, terminal=True)
+        times = list(run.step_by(0.1, until=1.))
+        fall = math.sqrt(1 / G)
+        np.testing.assert_allclose(times, [0.1, 0.2, 0.3, fall], atol=1e-6)
+        self.assertEqual(run.time, times[-1])
+        self.assertAlmostEqual(run["z"][-1], 0.5, delta=1e-12)
+        self.assertAlmostEqual(run.sample()["z"], 0.5, delta=1e-12)
+
+
+if __name__ == "__main__":
+    unittest.main()

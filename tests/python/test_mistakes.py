@@ -1,0 +1,124 @@
+"""solve_mechanism: the scale of its differences, and what it says of arguments and functions that are wrong."""
+
+import math
+import unittest
+import warnings
+
+import numpy as np
+
+import hhtdae as h
+
+G = 9.81
+
+
+def swing(length, trace=False, **options):
+    """A pendulum whose constraint is a distance, with the same period at every length"""
+    root = h.sqrt if trace else math.sqrt
+    return h.solve_mechanism(lambda t, q, v, a: [a[0], a[1] + G * length], (0, 1), [length, 0], [0, 0], constraints=lambda t, q: [root(q[0]**2 + q[1]**2) - length],
+                             rtol=1e-7, atol=1e-7 * length, trace=trace, **options)
+
+
+def stone(residual=lambda t, q, v, a: [a[0], a[1] + G], q0=(1., 0.), **options):
+    return h.solve_mechanism(residual, (0, 1), q0, [0, 0], **options)
+
+
+class Scales(unittest.TestCase):
+    def test_lengths(self):
+        """A millionth of a metre and a thousand kilometres: the motion is that of exact derivatives"""
+        for length in (1e-6, 1e-3, 1., 1e6):
+            a, b = swing(length), swing(length, trace=True)
+            self.assertTrue(a.success, a.message)
+            np.testing.assert_allclose(a.q[:, -1] / length, b.q[:, -1] / length, atol=3e-6)
+            self.assertLess(a.statistics.newton, 1.2 * b.statistics.newton)
+
+    def test_kinks(self):
+        from hhtdae.differences import scales
+
+        np.testing.assert_array_equal(scales(lambda x: np.array([abs(x[0]), x[1]**3]), [0., 0.2]), [1., 1.])
+        self.assertLess(scales(lambda x: np.tanh(x / 1e-4), [0.])[0], 1e-2)
+
+
+class Arguments(unittest.TestCase):
+    def test_tolerances(self):
+        for name in ("rtol", "atol", "max_step", "first_step"):
+            for wrong in (-1e-6, 0, float("nan"), "1e-6", [1e-6, 1e-6], True):
+                with self.assertRaisesRegex(ValueError, name + " is .*positive"):
+                    stone(**{name: wrong})
+        self.assertTrue(stone(rtol=np.float32(1e-5), max_step=np.int64(1)).success)
+
+    def test_options_nobody_asks_for(self):
+        scene = h.Scene()
+        scene.add("mass", h.PointMass())
+        for solve in (lambda **k: stone(**k), lambda **k: scene.solve(1., **k)):
+            with self.assertWarnsRegex(RuntimeWarning, "-ts_hhtdae_alhpa"):
+                solve(options={"ts_hhtdae_alhpa": -0.1})
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                solve(options={"-ts_hhtdae_alpha": -0.1, "ts_max_steps": 1000, "snes_max_it": 20})
+
+    def test_of_runs(self):
+        scene = h.Scene()
+        x = h.displacement(scene.add("mass", h.PointMass()).marker(), 0)
+        run, seen = scene.run(), []
+        for dt in (0, -0.1, float("nan"), "a"):
+            with self.assertRaisesRegex(ValueError, "dt is"):
+                list(run.step_by(dt, 1.))
+        with self.assertRaisesRegex(ValueError, "in parts"):
+            list(run.step_by(0.1, -1.))
+        for tolerance in ("1e-3", float("inf"), 0):
+            with self.assertRaisesRegex(ValueError, "tolerance is"):
+                scene.run(tolerance=tolerance)
+        with self.assertRaisesRegex(ValueError, "direction"):
+            run.event(x, direction="up")
+        with self.assertRaisesRegex(TypeError, "action"):
+            run.event(x, action=3)
+        run.on_step(lambda r: seen.append((r.steps, r.time)))
+        list(run.step_by(np.float32(0.25), np.int64(1)))
+        self.assertEqual(len(seen), run.steps)
+        self.assertEqual(seen[-1], (run.steps, 1.))
+
+    def test_values(self):
+        with self.assertRaisesRegex(ValueError, "t_eval"):
+            stone(t_eval=[0, float("nan"), 1])
+        with self.assertRaisesRegex(ValueError, "finite"):
+            stone(q0=[np.nan, 0])
+
+    def test_messages(self):
+        """Those of the library come as hhtdae.Error, and name the acceleration without mass; those of arguments which one it is"""
+        with self.assertRaisesRegex(h.Error, r"without mass.* not depend on a\[1\]$") as caught:
+            stone(lambda t, q, v, a: [a[0], 0 * a[1]])
+        self.assertNotIn("TSSolve", str(caught.exception))
+        for call, kind, text in ((lambda: stone(events=[3]), TypeError, "event 0 is 3"), (lambda: stone(args=3), TypeError, r"args is 3.*\(3,\)"),
+                                 (lambda: h.solve_mechanism(lambda t, q, v, a: a, (0, 1, 2), [1], [0]), ValueError, "t_span")):
+            with self.assertRaisesRegex(kind, text):
+                call()
+
+    def test_functions(self):
+        for residual, text in ((lambda t, q, v, a: [a[0], np.nan], "residual.* row 1"), (lambda t, q, v, a: None, "residual"),
+                               (lambda t, q, v, a: [a[0], "x"], "residual"), (lambda t, q, v, a: a + 1j, "residual.*complex")):
+            with self.assertRaisesRegex(ValueError, text):
+                stone(residual)
+        with self.assertRaisesRegex(ValueError, "event 0 is not a number"):
+            stone(events=lambda t, q, v: np.nan)
+
+    def test_functions_that_write_into_their_arguments(self):
+        def residual(t, q, v, a):
+            r = [a[0] + q[0], a[1]]
+            q[:] = v[:] = 0
+            return r
+        s = stone(residual)
+        self.assertAlmostEqual(s.q[0, 0], 1.)
+        self.assertAlmostEqual(s.q[0, -1], math.cos(1), delta=1e-3)
+
+    def test_constraint_jacobian(self):
+        rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1])
+        self.assertTrue(stone(constraint_jacobian=lambda t, q: [2 * q], **rod).success)
+        with self.assertRaisesRegex(ValueError, "row 0, column 0 it says 1, differences say 2"):
+            stone(constraint_jacobian=lambda t, q: [q], **rod)
+        with self.assertRaisesRegex(ValueError, "shape"):
+            h.solve_mechanism(lambda t, q, v, a: a, (0, 1), [1, 0, 0], [0, 0, 0], constraints=lambda t, q: [q[0] - 1, q[1]],
+                              constraint_jacobian=lambda t, q: [[1, 0], [0, 1], [0, 0]])
+
+
+if __name__ == "__main__":
+    unittest.main()
