@@ -17,6 +17,7 @@
 #include "formulas.h"
 #include "linear/linear.h"
 #include "solver.h"
+#include "work_vec.h"
 
 namespace hht3
 {
@@ -71,16 +72,18 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
 PetscErrorCode ForcesLeft(const Integrator &I, Consistent &c, PetscReal *part)
 {
   PetscReal sum[2] = {0, 0};
+  WorkVec   forces;
 
   PetscFunctionBegin;
-  PetscCall(MatMult(c.P, c.X, I.work));
+  PetscCall(forces.like(c.X));
+  PetscCall(MatMult(c.P, c.X, forces));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar f, PetscScalar of) {
       if (!IsCoordinate(I, i)) return;
       sum[0] += PetscRealPart(f * f);
       sum[1] += PetscRealPart(of * of);
     },
-    Read(c.F), Read(I.work)));
+    Read(c.F), Read(forces)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
   *part = sum[1] > 0 ? PetscSqrtReal(sum[0] / sum[1]) : 1;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -186,7 +189,7 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
     const bool known = c.its > 1 && !fresh, falls = e <= slow * last;
     if (!*ok || e <= converged || (known && (falls ? CorrectorError(e / last, e) <= converged : e <= rounding))) PetscFunctionReturn(PETSC_SUCCESS);
-    if (known && !falls) {
+    if (known && !falls && c.h == 0) {
       PetscCall(ForcesLeft(Get(ts), c, &forces));
       if (forces <= rounding) PetscFunctionReturn(PETSC_SUCCESS);
     }
