@@ -24,21 +24,31 @@ constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
 constexpr int       at_least = 9, at_most = 30; /* samples */
 constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
 
+constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
+constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
+
+/* What is found of a row's changes with time */
+struct Changes {
+  WorkVec largest, number;
+  Vec     shortest = nullptr; /* I.excitation */
+};
+
 /* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; whether any row does */
-PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, Vec largest, Vec T, PetscBool *any)
+PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, const Changes &c, PetscBool *any)
 {
   PetscMPIInt changes = 0;
 
   PetscFunctionBegin;
   PetscCall(ForEntries(
-    [&](PetscInt, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &shortest) {
+    [&](PetscInt, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
       const PetscReal change = PetscAbsScalar(f - f0);
       if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
       most     = PetscMax(change, PetscRealPart(most));
       shortest = tau;
-      changes  = 1;
+      number += 1;
+      changes = 1;
     },
-    Read(before), Read(after), Write(largest), Write(T)));
+    Read(before), Read(after), Write(c.largest), Write(c.number), Write(c.shortest)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changes, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)before)));
   *any = (PetscBool)changes;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -52,25 +62,45 @@ PetscErrorCode NoteExcitation(TS ts)
   Integrator     &I    = Get(ts);
   const PetscReal stop = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > ts->ptime ? ts->max_time - ts->ptime : 1;
   PetscBool       any = PETSC_FALSE;
-  WorkVec         zero, F[2], largest;
+  WorkVec         zero, F[2];
+  Changes         c;
+  PetscReal       swing = PETSC_MAX_REAL;
 
   PetscFunctionBegin;
-  for (WorkVec *v : {&zero, &F[0], &F[1], &largest}) PetscCall(v->like(I.U0));
+  for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
   if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
-  PetscCall(VecZeroEntries(zero));
-  PetscCall(VecZeroEntries(largest));
+  c.shortest = I.excitation;
+  for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
   PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
   PetscCall(EvaluateResidual(ts, ts->ptime + longest * stop, I.U0, I.V0, zero, F[0]));
   PetscReal tau = longest * stop;
   for (int sample = 1, still = 0; sample < at_least || (sample < at_most && still < quiet); sample++) {
     tau *= shorter;
     PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
-    PetscCall(NoteChanges(tau, F[0], F[1], largest, I.excitation, &any));
+    PetscCall(NoteChanges(tau, F[0], F[1], c, &any));
     still = any ? 0 : still + 1;
   }
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= all_along) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
+  PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
   if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
   else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After an accepted step: loads that swing faster than steps follow are said, once. Where positions move by less than the tolerance, the error test lets
+   velocities that they leave pass. */
+PetscErrorCode TellUnfollowed(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.told || !(I.h > unfollowed * I.swing)) PetscFunctionReturn(PETSC_SUCCESS);
+  I.told = PETSC_TRUE;
+  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                        "hhtdae: the step of %g at t = %g does not follow loads or motions that depend on time alone, some of which swing within %.1g or so. Where they matter, "
+                        "set a largest step (-ts_adapt_dt_max) or a smaller tolerance.\n",
+                        (double)I.h, (double)I.t0, (double)(6 * I.swing)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

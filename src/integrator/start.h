@@ -27,6 +27,7 @@ PetscErrorCode Start(TS ts);
 
 /* How fast loads and motions are that depend on time alone, excitation.cpp */
 PetscErrorCode NoteExcitation(TS ts);
+PetscErrorCode TellUnfollowed(TS ts);
 
 /* V0 projected on the constraints and a consistent start from there, before a step far shorter than the last one */
 PetscErrorCode Repair(TS ts);

@@ -88,6 +88,8 @@ struct StepState {
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
+  PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
+  PetscBool        told        = PETSC_FALSE;    /* that steps do not follow them */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
   PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
   TSHHT3Statistics stat        = {};

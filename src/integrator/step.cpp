@@ -151,6 +151,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
   I.stat.h_max = PetscMax(I.stat.h_max, h);
   I.have_step  = PETSC_TRUE;
+  PetscCall(TellUnfollowed(ts));
   PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

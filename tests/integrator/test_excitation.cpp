@@ -113,6 +113,34 @@ TEST(Excitation, APulseAtTheStart)
   }
 }
 
+/* Its positions move by less than the tolerance, and nothing holds the velocities that steps of any length leave of it */
+TEST(Excitation, UnfollowedIsTold)
+{
+  const std::string told = "does not follow loads";
+  for (double frequency : {.5, 100.}) {
+    const Shaken p(frequency, 100., false);
+    Printed      out;
+    Simulation   run(p, tolerance(1e-2) + "-ts_adapt_dt_max 5");
+    must(run.solve());
+    EXPECT_TRUE(out.says(told)) << frequency << " Hz";
+    EXPECT_EQ(out.text().find(told), out.text().rfind(told)) << "once";
+  }
+  for (const char *options : {"-ts_rtol 1e-5 -ts_atol 1e-5 -ts_max_steps 1000", "-ts_adapt_type none -ts_dt 1e-3 -ts_max_steps 1000"}) {
+    const Shaken p(100., 100., false);
+    Printed      out;
+    Simulation   run(p, options);
+    must(run.solve());
+    EXPECT_EQ(out.text(), "") << options;
+  }
+  for (double part : {.5, .1, 1e-2, 1e-3, 1e-4}) { /* over before most steps */
+    const Pushed p(part * 20., 20.);
+    Printed      out;
+    Simulation   run(p, tolerance(1e-2));
+    must(run.solve());
+    EXPECT_EQ(out.text(), "") << part;
+  }
+}
+
 /* What depends on nothing but the state pays a few residuals, and at rest no differences of constraints */
 TEST(Excitation, NoneAtRest)
 {
