@@ -261,6 +261,21 @@ TEST(SmallBodies, AttachmentsInALargeScene)
   EXPECT_EQ(DataOf(beam.scene).started.redundant, 0) << out.text();
 }
 
+namespace
+{
+
+/* A force of 1000 N times the square of the length pulls at the tip, and the scene starts in equilibrium */
+void hangLoad(Cantilever &beam, double l)
+{
+  UserForce f;
+  f.i = beam.tip;
+  for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = k < 2 ? 0 : -1e3 * l * l](const Real *t) -> Real { return 0. * t[0] + x; }));
+  beam.scene.add("load", f);
+  beam.scene.start().equilibrium = true;
+}
+
+} // namespace
+
 /* Bent by a force at the tip: as far, and found as soon */
 TEST(SmallBodies, Equilibrium)
 {
@@ -268,11 +283,7 @@ TEST(SmallBodies, Equilibrium)
   PetscInt iterations = 0;
   for (double l : lengths) {
     Cantilever beam(l);
-    UserForce  f;
-    f.i = beam.tip;
-    for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = k < 2 ? 0 : -1e3 * l * l](const Real *t) -> Real { return 0. * t[0] + x; }));
-    beam.scene.add("load", f);
-    beam.scene.start().equilibrium = true;
+    hangLoad(beam, l);
     must(beam.scene.setUp());
     const double down = (DataOf(beam.scene).frame(beam.tip).x - middle(1, l)).z() / l;
     if (l == 1) {
@@ -290,11 +301,7 @@ TEST(SmallBodies, StartFromEquilibrium)
   double one = 0;
   for (double l : lengths) {
     Cantilever beam(l);
-    UserForce  f;
-    f.i = beam.tip;
-    for (int k = 0; k < 3; k++) f.force.push_back(Expression({Measure::time()}, [x = k < 2 ? 0 : -1e3 * l * l](const Real *t) -> Real { return 0. * t[0] + x; }));
-    beam.scene.add("load", f);
-    beam.scene.start().equilibrium = true;
+    hangLoad(beam, l);
     SceneRun run(beam.scene, 1e-3 * l, "-ts_rtol 1e-6 -ts_atol 1e-6 -ts_max_steps 20");
     must(run.solve());
     const double down = (DataOf(beam.scene).frame(beam.tip).x - middle(1, l)).z() / l;
