@@ -3,7 +3,8 @@
   length of the run is no measure for a load of 100 Hz in a run of 100 s: differences over parts of it meet whole periods, and so does a first step.
 
   The residual is sampled at t + tau with everything else as it is, for ever shorter parts tau of the run. A row follows time within the shortest tau
-  up to which it changes by a tenth of its largest change from one sample to the next: of sin(w t) some 0.3/w. (From t itself a load that sets in there would change within nothing.)
+  up to which it changes by a tenth of its largest change from one sample to the next: of sin(w t) 0.08/w to 0.6/w. (From t itself a load that
+  sets in there would change within nothing.)
 */
 #include "consistent.h"
 #include "entries.h"
@@ -23,7 +24,6 @@ constexpr PetscReal longest = 0.618034, shorter = 0.236068;
 constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
 constexpr int       at_least = 9, at_most = 30; /* samples */
 constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
-
 constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
 constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
