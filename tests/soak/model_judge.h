@@ -405,7 +405,7 @@ private:
   {
     o_.stage = Referring;
 #ifdef HHTDAE_HAVE_IDA
-    for (double factor : {0.01, 0.03, 0.1, 0.3}) {
+    for (double factor : {0.001, 0.01, 0.03, 0.1, 0.3}) {
       if (o_.by != ByIDA) break;
       Trajectory t = RunIDA(build(), factor * reference_eps, patience(10), &o_.legs, 1e-5);
       if (t.arrived() || factor > 0.2) return t;
