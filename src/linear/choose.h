@@ -6,6 +6,19 @@
 
 PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given);
 
+/* What a factorization takes. large: for the packages that work on dense fronts; parts: for KLU on every rank; single: the factor is as large that
+   single precision pays. */
+struct LinearSize {
+  PetscBool large = PETSC_FALSE, parts = PETSC_FALSE, single = PETSC_FALSE;
+  char      text[160] = "";
+};
+
+/* many_solves: hundreds of solves follow each factorization */
+PetscErrorCode LinearMeasure(Mat P, PetscBool symmetric, PetscBool many_solves, LinearSize *size);
+
+/* Whether the matrix alone says that its factor is large */
+PetscErrorCode LinearHasManyEntries(Mat P, PetscBool *yes);
+
 /* Whether hhtconstraint is in use, and the tolerance of its Krylov method where nobody has set one */
 PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice);
 

@@ -40,6 +40,10 @@ PetscErrorCode ReadTask(const Arguments &arguments, Task *task);
 /* Options that nobody has asked for are named on standard error */
 PetscErrorCode WarnOfUnused();
 
+/* values.cpp */
+std::vector<std::string> Split(const std::string &text, char separator);
+bool                     Number(const std::string &text, double *value);
+
 /* Lists in the words of the command line; the text says what is wrong */
 std::string ParseMaterials(const std::string &text, std::map<std::string, hhtdae::Material> *materials);
 std::string ParseAttachments(const std::string &text, std::vector<hhtdae::Attachment> *attachments);
