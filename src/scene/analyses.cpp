@@ -137,22 +137,32 @@ PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
 }
 
 /* The consistent state nearest to where ts is, with the axes of its angles */
-PetscErrorCode Complete(TS ts, Runtime &R)
+PetscErrorCode CompleteBy(TS ts, Runtime &R, Vec A, TS *copy)
 {
-  TS        copy;
   PetscReal t;
-  Vec       U, V, A;
+  Vec       U, V;
   PetscFunctionBegin;
   PetscCall(TSGetTime(ts, &t));
   PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(VecDuplicate(U, &A));
-  PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, &copy));
-  PetscCall(TSHHT3EvaluateAt(copy, t, U, V, A));
-  PetscCall(VecCopy(RunOf(copy)->axes, R.axes));
+  PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, copy));
+  PetscCall(TSHHT3EvaluateAt(*copy, t, U, V, A));
+  PetscCall(VecCopy(RunOf(*copy)->axes, R.axes));
   PetscCall(UseAxes(R));
   PetscCall(KeepStart(ts, A));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Complete(TS ts, Runtime &R)
+{
+  TS  copy = nullptr;
+  Vec U, A;
+  PetscFunctionBegin;
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecDuplicate(U, &A));
+  const PetscErrorCode failed = CompleteBy(ts, R, A, &copy); /* dropped rows may be violated there: the two go all the same */
   PetscCall(VecDestroy(&A));
   PetscCall(TSDestroy(&copy));
+  PetscCall(failed);
   PetscFunctionReturn(0);
 }
 

@@ -150,12 +150,26 @@ void Resolve(Motion &m, const Matrix3 &R)
   m.axes = R.transpose() * m.axes;
 }
 
+/* u, u' and u'' of a run at t, or before its first step at where it stands; *copy: to be destroyed, whatever happens */
+PetscErrorCode StateAt(TS ts, PetscReal *t, Vec W[3], TS *copy)
+{
+  PetscInt steps;
+  PetscFunctionBegin;
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (steps) PetscCall(TSHHT3EvaluateAt(ts, *t, W[0], W[1], W[2]));
+  else {
+    PetscCall(TSGetTime(ts, t));
+    PetscCall(StateOfStart(ts, W, copy));
+  }
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode Snapshot::take(TS ts, PetscReal t)
 {
-  Vec       W[3];
-  PetscInt  steps;
+  TS        copy = nullptr;
+  Vec       U, W[3];
   PetscBool ours;
   TSType    type;
   Work     &w = *work_;
@@ -165,19 +179,13 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
   PetscCall(TSGetType(ts, &type));
   PetscCheck(ours, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP, "Snapshot::take(): TS type %s gives no accelerations; use hhtdae", type);
-  PetscCall(TSGetStepNumber(ts, &steps));
-  Vec U, V;
-  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(TSGetSolution(ts, &U));
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
-  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, W[0], W[1], W[2]));
-  else {
-    TS copy;
-    PetscCall(TSGetTime(ts, &t));
-    PetscCall(StateOfStart(ts, W, &copy));
-    PetscCall(TSDestroy(&copy));
-  }
-  PetscCall(take(*w.R, t, W));
+  PetscErrorCode failed = StateAt(ts, &t, W, &copy);
+  if (!failed) failed = take(*w.R, t, W);
+  PetscCall(TSDestroy(&copy));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
+  PetscCall(failed);
   PetscFunctionReturn(0);
 }
 
