@@ -5,9 +5,11 @@ static char help[] =
     "  -frame <frame.h5>: the reduced frame, by atv_frame\n"
     "  -o <atv.html>: the page\n"
     "  -end <2>: s, a multiple of 0.02;  -repeats <3>: of the timed runs;  -sweep <true>: error against run time too\n"
-    "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n";
+    "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n"
+    "  -jobs <1>: of the reference's and the sweep's runs at a time; the timed ones run alone\n";
 
 #include "atv_page.h"
+#include "side_by_side.h"
 #include <hhtdae/flexible.h>
 #include <petsctime.h>
 
@@ -60,7 +62,9 @@ static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector
 
 constexpr int sweep_samples = 5; /* errors at every fifth time of the reference: samples cost more than steps */
 
-static PetscErrorCode RunSweep(AtvRuns runs, std::vector<AtvRun> *all)
+using Planned = std::function<PetscErrorCode(AtvRun *)>;
+
+static std::vector<Planned> Sweep(AtvRuns runs)
 {
   struct Method {
     const char                            *name;
@@ -71,15 +75,12 @@ static PetscErrorCode RunSweep(AtvRuns runs, std::vector<AtvRun> *all)
       {"hhtdae", nullptr, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
       {"hhtdae, paper's form", Paper, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
       {"hhtdae, steps limited", nullptr, {{1e-5, 2e-3}, {1e-5, 1e-3}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}}};
+  std::vector<Planned> plan;
 
-  PetscFunctionBegin;
   runs.dt *= sweep_samples;
   for (const Method &m : methods)
-    for (const auto &[eps, step] : m.grid) {
-      all->emplace_back();
-      PetscCall(runs.hht(m.name, eps, step, m.configure, &all->back()));
-      PetscCall(Done(all->back()));
-    }
+    for (const auto &[eps, step] : m.grid)
+      plan.push_back([=, e = eps, h = step](AtvRun *run) { return runs.hht(m.name, e, h, m.configure, run); });
 #if defined(HHTDAE_HAVE_IDA)
   struct Foreign {
     const char                            *name;
@@ -91,12 +92,30 @@ static PetscErrorCode RunSweep(AtvRuns runs, std::vector<AtvRun> *all)
       {"IDA, index 3, steps limited", Form::Index3, {{1e-4, 5e-4}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}},
       {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}}}};
   for (const Foreign &m : foreign)
-    for (const auto &[eps, step] : m.grid) {
-      all->emplace_back();
-      PetscCall(runs.ida(m.name, eps, step, m.form, &all->back()));
-      PetscCall(Done(all->back()));
-    }
+    for (const auto &[eps, step] : m.grid)
+      plan.push_back([=, e = eps, h = step](AtvRun *run) { return runs.ida(m.name, e, h, m.form, run); });
 #endif
+  return plan;
+}
+
+/* Reference, reference at twice the step, and the sweep */
+static PetscErrorCode RunOthers(const AtvRuns &runs, bool sweep, AtvResults *results)
+{
+  const auto reference = [&runs](const char *name, double step) -> Planned {
+    return [=, &runs](AtvRun *run) { return runs.hht(name, 1e-8, step, LittleDamping, run, AtvRuns::Samples); };
+  };
+  std::vector<Planned> plan = {reference("reference", 5e-5), reference("reference at twice the step", 1e-4)};
+
+  PetscFunctionBegin;
+  if (sweep)
+    for (const Planned &p : Sweep(runs)) plan.push_back(p);
+  std::vector<AtvRun> all(plan.size());
+  PetscCall(SideBySide(
+      results->jobs, (int)plan.size(), [&](int k, FILE *file) { return !plan[k](&all[k]) && Write(all[k], file); },
+      [&](int k, FILE *file) { return Read(file, &all[k]) && !Done(all[k]); }));
+  results->reference = all[0];
+  results->check     = all[1];
+  results->sweep.assign(all.begin() + 2, all.end());
   PetscFunctionReturn(0);
 }
 
@@ -106,7 +125,7 @@ static PetscErrorCode Run()
   AtvRuns     runs;
   AtvResults  results;
   ReducedBody body;
-  PetscInt    repeats = 3;
+  PetscInt    repeats = 3, jobs = 1;
   PetscBool   sweep   = PETSC_TRUE;
   PetscReal   end = 2, limit = 120;
 
@@ -116,9 +135,10 @@ static PetscErrorCode Run()
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-end", &end, nullptr));
   PetscCall(PetscOptionsGetReal(nullptr, nullptr, "-limit", &limit, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-repeats", &repeats, nullptr));
+  PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-jobs", &jobs, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
   const double intervals = end / (sweep_samples * runs.dt); /* of the sweep's samples, which are some of the reference's */
-  PetscCheck(end > 0 && repeats > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end and -repeats must be positive");
+  PetscCheck(end > 0 && repeats > 0 && jobs > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end, -repeats and -jobs must be positive");
   PetscCheck(std::fabs(intervals - std::round(intervals)) < 1e-9, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end is %g s and must be a multiple of %g s",
              (double)end, sweep_samples * runs.dt);
   PetscCall(body.load(PETSC_COMM_SELF, frame));
@@ -126,11 +146,8 @@ static PetscErrorCode Run()
   runs.end   = end;
   runs.limit = limit;
   PetscCall(RunMain(runs, repeats, &results.main));
-  PetscCall(runs.hht("reference", 1e-8, 5e-5, LittleDamping, &results.reference, AtvRuns::Samples));
-  PetscCall(Done(results.reference));
-  PetscCall(runs.hht("reference at twice the step", 1e-8, 1e-4, LittleDamping, &results.check, AtvRuns::Samples));
-  PetscCall(Done(results.check));
-  if (sweep) PetscCall(RunSweep(runs, &results.sweep));
+  results.jobs = (int)jobs;
+  PetscCall(RunOthers(runs, sweep, &results));
 
   results.step = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
   PetscCall(runs.conditions(results.step, &results.condition));

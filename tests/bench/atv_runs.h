@@ -28,6 +28,42 @@ struct AtvRun {
   std::vector<std::vector<double>> x; /* channels at these times */
 };
 
+/* A run to a file and back, from the process that has made it */
+template <class Values> bool WriteValues(const Values &x, FILE *file)
+{
+  const size_t n = x.size();
+  return std::fwrite(&n, sizeof n, 1, file) == 1 && std::fwrite(x.data(), sizeof x[0], n, file) == n;
+}
+template <class Values> bool ReadValues(FILE *file, Values *x)
+{
+  size_t n;
+  if (std::fread(&n, sizeof n, 1, file) != 1) return false;
+  x->resize(n);
+  return std::fread(x->data(), sizeof(*x)[0], n, file) == n;
+}
+inline bool Write(const AtvRun &run, FILE *file)
+{
+  const double        number[] = {run.eps, run.step_max, run.cpu, (double)run.equations, (double)run.x.size()};
+  std::vector<double> numbers(number, number + 5);
+  bool                good = WriteValues(run.name, file) && WriteValues(run.failure, file) && WriteValues(numbers, file) && WriteValues(run.time, file) &&
+              std::fwrite(&run.count, sizeof run.count, 1, file) == 1;
+  for (const auto &x : run.x) good = good && WriteValues(x, file);
+  return good;
+}
+inline bool Read(FILE *file, AtvRun *run)
+{
+  std::vector<double> number;
+  if (!ReadValues(file, &run->name) || !ReadValues(file, &run->failure) || !ReadValues(file, &number) || !ReadValues(file, &run->time) ||
+      std::fread(&run->count, sizeof run->count, 1, file) != 1)
+    return false;
+  run->eps       = number[0];
+  run->step_max  = number[1];
+  run->cpu       = number[2];
+  run->equations = (long)number[3];
+  run->x.resize((size_t)number[4]);
+  return std::all_of(run->x.begin(), run->x.end(), [&](std::vector<double> &x) { return ReadValues(file, &x); });
+}
+
 class AtvRuns
 {
 public:
