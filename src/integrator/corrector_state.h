@@ -53,6 +53,7 @@ struct VerificationState {
 struct Verification : VerificationState {
   Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
   Vec unproved = nullptr; /* time before `since` in which a row's residual has stayed as it was, whenever it was looked at */
+  Vec defined = nullptr, product = nullptr, passed = nullptr; /* work of PassDefinitionsOn(), none where nothing is defined */
   Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
 };
 

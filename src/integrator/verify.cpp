@@ -20,7 +20,6 @@
 #include "entries.h"
 #include "proofs.h"
 #include "verify.h"
-#include "work_vec.h"
 
 namespace hht3
 {
@@ -75,12 +74,14 @@ struct Row {
 bool RateIsKnown(const Integrator &I) { return I.corrector.matrix.rate >= 0; }
 
 /* R: the residual F, with definitions what they make of it in the equations of motion */
-PetscErrorCode OfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
+PetscErrorCode OfMotion(TS ts, Vec F, Vec *R)
 {
+  Vec &passed = Get(ts).verify.passed;
+
   PetscFunctionBegin;
   *R = F;
   if (!HasDefinitions(Get(ts))) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(passed.like(F));
+  if (!passed) PetscCall(VecDuplicate(F, &passed));
   PetscCall(VecCopy(F, passed));
   PetscCall(PassDefinitionsOn(ts, passed));
   *R = passed;
@@ -94,11 +95,10 @@ PetscErrorCode NoteProof(TS ts, Vec F)
   Verification   &v     = I.verify;
   const bool      known = RateIsKnown(I);
   const RowScales scale(I);
-  WorkVec         passed;
   Vec             R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, passed, &R));
+  PetscCall(OfMotion(ts, F, &R));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar m, PetscScalar w, PetscScalar noise, PetscScalar f, PetscScalar model, PetscScalar force, PetscScalar &unproved) {
       if (!(PetscRealPart(m) > 0)) return;
@@ -115,18 +115,18 @@ PetscErrorCode NoteProof(TS ts, Vec F)
 /* Imbalances of variables and force states act on the equations of motion: R -= P R_B for B = V, F */
 PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
 {
-  Integrator &I = Get(ts);
-  WorkVec     only, product;
-  Mat         P;
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  Mat           P;
 
   PetscFunctionBegin;
   if (!HasDefinitions(I)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(only.like(R));
-  PetscCall(product.like(R));
-  PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, only));
-  PetscCall(MatMult(P, only, product));
-  PetscCall(VecAXPY(R, -1, product));
+  if (!v.defined) PetscCall(VecDuplicate(R, &v.defined));
+  if (!v.product) PetscCall(VecDuplicate(R, &v.product));
+  PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, v.defined));
+  PetscCall(MatMult(P, v.defined, v.product));
+  PetscCall(VecAXPY(R, -1, v.product));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,11 +161,10 @@ PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
   Integrator &I     = Get(ts);
   const bool  known = RateIsKnown(I);
   PetscReal   sum[4];
-  WorkVec     passed;
   Vec         R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, passed, &R));
+  PetscCall(OfMotion(ts, F, &R));
   PetscCall(SumRows(
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal model, PetscReal force) {
