@@ -23,8 +23,7 @@ static PetscErrorCode MatGetOrdering_MetisND(Mat A, MatOrderingType type, IS *ro
              mat_type);
   PetscCall(LinearMetisOrder(graph, {}, &order));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, graph.n, order.data(), PETSC_COPY_VALUES, row));
-  PetscCall(PetscObjectReference((PetscObject)*row));
-  *col = *row;
+  PetscCall(ISDuplicate(*row, col)); /* not the same one: of that PCLU would destroy one reference of two */
   PetscFunctionReturn(0);
 }
 
