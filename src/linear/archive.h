@@ -70,4 +70,11 @@ private:
   }
 };
 
+/* Bytes of a damaged file that were read as a flag may be neither of the two */
+template <class Flag> bool IsFlag(const Flag &x)
+{
+  const Flag no = Flag(0), yes = Flag(1);
+  return !std::memcmp(&x, &no, sizeof x) || !std::memcmp(&x, &yes, sizeof x);
+}
+
 #endif

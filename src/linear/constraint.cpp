@@ -7,7 +7,6 @@
 #include "fine.h"
 #include "linear.h"
 #include "node_product.h"
-#include <cstring>
 #include <petsc/private/pcimpl.h>
 
 namespace
@@ -206,7 +205,7 @@ PetscErrorCode SaveState(PC pc, Archive *archive)
   Constraint           &c       = Of(pc);
   ConstraintOptions     options = c;
   ConstraintState       state   = c;
-  unsigned char         coarse  = c.coarse.R != nullptr;
+  bool                  coarse  = c.coarse.R != nullptr;
   std::vector<PetscInt> node    = c.nodes.node;
 
   PetscFunctionBegin;
@@ -219,21 +218,13 @@ PetscErrorCode SaveState(PC pc, Archive *archive)
   PetscFunctionReturn(0);
 }
 
-/* Bytes of a damaged file may be neither of the two */
-bool IsFlag(const PetscBool &x)
-{
-  int value;
-  std::memcpy(&value, &x, sizeof value);
-  return value == PETSC_FALSE || value == PETSC_TRUE;
-}
-
 /* Where the user wishes otherwise now, or nodes are others, the preconditioner stays as it was set up. */
 PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
 {
   Constraint           &c = Of(pc);
   ConstraintOptions     options;
   ConstraintState       was;
-  unsigned char         coarse = 0; /* a bool, of which any byte may be left */
+  bool                  coarse = false;
   PetscBool             failed = PETSC_FALSE;
   std::vector<PetscInt> node;
 
@@ -242,7 +233,7 @@ PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
   archive->plain(was);
   archive->plain(coarse);
   archive->list(node);
-  *same = (PetscBool)(archive->good && IsFlag(options.single) && IsFlag(was.fallen) && IsFlag(was.measured) && options.single == c.single && options.aggregate == c.aggregate && coarse == (unsigned char)(c.coarse.R != nullptr) && node == c.nodes.node);
+  *same = (PetscBool)(archive->good && IsFlag(options.single) && IsFlag(was.fallen) && IsFlag(was.measured) && IsFlag(coarse) && options.single == c.single && options.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
   if (!*same) PetscFunctionReturn(0);
   if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));
