@@ -72,7 +72,7 @@ PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 
   PetscFunctionBegin;
   *found = PETSC_FALSE;
-  for (WorkVec *v : {&begin, &along, &next}) PetscCall(v->like(X));
+  for (WorkVec *v : {&begin, &along, &next}) PetscCall(v->like(X, I.spare));
   PetscCall(VecWAXPY(begin, 1, dX, X));
   PetscCall(WeightCorrection(I, dX, along));
   PetscCall(VecDot(along, dX, &moved));

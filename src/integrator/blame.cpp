@@ -25,8 +25,8 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
   WorkVec       Y, change;
 
   PetscFunctionBegin;
-  PetscCall(Y.like(dX));
-  PetscCall(change.like(dX));
+  PetscCall(Y.like(dX, Get(ts).spare));
+  PetscCall(change.like(dX, Get(ts).spare));
   PetscCall(VecWAXPY(Y, -way, dX, v.where));
   PetscCall(SNESComputeFunction(ts->snes, Y, change));
   PetscCall(VecAYPX(change, -1, F_where));
@@ -56,8 +56,8 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   WorkVec       F_where, forces;
 
   PetscFunctionBegin;
-  PetscCall(F_where.like(dX));
-  PetscCall(forces.like(dX));
+  PetscCall(F_where.like(dX, Get(ts).spare));
+  PetscCall(forces.like(dX, Get(ts).spare));
   PetscCall(VecCopy(v.work, forces));
   PetscCall(PassDefinitionsOn(ts, forces));
   PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));

@@ -99,7 +99,7 @@ static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noi
   PetscInt    first;
 
   PetscFunctionBegin;
-  PetscCall(near.like(X));
+  PetscCall(near.like(X, I.spare));
   PetscCall(VecCopy(X, near));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
   const auto rounding = [=](PetscInt i) { return rounding_of_sums * RandomRounding(first + i, salt); };
@@ -128,7 +128,7 @@ PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
   WorkVec other;
 
   PetscFunctionBegin;
-  PetscCall(other.like(noise));
+  PetscCall(other.like(noise, Get(ts).spare));
   PetscCall(SampleRounding(ts, X, F, salt, other));
   PetscCall(VecPointwiseMax(noise, noise, other));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -162,7 +162,7 @@ static PetscErrorCode MeasureInertia(TS ts)
   WorkVec     Z, A, F, change;
 
   PetscFunctionBegin;
-  for (WorkVec *v : {&Z, &A, &F, &change}) PetscCall(v->like(I.X));
+  for (WorkVec *v : {&Z, &A, &F, &change}) PetscCall(v->like(I.X, I.spare));
   PetscCall(ProbingAccelerations(ts, Z));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
   PetscCall(VecWAXPY(A, 1, Z, I.A1));

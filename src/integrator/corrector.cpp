@@ -48,8 +48,8 @@ PetscErrorCode ChoosePrediction(TS ts)
   PetscReal   predicted, at_rest;
 
   PetscFunctionBegin;
-  PetscCall(rest.like(I.X));
-  PetscCall(F.like(I.X));
+  PetscCall(rest.like(I.X, I.spare));
+  PetscCall(F.like(I.X, I.spare));
   PetscCall(SNESComputeFunction(ts->snes, I.X, F));
   PetscCall(VecNorm(F, NORM_2, &predicted));
   PetscCall(VecCopy(I.X, rest));

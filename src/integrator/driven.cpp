@@ -58,7 +58,7 @@ PetscErrorCode Unmoved(TS ts, Vec unmoved)
   WorkVec       force;
 
   PetscFunctionBegin;
-  PetscCall(force.like(unmoved));
+  PetscCall(force.like(unmoved, I.spare));
   PetscCall(VecGetOwnershipRange(force, &first, NULL));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &f) { f = IsCoordinate(I, i) ? RandomSign(first + i, 2) * m : 0; }, Read(v.inertia), Write(force)));
   PetscCall(AnswerOf(ts, force, unmoved, &solved));
@@ -118,7 +118,7 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   PetscFunctionBegin;
   if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.matrix.fresh && c.it - c.base == 1) {
-    PetscCall(unmoved.like(F));
+    PetscCall(unmoved.like(F, I.spare));
     PetscCall(Unmoved(ts, unmoved));
     PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
     PetscCall(CountDriven(I, &all));

@@ -100,7 +100,7 @@ PetscErrorCode UpdateWeights(TS ts, Vec U)
 }
 
 /* Sum of the squares of d by the weights on this rank, in four parts: they need not wait for one another, and lose less to rounding */
-PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum)
+static PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum)
 {
   const PetscScalar *x, *w;
   PetscReal          part[4] = {};
@@ -136,7 +136,7 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
 /* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
 {
-  PetscReal sum;
+  PetscReal sum = 0;
 
   PetscFunctionBegin;
   PetscCall(WeightedSquares(Get(ts), dX, &sum));

@@ -14,8 +14,7 @@ PetscErrorCode UpdateWeights(TS ts, Vec U);
 /* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
 
-/* The same in two parts: this rank's sum of squares by the weights, and the norm from it */
-PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum);
+/* The same from this rank's sum of squares by the weights */
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
 
 /* to = dX times the squares of its weights: a product with it is that of corrections, whose norm is CorrectionNorm() but for a factor */

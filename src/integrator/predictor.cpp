@@ -9,11 +9,9 @@
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
 #include "entries.h"
-#include "estimate.h"
 #include "events.h"
 #include "formulas.h"
 #include "predictor.h"
-#include <utility>
 
 namespace hht3
 {
@@ -40,18 +38,27 @@ PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
    of the times that its differences span; sum of squares by the weights, which are zero for unknowns that do not count. */
 PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
 {
-  Vec fresh = p.D[have + 1];
+  static_assert(max_degree + 2 <= WriteEach::most);
+  PetscReal inverse[max_degree + 1];
+  Sum       squares[max_degree + 1];
+  WriteEach D;
 
   PetscFunctionBegin;
-  PetscCall(VecCopy(I.X, fresh)); /* a, lambda, V, F as they are, of states s' */
-  if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [](PetscInt, PetscScalar v, PetscScalar &x) { x = v; }, Read(I.V1), Write(fresh)));
-  for (PetscInt k = 0; k <= have; k++) {
-    const PetscReal inverse = 1 / (I.t1 - p.t[k]);
-    std::swap(p.D[k], fresh);
-    PetscCall(ForEntries([=](PetscInt, PetscScalar now, PetscScalar &x) { x = (now - x) * inverse; }, Read(p.D[k]), Write(fresh)));
-    PetscCall(WeightedSquares(I, fresh, &miss[k]));
-  }
-  p.D[have + 1] = fresh;
+  for (PetscInt k = 0; k <= have + 1; k++) D.add(p.D[k]);
+  for (PetscInt k = 0; k <= have; k++) inverse[k] = 1 / (I.t1 - p.t[k]);
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar v, PetscScalar w, auto d) {
+      PetscScalar now = RoleOf(I, i) == TSHHT3_STATE ? v : x; /* a, lambda, V, F as they are, of states s' */
+      for (PetscInt k = 0; k <= have; k++) {
+        const PetscScalar next = (now - d[k]) * inverse[k];
+        d[k] = now;
+        now  = next;
+        squares[k].add(i, PetscSqr(now * w));
+      }
+      d[have + 1] = now;
+    },
+    Read(I.X), Read(I.V1), Read(I.weight), D));
+  for (PetscInt k = 0; k <= have; k++) miss[k] = squares[k].total();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -43,6 +43,7 @@ PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   if (Get(ts).linear.refines) PetscCall(LinearSolvesRoughly(P, &rough));
   if (rough) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
+  PetscCall(VecZeroEntries(dX)); /* the user may have it taken for a first guess: the same at every time, also in a resumed run */
   PetscCall(KSPSolve(ksp, r, dX));
   if (rough) PetscCall(LinearSolveRoughly(P, PETSC_TRUE));
   Get(ts).stat.solves++;
@@ -74,7 +75,7 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
   PetscFunctionBegin;
   *e = 0;
   if (!Get(ts).corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
-  for (WorkVec *v : {&F, &noise, &r}) PetscCall(v->like(X));
+  for (WorkVec *v : {&F, &noise, &r}) PetscCall(v->like(X, Get(ts).spare));
   PetscCall(SNESComputeFunction(ts->snes, X, F));
   PetscCall(MeasureRounding(ts, X, F, noise));
   for (unsigned salt = 0; salt < 2; salt++) {

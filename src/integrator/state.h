@@ -139,6 +139,7 @@ struct Integrator : StepState {
   PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
   PetscObjectState stage_state = 0;
   Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
+  std::vector<Vec> spare; /* of WorkVec: they hold nothing that outlives a call */
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
   Vec       excitation = nullptr; /* time within which each row follows loads and motions that depend on time alone, excitation.cpp; none: no row does */
