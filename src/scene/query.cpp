@@ -1,12 +1,9 @@
 /*
   Questions to a run. Motion and loads are computed where the body or the element is, and sent to the other ranks; what a measure says
-  is put together from them everywhere.
+  is put together from them everywhere (query_measures.cpp).
 */
 #include "hhtdae/query.h"
-#include "guard.h"
-#include "measures.h"
-#include "output/energy.h"
-#include "runtime.h"
+#include "snapshot.h"
 #include <algorithm>
 #include <cmath>
 
@@ -27,66 +24,12 @@ Vector3 Motion::bryant() const
   return {std::atan2(-axes(1, 2), axes(2, 2)), std::atan2(axes(0, 2), cosine), std::atan2(-axes(0, 1), axes(0, 0))};
 }
 
-/* The run, and the unknowns of this rank and of its neighbours at the time asked for */
-struct Snapshot::Work {
-  Runtime            *R = nullptr;
-  double              t = 0;
-  std::vector<double> u, v, a;
-  long                moved = -1; /* which move of the bodies was to this state */
-  std::vector<CountedAngle> counted; /* as the run had them when the state was taken, after so many accepted states */
-  long                      accepts = 0;
-  std::vector<Matrix3>      references; /* of the bodies' rotations then; the run has others once it has gone on */
-
-  Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
-  /* The bodies, where somebody else may have moved them */
-  void move()
-  {
-    if (moved == R->bodies.moves) return;
-    exchangeReferences();
-    R->bodies.move(u.data(), v.data());
-    exchangeReferences();
-    moved = R->bodies.moves;
-  }
-  void exchangeReferences()
-  {
-    for (std::size_t b = 0; b < references.size(); b++) std::swap(R->bodies.body[b].C, references[b]);
-  }
-  const SceneData &scene() const { return R->scene; }
-  PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
-  PetscMPIInt      ownerOfElement(const ElementData &e) const { return e.parts.empty() ? 0 : OwnerOf(*R->model, *e.parts[0].store, e.parts[0].index); }
-
-  PetscErrorCode load(PetscInt element, PetscInt on, Load *x);
-  PetscErrorCode motion(PetscInt marker, Motion *x);
-  PetscErrorCode scalar(PetscMPIInt owner, PetscInt global, double *x);
-  PetscErrorCode component(const ElementData &e, PetscInt row, bool constraint, double *x);
-  PetscErrorCode ofMarkers(const Measure &m, double *x);
-  PetscErrorCode angle(PetscInt i, PetscInt j, double *x);
-  PetscErrorCode checkMemory(PetscInt element);
-};
-
 Snapshot::Snapshot() : work_(std::make_unique<Work>()) {}
 Snapshot::~Snapshot() = default;
 PetscReal Snapshot::time() const { return work_->t; }
 
 namespace
 {
-
-/* Numbers that one rank computes, on all of them; what goes wrong there goes wrong everywhere */
-template <class F> PetscErrorCode FromOwner(const Runtime &R, PetscMPIInt owner, double *x, int n, const F &compute)
-{
-  std::vector<double> all(n + 1, 0);
-  PetscFunctionBegin;
-  if (R.rank == owner) {
-    all[n] = (double)Guarded([&] {
-      compute(all.data());
-      return PetscErrorCode(0);
-    });
-  }
-  if (R.size > 1) PetscCallMPI(MPI_Bcast(all.data(), n + 1, MPI_DOUBLE, owner, R.scene.comm));
-  PetscCheck(all[n] == 0, R.scene.comm, (PetscErrorCode)all[n], "rank %d could not answer a question to the run, see there", owner);
-  std::copy(all.begin(), all.end() - 1, x);
-  PetscFunctionReturn(0);
-}
 
 /* The unknowns on every rank that reads them */
 PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
@@ -234,10 +177,6 @@ PetscErrorCode Snapshot::Work::motion(PetscInt marker, Motion *x)
   PetscFunctionReturn(0);
 }
 
-#define CHECK_TAKEN(w) PetscCheck((w).R, PETSC_COMM_SELF, PETSC_ERR_ORDER, "Snapshot: nothing has been taken, call take() first")
-#define CHECK_MARKER(w, m, what) \
-  PetscCheck((w).scene().valid(m) && (w).scene().markers[(m).id].body >= -1, (w).scene().comm, PETSC_ERR_ARG_WRONG, "Snapshot: %s is not a marker of this scene", what)
-
 PetscErrorCode Snapshot::motion(Marker m, Motion *x, Marker axes)
 {
   Motion f;
@@ -365,150 +304,6 @@ PetscErrorCode Snapshot::load(Element e, Marker on, Load *x, Marker axes)
   PetscCall(w.motion(axes.id, &f));
   x->force  = f.axes.transpose() * x->force;
   x->moment = f.axes.transpose() * x->moment;
-  PetscFunctionReturn(0);
-}
-
-/* ---- measures ---- */
-
-/* An unknown; -1: it was dropped, and is zero */
-PetscErrorCode Snapshot::Work::scalar(PetscMPIInt owner, PetscInt global, double *x)
-{
-  PetscFunctionBegin;
-  *x = 0;
-  if (global >= 0) PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) { *y = u[global - R->start]; }));
-  PetscFunctionReturn(0);
-}
-
-/* A multiplier, or a component of a force */
-PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, bool constraint, double *x)
-{
-  PetscFunctionBegin;
-  *x = 0;
-  for (const Part &p : e.parts) {
-    if (p.store->isConstraint() != constraint) continue;
-    if (row >= p.store->rows()) {
-      row -= p.store->rows();
-      continue;
-    }
-    const PetscMPIInt owner = OwnerOf(*R->model, *p.store, p.index);
-    if (constraint && !p.store->isExplicit()) {
-      const unsigned char active = p.store->active(p.index);
-      PetscInt            place  = 0;
-      for (PetscInt i = 0; i < row; i++) place += active >> i & 1;
-      PetscCall(scalar(owner, active >> row & 1 ? p.store->start[p.index] + place : -1, x));
-    } else if (p.store->carried(p.index)) {
-      PetscCall(scalar(owner, p.store->start[p.index] + row, x));
-    } else {
-      PetscCall(checkMemory(p.store->element(p.index)));
-      PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) {
-        std::vector<double> c(p.store->rows());
-        move();
-        const PetscInt element = p.store->element(p.index);
-        const auto     part    = &p - scene().elements[element].parts.data();
-        ReadersOf(*R, element)[part]->components(at(), c.data());
-        *y = c[row];
-      }));
-    }
-    break;
-  }
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
-{
-  Motion i, j, frame;
-  PetscFunctionBegin;
-  PetscCall(motion(m.i.id, &i));
-  if (m.j.id != -1) PetscCall(motion(m.j.id, &j));
-  if (m.frame.id != -1) PetscCall(motion(m.frame.id, &frame));
-  const Vector3 d = i.position - j.position, v = i.velocity - j.velocity, axis = frame.axes.col(std::clamp(m.component, 0, 2));
-  switch (m.kind) {
-  case Measure::Displacement: *x = axis.dot(d); break;
-  case Measure::Distance: *x = d.norm(); break;
-  case Measure::Velocity: *x = axis.dot(v); break;
-  case Measure::Rate: *x = d.dot(v) / d.norm(); break;
-  case Measure::Acceleration: *x = axis.dot(i.acceleration - j.acceleration); break;
-  case Measure::AngularVelocity: *x = axis.dot(i.angular_velocity - j.angular_velocity); break;
-  case Measure::AngularAcceleration: *x = axis.dot(i.angular_acceleration - j.angular_acceleration); break;
-  default: *x = 0;
-  }
-  PetscFunctionReturn(0);
-}
-
-/* The run counts the turns of an angle from the first question for it on */
-PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
-{
-  const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
-  const auto                mine = std::find_if(counted.begin(), counted.end(), same);
-  std::vector<CountedAngle> now(1);
-  PetscFunctionBegin;
-  move();
-  if (mine != counted.end()) {
-    now[0] = *mine;
-  } else {
-    PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
-    const bool here = accepts == R->accepts; /* else the run has gone on since the state was taken */
-    if (here && std::none_of(R->asked.begin(), R->asked.end(), same)) R->asked.push_back(now[0]);
-    counted.push_back(now[0]);
-  }
-  PetscCall(CountAngles(*R, u.data(), now));
-  *x = now[0].angle;
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Snapshot::value(const Measure &m, double *x)
-{
-  Work              &w = *work_;
-  Load               l;
-  double             other;
-  std::vector<double> eta;
-  PetscFunctionBegin;
-  CHECK_TAKEN(w);
-  const SceneData  &s     = w.scene();
-  const Numbering  &N     = w.R->number;
-  const std::string error = CheckMeasure(s, m, false);
-  PetscCheck(error.empty(), s.comm, PETSC_ERR_ARG_WRONG, "Snapshot::value(): %s", error.c_str());
-  const bool of_element = (m.kind >= Measure::Multiplier && m.kind <= Measure::Component) || m.kind == Measure::ElementForce || m.kind == Measure::ElementMoment;
-  *x                    = 0;
-  if (of_element && s.elements[m.target].parts.empty()) PetscFunctionReturn(0); /* absent */
-  switch (m.kind) {
-  case Measure::Time: *x = w.t; break;
-  case Measure::KineticEnergy: PetscCall(energy(x, &other)); break;
-  case Measure::PotentialEnergy: PetscCall(energy(&other, x)); break;
-  case Measure::Value: PetscCall(w.scalar(N.variable_owner[m.target], N.variable[m.target], x)); break;
-  case Measure::StateValue: PetscCall(w.scalar(N.state_owner[m.target], N.state[m.target], x)); break;
-  case Measure::Modal:
-    PetscCall(modes(Body{m.target}, &eta));
-    *x = eta[m.component];
-    break;
-  case Measure::Multiplier: PetscCall(w.component(s.elements[m.target], m.component, true, x)); break;
-  case Measure::Component: PetscCall(w.component(s.elements[m.target], m.component, false, x)); break;
-  case Measure::JointForce:
-  case Measure::JointMoment:
-    PetscCall(load(Element{m.target}, s.elements[m.target].i, &l, m.frame.id != -1 ? m.frame : s.elements[m.target].j));
-    *x = m.kind == Measure::JointForce ? l.force(m.component) : l.moment(m.component);
-    break;
-  case Measure::ElementForce:
-  case Measure::ElementMoment:
-    PetscCall(load(Element{m.target}, m.i, &l, m.frame));
-    *x = m.kind == Measure::ElementForce ? l.force(m.component) : l.moment(m.component);
-    break;
-  case Measure::Angle: PetscCall(w.angle(m.i.id, m.j.id, x)); break;
-  default: PetscCall(w.ofMarkers(m, x));
-  }
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Snapshot::energy(double *kinetic, double *potential)
-{
-  Work   &w = *work_;
-  Balance b;
-  PetscFunctionBegin;
-  CHECK_TAKEN(w);
-  w.move();
-  PetscCall(MakeBalance(*w.R, w.at(), b));
-  *kinetic   = b.kinetic;
-  *potential = b.potential();
   PetscFunctionReturn(0);
 }
 
