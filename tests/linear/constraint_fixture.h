@@ -149,17 +149,19 @@ public:
 class LargeBody : public ConstraintPC
 {
 protected:
-  LinearChoice choice;
+  static constexpr PetscInt side = 17; /* bricks; of 15 the factor is chosen */
+  LinearChoice              choice;
 
   void choose(bool positions, const char *options = NULL, bool rough = true)
   {
-    create(block(20, 20, 20, true), 3 * 21 * 21 * 21);
+    constexpr PetscInt nodes_of_side = side + 1;
+    create(block(side, side, side, true), 3 * nodes_of_side * nodes_of_side * nodes_of_side);
     nodes(3);
     if (positions) {
       place([&](PetscInt node, double place[3]) {
-        place[0] = node % 21;
-        place[1] = node / 21 % 21;
-        place[2] = node / 21 / 21;
+        place[0] = node % nodes_of_side;
+        place[1] = node / nodes_of_side % nodes_of_side;
+        place[2] = node / nodes_of_side / nodes_of_side;
       });
     }
     if (options) { OK(PetscOptionsInsertString(NULL, options)); }
