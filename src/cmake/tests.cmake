@@ -156,6 +156,7 @@ if(TARGET hhtflexible)
 endif()
 hhtdae_script(exports ${PROJECT_SOURCE_DIR}/include ${libraries})
 hhtdae_script(unused_options $<TARGET_FILE:pendulum> $<TARGET_FILE:chain> ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG})
+hhtdae_script(fp_trap $<TARGET_FILE:pendulum> $<TARGET_FILE:doublependulum> $<TARGET_FILE:campbell>)
 hhtdae_script(python_pendulum $<TARGET_FILE:hhtdae>)
 
 # The Python package, from the build tree: a test for each file of tests/python

@@ -90,7 +90,8 @@ struct Subspace {
       return;
     }
     for (Eigen::Index i = 0; i < m; i++) {
-      scale(i) = A.row(i).norm() > 0 ? 1 / A.row(i).norm() : 1;
+      const double norm = A.row(i).norm();
+      scale(i)          = 1 / (norm > 0 ? norm : 1);
       A.row(i) *= scale(i);
     }
     const Eigen::HouseholderQR<Dense> qr(A.transpose());
