@@ -92,7 +92,7 @@ struct ProblemErrors {
 };
 
 PetscErrorCode ProblemCreateTS(MPI_Comm, const Problem &, TS *, Vec *U, Vec *V, bool setRoles = false);
-PetscErrorCode ProblemComputeErrors(TS, const Problem &, Vec U, Vec V, ProblemErrors *);
+PetscErrorCode ProblemComputeErrors(PetscReal t, const Problem &, Vec U, Vec V, ProblemErrors *);
 PetscErrorCode ProblemReport(TS, const Problem &, Vec U, Vec V);
 /* From t0 to t1 on all ranks by TSHHT3, at this relative and absolute tolerance unless options say otherwise, and its errors */
 PetscErrorCode ProblemSolve(const Problem &, PetscReal tolerance);

@@ -210,7 +210,9 @@ public:
   ProblemErrors errors() const
   {
     ProblemErrors e;
-    must(ProblemComputeErrors(ts, problem, U, V, &e));
+    PetscReal     t;
+    must(TSGetTime(ts, &t));
+    must(ProblemComputeErrors(t, problem, U, V, &e));
     return e;
   }
 

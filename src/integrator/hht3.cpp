@@ -390,6 +390,9 @@ static PetscErrorCode Finalize(void)
   Constraints of positions depend on coordinates and time alone, those of velocities also on first-order states, and on variables and force
   states V - v(...) = 0 of positions, states and time. Others are refused at the set-up: consistent accelerations need their derivatives.
 
+  With -ts_exact_final_time interpolate `TSSolve()` gives positions at the final time, but leaves velocities where the last step ended, as for all types of
+  second order; `TSHHT3Interpolate()` gives both.
+
   Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
   this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.
 
