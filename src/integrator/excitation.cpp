@@ -95,7 +95,7 @@ PetscErrorCode TellUnfollowed(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (I.told || !(I.h / unfollowed > I.swing)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.told || !(I.h / unfollowed > I.swing)) PetscFunctionReturn(PETSC_SUCCESS); /* swing may be the largest number, of which there is no multiple */
   I.told = PETSC_TRUE;
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                         "hhtdae: the step of %g at t = %g does not follow loads or motions that depend on time alone, some of which swing within %.1g or so. Where they matter, "

@@ -45,7 +45,7 @@ PetscErrorCode LimitOfTurns(const Runtime &R, Vec V, double *least)
     if (TurnsInSpace(k.kind)) fastest = std::max(fastest, Eigen::Map<const Vector3>(v + k.first + 3).norm());
   }
   PetscCall(VecRestoreArrayRead(V, &v));
-  if (fastest > farthest / *least) *least = farthest / fastest;
+  if (fastest > farthest / *least) *least = farthest / fastest; /* *least may be the largest number */
   PetscFunctionReturn(0);
 }
 
