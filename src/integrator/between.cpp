@@ -72,7 +72,8 @@ PetscErrorCode BetweenIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 
   PetscFunctionBegin;
   *found = PETSC_FALSE;
-  for (WorkVec *v : {&begin, &along, &next}) PetscCall(v->like(X, I.spare));
+  for (WorkVec *v : {&begin, &along}) PetscCall(v->like(X, I.spare));
+  PetscCall(next.like(X)); /* a user may have zeros taken for a first guess */
   PetscCall(VecWAXPY(begin, 1, dX, X));
   PetscCall(WeightCorrection(I, dX, along));
   PetscCall(VecDot(along, dX, &moved));

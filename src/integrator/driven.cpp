@@ -118,7 +118,7 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   PetscFunctionBegin;
   if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.matrix.fresh && c.it - c.base == 1) {
-    PetscCall(unmoved.like(F, I.spare));
+    PetscCall(unmoved.like(F)); /* a user may have zeros taken for a first guess */
     PetscCall(Unmoved(ts, unmoved));
     PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
     PetscCall(CountDriven(I, &all));

@@ -39,6 +39,7 @@ PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
 PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
 {
   static_assert(max_degree + 2 <= WriteEach::most);
+  const Vec rates = I.count[TSHHT3_STATE] ? I.V1 : I.X;
   PetscReal inverse[max_degree + 1];
   Sum       squares[max_degree + 1];
   WriteEach D;
@@ -47,8 +48,8 @@ PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, 
   for (PetscInt k = 0; k <= have + 1; k++) D.add(p.D[k]);
   for (PetscInt k = 0; k <= have; k++) inverse[k] = 1 / (I.t1 - p.t[k]);
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar x, PetscScalar v, PetscScalar w, auto d) {
-      PetscScalar now = RoleOf(I, i) == TSHHT3_STATE ? v : x; /* a, lambda, V, F as they are, of states s' */
+    [&](PetscInt i, PetscScalar x, PetscScalar rate, PetscScalar w, auto d) {
+      PetscScalar now = RoleOf(I, i) == TSHHT3_STATE ? rate : x; /* a, lambda, V, F as they are, of states s' */
       for (PetscInt k = 0; k <= have; k++) {
         const PetscScalar next = (now - d[k]) * inverse[k];
         d[k] = now;
@@ -57,7 +58,7 @@ PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, 
       }
       d[have + 1] = now;
     },
-    Read(I.X), Read(I.V1), Read(I.weight), D));
+    Read(I.X), Read(rates), Read(I.weight), D));
   for (PetscInt k = 0; k <= have; k++) miss[k] = squares[k].total();
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,7 +43,6 @@ PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   if (Get(ts).linear.refines) PetscCall(LinearSolvesRoughly(P, &rough));
   if (rough) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
-  PetscCall(VecZeroEntries(dX)); /* the user may have it taken for a first guess: the same at every time, also in a resumed run */
   PetscCall(KSPSolve(ksp, r, dX));
   if (rough) PetscCall(LinearSolveRoughly(P, PETSC_TRUE));
   Get(ts).stat.solves++;
