@@ -43,17 +43,6 @@ int RunAllRanks()
 
 } // namespace
 
-#if defined(__SANITIZE_ADDRESS__)
-/* Open MPI and what it loads leak at start-up, at the end and where a file is opened, and HDF5 forgets object headers of files
-   that are damaged on purpose, from its free lists alone; PETSc keeps the names of a block of options in which an error was
-   raised. By functions, not libraries: a communicator that the project forgets has to be seen. */
-extern "C" const char *__lsan_default_suppressions()
-{
-  return "leak:ompi_mpi_init\nleak:ompi_mpi_finalize\nleak:hwloc_topology_load\nleak:event_base_loop\n"
-         "leak:mca_io_base_file_select\nleak:H5FL_reg_malloc\nleak:H5FL_blk_malloc\nleak:PetscOptionsBegin_Private\n";
-}
-#endif
-
 int main(int argc, char **argv)
 {
   int failed;
