@@ -185,8 +185,7 @@ PetscErrorCode AddElement(const FeModel &model, const FeElement &e, const fe::No
   PetscInt             row[n];
   PetscFunctionBegin;
   *least = fe::ElementStiffness<Shape>(X, fe::Lame(material), K);
-  fe::Lower(*least, mass_as_stiffness ? fe::ElementMass<Shape, typename Shape::StiffnessRule>(X, material.density, m)
-                                      : fe::ElementMass<Shape>(X, material.density, m));
+  fe::Lower(*least, fe::ElementMass<Shape>(X, material.density, m, mass_as_stiffness ? fe::MassPoints::Stiffness : fe::MassPoints::Own));
   if (!(*least > fe::degenerate)) PetscFunctionReturn(0);
   /* both are symmetric: the order of storage does not matter */
   PetscCall(MatSetValuesBlocked(model.K, n, e.node, n, e.node, K.data(), ADD_VALUES));

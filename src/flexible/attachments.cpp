@@ -1,6 +1,7 @@
 /* Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom. */
 #include "attachments.h"
 #include "modes.h"
+#include "symmetric.h"
 #include <Eigen/Eigenvalues>
 #include <set>
 
@@ -236,11 +237,11 @@ static PetscErrorCode CheckIndependent(const FeModel &model, const std::vector<T
   PetscFunctionBegin;
   if (tied.empty()) PetscFunctionReturn(0);
   PetscCall(GramOfAverages(model, tied, &G));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(0.5 * (G + G.transpose()));
-  if (gram.eigenvalues()[0] > dependent_rows * gram.eigenvalues().tail<1>()[0]) PetscFunctionReturn(0);
+  const SymmetricEigen gram(0.5 * (G + G.transpose()));
+  if (gram.values[0] > dependent_rows * gram.values.tail<1>()[0]) PetscFunctionReturn(0);
   std::string names;
   for (std::size_t a = 0; a < tied.size(); a++)
-    if (gram.eigenvectors().block<6, 1>(6 * a, 0).norm() > 1e-3) names += (names.empty() ? "" : ", ") + tied[a].name;
+    if (gram.vectors.block<6, 1>(6 * a, 0).norm() > 1e-3) names += (names.empty() ? "" : ", ") + tied[a].name;
   SETERRQ(model.comm, PETSC_ERR_ARG_WRONG,
           "The averages of the attachments %s depend on each other: they are over the same few nodes; give each one "
           "nodes of its own",

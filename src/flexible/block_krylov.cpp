@@ -9,7 +9,7 @@
   change of the basis. Options: -eps_ncv, -eps_tol, -eps_max_it (restarts), monitors; -eps_krylov_block <vectors>.
 */
 #include "modes.h"
-#include <Eigen/Eigenvalues>
+#include "symmetric.h"
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -96,17 +96,16 @@ static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov 
   VectorXd       scale = G.diagonal().cwiseMax(0.).cwiseSqrt();
   if (!scaled) scale.setOnes();
   /* W has the size of 1/frequency^2, so that no size is small in itself (SmallBodies.ManyModes) */
-  const VectorXd                                inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 1; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(inverse.asDiagonal() * (0.5 * (G + G.transpose())) *
-                                                     inverse.asDiagonal());
-  PetscInt                                      from = 0;
-  *found                                             = n ? gram.eigenvalues()[0] : 0;
-  while (from < n && !(gram.eigenvalues()[from] > least)) from++;
-  const MatrixXd U = gram.eigenvectors().rightCols(n - from);
-  const VectorXd s = gram.eigenvalues().tail(n - from).cwiseSqrt();
+  const VectorXd       inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 1; });
+  const SymmetricEigen gram(inverse.asDiagonal() * (0.5 * (G + G.transpose())) * inverse.asDiagonal());
+  PetscInt             from = 0;
+  *found                    = n ? gram.values[0] : 0;
+  while (from < n && !(gram.values[from] > least)) from++;
+  const MatrixXd U = gram.vectors.rightCols(n - from);
+  const VectorXd s = gram.values.tail(n - from).cwiseSqrt();
   const MatrixXd S = inverse.asDiagonal() * U * s.cwiseInverse().asDiagonal();
   *back            = s.asDiagonal() * U.transpose() * scale.asDiagonal();
-  *all             = gram.eigenvalues().cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.eigenvectors().transpose() *
+  *all             = gram.values.cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.vectors.transpose() *
          scale.asDiagonal();
   PetscCall(Combine(b->W, S, &G));
   b->W.swap(G);
@@ -152,21 +151,21 @@ static void Extend(PetscInt count, const MatrixXd &H, BlockKrylov *b)
 /* Ritz values in descending size, and their errors: those of all but the last block are exact to rounding */
 static PetscErrorCode Ritz(EPS eps, PetscInt count, BlockKrylov *b)
 {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(b->T);
-  std::vector<PetscInt>                         order(b->k);
+  const SymmetricEigen  solver(b->T);
+  std::vector<PetscInt> order(b->k);
 
   PetscFunctionBegin;
-  PetscCheck(solver.info() == Eigen::Success && solver.eigenvalues().allFinite(), PetscObjectComm((PetscObject)eps),
+  PetscCheck(solver.found && solver.values.allFinite(), PetscObjectComm((PetscObject)eps),
              PETSC_ERR_CONV_FAILED, "The projected eigenvalue problem has no solution: solves are not finite");
   for (PetscInt i = 0; i < b->k; i++) order[i] = i;
-  const VectorXd &value = solver.eigenvalues();
+  const VectorXd &value = solver.values;
   std::stable_sort(order.begin(), order.end(),
                    [&](PetscInt i, PetscInt j) { return std::abs(value[i]) > std::abs(value[j]); });
   b->theta.resize(b->k);
   b->Y.resize(b->k, b->k);
   for (PetscInt i = 0; i < b->k; i++) {
     b->theta[i] = value[order[i]];
-    b->Y.col(i) = solver.eigenvectors().col(order[i]);
+    b->Y.col(i) = solver.vectors.col(order[i]);
   }
   b->error = (b->remainder * b->Y.bottomRows(count)).colwise().norm().transpose();
   PetscFunctionReturn(0);

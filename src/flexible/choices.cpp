@@ -1,7 +1,7 @@
 /* What is left to choose of modes, chosen so that it does not depend on the ranks: the combinations of modes of equal
    frequencies, and signs. */
 #include "craig_bampton.h"
-#include <Eigen/Eigenvalues>
+#include "symmetric.h"
 #include <algorithm>
 #include <cmath>
 
@@ -30,9 +30,9 @@ PetscErrorCode TurnEqual(const FeModel &model, const BodyScales &scales, PetscIn
     G += Weight(NodePosition(model, i / 3), scales, i % 3) * row * row.transpose();
   }
   PetscCall(SumOverRanks(model.comm, &G));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> turn(0.5 * (G + G.transpose()));
-  X->middleCols(from, n) = (X->middleCols(from, n) * turn.eigenvectors()).eval();
-  Y->middleCols(from, n) = (Y->middleCols(from, n) * turn.eigenvectors()).eval();
+  const SymmetricEigen turn(0.5 * (G + G.transpose()));
+  X->middleCols(from, n) = (X->middleCols(from, n) * turn.vectors).eval();
+  Y->middleCols(from, n) = (Y->middleCols(from, n) * turn.vectors).eval();
   PetscFunctionReturn(0);
 }
 

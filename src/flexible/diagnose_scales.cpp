@@ -1,6 +1,7 @@
 /* The scales of a body: mass, extent, rigid motions, stiffness; and what they tell of supports and units. */
 #include "diagnose.h"
 #include "modes.h"
+#include "symmetric.h"
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -115,19 +116,19 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
   PetscCall(LocalProduct(X, Y, &M));
   PetscCall(SumOverRanks(model.comm, &K));
   PetscCall(SumOverRanks(model.comm, &M));
-  const VectorXd                                scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const MatrixXd                                Ms    = scale.asDiagonal() * M * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> mass(0.5 * (Ms + Ms.transpose()));
-  PetscInt                                      from = 0; /* fields that few or flat nodes do not tell apart */
-  while (from < 23 && mass.eigenvalues()[from] < 1e-8) from++;
+  const VectorXd       scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixXd       Ms    = scale.asDiagonal() * M * scale.asDiagonal();
+  const SymmetricEigen mass(0.5 * (Ms + Ms.transpose()));
+  PetscInt             from = 0; /* fields that few or flat nodes do not tell apart */
+  while (from < 23 && mass.values[from] < 1e-8) from++;
   const PetscInt n = 24 - from;
-  const MatrixXd W = scale.asDiagonal() * mass.eigenvectors().rightCols(n) *
-                     mass.eigenvalues().tail(n).cwiseSqrt().cwiseInverse().asDiagonal();
-  const MatrixXd                                Kw = W.transpose() * K * W;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(0.5 * (Kw + Kw.transpose()), Eigen::EigenvaluesOnly);
-  s->soft = ritz.eigenvalues()[n - 1];
+  const MatrixXd W = scale.asDiagonal() * mass.vectors.rightCols(n) *
+                     mass.values.tail(n).cwiseSqrt().cwiseInverse().asDiagonal();
+  const MatrixXd       Kw = W.transpose() * K * W;
+  const SymmetricEigen ritz(0.5 * (Kw + Kw.transpose()));
+  s->soft = ritz.values[n - 1];
   for (PetscInt k = n; k-- > 0;) /* a mechanism among them is not the scale */
-    if (ritz.eigenvalues()[k] > 1e-9 * ritz.eigenvalues()[n - 1]) s->soft = ritz.eigenvalues()[k];
+    if (ritz.values[k] > 1e-9 * ritz.values[n - 1]) s->soft = ritz.values[k];
   PetscFunctionReturn(0);
 }
 

@@ -6,8 +6,8 @@
   (mean-axis conditions).
 */
 #include "craig_bampton.h"
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include "scene/complement.h"
+#include "symmetric.h"
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -54,18 +54,18 @@ static PetscErrorCode Project(const FeModel &model, const BodyScales &scales, co
 /* Combinations of the space that are orthonormal in M and, where it holds them, orthogonal to the rigid motions */
 static PetscErrorCode ElasticBasis(const FeModel &model, const ReducedPair &pair, bool holds_rigid, MatrixXd *S)
 {
-  const VectorXd                                scale = pair.M.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> mass(scale.asDiagonal() * pair.M * scale.asDiagonal());
-  const PetscInt                                n    = (PetscInt)scale.size();
-  PetscInt                                      from = 0;
+  const VectorXd       scale = pair.M.diagonal().cwiseSqrt().cwiseInverse();
+  const SymmetricEigen mass(scale.asDiagonal() * pair.M * scale.asDiagonal());
+  const PetscInt       n    = (PetscInt)scale.size();
+  PetscInt             from = 0;
 
   PetscFunctionBegin;
-  while (from < n && mass.eigenvalues()[from] < dependent_modes) from++;
+  while (from < n && mass.values[from] < dependent_modes) from++;
   if (from)
     PetscCall(
         PetscInfo(model.K, "%" PetscInt_FMT " of %" PetscInt_FMT " vectors are combinations of the others\n", from, n));
-  *S = scale.asDiagonal() * mass.eigenvectors().rightCols(n - from) *
-       mass.eigenvalues().tail(n - from).cwiseSqrt().cwiseInverse().asDiagonal();
+  *S = scale.asDiagonal() * mass.vectors.rightCols(n - from) *
+       mass.values.tail(n - from).cwiseSqrt().cwiseInverse().asDiagonal();
   if (!holds_rigid) PetscFunctionReturn(0);
   const MatrixXd rigid = S->transpose() * pair.rigid; /* orthonormal columns, if they are in the space */
   const double   off   = (rigid.transpose() * rigid - MatrixXd::Identity(6, 6)).cwiseAbs().maxCoeff();
@@ -74,9 +74,7 @@ static PetscErrorCode ElasticBasis(const FeModel &model, const ReducedPair &pair
              "exactly enough (an iterative solver with a coarse "
              "tolerance?)",
              off);
-  const Eigen::HouseholderQR<MatrixXd> qr(rigid);
-  const MatrixXd                       Q = qr.householderQ() * MatrixXd::Identity(rigid.rows(), rigid.rows());
-  *S                                     = (*S * Q.rightCols(rigid.rows() - 6)).eval();
+  *S = (*S * OrthogonalComplement(rigid)).eval();
   PetscFunctionReturn(0);
 }
 
@@ -92,12 +90,12 @@ static PetscErrorCode SolvePair(const FeModel &model, const BodyScales &scales, 
     Y->resize(pair.K.rows(), 0);
     PetscFunctionReturn(0);
   }
-  const MatrixXd                                K = S.transpose() * pair.K * S;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> elastic(0.5 * (K + K.transpose()));
-  PetscCheck(elastic.info() == Eigen::Success, model.comm, PETSC_ERR_CONV_FAILED,
+  const MatrixXd       K = S.transpose() * pair.K * S;
+  const SymmetricEigen elastic(0.5 * (K + K.transpose()));
+  PetscCheck(elastic.found, model.comm, PETSC_ERR_CONV_FAILED,
              "Reduce(): the eigenvalues of the reduced pair were not found");
-  *lambda            = elastic.eigenvalues();
-  *Y                 = S * elastic.eigenvectors();
+  *lambda            = elastic.values;
+  *Y                 = S * elastic.vectors;
   const double least = std::max(1e-10 * scales.soft, 1e-14 * scales.stiff);
   if ((*lambda)[0] < least) PetscCall(MechanismError(model, space.x * Y->col(0), "K"));
   PetscFunctionReturn(0);

@@ -3,7 +3,7 @@
 #include "flexible/assembly.h"
 #include "flexible/element.h"
 #include "flexible/exchange.h"
-#include <Eigen/Eigenvalues>
+#include "flexible/symmetric.h"
 #include <algorithm>
 
 namespace hhtdae
@@ -63,12 +63,12 @@ MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
 {
   VectorXd unit(K.rows()); /* translations and rotations alike */
   for (Eigen::Index i = 0; i < K.rows(); i++) unit(i) = i % 6 < 3 ? 1 : 1 / length;
-  const MatrixXd                                 A = unit.asDiagonal() * (0.5 * (K + K.transpose())) * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> modes(A);
-  const Eigen::Index                             n = K.rows() - 6;
+  const MatrixXd       A = unit.asDiagonal() * (0.5 * (K + K.transpose())) * unit.asDiagonal();
+  const SymmetricEigen modes(A);
+  const Eigen::Index   n = K.rows() - 6;
   if (n <= 0) return MatrixXd::Zero(f.rows(), f.cols());
-  const auto V = modes.eigenvectors().rightCols(n);
-  return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.eigenvalues().tail(n).replicate(1, f.cols())));
+  const auto V = modes.vectors.rightCols(n);
+  return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.values.tail(n).replicate(1, f.cols())));
 }
 
 /* T of Sum t (phi x (phi x d))/2 = phi^T T phi/2 for forces t that nodes at d from the point of an attachment get from it */
@@ -140,42 +140,63 @@ PetscErrorCode Bring(const FeModel &model, const ElementNodes &nodes, const Eige
   PetscFunctionReturn(0);
 }
 
-/* sigma grad phi_k : grad phi_l over the element at the points of its stiffness, for each load */
-template <class Shape>
-double AddElement(const FeModel &model, const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes,
-                  PetscInt m, const std::vector<double> &u, PetscInt loads, std::vector<MatrixXd> *sum)
-{
-  using Rule           = typename Shape::StiffnessRule;
-  constexpr int n      = Shape::nodes;
-  const auto   &points = fe::Table<Shape, Rule>::get().points;
-  const fe::Lame lame(model.materials[e.material]);
-  double         least = std::numeric_limits<double>::infinity();
-  PetscInt       place[n];
-  fe::NodeVectors<Shape> x, v;
-  MatrixXd               shape[3], gradient(9, m), stressed(9, m);
-  for (int i = 0; i < n; i++) {
-    place[i] = nodes.place(e.node[i]);
-    x.col(i) = Eigen::Map<const Vector3>(&X[3 * place[i]]);
+/* Derivatives of the shape functions with respect to positions, and weights, at the points of an element's stiffness */
+struct Sampled {
+  std::vector<MatrixXd> G; /* 3 x nodes */
+  std::vector<double>   weight;
+  double                least = std::numeric_limits<double>::infinity();
+
+  template <class Shape> Sampled(Shape, const fe::NodeVectors<Shape> &x)
+  {
+    using Rule           = typename Shape::StiffnessRule;
+    const auto   &points = fe::Table<Shape, Rule>::get().points;
+    for (int q = 0; q < Rule::count; q++) {
+      fe::Gradients<Shape::nodes> g;
+      const double                det = fe::SpatialGradients<Shape>(x, q, g);
+      fe::Lower(least, det);
+      G.push_back(g);
+      weight.push_back(det * points.weight[q]);
+    }
+    least *= fe::InverseExtent<Shape>(x);
   }
+};
+
+/* sigma grad phi_k : grad phi_l over the element at the points of its stiffness, for each load */
+void AddElement(const Sampled &s, const fe::Lame &lame, const std::vector<PetscInt> &place, const std::vector<double> &modes, PetscInt m, const std::vector<double> &u,
+                PetscInt loads, std::vector<MatrixXd> *sum)
+{
+  const Eigen::Index n = (Eigen::Index)place.size();
+  MatrixXd           shape[3], gradient(9, m), stressed(9, m);
   for (int c = 0; c < 3; c++) {
     shape[c].resize(n, m);
-    for (int i = 0; i < n; i++)
+    for (Eigen::Index i = 0; i < n; i++)
       for (PetscInt k = 0; k < m; k++) shape[c](i, k) = modes[3 * (place[i] * m + k) + c];
   }
-  for (int q = 0; q < Rule::count; q++) {
-    fe::Gradients<n> G;
-    const double     det = fe::SpatialGradients<Shape, Rule>(x, q, G);
-    fe::Lower(least, det);
-    for (int c = 0; c < 3; c++) gradient.middleRows<3>(3 * c).noalias() = G * shape[c];
+  for (std::size_t q = 0; q < s.G.size(); q++) {
+    for (int c = 0; c < 3; c++) gradient.middleRows<3>(3 * c).noalias() = s.G[q] * shape[c];
     for (PetscInt l = 0; l < loads; l++) {
-      for (int i = 0; i < n; i++) v.col(i) = Eigen::Map<const Vector3>(&u[3 * (place[i] * loads + l)]);
-      const Matrix3 D = v * G.transpose(), strain = 0.5 * (D + D.transpose());
-      const Matrix3 stress = det * points.weight[q] * (lame.lambda * strain.trace() * Matrix3::Identity() + 2 * lame.mu * strain);
+      Matrix3 D = Matrix3::Zero();
+      for (Eigen::Index i = 0; i < n; i++) D += Eigen::Map<const Vector3>(&u[3 * (place[i] * loads + l)]) * s.G[q].col(i).transpose();
+      const Matrix3 strain = 0.5 * (D + D.transpose());
+      const Matrix3 stress = s.weight[q] * (lame.lambda * strain.trace() * Matrix3::Identity() + 2 * lame.mu * strain);
       for (int c = 0; c < 3; c++) stressed.middleRows<3>(3 * c).noalias() = stress * gradient.middleRows<3>(3 * c);
       (*sum)[l].noalias() += gradient.transpose() * stressed;
     }
   }
-  return least * fe::InverseExtent<Shape>(x);
+}
+
+/* place: of the nodes of the element */
+Sampled SampleElement(const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, std::vector<PetscInt> *place)
+{
+  return fe::WithShape(e.type, [&](auto shape) {
+    fe::NodeVectors<decltype(shape)> x;
+    place->resize(shape.nodes);
+    for (int i = 0; i < shape.nodes; i++) {
+      (*place)[i] = nodes.place(e.node[i]);
+      x.col(i)    = Eigen::Map<const Vector3>(&X[3 * (*place)[i]]);
+    }
+    return Sampled(shape, x);
+  });
 }
 
 } // namespace
@@ -203,8 +224,10 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
     std::vector<MatrixXd> sum(count, MatrixXd::Zero(m, m));
     PetscCall(Bring(model, nodes, u.middleCols(from, count), &some));
     for (const FeElement &e : model.elements) {
-      const double least = fe::WithShape(e.type, [&](auto shape) { return AddElement<decltype(shape)>(model, e, nodes, X, modes, m, some, count, &sum); });
-      if (!(least > fe::degenerate)) problem = "geometric stiffening: an element has no volume or is turned inside out";
+      std::vector<PetscInt> place;
+      const Sampled         sampled = SampleElement(e, nodes, X, &place);
+      AddElement(sampled, fe::Lame(model.materials[e.material]), place, modes, m, some, count, &sum);
+      if (!(sampled.least > fe::degenerate)) problem = "geometric stiffening: an element has no volume or is turned inside out";
     }
     for (PetscInt l = 0; l < count; l++) all.middleCols(m * (from + l), m) = 0.5 * (sum[l] + sum[l].transpose());
   }

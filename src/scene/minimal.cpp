@@ -14,6 +14,7 @@
   All of this is in coordinates for which masses are 1 (Work::unit) and with rows of constraints of length 1: metres, radians and modal coordinates are not
   of one size, the less so the smaller the bodies are, and what is orthonormal in them loses digits (SmallBodies.StateSpace).
 */
+#include "complement.h"
 #include "linearization.h"
 #include <Eigen/Dense>
 #include <petscblaslapack.h>
@@ -94,9 +95,7 @@ struct Subspace {
       scale(i)          = 1 / (norm > 0 ? norm : 1);
       A.row(i) *= scale(i);
     }
-    const Eigen::HouseholderQR<Dense> qr(A.transpose());
-    const Dense                       Q = qr.householderQ();
-    free                                 = Q.rightCols(n - m);
+    if (m <= n) free = OrthogonalComplement(A.transpose()); /* else they are not independent */
     solver.compute(A);
   }
   bool  independent() const { return !A.rows() || solver.rank() == A.rows(); }

@@ -57,11 +57,9 @@ inline double ChooseAxes(const Attitudes &path, double *quaternion)
     worst = near;
     best  = c;
   }
-  const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(best, hhtdae::Vector3::UnitZ());
-  quaternion[0]              = q.w();
-  quaternion[1]              = q.x();
-  quaternion[2]              = q.y();
-  quaternion[3]              = q.z();
+  /* the turn from `best`, which is above the plane, to z */
+  const Eigen::Vector4d q = Eigen::Vector4d(1. + best[2], best[1], -best[0], 0.).normalized();
+  for (int i = 0; i < 4; i++) quaternion[i] = q[i];
   return std::sqrt(1. - worst * worst);
 }
 
