@@ -40,6 +40,7 @@ void Transfer(TS ts, Archive &a)
   SolverState s    = {ts->steps, ts->reject, ts->snes_its, ts->ksp_its, ts->num_snes_failures, ts->adapt->timestepjustdecreased, snes->lagjacobian, snes->lagpreconditioner,
                       snes->jac_iter, snes->pre_iter, ts->ptime, ts->ptime_prev, ts->ptime_prev_rollback, ts->time_step, ts->steprestart};
   a.plain(s);
+  a.good = a.good && IsFlag(s.restart);
   if (!a.reading || !a.good) return;
   ts->steps                        = s.steps;
   ts->reject                       = s.reject;
@@ -58,6 +59,16 @@ void Transfer(TS ts, Archive &a)
   ts->steprestart                  = s.restart;
 }
 
+bool FlagsAreFlags(const Integrator &I)
+{
+  const CorrectorState &c = I.corrector;
+  for (const PetscBool *x : {&I.have_step, &I.have_misfit, &I.repaired, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
+                             &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
+    if (!IsFlag(*x)) return false;
+  return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) && IsBetween(I.unfactored, PC_SETUP_ERROR, PC_SUBPC_ERROR) &&
+         IsBetween(c.reason, SNES_DIVERGED_TR_DELTA, SNES_BREAKOUT_INNER_ITER);
+}
+
 void TransferStructs(TS ts, Archive &a)
 {
   Integrator &I = Get(ts);
@@ -70,6 +81,7 @@ void TransferStructs(TS ts, Archive &a)
   a.plain(I.p);
   a.plain(static_cast<ChangeState &>(I.change));
   a.plain(static_cast<VerificationState &>(I.verify));
+  if (a.reading && !FlagsAreFlags(I)) a.good = false;
   if (I.order.past < 0 || I.order.past > max_order || I.order.now < 2 || I.order.now > max_order) a.good = false;
   if (I.predictor.available < 0 || I.predictor.available > max_degree || I.predictor.degree < 0 || I.predictor.degree > I.predictor.available) a.good = false;
 }
@@ -101,7 +113,8 @@ PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
 
   PetscFunctionBegin;
   a.plain(there);
-  if (there && a.good) PetscCall(TransferVec(ts, a, x));
+  a.good = a.good && IsFlag(there);
+  if (a.good && there) PetscCall(TransferVec(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,6 +2,7 @@
   The Newton matrix in a checkpoint: the values of its rows, and what the solver keeps. It is not evaluated again, because the application
   may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
 */
+#include "checkpoint_identity.h"
 #include "checkpoint_matrix.h"
 #include "equations.h"
 #include "formulas.h"
@@ -160,10 +161,12 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   Mat         J, P;
   KSP         ksp;
   PetscBool   rows, mffd, same = PETSC_FALSE;
-  bool        good = true;
+  bool        good;
 
   PetscFunctionBegin;
   a.plain(m);
+  PetscCall(Everywhere(ts, a.good && IsFlag(m.there) && IsFlag(m.chosen), &good));
+  if (!good) m = MatrixState{};
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));

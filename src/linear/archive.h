@@ -77,4 +77,13 @@ template <class Flag> bool IsFlag(const Flag &x)
   return !std::memcmp(&x, &no, sizeof x) || !std::memcmp(&x, &yes, sizeof x);
 }
 
+/* The same of an enumeration whose values run from `least` to `most` */
+template <class Enum> bool IsBetween(const Enum &x, Enum least, Enum most)
+{
+  int value;
+  static_assert(sizeof x == sizeof value, "as large as an int");
+  std::memcpy(&value, &x, sizeof value);
+  return value >= int(least) && value <= int(most);
+}
+
 #endif
