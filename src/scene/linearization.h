@@ -29,6 +29,7 @@ struct Linearization::Work {
   bool     coordinate(PetscInt i) const { return role[i] == TSHHT3_COORDINATE; }
 
   PetscErrorCode check(const char *call) const;
+  PetscErrorCode check(const char *call, const Mode &m) const; /* collective */
   PetscErrorCode differentiate();
   PetscErrorCode chooseUnits();
   PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double *x) const; /* how a measure changes */

@@ -128,6 +128,17 @@ PetscErrorCode Linearization::Work::check(const char *call) const
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
+{
+  PetscMPIInt foreign;
+  PetscFunctionBegin;
+  PetscCall(check(call));
+  foreign = (PetscInt)m.shape.size() != R->n;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &foreign, 1, MPI_INT, MPI_MAX, comm()));
+  PetscCheck(!foreign, comm(), PETSC_ERR_ARG_WRONG, "%s: the mode's shape has not the unknowns of this linearization, but %d (of this rank, which has %d); take a mode of its own", call, (int)m.shape.size(), (int)R->n);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Linearization::Work::differentiate()
 {
   Mat F[3];

@@ -155,7 +155,7 @@ PetscErrorCode Linearization::normalize(Mode *m) const
   const Work          &w    = *work_;
   std::complex<double> best = 0;
   PetscFunctionBegin;
-  PetscCall(w.check("Linearization::normalize()"));
+  PetscCall(w.check("Linearization::normalize()", *m));
   for (PetscInt i = 0; i < w.R->n; i++)
     if (w.coordinate(i) && std::abs(m->shape[i]) > (1 + 1e-9) * std::abs(best)) best = m->shape[i];
   std::vector<std::complex<double>> all(w.R->size);
@@ -171,7 +171,7 @@ PetscErrorCode Linearization::normalize(Mode *m) const
 PetscErrorCode Linearization::value(const Mode &m, const Measure &what, std::complex<double> *x) const
 {
   PetscFunctionBegin;
-  PetscCall(work_->check("Linearization::value()"));
+  PetscCall(work_->check("Linearization::value()", m));
   PetscCall(AmplitudeOf(*work_, what, m.shape, m.value, x));
   PetscFunctionReturn(0);
 }
@@ -184,7 +184,7 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   double         energy[2] = {0, 0}; /* of the body, of all */
   Vector3c       motion[2] = {Vector3c::Zero(), Vector3c::Zero()};
   PetscFunctionBegin;
-  PetscCall(w.check("Linearization::part()"));
+  PetscCall(w.check("Linearization::part()", m));
   PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
   Motion at; /* where it is, and so is what its attachments are attached to */
   Vec    state[3] = {w.state[0], w.state[1], w.state[2]};

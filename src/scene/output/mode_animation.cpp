@@ -13,7 +13,7 @@ PetscErrorCode Linearization::animate(const Mode &m, const std::string &prefix, 
   std::unique_ptr<Task> task;
   Vec                   d[3], at[3];
   PetscFunctionBegin;
-  PetscCall(w.check("Linearization::animate()"));
+  PetscCall(w.check("Linearization::animate()", m));
   PetscCheck(frames > 0 && std::isfinite(amplitude), w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization::animate(): %d frames of an amplitude of %g are none; the amplitude is in metres and radians", frames, amplitude);
   Runtime &R         = *w.R;
   settings.animation = prefix;
