@@ -42,15 +42,17 @@ PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
 PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why);
 
-/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: the time scale of the motion.
+/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: TimeScaleOfConstraints().
    again: with the differences that were the best ones at the last call, near by. */
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second);
 
 /* Whether neither velocities nor time move what stands still */
 PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);
 
-/* A time over which the motion changes q by as much as its tolerance refers to, project.cpp */
+/* A time over which the motion changes q by as much as its tolerance refers to; another one over which constraints are differentiated along it: project.cpp */
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
+PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T);
+PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T);
 
 } // namespace hht3
 

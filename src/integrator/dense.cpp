@@ -151,6 +151,9 @@ void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, const Petsc
 /* Where t lies in the last step: 0 to 1, and these at its ends exactly */
 PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
 
+/* Monitors are called when an event has taken the step back, too: then the state is that of t_n, and nothing is known of other times */
+bool IsRolledBackTo(TS ts, PetscReal t) { return !Get(ts).have_step && ts->steprollback && t == ts->ptime; }
+
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
@@ -161,6 +164,11 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscInt           n;
 
   PetscFunctionBegin;
+  if (IsRolledBackTo(ts, t)) {
+    for (int k = 0; k < 3; k++)
+      if (out[k]) PetscCall(VecCopy(begin[k], out[k]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);

@@ -42,9 +42,10 @@ struct Best {
   {
     if (!known) level.assign((size_t)n, -1);
   }
-  void take(PetscInt i, int l, PetscReal x)
+  /* noise: what rounding of the coordinates makes of x. Over a tau that is too short for anything to change the differences vanish, and agree (Units.DifferencesThatVanish). */
+  void take(PetscInt i, int l, PetscReal x, PetscReal noise)
   {
-    const PetscReal d  = PetscAbsReal(x - last[i]);
+    const PetscReal d  = PetscMax(PetscAbsReal(x - last[i]), noise);
     const int       nth = from.empty() ? l : l - from[i];
     if (known ? l == level[i] : nth > 0 && nth < levels && d < change[i]) { /* false for NaN */
       change[i] = d;
@@ -54,6 +55,25 @@ struct Best {
     last[i] = x;
   }
 };
+
+template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
+{
+  PetscReal sum = 0;
+  for (const PetscReal w : weight) sum += w < 0 ? -w : w;
+  return sum;
+}
+
+/* Rounding of the largest coordinate */
+PetscErrorCode RoundingOf(const Integrator &I, Vec U, PetscReal *rounding)
+{
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u) { if (IsCoordinate(I, i)) most = PetscMax(most, PetscAbsScalar(u)); }, Read(U)));
+  PetscCallMPI(MPI_Allreduce(&most, rounding, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)U)));
+  *rounding *= PETSC_MACHINE_EPSILON;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
 PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[max_levels])
@@ -128,6 +148,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   PetscInt               n;
   PetscBool              rest;
   bool                   used[max_levels];
+  PetscReal              rounding;
   std::vector<PetscReal> f0, s1, s2;
   std::vector<signed char> from;
 
@@ -137,6 +158,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
     PetscCall(DerivativesAtRest(ts, t, U, V, first, second));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(RoundingOf(I, U, &rounding));
   PetscCall(VecGetLocalSize(U, &n));
   PetscCall(Ut.like(U));
   PetscCall(F.like(U));
@@ -170,8 +192,8 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
     }
     for (PetscInt i = 0; i < n; i++) {
       if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau);
-      d2.take(i, level, s2[i] / (tau * tau));
+      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding / tau);
+      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding / (tau * tau));
     }
   }
   I.levels_known = PETSC_TRUE;

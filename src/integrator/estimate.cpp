@@ -52,7 +52,7 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   PetscReal   local[2] = {0, 0}, global[2];
 
   PetscFunctionBegin;
-  PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* a turn is rounded as the attitude is */
+  if (!I.norm_size) PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* a turn is rounded as the attitude is */
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar &y, PetscScalar &w) {
       if (!IsDifferential(RoleOf(I, i))) {
@@ -76,8 +76,8 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Y_i and the weights after U has been accepted */
-PetscErrorCode UpdateWeights(TS ts, Vec U)
+/* Y_i and the weights after U has been accepted; all: of every entry */
+static PetscErrorCode Weigh(TS ts, Vec U, bool all)
 {
   Integrator &I   = Get(ts);
   Tolerances  tol = {ts->atol, ts->rtol};
@@ -85,7 +85,7 @@ PetscErrorCode UpdateWeights(TS ts, Vec U)
   PetscFunctionBegin;
   if (ts->vatol) PetscCall(VecGetArrayRead(ts->vatol, &tol.va));
   if (ts->vrtol) PetscCall(VecGetArrayRead(ts->vrtol, &tol.vr));
-  if (!I.norm_size) PetscCall(FirstWeights(ts, tol, U));
+  if (all || !I.norm_size) PetscCall(FirstWeights(ts, tol, U));
   else
     PetscCall(ForEntries(
       [&](PetscInt i, PetscScalar u, PetscScalar &y, PetscScalar &w) {
@@ -96,6 +96,37 @@ PetscErrorCode UpdateWeights(TS ts, Vec U)
       Read(U), Write(I.ymax), Write(I.weight)));
   if (ts->vatol) PetscCall(VecRestoreArrayRead(ts->vatol, &tol.va));
   if (ts->vrtol) PetscCall(VecRestoreArrayRead(ts->vrtol, &tol.vr));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode UpdateWeights(TS ts, Vec U)
+{
+  PetscFunctionBegin;
+  PetscCall(Weigh(ts, U, false));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before a step from U: where the user has set other tolerances since the last one, all weights are made anew */
+PetscErrorCode FollowTolerances(TS ts, Vec U)
+{
+  Integrator      &I     = Get(ts);
+  const Vec        v[2]  = {ts->vatol, ts->vrtol};
+  bool             other = I.of_atol != ts->atol || I.of_rtol != ts->rtol;
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 2; k++) {
+    PetscObjectId    id    = 0;
+    PetscObjectState state = 0;
+    if (v[k]) PetscCall(PetscObjectGetId((PetscObject)v[k], &id));
+    if (v[k]) PetscCall(PetscObjectStateGet((PetscObject)v[k], &state));
+    other          = other || (I.of_vectors && (id != I.of_id[k] || state != I.of_state[k]));
+    I.of_id[k]    = id;
+    I.of_state[k] = state;
+  }
+  if (other && I.norm_size) PetscCall(Weigh(ts, U, true));
+  I.of_vectors = PETSC_TRUE;
+  I.of_atol    = ts->atol;
+  I.of_rtol    = ts->rtol;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

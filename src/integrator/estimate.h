@@ -10,6 +10,7 @@ namespace hht3
 
 /* Y_i and the weights after U has been accepted */
 PetscErrorCode UpdateWeights(TS ts, Vec U);
+PetscErrorCode FollowTolerances(TS ts, Vec U);
 
 /* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);

@@ -210,9 +210,9 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   Sampler    *S  = NULL;
 
   PetscFunctionBegin;
-  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
+  PetscCheck(I.have_step || IsRolledBackTo(ts, t), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   const PetscReal x = StepFraction(I, t);
-  if (x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
+  if (I.have_step && x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
   if (S) {
     PetscCall(ForgetEarlierSteps(I, *S));
     PetscCall(Interpolate(ts, t, S->at.U, S->at.V, S->at.A));

@@ -22,8 +22,9 @@ namespace
    periods one after the other (Excitation.ManyFrequencies) */
 constexpr PetscReal longest = 0.618034, shorter = 0.236068;
 constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
-constexpr int       at_least = 9, at_most = 30; /* samples */
+constexpr int       at_least = 9, at_most = 60; /* samples */
 constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
+constexpr PetscReal falling  = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
 constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
 constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
@@ -33,24 +34,23 @@ struct Changes {
   Vec     shortest = nullptr; /* I.excitation */
 };
 
-/* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; whether any row does */
-PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, const Changes &c, PetscBool *any)
+/* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; the largest change of any row, as a part of its largest one */
+PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, const Changes &c, PetscReal *part)
 {
-  PetscMPIInt changes = 0;
+  PetscReal most_of_all = 0;
 
   PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
       const PetscReal change = PetscAbsScalar(f - f0);
+      if (change > most_of_all * PetscRealPart(most)) most_of_all = PetscRealPart(most) > 0 ? PetscMin(change / PetscRealPart(most), 1) : 1;
       if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
       most     = PetscMax(change, PetscRealPart(most));
       shortest = tau;
       number += 1;
-      changes = 1;
     },
     Read(before), Read(after), Write(c.largest), Write(c.number), Write(c.shortest)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changes, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)before)));
-  *any = (PetscBool)changes;
+  PetscCallMPI(MPI_Allreduce(&most_of_all, part, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)before)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -60,13 +60,14 @@ PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, const Changes &
 PetscErrorCode NoteExcitation(TS ts)
 {
   Integrator     &I    = Get(ts);
-  const PetscReal stop = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > ts->ptime ? ts->max_time - ts->ptime : 1;
-  PetscBool       any = PETSC_FALSE;
+  PetscReal       stop = ts->max_time - ts->ptime;
+  const PetscReal step = ts->time_step != unset_step && ts->time_step > 0 ? ts->time_step : PETSC_MAX_REAL; /* of the user's, and those later: what it may follow is looked for */
   WorkVec         zero, F[2];
   Changes         c;
-  PetscReal       swing = PETSC_MAX_REAL;
+  PetscReal       swing = PETSC_MAX_REAL, part = 1, last;
 
   PetscFunctionBegin;
+  if (!(ts->max_time < PETSC_MAX_REAL / 2 && stop > 0)) PetscCall(TimeScale(ts, &stop)); /* of a run without end */
   for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
   if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
   c.shortest = I.excitation;
@@ -74,11 +75,12 @@ PetscErrorCode NoteExcitation(TS ts)
   PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
   PetscCall(EvaluateResidual(ts, ts->ptime + longest * stop, I.U0, I.V0, zero, F[0]));
   PetscReal tau = longest * stop;
-  for (int sample = 1, still = 0; sample < at_least || (sample < at_most && still < quiet); sample++) {
+  for (int sample = 1, still = 0; sample < at_least || (sample < at_most && (still < quiet || (tau > step && step < stop))); sample++) {
     tau *= shorter;
     PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
-    PetscCall(NoteChanges(tau, F[0], F[1], c, &any));
-    still = any ? 0 : still + 1;
+    last = part;
+    PetscCall(NoteChanges(tau, F[0], F[1], c, &part));
+    still = part > noticeable || (part > falling * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
   }
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
   PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= all_along) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));

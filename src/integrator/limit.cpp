@@ -6,14 +6,14 @@
 namespace hht3
 {
 
-/* Before an attempt from t_n; steps of fixed length and the search for an event are left alone */
+/* Before an attempt from t_n; steps of fixed length are left alone */
 PetscErrorCode ApplyStepLimit(TS ts)
 {
   Integrator &I = Get(ts);
   PetscReal   h = PETSC_MAX_REAL;
 
   PetscFunctionBegin;
-  if (!I.limit.limit || I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.limit.limit || I.fixed_h) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall((*I.limit.limit)(ts, ts->ptime, I.U0, I.V0, I.A0, &h, I.limit.ctx));
   PetscCheck(h > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "The function of TSHHT3SetStepLimit() allows a step of %g at t = %g, must be positive", (double)h,

@@ -10,6 +10,7 @@
 #include "consistent.h"
 #include "entries.h"
 #include "equations.h"
+#include "settings.h"
 #include "solver.h"
 #include "start.h"
 
@@ -91,12 +92,13 @@ PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal
   PetscCall(PetscInfo(ts, "start: %s violate the constraints by %g of the tolerance, most in row %" PetscInt_FMT " (%g)%s\n", what,
                       (double)e, row, (double)value, moved ? "; projected" : ""));
   /* within a run the velocities are consistent to the order of the method only, which is no fault of the user's */
-  if (e > (I.stat.restarts > 1 ? 100 : 1) && I.start_policy == TSHHT3_START_REPORT) {
+  const bool within = ts->steps > 0;
+  if (e > (within ? 100 : 1) && !I.own_start && I.start_policy == TSHHT3_START_REPORT) {
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                           "hhtdae: at t = %g the %s%s violate the constraints: the nearest consistent ones are %.3g "
                           "tolerances away%s; the largest violation is %.3g, in row %" PetscInt_FMT
                           ". Give consistent values, or use -ts_hhtdae_start project.\n",
-                          (double)ts->ptime, I.stat.restarts > 1 ? "" : "initial ", what, (double)e, unit, (double)value, row));
+                          (double)ts->ptime, within ? "" : "initial ", what, (double)e, unit, (double)value, row));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -139,11 +141,12 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
 PetscErrorCode CheckVelocities(TS ts, bool project, PetscReal *e, PetscInt *row, PetscReal *value)
 {
   Integrator &I = Get(ts);
-  PetscReal   T;
+  PetscReal   T, along;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, T, false, I.work, I.gamma));
+  PetscCall(TimeScaleOfConstraints(ts, &along));
+  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, along, false, I.work, I.gamma));
   PetscCall(SolveStart(ts, I.work, I.X));
   PetscCall(Distance(ts, I.X, T, e));
   PetscCall(WorstRow(ts, I.work, row, value));
@@ -159,23 +162,110 @@ Prepared PreparedBy(const Integrator &I, bool moved)
 
 } // namespace
 
-/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i|, at most the whole run */
-PetscErrorCode TimeScale(TS ts, PetscReal *T)
+namespace
+{
+
+/* The fastest and the largest of the coordinates that were named as lengths, on this rank; they are left out of `others` */
+PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscReal *y)
 {
   Integrator        &I = Get(ts);
-  PetscReal local = 0, rate;
+  const PetscScalar *rate, *size;
+  const PetscInt    *index;
+  PetscInt           n, first, end;
 
   PetscFunctionBegin;
-  const PetscReal least = PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8);
+  *v = *y = 0;
+  PetscCall(VecGetOwnershipRange(I.V0, &first, &end));
+  others.assign((size_t)(end - first), 1);
+  if (!I.lengths) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ISGetLocalSize(I.lengths, &n));
+  PetscCall(ISGetIndices(I.lengths, &index));
+  PetscCall(VecGetArrayRead(I.V0, &rate));
+  PetscCall(VecGetArrayRead(I.ymax, &size));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = index[k] - first;
+    PetscCheck(i >= 0 && i < end - first, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "TSHHT3SetLengths(): unknown %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT, index[k], first, end - 1);
+    others[(size_t)i] = 0;
+    *v                = PetscMax(*v, PetscAbsScalar(rate[i]));
+    *y                = PetscMax(*y, PetscRealPart(size[i]));
+  }
+  PetscCall(VecRestoreArrayRead(I.ymax, &size));
+  PetscCall(VecRestoreArrayRead(I.V0, &rate));
+  PetscCall(ISRestoreIndices(I.lengths, &index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
+constexpr PetscReal many = 1e3;
+
+/* 1/rate, at most the whole run where it has an end. Not what is left of it: differences over next to nothing are rounding */
+PetscReal TimeOf(TS ts, PetscReal rate)
+{
+  const Integrator &I    = Get(ts);
+  const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
+  PetscReal         span = ends ? ts->max_time - I.t_begin : rate > 0 ? PETSC_MAX_REAL : 1;
+  if (I.excitation && I.fastest < span / many) span = many * I.fastest;
+  return rate > 0 ? PetscMin(1 / rate, span) : span;
+}
+
+/* Coordinates whose size is less count as of this size */
+PetscReal LeastSize(TS ts) { return PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); }
+
+} // namespace
+
+/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i| */
+PetscErrorCode TimeScale(TS ts, PetscReal *T)
+{
+  Integrator     &I     = Get(ts);
+  const PetscReal least = LeastSize(ts);
+  PetscReal       local = 0, rate;
+
+  PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar v, PetscScalar y) {
       if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
     },
     Read(I.V0), Read(I.ymax)));
   PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  /* not what is left of the run: differences over next to nothing are rounding */
-  const PetscReal span = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin ? ts->max_time - I.t_begin : 1;
-  *T                   = rate > 0 ? PetscMin(1 / rate, span) : span;
+  *T = TimeOf(ts, rate);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A time in which accelerations alone move q by as much */
+PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
+{
+  Integrator     &I     = Get(ts);
+  const PetscReal least = LeastSize(ts);
+  PetscReal       local = 0, most;
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar a, PetscScalar y) {
+      if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(a) / PetscMax(PetscRealPart(y), least));
+    },
+    Read(A), Read(I.ymax)));
+  PetscCallMPI(MPI_Allreduce(&local, &most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  *T = most > 0 ? 1 / PetscSqrtReal(most) : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same with the largest length in place of each: one near 0 in millimetres moves by much more than 1 in a short time (Units.ForcesOfTheStart) */
+PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
+{
+  Integrator       &I     = Get(ts);
+  const PetscReal   least = LeastSize(ts);
+  PetscReal         local[3] = {0, 0, 0}, all[3]; /* of what is no length; fastest and largest length */
+  std::vector<char> others;
+
+  PetscFunctionBegin;
+  PetscCall(OwnLengths(ts, others, &local[1], &local[2]));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar v, PetscScalar y) {
+      if (IsCoordinate(I, i) && others[(size_t)i]) local[0] = PetscMax(local[0], PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
+    },
+    Read(I.V0), Read(I.ymax)));
+  PetscCallMPI(MPI_Allreduce(local, all, 3, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  *T = TimeOf(ts, PetscMax(all[0], all[1] / PetscMax(all[2], least)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -214,4 +304,45 @@ PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SetLengths(TS ts, IS lengths)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (lengths) PetscCall(PetscObjectReference((PetscObject)lengths));
+  PetscCall(ISDestroy(&I.lengths));
+  I.lengths = lengths;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace hht3
+
+/*@
+  TSHHT3SetLengths - Tells which coordinates are lengths of one unit
+
+  Logically Collective
+
+  Input Parameters:
++ ts      - the `TS` context
+- lengths - global indices of coordinates, each on the rank that owns it; or `NULL`
+
+  Level: advanced
+
+  Notes:
+  A consistent start differentiates the constraints along the velocities, over a time that moves no coordinate by much more than its size.
+  Without this function each coordinate is judged by itself and counts as 1 where it is less (as the quotient of the tolerances, absolute by relative, where there are
+  both). A position that is near 0 in millimetres is then taken for a small one, which costs digits of the first accelerations and multipliers. Of
+  coordinates that are named here the largest one is the size of all.
+
+  Scenes of libhhtscene say so themselves.
+
+.seealso: `TSHHT3`, `TSHHT3SetIS()`, `TSHHT3SetStart()`
+@*/
+PetscErrorCode TSHHT3SetLengths(TS ts, IS lengths)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  if (lengths) PetscValidHeaderSpecific(lengths, IS_CLASSID, 2);
+  PetscTryMethod(ts, "TSHHT3SetLengths_C", (TS, IS), (ts, lengths));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

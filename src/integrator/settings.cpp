@@ -120,8 +120,12 @@ PetscErrorCode ReportUnread(TS ts, bool own_test, bool own_line_search)
     reported = reported || (given && u.reader == test);
   }
   /* by the program */
-  const bool set = snes->rtol != (PetscReal)1e-8 || snes->abstol != (PetscReal)1e-50 || snes->stol != (PetscReal)1e-8;
+  PetscBool newton; /* other types set tolerances themselves */
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
+  const bool set = newton && (snes->rtol != (PetscReal)1e-8 || snes->abstol != (PetscReal)1e-50 || snes->stol != (PetscReal)1e-8);
   if (own_test && set && !reported) PetscCall(Report(ts, "SNESSetTolerances()", unread[0]));
+  if (ts->adapt->ignore_max > 0)
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ts_adapt_max_ignore %g has no effect, as the error test takes each coordinate by the largest value that it has had; what is not to count has a tolerance of its own, TSSetTolerances() with vectors\n", TSHHT3, (double)ts->adapt->ignore_max));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,7 +45,7 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   if (mffd) c->J = NULL;
   PetscCall(SNESGetKSP(ts->snes, &c->ksp));
   PetscCall(TimeScale(ts, &c->tiny));
-  c->tiny *= 1e-28; /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
+  c->tiny = 1e-28 * PetscMin(c->tiny, 1); /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
   c->t      = t;
   c->U      = I.U1;
   c->V      = I.V1;
@@ -75,14 +75,15 @@ PetscErrorCode GuessUnknowns(Integrator &I, Vec U)
 PetscErrorCode Rates(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
-  PetscReal   T;
+  PetscReal   T, Ta;
   PetscBool   ok, rest;
   WorkVec     X0, U, V;
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
   PetscCall(IsAtRest(I, I.V0, &rest));
-  const PetscReal d = PetscMin(1e-5 * T, four_digits * I.fastest);
+  PetscCall(TimeScaleOfAccelerations(ts, I.X, &Ta));
+  const PetscReal d = PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest); /* of what is at rest T may be a run without end: Units.LongRuns */
   PetscCall(X0.like(I.X));
   PetscCall(U.like(I.X));
   PetscCall(V.like(I.X));
@@ -285,7 +286,7 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   if (h > 0) PetscCall(VecCopy(V, c.begin[1]));
   if (I.constraints()) {
     c.gamma = I.gamma;
-    PetscCall(TimeScale(ts, &c.T));
+    PetscCall(TimeScaleOfConstraints(ts, &c.T));
     if (have.gamma != Gamma::Made) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, have.gamma == Gamma::Near, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
@@ -426,6 +427,12 @@ PetscErrorCode Start(TS ts)
   PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
+  if (!ts->steps) { /* a new run does not remember how large its coordinates once were */
+    I.t_begin   = ts->ptime;
+    I.norm_size = 0;
+    for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));
+  }
+  PetscCall(FollowTolerances(ts, I.U0));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(NoteExcitation(ts));
   PetscCall(CheckInitialState(ts, &have));

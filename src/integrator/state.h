@@ -79,6 +79,7 @@ struct StepState {
   Bend             bent        = Bend::None;
   PetscBool        repaired    = PETSC_FALSE; /* U0, V0 have been changed by Repair() */
   PetscInt         norm_size   = 0;           /* entries that enter the error test, global */
+  PetscReal        of_atol = -1, of_rtol = -1; /* tolerances that the weights were made of */
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
   PetscReal        h_regular   = 0;   /* running maximum of steps that went through the corrector, forgetting a tenth in each */
   PetscReal        h_proven    = 0;   /* largest step accepted since the last failed correction */
@@ -110,6 +111,7 @@ struct Integrator : StepState {
 
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
   IS                         is[TSHHT3_NUM_ROLES] = {};
+  IS                         lengths              = nullptr; /* coordinates that are lengths, where the application says so */
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
@@ -148,6 +150,10 @@ struct Integrator : StepState {
 
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;
+  PetscBool        own_start   = PETSC_FALSE; /* the present start is from values that nobody but the integrator has made */
+  PetscBool        of_vectors  = PETSC_FALSE; /* which vectors of tolerances they were made of is known: */
+  PetscObjectId    of_id[2]    = {};
+  PetscObjectState of_state[2] = {};
 
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */

@@ -38,9 +38,9 @@ constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every acc
 
 constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
-/* Whether someone other than the integrator has changed the solution since the last step: an event, a post-step function,
-   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. */
-PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
+/* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
+   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. Accept() may have moved the time a little. */
+PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *changed)
 {
   Integrator      &I = Get(ts);
   PetscObjectState s, d;
@@ -48,7 +48,8 @@ PetscErrorCode StateWasChanged(TS ts, Vec U, Vec V, PetscBool *changed)
   PetscBool        same_u, same_v;
 
   PetscFunctionBegin;
-  *changed = PETSC_FALSE;
+  *changed = (PetscBool)(PetscAbsReal(ts->ptime - t) > PetscMax(1e-9 * I.h, 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)));
+  if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &s));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &d));
   PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &id));
@@ -103,10 +104,15 @@ PetscErrorCode Begin(TS ts)
 
   PetscFunctionBegin;
   if (!ts->steprestart) {
-    if (ts->steprollback) PetscCall(StateWasChanged(ts, I.U0, I.V0, &changed));
-    else if (I.have_step) PetscCall(StateWasChanged(ts, I.U1, I.V1, &changed));
+    if (ts->steprollback) PetscCall(StateWasChanged(ts, I.t0, I.U0, I.V0, &changed));
+    else if (I.have_step) PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &changed));
     else if (!I.stat.restarts) changed = PETSC_TRUE;
-    if (changed) PetscCall(PetscInfo(ts, "the solution was changed from outside: restart\n"));
+    if (changed) PetscCall(PetscInfo(ts, "the solution or the time was changed from outside: restart\n"));
+  }
+  I.own_start = PETSC_FALSE;
+  if (ts->steprestart && I.have_step && !ts->steprollback) {
+    PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &I.own_start));
+    I.own_start = (PetscBool)!I.own_start;
   }
   if (ts->steprestart || changed) {
     I.have_step = PETSC_FALSE;
@@ -116,6 +122,7 @@ PetscErrorCode Begin(TS ts)
     if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
     PetscCall(ReferToState(ts));
   }
+  if (!ts->steprestart && !changed) PetscCall(FollowTolerances(ts, I.U0));
   I.have_step = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,6 +194,21 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TSAdaptChoose() accepts whatever step there is while an event is looked for, and the one from there to the end of the step that had it. The event
+   may have switched on what such a step cannot follow. */
+PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
+{
+  Integrator &I = Get(ts);
+  PetscInt    scheme = 0;
+  PetscReal   wlte[3];
+
+  PetscFunctionBegin;
+  if (HHT3EventActive(ts) && !I.fixed_h) PetscUseTypeMethod(ts->adapt, choose, ts, I.h, &scheme, next, accept, &wlte[0], &wlte[1], &wlte[2]);
+  else PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
+  if (*next <= 0 || (HHT3EventActive(ts) && *accept)) *next = I.h;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* vec_sol and vec_dot take the new state while TSAdapt looks at it, and the old one back if it is rejected */
 PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
 {
@@ -198,8 +220,7 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
   I.order.chosen = PETSC_FALSE;
   PetscCall(VecCopy(I.U1, ts->vec_sol));
   PetscCall(VecCopy(I.V1, ts->vec_dot));
-  PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
-  if (*next <= 0) *next = I.h;
+  PetscCall(AskAdapt(ts, next, accept));
   if (!*accept) {
     PetscCall(VecCopy(I.U0, ts->vec_sol));
     PetscCall(VecCopy(I.V0, ts->vec_dot));

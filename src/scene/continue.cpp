@@ -79,7 +79,7 @@ PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
 {
   Runtime  *R = RunOf(ts);
-  PetscReal t, atol, rtol;
+  PetscReal t, end, atol, rtol;
   PetscFunctionBegin;
   PetscCall(CreateRun(R->model, copy));
   PetscCall(CopyState(*R, ts, *RunOf(*copy), *copy));
@@ -87,7 +87,9 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
   PetscCall(TSSetTolerances(*copy, atol, nullptr, rtol, nullptr));
   PetscCall(TSSetTime(*copy, t));
-  PetscCall(TSSetMaxTime(*copy, t + 1));
+  PetscCall(TSGetMaxTime(ts, &end)); /* as long as the run is, where it has an end: no unit of time is known otherwise */
+  if (end < PETSC_MAX_REAL / 2 && end > R->scene.start.time) PetscCall(TSSetMaxTime(*copy, t + end - R->scene.start.time));
+  PetscCall(TSSetMaxSteps(*copy, 1)); /* for PETSc, which wants an end */
   PetscCall(TSHHT3SetStart(*copy, start));
   PetscCall(TSStep(*copy));
   PetscFunctionReturn(0);

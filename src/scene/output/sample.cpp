@@ -32,15 +32,21 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   std::vector<double> own, acceleration;
   PetscFunctionBegin;
   Runtime *run;
+  PetscInt steps;
+  PetscReal now;
+  TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(CheckUnchanged(data(), start_));
-  Runtime &R = *run;
   for (Vec &x : W) {
-    PetscCall(VecCreate(R.scene.comm, &x));
-    PetscCall(VecSetSizes(x, R.n, PETSC_DETERMINE));
+    PetscCall(VecCreate(run->scene.comm, &x));
+    PetscCall(VecSetSizes(x, run->n, PETSC_DETERMINE));
     PetscCall(VecSetType(x, VECSTANDARD));
   }
-  PetscCall((ChannelsFollowFromEquations(R) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
+  PetscCall(TSGetStepNumber(ts, &steps));
+  PetscCall(TSGetTime(ts, &now));
+  if (!steps && t == now) PetscCall(StateOfStart(ts, W, &copy));
+  else PetscCall((ChannelsFollowFromEquations(*run) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
+  Runtime &R = copy ? *RunOf(copy) : *run;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
   PetscCall(LocalMotion(R, w[0], w[1], w[2], acceleration, local));
   R.bodies.move(local[0], local[1]);
@@ -50,6 +56,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
     PetscCall(VecRestoreArrayRead(W[k], &w[k]));
     PetscCall(VecDestroy(&W[k]));
   }
+  PetscCall(TSDestroy(&copy));
   PetscFunctionReturn(0);
 }
 

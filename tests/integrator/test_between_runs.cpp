@@ -1,0 +1,170 @@
+/* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+PetscErrorCode again(Simulation &run, const Array &u, const Array &v, double end)
+{
+  PetscFunctionBegin;
+  PetscCall(TSSetTime(run.ts, 0.));
+  PetscCall(TSSetStepNumber(run.ts, 0));
+  PetscCall(TSSetMaxTime(run.ts, end));
+  for (PetscInt i = 0; i < (PetscInt)u.size(); i++) {
+    PetscCall(VecSetValue(run.U, i, u[i], INSERT_VALUES));
+    PetscCall(VecSetValue(run.V, i, v[i], INSERT_VALUES));
+  }
+  for (Vec x : {run.U, run.V}) {
+    PetscCall(VecAssemblyBegin(x));
+    PetscCall(VecAssemblyEnd(x));
+  }
+  PetscCall(run.solve());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const Oscillators &oscillator()
+{
+  static const Oscillators p({2.}, {0.}, false, 2.);
+  return p;
+}
+
+/* q'' + k q = 0 where k becomes another one at t = 1, or nothing but a load sin(2 pi t) */
+struct Switched : Problem {
+  mutable double k = 4.;
+  double         load;
+  explicit Switched(double amplitude) : load(amplitude)
+  {
+    name = "switched";
+    n    = 1;
+    t1   = 2.;
+    role = {TSHHT3_COORDINATE};
+  }
+  void initial(double *u, double *v) const override { u[0] = 1., v[0] = 0.; }
+  void residual(double t, const double *u, const double *, const double *a, double *f) const override { f[0] = a[0] + k * u[0] - load * std::sin(2. * M_PI * t); }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override { J.add(0, 0, sa + k); }
+};
+
+PetscErrorCode atOne(TS, PetscReal t, Vec, PetscScalar *f, void *)
+{
+  f[0] = t - 1.;
+  return 0;
+}
+
+PetscErrorCode stiffen(TS ts, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *k)
+{
+  *static_cast<double *>(k) = 1e6;
+  return TSRestartStep(ts);
+}
+
+PetscErrorCode leave(TS, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *) { return 0; }
+
+void watchFor(TS ts, PetscErrorCode (*then)(TS, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *), void *ctx)
+{
+  PetscInt  direction = 0;
+  PetscBool terminate = PETSC_FALSE;
+  must(TSSetEventHandler(ts, 1, &direction, &terminate, atOne, then, ctx));
+}
+
+} // namespace
+
+TEST(BetweenRuns, OtherTolerances)
+{
+  for (bool vector : {false, true}) {
+    Simulation run(oscillator(), tolerance(1e-3)), sharp(oscillator(), tolerance(1e-8));
+    Vec        tol;
+    must(VecDuplicate(run.U, &tol));
+    must(VecSet(tol, 1e-8));
+    must(run.solve());
+    must(sharp.solve());
+    const PetscInt loose = run.statistics().steps;
+    must(TSSetTolerances(run.ts, 1e-8, vector ? tol : nullptr, 1e-8, vector ? tol : nullptr));
+    must(TSSetMaxTime(run.ts, 4.));
+    must(run.solve());
+    EXPECT_GT(run.statistics().steps - loose, 0.8 * (double)sharp.statistics().steps) << vector;
+    must(VecDestroy(&tol));
+  }
+}
+
+TEST(BetweenRuns, ANewRunForgetsHowLargeTheOldOneWas)
+{
+  Simulation run(oscillator(), tolerance(1e-6)), fresh(oscillator(), tolerance(1e-6));
+  must(fresh.solve());
+  must(again(run, {1e6}, {0.}, 2.));
+  const PetscInt before = run.statistics().steps;
+  must(again(run, {1.}, {0.}, 2.));
+  EXPECT_NEAR((double)(run.statistics().steps - before), (double)fresh.statistics().steps, 2.);
+  EXPECT_NEAR(run.u()[0], std::cos(4.), 1e-3);
+}
+
+/* A load of period 1 does not see the time set back by 1 */
+TEST(BetweenRuns, TimeSetBack)
+{
+  const Switched p(1.);
+  for (const char *order : {"2", "3", "5"}) {
+    double q[2];
+    for (bool back : {false, true}) {
+      Simulation run(p, fixedSteps(2e-3) + "-ts_hhtdae_order " + order);
+      must(TSSetMaxTime(run.ts, 3.));
+      for (int k = 0; k < 1000; k++) {
+        must(run.step());
+        if (back && (k == 300 || k == 600)) must(TSSetTime(run.ts, run.t() - 1.));
+      }
+      q[back] = run.u()[0];
+    }
+    EXPECT_NEAR(q[1], q[0], 1e-4) << order;
+  }
+}
+
+/* PETSc accepts every step from an event to the end of the step in which it was; what the event has switched on is not to be missed */
+TEST(Events, WhatTheyLeaveIsUnderTheErrorTest)
+{
+  for (const char *order : {"2", "5"}) {
+    const Switched p(0.);
+    Simulation     run(p, tolerance(1e-6) + "-ts_hhtdae_order " + order);
+    double         largest = 0.;
+    watchFor(run.ts, stiffen, &p.k);
+    run.watch = [&](Simulation &r, PetscInt, double t) {
+      if (t > 1.) widen(largest, std::abs(r.u()[0]));
+    };
+    must(run.solve());
+    EXPECT_EQ(p.k, 1e6);
+    EXPECT_NEAR(largest, std::abs(std::cos(2.)), 2e-3) << order;
+  }
+}
+
+/* Monitors are called where an event has taken a step back, too */
+TEST(Events, SamplesInMonitors)
+{
+  const Switched p(0.);
+  Simulation     run(p, tolerance(1e-4));
+  Vec            U, A;
+  must(VecDuplicate(run.U, &U));
+  must(VecDuplicate(run.U, &A));
+  watchFor(run.ts, leave, nullptr);
+  run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (!step) return;
+    must(TSHHT3EvaluateAt(r.ts, t, U, nullptr, A));
+    EXPECT_EQ(whole(U), r.u()) << t;
+    EXPECT_NEAR(whole(A)[0], -4. * r.u()[0], 1e-2) << t;
+    must(TSHHT3Interpolate(r.ts, t, U, nullptr, nullptr));
+    EXPECT_EQ(whole(U), r.u()) << t;
+  };
+  must(run.solve());
+  must(VecDestroy(&U));
+  must(VecDestroy(&A));
+}
+
+/* What the integrator itself has left is no fault of the user's */
+TEST(BetweenRuns, RestartsAreNoReproach)
+{
+  const Pendulum p(-90., 0., 2.);
+  Simulation     run(p, tolerance(1e-7));
+  Printed        out;
+  run.watch = [&](Simulation &r, PetscInt step, double) {
+    if (step % 5 == 4) must(TSRestartStep(r.ts));
+  };
+  must(run.solve());
+  EXPECT_EQ(out.text().find("violate"), std::string::npos) << out.text();
+}

@@ -1,0 +1,145 @@
+/* Starts in other units of length and in runs that have no end: nothing depends on what 1 is, or on how long a run may be */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+/* A mass of 2 on a rod of length L at its lowest point, with a speed: m q'' + Phi_q^T lambda = Q with Phi = |q| - L */
+struct AtItsLowest : Problem {
+  const double L, speed, g;
+  AtItsLowest(double unit, double length, double v) : L(length * unit), speed(v * unit), g(9.81 * unit)
+  {
+    name = "pendulum at its lowest point";
+    n    = 3;
+    t1   = 1.;
+    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  void initial(double *u, double *v) const override
+  {
+    u[0] = u[2] = v[1] = v[2] = 0.;
+    u[1]                      = -L;
+    v[0]                      = speed;
+  }
+  void residual(double, const double *u, const double *, const double *a, double *f) const override
+  {
+    const double r = std::hypot(u[0], u[1]);
+    f[0]           = 2. * a[0] + u[2] * u[0] / r;
+    f[1]           = 2. * (a[1] + g) + u[2] * u[1] / r;
+    f[2]           = r - L;
+  }
+  void jacobian(double, const double *u, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    const double r = std::hypot(u[0], u[1]);
+    for (int i = 0; i < 2; i++)
+      for (int j = 0; j < 2; j++) J.add(i, j, (i == j ? 2. * sa + u[2] / r : 0.) - u[2] * u[i] * u[j] / (r * r * r));
+    for (int i = 0; i < 2; i++) J.add(i, 2, u[i] / r), J.add(2, i, u[i] / r);
+  }
+  /* the rod's force by what it is */
+  double ratio(double lambda) const { return lambda / (2. * (g + speed * speed / L)); }
+};
+
+double startRatio(const AtItsLowest &p, bool lengths)
+{
+  Simulation run(p, tolerance(1e-5));
+  Vec        U;
+  IS         positions;
+  must(ISCreateStride(PETSC_COMM_SELF, 2, 0, 1, &positions));
+  if (lengths) must(TSHHT3SetLengths(run.ts, positions));
+  must(ISDestroy(&positions));
+  must(run.step());
+  must(VecDuplicate(run.U, &U));
+  must(TSHHT3Interpolate(run.ts, 0., U, nullptr, nullptr));
+  const Array u = whole(U);
+  must(VecDestroy(&U));
+  return p.ratio(u[2]);
+}
+
+} // namespace
+
+TEST(Units, ForcesOfTheStart)
+{
+  for (double length : {.5, 5., 20.})
+    for (double unit : {1., 1e3, 1e6}) {
+      const AtItsLowest p(unit, length, 20.);
+      EXPECT_NEAR(startRatio(p, true), 1., 1e-6) << length << " m in units of 1/" << unit;
+    }
+}
+
+/* Where nobody says what is a length, differences over a time that is too short for anything to change are no zero */
+TEST(Units, DifferencesThatVanish) { EXPECT_NEAR(startRatio(AtItsLowest(1e3, 5., 20.), false), 1., 1e-2); }
+
+TEST(Units, LengthsOfAnotherRankAreRefused)
+{
+  const AtItsLowest p(1., 1., 1.);
+  Simulation        run(p, tolerance(1e-5));
+  IS                foreign;
+  ErrorTrap         trap;
+  must(ISCreateStride(PETSC_COMM_SELF, 1, 7, 1, &foreign));
+  must(TSHHT3SetLengths(run.ts, foreign));
+  must(ISDestroy(&foreign));
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_OUTOFRANGE);
+  EXPECT_NE(trap.message.find("unknown 7"), std::string::npos) << trap.message;
+}
+
+/* From rest the run's length is the only time that is known at first. Runs that something else is to end are as those that end. */
+TEST(Units, LongRuns)
+{
+  const Pendulum p(-60., 0., 2.);
+  double         short_run = 0.;
+  for (double end : {10., 1e9, 1e20, 1e300}) {
+    Simulation run(p, tolerance(1e-6));
+    double     error = 0.;
+    must(TSSetMaxTime(run.ts, end));
+    run.watch = [&](Simulation &r, PetscInt, double t) {
+      if (t > 2.) must(TSSetConvergedReason(r.ts, TS_CONVERGED_USER));
+      else widen(error, r.errors().q);
+    };
+    must(run.solve());
+    if (end == 10.) short_run = error;
+    EXPECT_LT(error, 1.2 * short_run) << "a run to " << end;
+    EXPECT_EQ(run.statistics().tiny_steps, 0) << "a run to " << end;
+  }
+}
+
+/* m q'' + lambda = 0, q = 1 - cos(w t) from rest: what a run without end finds out of how fast that is */
+struct Swung : Problem {
+  const double w;
+  explicit Swung(double frequency) : w(frequency)
+  {
+    name = "swung";
+    n    = 2;
+    t1   = 1.;
+    role = {TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  void initial(double *u, double *v) const override { u[0] = u[1] = v[0] = v[1] = 0.; }
+  void residual(double t, const double *u, const double *, const double *a, double *f) const override
+  {
+    f[0] = 2. * a[0] + u[1];
+    f[1] = u[0] - (1. - std::cos(w * t));
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    J.add(0, 0, 2. * sa);
+    J.add(0, 1, 1.);
+    J.add(1, 0, 1.);
+  }
+};
+
+TEST(Units, MotionsInLongRuns)
+{
+  for (double end : {10., 1e8, 1e9, 1e12})
+    for (double w : {2., 3., 4., 5., 7.}) {
+      const Swung p(w);
+      Simulation  run(p, tolerance(1e-6));
+      double      worst = 0.;
+      must(TSSetMaxTime(run.ts, end));
+      run.watch = [&](Simulation &r, PetscInt, double t) {
+        widen(worst, std::abs(r.u()[0] - (1. - std::cos(w * t))));
+        if (t > 1.) must(TSSetConvergedReason(r.ts, TS_CONVERGED_USER));
+      };
+      must(run.solve());
+      EXPECT_LT(worst, 1e-3) << "w = " << w << " in a run to " << end;
+    }
+}
