@@ -130,8 +130,9 @@ py::object NewRun(Scene &s, py::object from)
 /* Python's other threads go on meanwhile */
 void Solve(Scene &s, py::object ts)
 {
-  TS             run = ToTS(ts);
-  PetscErrorCode code;
+  const py::object held = FromTS(ToTS(ts));
+  TS               run  = ToTS(held);
+  PetscErrorCode   code;
   {
     py::gil_scoped_release others;
     code = s.solve(run);

@@ -108,6 +108,47 @@ class Keeping(unittest.TestCase):
         now.close()
 
 
+class WhileSolving(unittest.TestCase):
+    def test_close_and_solve_from_inside(self):
+        """What a run calls back can neither close it nor solve it: an error, with which the run is as good as before"""
+        for do, word in ((lambda r: r.close(), "close"), (lambda r: r.solve(3.), "solve"), (lambda r: r.load("x"), "load")):
+            for where in ("event", "on_step", "callback"):
+                held = []
+                scene = oscillator(lambda x: (do(held[0]) if held else None, -40. * x)[1])
+                run = scene.run(tolerance=1e-6)
+                if where == "event":
+                    run.event(h.time() - 0.1, do)
+                elif where == "on_step":
+                    run.on_step(do)
+                else:
+                    held.append(run)
+                with self.assertRaisesRegex((RuntimeError, h.Error), word + r"\(\): the run is being solved.*after solve\(\)"):
+                    run.solve(0.5)
+                held.clear()
+                self.assertLessEqual(run.time, 0.5)
+                self.assertIn("run at t =", repr(run))
+                run.close()
+                self.assertEqual(repr(run), "<closed run>")
+
+    def test_block_that_an_error_leaves(self):
+        def fail(run):
+            raise KeyError("from inside")
+        for hook in (lambda r: r.event(h.time() - 0.1, fail), lambda r: r.on_step(fail)):
+            with self.assertRaises((KeyError, h.Error)) as caught:
+                with oscillator().run() as run:
+                    hook(run)
+                    run.solve(0.5)
+            self.assertIn("from inside", str(caught.exception))
+            self.assertEqual(repr(run), "<closed run>")
+
+    def test_destroyed_by_hand(self):
+        for hook in (lambda r, f: r.event(h.time() - 0.1, f), lambda r, f: r.on_step(f)):
+            with oscillator().run() as run:
+                hook(run, lambda r: r.ts.destroy() if r.ts else None)
+                with self.assertRaisesRegex(ValueError, "closed"):
+                    run.solve(0.5)
+
+
 class Leaks(unittest.TestCase):
     def test_a_thousand_runs(self):
         """Memory after 1,000 runs is that after 100, but for less than a kilobyte a run"""

@@ -85,6 +85,7 @@ class Run(Channels):
         self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
         collect_garbage(scene.comm)
         with temporary_options(self._options) as self._unused:
+        self._solving = False  # while solve() is under way: what it calls back must neither solve nor close the run
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
             self.ts.setAttr("hhtdae", scene._keep)
             if tolerance is not None:
@@ -98,29 +99,38 @@ class Run(Channels):
             self.ts.setFromOptions()
 
     def _open(self):
-        if self.ts is None:
+        if not self.ts:  # also one that was destroyed by hand
             raise ValueError("the run has been closed")
         return self.ts
 
     def solve(self, until: float) -> "Run":
         """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
+    def _not_solving(self, call):
+        if self._solving:
+            raise RuntimeError("%s(): the run is being solved, and is at t = %g; events, on_step() and callbacks cannot do this to it: do it after solve(), or "
+                               "between the parts of step_by()" % (call, self.time))
+
         ts = self._open()
         if not until >= ts.getTime():
+        self._not_solving("solve")
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
         if until == ts.getTime():
             return self
         ts.setMaxTime(until)
-        self._ended = False
-        with temporary_options(self._options) as unused, self._page.settings():
-            if self._events:
-                self._solve_with_events(ts)
-            else:
-                self._serial += 1
-                self.scene._core.solve(ts)
+        self._ended, self._solving = False, True
+        try:
+            with temporary_options(self._options) as unused, self._page.settings():
+                if self._events:
+                    self._solve_with_events()
+                else:
+                    self._serial += 1
+                    self.scene._core.solve(ts)
+        finally:
+            self._solving = False
         if self._unused:
             tell_unused([name for name in unused if name in self._unused], 2)
             self._unused = []
-        reached = ts.getTime()
+        reached = self._open().getTime()
         if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
             warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
         elif ts.getConvergedReason() < 0:  # with -ts_error_if_step_fails 0
@@ -184,13 +194,14 @@ class Run(Channels):
             integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
-    def _solve_with_events(self, ts):
+    def _solve_with_events(self):
         while True:
             self._passed = []
             self._serial += 1
             self.scene._core.solve(ts)
             if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
+            ts = self._open()  # an action may have destroyed it
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
             if not PETSc.Options().hasName("ts_hhtdae_start"):
@@ -202,7 +213,7 @@ class Run(Channels):
                 if self._events[k][1] is not None:
                     self._events[k][1](self)
             self._ended = any(self._events[k][2] for k in here)
-            if self._ended or time >= ts.getMaxTime():
+            if self._ended or time >= self._open().getMaxTime():
                 return
 
     def restart(self) -> None:
@@ -317,11 +328,12 @@ class Run(Channels):
         return self
 
     def close(self) -> None:
-        """Frees what PETSc has for the run; its samples stay."""
-        if self.ts is not None:
+        """Frees what PETSc has for the run; its samples stay. While the run is being solved this is an error."""
+        if self.ts:
+            self._not_solving("close")
             self._left = self.time, self.steps, self.statistics
             self.ts.destroy()
-            self.ts = None
+        self.ts = None
 
     def __enter__(self):
         return self
@@ -330,7 +342,7 @@ class Run(Channels):
         self.close()
 
     def __repr__(self):
-        return "<closed run>" if self.ts is None else "<run at t = %.6g, %d steps, %d samples>" % (self.time, self.steps, len(self.times))
+        return "<closed run>" if not self.ts else "<run at t = %.6g, %d steps, %d samples>" % (self.time, self.steps, len(self.times))
 
 
 def _remove(folder, process):
