@@ -138,6 +138,50 @@ class Runs(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "cannot go back"):
             whole.solve(0.5)
 
+    def test_checkpoints(self):
+        """A loaded run is at the checkpoint at once: for snapshots, in parts, with events and files of results; wrong files are told by load()"""
+        scene, rod, pin = pendulum()
+        angle = h.angle(rod.marker(), scene.ground.marker())
+        scene.channel("angle", angle, "rad")
+        with tempfile.TemporaryDirectory() as folder:
+            file, table = os.path.join(folder, "half"), os.path.join(folder, "x.csv")
+            scene.output(csv=table, dt=0.1)
+            half = scene.solve(0.55, tolerance=1e-8)
+            half.save(file)
+            here = half["angle"][-1]
+            on = half.solve(1.)
+            with open(table) as text:
+                rows = text.read()
+            load = lambda: scene.run(tolerance=1e-8).load(file)
+            run = load()
+            self.assertEqual(run.time, 0.55)
+            self.assertEqual(run.snapshot().value(angle), here)
+            self.assertEqual(run.solve(1.)["angle"][-1], on["angle"][-1])
+            with open(table) as text:
+                self.assertEqual(text.read(), rows)
+            scene.output(csv="")
+            run = load()
+            np.testing.assert_allclose(list(run.step_by(0.25, 1.)), [0.8, 1.])
+            self.assertAlmostEqual(run["angle"][-1], on["angle"][-1], delta=1e-5)
+            run = load().solve(0.55)
+            self.assertEqual(run.solve(1.)["angle"][-1], on["angle"][-1])
+            with self.assertRaisesRegex(ValueError, "cannot go back"):
+                load().solve(0.5)
+            run, seen = load(), []
+            run.event(h.time() - 0.7, lambda r: seen.append(r.time))
+            run.solve(1.)
+            np.testing.assert_allclose(seen, [0.7])
+            with self.assertRaisesRegex(h.Error, "Cannot open the checkpoint"):
+                scene.run().load(file + " that is not there")
+            with open(file + " of others", "w") as text:
+                text.write("not a checkpoint" * 100)
+            with self.assertRaisesRegex(h.Error, "not a checkpoint"):
+                scene.run().load(file + " of others")
+            other = h.Scene()
+            other.add("rod", h.PointMass())
+            with self.assertRaises(h.Error):
+                other.run().load(file)
+
     def test_events(self):
         """A stone that falls through 0.5 m, and one that a switch at 0.75 m makes weightless"""
         def stone():

@@ -321,8 +321,12 @@ class Run(Channels):
         integrator.checkpoint_save(self._open(), file)
 
     def load(self, file: str) -> "Run":
-        """The next `solve` goes on from a checkpoint of a run of the same scene; returns the run. Collective."""
-        integrator.checkpoint_load(self._open(), file)
+        """Takes the run to a checkpoint of a run of the same scene, from where it goes on bit for bit; returns the run. Collective."""
+        ts = self._open()
+        self._not_solving("load")
+        with temporary_options(self._options):
+            _core.set_up(ts)  # before it, the file's name would only be noted
+            integrator.checkpoint_load(ts, file)
         if self._recorder:
             self._recorder.resume()
         return self

@@ -190,6 +190,22 @@ Recorder::~Recorder()
   for (Vec *x : {&U, &V, &A}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
+/* A checkpoint that was loaded after TSSetUp(), but before there was a recorder, has left its numbers in the vector: the run goes on in the
+   same files. They are zero otherwise, or those of the run that this one goes on from, Scene::createTS(&next, ts): then it has made no step. */
+static PetscErrorCode ResumeFromLoaded(Runtime &R, TS ts, PetscReal t)
+{
+  const double *x;
+  PetscInt      n, steps;
+  PetscFunctionBegin;
+  PetscCall(TSGetStepNumber(ts, &steps));
+  PetscCall(VecGetLocalSize(R.axes, &n));
+  PetscCall(VecGetArrayRead(R.axes, &x));
+  const std::vector<double> stood(x + n - kept + 2, x + n); /* behind the digest, kept.cpp */
+  PetscCall(VecRestoreArrayRead(R.axes, &x));
+  if (steps && stood[0] && stood[2] == t) PetscCall(ResumeOutput(R, stood.data()));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
 {
   OutputSettings o = settings;
@@ -219,6 +235,7 @@ PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
   PetscCall(CheckDistances(*r, ts));
   PetscCall(TSMonitorSet(ts, Monitor, &R, nullptr));
   R.recorder = r;
+  PetscCall(ResumeFromLoaded(R, ts, t));
   PetscFunctionReturn(0);
 }
 
