@@ -156,17 +156,18 @@ void Tape::evaluate(const double *u, double *out) const
   for (std::size_t k = 0; k < outputs.size(); k++) out[k] = plain_[outputs[k]];
 }
 
-/* Residuals need no derivatives: plain numbers are an eighth of the memory that numbers with up to 16 derivatives move. */
+/* Residuals and channels need no derivatives: plain numbers are an eighth of the memory that numbers with up to 16 derivatives move. Of channels there
+   may be more arguments than that. */
 Real Tape::operator()(const Real *u) const
 {
-  double plain[Real::most];
-  bool   constant = true;
+  bool constant = true;
+  values_.resize(arguments);
   for (int k = 0; k < arguments; k++) {
-    plain[k] = u[k].value();
-    constant = constant && u[k].derivatives().size() == 0;
+    values_[k] = u[k].value();
+    constant   = constant && u[k].derivatives().size() == 0;
   }
   if (constant) {
-    run(plain, plain_);
+    run(values_.data(), plain_);
     return plain_[outputs[0]];
   }
   run(u, real_);

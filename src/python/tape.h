@@ -54,6 +54,7 @@ public:
 
 private:
   template <class N> void run(const N *arguments, std::vector<N> &x) const;
+  mutable std::vector<double>               values_; /* of the arguments */
   mutable std::vector<double>               plain_;
   mutable std::vector<Real>                 real_;
   mutable std::vector<TimeFunction::Number> time_;

@@ -333,6 +333,13 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(finals[0][0], finals[1][0], delta=1e-8)
         self.assertEqual(finals[0][1], finals[1][1])
 
+    def test_channel_of_many_measures(self):
+        """A channel needs no derivatives, and so may have more measures than there is room for derivatives"""
+        scene = h.Scene()
+        markers = [scene.add("b%d" % k, h.PointMass(position=(k, 0, 0), velocity=(1, 0, 0))).marker() for k in range(40)]
+        scene.channel("sum", sum(h.displacement(m, 0) for m in markers))
+        self.assertAlmostEqual(scene.solve(0.1)["sum"][-1], 780 + 4., delta=1e-9)
+
     def test_options_and_output(self):
         scene, rod, pin = pendulum()
         scene.channel("angle", h.angle(rod.marker(), scene.ground.marker()), "rad")
