@@ -30,6 +30,16 @@ py::object FromVec(Vec x);
 py::object FromMat(Mat x);
 py::object FromIS(IS x);
 
+/* A plain value, `wanted` in words; `what` is named where it is another one */
+template <class T> T To(py::handle x, const std::string &what, const char *wanted)
+{
+  try {
+    return x.cast<T>();
+  } catch (const py::cast_error &) {
+    throw py::type_error(what + " must be " + wanted + ", is " + py::repr(x).cast<std::string>());
+  }
+}
+
 /* Arrays of one or two dimensions; `what` is named where the shape is wrong */
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 Array           ToArray(py::handle x, const std::string &what);

@@ -39,19 +39,11 @@ private:
   const py::dict &fields_;
   std::string     who_;
 
-  template <class T> static void plain(py::handle given, T &x, const std::string &what, const char *wanted)
-  {
-    try {
-      x = given.cast<T>();
-    } catch (const py::cast_error &) {
-      throw py::type_error(what + " must be " + wanted + ", is " + py::repr(given).cast<std::string>());
-    }
-  }
-  static void read(py::handle g, double &x, const std::string &w) { plain(g, x, w, "a number"); }
-  static void read(py::handle g, int &x, const std::string &w) { plain(g, x, w, "a whole number"); }
-  static void read(py::handle g, PetscInt64 &x, const std::string &w) { plain(g, x, w, "a whole number"); }
-  static void read(py::handle g, bool &x, const std::string &w) { plain(g, x, w, "True or False"); }
-  static void read(py::handle g, std::string &x, const std::string &w) { plain(g, x, w, "a text"); }
+  static void read(py::handle g, double &x, const std::string &w) { x = To<double>(g, w, "a number"); }
+  static void read(py::handle g, int &x, const std::string &w) { x = To<int>(g, w, "a whole number"); }
+  static void read(py::handle g, PetscInt64 &x, const std::string &w) { x = To<PetscInt64>(g, w, "a whole number"); }
+  static void read(py::handle g, bool &x, const std::string &w) { x = To<bool>(g, w, "True or False"); }
+  static void read(py::handle g, std::string &x, const std::string &w) { x = To<std::string>(g, w, "a text"); }
   static void read(py::handle g, Body &x, const std::string &w) { x = ToHandle<Body>(g, w); }
   static void read(py::handle g, Marker &x, const std::string &w) { x = ToHandle<Marker>(g, w); }
   static void read(py::handle g, Element &x, const std::string &w) { x = ToHandle<Element>(g, w); }
@@ -68,7 +60,7 @@ private:
   }
   static void read(py::handle g, MotionOf &x, const std::string &w)
   {
-    const std::string name = g.cast<std::string>();
+    const std::string name = To<std::string>(g, w, "a text");
     if (name == "displacement") x = MotionOf::Displacement;
     else if (name == "velocity") x = MotionOf::Velocity;
     else if (name == "acceleration") x = MotionOf::Acceleration;

@@ -35,7 +35,7 @@ template <class B> void Moving(const py::dict &d, const std::string &name, B &b)
 {
   b.position    = ToVector(d["position"], name + ": position");
   b.velocity    = ToVector(d["velocity"], name + ": velocity");
-  b.fixed_start = d["fixed_start"].cast<bool>();
+  b.fixed_start = To<bool>(d["fixed_start"], name + ": fixed_start", "True or False");
 }
 template <class B> void Turning(const py::dict &d, const std::string &name, B &b)
 {
@@ -48,7 +48,7 @@ RigidBody ToRigid(const py::dict &d, const std::string &name)
   RigidBody b;
   Moving(d, name, b);
   Turning(d, name, b);
-  b.mass    = d["mass"].cast<double>();
+  b.mass    = To<double>(d["mass"], name + ": mass", "a number");
   b.inertia = ToMatrix(d["inertia"], name + ": inertia");
   b.center  = ToVector(d["center"], name + ": center");
   return b;
@@ -58,7 +58,7 @@ PointMass ToPoint(const py::dict &d, const std::string &name)
 {
   PointMass b;
   Moving(d, name, b);
-  b.mass = d["mass"].cast<double>();
+  b.mass = To<double>(d["mass"], name + ": mass", "a number");
   return b;
 }
 
@@ -127,7 +127,7 @@ py::object NewRun(Scene &s, py::object from)
   return run;
 }
 
-/* Python's other threads go on meanwhile */
+/* Python's other threads go on meanwhile. What is called back may destroy the Python object's TS, so that the run is held here. */
 void Solve(Scene &s, py::object ts)
 {
   const py::object held = FromTS(ToTS(ts));

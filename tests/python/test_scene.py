@@ -90,6 +90,88 @@ class Elements(unittest.TestCase):
                 scene.add("s", spec)
 
 
+    def test_none_and_wrong_types(self):
+        """Where a number is wanted, nothing else is taken for one, or for the default: the message names element and field"""
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        for spec, text in ((h.SpringDamper(i, j, stiffness=None), "SpringDamper s: stiffness is None.*default"),
+                           (h.SpherePlane(i, j, law=None), "SpherePlane s: law is None.*default"),
+                           (h.SpherePlane(i, j, law=h.ContactLaw(friction=None)), "SpherePlane s: law: friction is None"),
+                           (h.Coupler([h.Term(i, j), h.Term(i, j, factor=None)]), "Coupler s: term 1: factor is None"),
+                           (h.TranslationalMotion(i, j, None), "TranslationalMotion s: function is None, must be a value$"),
+                           (h.NonlinearSpring(i, j, None), "NonlinearSpring s: tension is None"),
+                           (h.UserConstraint(None), "UserConstraint s: rows is None"),
+                           (h.PointOnCurve(i, j, None), "PointOnCurve s: points is None"),
+                           (h.RigidBody(mass=None), "RigidBody s: mass is None"),
+                           (h.PointMass(position=None), "PointMass s: position is None"),
+                           (h.PointMass(mass="3"), "s: mass must be a number, is '3'"),
+                           (h.RotationalMotion(i, j, 0., of=3), "of must be a text, is 3"),
+                           (h.SpringDamper(i, j, stiffness=1 + h.time()), "SpringDamper s: stiffness is a formula of the state or of time.*parameters"),
+                           (h.UserForce(i, force=[1, "2", 3]), "UserForce s: force: '2' is no number and no formula")):
+            with self.assertRaisesRegex(TypeError, text):
+                scene.add("s", spec)
+        for call, text in ((lambda: rod.marker((h.displacement(i, 0), 0, 0), name="tip"), "marker tip: position is a formula of the state"),
+                           (lambda: scene.set_gravity((0, h.time(), 0)), "gravity is a formula"),
+                           (lambda: scene.add(None, h.RigidBody()), "the name is None, must be a text"),
+                           (lambda: scene.variable("V", 1., None), "variable V: its initial value is None"),
+                           (lambda: scene.set(k="1"), "parameter k is '1'")):
+            with self.assertRaisesRegex(TypeError, text):
+                call()
+        for index in (3, -1, 10**12, 1., None):
+            with self.assertRaisesRegex(ValueError, "component is"):
+                h.displacement(i, index)
+            if index != 3:
+                with self.assertRaisesRegex(ValueError, "row is"):
+                    h.multiplier(pin, index)
+        scene.add("free", h.UserForce(i, None, None, [0, 0, 0], None))
+        run = scene.run()
+        for call in (run.snapshot, run.linearize, run.sample, run.equilibrium, run.assemble, run.solve, lambda t: list(run.step_by(0.1, t))):
+            with self.assertRaisesRegex(TypeError, "is 'a', must be a number"):
+                call("a")
+        with self.assertRaisesRegex(TypeError, "until is None"):
+            run.solve(None)
+
+    def test_parameters_of_another_scene(self):
+        other = h.Scene().parameter("k", 3.)
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        x = h.displacement(i, 0)
+        run = scene.run()
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        for call in (lambda: scene.add("s", h.SpringDamper(i, j, stiffness=2 * other)), lambda: scene.add("b", h.RigidBody(mass=other)),
+                     lambda: scene.add("s", h.SpherePlane(i, j, law=h.ContactLaw(friction=other))),
+                     lambda: scene.add("s", h.Coupler([h.Term(i, j, factor=other), h.Term(i, j)])),
+                     lambda: scene.add("s", h.NonlinearSpring(i, j, lambda l, v: other * l)), lambda: scene.add("s", h.UserForce(i, force=[other * x, 0, 0])),
+                     lambda: scene.add("s", h.RotationalMotion(i, j, lambda t: other * t)), lambda: scene.add("s", h.RotationalMotion(i, j, other * h.time())),
+                     lambda: scene.add("s", lambda: h.SpringDamper(i, j, stiffness=other)),
+                     lambda: scene.ground_acceleration(x=lambda t: other * t), lambda: scene.set_gravity((0, 0, -other)),
+                     lambda: rod.marker((other, 0, 0)), lambda: rod.marker(axes=[[other, 0, 0], [0, 1, 0], [0, 0, 1]]),
+                     lambda: scene.variable("V", other * x), lambda: scene.state("X", lambda own: -other * own, 1.), lambda: scene.channel("c", other * x),
+                     lambda: run.event(x - other), lambda: run.snapshot().value(other * h.time())):
+            with self.assertRaisesRegex((ValueError, RuntimeError), "parameter k is of another scene"):
+                call()
+                scene.set_up()
+        own = h.Scene()
+        k = own.parameter("k", 3.)
+        k.set(4.)
+        own.add("b", h.RigidBody(mass=k))
+        own.set_up()
+
+    def test_laws_of_more_than_their_arguments(self):
+        scene, rod, pin = pendulum()
+        i, j = rod.marker(), scene.ground.marker()
+        V = scene.variable("V", 1.)
+        for law in (lambda l, v: -l * h.time(), lambda l, v: -l * h.value(V), lambda l, v: h.velocity(i, 0)):
+            with self.assertRaisesRegex(TypeError, "NonlinearSpring s: tension: a force law depends on its two arguments.*UserScalarForce"):
+                scene.add("s", h.NonlinearSpring(i, j, law))
+        for motion in (lambda t: h.sin(h.time()), lambda t: t * h.value(V)):
+            with self.assertRaisesRegex(TypeError, "RotationalMotion m: function: a function of time depends on its argument.*use the argument"):
+                scene.add("m", h.RotationalMotion(i, j, motion))
+        with self.assertRaisesRegex(TypeError, "a function of time depends on"):
+            scene.ground_acceleration(x=lambda t: h.time())
+
+
 class Runs(unittest.TestCase):
     def test_pendulum(self):
         """Energy, channels, sampling, statistics, the closed form of small swings"""
@@ -286,7 +368,7 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(float(p(h.sqrt(a * a))), 0.3 + 0.6 * 0.3 + 3 * 0.09)
         with self.assertRaisesRegex(TypeError, "points of a spline are numbers"):
             h.spline([0, 1], [a, 2])
-        with self.assertRaisesRegex(TypeError, "initial value must be a number"):
+        with self.assertRaisesRegex(TypeError, "initial value is .*must be a number"):
             scene.state("x", 1., a)
 
     def test_parameters(self):

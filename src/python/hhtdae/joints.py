@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Callable, Sequence, Union
 
 from .expressions import Expression, TimeFunction
-from .spec import Formula, Number, Spec, _Joint, _expressions, _spec, plain
+from .spec import Formula, Number, Spec, Vector, _Joint, _expressions, _spec, plain
 from .tracing import time_function
 
 __all__ = ["Spherical", "Revolute", "Universal", "ConstantVelocity", "Translational", "Cylindrical", "Planar", "Fixed", "Screw", "Gear", "RackAndPinion",
@@ -96,8 +96,9 @@ class Coupler(Spec):
     """The sum of two or three terms keeps its value at the start."""
     terms: Sequence[Term]
 
-    def _described(self):
-        return any(t._described() for t in self.terms)
+    def _described(self, scene, who):
+        self._check(who)
+        return any([t._described(scene, "%s: term %d" % (who, k)) for k, t in enumerate(self.terms)])
 
     def _fields(self, converted):
         return {"terms": [t._fields({}) for t in self.terms]}
@@ -155,7 +156,7 @@ class PointOnCurve(_Joint):
 
     points : (n, 3)
     closed : bool"""
-    points: Any
+    points: Sequence[Vector]
     closed: bool = False
 
     def _fields(self, converted):

@@ -3,6 +3,8 @@
 Components are 0, 1, 2 or "x", "y", "z" of the marker `frame`; without one, of space axes.
 """
 
+import numpy as np
+
 from .expressions import Expression
 
 __all__ = ["Measure", "acceleration", "angle", "angular_acceleration", "angular_velocity", "displacement", "distance", "element_force", "element_moment",
@@ -15,7 +17,7 @@ class Measure(Expression):
     __slots__ = ()
 
     def __init__(self, kind, i=None, j=None, frame=None, component=0, target=None):
-        super().__init__("measure", (), (kind, i, j, frame, _component(component), target))
+        super().__init__("measure", (), (kind, i, j, frame, component, target))
 
     def key(self):
         return tuple((x._number, x._id) if hasattr(x, "_id") else x for x in self.value)
@@ -31,13 +33,18 @@ def _target(x, *kinds):
 
 
 def _component(c):
-    if c in (0, 1, 2):
-        return c
-    if isinstance(c, str) and c in "xyz" and len(c) == 1:
-        return "xyz".index(c)
-    if isinstance(c, int) and c >= 0:
-        return c
+    for k, name in enumerate("xyz"):
+        if isinstance(c, (int, np.integer, str)) and c in (k, name):
+            return k
     raise ValueError("component is %r, must be 0, 1, 2 or 'x', 'y', 'z'" % (c,))
+
+
+def _row(k, name):
+    if isinstance(k, str) and k in ("x", "y", "z"):
+        return "xyz".index(k)
+    if not isinstance(k, (int, np.integer)) or not 0 <= k < 2**31:
+        raise ValueError("%s is %r, must be a whole number from 0 on" % (name, k))
+    return int(k)
 
 
 def time():
@@ -47,7 +54,7 @@ def time():
 
 def displacement(i, component, j=None, frame=None):
     """Component of the position of marker i from marker j (default: the space origin), length."""
-    return Measure("displacement", i, j, frame, component)
+    return Measure("displacement", i, j, frame, _component(component))
 
 
 def distance(i, j):
@@ -57,7 +64,7 @@ def distance(i, j):
 
 def velocity(i, component, j=None, frame=None):
     """Component of the velocity of marker i relative to j, the time derivative taken in space."""
-    return Measure("velocity", i, j, frame, component)
+    return Measure("velocity", i, j, frame, _component(component))
 
 
 def rate(i, j):
@@ -67,7 +74,7 @@ def rate(i, j):
 
 def acceleration(i, component, j=None, frame=None):
     """Component of the acceleration of marker i relative to j."""
-    return Measure("acceleration", i, j, frame, component)
+    return Measure("acceleration", i, j, frame, _component(component))
 
 
 def angle(i, j):
@@ -77,42 +84,42 @@ def angle(i, j):
 
 def angular_velocity(i, component, j=None, frame=None):
     """Component of the angular velocity of marker i relative to j, radians per unit of time."""
-    return Measure("angular_velocity", i, j, frame, component)
+    return Measure("angular_velocity", i, j, frame, _component(component))
 
 
 def angular_acceleration(i, component, j=None, frame=None):
     """Component of the angular acceleration of marker i relative to j."""
-    return Measure("angular_acceleration", i, j, frame, component)
+    return Measure("angular_acceleration", i, j, frame, _component(component))
 
 
 def multiplier(joint, row):
     """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment."""
-    return Measure("multiplier", component=row, target=_target(joint, "element"))
+    return Measure("multiplier", component=_row(row, "row"), target=_target(joint, "element"))
 
 
 def joint_force(joint, component, frame=None):
     """Force of a joint or motion on the body of its marker i, in `frame` (default: its marker j)."""
-    return Measure("joint_force", frame=frame, component=component, target=_target(joint, "element"))
+    return Measure("joint_force", frame=frame, component=_component(component), target=_target(joint, "element"))
 
 
 def joint_moment(joint, component, frame=None):
     """Moment of a joint or motion on the body of its marker i, about that marker's origin, in `frame` (default: its marker j)."""
-    return Measure("joint_moment", frame=frame, component=component, target=_target(joint, "element"))
+    return Measure("joint_moment", frame=frame, component=_component(component), target=_target(joint, "element"))
 
 
 def force(element, component=0):
     """Component of a force element as its class says: tension, moment, force in some axes."""
-    return Measure("force", component=component, target=_target(element, "element"))
+    return Measure("force", component=_row(component, "component"), target=_target(element, "element"))
 
 
 def element_force(element, on, component, frame=None):
     """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone."""
-    return Measure("element_force", on, None, frame, component, _target(element, "element"))
+    return Measure("element_force", on, None, frame, _component(component), _target(element, "element"))
 
 
 def element_moment(element, on, component, frame=None):
     """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone."""
-    return Measure("element_moment", on, None, frame, component, _target(element, "element"))
+    return Measure("element_moment", on, None, frame, _component(component), _target(element, "element"))
 
 
 def value(x):
@@ -122,7 +129,7 @@ def value(x):
 
 def modal(body, mode):
     """Modal coordinate of a flexible body, modes from 0 on."""
-    return Measure("modal", component=mode, target=_target(body, "body"))
+    return Measure("modal", component=_row(mode, "mode"), target=_target(body, "body"))
 
 
 def kinetic_energy():

@@ -8,6 +8,7 @@ import numpy as np
 from . import _core
 from .expressions import _expression
 from .measures import Measure
+from .spec import check_parameters, number
 from .tracing import compile_tape, ordered
 
 __all__ = ["BodyPart", "Excitation", "Linearization", "Load", "Mode", "Motion", "Snapshot", "StateSpace"]
@@ -61,7 +62,7 @@ class Snapshot:
 
     def take(self, time=None):
         """Takes another time (default: the end of the last step)."""
-        self._core.take(self._run._open(), time)
+        self._core.take(self._run._open(), None if time is None else number(time, "time"))
         return self
 
     @property
@@ -104,6 +105,7 @@ class Snapshot:
             return values[0]
         keep = []
         tape = compile_tape([x], {key: k for k, key in enumerate(leaves)}, keep, len(leaves))
+        check_parameters(keep, self._run.scene, "value()")
         return float(tape(np.array(values, dtype=float))[0])
 
     def energy(self):
@@ -173,7 +175,7 @@ class Linearization:
 
     def __init__(self, run, time=None):
         self._core = _core.Linearization()
-        self._core.take(run._open(), time)
+        self._core.take(run._open(), None if time is None else number(time, "time"))
 
     def modes(self, count=None, shift=1.):
         """Natural modes, a list of `Mode` by increasing abs(value): all by dense algebra, for scenes of up to 1000 unknowns; or the `count` slowest by

@@ -16,6 +16,8 @@ from .events import Signs
 from .expressions import _expression
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
+from .spec import check_parameters, number
+from .tracing import ordered
 
 __all__ = ["Run"]
 
@@ -76,16 +78,16 @@ class Run(Channels):
         self.scene, self.ts, self._recorder, self._left = scene, None, None, None
         self._signature = list(scene._channels)
         self._page = _PageFile(scene, page)
-        if sample is not None and not sample >= 0:
+        if sample is not None and not number(sample, "sample") >= 0:
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
         if tolerance is not None:
             tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
         self._ended = False  # by a terminal event in the last solve()
         self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
+        self._solving = False  # while solve() is under way: what it calls back must neither solve nor close the run
         collect_garbage(scene.comm)
         with temporary_options(self._options) as self._unused:
-        self._solving = False  # while solve() is under way: what it calls back must neither solve nor close the run
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
             self.ts.setAttr("hhtdae", scene._keep)
             if tolerance is not None:
@@ -103,16 +105,17 @@ class Run(Channels):
             raise ValueError("the run has been closed")
         return self.ts
 
-    def solve(self, until: float) -> "Run":
-        """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
     def _not_solving(self, call):
         if self._solving:
             raise RuntimeError("%s(): the run is being solved, and is at t = %g; events, on_step() and callbacks cannot do this to it: do it after solve(), or "
                                "between the parts of step_by()" % (call, self.time))
 
-        ts = self._open()
-        if not until >= ts.getTime():
+    def solve(self, until: float) -> "Run":
+        """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
         self._not_solving("solve")
+        ts = self._open()
+        until = number(until, "solve(): until")
+        if not until >= ts.getTime():
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
         if until == ts.getTime():
             return self
@@ -144,7 +147,7 @@ class Run(Channels):
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
         """
-        begin, dt = self._open().getTime(), positive(dt, "dt")
+        begin, dt, until = self._open().getTime(), positive(dt, "dt"), number(until, "step_by(): until")
         if not begin <= until < np.inf:
             raise ValueError("the run is at t = %g and cannot go to %r in parts" % (begin, until))
         self._page.span = until - begin
@@ -176,7 +179,9 @@ class Run(Channels):
             raise ValueError("event(): direction is %r, must be 0, 1 or -1" % (direction,))
         if action is not None and not callable(action):
             raise TypeError("event(): action is %r, must be a function of the run" % (action,))
-        self._events.append((_expression(formula), action, terminal))
+        formula = _expression(formula)
+        check_parameters(ordered([formula]), self.scene, "event()")
+        self._events.append((formula, action, terminal))
         self._signs = Signs((self._signs.directions if self._signs else []) + [direction])
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
@@ -196,12 +201,12 @@ class Run(Channels):
 
     def _solve_with_events(self):
         while True:
+            ts = self._open()  # an action may have destroyed it
             self._passed = []
             self._serial += 1
             self.scene._core.solve(ts)
             if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
-            ts = self._open()  # an action may have destroyed it
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
             if not PETSc.Options().hasName("ts_hhtdae_start"):
@@ -231,21 +236,24 @@ class Run(Channels):
                 function(self)
         self._open().setMonitor(monitor)
 
+    def _at(self, time):
+        return self.time if time is None else number(time, "time")
+
     # ---- analyses of a run that has not begun ----
 
     def equilibrium(self, time: Any = None) -> "Run":
         """Moves the run to static equilibrium at a time, at rest; returns the run. Collective."""
-        _core.static_equilibrium(self._open(), self.time if time is None else time)
+        _core.static_equilibrium(self._open(), self._at(time))
         return self
 
     def assemble(self, time: Any = None) -> "Run":
         """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run."""
-        _core.assemble_at(self._open(), self.time if time is None else time)
+        _core.assemble_at(self._open(), self._at(time))
         return self
 
     def kinematics(self, time: Any = None) -> "Run":
         """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run."""
-        _core.kinematics(self._open(), self.time if time is None else time)
+        _core.kinematics(self._open(), self._at(time))
         return self
 
     # ---- results ----
@@ -278,7 +286,7 @@ class Run(Channels):
 
     def sample(self, time: Any = None) -> Dict[str, float]:
         """Values of all channels at a time of the last step (default: its end), by name."""
-        x = self.scene._core.sample(self._open(), self.time if time is None else time)
+        x = self.scene._core.sample(self._open(), self._at(time))
         return dict(zip([name for name, _ in self._signature], x))
 
     @property

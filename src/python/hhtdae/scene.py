@@ -12,7 +12,7 @@ from .expressions import Expression, Parameter
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
-from .spec import Formula, Spec, has_formula, plain
+from .spec import Formula, Spec, check_parameters, has_formula, number, plain
 from .tracing import time_function
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
@@ -103,11 +103,6 @@ class State(_Handle):
     _kind = "state"
 
 
-def _number(initial, who):
-    if isinstance(initial, Expression):
-        raise TypeError("%s: its initial value must be a number, not a formula" % who)
-
-
 class Scene:
     """A multibody scene: bodies, markers, joints, motions, forces.
 
@@ -167,23 +162,27 @@ class Scene:
         if self._begun:
             raise ValueError("parameter %s came too late: parameters are made before everything else but gravity" % name)
         self._edits += 1
-        self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, float(value)))
+        self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, number(value, "parameter " + name)))
         return p
 
     def set(self, **values: float) -> None:
         """Gives parameters other values, for runs made from now on; runs that were made before keep what they had. Collective."""
         for name, value in values.items():
-            self._core.set(name, float(value))
+            self._core.set(name, number(value, "parameter " + name))
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
+        described = has_formula(acceleration, self, "gravity")
         self._edits += 1
-        self._core.gravity(self._later(lambda: plain(acceleration)) if has_formula(acceleration) else acceleration)
+        self._core.gravity(self._later(lambda: plain(acceleration)) if described else acceleration)
 
     def ground_acceleration(self, x=0., y=0., z=0.) -> None:
         """Base excitation: the ground's acceleration along the space axes, functions of time. All coordinates are relative to the ground."""
+        keep = []
+        functions = [time_function(f, keep) for f in (x, y, z)]
+        self._keeps(keep, "ground_acceleration()")
         self._describe()
-        self._core.ground_acceleration(*(time_function(f, self._keep) for f in (x, y, z)))
+        self._core.ground_acceleration(*functions)
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
         """Adds a body, joint, motion or force.
@@ -200,9 +199,11 @@ class Scene:
         -------
         Body or Element
         """
+        if not isinstance(name, str):
+            raise TypeError("Scene.add(): the name is %r, must be a text" % (name,))
         if isinstance(what, Spec):
-            converted = what._convert(self._keep)
-            given = self._later(lambda: what._fields(converted)) if what._described() else what._fields(converted)
+            described, converted = self._converted(what, name)
+            given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
             return self._enter(name, type(what), given)
         if not callable(what):
@@ -217,11 +218,25 @@ class Scene:
             return None
         if type(what) is not kind:
             raise TypeError("%s must be a %s again, is %r" % (name, kind.__name__, what))
+        return what._fields(self._converted(what, name)[1])
+
+    def _converted(self, what, name):
+        """Whether it depends on parameters, and its functions"""
+        keep, who = [], "%s %s" % (type(what).__name__, name)
+        described, converted = what._described(self, who), what._convert(keep, who)
+        self._keeps(keep, who)
+        return described, converted
+
+    def _keeps(self, keep, who):
+        """Keeps what formulas refer to"""
+        check_parameters(keep, self, who)
+        self._keep.extend(keep)
+
+    def _formula(self, x, who):
         keep = []
-        converted = what._convert(keep)
-        if keep:
-            self._keep.append(keep)
-        return what._fields(converted)
+        given = description(x, keep)
+        self._keeps(keep, who)
+        return given
 
     def _enter(self, name, kind, given):
         self._describe()
@@ -240,8 +255,9 @@ class Scene:
     def _marker(self, body, position, axes, name, at):
         self._describe()
         place = lambda: (plain(position), np.eye(3) if axes is None else plain(axes))
-        given = self._later(place) if has_formula(position) or has_formula(axes) else place()
-        return Marker(self, self._core.marker(body, given, name, at), name or "on " + body.name)
+        who = "marker %s" % (name or "on " + body.name)
+        described = [has_formula(position, self, who + ": position"), has_formula(axes, self, who + ": axes")]
+        return Marker(self, self._core.marker(body, self._later(place) if any(described) else place(), name, at), name or "on " + body.name)
 
     def rigid_body(self, name: str, **fields: Any) -> Body:
         """The same as ``add(name, RigidBody(**fields))``."""
@@ -261,25 +277,25 @@ class Scene:
 
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula."""
-        _number(initial, "variable " + name)
+        initial = number(initial, "variable %s: its initial value" % name)
         self._describe()
-        return Variable(self, self._core.variable(name, description(definition, self._keep), initial), name)
+        return Variable(self, self._core.variable(name, self._formula(definition, "variable " + name), initial), name)
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
-        _number(initial, "state " + name)
+        initial = number(initial, "state %s: its initial value" % name)
         self._describe()
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
-        state = State(self, self._core.state(name, description(rate, self._keep), initial), name)
+        state = State(self, self._core.state(name, self._formula(rate, "state " + name), initial), name)
         self._states += 1
         return state
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
         self._describe()
-        self._core.channel(name, description(value, self._keep), unit)
+        self._core.channel(name, self._formula(value, "channel " + name), unit)
         self._channels.append((name, unit))
 
     def line(self, *markers: Marker) -> None:

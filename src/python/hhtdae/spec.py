@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import numbers
 import sys
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Callable, Sequence, Union
 
 import numpy as np
 
-from .expressions import Expression
+from .expressions import Expression, Parameter
 from .measures import description
-from .tracing import compile_tape, trace
+from .tracing import compile_tape, ordered, trace
 
 Number = Union[float, Expression]
 Vector = Sequence[float]
@@ -22,13 +23,40 @@ def _zero():
     return field(default=(0., 0., 0.))
 
 
-def has_formula(x):
-    """Whether a number, or one of an array, is a formula"""
+def number(x, name):
+    """A number as a float"""
+    if isinstance(x, np.ndarray) and x.ndim == 0:
+        x = x[()]
+    if not isinstance(x, numbers.Real):
+        raise TypeError("%s is %r, must be a number" % (name, x))
+    return float(x)
+
+
+def formulas(x):
+    """A number, and those of an array, that are formulas"""
     if isinstance(x, Expression):
-        return True
+        return [x]
     if isinstance(x, (tuple, list)):
-        return any(has_formula(y) for y in x)
-    return isinstance(x, np.ndarray) and x.dtype == object and any(has_formula(y) for y in x.flat)
+        return [f for y in x for f in formulas(y)]
+    return [y for y in x.flat if isinstance(y, Expression)] if isinstance(x, np.ndarray) and x.dtype == object else []
+
+
+def check_parameters(nodes, scene, who):
+    """Parameters are the scene's own: it would never hear of other values of another one's"""
+    for p in nodes:
+        if isinstance(p, Parameter) and p._scene is not scene:
+            raise ValueError("%s: parameter %s is of another scene; use one that parameter() of this scene has made" % (who, p.name))
+
+
+def has_formula(x, scene, who):
+    """Whether a number of the description, or one of an array, is a formula: one of the scene's parameters"""
+    found = formulas(x)
+    nodes = ordered(found)
+    if any(n.op in ("measure", "argument", "function") for n in nodes):
+        raise TypeError("%s is a formula of the state or of time, must be a number or a formula of parameters alone; what depends on the state is described by "
+                        "UserForce, UserScalarForce, NonlinearSpring or UserConstraint" % who)
+    check_parameters(nodes, scene, who)
+    return bool(found)
 
 
 def plain(x):
@@ -43,7 +71,11 @@ def plain(x):
 
 
 def _law(f, keep):
-    return compile_tape([trace(f, 2, "a force law")], {}, keep, 2)
+    y = trace(f, 2, "a force law")
+    if any(n.op == "measure" for n in ordered([y])):
+        raise TypeError("a force law depends on its two arguments and on parameters alone, not on time or measures: use UserScalarForce with a formula of "
+                        "these, hhtdae.distance(i, j) and hhtdae.rate(i, j), or hhtdae.angle(i, j)")
+    return compile_tape([y], {}, keep, 2)
 
 
 class Spec:
@@ -51,21 +83,31 @@ class Spec:
 
     _functions = {}  # fields that are functions: how they are converted
 
-    def _convert(self, keep):
+    def _convert(self, keep, who):
         """The functions, once"""
         converted = {}
         for name, how in self._functions.items():
             x = getattr(self, name)
             if x is not None:
-                converted[name] = how(x, keep)
+                try:
+                    converted[name] = how(x, keep)
+                except TypeError as error:
+                    raise TypeError("%s: %s: %s" % (who, name, error)) from error
         return converted
 
     def _numbers(self):
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self._functions}
 
-    def _described(self):
+    def _check(self, who):
+        """None is a value of fields alone that have it as a default, and of markers, about which the library complains"""
+        for f in fields(self):
+            if getattr(self, f.name) is None and f.default is not None and f.type not in (Any, "Any"):
+                raise TypeError("%s: %s is None, must be a value%s" % (who, f.name, "" if f.default is MISSING and f.default_factory is MISSING else "; leave it out for its default"))
+
+    def _described(self, scene, who):
         """Whether it depends on parameters"""
-        return any(has_formula(x) or (isinstance(x, Spec) and x._described()) for x in self._numbers().values())
+        self._check(who)
+        return any([x._described(scene, "%s: %s" % (who, name)) if isinstance(x, Spec) else has_formula(x, scene, "%s: %s" % (who, name)) for name, x in self._numbers().items()])
 
     def _fields(self, converted):
         out = dict(converted)

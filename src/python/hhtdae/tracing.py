@@ -51,6 +51,7 @@ def compile_tape(roots, leaves, keep, arguments=None):
             op, c = "argument", leaves[n.key()]
         elif op == "parameter":
             c, _ = len(parameters), parameters.append(n.value)
+            keep.append(n)
         elif op in ("table", "table_rate"):
             c, _ = len(tables), tables.append(n.value._core)
             keep.append(n.value)
@@ -70,6 +71,9 @@ def time_function(x, keep):
         return x._core
     if callable(x) and not isinstance(x, Expression):
         y = trace(x, 1, "a function of time")
+        if any(n.op == "measure" for n in ordered([y])):
+            raise TypeError("a function of time depends on its argument, which is the time, and on parameters alone, not on hhtdae.time() or other measures: "
+                            "use the argument, or a UserConstraint with a formula of the measures")
         return compile_tape([y], {}, keep, 1).time_function()
     x = _expression(x)
     leaves = {n.key(): n for n in ordered([x]) if n.op == "measure"}
