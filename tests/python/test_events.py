@@ -94,6 +94,109 @@ class Bounces(unittest.TestCase):
         np.testing.assert_allclose(tops, [fall * 1.8], atol=1e-5)
 
 
+def swing():
+    """A pendulum of 1 m, thrown from the bottom with 6.5 m/s: the tension v^2 + g cos(th) of its rod falls through zero at 0.507258 s"""
+    scene = h.Scene(gravity=(0, -G, 0))
+    b = scene.add("b", h.RigidBody(mass=1, inertia=(1e-3,) * 3, position=(0, -1, 0), velocity=(6.5, 0, 0), angular_velocity=(0, 0, 6.5)))
+    m = b.marker((0, 1, 0))
+    return scene, h.joint_force(scene.add("p", h.Revolute(m, scene.ground.marker())), 1, frame=m)
+
+
+class Reactions(unittest.TestCase):
+    """Reactions and accelerations jump a little where an event begins the integrator's history anew"""
+
+    def test_once_each(self):
+        scene, T = swing()
+        scene.channel("T", T)
+        fine = scene.solve(3., tolerance=1e-8)
+        passed = np.flatnonzero(np.diff(np.sign(fine["T"])))
+        self.assertGreaterEqual(len(passed), 4)
+        for tolerance in (1e-4, 1e-5, 1e-6, 1e-7):
+            for direction in (0, -1, 1):
+                run, seen = scene.run(tolerance=tolerance), []
+                run.event(T, lambda r: seen.append(r.time), direction=direction)
+                run.solve(3.)
+                wanted = [fine.times[k] for k in passed if direction * fine["T"][k] <= 0]
+                self.assertEqual(len(seen), len(wanted), (tolerance, direction))
+                np.testing.assert_allclose(seen, wanted, atol=0.02 + 600 * tolerance)
+
+    def test_terminal(self):
+        """A run that goes on after its end there has passed, too"""
+        scene, T = swing()
+        run = scene.run(tolerance=1e-5)
+        run.event(T, terminal=True)
+        run.solve(0.8)
+        self.assertAlmostEqual(run.time, 0.507258, delta=2e-3)
+        run.solve(0.8)
+        self.assertEqual(run.time, 0.8)
+
+    def test_velocities_that_actions_change(self):
+        """Passages of one direction, as close to each other as one likes: a velocity falls through zero, and an action, or somebody between two parts of
+        the run, kicks it up again"""
+        for kick in (1., 1e-2, 1e-4):
+            scene, z, w = ball()
+            run, seen = scene.run(tolerance=1e-6), []
+
+            def up(r):
+                r.ts.getSolution2()[1].setValue(2, kick)
+                r.ts.getSolution2()[1].assemble()
+
+            def action(r):
+                seen.append(r.time)
+                if len(seen) <= 5:
+                    up(r)
+            up(run)
+            run.event(w, action, direction=-1)
+            run.solve(6.5 * kick / G)
+            np.testing.assert_allclose(seen, np.arange(1, 7) * kick / G, rtol=1e-6)
+            run = scene.run(tolerance=1e-6)
+            run.event(w, terminal=True, direction=-1)
+            for k in range(1, 6):
+                up(run)
+                run.solve(run.time + 3 * kick / G)
+                self.assertAlmostEqual(run.time, k * kick / G, delta=1e-6 * k * kick / G)
+
+    def test_parameters_that_actions_change(self):
+        """An acceleration falls with time, and a parameter raises it"""
+        for more in (1e-1, 1e-3, 1e-5):
+            scene = h.Scene()
+            p = scene.parameter("p", 0.2)
+            m = scene.add("b", h.PointMass()).marker()
+            scene.add("f", h.UserForce(m, force=[p - h.time(), 0, 0]))
+            run, seen = scene.run(tolerance=1e-6), []
+
+            def action(r):
+                seen.append(r.time)
+                p.set(p.get() + more)
+            run.event(h.acceleration(m, 0), action, direction=-1)
+            run.solve(0.2 + 5.5 * more)
+            np.testing.assert_allclose(seen, 0.2 + np.arange(6) * more, rtol=0, atol=1e-6 * more + 1e-12)
+
+    def test_there_and_back(self):
+        """A function that is on the other side for a moment only, again and again"""
+        for depth in (1e-1, 1e-2, 1e-3):
+            scene = h.Scene()
+            m = scene.add("b", h.PointMass(position=(1, 0, 0))).marker()
+            scene.add("f", h.UserForce(m, force=[-100 * h.displacement(m, 0), 0, 0]))
+            run, seen = scene.run(tolerance=1e-8), []
+            run.event(1 - depth - h.acceleration(m, 0) / 100, lambda r: seen.append(r.time))
+            run.solve(3.)
+            half, middles = math.acos(1 - depth) / 10, math.pi / 10 * np.arange(1, 10, 2)
+            np.testing.assert_allclose(seen, np.sort(np.r_[middles - half, middles + half]), rtol=0, atol=2e-3)
+
+    def test_event_made_by_an_event(self):
+        """A further event of a run does not make those before it forget"""
+        scene, T = swing()
+        run, seen = scene.run(tolerance=1e-5), []
+
+        def action(r):
+            seen.append(r.time)
+            r.event(h.time() - 10.)
+        run.event(T, action, direction=-1)
+        run.solve(0.8)
+        self.assertEqual(len(seen), 1)
+
+
 class Outputs(unittest.TestCase):
     def test_nothing_that_was_taken_back(self):
         """CSV, balance, animation, on_step and samples end at an event and go on behind it"""

@@ -82,7 +82,8 @@ class Run(Channels):
             raise ValueError("sample is %r, must be the time between samples, 0 for the end of every step, or None" % (sample,))
         if tolerance is not None:
             tolerance = positive(tolerance, "tolerance")
-        self._options, self._events, self._signs, self._passed = dict(options or {}), [], None, []
+        self._options, self._events, self._signs, self._passed = dict(options or {}), [], Signs(), []
+        self._before, self._numbers = None, None  # state, and parameters, at the last event before its actions
         self._ended = False  # by a terminal event in the last solve()
         self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
         self._solving = False  # while solve() is under way: what it calls back must neither solve nor close the run
@@ -169,7 +170,8 @@ class Run(Channels):
         formula : Expression
             A measure, or a formula of measures.
         action : callable, optional
-            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``.
+            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes what a callback
+            does, it has to call `restart`.
         terminal : bool
             The run ends there.
         direction : {0, 1, -1}
@@ -182,7 +184,7 @@ class Run(Channels):
         formula = _expression(formula)
         check_parameters(ordered([formula]), self.scene, "event()")
         self._events.append((formula, action, terminal))
-        self._signs = Signs((self._signs.directions if self._signs else []) + [direction])
+        self._signs.add(direction)
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
             self._open().setPostStep(self._look)
@@ -199,9 +201,25 @@ class Run(Channels):
             integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
+    def _note_state(self):
+        state = self._open().getSolution2()
+        if self._before is None:
+            self._before = [x.duplicate() for x in state]
+        for x, y in zip(state, self._before):
+            x.copy(y)
+        self._numbers = [p.get() for p in self.scene._parameters.values()]
+
+    def _changed(self):
+        """Whether the state or a parameter is not what it was at the last event"""
+        if self._numbers is None or self._numbers != [p.get() for p in self.scene._parameters.values()]:
+            return True
+        return not all([x.equal(y) for x, y in zip(self._open().getSolution2(), self._before)])
+
     def _solve_with_events(self):
         while True:
             ts = self._open()  # an action may have destroyed it
+            if self._changed():
+                self._signs.changed()
             self._passed = []
             self._serial += 1
             self.scene._core.solve(ts)
@@ -209,6 +227,7 @@ class Run(Channels):
                 return
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
+            self._note_state()
             if not PETSc.Options().hasName("ts_hhtdae_start"):
                 integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
             for k in here:
@@ -223,6 +242,7 @@ class Run(Channels):
 
     def restart(self) -> None:
         """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
+        self._numbers = None
         self._open().restartStep()
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
