@@ -110,6 +110,44 @@ class Arguments(unittest.TestCase):
         self.assertAlmostEqual(s.q[0, 0], 1.)
         self.assertAlmostEqual(s.q[0, -1], math.cos(1), delta=1e-3)
 
+    def test_functions_that_return_the_same_array(self):
+        """An array that a function fills at every call has other numbers the next time"""
+        r, phi, psi, G1, K = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 2)), np.zeros((1, 1))
+
+        def spring(t, q, v, a):
+            np.add(a, q, out=r)
+            return r
+
+        def rod(t, q):
+            phi[0] = q[0]**2 + q[1]**2 - 1
+            return phi
+
+        def rod_gradient(t, q):
+            G1[0] = 2 * q
+            return G1
+
+        def blade(t, q, v):
+            psi[0] = v[0] * np.sin(q[2]) - v[1] * np.cos(q[2])
+            return psi
+
+        def matrices(t, q, v, a):
+            K[0, 0] = 1.
+            return K, 0 * K, K
+        for jacobian in (None, matrices):
+            s = h.solve_mechanism(spring, (0, 1), [1.], [0.], jacobian=jacobian)
+            self.assertAlmostEqual(s.q[0, -1], math.cos(1), delta=1e-3)
+        plain = stone(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1]).q[:, -1]
+        for gradient in (None, rod_gradient):
+            np.testing.assert_allclose(stone(constraints=rod, constraint_jacobian=gradient).q[:, -1], plain, atol=1e-4)
+        s = h.solve_mechanism(lambda t, q, v, a: [a[0], a[1], a[2]], (0, 1), [0, 0, 0], [1, 0, 0.5], velocity_constraints=blade)
+        np.testing.assert_allclose(s.q[:, -1], [2 * math.sin(0.5), 2 * (1 - math.cos(0.5)), 0.5], atol=1e-3)
+
+    def test_rows_of_messages(self):
+        """Rows that depend on one another are named as those of the user's function"""
+        rod = lambda t, q: q[0]**2 + q[1]**2 - 1
+        with self.assertRaisesRegex(h.Error, r"in rows 0 of constraints\(\), 1 of constraints\(\) depend on one another"):
+            stone(constraints=lambda t, q: [rod(t, q), 2 * rod(t, q)])
+
     def test_constraint_jacobian(self):
         rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1])
         self.assertTrue(stone(constraint_jacobian=lambda t, q: [2 * q], **rod).success)

@@ -176,7 +176,7 @@ class _Problem:
         if np.iscomplexobj(x):
             raise ValueError("%s is complex, must be real" % what)
         try:
-            x = np.asarray(x, dtype=float)
+            x = np.array(x, dtype=float)  # a copy: the function may write into the same array again
         except (TypeError, ValueError) as error:
             raise ValueError("%s must be numbers, is %r: %s" % (what, x, error)) from error
         plain = lambda s: tuple(k for k in s if k != 1)  # (n, 1) and (1, n) are as good as (n,)
