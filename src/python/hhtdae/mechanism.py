@@ -1,5 +1,7 @@
 """Equations of motion that one has written oneself, solved by one call in the manner of scipy.integrate.solve_ivp."""
 
+import re
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -100,7 +102,9 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         consist of operators, numpy's elementary functions, array products and `hhtdae.where`, and depend on their arguments alone. Functions
         that cannot be traced raise TypeError.
     start : {"project", "report", "off"}
-        About initial values that violate the constraints: moved to the nearest consistent ones; an error; nothing.
+        About initial values that violate the constraints: "project" moves them to the nearest consistent ones; "report" prints how far away these are, and
+        begins with those given, as "off" does without a word. Rows in what is printed are those of the residual, behind them those of the constraints. A run
+        from positions that violate them fails as a rule.
     options : dict, optional
         PETSc's options without the dash; those of the command line win.
 
@@ -227,6 +231,17 @@ class _Problem:
             row, column = np.unravel_index(np.argmax(np.where(np.isfinite(error), error, np.inf)), error.shape)
             raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
                              % (self.t0, row, column, given[row, column], found[row, column]))
+
+    def own_rows(self, message):
+        """Rows of the whole system in a message, as those of the user's functions"""
+        def own(match):
+            row = int(match.group())
+            for name, size in (("residual()", self.n), ("constraints()", self.m), ("velocity_constraints()", self.k)):
+                if row < size:
+                    return "%d of %s" % (row, name)
+                row -= size
+            return match.group()
+        return re.sub(r"\brows? \d+(, \d+)*(?!\d|, \d| of)", lambda rows: re.sub(r"\d+", own, rows.group()), message)
 
     def massless(self):
         """A remark about accelerations that the residual does not know at the begin, for messages"""
@@ -368,8 +383,8 @@ def _solve(ts, p, output):
             raise error.__cause__
         lines = [line.split("] ", 1)[-1] for line in str(error).splitlines()]
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
-            raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
-        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
+            raise Error(error.ierr, p.own_rows(lines[-1]) + p.massless(), lines[1:-1]) from None
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), p.own_rows(lines[-1]))
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:
