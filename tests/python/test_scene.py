@@ -512,6 +512,17 @@ class Questions(unittest.TestCase):
         p = math.atan2(axes[1, 0], axes[0, 0])
         self.assertAlmostEqual(-30. * p, 2 * 9.81 * 0.5 * math.cos(p), delta=1e-8)
 
+    def test_inconsistent_start(self):
+        """The message says what to call; with it analyses find the velocities that the motion asks for"""
+        scene, rod, pin = pendulum()
+        i = rod.marker((-0.5, 0, 0))
+        scene.add("drive", h.RotationalMotion(i, scene.ground.marker(), lambda t: 3 * t))
+        with self.assertRaisesRegex(h.Error, r"drive: velocities violate it by 3(.|\n)*scene\.start\(assembly=\"project\"\)"):
+            scene.run()
+        scene.start(assembly="project")
+        for analysis in (h.Run.kinematics, h.Run.assemble):
+            self.assertAlmostEqual(analysis(scene.run()).snapshot().motion(i).angular_velocity[2], 3., delta=1e-6)
+
     def test_linearization(self):
         """A mass on a damped spring: mode, frequency response, minimal coordinates, operators"""
         scene = h.Scene()

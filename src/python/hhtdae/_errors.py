@@ -41,4 +41,5 @@ def fail(code, text, specific, cause):
         raise cause
     trace = [line.split("] ", 1)[-1] for line in getattr(PETSc.Error, "_traceback_", [])]
     message = re.sub(r"\s+\Z", "", specific) or text
+    message = message.replace("-scene_assemble project", 'scene.start(assembly="project"), or the option -scene_assemble project')
     raise Error(code, message, trace) from cause

@@ -78,7 +78,11 @@ def acceleration(i, component, j=None, frame=None):
 
 
 def angle(i, j):
-    """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, full turns are counted from there."""
+    """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, full turns are counted from there.
+
+    In space that is so where an element, a variable, a state or a channel reads the angle. A snapshot or an event asks for it while the run goes: the first
+    question gets it in (-pi, pi], and turns are counted from there. Make a channel of an angle that is asked for later.
+    """
     return Measure("angle", i, j)
 
 

@@ -51,7 +51,8 @@ class Snapshot:
     """The state of a run at a time of its last step, made by `Run.snapshot`: answers questions that nobody has asked for beforehand.
 
     Accelerations and multipliers are those that belong to positions and velocities at that time: at no cost at the end of a step, at about that of a
-    factorization in between. All calls are collective.
+    factorization in between. An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
+    counted from there: make a channel of it, see `angle`. All calls are collective.
     """
 
     def __init__(self, run, time=None, later=False):
@@ -171,7 +172,12 @@ class Excitation:
 
 
 class Linearization:
-    """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective."""
+    """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
+
+    x are displacements and small rotations of bodies in space axes, and all other unknowns. M, C and K are those of this moment: modes are motions where the state
+    is at rest, or steady as seen from space, with M, C and K that do not change. An axisymmetric rotor at speed is, a swinging rod is not; nor is a mechanism
+    that is steady as seen from a frame that a motion turns: its eigenvalues are wrong, a bead in a turning hoop vibrates with another frequency.
+    """
 
     def __init__(self, run, time=None):
         self._core = _core.Linearization()

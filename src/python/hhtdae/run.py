@@ -168,7 +168,8 @@ class Run(Channels):
         Parameters
         ----------
         formula : Expression
-            A measure, or a formula of measures.
+            A measure, or a formula of measures. Full turns of an `angle` that no element and no channel reads are counted from this call's time on or later:
+            make a channel of it.
         action : callable, optional
             action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes what a callback
             does, it has to call `restart`.
@@ -262,17 +263,23 @@ class Run(Channels):
     # ---- analyses of a run that has not begun ----
 
     def equilibrium(self, time: Any = None) -> "Run":
-        """Moves the run to static equilibrium at a time, at rest; returns the run. Collective."""
+        """Moves the run to static equilibrium at a time, at rest; returns the run. Initial values that violate constraints need
+        ``scene.start(assembly="project")`` before the run is made. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 
     def assemble(self, time: Any = None) -> "Run":
-        """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run."""
+        """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run. Those of the start have to
+        meet them, or are moved by ``scene.start(assembly="project")`` where the run is made."""
         _core.assemble_at(self._open(), self._at(time))
         return self
 
     def kinematics(self, time: Any = None) -> "Run":
-        """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run."""
+        """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run.
+
+        >>> scene.start(assembly="project")  # velocities that motions ask for need not be given
+        >>> scene.run().kinematics(0.5).snapshot().load(drive, marker)
+        """
         _core.kinematics(self._open(), self._at(time))
         return self
 
@@ -339,7 +346,7 @@ class Run(Channels):
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step, see `Linearization`. Collective."""
+        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from space, see `Linearization`. Collective."""
         return Linearization(self, time)
 
     # ---- the rest ----
