@@ -13,20 +13,21 @@ namespace
 
 using Number = TimeFunction::Number;
 
-/* The value of a table, or its derivative, at x */
-double At(const TimeFunction &f, double x, bool rate)
+/* The value of a table, or its first or second derivative, at x */
+double At(const TimeFunction &f, double x, int derivative)
 {
   const TimeFunction::Value y = f(x);
-  return rate ? y.f1 : y.f;
+  return derivative == 0 ? y.f : derivative == 1 ? y.f1 : y.f2;
 }
-Real At(const TimeFunction &f, const Real &x, bool rate)
+Real At(const TimeFunction &f, const Real &x, int derivative)
 {
+  if (derivative > 1) throw std::runtime_error("the third derivative of a table is not known");
   const TimeFunction::Value y = f(x.value());
-  return rate ? chain(x, y.f1, y.f2) : chain(x, y.f, y.f1);
+  return derivative ? chain(x, y.f1, y.f2) : chain(x, y.f, y.f1);
 }
-Number At(const TimeFunction &f, const Number &x, bool rate)
+Number At(const TimeFunction &f, const Number &x, int derivative)
 {
-  if (rate) throw std::runtime_error("the derivative of a table is no function of time here");
+  if (derivative) throw std::runtime_error("the derivative of a table is no function of time here");
   const TimeFunction::Value y = f(x.value().value());
   return chain(x, chain(x.value(), y.f, y.f1), chain(x.value(), y.f1, y.f2));
 }
@@ -143,8 +144,9 @@ template <class N> void Tape::run(const N *u, std::vector<N> &x) const
     case op_logical_or: x[k] = N(Plain(a) != 0 || Plain(b) != 0 ? 1. : 0.); break;
     case op_logical_not: x[k] = N(Plain(a) == 0 ? 1. : 0.); break;
     case op_where: x[k] = Plain(a) != 0 ? b : x[o.c]; break;
-    case op_table: x[k] = At(tables[o.c], a, false); break;
-    case op_table_rate: x[k] = At(tables[o.c], a, true); break;
+    case op_table: x[k] = At(tables[o.c], a, 0); break;
+    case op_table_rate: x[k] = At(tables[o.c], a, 1); break;
+    case op_table_curvature: x[k] = At(tables[o.c], a, 2); break;
     case op_function: x[k] = Apply(functions[o.c], x); break;
     }
   }

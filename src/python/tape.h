@@ -20,7 +20,7 @@ namespace python
   X(constant, 0) X(argument, 0) X(parameter, 0) X(add, 2) X(subtract, 2) X(multiply, 2) X(divide, 2) X(negate, 1) X(power, 2)            \
   X(sin, 1) X(cos, 1) X(tan, 1) X(asin, 1) X(acos, 1) X(atan, 1) X(atan2, 2) X(sinh, 1) X(cosh, 1) X(tanh, 1) X(exp, 1) X(log, 1)        \
   X(log10, 1) X(sqrt, 1) X(cbrt, 1) X(hypot, 2) X(abs, 1) X(minimum, 2) X(maximum, 2) X(less, 2) X(less_equal, 2) X(equal, 2)            \
-  X(logical_and, 2) X(logical_or, 2) X(logical_not, 1) X(where, 3) X(table, 1) X(table_rate, 1) X(function, 0)
+  X(logical_and, 2) X(logical_or, 2) X(logical_not, 1) X(where, 3) X(table, 1) X(table_rate, 1) X(table_curvature, 1) X(function, 0)
 
 class Tape
 {

@@ -93,8 +93,38 @@ class Operations(unittest.TestCase):
         used = set()
         for _, f, _ in cases():
             used |= {n.op for n in ordered([trace(f, 2, "f")])}
-        beside = {"parameter", "table_rate"}
+        beside = {"parameter", "table_rate", "table_curvature"}
         self.assertEqual(set(_core.operations) - used - beside, set())
+
+
+class Arrays(unittest.TestCase):
+    def test_of_numbers(self):
+        """Arrays and lists of numbers give arrays of numbers"""
+        for y, expected in ((h.sin([0., 1.]), np.sin([0., 1.])), (h.maximum((1, 5), 3), [3, 5]), (h.hypot(np.array([[3.], [5.]]), [4., 12.]), np.hypot([[3], [5]], [4, 12])),
+                            (h.where(np.array([True, False]), 1., [2., 3.]), [1., 3.]), (h.step([-1, 0.5, 2], 0, 1., 1, 3.), [1, 2, 3]),
+                            (h.step5(np.array([0.5]), 0, 0, 1, 1), [0.5])):
+            self.assertEqual(np.asarray(y).dtype, float)
+            np.testing.assert_allclose(y, expected)
+        for y, expected in ((h.where(True, 1, 2), 1), (h.step(0.5, 0, 0, 1, 1), 0.5), (h.cos(0), 1), (h.sqrt(np.float64(4)), 2)):
+            self.assertIsInstance(y, float)
+            self.assertEqual(y, expected)
+
+    def test_of_formulas(self):
+        solve = lambda f, **k: h.solve_mechanism(lambda t, q, v, a: f(q) + a, (0, 1), [1., -0.5], [0., 0.], **k).q[:, -1]
+        for f, plain in ((lambda q: h.where([x > 0 for x in q], q, 2 * q), lambda q: np.where(q > 0, q, 2 * q)), (lambda q: h.maximum(q, 0.), lambda q: np.maximum(q, 0.)),
+                         (lambda q: h.step(q, -1, 0, [1., 2.], 1), lambda q: np.array([h.step(q[0], -1, 0, 1, 1), h.step(q[1], -1, 0, 2, 1)])),
+                         (lambda q: h.arctan2(1., q + 2), lambda q: np.arctan2(1., q + 2))):
+            np.testing.assert_allclose(solve(f, trace=True), solve(plain), atol=1e-6)
+        for f, word in ((lambda q: np.maximum(q, 0.), r"hhtdae\.maximum\(\)"), (lambda q: np.fabs(q), "hhtdae's functions"), (lambda q: np.arctan2(1., q), "hhtdae's functions")):
+            with self.assertRaisesRegex(TypeError, word):
+                solve(f, trace=True)
+
+    def test_tables_in_constraints(self):
+        """A bead on a curve that is a table; the forces of its constraint have the table's second derivative"""
+        x = np.linspace(-2, 2, 41)
+        curve = h.spline(x, 0.5 * x**2)
+        solve = lambda **k: h.solve_mechanism(lambda t, q, v, a: [a[0], a[1] + 9.81], (0, 1), [1., curve(1.)], [0, 0], constraints=lambda t, q: [q[1] - curve(q[0])], **k)
+        np.testing.assert_allclose(solve(trace=True).q[:, -1], solve().q[:, -1], atol=1e-5)
 
 
 class Mistakes(unittest.TestCase):

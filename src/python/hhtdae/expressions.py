@@ -56,8 +56,8 @@ class Expression:
     def __invert__(self): return _node("logical_not", self)
 
     def __bool__(self):
-        raise TypeError("the value of this formula is known in a run only, 'if', 'and', 'or', min() and max() cannot ask for it: use hhtdae.where(), "
-                        "&, |, minimum() and maximum(), or a hhtdae.callback()")
+        raise TypeError("the value of this formula is known in a run only, 'if', 'and', 'or', min(), max(), numpy's comparisons and functions of arrays cannot ask for it: use "
+                        "hhtdae.where(), &, |, hhtdae.minimum() and hhtdae.maximum(), which take arrays of formulas, or a hhtdae.callback()")
 
     def __float__(self):
         from .tracing import compile_tape, ordered
@@ -267,12 +267,21 @@ for _name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "log10"
     _UFUNCS[_name] = lambda a, _op=_name: _unary(_op, a)
 
 
+def _by_elements(function, *x):
+    """A function of numbers and formulas, or of arrays and lists of them element by element; numbers where all of them are"""
+    x = [np.array(y, dtype=object) if isinstance(y, (list, tuple)) else y for y in x]
+    arrays = [y for y in x if isinstance(y, np.ndarray)]
+    result = _arrays(function, *x) if any(y.ndim for y in arrays) else function(*x)
+    if any(isinstance(z, Expression) for y in x for z in (y.flat if isinstance(y, np.ndarray) else (y,))):
+        return result
+    return result.astype(float) if isinstance(result, np.ndarray) else float(result)
+
+
 def _public(op, text, names=("x",)):
     def function(*x):
         if len(x) != len(names):
             raise TypeError("%s() takes %d arguments" % (function.__name__, len(names)))
-        y = _node(op, *x)
-        return _constant(y) if isinstance(y, Expression) and not any(isinstance(z, Expression) for z in x) else y
+        return _by_elements(lambda *y: _node(op, *y), *x)
     function.__doc__ = text + " of formulas, numbers or arrays of them."
     return function
 
@@ -293,30 +302,31 @@ for _name in ("sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp log l
 
 
 def where(condition, a, b):
-    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated."""
+    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated. Arrays element by element."""
+    return _by_elements(_where, condition, a, b)
+
+
+def _where(condition, a, b):
     if not isinstance(condition, Expression):
         return a if condition else b
     return _node("where", condition, a, b)
 
 
 def _step(x, x0, h0, x1, h1, shape):
-    if not isinstance(x, Expression):
-        x = _expression(x)
-    for p, q in ((x0, x1),):
-        if not isinstance(p, Expression) and not isinstance(q, Expression) and not q > p:
-            raise ValueError("a step from x = %g to x = %g must end after it begins" % (p, q))
-    s = (x - x0) / (x1 - x0)
+    if not isinstance(x0, Expression) and not isinstance(x1, Expression) and not x1 > x0:
+        raise ValueError("a step from x = %g to x = %g must end after it begins" % (x0, x1))
+    s = (_expression(x) - x0) / (x1 - x0)
     return where(s <= 0, h0, where(s >= 1, h1, h0 + (h1 - h0) * shape(s)))
 
 
 def step(x, x0, h0, x1, h1):
     """From h0 where x <= x0 to h1 where x >= x1 by a cubic, as STEP is known; its second derivative jumps at both ends."""
-    return _step(x, x0, h0, x1, h1, lambda s: s * s * (3 - 2 * s))
+    return _by_elements(lambda *y: _step(*y, lambda s: s * s * (3 - 2 * s)), x, x0, h0, x1, h1)
 
 
 def step5(x, x0, h0, x1, h1):
     """From h0 where x <= x0 to h1 where x >= x1 by a quintic, as STEP5 is known: twice continuously differentiable."""
-    return _step(x, x0, h0, x1, h1, lambda s: s * s * s * (10 + s * (6 * s - 15)))
+    return _by_elements(lambda *y: _step(*y, lambda s: s * s * s * (10 + s * (6 * s - 15))), x, x0, h0, x1, h1)
 
 
 def callback(function, *arguments, gradient=None):

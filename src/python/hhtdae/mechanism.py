@@ -343,7 +343,8 @@ def _traced(f, what, *arguments):
         result = f(*arguments)
         return [_expression(x) for x in np.ravel(np.asarray(result, dtype=object))]
     except (TypeError, AttributeError, ValueError) as error:
-        raise TypeError("trace=True: %s cannot be traced: %s" % (what, error)) from error
+        hint = ": of arrays of formulas, use hhtdae's functions" if isinstance(error, AttributeError) or "ufunc" in str(error) else ""
+        raise TypeError("trace=True: %s cannot be traced: %s%s" % (what, error, hint)) from error
 
 
 def _trace(ts, p, keep):

@@ -52,7 +52,7 @@ def compile_tape(roots, leaves, keep, arguments=None):
         elif op == "parameter":
             c, _ = len(parameters), parameters.append(n.value)
             keep.append(n)
-        elif op in ("table", "table_rate"):
+        elif op in ("table", "table_rate", "table_curvature"):
             c, _ = len(tables), tables.append(n.value._core)
             keep.append(n.value)
         elif op == "function":
@@ -110,8 +110,8 @@ def _chain(n, x):
     if op in ("minimum", "maximum"):
         second = _node("less", x[1], a) if op == "minimum" else _node("less", a, x[1])
         return where(second, 0., 1.), where(second, 1., 0.)
-    if op == "table":
-        return (Expression("table_rate", (a,), n.value),)
+    if op in ("table", "table_rate"):
+        return (Expression("table_rate" if op == "table" else "table_curvature", (a,), n.value),)
     rules = {"sin": lambda: cos(a), "cos": lambda: -sin(a), "tan": lambda: 1. + n * n, "asin": lambda: 1. / sqrt(1. - a * a),
              "acos": lambda: -1. / sqrt(1. - a * a), "atan": lambda: 1. / (1. + a * a), "sinh": lambda: cosh(a), "cosh": lambda: sinh(a),
              "tanh": lambda: 1. - n * n, "exp": lambda: n, "log": lambda: 1. / a, "log10": lambda: 0.43429448190325182765 / a,
