@@ -21,7 +21,7 @@ PetscErrorCode again(Simulation &run, const Array &u, const Array &v, double end
     PetscCall(VecAssemblyEnd(x));
   }
   PetscCall(run.solve());
-  PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(0);
 }
 
 const Oscillators &oscillator()

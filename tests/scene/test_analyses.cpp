@@ -188,6 +188,30 @@ TEST(Analyses, ModesAboutAnEquilibrium)
   EXPECT_NEAR(std::abs(modes[0].value), std::sqrt(3 * (5 * std::sqrt(0.5) + 5 * std::sqrt(0.5))), 1e-6);
 }
 
+/* A mode is of its linearization's unknowns */
+TEST(Analyses, ModesOfAnotherLinearization)
+{
+  Lever l;
+  OwnTS run(l.scene);
+  must(StaticEquilibrium(run.ts, 5));
+  Linearization     about;
+  std::vector<Mode> modes;
+  must(about.take(run.ts));
+  must(about.modes(&modes));
+  for (int more : {-1, 1, 100}) {
+    Mode                 foreign = modes.at(0);
+    std::complex<double> x;
+    BodyPart             part;
+    ErrorTrap            trap;
+    foreign.shape.resize(foreign.shape.size() + more);
+    EXPECT_EQ(about.value(foreign, Measure::displacement(l.tip, 0), &x), PETSC_ERR_ARG_WRONG);
+    EXPECT_EQ(about.part(foreign, l.scene.ground(), &part), PETSC_ERR_ARG_WRONG);
+    EXPECT_EQ(about.animate(foreign, "mode", 1), PETSC_ERR_ARG_WRONG);
+    EXPECT_EQ(about.normalize(&foreign), PETSC_ERR_ARG_WRONG);
+    EXPECT_NE(trap.message.find("mode"), std::string::npos);
+  }
+}
+
 namespace
 {
 

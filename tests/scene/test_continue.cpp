@@ -163,3 +163,43 @@ TEST(Continue, SaysWhatCannotBe)
   EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
   EXPECT_TRUE(trap.says("the TS is not of this scene")) << trap.message;
 }
+
+/* What is asked of a run before its first step is what was true at the end of the one that it goes on from: attitudes count from another reference */
+TEST(Continue, SnapshotsBeforeTheFirstStep)
+{
+  Scene     scene(PETSC_COMM_SELF);
+  RigidBody b;
+  b.mass             = 2;
+  b.inertia          = Vector3(.3, .2, .1).asDiagonal();
+  b.position         = {.5, 0, 0};
+  b.velocity         = {0, 2.5, 0};
+  b.angular_velocity = {0, 0, 5};
+  const Body   body  = scene.add("body", b);
+  const Marker tip   = scene.marker(body, {.5, 0, 0});
+  scene.gravity({0, 0, -9.81});
+  const Element joint = scene.add("joint", Spherical{scene.markerAt(body, {0, 0, 0}), scene.marker(scene.ground())});
+  scene.channel("x", Measure::displacement(tip, 0));
+  TS first, next;
+  {
+    Options in(tolerance(1e-6));
+    must(scene.createTS(&first));
+    must(TSSetMaxTime(first, 1));
+    must(TSSetFromOptions(first));
+    must(scene.solve(first));
+    must(scene.createTS(&next, first));
+  }
+  const Motion old = of(first, tip), now = of(next, tip);
+  EXPECT_LT((now.position - old.position).norm(), 1e-9);
+  EXPECT_LT((now.axes - old.axes).norm(), 1e-9);
+  EXPECT_LT((now.acceleration - old.acceleration).norm(), 1e-3 * old.acceleration.norm());
+  Snapshot             s;
+  Load                 load;
+  std::vector<double>  sampled;
+  must(s.take(next));
+  must(s.load(joint, tip, &load));
+  EXPECT_NEAR(load.force.norm(), std::hypot(2 * 9.81, 2 * .5 * 25.), 1.); /* more or less on a circle */
+  must(scene.sample(next, 1, sampled));
+  EXPECT_NEAR(sampled[0], old.position[0], 1e-9);
+  must(TSDestroy(&first));
+  must(TSDestroy(&next));
+}

@@ -230,3 +230,31 @@ TEST(Query, SaysWhatIsWrong)
   refused(now.load(other.pin, m.tip, &l), "not one of this scene");
   refused(now.value(Measure::displacement(other.tip, 0), &y), "marker i is not one of this scene");
 }
+
+/* Forces at the start of a pendulum at its lowest point, described in any units of length and time */
+TEST(Query, Units)
+{
+  for (double length : {1., 1e3, 1e6})
+    for (double time : {1e-3, 1., 1e6}) {
+      Scene        scene(PETSC_COMM_SELF);
+      RigidBody    b;
+      const double L = 5 * length, v = 20 * length / time, g = 9.81 * length / (time * time), want = 2 * (g + v * v / L);
+      b.mass             = 2;
+      b.inertia          = 0.1 * length * length * Matrix3::Identity();
+      b.position         = {0, 0, -L};
+      b.velocity         = {v, 0, 0};
+      b.angular_velocity = {0, -v / L, 0};
+      const Body    body = scene.add("body", b);
+      const Marker  pivot = scene.markerAt(body, {0, 0, 0});
+      const Element joint = scene.add("joint", Spherical{pivot, scene.marker(scene.ground())});
+      scene.gravity({0, 0, -g});
+      TS       ts;
+      Snapshot now;
+      Load     load;
+      must(scene.createTS(&ts));
+      must(now.take(ts));
+      must(now.load(joint, pivot, &load));
+      EXPECT_NEAR(load.force[2] / want, 1, 1e-6) << length << " of a metre, " << time << " of a second";
+      must(TSDestroy(&ts));
+    }
+}
