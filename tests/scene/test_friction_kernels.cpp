@@ -72,6 +72,22 @@ TYPED_TEST(JointFrictionKernel, VanishesWithoutLoadAndAtRest)
   EXPECT_TRUE(J.frames.allFinite() && J.twists.allFinite() && J.inputs.allFinite());
 }
 
+/* Units of force do not matter: mu N is as exact for a load of 1e-12 as for one of 1e12 */
+TYPED_TEST(JointFrictionKernel, GrowsWithTheLoadInAnyUnits)
+{
+  Random                     random(6);
+  const Frame<double>        f[2] = {random.frame(), random.frame()};
+  const Twist<double>        w[2] = {random.twist(), random.twist()};
+  const FrictionData         d = SomeFriction(random);
+  const double               load[3] = {1, 2, 3};
+  const Evaluated<TypeParam> unit(d, f, w, load);
+  for (double scale : {1e-12, 1e12}) {
+    const double               scaled[3] = {scale, 2 * scale, 3 * scale};
+    const Evaluated<TypeParam> e(d, f, w, scaled);
+    for (int r = 0; r < TypeParam::count; r++) EXPECT_NEAR(e.c[r] / (scale * unit.c[r]), 1, 1e-12) << scale;
+  }
+}
+
 /* a shaft that turns with both bodies does not slip */
 TYPED_TEST(JointFrictionKernel, RigidMotionOfBothDoesNotSlip)
 {

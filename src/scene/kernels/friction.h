@@ -21,15 +21,15 @@ struct FrictionData {
   int    axis; /* of j, of the translation */
 };
 
-/* sqrt(z.z + e^2) - e: zero and smooth at zero. e is a force far below any that matters: it only keeps sqrt
- * differentiable. */
+/* |z|. A force that would round its tip off would be one of the units of force, in which small loads vanish (JointFrictionKernel.GrowsWithTheLoadInAnyUnits);
+   at the tip itself, an unloaded bearing, derivatives are zero, which is between those around it. */
 template <int Rows, class T> T BearingLoad(const T *z)
 {
   using std::sqrt;
-  constexpr double e = 1e-8;
-  T                square(e * e);
+  T square(0);
   for (int k = 0; k < Rows; k++) square += z[k] * z[k];
-  const T load = sqrt(square) - T(e);
+  if (Plain(square) == 0) return T(0);
+  const T load = sqrt(square);
   return load;
 }
 
