@@ -164,12 +164,14 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 /*
   Of h: as the forces fall. Where they fall along the step as in a hollow, h need not wait for that, as long as the next
   step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
-  against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding.
+  against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding. A step that its corrections have
+  taken back to where it began has gone too far into forces that set in on its way: h shrinks (SceneEquilibrium.ABallOnAPlane).
 */
 double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbalanced &after)
 {
   const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
-  if (after.step <= at_rest) return after.force <= rounding * E.scale ? largest_growth : falling;
+  if (after.step <= at_rest && after.force <= rounding * E.scale) return largest_growth;
+  if (after.step <= at_rest) return a.corrections > 0 && after.force > hollow * before ? 0.25 : falling;
   if (a.work[0] <= 0) return 0.25;
   const bool in_hollow = a.work[1] > 0 && a.work[1] < hollow * a.work[0];
   return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);

@@ -1,0 +1,78 @@
+/* Static equilibrium where forces set in along the way: contacts and stops. */
+#include "scene/kernels/contact_law.h"
+#include "scene_start.h"
+
+using namespace hhtest;
+using namespace hhtdae;
+
+namespace
+{
+
+constexpr double g = 10;
+
+/* A ball of 1 kg and radius 1 that a guide lets move along z alone, its centre at z at first */
+struct Guided {
+  Scene  scene{PETSC_COMM_SELF};
+  Body   ball;
+  Marker i, j;
+
+  explicit Guided(double z)
+  {
+    RigidBody b;
+    b.inertia  = 0.4 * Matrix3::Identity();
+    b.position = {0, 0, z};
+    ball       = scene.add("ball", b);
+    i          = scene.marker(ball);
+    j          = scene.marker(scene.ground());
+    scene.gravity({0, 0, -g});
+    scene.add("guide", Translational{i, j});
+    scene.start().equilibrium = true;
+  }
+  double depth()
+  {
+    must(scene.setUp());
+    return 1 - DataOf(scene).bodies[ball.id].r(2);
+  }
+};
+
+ContactLawData Law(double stiffness, double exponent, double onset)
+{
+  ContactLawData law;
+  law.stiffness = stiffness;
+  law.exponent  = exponent;
+  law.onset     = onset;
+  return law;
+}
+
+} // namespace
+
+/* From in front of a contact, its beginning and within: where the law carries the weight */
+TEST(SceneEquilibrium, ABallOnAPlane)
+{
+  for (double exponent : {1., 1.5, 2.})
+    for (double stiffness : {1e4, 1e5, 1e6, 1e8})
+      for (double z : {0.9999, 1., 1.001, 1.1}) {
+        Guided      s(z);
+        SpherePlane contact{s.i, s.j, 1};
+        contact.law.stiffness = stiffness;
+        contact.law.exponent  = exponent;
+        s.scene.add("contact", contact);
+        const double d = s.depth();
+        EXPECT_NEAR(ElasticForce<double>(Law(stiffness, exponent, 1e-4), d), g, 1e-6 * g) << exponent << " " << stiffness << " " << z << ": " << d;
+      }
+}
+
+/* The same with the end of a travel: from the stop itself, and from the air */
+TEST(SceneEquilibrium, ABallOnAStop)
+{
+  for (double stiffness : {1e4, 1e6, 1e8})
+    for (double z : {1., 1.1}) {
+      Guided            s(z);
+      TranslationalStop stop{s.i, s.j, 1};
+      stop.law.stiffness = stiffness;
+      stop.law.exponent  = 1;
+      s.scene.add("stop", stop);
+      const double d = s.depth();
+      EXPECT_NEAR(ElasticForce<double>(Law(stiffness, 1, 1e-4 * std::max(z, 1.)), d), g, 1e-6 * g) << stiffness << " " << z << ": " << d;
+    }
+}
