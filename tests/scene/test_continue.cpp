@@ -99,6 +99,37 @@ TEST(Continue, AJointTakesHold)
   must(TSDestroy(&ts));
 }
 
+/* Rows of a user's that count no angles may come and go, too: a guide of expressions, of positions and of velocities */
+TEST(Continue, AUserConstraintTakesHold)
+{
+  for (bool velocities : {false, true}) {
+    Swing      s;
+    const auto guide = [c = s.caught, x = s.line, i = s.centre, velocities] {
+      const double   at = x;
+      UserConstraint rows;
+      if (velocities) rows.rows = {Expression{{Measure::velocity(i, 0)}, [](const Real *m) { return m[0]; }}};
+      else rows.rows = {Expression{{Measure::displacement(i, 0)}, [at](const Real *m) { return m[0] - at; }}};
+      return c < 0 ? std::optional<UserConstraint>(rows) : std::nullopt;
+    };
+    s.scene.add("rows", guide);
+    SceneRun run(s.scene, 0.3, tolerance(1e-8));
+    must(run.solve());
+    const Motion x = of(run.ts, s.centre);
+    must(s.scene.set("held", 0));
+    must(s.scene.set("caught", -1));
+    must(s.scene.set("line", x.position(0)));
+    TS ts = goOn(s.scene, run.ts, 0.5);
+    const Motion caught = of(ts, s.centre);
+    EXPECT_NEAR(caught.position(0), x.position(0), 1e-7);
+    EXPECT_NEAR(caught.velocity(0), 0, 1e-7);
+    must(s.scene.set("caught", 0)); /* and lets go */
+    TS next = goOn(s.scene, ts, 0.6);
+    EXPECT_LT((of(next, s.centre).velocity - caught.velocity - Vector3(0, -0.981, 0)).norm(), 1e-6);
+    must(TSDestroy(&next));
+    must(TSDestroy(&ts));
+  }
+}
+
 /* A run that goes on with nothing changed is the same motion, counted angles included */
 TEST(Continue, NothingChanged)
 {

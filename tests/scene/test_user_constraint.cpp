@@ -114,8 +114,8 @@ void parabola(double t, double *x)
 
 } // namespace
 
-TEST(UserConstraint, DerivativesOfPositions) { CheckConstraint<UserPosition<4>>(ofPositions, 3); }
-TEST(UserConstraint, DerivativesOfVelocities) { CheckVelocityConstraint<UserVelocity<4>>(ofVelocities, 4); }
+TEST(UserConstraint, DerivativesOfPositions) { CheckConstraint<UserPosition<4, UserRow::angles>>(ofPositions, 3); }
+TEST(UserConstraint, DerivativesOfVelocities) { CheckVelocityConstraint<UserVelocity<4, UserRow::angles>>(ofVelocities, 4); }
 
 TEST(UserConstraint, BeadOnAParabola)
 {

@@ -48,6 +48,7 @@ private:
   std::vector<ScalarRef>   inputs_;
   UserRowData              data_;
   bool                     velocities_ = false;
+  int                      angles_     = 0;
 
   void require(bool condition, const std::string &message) { e_.require(condition, where_ + message); }
 
@@ -93,7 +94,6 @@ private:
 
   void read()
   {
-    int angles = 0;
     for (const Measure &m : given_.arguments) {
       UserRow::Argument a;
       a.kind      = m.kind;
@@ -105,15 +105,15 @@ private:
         const Marker of[3] = {m.i, m.j, m.frame};
         for (int i = 0; i < 3; i++) a.marker[i] = number(of[i]);
       }
-      if (m.kind == Measure::Angle && angles < UserRow::angles) {
-        a.number                = angles;
-        data_.memory[angles]    = PrincipalAngle<double>(e_.frame(m.i), e_.frame(m.j));
+      if (m.kind == Measure::Angle && angles_ < UserRow::angles) {
+        a.number              = angles_;
+        data_.memory[angles_] = PrincipalAngle<double>(e_.frame(m.i), e_.frame(m.j));
       }
-      angles += m.kind == Measure::Angle;
+      angles_ += m.kind == Measure::Angle;
       row_->arguments.push_back(a);
     }
     require((int)markers_.size() <= most_markers, " names " + std::to_string(markers_.size()) + " markers, at most " + std::to_string(most_markers));
-    require(angles <= UserRow::angles, " has " + std::to_string(angles) + " angles, at most " + std::to_string(UserRow::angles));
+    require(angles_ <= UserRow::angles, " has " + std::to_string(angles_) + " angles, at most " + std::to_string(UserRow::angles));
     require((int)inputs_.size() <= UserRow::inputs, " has " + std::to_string(inputs_.size()) + " variables and states, at most " + std::to_string(UserRow::inputs));
     const SceneData &s = e_.scene();
     require(std::any_of(markers_.begin(), markers_.end(), [&](Marker m) { return s.markers[m.id].body >= 0; }), " reads no marker of a body");
@@ -154,11 +154,16 @@ private:
   }
   template <int M> void put()
   {
+    if (angles_ > 0) enter<M, UserRow::angles>();
+    else enter<M, 0>();
+  }
+  template <int M, int Angles> void enter()
+  {
     std::vector<Marker> padded = markers_;
     padded.resize(M, markers_[0]);
     data_.row = row_;
-    if (velocities_) e_.constrain<UserVelocity<M>>(padded, data_, inputs_);
-    else e_.constrain<UserPosition<M>>(padded, data_, {});
+    if (velocities_) e_.constrain<UserVelocity<M, Angles>>(padded, data_, inputs_);
+    else e_.constrain<UserPosition<M, Angles>>(padded, data_, {});
   }
 };
 

@@ -64,11 +64,13 @@ struct UserRowData {
   std::shared_ptr<const UserRow> row;
 };
 
-template <int M> struct UserPosition : Constraint<UserPosition<M>, M, 1> {
-  using Base                             = Constraint<UserPosition<M>, M, 1>;
+/* Angles: 0, or UserRow::angles. Rows that count none have nothing to remember, so that they may come and go in a run that goes on
+   (Continue.AUserConstraintTakesHold). */
+template <int M, int Angles> struct UserPosition : Constraint<UserPosition<M, Angles>, M, 1> {
+  using Base                             = Constraint<UserPosition<M, Angles>, M, 1>;
   using Data                             = UserRowData;
   static constexpr const char *name      = "user constraint";
-  static constexpr int         memory    = UserRow::angles;
+  static constexpr int         memory    = Angles;
   static constexpr bool        own_units = true, driven = true;
 
   template <class T> static void value(const Data &d, const Frame<T> *f, const T &t, T *phi)
@@ -99,11 +101,11 @@ private:
   static UserRow::At at(const Data &d, const Frame<double> *f, double t) { return {f, nullptr, t, nullptr, d.memory}; }
 };
 
-template <int M> struct UserVelocity : VelocityConstraint<UserVelocity<M>, M, 1> {
-  using Base                             = VelocityConstraint<UserVelocity<M>, M, 1>;
+template <int M, int Angles> struct UserVelocity : VelocityConstraint<UserVelocity<M, Angles>, M, 1> {
+  using Base                             = VelocityConstraint<UserVelocity<M, Angles>, M, 1>;
   using Data                             = UserRowData;
   static constexpr const char *name      = "user constraint of velocities";
-  static constexpr int         memory    = UserRow::angles, inputs = UserRow::inputs;
+  static constexpr int         memory    = Angles, inputs = UserRow::inputs;
   static constexpr bool        own_units = true;
 
   template <class T> static void value(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *psi)
