@@ -49,30 +49,44 @@ struct Assembling : StillSystem {
     misfit = std::isfinite(at.misfit) ? at.misfit : INFINITY;
     PetscFunctionReturn(0);
   }
-  PetscErrorCode direction(double *part)
+  /* the move x that meets the rows in F as the matrix has them; part: how far that is, infinite if there is none */
+  PetscErrorCode move(Vec x, double *part)
   {
     KSPConvergedReason reason;
     PetscFunctionBegin;
     *part = INFINITY;
-    PetscCall(Jacobian(R, t, U, zero, zero, 0, heavy, J));
-    PetscCall(KSPSolve(ksp, F, d));
+    PetscCall(KSPSolve(ksp, F, x));
     PetscCall(KSPGetConvergedReason(ksp, &reason));
     if (reason < 0) PetscFunctionReturn(0);
-    PetscCall(keep(TSHHT3_COORDINATE, d));
-    PetscCall(reach(d, part));
+    PetscCall(keep(TSHHT3_COORDINATE, x));
+    PetscCall(reach(x, part));
+    PetscFunctionReturn(0);
+  }
+  PetscErrorCode direction(double *part)
+  {
+    PetscFunctionBegin;
+    PetscCall(Jacobian(R, t, U, zero, zero, 0, heavy, J));
+    PetscCall(move(d, part));
     PetscFunctionReturn(0);
   }
 };
 
-/* As far along d as the misfit falls */
-PetscErrorCode Advance(Assembling &E, double factor)
+/*
+  As far along d, a move by `part`, as it brings the constraints nearer. Rows are lengths, sines and what users give, which cannot be told to have
+  fallen together; how far the bodies would have to move next, by the same matrix, can (Deuflhard's natural monotonicity test,
+  Analyses.KinematicsInAnyUnitsOfLength).
+*/
+PetscErrorCode Advance(Assembling &E, double part, bool *nearer)
 {
-  const double before = E.misfit;
+  double factor = std::min(1.0, 1 / part), left;
   PetscFunctionBegin;
-  for (int cut = 0; cut <= most_cuts; cut++, factor /= 2) {
+  *nearer = false;
+  for (int cut = 0; cut <= most_cuts && !*nearer; cut++, factor /= 2) {
     PetscCall(VecWAXPY(E.next, -factor, E.d, E.U));
     PetscCall(E.look(E.next));
-    if (E.misfit < before) break;
+    if (!std::isfinite(E.misfit)) continue;
+    PetscCall(E.move(E.A, &left));
+    *nearer = left < part;
   }
   PetscFunctionReturn(0);
 }
@@ -82,6 +96,7 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
 {
   Assembling E(R, t);
   double     part = INFINITY;
+  bool       nearer;
   PetscFunctionBegin;
   PetscCall(E.create(U, "scene_assembly_"));
   PetscCall(RolesOf(E.R, E.role));
@@ -91,9 +106,9 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     const double before = E.misfit;
     PetscCall(E.direction(&part));
     if (!std::isfinite(part) || part * largest_turn <= still) break;
-    PetscCall(Advance(E, std::min(1.0, 1 / part)));
+    PetscCall(Advance(E, part, &nearer));
     PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, part * largest_turn));
-    if (!(E.misfit < before)) {
+    if (!nearer) {
       E.misfit = before;
       break;
     }
@@ -101,7 +116,11 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.V));
   }
-  PetscCheck(E.misfit <= E.R.scene.start.tolerance * E.size, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
+  /* Rows are within the tolerance as lengths and as sines (Analyses.AssemblyThatFallsShort); or bodies are within it of where the rows are met, as in scenes
+     so large that lengths are rounded by more (Analyses.KinematicsInAnyUnitsOfLength) */
+  const double tolerance = E.R.scene.start.tolerance;
+  const bool   met       = E.misfit <= tolerance * std::min(1.0, E.size) || part * largest_turn <= tolerance;
+  PetscCheck(met, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
              "the scene cannot be assembled at t = %g: constraints or motions are violated by %g.\nTake smaller steps in time, or start nearer to where they are met", E.t,
              E.misfit);
   PetscCall(VecCopy(E.U, U));

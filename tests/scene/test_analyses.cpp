@@ -275,6 +275,52 @@ TEST(Analyses, KinematicsOfAFourBar)
   EXPECT_NEAR(moment[0], moment[1], 1e-4 * std::abs(moment[0]));
 }
 
+/* Units of length do not matter: a crank with its centre of mass off its pin, in steps of 0.9 rad. The first move of Newton's, a straight one, takes it
+   off its pin; in small units that is a much larger number than the sine of the angle was wrong by, and nearer to the solution all the same. */
+TEST(Analyses, KinematicsInAnyUnitsOfLength)
+{
+  for (double R : {1e-6, 1e-3, 1., 1e3, 1e6, 1e12}) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    b.inertia          = R * R * 0.1 * Matrix3::Identity();
+    b.position         = {R, 0, 0};
+    b.velocity         = {0, R, 0};
+    b.angular_velocity = {0, 0, 1};
+    const Body   crank = s.add("crank", b);
+    const Marker i = s.markerAt(crank, Vector3::Zero()), j = s.marker(s.ground());
+    s.add("pin", Revolute{i, j});
+    s.add("drive", RotationalMotion{i, j, TimeFunction::polynomial({0, 1})});
+    OwnTS    run(s);
+    Snapshot now;
+    Motion   m;
+    for (int k = 1; k <= 8; k++) {
+      const double a = 0.9 * k;
+      must(Kinematics(run.ts, a));
+      must(now.take(run.ts));
+      must(now.motion(crank, &m));
+      EXPECT_LT((m.position - R * Vector3(std::cos(a), std::sin(a), 0)).norm(), 1e-10 * R) << R;
+      EXPECT_LT((m.velocity - R * Vector3(-std::sin(a), std::cos(a), 0)).norm(), 1e-9 * R) << R;
+    }
+  }
+}
+
+/* In units in which the scene is large a sine that cannot get nearer than 1e-4 is no small misfit either */
+TEST(Analyses, AssemblyThatFallsShort)
+{
+  Scene     s(PETSC_COMM_SELF);
+  const Body   wheel = s.add("wheel", RigidBody{});
+  const Marker i = s.marker(wheel), j = s.marker(s.ground());
+  s.marker(wheel, {1e3, 0, 0}); /* its size */
+  s.add("pin", Revolute{i, j});
+  s.add("sine", UserConstraint{{Expression{{Measure::angle(i, j), Measure::time()}, [](const Real *m) { return sin(m[0]) - 1.0001 * m[1]; }}}});
+  s.start().assembly = Assembly::Project; /* it is described at rest */
+  OwnTS run(s);
+  must(AssembleAt(run.ts, 0.9));
+  ErrorTrap error;
+  EXPECT_NE(AssembleAt(run.ts, 1), 0);
+  EXPECT_TRUE(error.says("the scene cannot be assembled at t = 1")) << error.message;
+}
+
 /* Power of the drive = change of kinetic energy + work against gravity, from snapshots alone */
 TEST(Analyses, InverseDynamicsByThePower)
 {
