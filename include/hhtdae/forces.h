@@ -21,7 +21,7 @@ struct SpringDamper {
   Marker i, j;
   double stiffness = 0;  /* k, force per length; not negative */
   double damping   = 0;  /* c, force per velocity; not negative */
-  double length    = -1; /* free length; negative: the distance at the start */
+  double length    = -1; /* free length; negative: the distance where bodies are described, before they are assembled */
   double preload   = 0;  /* tension at the free length */
   bool   state     = false;
 };
@@ -36,7 +36,8 @@ struct NonlinearSpring {
 
 /*
   Moment preload - k (angle - free angle) - c angle' on i's body, about z_j, and its opposite on j's. The angle is that
-  of i's x axis about z_j from j's x axis; it counts full turns, from the one in (-pi, pi] at the start. Component: the
+  of i's x axis about z_j from j's x axis; it counts full turns, from the one in (-pi, pi] at the start. Steps of variable length are kept
+  short enough for that; a step of fixed length (-ts_adapt_type none) that turns it by more than half a turn loses turns. Component: the
   moment. Meant for bodies that a joint holds together, with parallel z axes; where they are not parallel, the moment is
   about the gradient of the angle.
 */
@@ -114,7 +115,15 @@ struct ModalLoad {
   bool        state = false;
 };
 
-/* ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ---- */
+/*
+  ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ----
+
+  With exponent 1 the force sets in smoothly: for d < o it has the factor 3 u^2 - 2 u^3, u = d/o. Of contacts o is 1e-4 of the radius, the
+  smaller one of two balls, the least semiaxis, the outer radius of a torus, a flexible body's radius of gyration where its nodes have none; of stops 1e-4 of
+  the travel, or, if it is open at one end, of the larger of its limit and the distance at the start (angles: 1e-4 rad). A contact that carries its
+  load within o is deeper than load/k. The factor s = 1 + damping d' ends smoothly, too: it is s for s >= 1/4, 0 for s <= -1/4, and in
+  between u^3 (1 - u/2)/2 with u = 2 s + 1/2.
+*/
 struct ContactLaw {
   double stiffness = 1e5, exponent = 1.5;
   double damping  = 0;                       /* s/m, of the rate of penetration; force never pulls */

@@ -77,7 +77,10 @@ struct Measure {
     Modal,               /* modal coordinate `component` of a flexible body */
     ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output alone */
     ElementMoment,       /* likewise, about marker i's origin */
-    KineticEnergy, PotentialEnergy /* of the whole scene; for output alone */
+    KineticEnergy,       /* of the whole scene; for output alone */
+    PotentialEnergy      /* likewise: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing, Beam, contacts and stops. What the user's own
+                            functions do has no potential here, nor has groundAcceleration(), constant or not: NonlinearSpring,
+                            NonlinearTorsionalSpring, UserForce, UserScalarForce */
   };
   Kind     kind      = Time;
   Marker   i, j, frame;

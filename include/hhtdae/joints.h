@@ -15,7 +15,9 @@ namespace hhtdae
 struct Spherical { Marker i, j; };      /* origins coincide */
 struct Revolute { Marker i, j; };       /* and z axes are parallel */
 struct Universal { Marker i, j; };      /* origins coincide, z_i perpendicular to z_j */
-struct ConstantVelocity { Marker i, j; }; /* origins coincide, rotations about z_i and z_j are equal */
+/* Origins coincide, rotations about z_i and z_j are equal. Described with z_i and z_j more than 90 degrees apart, the axes are taken to point away from
+   each other, and the rotations are opposite; which of the two it is stays so in the run, however far the shafts bend. */
+struct ConstantVelocity { Marker i, j; };
 struct Translational { Marker i, j; };  /* along z_j, no rotation */
 struct Cylindrical { Marker i, j; };    /* along and about z_j */
 struct Planar { Marker i, j; };         /* xy planes coincide */
@@ -67,9 +69,10 @@ struct KnifeEdge { Marker i, j; };      /* no velocity of i's origin along y_i; 
 /*
   The user's own constraint: expressions that stay zero. A row reads displacements, distances, angles and time; or, at velocity level,
   velocities, rates and angular velocities as well, which it has to be linear in, and up to two states, or variables of positions, states
-  and time. It may name six markers. The load of a row on the bodies is its multiplier times the derivatives of the expression by positions (at velocity level, by
-  velocities): where the expression is a displacement less a constant, the force on i's body along it. Joint forces as measures are those
-  on the body of the first marker, in the axes of the first marker on another body (default: space axes).
+  and time; the factors of velocities may depend on positions and time, but not on states or variables. It may name six markers. The load of a
+  row on the bodies is its multiplier times the derivatives of the expression by positions (at velocity level, by velocities): where the
+  expression is a displacement less a constant, the force on i's body along it. Joint forces as measures are those on the body of the first
+  marker, in the axes of the first marker on another body (default: space axes).
 
     scene.add("cam", UserConstraint{{Expression{{Measure::displacement(follower, 2), Measure::angle(shaft, bearing)},
                                                 [=](const Real *m) { return m[0] - lift * (1 - cos(m[1])); }}}});

@@ -74,7 +74,7 @@ public:
   /* An angle counts full turns: from the start in planar scenes and where an element, a channel or an expression reads it, else from the first
      question for it on */
   PetscErrorCode value(const Measure &m, double *x);
-  /* kinetic, potential energy of the scene; the momenta are those about the space origin */
+  /* kinetic, potential energy of the scene, of what Measure::PotentialEnergy names; the momenta are those about the space origin */
   PetscErrorCode energy(double *kinetic, double *potential);
 
 private:

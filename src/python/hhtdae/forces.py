@@ -20,7 +20,7 @@ class SpringDamper(_Joint):
 
     stiffness : force per length, not negative
     damping : force per velocity, not negative
-    length : free length; negative: the distance at the start
+    length : free length; negative: the distance where bodies are described, before they are assembled
     preload : tension at the free length"""
     stiffness: Number = 0.
     damping: Number = 0.

@@ -31,7 +31,7 @@ class Universal(_Joint):
 
 @_spec
 class ConstantVelocity(_Joint):
-    """Origins coincide, rotations about z_i and z_j are equal."""
+    """Origins coincide, rotations about z_i and z_j are equal; opposite if they are described more than 90 degrees apart, which stays so in the run."""
 
 
 @_spec

@@ -142,7 +142,8 @@ def kinetic_energy():
 
 
 def potential_energy():
-    """Potential energy of the whole scene; for channels and snapshots alone."""
+    """Potential energy of the whole scene, for channels and snapshots alone: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing,
+    Beam, contacts and stops; users' functions and ground_acceleration() have none."""
     return Measure("potential_energy")
 
 
