@@ -160,11 +160,6 @@ Prepared PreparedBy(const Integrator &I, bool moved)
   return {!I.count[TSHHT3_NONHOLONOMIC] || !moved, moved ? Gamma::Near : Gamma::Made};
 }
 
-} // namespace
-
-namespace
-{
-
 /* The fastest and the largest of the coordinates that were named as lengths, on this rank; they are left out of `others` */
 PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscReal *y)
 {
@@ -211,22 +206,32 @@ PetscReal TimeOf(TS ts, PetscReal rate)
 /* Coordinates whose size is less count as of this size */
 PetscReal LeastSize(TS ts) { return PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); }
 
-} // namespace
-
-/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i| */
-PetscErrorCode TimeScale(TS ts, PetscReal *T)
+/* The largest of coordinates' rates or accelerations, each by the coordinate's size */
+PetscErrorCode MostOfItsSize(TS ts, Vec x, PetscReal *most)
 {
   Integrator     &I     = Get(ts);
   const PetscReal least = LeastSize(ts);
-  PetscReal       local = 0, rate;
+  PetscReal       local = 0;
 
   PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar v, PetscScalar y) {
       if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
     },
-    Read(I.V0), Read(I.ymax)));
-  PetscCallMPI(MPI_Allreduce(&local, &rate, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+    Read(x), Read(I.ymax)));
+  PetscCallMPI(MPI_Allreduce(&local, most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i| */
+PetscErrorCode TimeScale(TS ts, PetscReal *T)
+{
+  PetscReal rate;
+
+  PetscFunctionBegin;
+  PetscCall(MostOfItsSize(ts, Get(ts).V0, &rate));
   *T = TimeOf(ts, rate);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -234,17 +239,10 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
 /* A time in which accelerations alone move q by as much */
 PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
 {
-  Integrator     &I     = Get(ts);
-  const PetscReal least = LeastSize(ts);
-  PetscReal       local = 0, most;
+  PetscReal most;
 
   PetscFunctionBegin;
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar a, PetscScalar y) {
-      if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(a) / PetscMax(PetscRealPart(y), least));
-    },
-    Read(A), Read(I.ymax)));
-  PetscCallMPI(MPI_Allreduce(&local, &most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(MostOfItsSize(ts, A, &most));
   *T = most > 0 ? 1 / PetscSqrtReal(most) : PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -69,6 +69,27 @@ PetscErrorCode CheckSNESType(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Coarse matrices of the application would lack the scaling of (10), and PETSc would restrict the SNES' solution to their levels before there is one */
+PetscErrorCode CheckMultigrid(TS ts)
+{
+  KSP              ksp;
+  PC               pc;
+  PetscBool        mg;
+  PetscInt         levels;
+  PCMGGalerkinType galerkin;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCMG, &mg));
+  if (!mg) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCMGGetLevels(pc, &levels));
+  PetscCall(PCMGGetGalerkin(pc, &galerkin));
+  PetscCheck(levels < 2 || (galerkin != PC_MG_GALERKIN_NONE && galerkin != PC_MG_GALERKIN_EXTERNAL), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-pc_type mg with %" PetscInt_FMT " levels needs matrices of the coarse levels that are made of the fine one's, which is scaled: -pc_mg_galerkin, or PCMGSetGalerkin()", levels);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* PETSc's own number of iterations, which tells whether the user has set one */
 constexpr PetscInt petsc_max_it = 50;
 
@@ -159,6 +180,7 @@ PetscErrorCode TakeSNESSettings(TS ts)
 
   PetscFunctionBegin;
   PetscCall(CheckSNESType(ts));
+  PetscCall(CheckMultigrid(ts));
   PetscCall(OptionGiven((PetscObject)ts->snes, "-snes_max_it", &given));
   if (given || ts->snes->max_its != petsc_max_it) I.corrector.max_it = ts->snes->max_its;
   else I.corrector.max_it = CorrectorOptions().max_it;

@@ -203,3 +203,6 @@ TEST(RefusedSettings, FinalTimeByInterpolation)
   EXPECT_DOUBLE_EQ(end, .5);
 #endif
 }
+
+/* Coarse matrices that are not made of the scaled one ended in a segmentation fault */
+TEST(RefusedSettings, MultigridWithMatricesOfTheApplication) { expectRefused({"-ksp_type gmres -pc_type mg -pc_mg_levels 2", "coarse levels"}); }
