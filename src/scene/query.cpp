@@ -93,7 +93,7 @@ void Resolve(Motion &m, const Matrix3 &R)
   m.axes = R.transpose() * m.axes;
 }
 
-/* u, u' and u'' of a run at t, or before its first step at where it stands; *copy: what they belong to then, to be destroyed, whatever happens */
+/* u, u' and u'' of a run at t, or before its first step at where it stands; *copy: to be destroyed, whatever happens */
 PetscErrorCode StateAt(TS ts, PetscReal *t, Vec W[3], TS *copy)
 {
   PetscInt steps;
@@ -125,9 +125,10 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   PetscCall(TSGetSolution(ts, &U));
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
   PetscErrorCode failed = StateAt(ts, &t, W, &copy);
-  PetscCall(TSDestroy(&w.start));
-  w.start = copy;
-  if (!failed) failed = take(copy ? *RunOf(copy) : *w.R, t, W);
+  if (!failed) failed = take(*w.R, t, W);
+  /* attitudes that a first step in the run's place has found count from what that step has referred them to */
+  for (std::size_t b = 0; copy && !failed && b < w.references.size(); b++) w.references[b] = RunOf(copy)->bodies.body[b].C;
+  PetscCall(TSDestroy(&copy));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
   PetscCall(failed);
   PetscFunctionReturn(0);

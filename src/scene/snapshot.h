@@ -12,8 +12,7 @@ namespace hhtdae
 
 /* The run, and the unknowns of this rank and of its neighbours at the time asked for */
 struct Snapshot::Work {
-  TS                  start = nullptr; /* of a run that has not begun: one that has made the first step in its place, whose attitudes count from another reference */
-  Runtime            *R     = nullptr;
+  Runtime            *R = nullptr;
   double              t = 0;
   std::vector<double> u, v, a;
   long                moved = -1; /* which move of the bodies was to this state */
@@ -21,7 +20,6 @@ struct Snapshot::Work {
   long                      accepts = 0;
   std::vector<Matrix3>      references; /* of the bodies' rotations then; the run has others once it has gone on */
 
-  ~Work() { PetscCallAbort(PETSC_COMM_SELF, TSDestroy(&start)); }
   Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
   /* The bodies, where somebody else may have moved them */
   void move()
