@@ -19,7 +19,7 @@ namespace
 
 constexpr PetscReal accuracy = 1e-10;
 constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes) */
-constexpr PetscReal at_rest  = 1e-3; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
+constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
 constexpr int       sweeps   = 6; /* of balancing: each takes the root of how far rows are from a size of 1 */
 
