@@ -260,7 +260,7 @@ public:
   PetscErrorCode solve(TS ts);
 
   /* Values of all channels, in their order, on every rank: at time t between the ends of the last step, after scene.solve() or in a
-     monitor. Collective. */
+     monitor; before the first step at the start. Collective. */
   PetscErrorCode sample(TS ts, PetscReal t, std::vector<double> &values);
 
   PetscErrorCode view(PetscViewer viewer) const;

@@ -571,14 +571,17 @@ class Mistakes(unittest.TestCase):
 
     def test_runs_that_cannot_be(self):
         scene, rod, pin = pendulum()
-        scene.channel("x", h.displacement(rod.marker(), 0))
+        centre = rod.marker()
+        scene.channel("x", h.displacement(centre, 0))
         run = scene.run(tolerance=1e-6, options={"ts_max_steps": 3})
         self.assertEqual((run.values.shape, len(run["x"]), run.solve(0.).time), ((0, 1), 0, 0.))
         with self.assertWarnsRegex(RuntimeWarning, "largest number of steps"):
             run.solve(5.)
         self.assertEqual(run.steps, 3)
+        fresh = scene.run()
+        self.assertAlmostEqual(fresh.sample()["x"], fresh.snapshot().value(h.displacement(centre, 0)))
         with self.assertRaisesRegex(h.Error, "no step to interpolate"):
-            scene.run().sample()
+            fresh.sample(1.)
         with self.assertRaisesRegex(ValueError, "tolerance is -1"):
             scene.run(tolerance=-1)
         with self.assertRaisesRegex(h.Error, "no such file"):
