@@ -3,20 +3,11 @@
 #include "flexible/element_points.h"
 #include <Eigen/LU>
 #include <cmath>
-#include <petscblaslapack.h>
 
 namespace hhtdae
 {
 namespace fe
 {
-
-/* B = A A^T. Products of fixed sizes would be compiled for each shape, which takes longer than all of the rest. */
-static void Square(int rows, int columns, const double A[], double B[])
-{
-  const PetscBLASInt n = rows, k = columns;
-  const PetscScalar  one = 1, zero = 0;
-  BLASgemm_("N", "T", &n, &n, &k, &one, A, &n, A, &n, &zero, B, &n);
-}
 
 template <class Shape> double InverseExtent(const NodeVectors<Shape> &X)
 {
@@ -28,13 +19,13 @@ template <class Shape> double InverseExtent(const NodeVectors<Shape> &X)
 template <class Shape, class Rule> static double GradientsAt(const NodeVectors<Shape> &X, int q, Gradients<Shape::nodes> &G)
 {
   const auto           &d = Table<Shape, Rule>::get().d[q];
-  const Eigen::Matrix3d J = X.lazyProduct(d.transpose()); /* dX / dxi */
+  const Eigen::Matrix3d J = X * d.transpose(); /* dX / dxi */
   Eigen::Matrix3d       inverse;
   double                det;
   bool                  invertible;
   J.computeInverseAndDetWithCheck(inverse, det, invertible, 0.);
   if (invertible)
-    G.noalias() = inverse.transpose().lazyProduct(d);
+    G.noalias() = inverse.transpose() * d;
   else
     G.setZero();
   return det;
@@ -63,7 +54,7 @@ template <class Shape> double ElementStiffness(const NodeVectors<Shape> &X, cons
     G *= std::sqrt(std::max(det, 0.) * table.points.weight[q]);
     all.col(q) = Eigen::Map<const Eigen::Matrix<double, 3 * n, 1>>(G.data());
   }
-  Square(3 * n, Rule::count, all.data(), K.data());
+  K.noalias() = all * all.transpose();
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
       const Eigen::Matrix3d H = K.template block<3, 3>(3 * i, 3 * j);
@@ -83,12 +74,12 @@ template <class Shape, class Rule> static double MassAt(const NodeVectors<Shape>
   Eigen::Matrix<double, n, Rule::count> all;
   double                                least = std::numeric_limits<double>::infinity();
   for (int q = 0; q < Rule::count; q++) {
-    const Eigen::Matrix3d J   = X.lazyProduct(table.d[q].transpose());
+    const Eigen::Matrix3d J   = X * table.d[q].transpose();
     const double          det = J.determinant();
     Lower(least, det);
     all.col(q) = table.N[q] * std::sqrt(std::max(det, 0.) * table.points.weight[q] * density);
   }
-  Square(n, Rule::count, all.data(), m.data());
+  m.noalias()                                       = all * all.transpose();
   m.template triangularView<Eigen::StrictlyLower>() = m.transpose(); /* to the last digit */
   return least * InverseExtent<Shape>(X);
 }
@@ -137,23 +128,23 @@ template <class Shape> void StressAtNodes<Shape>::operator()(const NodeVectors<S
 {
   Eigen::Matrix<double, 6, count> at;
   for (int q = 0; q < count; q++) {
-    const Eigen::Matrix3d D = u.lazyProduct(G_[q].transpose()); /* du / dX */
+    const Eigen::Matrix3d D = u * G_[q].transpose(); /* du / dX */
     const double          p = lame.lambda * D.trace();
     at.col(q) << p + 2 * lame.mu * D(0, 0), p + 2 * lame.mu * D(1, 1), p + 2 * lame.mu * D(2, 2),
         lame.mu * (D(0, 1) + D(1, 0)), lame.mu * (D(1, 2) + D(2, 1)), lame.mu * (D(2, 0) + D(0, 2));
   }
-  stress.noalias() = at.lazyProduct(Extrapolation<Shape>());
+  stress.noalias() = at * Extrapolation<Shape>();
 }
 
 template <class Shape> void StressAtNodes<Shape>::large(const NodeVectors<Shape> &u, const Lame &lame, NodeStress<Shape> &stress) const
 {
   Eigen::Matrix<double, 6, count> at;
   for (int q = 0; q < count; q++) {
-    const Eigen::Matrix3d D = u.lazyProduct(G_[q].transpose()), F = Eigen::Matrix3d::Identity() + D, E = (D + D.transpose() + D.transpose() * D) / 2;
+    const Eigen::Matrix3d D = u * G_[q].transpose(), F = Eigen::Matrix3d::Identity() + D, E = (D + D.transpose() + D.transpose() * D) / 2;
     const Eigen::Matrix3d s = F * (lame.lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * lame.mu * E) * F.transpose() / F.determinant();
     at.col(q) << s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(1, 2), s(2, 0);
   }
-  stress.noalias() = at.lazyProduct(Extrapolation<Shape>());
+  stress.noalias() = at * Extrapolation<Shape>();
 }
 
 /* ---- large displacements ---- */
@@ -186,23 +177,23 @@ double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, cons
     Gradients<n> G;
     const double det = GradientsAt<Shape, Rule>(X, q, G), w = std::max(det, 0.) * table.points.weight[q];
     Lower(least, det);
-    const Eigen::Matrix3d D = u.lazyProduct(G.transpose()), F = Eigen::Matrix3d::Identity() + D;
+    const Eigen::Matrix3d D = u * G.transpose(), F = Eigen::Matrix3d::Identity() + D;
     /* not the difference of F^T F and 1, which would lose the digits of small strains */
     const Eigen::Matrix3d E = (D + D.transpose() + D.transpose() * D) / 2;
     const Eigen::Matrix3d S = lame.lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * lame.mu * E;
     const Eigen::Matrix3d P = w * F * S;
-    force.noalias() += P.lazyProduct(G);
+    force.noalias() += P * G;
     if (energy) *energy += w * (lame.lambda / 2 * E.trace() * E.trace() + lame.mu * E.squaredNorm());
-    const Gradients<n> h = Eigen::Matrix3d(std::sqrt(w) * F).lazyProduct(G), SG = Eigen::Matrix3d(w * S).lazyProduct(G);
+    const Gradients<n> h = std::sqrt(w) * F * G, SG = w * S * G;
     all.col(q)               = Eigen::Map<const Eigen::Matrix<double, 3 * n, 1>>(h.data());
     const Eigen::Matrix3d FF = w * lame.mu * F * F.transpose();
-    const Mass<Shape>     GG = G.transpose().lazyProduct(G), GSG = G.transpose().lazyProduct(SG);
+    const Mass<Shape>     GG = G.transpose() * G, GSG = G.transpose() * SG;
     for (int d = 0; d < 3; d++) {
       symmetric[d] += FF(d, d) * GG + GSG;
       symmetric[3 + d] += FF(d, (d + 1) % 3) * GG;
     }
   }
-  Square(3 * n, Rule::count, all.data(), tangent->data());
+  tangent->noalias() = all * all.transpose();
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
       const Eigen::Matrix3d H = tangent->template block<3, 3>(3 * i, 3 * j);
