@@ -172,7 +172,6 @@ PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscR
   *v = *y = 0;
   PetscCall(VecGetOwnershipRange(I.V0, &first, &end));
   others.assign((size_t)(end - first), 1);
-  if (!I.lengths) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ISGetLocalSize(I.lengths, &n));
   PetscCall(ISGetIndices(I.lengths, &index));
   PetscCall(VecGetArrayRead(I.V0, &rate));
@@ -256,6 +255,10 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
   std::vector<char> others;
 
   PetscFunctionBegin;
+  if (!I.lengths) {
+    PetscCall(TimeScale(ts, T));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(OwnLengths(ts, others, &local[1], &local[2]));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar v, PetscScalar y) {
