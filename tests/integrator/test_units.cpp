@@ -128,7 +128,7 @@ struct Swung : Problem {
 
 TEST(Units, MotionsInLongRuns)
 {
-  for (double end : {10., 1e8, 1e9, 1e12})
+  for (double end : {10., 1e8, 1e9, 1e12, 1e30})
     for (double w : {2., 3., 4., 5., 7.}) {
       const Swung p(w);
       Simulation  run(p, tolerance(1e-6));
