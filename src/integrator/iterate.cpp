@@ -226,6 +226,42 @@ static void BeginIteration(Integrator &I)
   c.rounding       = PETSC_FALSE;
 }
 
+/* Trust regions and line searches compare norms of residuals. They end in failure, or shorten corrections to nothing, where these are rounding or where
+   the way to the solution is not downhill. Then full steps with the matrix at hand, judged as any other, tell whether the equations hold. */
+static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
+{
+  Integrator     &I     = Get(ts);
+  Corrector      &c     = I.corrector;
+  const PetscBool fresh = c.matrix.fresh;
+  PetscBool       newton, solved, evaluated = PETSC_FALSE;
+  Vec             X, F;
+  WorkVec         Y;
+  PetscReal       e;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESNEWTONLS, &newton));
+  const bool shortened = newton ? !I.hooks.line_search && *reason == SNES_DIVERGED_LINE_SEARCH
+                                : *reason == SNES_DIVERGED_TR_DELTA || *reason == SNES_DIVERGED_INNER || *reason == SNES_DIVERGED_DTOL;
+  if (!shortened || !c.matrix.have || c.user_test) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: full steps after %s\n", SNESConvergedReasons[*reason]));
+  ts->snes_its += c.it;
+  BeginIteration(I);
+  c.matrix.fresh = fresh;
+  PetscCall(SNESGetSolution(ts->snes, &X));
+  PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
+  PetscCall(Y.like(X));
+  while (!c.reason) {
+    if (!evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
+    PetscCall(AnswerOf(ts, F, Y, &solved));
+    if (!solved) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SubtractCorrection(ts, X, Y, &e));
+    evaluated = PETSC_FALSE;
+    PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
+  }
+  *reason = c.reason;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
 PetscErrorCode Iterate(TS ts, PetscBool *ok)
 {
@@ -247,8 +283,9 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   const PetscErrorCode failed = SNESSolve(ts->snes, NULL, I.X);
   if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
   PetscCall(failed);
-  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
+  PetscCall(FinishWithFullSteps(ts, &reason));
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
   ts->ksp_its += its;
   PetscCall(GiveUpKrylov(ts, &other));

@@ -116,6 +116,20 @@ TEST(RefusedSettings, EveryTypeOfSNES)
     tryTypeOfSNES(type);
 }
 
+/* Trust regions and line searches end where norms of residuals are rounding: no reason for a smaller step. This four-bar passes its flat positions */
+TEST(RefusedSettings, NormsThatAreRounding)
+{
+  const FourBar p(2, 10.);
+  for (double eps : {1e-3, 3e-5, 1e-5, 1e-6}) {
+    Simulation plain(p, tolerance(eps)), run(p, tolerance(eps) + "-snes_type newtontr");
+    must(plain.solve());
+    must(run.solve());
+    MEASURED("%g: %d steps, %d", eps, (int)run.statistics().steps, (int)plain.statistics().steps);
+    EXPECT_LT(run.statistics().steps, 1.3 * plain.statistics().steps) << eps;
+    EXPECT_LT(run.errors().q, 3 * plain.errors().q) << eps;
+  }
+}
+
 /* By itself, since it loses its DM, and with it the communicator, where there are no cells to make patches of: looked for leaks without it */
 TEST(RefusedSettings, SNESOfTypePatch)
 {
