@@ -23,7 +23,9 @@
 
   Samples between the ends of steps: positions and velocities are cubic in the step, TSHHT3Interpolate(). Where a channel needs
   accelerations, reactions, variables or force states, the equations of motion are solved for them at the time of the sample,
-  TSHHT3EvaluateAt(), at about the cost of a matrix and its factorization; samples at the ends of steps cost nothing. The first sample is the consistent start. Other types of TS are sampled at the ends of steps.
+  TSHHT3EvaluateAt(), at about the cost of a matrix and its factorization. Samples at the ends of steps cost nothing and are what the step has found, to
+  second order in h, but with several times the error of those between; with a grid the last sample of a run may be such a one. The first sample is the
+  consistent start. Other types of TS are sampled at the ends of steps.
 */
 #ifndef HHTDAE_OUTPUT_H
 #define HHTDAE_OUTPUT_H

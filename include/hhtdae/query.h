@@ -51,7 +51,7 @@ public:
 
   /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step. Accelerations, multipliers,
      variables and force states are those that belong to positions and velocities at t, TSHHT3EvaluateAt(), at about the cost of a
-     factorization between the ends of a step, at none at its end. Before the first step it is the start, whose accelerations and
+     factorization between the ends of a step; at its end at none, and then with the error of the step's own. Before the first step it is the start, whose accelerations and
      multipliers cost a consistent start and a step of a copy; after StaticEquilibrium() the equilibrium, with what the motions would have
      moved held still. */
   PetscErrorCode take(TS ts, PetscReal t);
