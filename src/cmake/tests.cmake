@@ -49,29 +49,25 @@ function(hhtdae_test_program folder)
   endif()
 endfunction()
 
-include(GoogleTest)
 set(rooms integrator linear scene flexible)
-foreach(room IN LISTS rooms)
-  set(${room}_timeout 120)
-endforeach()
-set(verification_timeout 300)
-set(stability_timeout 600)
+set(suite_timeout 600)
 set(parallel_timeout 600)
 if(HHTDAE_SANITIZE)
-  foreach(folder IN LISTS rooms ITEMS verification stability parallel)
-    math(EXPR ${folder}_timeout "5 * ${${folder}_timeout}")
-  endforeach()
+  set(suite_timeout 3000)
+  set(parallel_timeout 3000)
 endif()
+string(REPLACE ";" "|" suite_environment "${serial_environment}")
 foreach(folder IN LISTS rooms ITEMS verification stability)
   hhtdae_test_program(${folder})
   if(${folder}_found)
-    gtest_discover_tests(${folder}_tests TEST_PREFIX ${folder}. TEST_LIST ${folder}_list NO_PRETTY_VALUES
-                         DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT ${${folder}_timeout} LABELS ${folder})
-    # gtest_discover_tests takes lists among the properties apart, so the environment is set when ctest reads the tests.
-    file(WRITE ${PROJECT_BINARY_DIR}/${folder}_environment.cmake
-         "set_tests_properties(\${${folder}_list} PROPERTIES ENVIRONMENT \"${serial_environment}\")\n")
-    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${PROJECT_BINARY_DIR}/${folder}_environment.cmake)
+    set(listed ${PROJECT_BINARY_DIR}/${folder}_suites.cmake)
+    add_custom_command(TARGET ${folder}_tests POST_BUILD BYPRODUCTS ${listed} VERBATIM
+                       COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${folder}_tests> -DROOM=${folder} -DTIMEOUT=${suite_timeout}
+                               "-DENVIRONMENT=${suite_environment}" -DRESULTS=${PROJECT_BINARY_DIR}/suites -DOUTPUT=${listed}
+                               -P ${PROJECT_SOURCE_DIR}/src/cmake/suites.cmake)
+    file(WRITE ${PROJECT_BINARY_DIR}/${folder}_tests.cmake
+         "if(EXISTS [=[${listed}]=])\n  include([=[${listed}]=])\nelse()\n  add_test(${folder}_tests_NOT_BUILT ${folder}_tests_NOT_BUILT)\nendif()\n")
+    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${PROJECT_BINARY_DIR}/${folder}_tests.cmake)
   endif()
 endforeach()
 
