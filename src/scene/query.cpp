@@ -162,11 +162,31 @@ PetscErrorCode Snapshot::take(TS ts)
 
 /* ---- motion ---- */
 
+PetscErrorCode Snapshot::Work::hasBody(PetscInt body) const
+{
+  PetscFunctionBegin;
+  PetscCheck(body < (PetscInt)R->local_body.size(), scene().comm, PETSC_ERR_ARG_WRONGSTATE,
+             "Snapshot: body %s came too late: the scene is fixed from createTS() or setUp() on; ask for attachments and nodes, Scene::attachment() and node(), before",
+             scene().bodyName(body).c_str());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Snapshot::Work::hasElement(PetscInt element) const
+{
+  const ElementData &e     = scene().elements[element];
+  const auto         known = [](const Part &p) { return p.index < (PetscInt)p.store->start.size(); };
+  PetscFunctionBegin;
+  PetscCheck(std::all_of(e.parts.begin(), e.parts.end(), known), scene().comm, PETSC_ERR_ARG_WRONGSTATE, "Snapshot: element %s came too late: the scene is fixed from createTS() or setUp() on",
+             e.name.c_str());
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Snapshot::Work::motion(PetscInt marker, Motion *x)
 {
   const MarkerData &m = scene().markers[marker];
   double            numbers[motion_size];
   PetscFunctionBegin;
+  PetscCall(hasBody(m.body));
   if (m.body < 0) {
     *x = Moved(Motion(), m.s, m.R);
     PetscFunctionReturn(0);
@@ -220,6 +240,7 @@ PetscErrorCode Snapshot::motion(Body b, Motion *x)
   PetscFunctionBegin;
   CHECK_TAKEN(w);
   PetscCheck(w.scene().valid(b), w.scene().comm, PETSC_ERR_ARG_WRONG, "Snapshot: the body is not one of this scene");
+  PetscCall(w.hasBody(b.id));
   PetscCall(FromOwner(*w.R, w.owner(b.id), numbers, motion_size, [&](double *y) {
     w.move();
     Pack(OfBody(*w.R, b.id, w.at()), y);
@@ -234,6 +255,7 @@ PetscErrorCode Snapshot::modes(Body b, std::vector<double> *coordinates)
   PetscFunctionBegin;
   CHECK_TAKEN(w);
   PetscCheck(w.scene().valid(b) && w.scene().bodies[b.id].flexible, w.scene().comm, PETSC_ERR_ARG_WRONG, "Snapshot: the body is not a flexible one of this scene");
+  PetscCall(w.hasBody(b.id));
   const int n = (int)w.scene().bodies[b.id].flexible->model->modes();
   coordinates->resize(n);
   PetscCall(FromOwner(*w.R, w.owner(b.id), coordinates->data(), n, [&](double *y) {
@@ -268,6 +290,7 @@ PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
   double             numbers[6];
   Motion             at_marker;
   PetscFunctionBegin;
+  PetscCall(hasElement(element));
   PetscCall(checkMemory(element));
   PetscCall(motion(on, &at_marker));
   PetscCall(FromOwner(*R, ownerOfElement(e), numbers, 6, [&](double *y) {

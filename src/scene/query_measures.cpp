@@ -78,6 +78,8 @@ PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
   const auto                mine = std::find_if(counted.begin(), counted.end(), same);
   std::vector<CountedAngle> now(1);
   PetscFunctionBegin;
+  PetscCall(hasBody(scene().markers[i].body));
+  PetscCall(hasBody(scene().markers[j].body));
   move();
   if (mine != counted.end()) {
     now[0] = *mine;
@@ -106,6 +108,10 @@ PetscErrorCode Snapshot::value(const Measure &m, double *x)
   PetscCheck(error.empty(), s.comm, PETSC_ERR_ARG_WRONG, "Snapshot::value(): %s", error.c_str());
   const bool of_element = (m.kind >= Measure::Multiplier && m.kind <= Measure::Component) || m.kind == Measure::ElementForce || m.kind == Measure::ElementMoment;
   *x                    = 0;
+  if (of_element) PetscCall(w.hasElement(m.target));
+  if (m.kind == Measure::Value || m.kind == Measure::StateValue)
+    PetscCheck(m.target < (PetscInt)(m.kind == Measure::Value ? N.variable : N.state).size(), s.comm, PETSC_ERR_ARG_WRONGSTATE,
+               "Snapshot::value(): the %s came too late: the scene is fixed from createTS() or setUp() on", m.kind == Measure::Value ? "variable" : "state");
   if (of_element && s.elements[m.target].parts.empty()) PetscFunctionReturn(0); /* absent */
   switch (m.kind) {
   case Measure::Time: *x = w.t; break;

@@ -38,6 +38,9 @@ struct Snapshot::Work {
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
   PetscMPIInt      ownerOfElement(const ElementData &e) const { return e.parts.empty() ? 0 : OwnerOf(*R->model, *e.parts[0].store, e.parts[0].index); }
 
+  /* What was described after the run was made has no place in it */
+  PetscErrorCode hasBody(PetscInt body) const;
+  PetscErrorCode hasElement(PetscInt element) const;
   PetscErrorCode load(PetscInt element, PetscInt on, Load *x);
   PetscErrorCode motion(PetscInt marker, Motion *x);
   PetscErrorCode scalar(PetscMPIInt owner, PetscInt global, double *x);
