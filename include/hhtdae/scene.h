@@ -73,7 +73,9 @@ struct FlexibleBody {
   Vector3   velocity         = Vector3::Zero();     /* of the undeformed centre of mass, space axes */
   Vector3   angular_velocity = Vector3::Zero();     /* space axes */
   ModalMass mass             = ModalMass::Full;
-  std::vector<DampingBand> damping;  /* ratio of critical, by bands of increasing frequency; beyond the last one its ratio; empty: none */
+  /* Ratio of critical, by bands of increasing frequency; beyond the last one its ratio; empty: none. Ratios and frequencies are those of the model's modes, of the
+     free body: modes of the body as it is held in the scene are slower, and damped less (the first of a cantilever by a fourteenth of the ratio). */
+  std::vector<DampingBand> damping;
   Eigen::VectorXd          ratios;   /* the same, mode by mode; it goes before the bands */
   Eigen::VectorXd deformation, deformation_rate; /* modal coordinates at the start; empty: undeformed */
   bool            fixed_start = false;

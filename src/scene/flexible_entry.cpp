@@ -1,6 +1,7 @@
 /* Flexible bodies of a scene's description, and the frames of their attachments. */
 #include "attach.h"
 #include <cmath>
+#include <sstream>
 
 namespace hhtdae
 {
@@ -13,6 +14,13 @@ double RatioOf(const FlexibleBody &b, double frequency)
   for (const DampingBand &band : b.damping)
     if (!(frequency > band.below)) return band.ratio;
   return b.damping.empty() ? 0 : b.damping.back().ratio;
+}
+
+std::string Number(double x)
+{
+  std::ostringstream o;
+  o << x;
+  return o.str();
 }
 
 std::vector<double> Sized(const Eigen::VectorXd &x, PetscInt n)
@@ -85,9 +93,14 @@ std::string Fault(const FlexibleBody &b, bool planar)
     return "its modes move the centre of mass or turn the body as a whole; a constant mass matrix needs modes that are free of that";
   for (const Eigen::VectorXd *x : {&b.ratios, &b.deformation, &b.deformation_rate})
     if (x->size() && x->size() != n) return "it has " + std::to_string(n) + " modes, and damping ratios or a deformation of " + std::to_string(x->size());
-  for (const DampingBand &d : b.damping)
+  if (!b.deformation.allFinite() || !b.deformation_rate.allFinite()) return "its deformation at the start is not finite";
+  for (std::size_t k = 0; k < b.damping.size(); k++) {
+    const DampingBand &d = b.damping[k];
     if (!(d.ratio >= 0) || !std::isfinite(d.ratio)) return "a damping ratio is negative or not finite";
-  if (b.ratios.size() && !(b.ratios.minCoeff() >= 0)) return "a damping ratio is negative";
+    if (!(k ? d.below > b.damping[k - 1].below : d.below >= 0))
+      return "its bands of damping end at " + (k ? Number(b.damping[k - 1].below) + " and then at " : std::string()) + Number(d.below) + "; they have to be given by increasing frequency";
+  }
+  if (b.ratios.size() && !(b.ratios.minCoeff() >= 0 && b.ratios.allFinite())) return "a damping ratio is negative or not finite";
   return "";
 }
 

@@ -1,7 +1,9 @@
 /* A flexible body in a scene: its equations against sums over particles, its Jacobian against differences, refusals. */
+#include "hhtdae/query.h"
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
 #include "scene_jacobian.h"
+#include "scene_output.h"
 #include "scene/attach.h"
 
 using namespace hhtest;
@@ -256,6 +258,39 @@ TEST(FlexibleScene, ModesFreeLoopsOfRedundancy)
   }
 }
 
+/* They have no place in the run: nothing can be said of them, though they have handles of this scene */
+TEST(FlexibleScene, LateAttachmentsAndElementsAreRefused)
+{
+  const ModalCloud c(9, 3, 11, false);
+  Scene            scene(PETSC_COMM_SELF);
+  const Body       body = scene.add("arm", flexible(c)), hub = scene.attachment(body, "hub");
+  const Marker     early = scene.marker(hub);
+  SceneRun         run(scene, 0.01, "");
+  Snapshot         now;
+  Motion           x;
+  Load             l;
+  double           y;
+  must(now.take(run.ts));
+  must(now.motion(scene.marker(hub, {0.1, 0, 0}), &x)); /* a marker alone may come at any time */
+  const Body    tip  = scene.attachment(body, "tip");
+  const Marker  late = scene.marker(tip);
+  const Element e    = scene.add("spring", SpringDamper{late, scene.marker(scene.ground()), 1});
+  const Variable v   = scene.variable("v", Expression{{Measure::displacement(early, 0)}, [](const Real *m) { return m[0]; }});
+  ErrorTrap     trap;
+  const auto    refused = [&](PetscErrorCode code, const char *why) {
+    EXPECT_NE(code, 0) << why;
+    EXPECT_TRUE(trap.says(why)) << trap.message;
+  };
+  refused(now.motion(late, &x), "body arm.tip came too late");
+  refused(now.motion(tip, &x), "body arm.tip came too late");
+  refused(now.relativeMotion(early, late, &x), "body arm.tip came too late");
+  refused(now.value(Measure::angle(early, late), &y), "body arm.tip came too late");
+  refused(now.value(Measure::displacement(late, 0), &y), "body arm.tip came too late");
+  refused(now.load(e, early, &l), "element spring came too late");
+  refused(now.value(Measure::force(e, 0), &y), "element spring came too late");
+  refused(now.value(Measure::value(v), &y), "the variable came too late");
+}
+
 TEST(FlexibleScene, RefusesByName)
 {
   const ModalCloud c(9, 3, 11, false);
@@ -272,6 +307,11 @@ TEST(FlexibleScene, RefusesByName)
   refused([](FlexibleBody &b, Scene &) { b.mass = ModalMass::Constant; }, "constant mass matrix");
   refused([](FlexibleBody &b, Scene &) { b.deformation.setZero(7); }, "deformation of 7");
   refused([](FlexibleBody &b, Scene &) { b.damping = {{1, -0.1}}; }, "damping ratio");
+  refused([](FlexibleBody &b, Scene &) { b.damping = {{3, 0.1}, {1, 0.2}}; }, "bands of damping end at 3 and then at 1");
+  refused([](FlexibleBody &b, Scene &) { b.damping = {{NAN, 0.1}}; }, "bands of damping end at nan");
+  refused([](FlexibleBody &b, Scene &) { b.ratios.setConstant(b.model->modes(), INFINITY); }, "damping ratio");
+  refused([](FlexibleBody &b, Scene &) { b.deformation.setConstant(b.model->modes(), NAN); }, "deformation at the start is not finite");
+  refused([](FlexibleBody &b, Scene &) { b.deformation_rate.setConstant(b.model->modes(), INFINITY); }, "deformation at the start is not finite");
   refused([](FlexibleBody &b, Scene &) {
     auto m = std::make_shared<ModalBody>(*b.model);
     m->omega(1) = 0;
