@@ -27,6 +27,8 @@ constexpr double balanced       = 1e-10; /* of forces, times the largest of the 
 constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and from its first value */
 constexpr double downhill_growth = 2, hollow = 0.999; /* of h in a hollow: where forces fall to this part in a step */
 constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
+constexpr int    still_for = 10;        /* steps in a row at rest: what is left is noise, up to */
+constexpr double noise = 1e-3;          /* of the forces, as of a stiff mesh far from the origin (Equilibrium.AMeshFarFromTheOrigin) */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
 constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
 
@@ -171,6 +173,7 @@ double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbal
 {
   const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
   if (after.step <= at_rest && after.force <= rounding * E.scale) return largest_growth;
+  if (after.step <= at_rest && after.force <= noise * E.scale && a.corrections == 0) return std::max(falling, downhill_growth);
   if (after.step <= at_rest) return a.corrections > 0 && after.force > hollow * before ? 0.25 : falling;
   if (a.work[0] <= 0) return 0.25;
   const bool in_hollow = a.work[1] > 0 && a.work[1] < hollow * a.work[0];
@@ -178,15 +181,17 @@ double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbal
 }
 
 /* Stiff springs leave rounding that is no small part of the weights: there it is the step that has to vanish. */
-bool Balanced(const Equilibrium &E, const Unbalanced &at, double h)
+bool Balanced(const Equilibrium &E, const Unbalanced &at, double h, int *still)
 {
-  if (!(at.misfit <= balanced * E.size && at.other <= 1e-8 * std::max(1.0, E.scale))) return false;
-  return at.force <= balanced * E.scale || (at.force <= rounding * E.scale && at.step <= 1e-12 && h >= 1e3);
+  const bool met = at.misfit <= balanced * E.size && at.other <= 1e-8 * std::max(1.0, E.scale);
+  *still         = met && at.force <= noise * E.scale && at.step <= at_rest && h >= 1e3 ? *still + 1 : 0;
+  return met && (at.force <= balanced * E.scale || (at.force <= rounding * E.scale && at.step <= 1e-12 && h >= 1e3) || *still >= still_for);
 }
 
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
   double  h = 0, first, before;
+  int     still = 0;
   Attempt a;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
@@ -202,7 +207,7 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
       h /= 4;
       continue;
     }
-    *found = Balanced(E, at, h / first);
+    *found = Balanced(E, at, h / first, &still);
     h      = std::min(longest * first, h * Growth(E, a, before, at));
     before = at.force;
     PetscCall(Remember(E.R, E.U, E.zero));

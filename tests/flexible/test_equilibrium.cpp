@@ -26,11 +26,12 @@ struct Plank {
   Scene      scene{PETSC_COMM_WORLD};
   Body       tip;
 
-  Plank(int n, double depth, double young, Vector3 force)
+  Plank(int n, double depth, double young, Vector3 force, Vector3 position = Vector3::Zero(), FeLaw law = FeLaw::Large)
   {
     FullBody b;
     BoxBuilder({{n, 1, 1}, {1, depth, depth}, {young, 0, 2700}}, &model);
-    b.law = FeLaw::Large;
+    b.law      = law;
+    b.position = position;
     b.attachments.resize(2);
     b.attachments[0].name = "left";
     b.attachments[1].name = "right";
@@ -49,6 +50,19 @@ struct Plank {
 };
 
 } // namespace
+
+/* Positions of some 100 m leave rounding in the forces of a stiff mesh, here 1e-4 of the load, of which no step comes any nearer to zero */
+TEST(Equilibrium, AMeshFarFromTheOrigin)
+{
+  for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
+    const Vector3 far(50, 60, -70), force(0, 0, -1);
+    Plank         here(8, 0.02, 2.1e11, force, Vector3::Zero(), law), there(8, 0.02, 2.1e11, force, far, law);
+    const auto    sag = [](Plank &p, const Vector3 &at) { return (DataOf(p.scene).bodies[p.tip.id].r - at)(2) - 0.01; };
+    EXPECT_LT(there.corrections(), 60);
+    EXPECT_LT(sag(here, Vector3::Zero()), -5e-6);
+    EXPECT_NEAR(sag(there, far), sag(here, Vector3::Zero()), -2e-3 * sag(here, Vector3::Zero()));
+  }
+}
 
 /* Bending far softer than stretching: every correction along a straight line leaves forces far above the load */
 TEST(Equilibrium, AThinPlankBentFar)
