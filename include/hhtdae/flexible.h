@@ -211,8 +211,8 @@ PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface);
 /* ---- the whole model in a scene ---- */
 
 enum class FeLaw {
-  Small, /* K (x - X) about the position at the start, which must not turn away from it much */
-  Large  /* St. Venant-Kirchhoff material, total Lagrangian: displacements and rotations at large */
+  Small, /* K (x - X) about the position at the start, which must not turn away from it much; rigid attachments turn with the nodes to first order */
+  Large  /* St. Venant-Kirchhoff material, total Lagrangian: displacements and rotations at large. All that is in K and M has to be there as elements. */
 };
 
 struct FullBody {

@@ -1,5 +1,6 @@
 /* Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom. */
 #include "attachments.h"
+#include "body_check.h"
 #include "modes.h"
 #include "symmetric.h"
 #include <Eigen/Eigenvalues>
@@ -178,14 +179,14 @@ static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied
 }
 
 /* A node follows one rigid attachment alone, and then is not averaged by another one */
-static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied> &tied)
+static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied> &tied, bool averages)
 {
   std::vector<int> holder(model.own, -1);
   const int        none = (int)tied.size() * (int)tied.size();
   int              pair = none, at = -1;
 
   PetscFunctionBegin;
-  for (int pass = 0; pass < 2; pass++)
+  for (int pass = 0; pass < (averages ? 2 : 1); pass++)
     for (std::size_t a = 0; a < tied.size(); a++) {
       if ((tied[a].tie == Tie::Rigid) != (pass == 0)) continue;
       for (PetscInt n : tied[a].node) {
@@ -204,8 +205,8 @@ static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied>
   const Tied &x = tied[all / (int)tied.size()], &y = tied[all % (int)tied.size()];
   SETERRQ(model.comm, PETSC_ERR_ARG_WRONG,
           "Attachments %s and %s overlap: node %" PetscInt_FMT
-          " is in both; the nodes of a rigid attachment can be in no other one",
-          x.name.c_str(), y.name.c_str(), label);
+          " is in both; the nodes of a rigid attachment can be in no other %sone",
+          x.name.c_str(), y.name.c_str(), label, averages ? "" : "rigid ");
 }
 
 /* Rows of averages, each of length one, times each other: singular if one average says what others say */
@@ -248,8 +249,7 @@ static PetscErrorCode CheckIndependent(const FeModel &model, const std::vector<T
           names.c_str());
 }
 
-PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
-                                  std::vector<Tied> *tied)
+static PetscErrorCode ResolveEach(const FeModel &model, const std::vector<Attachment> &attachments, std::vector<Tied> *tied)
 {
   std::set<std::string> names;
 
@@ -261,7 +261,25 @@ PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attach
                "There are two attachments of the name %s", attachments[a].name.c_str());
     PetscCall(ResolveOne(model, attachments[a], &(*tied)[a]));
   }
-  PetscCall(CheckOverlap(model, *tied));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckAttachments(const FeModel &model, const std::vector<Attachment> &attachments)
+{
+  std::vector<Tied> tied;
+
+  PetscFunctionBegin;
+  PetscCall(ResolveEach(model, attachments, &tied));
+  PetscCall(CheckOverlap(model, tied, false));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
+                                  std::vector<Tied> *tied)
+{
+  PetscFunctionBegin;
+  PetscCall(ResolveEach(model, attachments, tied));
+  PetscCall(CheckOverlap(model, *tied, true));
   PetscCall(CheckIndependent(model, *tied));
   PetscFunctionReturn(0);
 }

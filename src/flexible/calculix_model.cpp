@@ -50,8 +50,8 @@ std::string Number(const Deck &deck, const std::vector<std::pair<Label, int>> &u
     have |= 1 << u.second;
     if (!deck.node.count(u.first))
       return "node " + std::to_string(u.first) +
-             " is not in the deck: CalculiX makes nodes of its own for beams, shells and plane elements, which are not "
-             "read";
+             " is not in the deck: CalculiX makes nodes of its own for beams, shells, plane elements and C3D8I, which are not "
+             "read; take C3D20 or C3D10 where bricks bend";
   }
   for (const auto &d : directions) {
     for (int c = 1; c <= 3; c++)

@@ -62,7 +62,8 @@ PetscErrorCode FactorInterior(const FeModel &model, const Interior &in, const Bo
   }
   PetscCheck(negative <= in.pencil.multipliers, model.comm, PETSC_ERR_ARG_WRONG,
              "K with the attachments held has %" PetscInt_FMT
-             " negative eigenvalues: it is not a stiffness matrix; are elements inside out?",
+             " negative eigenvalues: it is not a stiffness matrix. Are elements inside out, or are some of reduced integration (C3D20R, C3D8R) free to take the shapes that "
+             "have no strain at its points?",
              negative - in.pencil.multipliers);
   PetscFunctionReturn(0);
 }

@@ -76,7 +76,7 @@ PetscErrorCode MechanismError(const FeModel &model, const Eigen::VectorXd &u, co
   SETERRQ(model.comm, PETSC_ERR_MAT_LU_ZRPVT,
           "The FE model has a mechanism: %s is singular beyond rigid-body motions. It moves without stiffness most at "
           "node(s) %s; look there for "
-          "elements that hang on a node or an edge, or are missing",
+          "elements that hang on a node or an edge, are missing, or have reduced integration (C3D8R)",
           where, labels.c_str());
 }
 

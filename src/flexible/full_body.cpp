@@ -1,13 +1,13 @@
 #include "flexible/full_body.h"
 #include "flexible/assembly.h"
+#include "flexible/body_check.h"
 #include "flexible/exchange.h"
 #include "scene/runtime.h"
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 namespace hhtdae
 {
-
 
 PetscMPIInt FullExtension::ownerOf(PetscInt node) const
 {
@@ -56,10 +56,9 @@ std::string Fault(const FeModel &m, const FullBody &b)
   if (!(b.rotation.transpose() * b.rotation - Matrix3::Identity()).isZero(1e-8) || b.rotation.determinant() < 0)
     return "rotation must be orthonormal and right-handed";
   if (!b.position.allFinite() || !b.velocity.allFinite() || !b.angular_velocity.allFinite()) return "position and velocities must be finite";
-  if (!(b.mass_damping >= 0) || !(b.stiffness_damping >= 0)) return "damping coefficients must not be negative";
+  if (!(b.mass_damping >= 0) || !(b.stiffness_damping >= 0) || std::isinf(b.mass_damping + b.stiffness_damping)) return "damping coefficients must be finite and not negative";
   if (b.law == FeLaw::Large && b.stiffness_damping != 0) return "damping in proportion to K goes with FeLaw::Small alone";
-  for (const Attachment &a : b.attachments)
-    if (!m.sets.count(a.set.empty() ? a.name : a.set)) return "attachment " + a.name + ": the model has no node set " + (a.set.empty() ? a.name : a.set);
+  if ((PetscInt)m.coordinates.size() != 3 * m.own) return "the FE model has no coordinates of its nodes; give them with the matrices";
   return "";
 }
 
@@ -107,17 +106,7 @@ PetscErrorCode Gather(const FeModel &m, const Attachment &a, std::vector<SetNode
   PetscFunctionReturn(0);
 }
 
-/* The least of the second moments about the centroid, relative to the largest: zero for a line */
-double Spread(const TieNodes &t)
-{
-  Vector3 c = Vector3::Zero();
-  for (std::size_t i = 0; i < t.arm.size(); i++) c += t.weight[i] * t.arm[i];
-  Matrix3 S = Matrix3::Zero();
-  for (std::size_t i = 0; i < t.arm.size(); i++) S += t.weight[i] * (t.arm[i] - c) * (t.arm[i] - c).transpose();
-  const Vector3 s = Eigen::SelfAdjointEigenSolver<Matrix3>(S).eigenvalues();
-  return s(2) > 0 ? s(1) / s(2) : 0;
-}
-
+/* The attachment has been checked, CheckAttachments() */
 PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
 {
   const FeModel       &m = *x.model;
@@ -127,9 +116,6 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(m.comm, &rank));
   PetscCall(Gather(m, a, &nodes));
-  PetscCheck(!nodes.empty(), m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: its node set is empty", a.name.c_str());
-  PetscCheck(a.weights.empty() || a.weights.size() == nodes.size(), m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: %zu weights for %zu nodes", a.name.c_str(),
-             a.weights.size(), nodes.size());
   double sum = 0;
   *point     = Vector3::Zero();
   for (std::size_t i = 0; i < nodes.size(); i++) {
@@ -138,15 +124,12 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
     sum += t.weight.back();
     *point += t.weight.back() * Eigen::Map<const Vector3>(nodes[i].X);
   }
-  PetscCheck(sum > 0, m.comm, PETSC_ERR_ARG_WRONG, "attachment %s: the sum of its weights is %g, must be positive", a.name.c_str(), sum);
   *point = a.at_given ? a.position : Vector3(*point / sum);
   for (std::size_t i = 0; i < nodes.size(); i++) {
     t.weight[i] /= sum;
     t.arm.push_back(Eigen::Map<const Vector3>(nodes[i].X) - *point);
   }
   t.tie = a.tie;
-  PetscCheck(nodes.size() >= 3 && Spread(t) > 1e-8, m.comm, PETSC_ERR_ARG_WRONG,
-             "attachment %s: its %zu nodes are on a line, so that they do not hold a frame; take nodes of a face", a.name.c_str(), nodes.size());
   if (t.tie == Tie::Rigid) {
     std::vector<PetscInt> next(x.node_first.size(), 0);
     next[rank] = x.own_multipliers;
@@ -221,7 +204,8 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   Vector3     corner[2];
   PetscFunctionBegin;
   const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
-  PetscCheck(fault.empty(), model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: %s", name.c_str(), fault.c_str());
+  PetscCall(Agree(model.comm, fault.empty() ? "" : "finite-element body " + name + ": " + fault, PETSC_ERR_ARG_WRONG));
+  PetscCall(CheckAttachments(model, body.attachments));
   SceneAccess::record(scene, [=, &model](Scene &s) {
     if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
   });
@@ -244,6 +228,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
     PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_INT, MPI_SUM, model.comm));
     PetscCheck(all > 0, model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: large displacements need elements, which this model does not have",
                name.c_str());
+    PetscCall(CheckElements(model, "finite-element body " + name + ": FeLaw::Large"));
     PetscCall(BringElements(*x));
   } else {
     PetscCall(ExtractBlocks(*x));

@@ -1,7 +1,8 @@
 /*
   Nodes of a finite-element body tied to frames, with y_n = x_n - r and arms A a_n of a frame at r with axes A:
 
-    rigidly:   x_n - r - A a_n = 0 of every node
+    rigidly:   x_n - r - A a_n = 0 of every node; with FeLaw::Small x_n - r - a_n - s x a_n = 0, s the frame's turn from its start: exact turns would strain
+               a face by half their square, and K, which is linear, would hold that against bending
     averaged:  sum w_n (y_n - A a_n) = 0,  sum w_n A d_n x y_n = 0,  d_n = a_n - c from the mean c = sum w_n a_n
 */
 #include "flexible/full_nodes.h"
@@ -27,13 +28,21 @@ protected:
   static BodyMotion &loaded(Bodies &B, PetscInt marker) { return B.now[B.marker[marker].body]; }
 };
 
+/* What is left of a turn B if its second order is left out: a vector of the axis' direction and the sine's length; by a further turn w it changes by D w */
+struct LinearTurn {
+  Matrix3 B, D;
+  Vector3 s;
+  explicit LinearTurn(const Matrix3 &b) : B(b), D((b.trace() * Matrix3::Identity() - b) / 2), s(b(2, 1) - b(1, 2), b(0, 2) - b(2, 0), b(1, 0) - b(0, 1)) { s /= 2; }
+};
+
 class RigidTies : public TieBatch
 {
 public:
   struct Instance {
-    NodePlace node;
-    PetscInt  lambda, group, marker;
-    Vector3   arm;
+    NodePlace       node;
+    PetscInt        lambda, group, marker;
+    Vector3         arm;
+    const FullBody *body;
   };
   std::vector<Instance> all;
 
@@ -55,7 +64,7 @@ public:
   {
     for (const Instance &e : all) {
       const BodyMotion &b   = frame(ev.bodies, e.marker);
-      const Vector3     phi = At(ev.u, e.node) - b.r - b.A * e.arm;
+      const Vector3     phi = At(ev.u, e.node) - b.r - Arm(e, b).at;
       for (int c = 0; c < 3; c++) ev.row(e.lambda + c, phi(c));
       AddRows(ev, e.node, load(ev, e));
     }
@@ -68,24 +77,46 @@ public:
     for (const Instance &e : all) {
       const BodyMotion &b = frame(ev.bodies, e.marker);
       const Vector3     l = load(ev, e);
-      const Matrix3     G = b.G, S = X(b.A * e.arm), turn = S * G;
+      const Arm         arm(e, b);
+      const Matrix3     G = b.G, turn = -arm.by_turn * G;
       for (double sign : {1., -1.}) {
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
         ev.sink.add(*slot++, Matrix3(sign * one), 3, 3);
       }
       ev.sink.add(*slot++, Matrix3(turn * ev.bodies.inStep(b)), 3, 3);
       ev.sink.add(*slot++, Matrix3(turn.transpose()), 3, 3);
-      ev.sink.add(*slot++, Matrix3(-G.transpose() * X(l) * turn * ev.bodies.inStep(b)), 3, 3);
+      ev.sink.add(*slot++, Matrix3(-G.transpose() * arm.momentByTurn(l) * G * ev.bodies.inStep(b)), 3, 3);
     }
   }
 
 private:
+  /* From the frame's origin to the node, and its derivative by a turn of the frame; a force l there has the moment by_turn^T l */
+  struct Arm {
+    Vector3 at, start;
+    Matrix3 by_turn;
+    bool    linear;
+    LinearTurn turn;
+
+    Arm(const Instance &e, const BodyMotion &b)
+      : start(e.body->rotation * e.arm), linear(e.body->law == FeLaw::Small), turn(linear ? Matrix3(b.A * e.body->rotation.transpose()) : Matrix3(Matrix3::Identity()))
+    {
+      at      = linear ? Vector3(start + turn.s.cross(start)) : Vector3(b.A * e.arm);
+      by_turn = linear ? Matrix3(-X(start) * turn.D) : Matrix3(-X(at));
+    }
+    Matrix3 momentByTurn(const Vector3 &l) const
+    {
+      if (!linear) return X(l) * X(at);
+      const Vector3 c = start.cross(l);
+      return -c * turn.s.transpose() - turn.B.transpose() * X(c) / 2;
+    }
+  };
+
   static Vector3 load(Evaluation &ev, const Instance &e)
   {
     BodyMotion   &b = loaded(ev.bodies, e.marker);
     const Vector3 l = Eigen::Map<const Vector3>(ev.u + e.lambda);
     b.f += l;
-    b.m += (b.A * e.arm).cross(l);
+    b.m += Arm(e, b).by_turn.transpose() * l;
     return l;
   }
 };
@@ -207,6 +238,7 @@ void Rigid(const FullExtension &x, const TieNodes &t, Localizer &l, RigidTies &b
     e.lambda = l.local(number);
     e.marker = l.marker(t.frame.id);
     e.arm    = t.arm[i];
+    e.body   = &x.spec;
     batch.all.push_back(e);
   }
 }

@@ -1,6 +1,7 @@
 /* Geometric stiffening of a body in modal coordinates; see stiffening.h. */
 #include "stiffening.h"
 #include "flexible/assembly.h"
+#include "flexible/body_check.h"
 #include "flexible/element.h"
 #include "flexible/exchange.h"
 #include "flexible/symmetric.h"
@@ -17,17 +18,13 @@ constexpr int      velocities = 6;  /* products of angular velocities: xx, yy, z
 
 PetscErrorCode CheckInput(const FeModel &model, const std::vector<Tied> &tied)
 {
-  long long   elements = (long long)model.elements.size(), all;
-  std::string problem;
+  long long elements = (long long)model.elements.size(), all;
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(&elements, &all, 1, MPI_LONG_LONG, MPI_SUM, model.comm));
   PetscCheck(all, model.comm, PETSC_ERR_ARG_WRONG,
              "geometric stiffening needs elements, and the model from \"%s\" has matrices alone; read it from a mesh (FeModel::readMesh)", model.source.c_str());
   PetscCheck(!tied.empty(), model.comm, PETSC_ERR_ARG_WRONG, "geometric stiffening needs an attachment: nothing else holds the body while its loads are found");
-  for (const FeElement &e : model.elements)
-    if (e.material < 0 || e.material >= (PetscInt)model.materials.size())
-      problem = "an element has material " + std::to_string(e.material) + " of " + std::to_string(model.materials.size());
-  PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
+  PetscCall(CheckElements(model, "geometric stiffening"));
   PetscFunctionReturn(0);
 }
 

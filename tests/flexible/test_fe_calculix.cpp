@@ -235,6 +235,48 @@ TEST(Calculix, RefusesSupports)
   EXPECT_SAYS(Refused(folder.name + "/whole"), "*BOUNDARY");
 }
 
+TEST(Calculix, IncompatibleModesHaveNodesOfTheirOwn)
+{
+  if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
+  Folder folder;
+  folder.write("brick.inp", std::string("*NODE, NSET=all\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n*ELEMENT, TYPE=C3D8I, ELSET=e\n1,1,2,3,4,5,6,7,8\n"
+                                        "*MATERIAL,NAME=S\n*ELASTIC\n1000.,0.3\n*DENSITY\n2.\n*SOLID SECTION,ELSET=e,MATERIAL=S\n") + store);
+  ASSERT_TRUE(folder.ccx("brick"));
+  EXPECT_SAYS(Refused(folder.name + "/brick"), "and C3D8I, which are not read; take C3D20");
+}
+
+/* Point masses, springs and wedges are in the matrices alone: what needs elements does without them by no accident. Reduced elements are taken as they are. */
+TEST(Calculix, ElementsThatAreNotAllOfTheModel)
+{
+  if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
+  Folder            folder;
+  const std::string nodes = "*NODE, NSET=all\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n9,2,0.1,0\n10,2,1,0.1\n11,2,0,1.2\n12,2,1,1\n",
+                    material = "*MATERIAL,NAME=S\n*ELASTIC\n1000.,0.3\n*DENSITY\n2.\n*SOLID SECTION,ELSET=e,MATERIAL=S\n",
+                    brick = "1,1,2,3,4,5,6,7,8\n", two = brick + "2,2,9,10,3,6,11,12,7\n", full = "*ELEMENT, TYPE=C3D8, ELSET=e\n";
+  const std::string sets = "*NSET,NSET=left\n1,4,5,8\n*NSET,NSET=right\n9,10,11,12\n";
+  const auto        says = [&](const char *stem, const std::string &elements) {
+    folder.write(std::string(stem) + ".inp", nodes + elements + sets + material + store);
+    EXPECT_TRUE(folder.ccx(stem));
+    FeModel    model(PETSC_COMM_SELF);
+    Scene      scene(PETSC_COMM_SELF);
+    FullFeBody fe;
+    ErrorTrap  trap;
+    EXPECT_EQ(model.readCalculix(folder.name + "/" + stem), 0) << trap.message;
+    const bool refused = fe.add(scene, "body", model, FullBody()) != 0;
+    Reduction  r;
+    r.attachments = {{"left"}, {"right"}};
+    r.modes       = 2;
+    r.stiffening  = true;
+    ReducedBody b;
+    EXPECT_EQ(Reduce(model, r, &b) != 0, refused);
+    return refused ? trap.message : std::string();
+  };
+  EXPECT_EQ(says("full", full + two), "");
+  EXPECT_SAYS(says("mass", full + two + "*ELEMENT, TYPE=MASS, ELSET=m\n3,10\n*MASS, ELSET=m\n1.\n"), "than the elements: 10. Springs, point masses");
+  EXPECT_SAYS(says("spring", full + two + "*ELEMENT, TYPE=SPRINGA, ELSET=s\n3,4,10\n*SPRING, ELSET=s\n\n800.\n"), "at 2 node(s)");
+  EXPECT_SAYS(says("wedge", full + brick + "*ELEMENT, TYPE=C3D6, ELSET=e\n2,2,9,3,6,11,7\n3,9,10,3,11,12,7\n"), "wedges");
+}
+
 TEST(Calculix, RefusesDamage)
 {
   if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
