@@ -21,6 +21,7 @@ constexpr PetscReal accuracy = 1e-10;
 constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes) */
 constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
+constexpr PetscInt  workspace = 100; /* percent more than MUMPS estimates, ICNTL(14): pivots change places where constraints are (FullBodyRanks.SlowestModes) */
 constexpr int       sweeps   = 6; /* of balancing: each takes the root of how far rows are from a size of 1 */
 
 /* The operators of D y = x, where D makes all rows of the matrix that is factored about as large (Ruiz, RAL-TR-2001-034): constraints have entries of 1
@@ -60,6 +61,29 @@ PetscErrorCode Balance(const Mat given[3], PetscReal shift, Balanced *b)
   PetscFunctionReturn(0);
 }
 
+/* The factor is made here, before SLEPc gives its solver the matrix to be factored, so that MUMPS gets more workspace; A: of the same size and type */
+PetscErrorCode GiveRoom(KSP ksp, Mat A)
+{
+  PC            pc;
+  MatSolverType package = nullptr;
+  PetscBool     direct, mumps = PETSC_FALSE;
+  Mat           F;
+  PetscFunctionBegin;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
+  if (!direct) PetscFunctionReturn(0);
+  PetscCall(PCFactorGetMatSolverType(pc, &package));
+  if (package) PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
+  if (!mumps) PetscFunctionReturn(0);
+  PetscCall(KSPSetOperators(ksp, A, A));
+  PetscCall(PCFactorSetUpMatSolverType(pc));
+  PetscCall(PCFactorGetMatrix(pc, &F));
+#if defined(PETSC_HAVE_MUMPS)
+  PetscCall(MatMumpsSetIcntl(F, 14, workspace));
+#endif
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
 {
   ST       st;
@@ -89,6 +113,7 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 #endif
   PetscCall(PEPSetFromOptions(pep));
+  PetscCall(GiveRoom(ksp, operators[0]));
   PetscFunctionReturn(0);
 }
 
@@ -238,12 +263,14 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCall(SlepcInitialized(&ready));
   if (!ready) PetscCall(SlepcInitializeNoArguments());
   PetscCall(Search(of, given, shift, count, modes));
-  PetscCall(Worst(given, shift, *modes, &left, &frequency));  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
+  PetscCall(Worst(given, shift, *modes, &left, &frequency));
+  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
   const PetscReal slowest = Slowest(*modes, shift);
   if (slowest > beside * std::abs(shift) && (left > balanced || slowest == std::abs(modes->front().value))) { /* about rigid motions only where need be */
     shift = std::copysign(slowest, shift);
     PetscCall(Search(of, given, shift, count, modes));
-    PetscCall(Worst(given, shift, *modes, &left, &frequency));  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
+    PetscCall(Worst(given, shift, *modes, &left, &frequency));
+    PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
   }
   PetscCheck((PetscInt)modes->size() >= count, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): %d of %" PetscInt_FMT " modes about %g 1/s were found; a scene of few unknowns has all of them by Linearization::modes(), else try another shift or -scene_modes_pep_ncv",
