@@ -158,6 +158,25 @@ class Beam(unittest.TestCase):
         body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6)
         np.testing.assert_allclose(body.frequencies, self.body.frequencies, rtol=1e-7)
 
+    def test_sets_by_condition(self):
+        """An array of True and False names the nodes where it is True"""
+        model = flexible.FeModel.from_matrices(self.model.K, self.model.M, self.model.coordinates)
+        model.add_set("root", model.coordinates[:, 0] < 1e-9)
+        np.testing.assert_array_equal(model.sets["root"], self.model.sets["root"])
+        with self.assertRaisesRegex(ValueError, "each of the 128 own nodes"):
+            model.add_set("short", [True, False])
+        with self.assertRaisesRegex(TypeError, "set half: nodes must be integers"):
+            model.add_set("half", [0.5])
+
+    def test_late_attachment(self):
+        """One that is asked for after the run was made is no body of it"""
+        scene = h.Scene()
+        b = scene.add("beam", h.FlexibleBody(self.body))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        now = scene.run().snapshot()
+        with self.assertRaisesRegex(h.Error, "beam.tip came too late"):
+            now.motion(b.attachment("tip").marker())
+
     def test_whole_model(self):
         """A free beam that falls: each node by g t^2 / 2"""
         scene = h.Scene(gravity=(0, 0, -9.81))
@@ -168,7 +187,27 @@ class Beam(unittest.TestCase):
         self.assertAlmostEqual(run["z"][-1], -0.5 * 9.81 * 0.01**2, delta=1e-8)
 
     def test_mistakes(self):
+        try:
+            import scipy.sparse
+
+            eye = scipy.sparse.eye(6, format="csr")
+            for call, kind, text in ((lambda: flexible.FeModel.from_matrices(eye, eye, np.zeros((3, 2))), ValueError, "must have .own nodes, 3."),
+                                     (lambda: flexible.FeModel.from_matrices(eye * 1j, eye, np.zeros((2, 3))), TypeError, "K is complex"),
+                                     (lambda: flexible.FeModel.from_matrices(eye, np.eye(6), np.zeros((2, 3))), TypeError, "M is a ndarray, must be a sparse")):
+                with self.assertRaisesRegex(kind, text):
+                    call()
+        except ImportError:
+            pass
+        file = os.path.join(self.folder.name, "beam.msh")
         for call, kind, text in ((lambda: flexible.reduce(self.model, [], method="guess"), ValueError, "craig_bampton"),
+                                 (lambda: flexible.FeModel.from_mesh(file, (2e11, .3)), TypeError, "must be Material"),
+                                 (lambda: flexible.FeModel.from_mesh(file, {"beam": "steel"}), TypeError, "volume 'beam' is 'steel'"),
+                                 (lambda: flexible.reduce(self.model, ["root"]), TypeError, "list of Attachment"),
+                                 (lambda: flexible.reduce(self.model, flexible.Attachment("root")), TypeError, "list of Attachment"),
+                                 (lambda: flexible.reduce(self.model, [], modes=5.5), TypeError, "modes must be integers"),
+                                 (lambda: flexible.reduce(self.model, [], node_sets="tip"), TypeError, "list of names"),
+                                 (lambda: flexible.FullFeBody(h.Scene(), "b", self.body), TypeError, "must be of a FeModel"),
+                                 (lambda: h.Scene().add("b", h.FlexibleBody(self.body, damping=(100, 0.01))), ValueError, "list of .frequency, ratio."),
                                  (lambda: flexible.reduce(self.model, [flexible.Attachment("hub")]), h.Error, "hub"),
                                  (lambda: flexible.Attachment("tip", tie="glue")._fields(), ValueError, "rigid"),
                                  (lambda: flexible.FeModel.from_mesh("no such.msh", STEEL), h.Error, "no such.msh")):

@@ -8,6 +8,7 @@
 Arrays are those of this rank where a model is distributed. All functions that read, reduce or write are collective.
 """
 
+import operator
 import os
 import tempfile
 from dataclasses import asdict, dataclass, field
@@ -80,6 +81,14 @@ class Elements(NamedTuple):
         return {order[t][0]: self.nodes[types == t][:, list(order[t][1])] for t in dict.fromkeys(self.types)}
 
 
+def _attachments(attachments):
+    """Their fields"""
+    for a in [attachments] if isinstance(attachments, (str, Attachment)) else attachments:
+        if not isinstance(a, Attachment) or a is attachments:
+            raise TypeError("attachments are %r, must be a list of Attachment" % (attachments,))
+    return [a._fields() for a in attachments]
+
+
 def _comm(comm):
     return PETSc.COMM_WORLD if comm is None else PETSc.Comm(comm)
 
@@ -109,7 +118,7 @@ class FeModel:
     def from_mesh(cls, file, materials, comm=None):
         """A Gmsh mesh of tetrahedra or bricks; materials, `Material` or triples, by the name of physical volumes, "" for all others."""
         model = cls(comm)
-        model._core.read_mesh(str(file), {name: tuple(m) for name, m in ({"": materials} if isinstance(materials, tuple) else materials).items()})
+        model._core.read_mesh(str(file), {name: _material(m, name) for name, m in (materials if isinstance(materials, dict) else {"": materials}).items()})
         return model
 
     @classmethod
@@ -130,12 +139,20 @@ class FeModel:
     def from_matrices(cls, K, M, coordinates, comm=None):
         """Matrices in memory, petsc4py's or scipy.sparse ones (on one rank), with both triangles; coordinates (own nodes, 3)."""
         model = cls(PETSc.COMM_SELF if comm is None and not isinstance(K, PETSc.Mat) else K.getComm() if comm is None else comm)
-        model._core.set_matrices(_matrix(K, model.comm), _matrix(M, model.comm), np.asarray(coordinates, dtype=float).reshape(-1))
+        x = np.asarray(coordinates, dtype=float)
+        if x.size and (x.ndim != 2 or x.shape[1] != 3):
+            raise ValueError("coordinates have the shape %r, must have (own nodes, 3): a row for each node" % (x.shape,))
+        model._core.set_matrices(_matrix(K, "K", model.comm), _matrix(M, "M", model.comm), x.reshape(-1))
         return model
 
     def add_set(self, name, nodes):
-        """A named set of own nodes, by global number from 0 on."""
-        self._core.add_set(name, [int(n) for n in nodes])
+        """A named set of own nodes, by global number from 0 on, or as an array of own, True or False, that says which."""
+        x = np.asarray(nodes)
+        if x.dtype == bool:
+            if x.shape != (self.own,):
+                raise ValueError("set %s: True or False is needed for each of the %d own nodes, the shape is %r" % (name, self.own, x.shape))
+            x = self.first + np.flatnonzero(x)
+        self._core.add_set(name, _integers(x, "set %s: nodes" % name))
         return self
 
     def select(self, where):
@@ -159,10 +176,31 @@ class FeModel:
     M = property(lambda self: self._core.M)
 
 
-def _matrix(A, comm):
+def _integers(x, what):
+    """A list of Python's integers"""
+    try:
+        return [operator.index(n) for n in x]
+    except TypeError:
+        raise TypeError("%s must be integers, are %r" % (what, x)) from None
+
+
+def _material(m, name):
+    """Three numbers"""
+    try:
+        young, poisson, density = (float(x) for x in m)
+    except (TypeError, ValueError):
+        raise TypeError("the material of %s is %r, must be Material(young, poisson, density)" % ("volume %r" % name if name else "the mesh", m)) from None
+    return young, poisson, density
+
+
+def _matrix(A, name, comm):
     if isinstance(A, PETSc.Mat):
         return A
+    if not hasattr(A, "tocsr"):
+        raise TypeError("%s is a %s, must be a sparse matrix of scipy (scipy.sparse.csr_matrix(%s)) or one of petsc4py" % (name, type(A).__name__, name))
     A = A.tocsr()
+    if np.iscomplexobj(A):
+        raise TypeError("%s is complex, must be real; damping of structure goes into the scene's FlexibleBody" % name)
     mat = PETSc.Mat().createAIJ(A.shape, csr=(A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data.astype(float)), comm=comm)
     mat.assemble()
     return mat
@@ -316,8 +354,14 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
         raise ValueError("method is %r, must be 'craig_bampton', 'free_free' or 'static'" % (method,))
     loads = [(name, p, True) if isinstance(p, str) else (name, p[0], bool(p[1])) for name, p in (pressures or {}).items()]
     loads += [(name, dict(forces)) for name, forces in (nodal_loads or {}).items()]
-    core = _flexible.reduce(model._core, dict(node_sets=list(node_sets), nodes=list(nodes), loads=loads, attachments=[a._fields() for a in attachments], method=method, modes=modes, max_frequency=max_frequency,
-                                              keep_below=keep_below, keep=list(keep), stiffening=stiffening, all_nodes=all_nodes, progress=progress))
+    if not isinstance(model, FeModel):
+        raise TypeError("the model is %r, must be a FeModel" % (model,))
+    if isinstance(node_sets, str):
+        raise TypeError("node_sets is %r, must be a list of names" % node_sets)
+    modes = modes if modes is None else _integers([modes], "modes")[0]
+    core = _flexible.reduce(model._core, dict(node_sets=list(node_sets), nodes=_integers(nodes, "nodes"), loads=loads, attachments=_attachments(attachments), method=method,
+                                              modes=modes, max_frequency=max_frequency, keep_below=keep_below, keep=_integers(keep, "keep"), stiffening=stiffening,
+                                              all_nodes=all_nodes, progress=progress))
     body = ReducedBody(core)
     return body.add_stress_modes(model) if stress else body
 
@@ -378,12 +422,14 @@ class FullFeBody:
     """
 
     def __init__(self, scene, name, model, body=FullBody()):
+        if not isinstance(model, FeModel) or not isinstance(body, FullBody):
+            raise TypeError("%s is made of %r and %r, must be of a FeModel and a FullBody" % (name, model, body))
         if body.law not in ("small", "large"):
             raise ValueError("%s: law is %r, must be 'small' or 'large'" % (name, body.law))
         self._scene, self._model, self._core, self.name = scene, model, _flexible.FullFeBody(), name
         self._placed = body.position, body.rotation
         scene._describe()
-        fields = dict(vars(body), attachments=[a._fields() for a in body.attachments])
+        fields = dict(vars(body), attachments=_attachments(body.attachments))
         self._core.add(scene._core, name, model._core, fields)
         scene._keep.append(model)
 
