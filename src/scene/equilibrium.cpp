@@ -25,20 +25,25 @@ namespace
 constexpr int    equilibrium_iterations = 2000;
 constexpr double balanced       = 1e-10; /* of forces, times the largest of the scene; of constraints, times its size */
 constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and from its first value */
-constexpr double downhill_growth = 2, hollow = 0.999; /* of h in a hollow: where forces fall to this part in a step */
+constexpr double downhill_growth = 2; /* of h in one step on the way down a hollow */
+constexpr double unchanged = 0.999;               /* part of the forces: a step that leaves more has been taken back */
 constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
 constexpr int    still_for = 10;        /* steps in a row at rest: what is left is noise, up to */
 constexpr double noise = 1e-3;          /* of the forces, as of a stiff mesh far from the origin (Equilibrium.AMeshFarFromTheOrigin) */
+constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
 constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
 
 struct Equilibrium : StillSystem {
-  Vec      start = nullptr;
+  Vec      start = nullptr, undamped = nullptr;
   double   scale = 0; /* of forces */
   PetscInt iterations = 0;
 
   using StillSystem::StillSystem;
-  ~Equilibrium() { PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&start)); }
+  ~Equilibrium()
+  {
+    for (Vec *x : {&start, &undamped}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
+  }
 };
 
 /* What became of a step: how far it went, and the work over it of the forces that were left before and after it */
@@ -102,15 +107,18 @@ PetscErrorCode Newton(Equilibrium &E, double *reach)
   PetscFunctionReturn(0);
 }
 
-/* F: what is left of the equations of the step from U to next */
+/* F: what is left of the equations of the step from U to next. Damping is that of slow motion: dry friction, which saturates, would throw back every
+   step but those of its slip velocity, and does not move equilibrium (SceneEquilibrium.ALeverOnRoughGround). */
 PetscErrorCode StepResidual(Equilibrium &E, double h, Unbalanced &left)
 {
   PetscFunctionBegin;
-  PetscCall(VecWAXPY(E.V, -1, E.U, E.next));
-  PetscCall(VecScale(E.V, 1 / h));
-  PetscCall(VecCopy(E.V, E.A));
-  PetscCall(VecScale(E.A, 1 / h));
+  PetscCall(VecWAXPY(E.A, -1, E.U, E.next));
+  PetscCall(VecScale(E.A, 1 / (h * h)));
+  PetscCall(VecCopy(E.A, E.V));
+  PetscCall(VecScale(E.V, slow * h));
+  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.A, E.undamped));
   PetscCall(Residual(E.R, E.t, E.next, E.V, E.A, E.F));
+  PetscCall(VecAXPBY(E.F, 1 - 1 / slow, 1 / slow, E.undamped));
   PetscCall(E.measure(E.F, left));
   PetscFunctionReturn(0);
 }
@@ -132,7 +140,7 @@ PetscErrorCode Correct(Equilibrium &E, double h, double before, Attempt &a, Unba
     PetscCall(StepResidual(E, h, left));
     if (left.force <= solved * before) break;
     if (a.corrections == most_corrections) PetscFunctionReturn(0);
-    PetscCall(Jacobian(E.R, E.t, E.next, E.V, E.A, 1 / h, 1 / (h * h), E.J));
+    PetscCall(Jacobian(E.R, E.t, E.next, E.zero, E.A, 1 / h, 1 / (h * h), E.J));
     PetscCall(Newton(E, &last));
     if (!(last <= a.reach)) PetscFunctionReturn(0);
   }
@@ -164,8 +172,8 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 }
 
 /*
-  Of h: as the forces fall. Where they fall along the step as in a hollow, h need not wait for that, as long as the next
-  step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
+  Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong
+  (SceneEquilibrium.StrongDamping), h need not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
   against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding. A step that its corrections have
   taken back to where it began has gone too far into forces that set in on its way: h shrinks (SceneEquilibrium.ABallOnAPlane).
 */
@@ -175,8 +183,9 @@ double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbal
   if (after.step <= at_rest && after.force <= rounding * E.scale) return largest_growth;
   if (after.step <= at_rest && after.force <= noise * E.scale && a.corrections == 0) return std::max(falling, downhill_growth);
   if (after.step <= at_rest) return a.corrections > 0 && after.force > hollow * before ? 0.25 : falling;
+  if (after.step <= at_rest) return a.corrections > 0 && after.force > unchanged * before ? 0.25 : falling;
   if (a.work[0] <= 0) return 0.25;
-  const bool in_hollow = a.work[1] > 0 && a.work[1] < hollow * a.work[0];
+  const bool in_hollow = a.work[1] > 0 && a.work[1] < a.work[0];
   return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);
 }
 
@@ -227,6 +236,7 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   PetscFunctionBegin;
   PetscCall(E.create(U, "scene_equilibrium_"));
   PetscCall(VecDuplicate(U, &E.start));
+  PetscCall(VecDuplicate(U, &E.undamped));
   PetscCall(Relax(E, &found, at));
   PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "

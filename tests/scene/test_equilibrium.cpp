@@ -1,4 +1,5 @@
 /* Static equilibrium where forces set in along the way: contacts and stops. */
+#include "hhtdae/helpers.h"
 #include "scene/kernels/contact_law.h"
 #include "scene_start.h"
 
@@ -75,4 +76,40 @@ TEST(SceneEquilibrium, ABallOnAStop)
       const double d = s.depth();
       EXPECT_NEAR(ElasticForce<double>(Law(stiffness, 1, 1e-4 * std::max(z, 1.)), d), g, 1e-6 * g) << stiffness << " " << z << ": " << d;
     }
+}
+
+/* A rod whose end falls on rough ground and slides there before it comes to rest: as without friction, whose slip velocity is no limit of the way */
+TEST(SceneEquilibrium, ALeverOnRoughGround)
+{
+  double height[2];
+  for (int rough = 0; rough < 2; rough++) {
+    Scene     scene(PETSC_COMM_SELF);
+    RigidBody b;
+    b.mass            = 2;
+    b.inertia         = 0.1 * Matrix3::Identity();
+    b.position        = {0.5, 0, 0.6};
+    const Body    rod = scene.add("rod", b);
+    const Matrix3 y   = hhtdae::axesAlong(Vector3::UnitY());
+    scene.gravity({0, 0, -g});
+    scene.add("pin", Revolute{scene.markerAt(rod, {0, 0, 0.6}, y), scene.markerAt(scene.ground(), {0, 0, 0.6}, y)});
+    SpherePlane ground{scene.marker(rod, {0.5, 0, 0}), scene.marker(scene.ground()), 0.1};
+    ground.law.friction = 0.3 * rough;
+    scene.add("ground", ground);
+    scene.start().equilibrium = true;
+    must(scene.setUp());
+    height[rough] = DataOf(scene).bodies[rod.id].r(2);
+  }
+  EXPECT_NEAR(height[1], height[0], 1e-9);
+}
+
+/* Where friction in a joint and a damper let things but creep, forces fall slowly: steps grow all the same */
+TEST(SceneEquilibrium, StrongDamping)
+{
+  Guided       s(1);
+  SpringDamper spring{s.i, s.scene.marker(s.scene.ground(), {0, 0, 3})};
+  spring.stiffness = 100;
+  spring.damping   = 1e7;
+  spring.length    = 1;
+  s.scene.add("spring", spring);
+  EXPECT_NEAR(s.depth(), 0.1 - 1, 1e-7);
 }
