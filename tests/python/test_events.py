@@ -197,6 +197,35 @@ class Reactions(unittest.TestCase):
         self.assertEqual(len(seen), 1)
 
 
+class Checkpoints(unittest.TestCase):
+    def test_resumed_bit_for_bit(self):
+        """After an event, also where the run is begun anew after the checkpoint, and after one that has ended it"""
+        def swing(terminal):
+            scene = h.Scene(gravity=(0, -G, 0))
+            load = scene.parameter("load", 0.)
+            rod = scene.add("rod", h.RigidBody(inertia=h.inertia.box(1, (1, .1, .1)), position=(0.5, 0, 0)))
+            scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0))
+            tip = rod.marker((0.5, 0, 0))
+            scene.add("load", h.UserForce(tip, force=[load, 0, 0]))
+            scene.channel("x", h.displacement(tip, 0))
+            run = scene.run(tolerance=1e-5)
+            run.event(h.time() - 0.3, terminal=terminal)
+            return run, load
+
+        def on(run, load):
+            load.set(3.)
+            run.restart()
+            return run.solve(1.)["x"][-1]
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "checkpoint")
+            for terminal in (False, True):
+                run, load = swing(terminal)
+                run.solve(0.5)
+                run.save(file)
+                other, its_load = swing(terminal)
+                self.assertEqual(on(other.load(file), its_load), on(run, load))
+
+
 class Outputs(unittest.TestCase):
     def test_nothing_that_was_taken_back(self):
         """CSV, balance, animation, on_step and samples end at an event and go on behind it"""

@@ -189,6 +189,8 @@ class Run(Channels):
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
             self._open().setPostStep(self._look)
+            if self.steps:
+                self._project_restarts()
 
     def _event_value(self, k, time):
         self._now.take(time)
@@ -224,13 +226,12 @@ class Run(Channels):
             self._passed = []
             self._serial += 1
             self.scene._core.solve(ts)
+            self._project_restarts()
             if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
                 return
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
             self._note_state()
-            if not PETSc.Options().hasName("ts_hhtdae_start"):
-                integrator.set_start(ts, "project")  # interpolated velocities meet the constraints as the step's tolerance goes
             for k in here:
                 self._signs.note(k, time)
                 if self._events[k][1] is not None and self._signs.last[k][1] < 1e-12 * abs(time):  # Bounces.test_without_end
@@ -240,6 +241,12 @@ class Run(Channels):
             self._ended = any(self._events[k][2] for k in here)
             if self._ended or time >= self._open().getMaxTime():
                 return
+
+    def _project_restarts(self):
+        """Interpolated velocities, with which a step begins after an event, meet the constraints as the step's tolerance goes. That holds for all restarts of a
+        run with events that has begun, so that it goes on from a checkpoint as it has gone on itself: test Checkpoints of test_events.py."""
+        if self._events and not PETSc.Options().hasName("ts_hhtdae_start"):
+            integrator.set_start(self._open(), "project")
 
     def restart(self) -> None:
         """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
@@ -362,6 +369,7 @@ class Run(Channels):
         with temporary_options(self._options):
             _core.set_up(ts)  # before it, the file's name would only be noted
             integrator.checkpoint_load(ts, file)
+            self._project_restarts()
         if self._recorder:
             self._recorder.resume()
         return self
