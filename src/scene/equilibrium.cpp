@@ -172,8 +172,8 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 }
 
 /*
-  Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong
-  (SceneEquilibrium.StrongDamping), h need not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
+  Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong (SceneEquilibrium.StrongDamping), h need
+  not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
   against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding. A step that its corrections have
   taken back to where it began has gone too far into forces that set in on its way: h shrinks (SceneEquilibrium.ABallOnAPlane).
 */
@@ -182,7 +182,6 @@ double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbal
   const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
   if (after.step <= at_rest && after.force <= rounding * E.scale) return largest_growth;
   if (after.step <= at_rest && after.force <= noise * E.scale && a.corrections == 0) return std::max(falling, downhill_growth);
-  if (after.step <= at_rest) return a.corrections > 0 && after.force > hollow * before ? 0.25 : falling;
   if (after.step <= at_rest) return a.corrections > 0 && after.force > unchanged * before ? 0.25 : falling;
   if (a.work[0] <= 0) return 0.25;
   const bool in_hollow = a.work[1] > 0 && a.work[1] < a.work[0];
