@@ -7,6 +7,7 @@
   slow modes and infinite ones look alike. So the search is repeated about what it has found, and the modes are held against the equations.
 */
 #include "hhtdae/modes.h"
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <slepcpep.h>
@@ -22,6 +23,10 @@ constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond 
 constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
 constexpr PetscInt  workspace = 100; /* percent more than MUMPS estimates, ICNTL(14): pivots change places where constraints are (FullBodyRanks.SlowestModes) */
+constexpr PetscReal as_fast  = 1e-2; /* part of the value: modes that close may be of one value, of which each combination is one, found with less digits */
+constexpr PetscReal apart    = 0.1;  /* part of its norm that a shape has beside those of modes as fast, or it is none of its own (SmallBodies.SlowestModesOfAFreeBody) */
+constexpr PetscReal accurate = 1e-6; /* values differ by less than this part are not told apart */
+constexpr int       searches = 20, failures = 3; /* at most, from other random vectors (SmallBodies.SlowestModesOfEqualParts); without a Schur form */
 constexpr int       sweeps   = 6; /* of balancing: each takes the root of how far rows are from a size of 1 */
 
 /* The operators of D y = x, where D makes all rows of the matrix that is factored about as large (Ruiz, RAL-TR-2001-034): constraints have entries of 1
@@ -189,6 +194,12 @@ PetscErrorCode Worst(const Mat given[3], PetscReal shift, const std::vector<Mode
   PetscFunctionReturn(0);
 }
 
+void Sort(PetscInt count, std::vector<Mode> *modes)
+{
+  std::stable_sort(modes->begin(), modes->end(), [](const Mode &a, const Mode &b) { return std::abs(a.value) < std::abs(b.value); });
+  if ((PetscInt)modes->size() > count) modes->resize(count);
+}
+
 /* Of pairs the one with a positive imaginary part; the `count` slowest of all */
 PetscErrorCode Collect(const Linearization &of, PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
 {
@@ -221,8 +232,7 @@ PetscErrorCode Collect(const Linearization &of, PEP pep, const Balanced &by, Pet
   }
   PetscCall(VecDestroy(&re));
   PetscCall(VecDestroy(&im));
-  std::stable_sort(modes->begin(), modes->end(), [](const Mode &a, const Mode &b) { return std::abs(a.value) < std::abs(b.value); });
-  if ((PetscInt)modes->size() > count) modes->resize(count);
+  Sort(count, modes);
   PetscFunctionReturn(0);
 }
 
@@ -234,16 +244,136 @@ PetscReal Slowest(const std::vector<Mode> &modes, PetscReal shift)
   return 0;
 }
 
+/* Takes from a shape its parts along unit vectors, and leaves its norm */
+PetscErrorCode Orthogonalize(MPI_Comm comm, const std::vector<Eigen::VectorXcd> &units, Eigen::VectorXcd *x, PetscReal *norm)
+{
+  PetscFunctionBegin;
+  for (int twice = 0; twice < 2; twice++)
+    for (const Eigen::VectorXcd &e : units) {
+      std::complex<double> product = e.dot(*x);
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &product, 1, MPI_CXX_DOUBLE_COMPLEX, MPI_SUM, comm));
+      *x -= product * e;
+    }
+  *norm = x->squaredNorm();
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm, 1, MPIU_REAL, MPI_SUM, comm));
+  *norm = PetscSqrtReal(*norm);
+  PetscFunctionReturn(0);
+}
+
+/* The shape in the balanced unknowns: beside multipliers and rigid motions, in units of their own, others would not be seen */
+PetscErrorCode BalancedShape(const Mode &m, const Balanced &by, Eigen::VectorXcd *x)
+{
+  const PetscScalar *d;
+  PetscFunctionBegin;
+  *x = Eigen::VectorXcd::Map(m.shape.data(), (Eigen::Index)m.shape.size());
+  PetscCall(VecGetArrayRead(by.D, &d));
+  for (Eigen::Index i = 0; i < x->size(); i++) (*x)[i] /= d[i];
+  PetscCall(VecRestoreArrayRead(by.D, &d));
+  PetscFunctionReturn(0);
+}
+
+/* Adds the mode if its shape is no combination of those that are there and as fast */
+PetscErrorCode AddNew(const Mode &m, const Balanced &by, PetscReal shift, std::vector<Mode> *modes, bool *added)
+{
+  const MPI_Comm                comm = PetscObjectComm((PetscObject)by.D);
+  std::vector<Eigen::VectorXcd> units;
+  Eigen::VectorXcd              x;
+  PetscReal                     norm, whole;
+  PetscFunctionBegin;
+  for (const Mode &k : *modes) {
+    const bool rest = AtRest(m, *modes, shift) && AtRest(k, *modes, shift);
+    if (!rest && std::abs(k.value - m.value) > as_fast * std::abs(m.value)) continue;
+    PetscCall(BalancedShape(k, by, &x));
+    PetscCall(Orthogonalize(comm, {}, &x, &whole));
+    PetscCall(Orthogonalize(comm, units, &x, &norm));
+    if (norm > accurate * whole) units.push_back(x / norm);
+  }
+  PetscCall(BalancedShape(m, by, &x));
+  PetscCall(Orthogonalize(comm, {}, &x, &whole));
+  PetscCall(Orthogonalize(comm, units, &x, &norm));
+  *added = norm > apart * whole;
+  if (*added) modes->push_back(m);
+  PetscFunctionReturn(0);
+}
+
+/* PEPSolve(); SLEPc's Schur form does not always come to an end beside many values 0, from other vectors it does */
+PetscErrorCode Solved(PEP pep, bool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscPushErrorHandler(PetscIgnoreErrorHandler, nullptr));
+  *solved = PEPSolve(pep) == 0;
+  PetscCall(PetscPopErrorHandler());
+  PetscFunctionReturn(0);
+}
+
+/* Adds what is new among the slowest */
+PetscErrorCode Merge(const Linearization &of, const Mat given[3], PEP pep, const Balanced &b, PetscReal shift, PetscInt count, std::vector<Mode> *modes, int *news)
+{
+  std::vector<Mode> found;
+  Balanced          here;
+  PetscReal         at = 0;
+  PetscFunctionBegin;
+  *news = 0;
+  PetscCall(Collect(of, pep, b, count, &found));
+  if (modes->empty()) {
+    *modes = found;
+    *news  = (int)found.size();
+    PetscFunctionReturn(0);
+  }
+  const PetscReal slow = (PetscInt)modes->size() < count ? PETSC_MAX_REAL : (1 - accurate) * std::abs(modes->back().value);
+  for (const Mode &m : found) {
+    const PetscReal where = AtRest(m, *modes, shift) ? std::abs(shift) : std::abs(m.value);
+    bool            added = false;
+    if (std::abs(m.value) >= slow) continue;
+    if (!(where <= beside * at && at <= beside * where)) {
+      PetscCall(Destroy(&here));
+      PetscCall(Balance(given, where, &here));
+      at = where;
+    }
+    PetscCall(AddNew(m, here, shift, modes, &added));
+    *news += added;
+  }
+  PetscCall(Destroy(&here));
+  Sort(count, modes);
+  PetscFunctionReturn(0);
+}
+
+/* A Krylov space from one vector has one vector of each value, and others of a multiple one by rounding alone: so it is searched from other ones until
+   there is nothing new among the slowest */
 PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shift, PetscInt count, std::vector<Mode> *modes)
 {
-  Balanced b;
-  PEP      pep;
+  Balanced    b;
+  PEP         pep = nullptr;
+  Vec         begin;
+  PetscRandom numbers;
+  bool        solved;
   PetscFunctionBegin;
-  PetscCall(PEPCreate(PetscObjectComm((PetscObject)given[0]), &pep));
+  modes->clear();
   PetscCall(Balance(given, shift, &b));
-  PetscCall(SetUp(pep, b.operators, count, shift));
-  PetscCall(PEPSolve(pep));
-  PetscCall(Collect(of, pep, b, count, modes));
+  PetscCall(VecDuplicate(b.D, &begin));
+  PetscCall(PetscRandomCreate(PetscObjectComm((PetscObject)given[0]), &numbers));
+  for (int k = 0, news = 1, failed = 0; k < searches && news > 0; k++) {
+    if (!pep) {
+      PetscCall(PEPCreate(PetscObjectComm((PetscObject)given[0]), &pep));
+      PetscCall(SetUp(pep, b.operators, count, shift));
+    }
+    if (k > 0) {
+      PetscCall(VecSetRandom(begin, numbers));
+      PetscCall(PEPSetInitialSpace(pep, 1, &begin));
+    }
+    if (modes->empty() && failed == failures) {
+      PetscCall(PEPSolve(pep)); /* the error for the user */
+      solved = true;
+    } else PetscCall(Solved(pep, &solved));
+    if (solved) PetscCall(Merge(of, given, pep, b, shift, count, modes, &news));
+    else {
+      PetscCall(PEPDestroy(&pep));
+      if (failed++ == failures) break;
+    }
+    PetscCall(PetscInfo(given[0], "search %d about %g 1/s: %s, %d modes more\n", k + 1, (double)shift, solved ? "done" : "no Schur form", news));
+  }
+  PetscCall(PetscRandomDestroy(&numbers));
+  PetscCall(VecDestroy(&begin));
   PetscCall(PEPDestroy(&pep));
   PetscCall(Destroy(&b));
   PetscFunctionReturn(0);
@@ -254,12 +384,17 @@ PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shi
 PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector<Mode> *modes, PetscReal shift)
 {
   Mat       given[3];
+  PetscInt  unknowns;
   PetscReal left, frequency;
   PetscBool ready;
   PetscFunctionBegin;
   PetscCall(of.operators(&given[2], &given[1], &given[0]));
   const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
   PetscCheck(count > 0, comm, PETSC_ERR_ARG_OUTOFRANGE, "SlowestModes(): the number of modes is %" PetscInt_FMT ", it must be positive", count);
+  PetscCheck(std::isfinite(shift), comm, PETSC_ERR_ARG_OUTOFRANGE, "SlowestModes(): the shift is %g 1/s, it must be finite", (double)shift);
+  PetscCall(MatGetSize(given[0], &unknowns, nullptr));
+  PetscCheck(2 * count < unknowns, comm, PETSC_ERR_ARG_OUTOFRANGE,
+             "SlowestModes(): %" PetscInt_FMT " modes are too many of %" PetscInt_FMT " unknowns for a search; Linearization::modes() has all modes of so small a scene", count, unknowns);
   PetscCall(SlepcInitialized(&ready));
   if (!ready) PetscCall(SlepcInitializeNoArguments());
   PetscCall(Search(of, given, shift, count, modes));

@@ -195,6 +195,36 @@ TEST(SmallBodies, SlowestModesAreChecked)
   EXPECT_TRUE(trap.says("without balance")) << trap.message;
 }
 
+/* A value of many modes: a search has as many of them as rounding tells apart, at first nine of twelve here */
+TEST(SmallBodies, SlowestModesOfEqualParts)
+{
+  Scene             scene(PETSC_COMM_SELF);
+  std::vector<Mode> slow;
+  for (int k = 0; k < 42; k++) {
+    PointMass m;
+    m.position          = {double(k), 0, 0};
+    const Body   b      = scene.add("", m);
+    const Marker i      = scene.marker(b), j = scene.marker(scene.ground(), m.position);
+    SpringDamper spring{i, scene.marker(scene.ground(), m.position - Vector3::UnitZ())};
+    spring.stiffness = k < 12 ? 4 : 13 + k;
+    scene.add("", InLine{i, j});
+    scene.add("", spring);
+  }
+  const Taken t(scene);
+  must(SlowestModes(t.small, 14, &slow));
+  ASSERT_EQ(slow.size(), 14u);
+  for (int k = 0; k < 12; k++) EXPECT_NEAR(std::abs(slow[k].value), 2, 1e-8) << k;
+  for (int k = 12; k < 14; k++) EXPECT_NEAR(std::abs(slow[k].value), std::sqrt(13. + k), 1e-8) << k;
+  Complexs shapes(12, (Eigen::Index)slow[0].shape.size());
+  for (int k = 0; k < 12; k++) shapes.row(k) = Eigen::Map<const Complexs>(slow[k].shape.data(), 1, shapes.cols()).normalized();
+  EXPECT_EQ(Eigen::FullPivLU<Complexs>(shapes).setThreshold(1e-6).rank(), 12);
+  for (const auto &wrong : {std::pair<PetscInt, double>{1000, 1}, {3, NAN}}) {
+    ErrorTrap trap;
+    EXPECT_NE(SlowestModes(t.small, wrong.first, &slow, wrong.second), 0);
+    EXPECT_TRUE(trap.says(wrong.first == 3 ? "shift" : "too many")) << trap.message;
+  }
+}
+
 /* Transfer functions by minimal coordinates and by the sparse system, at rest and beside the first modes; force and moment at the tip to displacement, speed,
    acceleration and rotation there */
 TEST(SmallBodies, StateSpace)
