@@ -2,6 +2,7 @@
 #include "linearization.h"
 #include "start.h"
 #include <algorithm>
+#include <cmath>
 
 namespace hhtdae
 {
@@ -95,6 +96,7 @@ PetscErrorCode Linearization::response(const Excitation &in, const Measure &out,
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::response()"));
   PetscCall(w.load(in, &load));
+  for (double f : circular) PetscCheck(std::isfinite(f), w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization::response(): a frequency is %g rad/s, all must be finite", f);
   amplitude->resize(circular.size());
   Response r;
   for (std::size_t k = 0; k < circular.size(); k++) {

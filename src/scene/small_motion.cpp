@@ -107,6 +107,7 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
   }
   PetscCheck(s.valid(in.at), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is not one of this scene");
   const PetscInt body = s.markers[in.at.id].body;
+  PetscCheck(in.load.allFinite() && in.moment.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: force or moment of an excitation is not a number");
   PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");
   Vec at[3] = {state[0], state[1], state[2]};
   PetscCall(moved.take(*R, t, at));

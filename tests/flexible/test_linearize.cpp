@@ -428,6 +428,10 @@ TEST(Linearize, ErrorsThatSayWhatToDo)
   EXPECT_TRUE(trap.says("on the ground")) << trap.message;
   EXPECT_NE(small.response(Excitation::force(Marker{1000}, {1, 0, 0}), Measure::time(), {1}, &h), 0);
   EXPECT_TRUE(trap.says("not one of this scene")) << trap.message;
+  EXPECT_NE(small.response(Excitation::force(s.at, {NAN, 0, 0}), Measure::time(), {1}, &h), 0);
+  EXPECT_TRUE(trap.says("not a number")) << trap.message;
+  EXPECT_NE(small.response(s.push, Measure::time(), {1, NAN}, &h), 0);
+  EXPECT_TRUE(trap.says("must be finite")) << trap.message;
   EXPECT_NE(SlowestModes(small, 0, &modes), 0);
   EXPECT_TRUE(trap.says("must be positive")) << trap.message;
 }
