@@ -114,6 +114,7 @@ class Elements(unittest.TestCase):
                            (lambda: scene.set_gravity((0, h.time(), 0)), "gravity is a formula"),
                            (lambda: scene.add(None, h.RigidBody()), "the name is None, must be a text"),
                            (lambda: scene.variable("V", 1., None), "variable V: its initial value is None"),
+                           (lambda: scene.output(dt="1"), r"output\(\): dt is '1', must be a number"),
                            (lambda: scene.set(k="1"), "parameter k is '1'")):
             with self.assertRaisesRegex(TypeError, text):
                 call()
@@ -448,6 +449,22 @@ class Runs(unittest.TestCase):
             scene.output(page_frames=0)
         with self.assertRaisesRegex(ValueError, "must be one of report"):
             scene.start(assembly="maybe")
+
+    def test_two_writers_of_one_file(self):
+        """Neither two runs, one of which goes on later, nor two kinds of results"""
+        scene, rod, pin = pendulum()
+        scene.channel("y", h.displacement(rod.marker(), 1), "m")
+        with tempfile.TemporaryDirectory() as folder:
+            scene.output(csv=os.path.join(folder, "a.csv"))
+            first = scene.solve(0.1)
+            second = scene.run().solve(0.15)
+            second.solve(0.2)
+            with self.assertRaisesRegex(h.Error, "a.csv has .* bytes.*another run"):
+                first.solve(0.2)
+            scene.output(balance=os.path.join(folder, "a.csv"))
+            with self.assertRaisesRegex(h.Error, "a.csv has .* bytes.*another output"):
+                run = scene.solve(0.1)
+                run.solve(0.2)
 
     def test_page(self):
         """A page with its frames, where the library has pages"""

@@ -313,8 +313,8 @@ def _where(condition, a, b):
 
 
 def _step(x, x0, h0, x1, h1, shape):
-    if not isinstance(x0, Expression) and not isinstance(x1, Expression) and not x1 > x0:
-        raise ValueError("a step from x = %g to x = %g must end after it begins" % (x0, x1))
+    if not isinstance(x0, Expression) and not isinstance(x1, Expression) and not -np.inf < x0 < x1 < np.inf:
+        raise ValueError("a step from x = %g to x = %g must end after it begins, and be finite" % (x0, x1))
     s = (_expression(x) - x0) / (x1 - x0)
     return where(s <= 0, h0, where(s >= 1, h1, h0 + (h1 - h0) * shape(s)))
 

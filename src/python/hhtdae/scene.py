@@ -352,6 +352,8 @@ class Scene:
         page_frames, page_nodes : int
             Frames, and nodes that are shown of whole finite-element bodies, at most.
         """
+        for name in {"dt", "animation_dt", "page_dt"} & set(settings):
+            settings[name] = number(settings[name], "output(): " + name)
         self._choose(self._output, settings, "output")
         self._core.output(*[self._output[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
         self._set_page(self._output)

@@ -137,7 +137,7 @@ private:
   /* The index is whole after every frame: a new entry goes where the closing tags were. */
   PetscErrorCode closeIndex()
   {
-    long end;
+    long end = 0;
     PetscFunctionBegin;
     PetscCall(AppendText(prefix_ + ".pvd", false, "</Collection>\n</VTKFile>\n", &end));
     PetscFunctionReturn(0);

@@ -36,6 +36,12 @@ PetscErrorCode AppendText(const std::string &file, bool first, const std::string
   errno     = 0;
   FILE *out = std::fopen(file.c_str(), first ? "w" : "a");
   PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write into %s: %s", file.c_str(), std::strerror(errno));
+  struct stat info;
+  if (!first && *end > 0 && fstat(fileno(out), &info) == 0 && S_ISREG(info.st_mode) && info.st_size != *end) {
+    (void)std::fclose(out);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s has %ld bytes, and not the %ld that this run has written: another run or another output writes into it, too. Give each a file of its own", file.c_str(),
+            (long)info.st_size, *end);
+  }
   const bool written = std::fwrite(text.data(), 1, text.size(), out) == text.size() && std::fflush(out) == 0;
   const int  why     = errno;
   *end               = std::ftell(out);

@@ -8,7 +8,7 @@
 namespace hhtdae
 {
 
-/* first: begins the file anew. *end: its length then. */
+/* first: begins the file anew. *end: its length, before (0: not known) and then; another length than that before is an error: somebody else writes into it. */
 PetscErrorCode AppendText(const std::string &file, bool first, const std::string &text, long *end);
 /* Where a run goes on that was recorded up to so many bytes: what was written later is dropped. *there: whether the file is; a run may be resumed
    with another one, which then begins there. A file that is too short is an error. */
