@@ -48,7 +48,11 @@ def _row(k, name):
 
 
 def time():
-    """Time."""
+    """Time.
+
+    Steps see loads at their ends: a pulse while nothing moves may lie between two of them. ``options={"ts_adapt_dt_max": 0.1}`` holds steps below a part of its
+    duration, see `Scene.run`.
+    """
     return Measure("time")
 
 
