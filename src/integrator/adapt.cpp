@@ -31,6 +31,10 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where nothing moves, or evenly, the error says nothing of loads and motions that are to come. At twice the last step none that follows from time alone is stepped
+   over that lasts as long as it has been waited for (Excitation.WhatSetsInLater, Excitation.ALoadThatChangesItsSign). */
+constexpr PetscReal waiting = 2;
+
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
 PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
 {
@@ -41,6 +45,7 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
   if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
   if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
+  if (Get(ts).fastest < PETSC_MAX_REAL) *next = PetscMin(*next, PetscMax(waiting * h, adapt->dt_min));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
   PetscFunctionReturn(PETSC_SUCCESS);

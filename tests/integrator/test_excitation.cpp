@@ -150,3 +150,45 @@ TEST(Excitation, NoneAtRest)
   MEASURED("pendulum from rest: %d residuals, %d factorizations in the first step", (int)run.statistics().residuals, (int)run.statistics().factorizations);
   EXPECT_LT(run.statistics().residuals, 25);
 }
+
+namespace
+{
+
+/* A free mass of 1 under a load that is a function of time, from rest */
+struct Pushed : Problem {
+  double (*const load)(double);
+  Pushed(double (*f)(double), double end) : load(f)
+  {
+    name = "pushed";
+    n    = 1;
+    t1   = end;
+    role = {TSHHT3_COORDINATE};
+  }
+  void initial(double *u, double *v) const override { u[0] = v[0] = 0.; }
+  void residual(double t, const double *, const double *, const double *a, double *f) const override { f[0] = a[0] - load(t); }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override { J.add(0, 0, sa); }
+};
+
+double speedAtTheEnd(double (*load)(double), double end)
+{
+  const Pushed p(load, end);
+  Simulation   run(p, tolerance(1e-6));
+  must(run.solve());
+  return run.v()[0];
+}
+
+} // namespace
+
+/* All is at rest until a load of 1 acts from 3 on, for 4 s, of which the end of the run knows nothing */
+TEST(Excitation, WhatSetsInLater)
+{
+  EXPECT_NEAR(speedAtTheEnd([](double t) { return t > 3. && t < 7. ? 1. : 0.; }, 10.), 4., 1e-2);
+  EXPECT_NEAR(speedAtTheEnd([](double t) { return t > 30. && t < 70. ? 1. : 0.; }, 1000.), 40., 1e-1);
+}
+
+/* Between its changes there is no error: steps that grow at will meet it where it has the sign of before */
+TEST(Excitation, ALoadThatChangesItsSign)
+{
+  for (double end : {10., 100.})
+    EXPECT_NEAR(speedAtTheEnd([](double t) { return std::sin(2. * M_PI * t) >= 0. ? 1. : -1.; }, end + .25), .25, 1e-2) << end;
+}
