@@ -135,77 +135,15 @@ public:
     b.m += moment + (at.x - b.r).cross(f);
   }
 
-  /* J, columns (x, theta) of marker m at f, to the coordinates of its body; returns their number */
-  template <class In, class Out> int columns(PetscInt m, const Frame<double> &f, const In &J, Out &out) const
-  {
-    const BodyMotion &b = now[marker[m].body];
-    switch (body[marker[m].body].kind) {
-    case BodyKind::Ground:
-      return 0;
-    case BodyKind::PlanarPoint:
-      out.template leftCols<2>() = J.template leftCols<2>();
-      return 2;
-    case BodyKind::Point:
-      out.template leftCols<3>() = J.template leftCols<3>();
-      return 3;
-    case BodyKind::Planar: {
-      const double sx = f.x(0) - b.r(0), sy = f.x(1) - b.r(1);
-      out.template leftCols<2>() = J.template leftCols<2>();
-      out.col(2)                 = J.col(5) - sy * J.col(0) + sx * J.col(1);
-      return 3;
-    }
-    case BodyKind::Attached: /* the frame's own x and theta */
-      out.template leftCols<3>()  = J.template leftCols<3>();
-      out.template rightCols<3>() = About(J, Vector3(f.x - b.r));
-      return 6;
-    case BodyKind::Flexible: /* at its floating frame */
-    case BodyKind::Rigid: /* dx = dr + dtheta x s, dtheta = G dU */
-      out.template leftCols<3>()            = J.template leftCols<3>();
-      out.template rightCols<3>().noalias() = About(J, Vector3(f.x - b.r)) * b.G;
-      return 6;
-    }
-    return 0;
-  }
+  /* J, columns (x, theta) of marker m at f, to the coordinates of its body; returns their number. R is 1, 2, 3 or 6; columns.cpp */
+  template <int R> int columns(PetscInt m, const Frame<double> &f, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
   /* dU of a rotation vector in the step, by that of Newmark's relations: it has a term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives
      of the residual by U are to be multiplied by it, rows of moments are not. */
   Matrix3 inStep(const BodyMotion &b) const { return commutator == 0 ? Matrix3(Matrix3::Identity()) : Matrix3(Matrix3::Identity() - commutator * Cross<double>(b.w0)); }
   /* the same for what columns() has made */
-  template <class Out> void inStep(PetscInt m, Out &out) const
-  {
-    if (commutator == 0 || !TurnsInSpace(body[marker[m].body].kind)) return;
-    const Matrix<Out::RowsAtCompileTime, 3> by_turn = out.template rightCols<3>();
-    out.template rightCols<3>().noalias()           = by_turn * inStep(now[marker[m].body]);
-  }
+  template <int R> void inStep(PetscInt m, Matrix<R, 6> &out) const;
   /* J, columns (v, w) of marker m: adds its change with coordinates and, times sv, with their velocities, to out */
-  template <class In, class Out> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const In &J, Out &out) const
-  {
-    const LocalBody  &k = body[marker[m].body];
-    const BodyMotion &b = now[marker[m].body];
-    const Vector3     s = f.x - b.r;
-    switch (k.kind) {
-    case BodyKind::Ground:
-      return;
-    case BodyKind::PlanarPoint:
-      out.template leftCols<2>() += sv * J.template leftCols<2>();
-      return;
-    case BodyKind::Point:
-      out.template leftCols<3>() += sv * J.template leftCols<3>();
-      return;
-    case BodyKind::Planar:
-      out.template leftCols<2>() += sv * J.template leftCols<2>();
-      out.col(2) += sv * (J.col(5) - s(1) * J.col(0) + s(0) * J.col(1)) + J.template leftCols<3>() * b.w.cross(CrossZ(s));
-      return;
-    case BodyKind::Attached: /* the frame's v and w are columns of their own */
-      out.template rightCols<3>() -= J.template leftCols<3>() * (Cross<double>(b.w) * Cross<double>(s));
-      return;
-    case BodyKind::Flexible:
-    case BodyKind::Rigid: { /* dv = dv_r + dw x s + w x (dtheta x s) */
-      const Matrix3 turned = Cross<double>(b.w) * Cross<double>(s) * b.G * inStep(b);
-      out.template leftCols<3>() += sv * J.template leftCols<3>();
-      out.template rightCols<3>() += About(J, s) * angularVelocityGradient(b, v + k.first + 3, sv) - J.template leftCols<3>() * turned;
-    }
-    }
-  }
+  template <int R> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
   /* dw/dU + sv dw/dU' */
   Matrix3 angularVelocityGradient(const BodyMotion &b, const double *rate, double sv) const
   {
@@ -232,15 +170,6 @@ public:
   AngularGradient byAngles(PetscInt b, const double *v, const double *a, double sv, double sa) const;
 
 private:
-  /* what a turn does through a marker at s from the centre of mass: J_theta - J_x [s] */
-  template <class In> static Matrix<In::RowsAtCompileTime, 3> About(const In &J, const Vector3 &s)
-  {
-    Matrix<In::RowsAtCompileTime, 3> R;
-    R.col(0) = J.col(3) - s(2) * J.col(1) + s(1) * J.col(2);
-    R.col(1) = J.col(4) - s(0) * J.col(2) + s(2) * J.col(0);
-    R.col(2) = J.col(5) - s(1) * J.col(0) + s(0) * J.col(1);
-    return R;
-  }
   Matrix3         momentGradient(PetscInt b, const double *u, const Vector3 &m) const; /* d(G^T m)/dU for fixed m, in a step */
   void modalResidual(PetscInt b, const double *u, const double *v, const double *a, double *row);
 };

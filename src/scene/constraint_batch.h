@@ -137,15 +137,18 @@ public:
 private:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
 
-  static bool uses(BodyKind b, int g, int k)
-  {
-    if (Depends(K::depends, 2 * k)) return true;
-    return Turns(b, g) && Depends(K::depends, 2 * k + 1);
-  }
+  static bool uses(BodyKind b, int g, int k) { return Reach(OfMarker(K::depends, k), b, g); }
   static bool curves(BodyKind b, int g, int k, BodyKind c, int h, int l)
   {
     if (k == l && Turns(b, g) && Turns(c, h) && Depends(K::depends, 2 * k)) return true; /* AddLever() */
-    return Reaches([&](int x, int y) { return K::curved(2 * k + x, 2 * l + y); }, b, g, c, h);
+    return InPairs(pairs(k, l), b, g, c, h);
+  }
+  static constexpr unsigned pairs(int k, int l) /* of AddCurvature() */
+  {
+    unsigned bits = 0;
+    for (int x = 0; x < 2; x++)
+      for (int y = 0; y < 2; y++) bits |= (unsigned)K::curved(2 * k + x, 2 * l + y) << (2 * x + y);
+    return bits;
   }
 
   /* the velocity of an attachment's frame has columns of its own */
@@ -166,57 +169,30 @@ private:
   /* - Phi_q^T lambda as a load */
   static void react(Bodies &B, const Instance &e, const Frame<double> *f, const double *lambda, const typename K::Gradient &J)
   {
-    const Eigen::Map<const Matrix<R, 1>> l(lambda);
     if constexpr (K::translates) { /* no need to multiply by ones and zeros */
       Vector3 force = Vector3::Zero();
-      force.template head<R>() = l;
+      std::copy(lambda, lambda + R, force.data());
       B.load(e.marker[0], f[0], force, Vector3::Zero());
       B.load(e.marker[1], f[1], -force, Vector3::Zero());
       return;
     }
-    const Matrix<6 * M, 1> on = -J.transpose() * l;
-    for (int k = 0; k < M; k++) B.load(e.marker[k], f[k], on.template segment<3>(6 * k), on.template segment<3>(6 * k + 3));
+    for (int k = 0; k < M; k++) {
+      const Wrench<double> on = Reaction<R>(J.data() + 6 * R * k, lambda);
+      B.load(e.marker[k], f[k], on.f, on.m);
+    }
   }
 
   /* rows of Phi and columns of lambda */
   static void gradientBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, typename K::Gradient &J,
                              const typename K::Gradient &P, const double *zj, const Slot *&slot)
   {
-    int active[R], rows = 0;
-    for (int r = 0; r < R; r++)
-      if (e.active >> r & 1) active[rows++] = r;
-    for (int k = 0; k < M; k++) {
-      const LocalBody &b = bodyOf(ev.bodies, e, k);
-      if (!Groups(b.kind)) continue;
-      Matrix<R, 6>     T, S; /* columns of lambda are T^T, rows of Phi are S */
-      const int        n = ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(J.template middleCols<6>(6 * k)), T);
-      if constexpr (K::holonomic) {
-        S.leftCols(n) = T.leftCols(n);
-        ev.bodies.inStep(e.marker[k], S);
-      } else {
-        S.leftCols(n).setZero();
-        ev.bodies.columns(e.marker[k], f[k], Matrix<R, 6>(P.template middleCols<6>(6 * k)), S);
-        ev.bodies.inStep(e.marker[k], S);
-        ev.bodies.velocityColumns(e.marker[k], f[k], ev.v, ev.sv, Matrix<R, 6>(J.template middleCols<6>(6 * k)), S);
-      }
-      if (rows < R)
-        for (int c = 0; c < n; c++)
-          for (int r = 0; r < rows; r++) {
-            T(r, c) = T(active[r], c);
-            S(r, c) = S(active[r], c);
-          }
-      for (int g = 0; g < Groups(b.kind); g++) {
-        if (!uses(b.kind, g, k)) continue;
-        const int size = GroupSize(b.kind, g), at = GroupOffset(b.kind, g);
-        ev.sink.add(*slot++, S.middleCols(at, size), rows, size);
-        ev.sink.add(*slot++, T.middleCols(at, size).transpose(), size, rows);
-      }
-      for (int g = 0; g < 2 && byRates(b.kind); g++)
-        if (uses(b.kind, g, k)) ev.sink.add(*slot++, T.template middleCols<3>(3 * g), rows, 3);
-    }
+    for (int k = 0; k < M; k++)
+      AddGradient<R>(ev, e.marker[k], f[k], J.data() + 6 * R * k, K::holonomic ? nullptr : P.data() + 6 * R * k, e.active, OfMarker(K::depends, k), slot);
     for (int i = 0; i < Z; i++) {
       Matrix<R, 1> column;
-      for (int r = 0; r < rows; r++) column(r) = zj[active[r] * Z + i];
+      int          rows = 0;
+      for (int r = 0; r < R; r++)
+        if (e.active >> r & 1) column(rows++) = zj[r * Z + i];
       ev.sink.add((slot++)->column(e.input[i].offset), column, rows, 1);
     }
     (void)P;
@@ -233,25 +209,15 @@ private:
       if constexpr (K::holonomic) K::curvature(e.data, f, ev.t, lambda, H);
       else K::curvature(e.data, f, w, ev.t, z, lambda, H);
     }
-    const Eigen::Map<const Matrix<R, 1>> l(lambda);
-    for (int k = 0; k < M; k++)
+    for (int k = 0; k < M; k++) {
+      const Vector3 force = -Reaction<R>(J.data() + 6 * R * k, lambda).f;
       for (int m = 0; m < M; m++) {
-        const LocalBody            &b = bodyOf(ev.bodies, e, k), &c = bodyOf(ev.bodies, e, m);
-        Six                         D;
-        bool                        made = false;
-        for (int g = 0; g < Groups(b.kind); g++)
-          for (int h = 0; h < Groups(c.kind); h++) {
-            if (!curves(b.kind, g, k, c.kind, h, m)) continue;
-            if (!made) {
-              if constexpr (curved) D = PairBlock(ev, e.marker[k], f[k], e.marker[m], f[m], H.template block<6, 6>(6 * k, 6 * m));
-              else D.setZero();
-              if (k == m && Depends(K::depends, 2 * k))
-                AddLever(ev.bodies, e.marker[k], f[k], J.template middleCols<3>(6 * k).transpose() * l, D);
-              made = true;
-            }
-            AddBlock(ev.sink, *slot++, D, b.kind, g, c.kind, h);
-          }
+        const bool lever = k == m && Depends(K::depends, 2 * k);
+        if (!pairs(k, m) && !lever) continue;
+        AddCurvature(ev, {e.marker[k], e.marker[m], f[k], f[m]}, curved ? H.data() + 6 * M * 6 * m + 6 * k : nullptr, 6 * M, pairs(k, m),
+                     lever ? &force : nullptr, slot);
       }
+    }
     (void)w;
     (void)z;
   }

@@ -86,11 +86,11 @@ protected:
   /* does the load reach group g of marker k's body; do the load or its components depend on it */
   static bool loads(BodyKind b, int g, int k)
   {
-    return Depends(K::acts, 2 * k) || (Turns(b, g) && Depends(K::acts, 2 * k + 1));
+    return Reach(OfMarker(K::acts, k), b, g);
   }
   static bool uses(BodyKind b, int g, int k)
   {
-    return Depends(K::depends, 2 * k) || (Turns(b, g) && Depends(K::depends, 2 * k + 1));
+    return Reach(OfMarker(K::depends, k), b, g);
   }
   static bool couples(BodyKind b, int g, int k, BodyKind c, int h, int l)
   {
@@ -138,9 +138,9 @@ protected:
           for (int h = 0; h < Groups(c.kind); h++) {
             if (!couples(b.kind, g, k, c.kind, h, l)) continue;
             if (!made) {
-              const Six A = -frames.template block<6, 6>(6 * k, 6 * l);
+              const Six A = MinusBlock(frames.data(), 6 * M, k, l);
               Six       V;
-              if (twists) V = -twists->template block<6, 6>(6 * k, 6 * l);
+              if (twists) V = MinusBlock(twists->data(), 6 * M, k, l);
               D = PairBlock(ev, e.marker[k], f[k], e.marker[l], f[l], A, twists ? &V : nullptr);
               if (k == l && Depends(K::acts, 2 * k)) AddLever(ev.bodies, e.marker[k], f[k], -on[k].f, D);
               made = true;
@@ -168,24 +168,15 @@ protected:
       for (int k = 0; k < M && byRates(e, ev.bodies, l); k++) {
         const BodyKind b           = bodyOf(ev.bodies, e, k).kind;
         const bool     reached[2]  = {loads(b, 0, k), loads(b, 1, k)};
-        if (Groups(b)) slot += RateBlocks(ev, e.marker[k], f[k], e.marker[l], f[l], -twists.template block<6, 6>(6 * k, 6 * l), slot, reached);
+        if (Groups(b)) slot += RateBlocks(ev, e.marker[k], f[k], e.marker[l], f[l], MinusBlock(twists.data(), 6 * M, k, l), slot, reached);
       }
   }
 
   /* - d load / d scalars: columns of one group of size n */
   template <int n>
-  static void scalarColumns(Evaluation &ev, const Instance &e, const Frame<double> *f, const Matrix<6 * M, n> &J, PetscInt offset, const Slot *&slot)
+  static void scalarColumns(Evaluation &ev, const Instance &e, const Frame<double> *f, const double *J, PetscInt offset, const Slot *&slot)
   {
-    for (int k = 0; k < M; k++) {
-      const LocalBody &b = bodyOf(ev.bodies, e, k);
-      Matrix<n, 6>     T = Matrix<n, 6>::Zero();
-      ev.bodies.columns(e.marker[k], f[k], Matrix<n, 6>(-J.template middleRows<6>(6 * k).transpose()), T);
-      for (int g = 0; g < Groups(b.kind); g++) {
-        if (!loads(b.kind, g, k)) continue;
-        const int size = GroupSize(b.kind, g);
-        ev.sink.add((slot++)->column(offset), T.middleCols(GroupOffset(b.kind, g), size).transpose(), size, n);
-      }
-    }
+    for (int k = 0; k < M; k++) AddScalars<n>(ev, e.marker[k], f[k], J + 6 * k, 6 * M, OfMarker(K::acts, k), offset, slot);
   }
 };
 
@@ -239,7 +230,7 @@ public:
       Base::apply(ev, e, f, on);
       Base::bodyBlocks(ev, e, f, on, J.frames, K::damped ? &J.twists : nullptr, slot);
       Base::rateBlocks(ev, e, f, J.twists, slot);
-      for (int i = 0; i < Z; i++) this->template scalarColumns<1>(ev, e, f, J.inputs.col(i), e.input[i].offset, slot);
+      for (int i = 0; i < Z; i++) this->template scalarColumns<1>(ev, e, f, J.inputs.data() + 6 * M * i, e.input[i].offset, slot);
     }
   }
 };
@@ -370,7 +361,7 @@ private:
       }
     Base::apply(ev, e, f, on);
     Base::bodyBlocks(ev, e, f, on, frames, nullptr, slot);
-    Base::template scalarColumns<C>(ev, e, f, columns, 0, slot);
+    Base::template scalarColumns<C>(ev, e, f, columns.data(), 0, slot);
   }
 };
 

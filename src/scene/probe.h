@@ -82,8 +82,7 @@ public:
   {
     State s;
     gather(ev, s);
-    const Matrix<6 * M, 1> load = -s.J.transpose() * Eigen::Map<const Matrix<R, 1>>(s.lambda);
-    for (int k = 0; k < M; k++) on[k] = {load.template segment<3>(6 * k), load.template segment<3>(6 * k + 3)};
+    for (int k = 0; k < M; k++) on[k] = Reaction<R>(s.J.data() + 6 * R * k, s.lambda);
   }
   void  loads(const Evaluation &ev, Wrench<double> *on) const override { reaction(ev, on); }
   int   multipliers() const override { return rows_; }
@@ -97,9 +96,8 @@ public:
       K::curvature(this->e.data, s.f, ev.t, s.lambda, H);
     else
       K::curvature(this->e.data, s.f, s.w, ev.t, s.z, s.lambda, H);
-    const Eigen::Map<const Matrix<6 * M, 1>> by(y);
-    const Matrix<R, 1>                       rows  = -s.J * by;
-    Eigen::Map<Matrix<6 * M, 1>>(frames).noalias() = -H.transpose() * by;
+    const Matrix<R, 1> rows = -s.J * Eigen::Map<const Matrix<6 * M, 1>>(y);
+    MinusTransposed(H.data(), 6 * M, y, frames);
     for (int i = 0; i < rows_; i++) lambda[i] = rows(row_[i]);
   }
 

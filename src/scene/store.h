@@ -121,7 +121,8 @@ public:
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
-    auto batch      = std::make_unique<ConstraintBatch<K>>();
+    auto                  *batch = new ConstraintBatch<K>;
+    std::unique_ptr<Batch> owner(batch);
     batch->bodies   = l.bodies;
     batch->of.store = this;
     for (PetscInt e = 0; e < this->size(); e++) {
@@ -135,7 +136,7 @@ public:
       if constexpr (K::memory > 0 || K::says_angle) batch->of.add(e);
     }
     batch->all.shrink_to_fit();
-    if (!batch->all.empty()) batches.push_back(std::move(batch));
+    if (!batch->all.empty()) batches.push_back(std::move(owner));
   }
 
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
@@ -145,7 +146,7 @@ public:
     i.active = active(e);
     i.lambda = this->unknowns(e) ? l.local(this->start[e]) : -1;
     i.group  = this->unknowns(e) ? l.group(this->start[e], this->unknowns(e)) : -1;
-    return std::make_unique<ConstraintProbe<K>>(i);
+    return std::unique_ptr<Probe>(new ConstraintProbe<K>(i));
   }
 };
 
@@ -175,7 +176,8 @@ private:
   }
   template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried) const
   {
-    auto batch      = std::make_unique<B>();
+    auto                  *batch = new B;
+    std::unique_ptr<Batch> owner(batch);
     batch->bodies   = l.bodies;
     batch->of.store = this;
     for (PetscInt e = 0; e < this->size(); e++) {
@@ -189,7 +191,7 @@ private:
       batch->all.push_back(i);
       if constexpr (K::memory > 0) batch->of.add(e);
     }
-    if (!batch->all.empty()) batches.push_back(std::move(batch));
+    if (!batch->all.empty()) batches.push_back(std::move(owner));
   }
 
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
@@ -197,7 +199,7 @@ private:
     ForceInstance<K> i;
     this->place(l, this->all[e], i);
     if (this->all[e].carried) i.state = l.local(this->start[e]);
-    return std::make_unique<ForceProbe<K>>(i);
+    return std::unique_ptr<Probe>(new ForceProbe<K>(i));
   }
 };
 
@@ -205,7 +207,7 @@ template <class S> S &ElementBuilder::store()
 {
   std::unique_ptr<StoreBase> &s = data_.stores[std::type_index(typeid(S))];
   if (!s) {
-    s = std::make_unique<S>();
+    s.reset(new S);
     data_.order.push_back(s.get());
   }
   return static_cast<S &>(*s);
