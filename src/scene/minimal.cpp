@@ -16,7 +16,7 @@
 */
 #include "complement.h"
 #include "linearization.h"
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <petscblaslapack.h>
 #include <algorithm>
 #include <numeric>
@@ -77,11 +77,26 @@ Dense Block(const Dense &A, const std::vector<PetscInt> &rows, const std::vector
   return B;
 }
 
+/* The least x with A x = b for each column of b, and the rank of A; by LAPACK: Eigen's decompositions take seconds to compile */
+Dense Least(Dense A, const Dense &b, PetscBLASInt *rank)
+{
+  const PetscBLASInt  m = (PetscBLASInt)A.rows(), n = (PetscBLASInt)A.cols(), k = (PetscBLASInt)b.cols(), longer = PetscMax(m, n);
+  const PetscBLASInt  size = 64 * (m + n) + k;
+  const double        least = PETSC_MACHINE_EPSILON * (double)PetscMin(m, n); /* singular values, in parts of the largest, that count as 0 */
+  std::vector<double> singular(PetscMin(m, n) + 1), work(size);
+  PetscBLASInt        info = 0;
+  Dense               x = Dense::Zero(longer, k);
+  x.topRows(m) = b;
+  LAPACKgelss_(&m, &n, &k, A.data(), &m, x.data(), &longer, singular.data(), &least, rank, work.data(), &size, &info);
+  if (info) *rank = 0;
+  return x.topRows(n);
+}
+
 /* Rows of independent constraints, each of length 1: an orthonormal basis of what they leave, and the least x with A x = b */
 struct Subspace {
-  Dense A, free;
-  Eigen::VectorXd                        scale;
-  Eigen::CompleteOrthogonalDecomposition<Dense> solver;
+  Dense           A, free, inverse;
+  Eigen::VectorXd scale;
+  PetscBLASInt    rank = 0;
 
   explicit Subspace(const Dense &rows) : A(rows), scale(rows.rows())
   {
@@ -96,10 +111,10 @@ struct Subspace {
       A.row(i) *= scale(i);
     }
     if (m <= n) free = OrthogonalComplement(A.transpose()); /* else they are not independent */
-    solver.compute(A);
+    inverse = Least(A, Dense::Identity(m, m), &rank);
   }
-  bool  independent() const { return !A.rows() || solver.rank() == A.rows(); }
-  Dense least(const Dense &b) const { return A.rows() ? Dense(solver.solve(scale.asDiagonal() * b)) : Dense::Zero(A.cols(), b.cols()); }
+  bool  independent() const { return rank == A.rows(); }
+  Dense least(const Dense &b) const { return A.rows() ? Dense(inverse * (scale.asDiagonal() * b)) : Dense::Zero(A.cols(), b.cols()); }
 };
 
 struct Minimal {
@@ -114,7 +129,7 @@ struct Minimal {
   Eigen::Index          states() const { return dz() + dy() + ds(); }
 };
 
-/* Solves with rows and columns brought to a size of 1 */
+/* Solves with rows and columns brought to a size of 1; not a number if the matrix is singular */
 Dense Scaled(Dense W, Dense right)
 {
   Eigen::VectorXd row(W.rows()), column(W.cols());
@@ -129,7 +144,12 @@ Dense Scaled(Dense W, Dense right)
     column(j)      = x > 0 ? 1 / x : 1;
   }
   W = W * column.asDiagonal();
-  return column.asDiagonal() * W.partialPivLu().solve(right);
+  const PetscBLASInt        n = (PetscBLASInt)W.rows(), k = (PetscBLASInt)right.cols(), leading = PetscMax(n, 1);
+  std::vector<PetscBLASInt> pivot(leading);
+  PetscBLASInt              info = 0;
+  LAPACKgesv_(&n, &k, W.data(), &leading, pivot.data(), right.data(), &leading, &info);
+  if (info) right.setConstant(NAN);
+  return column.asDiagonal() * right;
 }
 
 /* Matrices to units in which masses are 1 and rows of constraints have length 1, with the multipliers that belong to them */
