@@ -9,6 +9,13 @@ namespace hhtdae
 namespace fe
 {
 
+/* A A^T, n x n: a product whose sizes are known at run time, so that it is compiled once for all shapes and rules */
+static void OuterProduct(const double *A, int n, int columns, double *out)
+{
+  const Eigen::Map<const Eigen::MatrixXd> a(A, n, columns);
+  Eigen::Map<Eigen::MatrixXd>(out, n, n).noalias() = a * a.transpose();
+}
+
 template <class Shape> double InverseExtent(const NodeVectors<Shape> &X)
 {
   const double l = (X.rowwise().maxCoeff() - X.rowwise().minCoeff()).maxCoeff();
@@ -54,7 +61,7 @@ template <class Shape> double ElementStiffness(const NodeVectors<Shape> &X, cons
     G *= std::sqrt(std::max(det, 0.) * table.points.weight[q]);
     all.col(q) = Eigen::Map<const Eigen::Matrix<double, 3 * n, 1>>(G.data());
   }
-  K.noalias() = all * all.transpose();
+  OuterProduct(all.data(), 3 * n, Rule::count, K.data());
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
       const Eigen::Matrix3d H = K.template block<3, 3>(3 * i, 3 * j);
@@ -79,7 +86,7 @@ template <class Shape, class Rule> static double MassAt(const NodeVectors<Shape>
     Lower(least, det);
     all.col(q) = table.N[q] * std::sqrt(std::max(det, 0.) * table.points.weight[q] * density);
   }
-  m.noalias()                                       = all * all.transpose();
+  OuterProduct(all.data(), n, Rule::count, m.data());
   m.template triangularView<Eigen::StrictlyLower>() = m.transpose(); /* to the last digit */
   return least * InverseExtent<Shape>(X);
 }
@@ -193,7 +200,7 @@ double LargeForce(const NodeVectors<Shape> &X, const NodeVectors<Shape> &u, cons
       symmetric[3 + d] += FF(d, (d + 1) % 3) * GG;
     }
   }
-  tangent->noalias() = all * all.transpose();
+  OuterProduct(all.data(), 3 * n, Rule::count, tangent->data());
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
       const Eigen::Matrix3d H = tangent->template block<3, 3>(3 * i, 3 * j);
