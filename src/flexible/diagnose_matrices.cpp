@@ -39,7 +39,7 @@ static PetscErrorCode CheckLayout(const FeModel &model, Mat A, const char name[]
   PetscFunctionReturn(0);
 }
 
-static double Pattern(PetscInt row, double k) { return std::sin(k * (double)row + 0.3 * k); }
+static double Wave(PetscInt row, double k) { return std::sin(k * (double)row + 0.3 * k); }
 
 /* y^T A x = x^T A y for two fixed vectors; Inf and NaN among the entries are found on the way */
 static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char name[])
@@ -54,7 +54,7 @@ static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char nam
              "The matrix %s of the FE model has entries that are not numbers", name);
   PetscCheck(norm > 0, model.comm, PETSC_ERR_ARG_WRONG, "The matrix %s of the FE model is zero", name);
   for (PetscInt i = 0; i < 3 * model.own; i++)
-    X.row(i) << Pattern(3 * model.first + i, 1.1), Pattern(3 * model.first + i, 2.3);
+    X.row(i) << Wave(3 * model.first + i, 1.1), Wave(3 * model.first + i, 2.3);
   PetscCall(Multiply(A, X, &AX));
   if (X.rows()) {
     s[0] = X.col(0).dot(AX.col(1));

@@ -19,7 +19,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr PetscInt together = 16; /* modes at a time: the geometry of an element serves them all */
+constexpr PetscInt modes_at_once = 16; /* modes at a time: the geometry of an element serves them all */
 
 PetscErrorCode CheckInput(const FeModel &model, const ReducedBody &body)
 {
@@ -87,7 +87,7 @@ PetscErrorCode ChooseSides(const FeModel &model, const ElementNodes &nodes, Side
 namespace
 {
 
-/* Adds an element's stress to its nodes; u and stress have `together` columns per node */
+/* Adds an element's stress to its nodes; u and stress have `modes_at_once` columns per node */
 template <class Shape>
 double AddStress(const FeModel &model, const FeElement &e, const ElementNodes &nodes, const Sides &sides,
                  const std::vector<double> &X, const std::vector<double> &u, PetscInt modes,
@@ -104,11 +104,11 @@ double AddStress(const FeModel &model, const FeElement &e, const ElementNodes &n
   }
   const fe::StressAtNodes<Shape> kernel(x);
   for (PetscInt k = 0; k < modes; k++) {
-    for (int i = 0; i < n; i++) v.col(i) = Eigen::Map<const Eigen::Vector3d>(&u[3 * (place[i] * together + k)]);
+    for (int i = 0; i < n; i++) v.col(i) = Eigen::Map<const Eigen::Vector3d>(&u[3 * (place[i] * modes_at_once + k)]);
     kernel(v, lame, at);
     for (int i = 0; i < n; i++)
       if (sides.material[place[i]] == e.material)
-        Eigen::Map<Eigen::Matrix<double, 6, 1>>(&stress[6 * (place[i] * together + k)]) += at.col(i);
+        Eigen::Map<Eigen::Matrix<double, 6, 1>>(&stress[6 * (place[i] * modes_at_once + k)]) += at.col(i);
   }
   return kernel.least();
 }
@@ -117,26 +117,26 @@ double AddStress(const FeModel &model, const FeElement &e, const ElementNodes &n
 PetscErrorCode SomeModes(const FeModel &model, const ElementNodes &nodes, const Sides &sides,
                          const std::vector<double> &X, PetscInt from, PetscInt count, ReducedBody *body)
 {
-  std::vector<double> own(3 * together * (model.own + 1), 0), u(3 * together * (nodes.global.size() + 1), 0);
-  std::vector<double> sum(6 * together * (model.own + 1), 0), stress(6 * together * (nodes.global.size() + 1), 0);
+  std::vector<double> own(3 * modes_at_once * (model.own + 1), 0), u(3 * modes_at_once * (nodes.global.size() + 1), 0);
+  std::vector<double> sum(6 * modes_at_once * (model.own + 1), 0), stress(6 * modes_at_once * (nodes.global.size() + 1), 0);
   std::string         problem;
   PetscFunctionBegin;
   for (PetscInt k = 0; k < count; k++)
     for (PetscInt n = 0; n < model.own; n++)
-      for (int d = 0; d < 3; d++) own[3 * (n * together + k) + d] = body->shape(3 * n + d, from + k);
-  PetscCall(nodes.bring(3 * together, own.data(), u.data()));
+      for (int d = 0; d < 3; d++) own[3 * (n * modes_at_once + k) + d] = body->shape(3 * n + d, from + k);
+  PetscCall(nodes.bring(3 * modes_at_once, own.data(), u.data()));
   for (const FeElement &e : model.elements) {
     const double least = fe::WithShape(
         e.type, [&](auto shape) { return AddStress<decltype(shape)>(model, e, nodes, sides, X, u, count, stress); });
     if (!(least > fe::degenerate)) problem = "stress: an element has no volume or is turned inside out";
   }
   PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
-  PetscCall(nodes.add(6 * together, stress.data(), sum.data()));
+  PetscCall(nodes.add(6 * modes_at_once, stress.data(), sum.data()));
   for (PetscInt k = 0; k < count; k++)
     for (std::size_t i = 0; i < body->stress.node.size(); i++) {
       const PetscInt n = body->stress.node[i];
       for (int d = 0; d < 6; d++)
-        body->stress.values(6 * i + d, from + k) = sum[6 * (n * together + k) + d] / sides.count[n];
+        body->stress.values(6 * i + d, from + k) = sum[6 * (n * modes_at_once + k) + d] / sides.count[n];
     }
   PetscFunctionReturn(0);
 }
@@ -158,8 +158,8 @@ PetscErrorCode AddStressModes(const FeModel &model, ReducedBody *body)
     if (sides.count[n] > 0) body->stress.node.push_back(n);
   const PetscInt modes = body->modal.modes();
   body->stress.values.resize(6 * body->stress.node.size(), modes);
-  for (PetscInt k = 0; k < modes; k += together)
-    PetscCall(SomeModes(model, nodes, sides, X, k, std::min(together, modes - k), body));
+  for (PetscInt k = 0; k < modes; k += modes_at_once)
+    PetscCall(SomeModes(model, nodes, sides, X, k, std::min(modes_at_once, modes - k), body));
   PetscFunctionReturn(0);
 }
 

@@ -14,7 +14,7 @@ namespace
 {
 
 /* The axis that the surface looks along at each node, 0 to 5 for x, -x, y, -y, z, -z */
-std::vector<int> Sides(const std::vector<double> &point, const std::vector<int> &triangle)
+std::vector<int> TriangleSides(const std::vector<double> &point, const std::vector<int> &triangle)
 {
   Eigen::Matrix3Xd normal = Eigen::Matrix3Xd::Zero(3, (Eigen::Index)point.size() / 3);
   std::vector<int> side((std::size_t)normal.cols());
@@ -53,7 +53,7 @@ void ThinSurface(const std::vector<double> &point, std::size_t most, std::vector
   for (std::size_t n = 0; n < nodes; n++) (*kept)[n] = n;
   if (nodes <= most) return;
   const Eigen::Map<const Eigen::Matrix3Xd> x(point.data(), 3, (Eigen::Index)nodes);
-  const std::vector<int>                   side = Sides(point, *triangle);
+  const std::vector<int>                   side = TriangleSides(point, *triangle);
   std::vector<std::size_t>                 of;
   double                                   edge = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm() / std::sqrt((double)most);
   edge /= 8; /* too short, for long bodies as well */
