@@ -346,7 +346,7 @@ PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shi
   PEP         pep = nullptr;
   Vec         begin;
   PetscRandom numbers;
-  bool        solved;
+  bool        solved = false;
   PetscFunctionBegin;
   modes->clear();
   PetscCall(Balance(given, shift, &b));

@@ -31,9 +31,9 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where nothing moves, or evenly, the error says nothing of loads and motions that are to come. At twice the last step none that follows from time alone is stepped
-   over that lasts as long as it has been waited for (Excitation.WhatSetsInLater, Excitation.ALoadThatChangesItsSign). */
-constexpr PetscReal waiting = 2;
+/* Where nothing moves, or evenly, the error says nothing of loads and motions that are to come. With steps at most so many times the last one, none that follows from time
+   alone is stepped over that lasts twice as long as it has been waited for (Excitation.WhatSetsInLater). */
+constexpr PetscReal waiting = 3;
 
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
 PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)

@@ -107,7 +107,7 @@ struct Subspace {
     }
     for (Eigen::Index i = 0; i < m; i++) {
       const double norm = A.row(i).norm();
-      scale(i)          = 1 / (norm > 0 ? norm : 1);
+      scale(i)          = 1 / (norm + (double)(norm == 0)); /* no choice, of which both sides might be divided by, and trap */
       A.row(i) *= scale(i);
     }
     if (m <= n) free = OrthogonalComplement(A.transpose()); /* else they are not independent */
