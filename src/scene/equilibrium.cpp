@@ -28,7 +28,7 @@ constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and fr
 constexpr double downhill_growth = 2; /* of h in one step on the way down a hollow */
 constexpr double unchanged = 0.999;               /* part of the forces: a step that leaves more has been taken back */
 constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
-constexpr int    still_for = 10;        /* steps in a row at rest: what is left is noise, up to */
+constexpr int    still_for = 10;        /* of the longest steps in a row at rest: what is left is noise, up to */
 constexpr double noise = 1e-3;          /* of the forces, as of a stiff mesh far from the origin (Equilibrium.AMeshFarFromTheOrigin) */
 constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
@@ -192,7 +192,7 @@ double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbal
 bool Balanced(const Equilibrium &E, const Unbalanced &at, double h, int *still)
 {
   const bool met = at.misfit <= balanced * E.size && at.other <= 1e-8 * std::max(1.0, E.scale);
-  *still         = met && at.force <= noise * E.scale && at.step <= at_rest && h >= 1e3 ? *still + 1 : 0;
+  *still         = met && at.force <= noise * E.scale && at.step <= at_rest && h >= longest / 2 ? *still + 1 : 0; /* the longest steps: in short ones a strong damper is at rest, too */
   return met && (at.force <= balanced * E.scale || (at.force <= rounding * E.scale && at.step <= 1e-12 && h >= 1e3) || *still >= still_for);
 }
 
