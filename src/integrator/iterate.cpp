@@ -250,7 +250,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
   PetscCall(SNESGetSolution(ts->snes, &X));
   PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
   PetscCall(Y.like(X));
-  while (!c.reason) {
+  while (!c.reason && c.it < ts->snes->max_its) {
     if (!evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
     PetscCall(AnswerOf(ts, F, Y, &solved));
     if (!solved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -258,7 +258,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
     evaluated = PETSC_FALSE;
     PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
   }
-  *reason = c.reason;
+  if (c.reason) *reason = c.reason;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
