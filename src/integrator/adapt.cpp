@@ -4,6 +4,7 @@
 */
 #include "estimate.h"
 #include "order.h"
+#include "start.h"
 
 namespace hht3
 {
@@ -31,9 +32,23 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where nothing moves, or evenly, the error says nothing of loads and motions that are to come. With steps at most so many times the last one, none that follows from time
-   alone is stepped over that lasts twice as long as it has been waited for (Excitation.WhatSetsInLater). */
-constexpr PetscReal waiting = 3;
+/* Of the tolerance: nothing moves, or evenly */
+constexpr PetscReal negligible = 1e-6;
+constexpr PetscReal waiting    = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
+constexpr PetscReal regular    = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
+
+/* Where nothing moves the error says nothing of loads and motions that are to come */
+PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
+{
+  Integrator     &I        = Get(ts);
+  const PetscReal furthest = PetscMin(PetscMax(waiting * h, regular * I.h_regular), PetscMax(h, coasting * (ts->max_time - I.t_begin)));
+
+  PetscFunctionBegin;
+  if (*next <= furthest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.fastest >= PETSC_MAX_REAL && I.ahead == Ahead::Unknown) PetscCall(LookAhead(ts, I.t1, I.U1, I.V1));
+  if (I.fastest < PETSC_MAX_REAL || I.ahead == Ahead::Loads) *next = furthest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
 PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
@@ -45,7 +60,7 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
   if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
   if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
-  if (Get(ts).fastest < PETSC_MAX_REAL) *next = PetscMin(*next, PetscMax(waiting * h, adapt->dt_min));
+  if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -67,6 +67,7 @@ PetscErrorCode NoteExcitation(TS ts)
   PetscReal       swing = PETSC_MAX_REAL, part = 1, last;
 
   PetscFunctionBegin;
+  I.ahead = Ahead::Unknown;
   if (!(ts->max_time < PETSC_MAX_REAL / 2 && stop > 0)) PetscCall(TimeScale(ts, &stop)); /* of a run without end */
   for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
   if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
@@ -87,6 +88,31 @@ PetscErrorCode NoteExcitation(TS ts)
   PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
   if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
   else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the rest of the run has loads or motions that set in, of which the start has seen nothing: samples at multiples of the golden section, nowhere
+   further apart than 0.09 of the rest */
+PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
+{
+  constexpr int   samples = 12;
+  Integrator     &I       = Get(ts);
+  const PetscReal rest    = ts->max_time - t;
+  PetscReal       part = 0, change = 0;
+  WorkVec         zero, now, then;
+
+  PetscFunctionBegin;
+  for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
+  PetscCall(VecZeroEntries(zero));
+  PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
+  for (int sample = 0; sample < samples && !(change > 0); sample++) {
+    part = part + longest < 1 ? part + longest : part + longest - 1;
+    PetscCall(EvaluateResidual(ts, t + part * rest, U, V, zero, then));
+    PetscCall(VecAXPY(then, -1, now));
+    PetscCall(VecNorm(then, NORM_INFINITY, &change));
+  }
+  I.ahead = change > 0 ? Ahead::Loads : Ahead::Nothing;
+  PetscCall(PetscInfo(ts, "%s loads or motions set in between t = %g and the end of the run\n", change > 0 ? "some" : "no", (double)t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -67,6 +67,9 @@ struct Hooks {
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
 enum class Bend { None, Rates, Velocities };
 
+/* What is known of loads and motions that set in later, excitation.cpp */
+enum class Ahead { Unknown, Nothing, Loads };
+
 /* Of the step and of the bookkeeping about steps */
 struct StepState {
   PetscReal        t0 = 0, t1 = 0, h = 0; /* of the last accepted step, or of the attempt */
@@ -90,6 +93,7 @@ struct StepState {
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
+  Ahead            ahead       = Ahead::Unknown; /* of what the start has not seen */
   PetscBool        told        = PETSC_FALSE;    /* that steps do not follow them */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
   PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
