@@ -156,7 +156,8 @@ public:
      rotation refuse a node whose neighbours tell none. */
   Body node(Body flexible, PetscInt label);
 
-  /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes */
+  /* a marker on a body: position and axes (columns) in body axes from the body's origin; of the ground: in space axes. Made after setUp(), it is of queries
+     alone (query.h). */
   Marker marker(Body body, const Vector3 &position = Vector3::Zero(), const Matrix3 &axes = Matrix3::Identity(),
                 const std::string &name = "");
   /* the same, given where it is at the start, in space axes */
@@ -193,7 +194,7 @@ public:
     All that was described is then described anew in the same order, so that what follows from it, lengths at the start for
     example, is right. Runs that were made before keep what they had. A function of the state (of an Expression, say) that holds
     a Parameter reads its present value at every evaluation: a controller may change it between steps; after a jump
-    TSRestartStep() begins the integrator's history anew.
+    TSRestartStep() begins the integrator's history anew. A checkpoint is read with the values it was written with, or names the parameter.
   */
   Parameter      parameter(const std::string &name, double value);
   PetscErrorCode set(const std::string &parameter, double value);
@@ -243,7 +244,7 @@ public:
 
   /* Checks the scene, assembles it, drops redundant constraints, numbers it, looks for static equilibrium, all as start() says;
      collective; called by createTS() when it has not been. After this the scene is fixed, but for its parameters: what is added
-     later is an error of the next createTS(), solve() or sample(). */
+     later, markers apart, is an error of the next createTS(), solve() or sample(). */
   PetscErrorCode setUp();
 
   /* A run from the start: a TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it.

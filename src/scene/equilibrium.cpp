@@ -239,9 +239,9 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   PetscCall(Relax(E, &found, at));
   PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
-             "constraints are violated by %g.\n"
-             "Start nearer to it, or hold what is free to move for ever",
-             (int)E.iterations, at.force, R.scene.bodyName(at.body).c_str(), at.misfit);
+             "constraints are violated by %g, motions of velocities, rates of states and definitions by %g.\n"
+             "Start nearer to it, hold what is free to move for ever, or stop what never rests: a motion of constant velocity, a state with a constant rate",
+             (int)E.iterations, at.force, R.scene.bodyName(at.body).c_str(), at.misfit, at.other);
   PetscCall(VecCopy(E.U, U));
   *iterations = E.iterations;
   PetscFunctionReturn(0);

@@ -1,8 +1,9 @@
 /*
-  The end of the vector that checkpoints keep of a scene, the same on every rank: a digest of the description, and where the recording of
-  results stands, so that a run which is resumed goes on in the same files.
+  The end of the vector that checkpoints keep of a scene, the same on every rank: values of parameters, a digest of the description, and where the
+  recording of results stands, so that a run which is resumed goes on in the same files.
 */
 #include "runtime.h"
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -84,7 +85,8 @@ Digest MakeDigest(const SceneData &s)
   d.numbers(s.gravity);
   d.whole((long)s.ground_acceleration.size());
   for (const BodyData &b : s.bodies) Add(d, b);
-  for (const MarkerData &m : s.markers) {
+  for (std::size_t k = 0; k < s.ownMarkers(); k++) {
+    const MarkerData &m = s.markers[k];
     d.whole(m.body);
     d.numbers(m.s);
     d.numbers(m.R);
@@ -99,7 +101,25 @@ Digest MakeDigest(const SceneData &s)
   return d;
 }
 
+/* The value of a checkpoint, to so many digits */
+bool Same(double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(a); }
+
+PetscErrorCode CheckParameters(const SceneData &s, const double *x)
+{
+  PetscFunctionBegin;
+  for (const ParameterData &p : s.parameters) {
+    PetscCheck(Same(x[0], p.described), s.comm, PETSC_ERR_FILE_UNEXPECTED,
+               "The checkpoint is of a run with parameter %s = %.15g, this one was made with %.15g: Scene::set() it before the run is made", p.name.c_str(), x[0], p.described);
+    PetscCheck(Same(x[1], *p.present), s.comm, PETSC_ERR_FILE_UNEXPECTED,
+               "When the checkpoint was written, parameter %s was %.15g, now it is %.15g: Scene::set() it before the checkpoint is read, and to another value after that", p.name.c_str(), x[1], *p.present);
+    x += 2;
+  }
+  PetscFunctionReturn(0);
+}
+
 } // namespace
+
+PetscInt Kept(const Runtime &R) { return 2 * (PetscInt)R.scene.parameters.size() + kept; }
 
 PetscErrorCode WriteKept(Runtime &R)
 {
@@ -108,7 +128,11 @@ PetscErrorCode WriteKept(Runtime &R)
   PetscFunctionBegin;
   PetscCall(VecGetLocalSize(R.axes, &n));
   PetscCall(VecGetArray(R.axes, &x));
-  double *end = x + n - kept;
+  double *end = x + n - Kept(R);
+  for (const ParameterData &p : R.scene.parameters) {
+    *end++ = p.described;
+    *end++ = *p.present;
+  }
   std::fill(end, end + kept, 0.0);
   MakeDigest(R.scene).put(end);
   PetscCall(SaveOutput(R, end + 2));
@@ -118,11 +142,14 @@ PetscErrorCode WriteKept(Runtime &R)
 
 PetscErrorCode ReadKept(Runtime &R, const double *x)
 {
-  double digest[2];
+  const double *parameters = x;
+  double        digest[2];
   PetscFunctionBegin;
+  x += Kept(R) - kept;
   MakeDigest(R.scene).put(digest);
   PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
+  PetscCall(CheckParameters(R.scene, parameters));
   PetscCall(ResumeOutput(R, x + 2));
   PetscFunctionReturn(0);
 }

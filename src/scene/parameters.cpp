@@ -25,6 +25,7 @@ Parameter Scene::parameter(const std::string &name, double value)
   if (!std::isfinite(value)) fault("its value is not finite");
   Parameter &p = journal_->parameters[name];
   *p.value_    = value;
+  data().parameters.push_back({name, p.value_, value});
   return p;
 }
 
@@ -53,6 +54,8 @@ void Scene::describeAnew()
   s.comm          = data().comm;
   s.planar        = data().planar;
   s.errors        = journal_->errors;
+  s.parameters    = data().parameters;
+  for (ParameterData &p : s.parameters) p.described = *p.present;
   model_.swap(next);
   const Nested nested(*this);
   for (const auto &call : journal_->calls) call(*this);

@@ -162,7 +162,7 @@ PetscErrorCode Resume(Runtime &R, TS ts)
   PetscFunctionBegin;
   PetscCall(AngleTolerances(R, ts));
   PetscCall(VecGetArray(R.axes, &x));
-  const std::vector<double> end(x + 4 * R.bodies.own + Memories(R), x + 4 * R.bodies.own + Memories(R) + kept);
+  const std::vector<double> end(x + 4 * R.bodies.own + Memories(R), x + 4 * R.bodies.own + Memories(R) + Kept(R));
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscCall(ReadKept(R, end.data()));
   PetscFunctionReturn(0);
@@ -342,7 +342,7 @@ PetscErrorCode MakeAxes(Runtime &R)
   R.turns     = global[0];
   R.remembers = global[1];
   PetscCall(VecCreate(R.scene.comm, &R.axes));
-  PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R) + kept, PETSC_DETERMINE));
+  PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R) + Kept(R), PETSC_DETERMINE));
   PetscCall(VecSetType(R.axes, VECSTANDARD));
   if (R.size > 1) PetscCall(MakeExchange(R));
   PetscCall(VecGetArray(R.axes, &x));

@@ -121,7 +121,7 @@ double SceneSize(const SceneData &s)
 {
   Eigen::AlignedBox3d box;
   for (const BodyData &b : s.bodies) box.extend(b.r);
-  for (std::size_t m = 0; m < s.markers.size(); m++)
+  for (std::size_t m = 0; m < s.ownMarkers(); m++)
     if (s.markers[m].body >= -1) box.extend(s.frame(Marker{(PetscInt)m}).x);
   const double size = box.isEmpty() ? 0 : box.diagonal().norm();
   return size > 0 ? size : 1;

@@ -123,8 +123,9 @@ PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V);
 /* dropped_rows.cpp: an error where one is violated */
 PetscErrorCode LocalizeDropped(Runtime &R, Localizer &l);
 PetscErrorCode CheckDropped(Runtime &R, PetscReal t, Vec U, Vec V);
-/* kept.cpp: the end of the vector of checkpoints, of that many entries */
+/* kept.cpp: the end of the vector of checkpoints, of Kept() entries: parameters, and behind them these */
 constexpr PetscInt kept = 72;
+PetscInt           Kept(const Runtime &R);
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
 PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read */
 /* step_limit.cpp: no step goes through a contact, or loses a turn of an angle */

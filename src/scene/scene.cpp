@@ -76,7 +76,6 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
   const PetscInt id   = (PetscInt)s.markers.size();
   const bool     good = body.id == -1 || s.valid(body);
   const std::string who = "marker " + (name.empty() ? std::to_string(id) : name);
-  s.refuseLate(who);
   if (!good) s.errors.push_back(who + ": its body is not one of this scene");
   else if (body.id >= 0 && s.bodies[body.id].flexible)
     s.errors.push_back(who + ": a flexible body is held at its attachments and kept nodes; use scene.attachment(" + s.bodies[body.id].name +
@@ -234,6 +233,7 @@ PetscErrorCode Scene::setUp()
     if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
     if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
     s.start_given = start_;
+    s.markers_then = s.markers.size();
     s.fixed = M.compiled = true; /* not before everything is done: after an error setUp() starts anew */
     PetscFunctionReturn(0);
   }));

@@ -112,6 +112,13 @@ struct StartResult {
   PetscInt         degreesOfFreedom() const { return coordinates - (rows - redundant); }
 };
 
+/* In checkpoints: elements were described with one value, functions read the present one */
+struct ParameterData {
+  std::string                   name;
+  std::shared_ptr<const double> present;
+  double                        described;
+};
+
 struct SceneData {
   PetscInt                    number = 0; /* of the scene, which its handles bear */
   MPI_Comm                    comm;
@@ -130,11 +137,13 @@ struct SceneData {
   std::vector<ShapeData>      shapes;
   std::vector<SurfaceData>    surfaces;
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
+  std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
   StartPolicy                 start; /* of setUp(), with options */
   StartPolicy                 start_given;
   StartResult                 started;
   bool                        fixed = false; /* from setUp() on */
+  std::size_t                 markers_then = 0; /* when it was fixed: later markers are of queries alone */
 
   SceneData();
   ~SceneData();
@@ -147,6 +156,7 @@ struct SceneData {
   }
   /* Whether a handle is of this scene. Number 0 stands for a handle made by hand. */
   template <class Handle> bool mine(Handle h) const { return h.scene == 0 || h.scene == number; }
+  std::size_t ownMarkers() const { return fixed ? markers_then : markers.size(); }
   bool valid(Marker m) const { return mine(m) && m.id >= 0 && m.id < (PetscInt)markers.size(); }
   bool valid(Body b) const { return mine(b) && b.id >= 0 && b.id < (PetscInt)bodies.size(); }
   bool valid(Element e) const { return mine(e) && e.id >= 0 && e.id < (PetscInt)elements.size(); }

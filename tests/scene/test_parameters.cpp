@@ -205,3 +205,35 @@ TEST(Parameters, SayWhatIsWrong)
   EXPECT_NE(late.setUp(), 0);
   EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
 }
+
+/* A checkpoint goes on with the values it was written with, of elements and of functions, or names the parameter: the spring is slack where it is written, so
+   that the residual tells nothing */
+TEST(Parameters, OfCheckpoints)
+{
+  const TemporaryFile file("parameters.checkpoint");
+  const auto          swing = [&](double stiffness, double load, const auto &use) {
+    Scene           s(PETSC_COMM_SELF);
+    const Parameter k = s.parameter("stiffness", 100), f = s.parameter("load", 1);
+    const Body      mass = s.add("mass", PointMass());
+    const Marker    i = s.marker(mass), j = s.marker(s.ground());
+    s.add("stop", [=] { return TranslationalStop{i, j, -INFINITY, 0.5, ContactLaw{k, 1}, 0}; });
+    s.add("load", UserScalarForce{i, s.marker(s.ground(), {-1, 0, 0}), Expression{{Measure::time()}, [f](const Real *t) { return f.value() * step(t[0], 0.3, 0, 0.4, 1); }}});
+    must(s.set("stiffness", stiffness));
+    must(s.set("load", load));
+    SceneRun run(s, 0.2, tolerance(1e-6));
+    use(s, run.ts);
+  };
+  swing(200, 3, [&](Scene &s, TS ts) {
+    must(s.solve(ts));
+    must(TSHHT3CheckpointSave(ts, file.name.c_str()));
+  });
+  for (const auto &[stiffness, load, word] : {std::tuple<double, double, const char *>{200, 3, ""}, {100, 3, "stiffness = 200"}, {200, 1, "load = 3"}, {200, 3, "load was 3"}})
+    swing(stiffness, load, [&, word = word](Scene &s, TS ts) {
+      ErrorTrap trap;
+      must(TSSetUp(ts));
+      if (std::string(word) == "load was 3") must(s.set("load", 1));
+      const PetscErrorCode failed = TSHHT3CheckpointLoad(ts, file.name.c_str());
+      EXPECT_EQ(failed != 0, word[0] != 0);
+      EXPECT_TRUE(trap.says(word)) << trap.message;
+    });
+}

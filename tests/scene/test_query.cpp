@@ -258,3 +258,39 @@ TEST(Query, Units)
       must(TSDestroy(&ts));
     }
 }
+
+/* A point that nobody thought of before the run: its motion can be asked for, and the run and others of the scene go on as without it */
+TEST(Query, MarkersMadeAfterwards)
+{
+  const TemporaryFile file("afterwards.checkpoint");
+  Machine             m;
+  SceneRun            run(m.scene, 0.5, tolerance(1e-6));
+  Snapshot            now;
+  Motion              x, centre;
+  double              height;
+  const auto          state = [](const SceneRun &r) {
+    Vec U;
+    must(TSGetSolution(r.ts, &U));
+    return whole(U);
+  };
+  SceneRun first(m.scene, 1, tolerance(1e-6));
+  must(first.solve());
+  must(run.solve());
+  must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+  const Marker late = m.scene.marker(m.rod, {0.25, 0.5, 100});
+  must(now.take(run.ts));
+  must(now.motion(late, &x));
+  must(now.motion(m.rod, &centre));
+  expectNear(x.position, centre.position + centre.axes * Vector3(0.25, 0.5, 100), 1e-12);
+  must(now.value(Measure::displacement(late, 2), &height));
+  EXPECT_EQ(height, x.position[2]);
+  must(TSSetMaxTime(run.ts, 1));
+  must(m.scene.solve(run.ts));
+  SceneRun again(m.scene, 1, tolerance(1e-6)), resumed(m.scene, 1, tolerance(1e-6));
+  must(again.solve());
+  EXPECT_EQ(state(again), state(first));
+  must(TSSetUp(resumed.ts));
+  must(TSHHT3CheckpointLoad(resumed.ts, file.name.c_str()));
+  must(resumed.solve());
+  EXPECT_EQ(state(resumed), state(run));
+}

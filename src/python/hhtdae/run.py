@@ -363,7 +363,10 @@ class Run(Channels):
         integrator.checkpoint_save(self._open(), file)
 
     def load(self, file: str) -> "Run":
-        """Takes the run to a checkpoint of a run of the same scene, from where it goes on bit for bit; returns the run. Collective."""
+        """Takes the run to a checkpoint of a run of the same scene, from where it goes on bit for bit; returns the run. Collective.
+
+        Parameters must have the values with which the checkpoint was written; afterwards `Scene.set` may change them.
+        """
         ts = self._open()
         self._not_solving("load")
         with temporary_options(self._options):

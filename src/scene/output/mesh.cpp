@@ -104,7 +104,7 @@ double Size(const SceneData &s)
     low  = low.cwiseMin(b.r);
     high = high.cwiseMax(b.r);
   }
-  for (std::size_t m = 0; m < s.markers.size(); m++) {
+  for (std::size_t m = 0; m < s.ownMarkers(); m++) {
     if (s.markers[m].body < -1) continue;
     const Vector3 x = s.frame(Marker{(PetscInt)m}).x;
     low             = low.cwiseMin(x);
@@ -163,7 +163,7 @@ Mesh MakeMesh(const SceneData &s)
     m.lines.close(s.markers[line[0]].body);
   }
   const double size = Size(s);
-  for (std::size_t k = 0; k < s.markers.size(); k++)
+  for (std::size_t k = 0; k < s.ownMarkers(); k++)
     if (s.markers[k].body >= 0) markers[s.markers[k].body].push_back((PetscInt)k);
   for (std::size_t b = 0; b < s.bodies.size(); b++)
     if (!has[b]) Default(m, s, (PetscInt)b, markers[b], size);
