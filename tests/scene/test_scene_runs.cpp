@@ -128,7 +128,6 @@ TEST(SceneRuns, CallsAfterTheSetUp)
   const std::vector<std::pair<std::string, Call>> calls = {
     {"body late", [](Winder &w) { w.scene.add("late", RigidBody()); }},
     {"body point", [](Winder &w) { w.scene.add("point", PointMass()); }},
-    {"marker late", [](Winder &w) { w.scene.marker(w.wheel, {0, 0, 0}, Matrix3::Identity(), "late"); }},
     {"spring-damper late", [](Winder &w) { w.scene.add("late", SpringDamper{w.on, w.at, 1}); }},
     {"variable late", [](Winder &w) { w.scene.variable("late", Measure::time()); }},
     {"state late", [](Winder &w) { w.scene.state("late", Measure::time(), 0); }},
