@@ -102,6 +102,8 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   WorkVec         zero, now, then;
 
   PetscFunctionBegin;
+  I.ahead = Ahead::Nothing;
+  if (!(ts->max_time < PETSC_MAX_REAL / 2 && rest > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* a run without end (Excitation.RunsWithoutEnd) */
   for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
   PetscCall(VecZeroEntries(zero));
   PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
@@ -111,7 +113,7 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
     PetscCall(VecAXPY(then, -1, now));
     PetscCall(VecNorm(then, NORM_INFINITY, &change));
   }
-  I.ahead = change > 0 ? Ahead::Loads : Ahead::Nothing;
+  if (change > 0) I.ahead = Ahead::Loads;
   PetscCall(PetscInfo(ts, "%s loads or motions set in between t = %g and the end of the run\n", change > 0 ? "some" : "no", (double)t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

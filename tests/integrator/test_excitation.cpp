@@ -200,3 +200,15 @@ TEST(Excitation, InTheMiddleOfTheRun)
   for (begin = 0.; begin <= 9.; begin += .25)
     EXPECT_NEAR(speedAtTheEnd([](double t) { return t > begin && t < begin + 1. ? 1. : 0.; }, 10.), 1., 1e-2) << begin;
 }
+
+/* Of a run that has no final time, nobody looks at its end */
+TEST(Excitation, RunsWithoutEnd)
+{
+  static double latest;
+  latest = 0.;
+  const PushedLater p([](double t) { return latest = std::max(latest, t), 0.; }, PETSC_MAX_REAL);
+  Simulation        run(p, tolerance(1e-6) + "-ts_dt 1e-3 -ts_max_steps 5");
+  must(run.solve());
+  EXPECT_LT(latest, 1e9);
+  EXPECT_GT(run.t(), 1e-3);
+}
