@@ -166,19 +166,21 @@ PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscR
   Integrator        &I = Get(ts);
   const PetscScalar *rate, *size;
   const PetscInt    *index;
-  PetscInt           n, first, end;
+  PetscInt           n, first, end, least, most;
 
   PetscFunctionBegin;
   *v = *y = 0;
   PetscCall(VecGetOwnershipRange(I.V0, &first, &end));
   others.assign((size_t)(end - first), 1);
   PetscCall(ISGetLocalSize(I.lengths, &n));
+  PetscCall(ISGetMinMax(I.lengths, &least, &most));
+  PetscCheck(n == 0 || (least >= first && most < end), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "TSHHT3SetLengths(): unknown %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT,
+             least < first ? least : most, first, end - 1);
   PetscCall(ISGetIndices(I.lengths, &index));
   PetscCall(VecGetArrayRead(I.V0, &rate));
   PetscCall(VecGetArrayRead(I.ymax, &size));
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = index[k] - first;
-    PetscCheck(i >= 0 && i < end - first, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "TSHHT3SetLengths(): unknown %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT, index[k], first, end - 1);
     others[(size_t)i] = 0;
     *v                = PetscMax(*v, PetscAbsScalar(rate[i]));
     *y                = PetscMax(*y, PetscRealPart(size[i]));
