@@ -65,7 +65,8 @@ bool FlagsAreFlags(const Integrator &I)
   for (const PetscBool *x : {&I.have_step, &I.have_misfit, &I.repaired, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
                              &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
     if (!IsFlag(*x)) return false;
-  return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) && IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) && IsBetween(I.unfactored, PC_SETUP_ERROR, PC_SUBPC_ERROR) &&
+  return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) &&
+         IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) && IsBetween(I.unfactored, PC_SETUP_ERROR, PC_SUBPC_ERROR) &&
          IsBetween(c.reason, SNES_DIVERGED_TR_DELTA, SNES_BREAKOUT_INNER_ITER);
 }
 

@@ -91,8 +91,8 @@ PetscErrorCode NoteExcitation(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the rest of the run has loads or motions that set in, of which the start has seen nothing: samples at multiples of the golden section, nowhere
-   further apart than 0.09 of the rest */
+/* I.ahead: whether the rest of the run, from U and V at t, has loads or motions that set in, of which the start has seen nothing. Samples at multiples of the
+   golden section, nowhere further apart than 0.09 of the rest */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 {
   constexpr int   samples = 12;

@@ -81,7 +81,7 @@ inline void AddCatches(Cases &cases)
   const struct {
     const char *name;
     double      eps, h, accept; /* a step over the grip misses a velocity of up to F0 h, but takes no more than all of it: 5 m/s h. Where in a step it lies is
-                                   luck: of grips 0.1 earlier to 0.16 later the worst are 0.165 and 5.4e-3. */
+                                   luck: with `grip` from 0.1 earlier to 0.16 later the worst are 0.165 and 5.4e-3. */
   } steps[] = {{"1e-3", 1e-3, 0, 0.17}, {"1e-6", 1e-6, 0, 6e-3}, {"1e-5, h=1e-3", 1e-5, 1e-3, 1e-2}};
   for (int blocks : {1, 2})
     for (double force : {2e1, 1e3, 1e6})
