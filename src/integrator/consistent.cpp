@@ -28,7 +28,7 @@ namespace
 /* Corrections relative to the unknowns, or what forces leave relative to these: converged; and the largest that may be rounding where they no longer fall */
 constexpr PetscReal converged = 1e-13, rounding = 1e-8;
 constexpr PetscReal slow      = 0.3; /* rate beyond which the matrix is made again at the iterate */
-constexpr PetscInt  max_it    = 20;
+constexpr PetscInt  max_it    = 30;  /* at a rate of `slow` 13 digits take 25 */
 
 /* Rows of constraints of F: Phi_q q'' + gamma. The columns of states are left out, since gamma follows s along V. */
 PetscErrorCode ConstraintRows(const Integrator &I, Consistent &c)

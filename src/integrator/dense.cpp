@@ -161,9 +161,15 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   Vec                out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0}, end[3] = {I.U1, I.V1, I.A1};
   PetscScalar       *o[3]   = {};
   const PetscScalar *s0[3], *s1[3];
-  PetscInt           n;
+  PetscInt           n, size;
 
   PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  for (Vec x : out) {
+    if (!x) continue;
+    PetscCall(VecGetLocalSize(x, &size));
+    PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
+  }
   if (IsRolledBackTo(ts, t)) {
     for (int k = 0; k < 3; k++)
       if (out[k]) PetscCall(VecCopy(begin[k], out[k]));
@@ -173,7 +179,6 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);
   const PetscReal x = StepFraction(I, t);
-  PetscCall(VecGetLocalSize(I.U0, &n));
   for (int k = 0; k < 3; k++) {
     PetscCall(VecGetArrayRead(begin[k], &s0[k]));
     PetscCall(VecGetArrayRead(end[k], &s1[k]));

@@ -386,7 +386,7 @@ static PetscErrorCode Finalize(void)
 
   The Newton matrix is scaled by rows and columns, and so is an operator (Amat) beside it, also a `MATSHELL`, which the integrator assembles for that
   purpose: its product is that of the Jacobian as `TSSetI2Jacobian()` defines it. The matrix beside it (Pmat) has to give its rows (`MatGetRow()`): `MATAIJ`,
-  `MATBAIJ`, `MATSBAIJ`, `MATDENSE`.
+  `MATBAIJ`, `MATSBAIJ`, on one rank `MATDENSE`.
 
   Constraints of positions depend on coordinates and time alone, those of velocities also on first-order states, and on variables and force
   states V - v(...) = 0 of positions, states and time. Others are refused at the set-up: consistent accelerations need their derivatives.

@@ -92,7 +92,7 @@ PetscErrorCode GivesRows(Mat A, PetscBool *yes)
 
   PetscFunctionBegin;
   PetscCall(MatHasOperation(A, MATOP_GET_ROW, yes));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, MATNEST, ""));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, MATNEST, MATMPIDENSE, ""));
   if (foreign) *yes = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,7 +110,7 @@ PetscErrorCode CheckMatrices(TS ts)
   PetscCall(MatGetType(P, &type));
   PetscCall(GivesRows(P, &rows));
   PetscCheck(rows, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
-             "The matrix (Pmat of TSSetI2Jacobian()) is of type %s, which gives no rows: TSHHT3 needs an assembled one there, of type %s, %s, %s or %s. A matrix-free product may be the operator (Amat) beside it",
+             "The matrix (Pmat of TSSetI2Jacobian()) is of type %s, which gives no rows: TSHHT3 needs an assembled one there, of type %s, %s, %s or, on one rank, %s. A matrix-free product may be the operator (Amat) beside it",
              type, MATAIJ, MATBAIJ, MATSBAIJ, MATDENSE);
   if (!J || J == P) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetType(J, &type));

@@ -92,7 +92,8 @@ PetscReal Tolerance(const Integrator &I)
 {
   const Corrector &c = I.corrector;
   const PetscReal tol = CorrectorTolerance(I);
-  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, 0.01, 1);
+  const PetscReal least = I.h_limit > 0 ? 0.01 : 0; /* h is short for the corrector's sake */
+  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, least, 1);
 }
 
 /* The iteration does not converge as it is: is that rounding, may a new matrix help, or has it failed? */

@@ -276,7 +276,7 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
 {
   Integrator &I       = Get(ts);
-  const bool  project = I.start_policy == TSHHT3_START_PROJECT;
+  const bool  project = I.start_policy == TSHHT3_START_PROJECT || I.own_start; /* own velocities meet the constraints to O(h^2), which would leave O(h) in the multipliers */
   PetscReal   e, value;
   PetscInt    row;
   PetscBool   matrix;

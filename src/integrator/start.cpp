@@ -143,7 +143,7 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   Integrator        &I = Get(ts);
   Predictor         &p = I.predictor;
   const PetscReal    h = ts->time_step;
-  PetscReal          e;
+  PetscReal          e, T;
 
   PetscFunctionBegin;
   PetscCall(PredictorReset(ts));
@@ -154,7 +154,8 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   PetscCall(CorrectionNorm(ts, rate, &e));
   e *= h;
   I.corrector.wlte = e;
-  if (e > 100) {
+  PetscCall(TimeScaleOfAccelerations(ts, rate, &T));
+  if (I.fixed_h ? h * h * h > T * T : e > 100) { /* fixed steps know no tolerance: of the coordinates */
     PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -427,7 +428,7 @@ PetscErrorCode Start(TS ts)
   PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
-  if (!ts->steps) { /* a new run does not remember how large its coordinates once were */
+  if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were */
     I.t_begin   = ts->ptime;
     I.norm_size = 0;
     for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));

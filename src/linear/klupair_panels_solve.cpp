@@ -139,8 +139,11 @@ static PetscErrorCode LowerBackward(const Panel &q, const double x[])
     first = (last - 1) / CHUNK * CHUNK;
     PetscCall(SubtractTransposed(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + last,
                                  q.x + first));
-    for (PetscInt j = last; j-- > first;)
-      for (PetscInt i = j + 1; i < last; ++i) q.x[j] -= q.lower[i + j * q.ld] * q.x[i];
+    for (PetscInt j = last; j-- > first;) {
+      double rest = q.x[j];
+      for (PetscInt i = j + 1; i < last; ++i) rest -= q.lower[i + j * q.ld] * q.x[i];
+      q.x[j] = rest;
+    }
   }
   for (PetscInt k = q.width; k-- > 0;)
     if (q.exchange[k] != k) std::swap(q.x[k], q.x[q.exchange[k]]);
@@ -155,8 +158,9 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
     last = PetscMin(first + CHUNK, q.width);
     PetscCall(SubtractTransposed(first, last - first, q.lower + first * q.ld, q.ld, q.x, q.x + first));
     for (PetscInt j = first; j < last; ++j) {
-      for (PetscInt i = first; i < j; ++i) q.x[j] -= q.lower[i + j * q.ld] * q.x[i];
-      q.x[j] /= q.lower[j + j * q.ld];
+      double rest = q.x[j];
+      for (PetscInt i = first; i < j; ++i) rest -= q.lower[i + j * q.ld] * q.x[i];
+      q.x[j] = rest / q.lower[j + j * q.ld];
     }
   }
   if (Together(q.col, q.cols)) {

@@ -97,6 +97,28 @@ Number Apply(const Tape::Function &, const std::vector<Number> &)
   throw std::runtime_error("a Python function in a function of time has no derivatives: give them with hhtdae.time_values()");
 }
 
+/* Memory that stays with the thread, lent to one evaluation at a time: a callback may evaluate this tape or another one, in another run */
+template <class N> class Lent
+{
+public:
+  std::vector<N> x;
+
+  explicit Lent(std::size_t n)
+  {
+    x.swap(spare());
+    if (x.size() < n) x.resize(n);
+  }
+  ~Lent() { x.swap(spare()); }
+  Lent(const Lent &) = delete;
+
+private:
+  static std::vector<N> &spare()
+  {
+    static thread_local std::vector<N> x;
+    return x;
+  }
+};
+
 } // namespace
 
 /* Every operation is evaluated, both branches of `where` too: it selects, so that what the other branch is does not matter. */
@@ -104,7 +126,6 @@ template <class N> void Tape::run(const N *u, std::vector<N> &x) const
 {
   using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cbrt, std::cos, std::cosh, std::exp, std::hypot, std::log, std::log10, std::max,
     std::min, std::pow, std::sin, std::sinh, std::sqrt, std::tan, std::tanh;
-  if (x.size() < operations.size()) x.resize(operations.size());
   for (std::size_t k = 0; k < operations.size(); k++) {
     const Operation &o = operations[k];
     const N         &a = x[o.a], &b = x[o.b];
@@ -152,35 +173,34 @@ template <class N> void Tape::run(const N *u, std::vector<N> &x) const
   }
 }
 
+template <class N> N Tape::run(const N *u) const
+{
+  Lent<N> lent(operations.size());
+  run(u, lent.x);
+  return lent.x[outputs[0]];
+}
+
 void Tape::evaluate(const double *u, double *out) const
 {
-  run(u, plain_);
-  for (std::size_t k = 0; k < outputs.size(); k++) out[k] = plain_[outputs[k]];
+  Lent<double> lent(operations.size());
+  run(u, lent.x);
+  for (std::size_t k = 0; k < outputs.size(); k++) out[k] = lent.x[outputs[k]];
 }
 
 /* Residuals and channels need no derivatives: plain numbers are an eighth of the memory that numbers with up to 16 derivatives move. Of channels there
    may be more arguments than that. */
 Real Tape::operator()(const Real *u) const
 {
-  bool constant = true;
-  values_.resize(arguments);
+  Lent<double> values(arguments);
+  bool         constant = true;
   for (int k = 0; k < arguments; k++) {
-    values_[k] = u[k].value();
-    constant   = constant && u[k].derivatives().size() == 0;
+    values.x[k] = u[k].value();
+    constant    = constant && u[k].derivatives().size() == 0;
   }
-  if (constant) {
-    run(values_.data(), plain_);
-    return plain_[outputs[0]];
-  }
-  run(u, real_);
-  return real_[outputs[0]];
+  return constant ? Real(run(values.x.data())) : run(u);
 }
 
-Number Tape::operator()(const Number &t) const
-{
-  run(&t, time_);
-  return time_[outputs[0]];
-}
+Number Tape::operator()(const Number &t) const { return run(&t); }
 
 } // namespace python
 } // namespace hhtdae

@@ -53,11 +53,8 @@ public:
   TimeFunction::Number operator()(const TimeFunction::Number &t) const;
 
 private:
+  template <class N> N run(const N *arguments) const; /* the first output */
   template <class N> void run(const N *arguments, std::vector<N> &x) const;
-  mutable std::vector<double>               values_; /* of the arguments */
-  mutable std::vector<double>               plain_;
-  mutable std::vector<Real>                 real_;
-  mutable std::vector<TimeFunction::Number> time_;
 };
 
 } // namespace python

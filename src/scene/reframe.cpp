@@ -296,6 +296,7 @@ PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
   R.accepts++;
   if (!R.remembers && R.asked.empty()) PetscFunctionReturn(0);
   PetscCall(MoveBodies(R, U, V));
+  R.moved = R.bodies.local ? R.bodies.moves : -1;
   for (auto &b : R.batches) b->accept(R.bodies);
   PetscCall(KeepMemories(R));
   PetscCall(VecGetArrayRead(U, &u));

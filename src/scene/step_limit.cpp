@@ -24,7 +24,7 @@ PetscErrorCode LimitOfBatches(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, doub
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(A, &a));
   PetscCall(LocalMotion(R, u, v, a, acceleration, local));
-  R.bodies.move(local[0], local[1]);
+  if (R.moved != R.bodies.moves) R.bodies.move(local[0], local[1]); /* else they have just been asked what to remember of this state */
   const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
   for (const auto &b : R.batches) *least = std::min(*least, b->longestStep(e));
   PetscCall(VecRestoreArrayRead(U, &u));

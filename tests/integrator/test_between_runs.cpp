@@ -6,11 +6,11 @@ using namespace hhtest;
 namespace
 {
 
-PetscErrorCode again(Simulation &run, const Array &u, const Array &v, double end)
+PetscErrorCode again(Simulation &run, const Array &u, const Array &v, double end, bool count = true)
 {
   PetscFunctionBegin;
   PetscCall(TSSetTime(run.ts, 0.));
-  PetscCall(TSSetStepNumber(run.ts, 0));
+  if (count) PetscCall(TSSetStepNumber(run.ts, 0));
   PetscCall(TSSetMaxTime(run.ts, end));
   for (PetscInt i = 0; i < (PetscInt)u.size(); i++) {
     PetscCall(VecSetValue(run.U, i, u[i], INSERT_VALUES));
@@ -98,6 +98,17 @@ TEST(BetweenRuns, ANewRunForgetsHowLargeTheOldOneWas)
   EXPECT_NEAR(run.u()[0], std::cos(4.), 1e-3);
 }
 
+/* The time set back to where it began says so, too: PETSc goes on counting steps */
+TEST(BetweenRuns, ANewRunAtTheSameTime)
+{
+  Simulation run(oscillator(), tolerance(1e-6)), fresh(oscillator(), tolerance(1e-6));
+  must(fresh.solve());
+  must(again(run, {1e3}, {0.}, 2.));
+  const PetscInt before = run.statistics().steps;
+  must(again(run, {1.}, {0.}, 2., false));
+  EXPECT_NEAR((double)(run.statistics().steps - before), (double)fresh.statistics().steps, 2.);
+}
+
 /* A load of period 1 does not see the time set back by 1 */
 TEST(BetweenRuns, TimeSetBack)
 {
@@ -154,6 +165,48 @@ TEST(Events, SamplesInMonitors)
   must(run.solve());
   must(VecDestroy(&U));
   must(VecDestroy(&A));
+}
+
+namespace
+{
+
+/* The largest error of the multiplier of a pendulum that falls from 90 degrees, of g/L times 3 cos(theta) at most: y alone tells it */
+double errorOfTension(const std::string &options, int every = 0)
+{
+  const Pendulum p(-90., 0., 2.);
+  Simulation     run(p, options);
+  double         error = 0.;
+  run.watch = [&](Simulation &r, PetscInt step, double) {
+    const Array u = r.u();
+    if (step) widen(error, std::abs(u[2] + 3. * p.m * p.g * u[1] / (p.L * p.L)));
+    if (every && step % every == 0) must(TSRestartStep(r.ts));
+  };
+  must(run.solve());
+  return error / (3. * p.m * p.g / p.L);
+}
+
+} // namespace
+
+/* Velocities of a step meet the constraints to second order. A restart from them as they are leaves oscillations of first order in the multipliers. */
+TEST(BetweenRuns, RestartsKeepTheMultipliers)
+{
+  for (const char *alpha : {"-0.3", "-0.05"})
+    for (const std::string &steps : {fixedSteps(0.01), tolerance(1e-6)}) {
+      const std::string o    = steps + "-ts_hhtdae_alpha " + alpha;
+      const double      once = errorOfTension(o), often = errorOfTension(o, 40);
+      MEASURED("%s: %.1e of the tension, with restarts %.1e", o.c_str(), once, often);
+      EXPECT_LT(often, 3. * once) << o;
+    }
+}
+
+/* Where something else than the error test keeps steps short the corrector's part of the tolerance, divided by h^2, is not left in the multipliers */
+TEST(BetweenRuns, ShortStepsKeepTheMultipliers)
+{
+  for (const char *alpha : {"-0.3", "-0.05"}) {
+    const double error = errorOfTension(tolerance(1e-4) + "-ts_adapt_dt_max 1e-4 -ts_hhtdae_alpha " + std::string(alpha));
+    MEASURED("alpha %s: %.1e of the tension", alpha, error);
+    EXPECT_LT(error, 1e-4) << alpha;
+  }
 }
 
 /* What the integrator itself has left is no fault of the user's */

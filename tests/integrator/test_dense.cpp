@@ -187,6 +187,20 @@ TEST(Dense, RefusesOtherTimes)
   EXPECT_NE(TSHHT3Interpolate(run.ts, 2. * run.t(), x.U, nullptr, nullptr), 0);
 }
 
+TEST(Dense, RefusesVectorsOfAnotherSize)
+{
+  const Pendulum p(-90., 0., 2.);
+  Simulation     run(p, tolerance(1e-4));
+  Vec            other;
+  must(run.solve());
+  must(VecCreateSeq(PETSC_COMM_SELF, 1, &other));
+  ErrorTrap trap;
+  EXPECT_EQ(TSInterpolate(run.ts, 2., other), PETSC_ERR_ARG_SIZ);
+  EXPECT_TRUE(trap.says("has 1 entries on this rank, must be 3")) << trap.message;
+  EXPECT_EQ(TSHHT3Interpolate(run.ts, 2., nullptr, other, nullptr), PETSC_ERR_ARG_SIZ);
+  must(VecDestroy(&other));
+}
+
 TEST(Dense, FinalTimeInterpolate)
 {
   const Pendulum p(-90., 0., 1.);

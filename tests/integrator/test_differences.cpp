@@ -78,8 +78,8 @@ TEST(Differences, GiveTheSameAnswer)
     MEASURED("%-15s without a Jacobian: differs by %.1e in q, %.1e in q'; %d residuals in place of %d, %d steps, %d",
              f.name, du, dv, (int)end.statistics.residuals, (int)run.statistics().residuals, (int)end.statistics.steps,
              (int)run.statistics().steps);
-    EXPECT_LT(du, 1e-6);
-    EXPECT_LT(dv, 1e-6);
+    EXPECT_LT(du, 1e-5); /* the rates of a start have four digits */
+    EXPECT_LT(dv, 1e-5);
   }
 }
 

@@ -64,6 +64,22 @@ TEST(FirstStep, IsChosenWithoutAWordOfTheUser)
   EXPECT_EQ(q.first(), chosen);
 }
 
+/* Of fixed length it knows no tolerance: the start is as good as the method at any */
+TEST(FirstStep, OfFixedLengthIsOfSecondOrderAtAnyTolerance)
+{
+  const Pendulum p(-60., 2., 10.);
+  for (double eps : {1e-4, 1e-12}) {
+    double error[2];
+    for (int k = 0; k < 2; k++) {
+      Simulation run(p, text("-ts_adapt_type none -ts_dt %g -ts_max_steps 1 -ts_rtol %g -ts_atol %g", 0.02 / (k + 1), eps, eps));
+      must(run.solve());
+      error[k] = run.errors().lambda;
+    }
+    MEASURED("tolerance %g: multiplier off by %.1e and %.1e with half the step", eps, error[0], error[1]);
+    EXPECT_GT(error[0], 3. * error[1]) << eps;
+  }
+}
+
 TEST(FirstStep, SetByTheProgram)
 {
   for (double h : {1e-3, 1e-2, .1}) {

@@ -61,6 +61,16 @@ class Operations(unittest.TestCase):
             symbolic = [compile_tape([d[0, k]], {}, keep, 2)(x)[0] if (0, k) in d else 0. for k in range(2)]
             np.testing.assert_allclose(symbolic, gradient, rtol=1e-12, atol=1e-13, err_msg=name)
 
+    def test_derivatives_where_roots_are_zero(self):
+        """As the kernels have them: drag, |v| v by a square root, from rest"""
+        drag = h.solve_mechanism(lambda t, q, v, a: [a[0] + np.sqrt(v[0] * v[0] + v[1] * v[1]) * v[0], a[1] + 9.81 + np.sqrt(v[0] * v[0] + v[1] * v[1]) * v[1]],
+                                 (0, 2), [0, 0], [0, 0], rtol=1e-7, atol=1e-7, trace=True)
+        self.assertTrue(drag.success, drag.message)
+        self.assertAlmostEqual(drag.q[1, -1], -np.log(np.cosh(np.sqrt(9.81) * 2)), delta=1e-4)
+        for f in (lambda x: abs(x) ** 0.5 * x, lambda x: x * (x * x) ** 0.25):
+            still = h.solve_mechanism(lambda t, q, v, a: [a[0] + f(q[0])], (0, 1), [0], [0], trace=True)
+            self.assertTrue(still.success, still.message)
+
     def test_time_derivatives(self):
         """First and second derivatives of traced functions of time"""
         for f in (lambda t: np.sin(3 * t) * t, lambda t: h.step5(t, 0., 1., 2., 3.), lambda t: h.spline(*TABLE)(t * t), lambda t: h.where(t > 0.5, t**3, t),
@@ -134,6 +144,16 @@ class Mistakes(unittest.TestCase):
             with self.assertRaises(TypeError) as caught:
                 trace(f, 1, "the law")
             self.assertIn(word, str(caught.exception))
+
+    def test_parameters_are_not_frozen(self):
+        """Where a formula of parameters cannot follow them it is refused"""
+        scene = h.Scene()
+        p = scene.parameter("p", 0.)
+        b = scene.add("b", h.RigidBody())
+        for freeze in (lambda: math.cos(p), lambda: float(2 * p), lambda: h.axes_along((h.sin(p), h.cos(p), 0)),
+                       lambda: scene.connect("pin", h.Revolute, b, scene.ground, (0, 0, 0), axis=(h.sin(p), h.cos(p), 0)), lambda: h.composed([h.RigidBody(mass=1 + p)])):
+            with self.assertRaisesRegex(TypeError, "frozen at its present value"):
+                freeze()
 
     def test_functions_of_time(self):
         with self.assertRaisesRegex(ValueError, "must increase"):

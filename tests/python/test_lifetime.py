@@ -149,6 +149,48 @@ class WhileSolving(unittest.TestCase):
                     run.solve(0.5)
 
 
+class Within(unittest.TestCase):
+    """Runs that are made and solved while another one is: what a controller predicts with"""
+
+    def test_options_are_each_runs_own(self):
+        scene, inner = oscillator(), []
+        alone = scene.solve(1., tolerance=1e-5, options={"ts_hhtdae_order": 2})
+        run = scene.run(tolerance=1e-5, options={"ts_hhtdae_order": 5})
+
+        def predict(run):
+            if not inner:
+                inner.append(scene.solve(1., tolerance=1e-5, options={"ts_hhtdae_order": 2}))
+                inner.append(scene.solve(1., tolerance=1e-5))
+                inner.append(h.solve_mechanism(lambda t, q, v, a: [a[0] + 9 * q[0]], (0, 1), [1], [0], options={"ts_hhtdae_order": 2}))
+
+        run.on_step(predict)
+        run.solve(1.)
+        self.assertEqual(inner[0].statistics.of_order, alone.statistics.of_order)
+        for x in inner:
+            self.assertEqual(sum(x.statistics.of_order[1:]), 0)
+        self.assertGreater(sum(run.statistics.of_order[1:]), 0)
+
+    def test_of_the_same_scene(self):
+        """The formulas of both are the same, with a callback between them"""
+        scene, nested, depth = h.Scene(), [False], []
+        m = scene.add("b", h.PointMass(position=(1, 0, 0))).marker()
+        x = h.displacement(m, "x")
+
+        def one(t):
+            if nested[0] and not depth:
+                depth.append(1)
+                scene.solve(0.3, tolerance=1e-3)
+                depth.pop()
+            return 1.
+
+        scene.add("f", h.UserForce(m, force=(-4 * x * h.callback(one, h.time()), 0, 0)))
+        scene.channel("x", x)
+        ends = []
+        for nested[0] in (False, True):
+            ends.append(scene.solve(0.5, tolerance=1e-5)["x"][-1])
+        self.assertEqual(ends[0], ends[1])
+
+
 class Leaks(unittest.TestCase):
     def test_a_thousand_runs(self):
         """Memory after 1,000 runs is that after 100, but for less than a kilobyte a run"""

@@ -675,5 +675,23 @@ class Mistakes(unittest.TestCase):
             run.solve(1e3)
 
 
+class Controllers(unittest.TestCase):
+    def test_held_between_samples(self):
+        """A force that is set every 0.1 s; between the samples the motion is known exactly"""
+        scene = h.Scene()
+        u = scene.parameter("u", -10.)
+        m = scene.add("b", h.PointMass(position=(1, 0, 0))).marker()
+        scene.add("f", h.UserForce(m, force=(u, 0, 0)))
+        x, v, hold, worst = 1., 0., -10., 0.
+        run = scene.run(tolerance=1e-4)
+        for t in run.step_by(0.1, 3.):
+            x, v = x + 0.1 * v + 0.005 * hold, v + 0.1 * hold
+            now = run.snapshot()
+            worst = max(worst, abs(now.value(h.displacement(m, "x")) - x))
+            hold = -10 * x - 2 * v
+            u.set(hold)
+        self.assertLess(worst, 1e-12)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -65,6 +65,8 @@ class Expression:
         if any(n.op in ("argument", "measure", "function") for n in ordered([self])):
             raise TypeError("the value of this formula is known in a run only; functions of `math` take numbers: use those of hhtdae or numpy, "
                             "or a hhtdae.callback()")
+        if any(n.op == "parameter" for n in ordered([self])):
+            raise TypeError("this formula of parameters would be frozen at its present value here: describe the scene by a function that is called again, or take Parameter.get()")
         return float(compile_tape([self], {}, [])(np.empty(0))[0])
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):

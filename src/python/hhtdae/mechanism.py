@@ -86,13 +86,16 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     constraint_jacobian : callable, optional
         constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
-        Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3).
+        Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3);
+        where forces jump at unknown times, as tol^(1/2).
     t_eval : sequence of float, optional
-        Times of the output, increasing; default: the ends of steps. Accelerations and multipliers there solve the equations of motion.
+        Times of the output, increasing; default: the ends of steps. Accelerations and multipliers solve the equations of motion between the ends of steps;
+        at the ends they are the step's own, with an error many times as large.
     dense_output : bool
         `sol`, a function of time.
     events : callable or list of them, optional
-        event(t, q, v, *args) returns a number whose zeros are sought; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
+        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought: two zeros within a step are not seen, see
+        `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
     max_step, first_step : float, optional
         Longest step, and the first one; the first is found otherwise.
     args : tuple

@@ -50,8 +50,8 @@ class Load:
 class Snapshot:
     """The state of a run at a time of its last step, made by `Run.snapshot`: answers questions that nobody has asked for beforehand.
 
-    Accelerations and multipliers are those that belong to positions and velocities at that time: at no cost at the end of a step, at about that of a
-    factorization in between. An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
+    Accelerations and multipliers at a time within a step are those that belong to positions and velocities there, which costs about a factorization; at
+    the end of a step they are the step's own, at no cost and with an error many times as large. An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
     counted from there: make a channel of it, see `angle`. All calls are collective.
     """
 

@@ -22,22 +22,42 @@ from .tracing import ordered
 __all__ = ["Run"]
 
 
+class _Given:
+    """Options that are in PETSc's database for the time being, and which of them have been asked for"""
+
+    def __init__(self):
+        self.values, self.used = {}, set()
+
+    def put(self):
+        for name, value in self.values.items():
+            PETSc.Options().setValue(name, value)
+
+    def take(self):
+        for name in self.values:
+            if _core.option_used(name):
+                self.used.add(name)
+            PETSc.Options().delValue(name)
+
+
+_given = []  # the innermost last
+
+
 @contextmanager
 def temporary_options(given):
-    """PETSc's options while something is done; what the user has set already stays. Yields a list that has the names of those that were not asked for after it."""
-    database, own, unused = PETSc.Options(), [], []
+    """PETSc's options while something is done; what the user has set already stays. Yields a list that has the names of those that were not asked for after it.
+    Those of a run within which this is done, by one of its callbacks, are away meanwhile."""
+    own, unused, outer = _Given(), [], _given[-1] if _given else _Given()
+    outer.take()
+    _given.append(own)
     try:
-        for name, value in (given or {}).items():
-            name = name.lstrip("-")
-            if not database.hasName(name):
-                database.setValue(name, value)
-                own.append(name)
+        own.values = {n: x for n, x in ((name.lstrip("-"), x) for name, x in (given or {}).items()) if not PETSc.Options().hasName(n)}
+        own.put()
         yield unused
     finally:
-        for name in own:
-            if not _core.option_used(name):
-                unused.append(name)
-            database.delValue(name)
+        own.take()
+        unused.extend(name for name in own.values if name not in own.used)
+        _given.pop()
+        outer.put()
 
 
 def tell_unused(names, level):
@@ -142,8 +162,8 @@ class Run(Channels):
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
-        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them. A terminal
-        event ends it, after its time.
+        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them, after which the integrator's history
+        begins anew. A terminal event ends it, after its time.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
@@ -156,12 +176,16 @@ class Run(Channels):
         for k in range(1, count + 1):
             end = until if k == count else begin + k * dt
             self.solve(end)
+            before = self._present_parameters()
             yield self.time
+            if self.ts and self._present_parameters() != before:
+                self.restart()
             if self._ended or self.time < end:
                 return
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
-        """What is done where a formula passes through zero. The step ends there, and the integrator's history begins anew; velocities that joints
+        """What is done where a formula passes through zero, from one step to the next: of two passages within a step none is seen, for which the option
+        -ts_adapt_dt_max keeps steps short. The step ends there, and the integrator's history begins anew; velocities that joints
         forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise. Channels, files and `on_step` see the step end there, before
         the action; that an action makes a velocity jump through zero is no passage.
 
@@ -204,17 +228,20 @@ class Run(Channels):
             integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
 
+    def _present_parameters(self):
+        return [p.get() for p in self.scene._parameters.values()]
+
     def _note_state(self):
         state = self._open().getSolution2()
         if self._before is None:
             self._before = [x.duplicate() for x in state]
         for x, y in zip(state, self._before):
             x.copy(y)
-        self._numbers = [p.get() for p in self.scene._parameters.values()]
+        self._numbers = self._present_parameters()
 
     def _changed(self):
         """Whether the state or a parameter is not what it was at the last event"""
-        if self._numbers is None or self._numbers != [p.get() for p in self.scene._parameters.values()]:
+        if self._numbers is None or self._numbers != self._present_parameters():
             return True
         return not all([x.equal(y) for x, y in zip(self._open().getSolution2(), self._before)])
 

@@ -166,7 +166,11 @@ class Scene:
         return p
 
     def set(self, **values: float) -> None:
-        """Gives parameters other values, for runs made from now on; runs that were made before keep what they had. Collective."""
+        """Gives parameters other values. Collective.
+
+        What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
+        which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
+        """
         for name, value in values.items():
             self._core.set(name, number(value, "parameter " + name))
 

@@ -100,8 +100,10 @@ def _chain(n, x):
     if op == "negate":
         return (_expression(-1.),)
     if op == "power":
+        nothing = _node("equal", a, 0.)  # as for square roots
         by_base = x[1] * _power(a, x[1] - 1.)
-        return by_base, (_expression(0.) if _constant(x[1]) is not None else n * _unary("log", a))
+        by_base = where(nothing & (x[1] < 1.), 0., by_base) if not (_constant(x[1]) or 0.) >= 1. else by_base
+        return by_base, (_expression(0.) if _constant(x[1]) is not None else where(nothing, 0., n * _unary("log", a)))
     if op == "atan2":
         square = a * a + x[1] * x[1]
         return x[1] / square, -a / square
@@ -115,7 +117,8 @@ def _chain(n, x):
     rules = {"sin": lambda: cos(a), "cos": lambda: -sin(a), "tan": lambda: 1. + n * n, "asin": lambda: 1. / sqrt(1. - a * a),
              "acos": lambda: -1. / sqrt(1. - a * a), "atan": lambda: 1. / (1. + a * a), "sinh": lambda: cosh(a), "cosh": lambda: sinh(a),
              "tanh": lambda: 1. - n * n, "exp": lambda: n, "log": lambda: 1. / a, "log10": lambda: 0.43429448190325182765 / a,
-             "sqrt": lambda: 0.5 / n, "cbrt": lambda: 1. / (3. * n * n), "abs": lambda: where(a < 0, -1., where(a <= 0, 0., 1.))}
+             "sqrt": lambda: where(n <= 0, 0., 0.5 / n),  # at 0 as the numbers of the kernels have it: of sqrt(v v) v the rest is 0 there
+             "cbrt": lambda: 1. / (3. * n * n), "abs": lambda: where(a < 0, -1., where(a <= 0, 0., 1.))}
     if op in rules:
         return (rules[op](),)
     raise TypeError("a formula with '%s' has no derivative here" % op)
