@@ -77,7 +77,8 @@ struct Bushing {
 /*
   Timoshenko beam from j (at x = 0) to i (at x = length) along the x axes of the markers, without mass. It is linear in
   the mean frame of the two markers, which goes along with any motion of the whole; several in a row, with bodies
-  between, bend far. Free of force when both markers have the same axes and i is at (length, 0, 0) of j. Components:
+  between, bend far. Rotations of i against j stay below half a turn, beyond it the torque has the wrong sign.
+  Free of force when both markers have the same axes and i is at (length, 0, 0) of j. Components:
   force and moment on i in the mean frame. Planar scenes need E, area and Izz alone.
 */
 struct Beam {

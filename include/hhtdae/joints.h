@@ -55,7 +55,7 @@ struct PointDistance { Marker i, j; double length = -1; }; /* negative: the dist
 struct PointOnCurve {                   /* origin of i on the curve (c_x(s), c_y(s), c_z(s)) in j's axes */
   Marker i, j;
   std::vector<Vector3> points;          /* interpolated by a twice continuously differentiable cubic spline over chord length */
-  bool closed = false;
+  bool closed = false;                  /* an open curve goes on as a straight line beyond its ends */
 };
 
 /* ---- velocity-level (non-holonomic) ---- */

@@ -14,6 +14,9 @@
 
   x: displacements and small rotations of bodies in space axes, and all other unknowns as they are. M, C and K are those of this moment: modes
   are motions where the state is at rest, or steady as seen from space. An axisymmetric rotor at speed is, a swinging rod is not.
+  Modal and nodal coordinates of flexible bodies are in the bodies' own axes. One whose rotation joints and motions determine, a blade on a driven
+  hub, may turn; of one that is free to turn, a flexible shaft in bearings, the equations change within a revolution, and eigenvalues at speed are
+  wrong: rigid discs with beams between them are such a rotor in space axes.
   All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */
 #ifndef HHTDAE_LINEARIZE_H

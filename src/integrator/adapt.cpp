@@ -76,6 +76,21 @@ PetscErrorCode DestroyAdapt(TSAdapt adapt)
 
 } // namespace
 
+/* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn */
+PetscErrorCode LookFurther(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscBool   ours;
+
+  PetscFunctionBegin;
+  if (I.ahead != Ahead::Nothing || !(ts->max_time > I.ahead_to)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSHHT3, &ours));
+  if (!ours) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LookAhead(ts, ts->ptime, I.U0, I.V0));
+  if (I.ahead == Ahead::Loads) ts->time_step = PetscMin(ts->time_step, coasting * (ts->max_time - I.t_begin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The basic type, whose choice is looked at */
 PetscErrorCode CreateAdapt(TSAdapt adapt)
 {

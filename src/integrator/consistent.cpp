@@ -16,6 +16,7 @@
 #include "equations.h"
 #include "formulas.h"
 #include "linear/linear.h"
+#include "random.h"
 #include "solver.h"
 #include "work_vec.h"
 
@@ -86,6 +87,35 @@ PetscErrorCode ForcesLeft(const Integrator &I, Consistent &c, PetscReal *part)
     Read(c.F), Read(forces)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
   *part = sum[1] > 0 ? PetscSqrtReal(sum[0] / sum[1]) : 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the residual in the equations of motion is what rounding of the coordinates makes there, and constraints hold: forces that balance each other without
+   constraints leave no other measure (SceneEquilibrium.OfBodiesOnSprings) */
+PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
+{
+  const Integrator &I = Get(ts);
+  PetscReal         sum[4] = {0, 0, 0, 0}; /* squares of: forces left, what rounding makes of them; constraints left, their terms */
+  WorkVec           U, F;
+
+  PetscFunctionBegin;
+  PetscCall(U.like(c.X));
+  PetscCall(F.like(c.X));
+  PetscCall(VecCopy(c.U, U));
+  PetscCall(Shake(U, PETSC_MACHINE_EPSILON, 0, [&](PetscInt i) { return IsCoordinate(I, i); }));
+  PetscCall(EvaluateResidual(ts, c.t, U, c.V, c.A, F));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f, PetscScalar other, PetscScalar a, PetscScalar g) {
+      if (IsConstraint(I, i)) sum[2] += PetscRealPart(f * f);
+      else if (IsCoordinate(I, i)) {
+        sum[0] += PetscRealPart(f * f);
+        sum[1] += PetscRealPart((other - f) * (other - f));
+      }
+      sum[3] += PetscRealPart(IsConstraint(I, i) ? g * g : IsCoordinate(I, i) ? a * a : 0);
+    },
+    Read(c.F), Read(F), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
+  *yes = (PetscBool)(PetscSqrtReal(sum[0]) < of_rounding * PetscSqrtReal(sum[1]) && PetscSqrtReal(sum[2]) <= rounding * PetscSqrtReal(sum[3]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,7 +192,7 @@ static PetscErrorCode WithOwnFactors(Consistent &c)
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
   PetscReal e = 0, last, first = 0, forces;
-  PetscBool renew = (PetscBool)!have_matrix, other;
+  PetscBool renew = (PetscBool)!have_matrix, other, balanced;
 
   PetscFunctionBegin;
   *ok = PETSC_TRUE;
@@ -192,6 +222,8 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     if (known && !falls && c.h == 0) {
       PetscCall(ForcesLeft(Get(ts), c, &forces));
       if (forces <= rounding) PetscFunctionReturn(PETSC_SUCCESS);
+      PetscCall(LeftByRounding(ts, c, &balanced));
+      if (balanced) PetscFunctionReturn(PETSC_SUCCESS);
     }
     renew = (PetscBool)(c.its > 1 && !falls);
     if (renew) PetscCall(WithOwnFactors(c));

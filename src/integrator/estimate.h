@@ -26,6 +26,7 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
 PetscErrorCode NoteError(TS ts);
 
 PetscErrorCode CreateAdapt(TSAdapt adapt);
+PetscErrorCode LookFurther(TS ts); /* before the attempts from t_n, where the run goes on beyond its old end */
 
 /* Before an attempt from t_n */
 PetscErrorCode ApplyStepLimit(TS ts);

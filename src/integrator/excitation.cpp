@@ -28,21 +28,43 @@ constexpr PetscReal falling  = 0.5;     /* and each of them less than this times
 constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
 constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
+/* Of the largest change of any row of its kind: less may be what rounding leaves of loads that cancel, with lever arms of up to 1e6 (Excitation.OfLoadsThatCancel) */
+constexpr PetscReal cancelled = 1e-9;
+
 /* What is found of a row's changes with time */
 struct Changes {
-  WorkVec largest, number;
-  Vec     shortest = nullptr; /* I.excitation */
+  WorkVec   largest, number;
+  Vec       shortest = nullptr; /* I.excitation */
+  PetscReal of_kind[TSHHT3_NUM_ROLES] = {};
 };
 
+PetscErrorCode NoteLargest(const Integrator &I, Vec before, Vec after, Changes &c)
+{
+  PetscReal most[TSHHT3_NUM_ROLES] = {};
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f0, PetscScalar f) {
+      const PetscReal change = PetscAbsScalar(f - f0);
+      if (change > most[RoleOf(I, i)] && change < PETSC_MAX_REAL) most[RoleOf(I, i)] = change;
+    },
+    Read(before), Read(after)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, TSHHT3_NUM_ROLES, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)before)));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) c.of_kind[r] = PetscMax(c.of_kind[r], most[r]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; the largest change of any row, as a part of its largest one */
-PetscErrorCode NoteChanges(PetscReal tau, Vec before, Vec after, const Changes &c, PetscReal *part)
+PetscErrorCode NoteChanges(const Integrator &I, PetscReal tau, Vec before, Vec after, Changes &c, PetscReal *part)
 {
   PetscReal most_of_all = 0;
 
   PetscFunctionBegin;
+  PetscCall(NoteLargest(I, before, after, c));
   PetscCall(ForEntries(
-    [&](PetscInt, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
+    [&](PetscInt i, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
       const PetscReal change = PetscAbsScalar(f - f0);
+      if (change <= cancelled * c.of_kind[RoleOf(I, i)]) return;
       if (change > most_of_all * PetscRealPart(most)) most_of_all = PetscRealPart(most) > 0 ? PetscMin(change / PetscRealPart(most), 1) : 1;
       if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
       most     = PetscMax(change, PetscRealPart(most));
@@ -80,7 +102,7 @@ PetscErrorCode NoteExcitation(TS ts)
     tau *= shorter;
     PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
     last = part;
-    PetscCall(NoteChanges(tau, F[0], F[1], c, &part));
+    PetscCall(NoteChanges(I, tau, F[0], F[1], c, &part));
     still = part > noticeable || (part > falling * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
   }
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
@@ -102,7 +124,8 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   WorkVec         zero, now, then;
 
   PetscFunctionBegin;
-  I.ahead = Ahead::Nothing;
+  I.ahead    = Ahead::Nothing;
+  I.ahead_to = ts->max_time;
   if (!(ts->max_time < PETSC_MAX_REAL / 2 && rest > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* a run without end (Excitation.RunsWithoutEnd) */
   for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
   PetscCall(VecZeroEntries(zero));

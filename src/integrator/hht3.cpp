@@ -377,9 +377,12 @@ static PetscErrorCode Finalize(void)
   line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it counts always; the program's
   number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told from PETSc's defaults and want the option.
   -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. The default type of `TSAdapt`, also called hhtdae,
-  is basic but for small gains of h, which it does not take since they cost a matrix, and growth after failures, which it slows. A step size
+  is basic but for small gains of h, which it does not take since they cost a matrix, growth after failures, which it slows, and growth where nothing moves, where it
+  waits for loads and motions that set in later. A step size
   chosen by another type is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
   or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
+
+  Forces that jump where the integrator cannot see it, between two calls of `TSSolve()` or in a monitor, want `TSRestartStep()`; its history is that of the forces before.
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.

@@ -194,12 +194,16 @@ PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscR
 /* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
 constexpr PetscReal many = 1e3;
 
+/* What rounding leaves of velocities is no time scale (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be
+   a millionth of what things take (Query.Units) */
+PetscReal WithoutEnd(PetscReal t) { return t != 0 ? many * PetscAbsReal(t) : many * many; }
+
 /* 1/rate, at most the whole run where it has an end. Not what is left of it: differences over next to nothing are rounding */
 PetscReal TimeOf(TS ts, PetscReal rate)
 {
   const Integrator &I    = Get(ts);
   const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
-  PetscReal         span = ends ? ts->max_time - I.t_begin : rate > 0 ? PETSC_MAX_REAL : 1;
+  PetscReal         span = ends ? ts->max_time - I.t_begin : rate > 0 ? WithoutEnd(ts->ptime) : 1;
   if (I.excitation && I.fastest < span / many) span = many * I.fastest;
   return rate > 0 ? PetscMin(1 / rate, span) : span;
 }

@@ -94,6 +94,7 @@ struct StepState {
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
   Ahead            ahead       = Ahead::Unknown; /* of what the start has not seen */
+  PetscReal        ahead_to    = 0;              /* end of the run that it was looked for in */
   PetscBool        told        = PETSC_FALSE;    /* that steps do not follow them */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
   PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */

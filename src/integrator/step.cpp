@@ -297,6 +297,7 @@ PetscErrorCode Step(TS ts)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(CheckpointIfDue(ts));
   PetscCall(Begin(ts));
+  PetscCall(LookFurther(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {
     PetscCall(Attempt(ts, &tiny, &ok));

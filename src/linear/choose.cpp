@@ -299,6 +299,8 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(ChooseNone(ksp, P, pc, choice));
     PetscFunctionReturn(0);
   }
+  if (choice->user_pc && cholesky && !symmetric)
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)P), "hhtdae: -pc_type cholesky takes one triangle of a matrix that is not symmetric: corrections will be slow, and less accurate; use lu\n"));
   if (package && size.single && choice->may_be_rough) PetscCall(PreferSingle(ksp, P, cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &package));
   if (package && choice->user_pc)
     PetscCall(SetPackage(pc, package));

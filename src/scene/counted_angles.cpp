@@ -48,6 +48,15 @@ double PrincipalOf(const Axes &x)
   return std::atan2(yj.dot(xi), xj.dot(xi));
 }
 
+/* The marker's axes with its body as it was described */
+Frame<double> AsDescribed(const Model &M, Marker m)
+{
+  Frame<double>  f = M.scene.frame(m);
+  const PetscInt b = M.scene.markers[m.id].body;
+  if (b >= 0 && b < (PetscInt)M.described.size()) f.R = M.described[b] * M.scene.markers[m.id].R;
+  return f;
+}
+
 /* The angle of a planar body at the start, as its unknown has it */
 double StartOf(const SceneData &s, PetscInt marker)
 {
@@ -56,6 +65,12 @@ double StartOf(const SceneData &s, PetscInt marker)
 }
 
 } // namespace
+
+/* In (-pi, pi] as the bodies are described; from there assembly and equilibrium have turned them by less than half a turn */
+double StartAngle(const Model &M, Marker i, Marker j)
+{
+  return Unwind<double>(PrincipalAngle<double>(M.scene.frame(i), M.scene.frame(j)), PrincipalAngle<double>(AsDescribed(M, i), AsDescribed(M, j)));
+}
 
 bool InstancesOf::joins(std::size_t n, int k, PetscInt i, PetscInt j) const { return store->marker(number[n], 2 * k) == i && store->marker(number[n], 2 * k + 1) == j; }
 
@@ -79,7 +94,7 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
   if (s.planar) {
-    now[0].angle  = PrincipalAngle<double>(s.frame(Marker{i}), s.frame(Marker{j}));
+    now[0].angle  = StartAngle(*R.model, Marker{i}, Marker{j});
     now[0].turned = StartOf(s, i) - StartOf(s, j);
   } else {
     for (const auto &b : R.batches)

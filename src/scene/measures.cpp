@@ -216,7 +216,7 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
     if (s.valid(m.j)) k.j = l.marker(m.j.id);
     if (s.valid(m.frame)) k.frame = l.marker(m.frame.id);
     if (m.kind != Measure::Angle) break;
-    k.angle = PrincipalAngle<double>(s.frame(m.i), s.frame(m.j));
+    k.angle = StartAngle(*l.run->model, m.i, m.j);
     k.of[0] = m.i.id;
     k.of[1] = m.j.id;
   }

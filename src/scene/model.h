@@ -24,6 +24,7 @@ struct Model {
   double      begin     = 0;
   PetscMPIInt rank = 0, size = 1;
   Numbering   number;
+  std::vector<Matrix3> described; /* attitudes of the bodies, before assembly and equilibrium moved them */
   PetscInt    n = 0, start = 0; /* own unknowns, global number of the first */
   /* one triangle of the matrix: asked for; else why all of it is stored */
   bool        wants_triangle = false;

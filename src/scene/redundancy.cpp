@@ -402,6 +402,29 @@ PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, con
   PetscFunctionReturn(0);
 }
 
+bool ReadsDropped(const SceneData &s, const ElementData &e)
+{
+  for (const Part &p : e.parts)
+    for (int i = 0; i < p.store->inputs(); i++) {
+      const ScalarRef r = p.store->input(p.index, i);
+      if (r.kind != ScalarRef::Multiplier) continue;
+      for (const auto &d : s.started.dropped)
+        if (d.element == r.id && d.row == r.component) return true;
+    }
+  return false;
+}
+
+/* Friction whose joint has lost rows finds no load there: the other joints carry it */
+PetscErrorCode TellReaders(const SceneData &s)
+{
+  PetscFunctionBegin;
+  for (const ElementData &e : s.elements)
+    if (ReadsDropped(s, e))
+      PetscCall(PetscPrintf(s.comm, "scene: %s %s takes the forces of dropped rows for zero: put it on the joint that is left to carry the load, or use joints that leave more freedom\n",
+                            e.type, e.name.c_str()));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode DropRedundant(Model &M)
@@ -431,6 +454,7 @@ PetscErrorCode DropRedundant(Model &M)
     b.store->setActive(b.instance, (unsigned char)(b.store->active(b.instance) & ~(1u << f.row)));
     s.started.dropped.push_back({b.element, b.first + f.row});
   }
+  PetscCall(TellReaders(s));
   PetscFunctionReturn(0);
 }
 

@@ -117,6 +117,7 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* counted_angles.cpp: the angles at the state where the bodies have been moved to, which u is the own unknowns of; one more of them: its
    turns are those that a spring, a motion, a channel count, or in a planar scene those from the start, else it is in (-pi, pi]. Collective */
 PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all);
+double StartAngle(const Model &M, Marker i, Marker j); /* of assembly and equilibrium too: less than half a turn from how the bodies are described */
 PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first);
 PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y); /* to a run that goes on in another vector */
 /* reframe.cpp: others' bodies too */

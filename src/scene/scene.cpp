@@ -225,6 +225,8 @@ PetscErrorCode Scene::setUp()
     if (M.continues) s.start.time = M.begin;
     else PetscCall(Partition(s, M.size, M.number.owner));
     FillLight(s);
+    M.described.clear();
+    for (const BodyData &b : s.bodies) M.described.push_back(b.A);
     PetscCall(Assemble(M));
     PetscCall(DropRedundant(M));
     PetscCall(CheckInertia(s));

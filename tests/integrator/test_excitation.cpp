@@ -212,3 +212,61 @@ TEST(Excitation, RunsWithoutEnd)
   EXPECT_LT(latest, 1e9);
   EXPECT_GT(run.t(), 1e-3);
 }
+
+/* The end that the first part of a run has looked at is not the end of what follows, nor is it that of a checkpoint */
+TEST(Excitation, InARunThatGoesOn)
+{
+  const PushedLater p([](double t) { return t > 5. && t < 7. ? .5 : 0.; }, 2.);
+  const std::string file = ::testing::TempDir() + "goes_on.checkpoint";
+  for (bool resumed : {false, true}) {
+    Simulation first(p, tolerance(1e-6));
+    must(first.solve());
+    if (resumed) must(TSHHT3CheckpointSave(first.ts, file.c_str()));
+    Simulation  second(p, tolerance(1e-6));
+    Simulation &run = resumed ? second : first;
+    if (resumed) must(TSHHT3CheckpointLoad(run.ts, file.c_str()));
+    must(TSSetMaxTime(run.ts, 10.));
+    must(run.solve());
+    EXPECT_NEAR(run.v()[0], 1., 1e-2) << resumed;
+  }
+}
+
+namespace
+{
+
+/* A thrust of 5 + 30 sin(50 t) in one row, of which rounding is left in the other */
+struct Cancelled : Problem {
+  Cancelled()
+  {
+    name = "cancelled";
+    n    = 2;
+    t1   = .1;
+    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE};
+  }
+  void initial(double *u, double *v) const override { std::fill_n(u, 2, 0.), std::fill_n(v, 2, 0.); }
+  void residual(double t, const double *, const double *, const double *a, double *f) const override
+  {
+    const double F = 5. + 30. * std::sin(50. * t);
+    f[0]           = 100. * a[0] - F;
+    f[1]           = a[1] - (F * .1 + F * .7 - F * (.1 + .7)) * 10.; /* lever arms */
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    J.add(0, 0, 100. * sa);
+    J.add(1, 1, sa);
+  }
+};
+
+} // namespace
+
+/* Forces whose moments cancel swing as they do, not as the rounding of their sum does */
+TEST(Excitation, OfLoadsThatCancel)
+{
+  const Cancelled p;
+  Simulation      run(p, tolerance(1e-9));
+  must(run.step());
+  EXPECT_NEAR(accelerations(run)[0], .05, 1e-6);
+  must(run.solve());
+  EXPECT_LT(run.statistics().steps, 300);
+  EXPECT_NEAR(run.v()[0], (5. * .1 + .6 * (1. - std::cos(5.))) / 100., 1e-5);
+}

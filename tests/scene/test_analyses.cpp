@@ -304,6 +304,40 @@ TEST(Analyses, KinematicsInAnyUnitsOfLength)
   }
 }
 
+/* What rounding leaves of velocities that are zero, or small ones, are no measure of how fast a motion becomes; nor are those of other bodies */
+TEST(Analyses, KinematicsWhereAMotionHasStoodStill)
+{
+  for (double first : {0., 1e-4, 3e-4})
+    for (bool cart : {false, true}) {
+      Scene        s(PETSC_COMM_SELF);
+      const Body   wheel = s.add("wheel", RigidBody());
+      const Marker i = s.marker(wheel), j = s.marker(s.ground());
+      s.add("axle", Revolute{i, j});
+      const Element drive = s.add("drive", RotationalMotion{i, j, TimeFunction::step5(0, 0, 1, 1)});
+      if (cart) {
+        RigidBody other;
+        other.velocity   = {0, 6e-17, 0};
+        const Body     c = s.add("cart", other);
+        const Marker   x = s.marker(c, Vector3::Zero(), hhtdae::axesAlong(Vector3::UnitX())), y = s.marker(s.ground(), Vector3::Zero(), hhtdae::axesAlong(Vector3::UnitX()));
+        s.add("rail", Translational{x, y});
+        s.add("hold", TranslationalMotion{x, y, TimeFunction::polynomial({0})});
+      }
+      OwnTS    run(s);
+      Snapshot now;
+      Motion   m;
+      Load     load;
+      must(Kinematics(run.ts, first));
+      for (double t = .1; t < 1; t += .1) {
+        must(Kinematics(run.ts, t));
+        must(now.take(run.ts));
+        must(now.motion(wheel, &m));
+        must(now.load(drive, i, &load));
+        EXPECT_NEAR(m.angular_velocity(2), 30 * t * t * (1 - t) * (1 - t), 1e-8) << first << " " << t;
+        EXPECT_NEAR(load.moment(2), 60 * t * (1 - t) * (1 - 2 * t), 1e-5) << first << " " << t;
+      }
+    }
+}
+
 /* In units in which the scene is large a sine that cannot get nearer than 1e-4 is no small misfit either */
 TEST(Analyses, AssemblyThatFallsShort)
 {

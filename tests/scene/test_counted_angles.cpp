@@ -204,3 +204,34 @@ TEST(CountedAngles, GoOnWithTheRun)
       must(TSDestroy(&next));
     }
 }
+
+/* Assembly and equilibrium may move a body over half a turn before the run begins: all who read the angle count on from how it is described */
+TEST(CountedAngles, StartsThatPassHalfATurn)
+{
+  for (Space space : {Space::Planar, Space::Spatial})
+    for (bool equilibrium : {false, true}) {
+      Scene     scene(PETSC_COMM_SELF, space);
+      RigidBody b;
+      b.rotation         = Eigen::AngleAxisd(3, Vector3::UnitZ()).toRotationMatrix();
+      const Body   wheel = scene.add("wheel", b);
+      const Marker i = scene.marker(wheel), j = scene.marker(scene.ground());
+      scene.add("axle", Revolute{i, j});
+      if (equilibrium) {
+        TorsionalSpringDamper spring{i, j, 1, .1};
+        spring.angle = 3.9;
+        UserScalarForce pull{i, j, Expression({Measure::angle(i, j)}, [](const Real *x) { return .2 - .1 * x[0]; }), true};
+        scene.add("spring", spring);
+        scene.add("pull", pull);
+        scene.start().equilibrium = true;
+      } else {
+        scene.add("drive", RotationalMotion{i, j, TimeFunction(3.5)});
+        scene.start().assembly = Assembly::Project;
+      }
+      const double expected = equilibrium ? 4.1 / 1.1 : 3.5;
+      scene.variable("angle", Measure::angle(i, j));
+      scene.channel("angle", Measure::angle(i, j));
+      SceneRun run(scene, .3, "");
+      must(run.solve());
+      EXPECT_NEAR(angleOf(run.ts, i, j), expected, 1e-6) << equilibrium;
+    }
+}

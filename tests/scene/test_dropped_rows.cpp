@@ -144,3 +144,22 @@ TEST(DroppedRows, InTheLastStepAndInKinematics)
   must(TSGetTime(run.ts, &t));
   EXPECT_EQ(t, 0.3);
 }
+
+/* Two hinges of a door on one line: friction of the one whose rows are left out finds no load, which is said */
+TEST(DroppedRows, FrictionThatReadsThem)
+{
+  for (int k = 0; k < 2; k++) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    b.position         = {.5, 0, 1};
+    b.velocity         = {0, .5, 0};
+    b.angular_velocity = {0, 0, 1};
+    const Body    door = s.add("door", b);
+    Element       hinge[2];
+    for (int h = 0; h < 2; h++) hinge[h] = s.add("hinge " + std::to_string(h), Revolute{s.markerAt(door, {0, 0, .3 + 1.4 * h}), s.markerAt(s.ground(), {0, 0, .3 + 1.4 * h})});
+    s.add("rub", JointFriction{hinge[k], .3, .01});
+    Printed out;
+    must(s.setUp());
+    EXPECT_EQ(out.says("joint friction rub takes the forces of dropped rows for zero"), k == 1) << out.text();
+  }
+}

@@ -113,3 +113,34 @@ TEST(SceneEquilibrium, StrongDamping)
   s.scene.add("spring", spring);
   EXPECT_NEAR(s.depth(), 0.1 - 1, 1e-7);
 }
+
+/* A body that springs alone hold: what is left of its forces is rounding, and there are no accelerations or reactions to measure it by */
+TEST(SceneEquilibrium, OfBodiesOnSprings)
+{
+  for (int seed = 1; seed <= 30; seed++) {
+    std::srand(seed);
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    b.mass     = 2;
+    b.inertia  = .1 * Matrix3::Identity();
+    b.position = Vector3::Random();
+    b.rotation = Eigen::Quaterniond(Eigen::Vector4d::Random().normalized()).toRotationMatrix();
+    const Body body = s.add("b", b);
+    s.gravity(5 * Vector3::Random());
+    for (int k = 0; k < 4; k++) {
+      SpringDamper spring;
+      spring.i         = s.marker(body, .3 * Vector3::Random());
+      spring.j         = s.marker(s.ground(), 2 * Vector3::Random());
+      spring.stiffness = 100;
+      spring.damping   = 5;
+      spring.length    = .5;
+      s.add("spring " + std::to_string(k), spring);
+    }
+    s.start().equilibrium = true;
+    TS ts;
+    must(s.createTS(&ts));
+    must(TSSetMaxTime(ts, .1));
+    EXPECT_EQ(s.solve(ts), 0) << seed;
+    must(TSDestroy(&ts));
+  }
+}

@@ -291,3 +291,38 @@ TEST(JointFrictionEntry, SlowsDownAsCoulombSays)
     EXPECT_NEAR(RatesAfter(scene, t)(0), -3 + mu * g * t, 1e-4);
   }
 }
+
+/* A crank drives a piston under gas through a rod at 1 rad; the search for accelerations goes at a rate of mu tan(1) or so */
+TEST(JointFrictionEntry, StartsAtAnyCoefficient)
+{
+  for (double mu = .1; mu < .25; mu += .005) {
+    Scene         scene(PETSC_COMM_SELF, Space::Planar);
+    const double  c = std::cos(1.), s = std::sin(1.);
+    RigidBody     rod, piston, crank;
+    rod.mass        = .01;
+    rod.inertia     = 1e-6 * Matrix3::Identity();
+    rod.position    = {-c / 2, s / 2, 0};
+    piston.inertia  = .01 * Matrix3::Identity();
+    crank.mass      = 5;
+    crank.inertia   = .1 * Matrix3::Identity();
+    crank.position  = {-c, s, 0};
+    crank.angular_velocity = {0, 0, 1};
+    for (RigidBody *b : {&rod, &piston, &crank}) b->velocity = {-.2, 0, 0};
+    const Body    r = scene.add("rod", rod), p = scene.add("piston", piston), k = scene.add("crank", crank);
+    scene.add("bearing", Revolute{scene.marker(k, {0, -.2, 0}), scene.marker(scene.ground(), {-c, s - .2, 0})});
+    scene.add("pin", Revolute{scene.marker(r, {-c / 2, s / 2, 0}), scene.marker(k)});
+    scene.add("gudgeon", Revolute{scene.marker(r, {c / 2, -s / 2, 0}), scene.marker(p)});
+    const Element slide = scene.add("slide", Translational{scene.marker(p), scene.marker(scene.ground())});
+    scene.add("friction", JointFriction{slide, mu});
+    const auto constant = [](double x) { return Expression({}, [x](const Real *) -> Real { return Real(x); }); };
+    UserForce  gas;
+    gas.i     = scene.marker(p);
+    gas.force = {constant(-1000), constant(0), constant(0)};
+    scene.add("gas", gas);
+    TS ts;
+    EXPECT_EQ(scene.createTS(&ts), 0);
+    EXPECT_EQ(TSSetMaxTime(ts, 1e-3), 0);
+    EXPECT_EQ(scene.solve(ts), 0) << mu;
+    EXPECT_EQ(TSDestroy(&ts), 0);
+  }
+}

@@ -380,7 +380,8 @@ class Run(Channels):
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from space, see `Linearization`. Collective."""
+        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from space, see `Linearization`. Flexible bodies that are
+        free to turn, shafts in bearings, are not steady at speed: their modes turn with them. Collective."""
         return Linearization(self, time)
 
     # ---- the rest ----
