@@ -164,12 +164,6 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscInt           n, size;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(I.U0, &n));
-  for (Vec x : out) {
-    if (!x) continue;
-    PetscCall(VecGetLocalSize(x, &size));
-    PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
-  }
   if (IsRolledBackTo(ts, t)) {
     for (int k = 0; k < 3; k++)
       if (out[k]) PetscCall(VecCopy(begin[k], out[k]));
@@ -178,6 +172,12 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  for (Vec x : out) {
+    if (!x) continue;
+    PetscCall(VecGetLocalSize(x, &size));
+    PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
+  }
   const PetscReal x = StepFraction(I, t);
   for (int k = 0; k < 3; k++) {
     PetscCall(VecGetArrayRead(begin[k], &s0[k]));

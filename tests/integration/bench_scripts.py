@@ -65,9 +65,9 @@ check(float(found[0]["messages"]) == 0 and float(found[1]["messages"]) > 0 and f
 one, two = (float(row["operations of a rank, most"]) for row in found)
 check(0.4 * one < two < one, "operations on one and two ranks: %g, %g" % (one, two))
 
-# CalculiX has the same equilibrium, and with bricks, whose mass it integrates exactly, the same motion
+# CalculiX has the same equilibrium, and with bricks, whose mass it integrates exactly, the same motion but for its start, of first order
 if shutil.which("ccx"):
-    for element, motion in (("tetrahedron10", 0.2), ("brick20", 1e-4)):
+    for element, motion in (("tetrahedron10", 0.2), ("brick20", 1e-3)):
         text = script("calculix_beam.py", solidbeam, "--size", "2,1,1", "--element", element, "--steps", "1e-2", "--tolerances", "1e-3", "--reference", "2e-3")
         check(float(re.search(r"difference of CalculiX' (\S+) of it", text).group(1)) < 1e-6, text)
         check(float(re.search(r"differ by (\S+) at", text).group(1)) < motion, text)

@@ -55,9 +55,9 @@ void compare(const Problem &p, const std::string &options, bool setRoles = false
              (int)all.s.steps, (int)self.s.steps);
   EXPECT_EQ(all.t, p.t1);
   EXPECT_EQ(all.s.steps, self.s.steps);
-  EXPECT_LT(dq, 1e-10);
-  EXPECT_LT(dv, 1e-10);
-  EXPECT_LT(dl, 1e-10 + algebraicFloor(p, self));
+  EXPECT_LT(dq, 1e-9); /* rates of a start are differences over a short time */
+  EXPECT_LT(dv, 1e-9);
+  EXPECT_LT(dl, 1e-9 + algebraicFloor(p, self));
 }
 
 /* Steps of one length, so that no decision hangs on a rounding error, and corrections to rounding */

@@ -11,6 +11,7 @@ likewise. What cannot be written as a formula can be a ``callback``, at the cost
 """
 
 import numbers
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -19,6 +20,19 @@ from . import _core
 __all__ = ["Expression", "Parameter", "TimeFunction", "abs_", "arccos", "arcsin", "arctan", "arctan2", "callback", "cbrt", "cos", "cosh", "exp",
            "harmonic", "hypot", "log", "log10", "logical_and", "logical_not", "logical_or", "maximum", "minimum", "polynomial", "sin", "sinh", "spline",
            "sqrt", "step", "step5", "tan", "tanh", "time_values", "where"]
+
+
+_describing = []  # not empty while a function describes, which is called again when parameters have changed
+
+
+@contextmanager
+def describing():
+    """Formulas of parameters stand for their present values."""
+    _describing.append(True)
+    try:
+        yield
+    finally:
+        _describing.pop()
 
 
 class Expression:
@@ -65,9 +79,14 @@ class Expression:
         if any(n.op in ("argument", "measure", "function") for n in ordered([self])):
             raise TypeError("the value of this formula is known in a run only; functions of `math` take numbers: use those of hhtdae or numpy, "
                             "or a hhtdae.callback()")
-        if any(n.op == "parameter" for n in ordered([self])):
-            raise TypeError("this formula of parameters would be frozen at its present value here: describe the scene by a function that is called again, or take Parameter.get()")
+        if not _describing and any(n.op == "parameter" for n in ordered([self])):
+            raise TypeError("this formula of parameters would be frozen at its present value here: describe the scene by a function that is called again, or take its get()")
         return float(compile_tape([self], {}, [])(np.empty(0))[0])
+
+    def get(self):
+        """The present value of a formula of parameters and numbers alone."""
+        with describing():
+            return float(self)
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
         function = _UFUNCS.get(ufunc.__name__)

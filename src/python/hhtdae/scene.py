@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from . import _core
 from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
 from .elements import ELEMENTS
-from .expressions import Expression, Parameter
+from .expressions import Expression, Parameter, describing
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
@@ -212,7 +212,8 @@ class Scene:
             return self._enter(name, type(what), given)
         if not callable(what):
             raise TypeError("Scene.add(%r): %r is no body, joint, motion or force" % (name, what))
-        first = what()
+        with describing():
+            first = what()
         if first is None:
             raise TypeError("Scene.add(%r): the function must return a body or an element at first, then its kind is known" % name)
         return self._enter(name, type(first), self._later(lambda: self._fields_of(what(), type(first), name)))
@@ -253,8 +254,12 @@ class Scene:
         return Element(self, self._core.element(known, name, given), name)
 
     def _later(self, function):
-        self._keep.append(function)
-        return function
+        def describe(*given):
+            with describing():
+                return function(*given)
+
+        self._keep.append(describe)
+        return describe
 
     def _marker(self, body, position, axes, name, at):
         self._describe()
