@@ -90,32 +90,31 @@ PetscErrorCode ForcesLeft(const Integrator &I, Consistent &c, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the residual in the equations of motion is what rounding of the coordinates makes there, and constraints hold: forces that balance each other without
-   constraints leave no other measure (SceneEquilibrium.OfBodiesOnSprings) */
+/* Whether the residual in the equations of motion is what rounding of the coordinates makes there, and constraints hold and carry no more than that: loads
+   that balance each other without them leave no other measure (SceneEquilibrium.OfBodiesOnSprings) */
 PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
 {
   const Integrator &I = Get(ts);
-  PetscReal         sum[4] = {0, 0, 0, 0}; /* squares of: forces left, what rounding makes of them; constraints left, their terms */
-  WorkVec           U, F;
+  PetscReal         sum[5] = {0, 0, 0, 0, 0}; /* squares of: forces left, what rounding makes of them, forces of constraints; constraints left, their terms */
+  WorkVec           U, F, held;
 
   PetscFunctionBegin;
-  PetscCall(U.like(c.X));
-  PetscCall(F.like(c.X));
+  for (WorkVec *v : {&U, &F, &held}) PetscCall(v->like(c.X));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &l) { l = IsConstraint(I, i) ? x : 0; }, Read(c.X), Write(U)));
+  PetscCall(MatMult(c.P, U, held));
   PetscCall(VecCopy(c.U, U));
   PetscCall(Shake(U, PETSC_MACHINE_EPSILON, 0, [&](PetscInt i) { return IsCoordinate(I, i); }));
   PetscCall(EvaluateResidual(ts, c.t, U, c.V, c.A, F));
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar f, PetscScalar other, PetscScalar a, PetscScalar g) {
-      if (IsConstraint(I, i)) sum[2] += PetscRealPart(f * f);
-      else if (IsCoordinate(I, i)) {
-        sum[0] += PetscRealPart(f * f);
-        sum[1] += PetscRealPart((other - f) * (other - f));
-      }
-      sum[3] += PetscRealPart(IsConstraint(I, i) ? g * g : IsCoordinate(I, i) ? a * a : 0);
+    [&](PetscInt i, PetscScalar f, PetscScalar other, PetscScalar force, PetscScalar a, PetscScalar g) {
+      const auto square = [](PetscScalar x) { return PetscRealPart(x * x); };
+      if (IsConstraint(I, i)) sum[3] += square(f), sum[4] += square(g);
+      else if (IsCoordinate(I, i)) sum[0] += square(f), sum[1] += square(other - f), sum[2] += square(force), sum[4] += square(a);
     },
-    Read(c.F), Read(F), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
-  *yes = (PetscBool)(PetscSqrtReal(sum[0]) < of_rounding * PetscSqrtReal(sum[1]) && PetscSqrtReal(sum[2]) <= rounding * PetscSqrtReal(sum[3]));
+    Read(c.F), Read(F), Read(held), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 5, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
+  for (PetscReal &x : sum) x = PetscSqrtReal(x);
+  *yes = (PetscBool)(PetscMax(sum[0], sum[2]) < of_rounding * sum[1] && sum[3] <= rounding * sum[4]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
