@@ -101,3 +101,17 @@ TEST(MatrixTypes, Refusals)
       EXPECT_TRUE(run.says(std::string("is of type ") + type + ", which gives no rows")) << run.said;
     }
 }
+
+/* One triangle of a matrix that is not symmetric: the user's choice stands, and is said to be a poor one */
+TEST(MatrixTypes, CholeskyOfAnUnsymmetricMatrix)
+{
+  const UserVars  unsymmetric(1.);
+  const Pendulum  symmetric(-90., 0., 1.);
+  const Problem  *p[2] = {&unsymmetric, &symmetric};
+  for (int k = 0; k < 2; k++) {
+    Printed    out;
+    Simulation run(*p[k], tolerance(1e-4) + "-pc_type cholesky");
+    must(run.step());
+    EXPECT_EQ(out.says("-pc_type cholesky takes one triangle of a matrix that is not symmetric"), k == 0) << out.text();
+  }
+}
