@@ -363,7 +363,11 @@ PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
   The misfit is the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance;
   it is printed if it exceeds 1 and always shown by -info. Accelerations and multipliers are made consistent in any case.
 
-.seealso: `TSHHT3`
+  A restart from values that the integrator itself has left (`TSRestartStep()`, events) projects the velocities, unless the choice is
+  `TSHHT3_START_OFF`: those of a step meet the constraints to second order, which multipliers would answer with oscillations of first order. Where an
+  event has added constraints this is a plastic impact.
+
+.seealso: `TSHHT3`, `TSRestartStep()`
 @*/
 PetscErrorCode TSHHT3SetStart(TS ts, TSHHT3Start start)
 {
