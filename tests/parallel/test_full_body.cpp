@@ -163,7 +163,8 @@ TEST(FullBodyRanks, WithoutRoomForAFactor)
   EXPECT_TRUE(trap.says("not enough memory")) << trap.message;
 }
 
-/* Factors in single precision: constraints hold as well, and reactions differ by what the corrector leaves of them */
+/* Factors in single precision: constraints hold to a tenth of the corrector's tolerance of 1e-11 m (what is left depends on the order in which MUMPS' messages come:
+   up to 4e-14 m was seen), and reactions differ by what the corrector leaves of them */
 TEST(FullBodyRanks, InSinglePrecision)
 {
   const std::string package = "-pc_factor_mat_solver_type ";
@@ -178,7 +179,7 @@ TEST(FullBodyRanks, InSinglePrecision)
       for (int k = 0; k < 3; k++) {
         EXPECT_NEAR(s[k], d[k], 1e-8) << k;
         EXPECT_NEAR(s[3 + k], d[3 + k], 1e-6 * force) << k;
-        EXPECT_LT(std::abs(s[6 + k]), 1e-14) << k;
+        EXPECT_LT(std::abs(s[6 + k]), 1e-12) << k;
       }
       EXPECT_GT(force, 100);
     }
