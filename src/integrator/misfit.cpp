@@ -79,15 +79,20 @@ PetscErrorCode TrySolve(TS ts, Vec dV, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had. The matrix at hand may be the one
-   with which the last correction failed, as it was singular: then another one. */
+/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had. The factors at hand serve, though those of a start have met
+   the matrix of its rates since (Statistics.FactorizationsOfAStart); they may be those with which the last correction failed, as the matrix was singular: then others. */
 PetscErrorCode SolveNormal(TS ts, Vec dV)
 {
   Integrator &I = Get(ts);
-  PetscBool   ok;
+  KSP         ksp;
+  PetscBool   ok, reuse; /* the user's */
 
   PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetReusePreconditioner(ksp, &reuse));
+  PetscCall(KSPSetReusePreconditioner(ksp, PETSC_TRUE));
   PetscCall(TrySolve(ts, dV, &ok));
+  PetscCall(KSPSetReusePreconditioner(ksp, reuse));
   if (!ok) {
     PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
     PetscCall(TrySolve(ts, dV, &ok));

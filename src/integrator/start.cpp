@@ -89,8 +89,8 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(V.like(I.X));
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
-  /* from rest gamma grows with d^2, so that it has no part in the rates */
-  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {false, rest ? Gamma::Made : Gamma::Near, true}, &ok));
+  /* from rest gamma and the matrix change with d^2, so that they have no part in the rates */
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {(bool)rest, rest ? Gamma::Made : Gamma::Near, true}, &ok));
   PetscCall(VecZeroEntries(rate));
   if (ok) {
     PetscCall(VecWAXPY(rate, -1, X0, I.X));
