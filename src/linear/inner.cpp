@@ -85,6 +85,7 @@ PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, In
   PetscFunctionBegin;
   PetscCall(GatherMatrix(A, (PetscBool)(s->whole && !another), s));
   if (s->whole) A = s->whole[0];
+  PetscCall(LinearSolveOften(A));
   if (first) PetscCall(Create(pc, name, s));
   PetscCall(KSPSetOperators(s->ksp, A, A));
   if (first || another || s->choice.cholesky) {
@@ -115,6 +116,7 @@ PetscErrorCode InnerLoadState(PC pc, const char name[], Mat A, InnerSolver *s, A
     PetscCall(Create(pc, name, s));
   }
   if (s->whole) A = s->whole[0];
+  PetscCall(LinearSolveOften(A));
   PetscCall(KSPSetOperators(s->ksp, A, A));
   PetscCall(LinearLoadState(s->ksp, A, &s->choice, archive, same, &usable));
   *failed = (PetscBool)!usable;

@@ -29,7 +29,7 @@ struct KluPairState {
   double   tolerated     = 0; /* entries of L and U from which the pivots are looked for anew */
   double   growth        = 0; /* reciprocal pivot growth of the last factorization with pivoting */
   bool     panels_looked = false, panels_used = false, plan_tried = false;
-  bool     old_pivots    = false; /* the last factorization went with the pivots of another matrix */
+  bool     old_pivots    = false; /* the last factorization went with pivots that were there before it */
   PetscInt panels_made   = 0;     /* factorizations by panels */
   PetscInt analyses = 0, factorizations = 0, refactorizations = 0, rejected = 0;
 };

@@ -76,14 +76,12 @@ static PetscErrorCode ReportPanels(Mat F, const KluPanels &p)
   PetscFunctionReturn(0);
 }
 
-/* Panels for KLU's pivots are built when these are kept for the first time */
 static PetscErrorCode FindPanels(Mat F, const LinearRows &rows, KluPair *k)
 {
   bool pays;
 
   PetscFunctionBegin;
   if (k->panels_looked || !PanelsAllowed(k)) PetscFunctionReturn(0);
-  if (k->rejected > k->refactorizations) PetscFunctionReturn(0); /* pivots are not kept for long */
   k->panels_looked = true;
   k->panels        = std::make_shared<KluPanels>();
   PetscCall(KluPanelsBuild(rows, k, k->panels.get(), &pays));
@@ -115,7 +113,7 @@ static PetscErrorCode Refactor(Mat F, const LinearRows &rows, bool *good)
   PetscFunctionBegin;
   *good = false;
   if (!k->factored() || !k->refactor) PetscFunctionReturn(0);
-  PetscCall(FindPanels(F, rows, k));
+  if (k->rejected <= k->refactorizations) PetscCall(FindPanels(F, rows, k)); /* else pivots are not kept for long */
   PetscCall(FactorWithOldPivots(rows, k, &growth));
   *good = growth > 0 && growth * GROWTH >= k->growth;
   PetscCall(
@@ -213,6 +211,27 @@ static PetscErrorCode PlanAnew(Mat F, Mat A, const LinearRows &rows)
   PetscFunctionReturn(0);
 }
 
+/* Solves go by panels in half the time of KLU's, so that for hundreds of them the factorization is made again at once with the pivots just found
+   (KluPairPanels.AtOnceForManySolves) */
+static PetscErrorCode PanelsForManySolves(Mat F, Mat A, const LinearRows &rows)
+{
+  KluPair  *k = KluPairOf(F);
+  PetscBool often;
+  double    growth;
+
+  PetscFunctionBegin;
+  PetscCall(LinearSolvesOften(A, &often));
+  if (!often || !k->numeric || !k->refactor || k->growth <= 0) PetscFunctionReturn(0);
+  PetscCall(FindPanels(F, rows, k));
+  if (!k->panels) PetscFunctionReturn(0);
+  PetscCall(FactorWithOldPivots(rows, k, &growth));
+  k->old_pivots = growth > 0 && growth * GROWTH >= k->growth;
+  if (k->old_pivots) PetscFunctionReturn(0);
+  k->panels.reset();
+  k->panels_used = false; /* the values of `numeric` are those of this matrix */
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode ReportError(Mat F, Mat A)
 {
   KluPair *k = KluPairOf(F);
@@ -259,6 +278,7 @@ PetscErrorCode KluPairFactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   if (!good) {
     PetscCall(FactorWithPivoting(F, rows, k));
     PetscCall(PlanAnew(F, A, rows));
+    PetscCall(PanelsForManySolves(F, A, rows));
   }
   PetscCall(KluPairRestoreRows(A, &rows));
   PetscCall(ReportError(F, A));

@@ -61,6 +61,10 @@ PetscErrorCode LinearLoadState(KSP ksp, Mat P, LinearChoice *choice, Archive *ar
 PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough);
 PetscErrorCode LinearSolvesRoughly(Mat P, PetscBool *rough);
 
+/* Hundreds of solves follow each factorization of P: a package may do more for them (klupair.h) */
+PetscErrorCode LinearSolveOften(Mat P);
+PetscErrorCode LinearSolvesOften(Mat P, PetscBool *often);
+
 /* Functions by these names: of a factor, (Mat F, Archive *) and (Mat F, Mat P, Archive *, PetscBool *same); of a preconditioner that was set up with its operators,
    (PC, Archive *) and (PC, Archive *, PetscBool *same) */
 #define LINEAR_SAVE_STATE "LinearSaveState_C"

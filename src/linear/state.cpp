@@ -87,29 +87,54 @@ PetscErrorCode LinearLoadState(KSP ksp, Mat P, LinearChoice *choice, Archive *ar
   PetscFunctionReturn(0);
 }
 
-static const char ROUGH[] = "hhtdae_linear_rough";
+static const char ROUGH[] = "hhtdae_linear_rough", OFTEN[] = "hhtdae_linear_often";
 
-PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough)
+static PetscErrorCode Mark(Mat P, const char name[])
 {
   PetscContainer mark;
 
   PetscFunctionBegin;
-  if (!rough) {
-    PetscCall(PetscObjectCompose((PetscObject)P, ROUGH, NULL));
-    PetscFunctionReturn(0);
-  }
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)P), &mark));
-  PetscCall(PetscObjectCompose((PetscObject)P, ROUGH, (PetscObject)mark));
+  PetscCall(PetscObjectCompose((PetscObject)P, name, (PetscObject)mark));
   PetscCall(PetscContainerDestroy(&mark));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode IsMarked(Mat P, const char name[], PetscBool *yes)
+{
+  PetscObject mark;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)P, name, &mark));
+  *yes = (PetscBool)(mark != NULL);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough)
+{
+  PetscFunctionBegin;
+  if (rough) PetscCall(Mark(P, ROUGH));
+  else PetscCall(PetscObjectCompose((PetscObject)P, ROUGH, NULL));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LinearSolvesRoughly(Mat P, PetscBool *rough)
 {
-  PetscObject mark;
-
   PetscFunctionBegin;
-  PetscCall(PetscObjectQuery((PetscObject)P, ROUGH, &mark));
-  *rough = (PetscBool)(mark != NULL);
+  PetscCall(IsMarked(P, ROUGH, rough));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearSolveOften(Mat P)
+{
+  PetscFunctionBegin;
+  PetscCall(Mark(P, OFTEN));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearSolvesOften(Mat P, PetscBool *often)
+{
+  PetscFunctionBegin;
+  PetscCall(IsMarked(P, OFTEN, often));
   PetscFunctionReturn(0);
 }

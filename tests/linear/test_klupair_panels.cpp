@@ -1,5 +1,6 @@
 /* The solver type "klupair": dense parts by panels */
 #include "klupair_test.h"
+#include "linear/linear.h"
 #include <algorithm>
 #include <random>
 
@@ -74,6 +75,16 @@ protected:
   {
     OK(MatLUFactorNumeric(F, A, &info));
     EXPECT_EQ(error(), expected);
+  }
+
+  /* Of coupled_blocks() this part of A and B, and the coupling whole */
+  void leave(double part, PetscInt n)
+  {
+    OK(MatScale(A, part));
+    for (PetscInt i = 0; i < n; ++i) {
+      set(i, n + i, 1.0);
+      set(n + i, i, 1.0);
+    }
   }
 
   /* The same matrix without panels, and without old pivots */
@@ -159,30 +170,32 @@ TEST_F(KluPairPanels, SeveralDiagonalBlocks)
   }
 }
 
-/* [A I; I B], where nothing or nearly nothing remains of A and B */
+/* [A I; I B], of which A and B are diagonally dominant */
+Entries coupled_blocks(std::mt19937 &random, PetscInt n)
+{
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  Entries                                e;
+  e.n = 2 * n;
+  for (PetscInt i = 0; i < n; ++i) {
+    for (PetscInt j = 0; j < n; ++j)
+      for (PetscInt part : {(PetscInt)0, n}) e.add(part + i, part + j, i == j ? (double)n : uniform(random));
+    e.add_symmetric(i, n + i, 1.0);
+  }
+  return e;
+}
+
+/* Nothing or nearly nothing remains of A and B */
 TEST_F(KluPairPanels, GivesUpBadPivots)
 {
-  std::mt19937                           random(9);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const PetscInt                         n = 90;
+  std::mt19937   random(9);
+  const PetscInt n = 90;
   for (double left : {0.0, 1e-14}) {
-    Entries e;
-    e.n = 2 * n;
-    for (PetscInt i = 0; i < n; ++i) {
-      for (PetscInt j = 0; j < n; ++j)
-        for (PetscInt part : {(PetscInt)0, n}) e.add(part + i, part + j, i == j ? (double)n : uniform(random));
-      e.add_symmetric(i, n + i, 1.0);
-    }
-    factor(e);
+    factor(coupled_blocks(random, n));
     change(random);
     again();
     ASSERT_NE(view().find(used), std::string::npos) << view();
     EXPECT_LT(residual(), 1e-12);
-    OK(MatScale(A, left));
-    for (PetscInt i = 0; i < n; ++i) {
-      set(i, n + i, 1.0);
-      set(n + i, i, 1.0);
-    }
+    leave(left, n);
     again();
     EXPECT_EQ(counts().given_up, 1);
     EXPECT_LT(residual(), 1e-12) << left;
@@ -190,6 +203,24 @@ TEST_F(KluPairPanels, GivesUpBadPivots)
     again(); /* with the new pivots */
     EXPECT_EQ(counts().given_up, 1);
     EXPECT_LT(residual(), 1e-12) << left;
+    expect_same_solution(1e-10);
+  }
+}
+
+/* Pivots that were just found are used again for panels where hundreds of solves follow */
+TEST_F(KluPairPanels, AtOnceForManySolves)
+{
+  std::mt19937   random(11);
+  const PetscInt n = 90;
+  for (bool often : {false, true}) {
+    factor(coupled_blocks(random, n));
+    if (often) OK(LinearSolveOften(A));
+    leave(1e-14, n);
+    again();
+    EXPECT_EQ(counts().given_up, 1);
+    EXPECT_EQ(view().find(used) != std::string::npos, often) << view();
+    EXPECT_LT(residual(), 1e-12);
+    EXPECT_LT(residual(true), 1e-12);
     expect_same_solution(1e-10);
   }
 }
