@@ -102,6 +102,17 @@ TEST_F(ConstraintPC, CoarseLevelKeepsIterationsDown)
   EXPECT_LT(with[1], without[1] / 2);
 }
 
+/* Its solves go by panels from the first matrix on, also where these would not pay for one factorization */
+TEST_F(ConstraintPC, CoarseLevelByPanels)
+{
+  bar(12, 4, 4);
+  OK(PetscOptionsSetValue(NULL, "-pc_hhtconstraint_aggregate", "20"));
+  solver(KSPCG, 1e-6);
+  EXPECT_GT(solve(), 0);
+  EXPECT_NE(view().find("dense panels for these pivots"), std::string::npos) << view();
+  OK(PetscOptionsClearValue(NULL, "-pc_hhtconstraint_aggregate"));
+}
+
 TEST_F(ConstraintPC, CoarseLevelMovesAlongTheConstraints)
 {
   double forces, constraints;
