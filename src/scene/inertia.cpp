@@ -17,6 +17,7 @@ namespace
 
 constexpr double none        = 1e-12; /* of the other moments of a body: no inertia */
 constexpr double light       = 1e-3;  /* what assembly takes in its place, of others */
+constexpr double least       = 1e-7;  /* of the largest: to assembly nothing is lighter (Massless.NextToNothing) */
 constexpr double independent = 1e-8;  /* columns of norm one */
 
 /* Axes of a body, as columns in body axes, about which turning has no inertia */
@@ -28,6 +29,12 @@ Eigen::MatrixXd TurnsWithout(const SceneData &s, const BodyData &b)
   int                                          n = 0;
   while (n < 3 && principal.eigenvalues()(n) <= none * principal.eigenvalues()(2)) n++;
   return principal.eigenvectors().leftCols(n);
+}
+
+double LeastMoment(const SceneData &s, const BodyData &b)
+{
+  if (s.planar) return b.inertia(2, 2);
+  return Eigen::SelfAdjointEigenSolver<Matrix3>(b.inertia, Eigen::EigenvaluesOnly).eigenvalues()(0);
 }
 
 bool HasAll(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && TurnsWithout(s, b).cols() == 0); }
@@ -47,14 +54,21 @@ Eigen::MatrixXd Without(const SceneData &s, const BodyData &b)
 
 } // namespace
 
-/* A little of the inertia of others, as the metric of assembly */
+/* A little of the inertia of others, as the metric of assembly, whose equations lose what joins two heavy bodies by one that is far lighter */
 void FillLight(SceneData &s)
 {
-  double lightest = INFINITY;
-  for (const BodyData &b : s.bodies)
+  double lightest = INFINITY, heaviest = 0, moment = 0;
+  for (const BodyData &b : s.bodies) {
     if (b.mass > 0) lightest = std::min(lightest, b.mass);
+    heaviest = std::max(heaviest, b.mass);
+    moment   = std::max(moment, b.inertia.norm());
+  }
   for (BodyData &b : s.bodies) {
-    if (HasAll(s, b)) continue;
+    if (HasAll(s, b)) {
+      if (b.mass < least * heaviest) b.light_mass = std::max(b.light_mass, least * heaviest);
+      if (LeastMoment(s, b) < least * moment) b.light_inertia = std::max(b.light_inertia, least * moment);
+      continue;
+    }
     const double size = SceneSize(s);
     b.light_mass      = std::isfinite(lightest) ? light * lightest : 1;
     b.light_inertia   = std::max(light * b.inertia.norm(), light * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));

@@ -28,7 +28,7 @@ Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
     M.diagonal() << Vector3::Constant(1 / b.light_mass), Vector3::Constant(1 / b.light_inertia);
     return M;
   }
-  M.topLeftCorner<3, 3>().diagonal().setConstant(1 / (b.mass > 0 ? b.mass : b.light_mass));
+  M.topLeftCorner<3, 3>().diagonal().setConstant(1 / std::max(b.mass, b.light_mass));
   if (s.planar)
     M(5, 5) = b.point ? 0 : 1 / (b.inertia(2, 2) + b.light_inertia);
   else if (!b.point)

@@ -98,6 +98,46 @@ TEST(Massless, CrossAsAUniversalJoint)
   EXPECT_LT((a - b).norm(), 1e-5);
 }
 
+/* A cross between two shafts 0.5 rad apart, of mass and moments far below theirs: tan b = cos 0.5 tan a. Two of its rows are redundant where the axes meet at right angles
+   in the start alone, which a neighbouring position tells. */
+TEST(Massless, NextToNothing)
+{
+  const double bend = 0.5;
+  for (double mass : {1e-12, 1.})
+    for (double moment : {1e-14, 1e-9}) {
+      Scene         s(PETSC_COMM_SELF);
+      const Vector3 y(0, 1, 0), z1(0, 0, 1), z2(std::sin(bend), 0, std::cos(bend)), x1(1, 0, 0), x2 = y.cross(z2);
+      const auto    axes = [](const Vector3 &z, const Vector3 &x) { return (Matrix3() << x, z.cross(x), z).finished(); };
+      const auto    shaft = [&](const char *name, const Vector3 &at) {
+        RigidBody b;
+        b.mass     = 1;
+        b.inertia  = Vector3(0.01, 0.01, 0.02).asDiagonal();
+        b.position = at;
+        return s.add(name, b);
+      };
+      const Body first = shaft("first", -0.5 * z1), second = shaft("second", 0.5 * z2);
+      RigidBody  part;
+      part.mass        = mass;
+      part.inertia     = moment * Matrix3::Identity();
+      const Body cross = s.add("cross", part);
+      const auto both  = [&](const Body &a, const Body &b, const Vector3 &at, const Matrix3 &R) { return std::make_pair(s.markerAt(a, at, R), s.markerAt(b, at, R)); };
+      const auto in = both(first, s.ground(), -0.5 * z1, axes(z1, x1)), out = both(second, s.ground(), 0.5 * z2, axes(z2, x2));
+      const auto to = both(cross, first, Vector3::Zero(), axes(y, x1)), from = both(cross, second, Vector3::Zero(), axes(x2, y));
+      s.add("in", Revolute{in.first, in.second});
+      s.add("out", Cylindrical{out.first, out.second});
+      s.add("to", Revolute{to.first, to.second});
+      s.add("from", Revolute{from.first, from.second});
+      s.add("turn", RotationalMotion{in.first, in.second, TimeFunction::polynomial({0, 2})});
+      SceneRun run(s, 0.5, tolerance(1e-8) + "-scene_assemble project ");
+      must(run.solve());
+      Snapshot now;
+      double   angle;
+      must(now.take(run.ts));
+      must(now.value(Measure::angle(out.first, out.second), &angle));
+      EXPECT_NEAR(angle, std::atan(std::cos(bend) * std::tan(1.)), 1e-5) << mass << ' ' << moment;
+    }
+}
+
 /* Thin rods on universal joints have nothing about their axes to be turned */
 TEST(Massless, RodsWithoutMomentAboutTheirAxes)
 {
