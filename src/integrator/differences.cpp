@@ -4,10 +4,12 @@
   unknown at a time, which takes as many evaluations as there are unknowns; both are said with -info.
 */
 #include "compat.h"
+#include "entries.h"
 #include "equations.h"
 #include "jacobian.h"
 #include "linear/linear.h"
 #include "work_vec.h"
+#include <cstdint>
 #include <vector>
 
 namespace hht3
@@ -40,6 +42,28 @@ PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A state off the initial one, where entries may happen to vanish */
+PetscErrorCode OffTheStart(TS ts, WorkVec (&x)[3])
+{
+  PetscInt start, end;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  for (WorkVec &v : x) PetscCall(v.like(ts->vec_sol));
+  PetscCall(VecCopy(ts->vec_sol, x[0]));
+  PetscCall(VecCopy(ts->vec_dot, x[1]));
+  PetscCall(VecSet(x[2], 0.1));
+  for (PetscInt i = start; i < end; i++) {
+    PetscCall(VecSetValue(x[0], i, 1e-4 * (1 + i % 1000 * 7919 % 13), ADD_VALUES));
+    PetscCall(VecSetValue(x[1], i, 1e-3 * (1 + i % 1000 * 104729 % 17), ADD_VALUES));
+  }
+  for (int k = 0; k < 2; k++) {
+    PetscCall(VecAssemblyBegin(x[k]));
+    PetscCall(VecAssemblyEnd(x[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
 PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
 {
@@ -51,20 +75,9 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetLocalSize(ts->vec_sol, &n));
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
-  for (WorkVec &v : x) PetscCall(v.like(ts->vec_sol));
+  PetscCall(OffTheStart(ts, x));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(F.like(ts->vec_sol));
-  PetscCall(VecCopy(ts->vec_sol, x[0]));
-  PetscCall(VecCopy(ts->vec_dot, x[1]));
-  PetscCall(VecSet(x[2], 0.1));
-  for (PetscInt i = start; i < end; i++) { /* off the initial state, where entries may happen to vanish */
-    PetscCall(VecSetValue(x[0], i, 1e-4 * (1 + (i * 7919) % 13), ADD_VALUES));
-    PetscCall(VecSetValue(x[1], i, 1e-3 * (1 + (i * 104729) % 17), ADD_VALUES));
-  }
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecAssemblyBegin(x[k]));
-    PetscCall(VecAssemblyEnd(x[k]));
-  }
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   rows.assign(n, {});
   for (PetscInt j = 0; j < N; j++) {
@@ -112,6 +125,89 @@ PetscErrorCode CreateMatrix(TS ts, Mat *P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Entry by entry 1 */
+PetscErrorCode SetOnes(Mat pattern, Mat ones)
+{
+  PetscInt        start, end, n;
+  const PetscInt *col;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(pattern, &start, &end));
+  for (PetscInt i = start; i < end; i++) {
+    PetscCall(MatGetRow(pattern, i, &n, &col, NULL));
+    const std::vector<PetscScalar> values((size_t)n, 1);
+    PetscCall(MatSetValues(ones, 1, &i, n, col, values.data(), INSERT_VALUES));
+    PetscCall(MatRestoreRow(pattern, i, &n, &col, NULL));
+  }
+  PetscCall(MatAssemblyBegin(ones, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(ones, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+constexpr int halvings = 4; /* of each color: of two of its unknowns that a row follows one is alone in some half, but for a sixteenth of the pairs */
+
+/* A half of the unknowns, another one for each bit */
+bool InHalf(PetscInt index, int half) { return ((uint32_t)index * 2654435761u >> (31 - half / 2) & 1) == (uint32_t)(half % 2); }
+
+/* The first row that follows unknowns of this half of a color though the pattern has none of them there; -1: none */
+PetscErrorCode RowBeside(TS ts, Mat ones, IS color, int half, const WorkVec (&x)[3], Vec F0, PetscInt *row)
+{
+  WorkVec         moved[3], mark, F, places;
+  const PetscInt *index;
+  PetscInt        n, first;
+
+  PetscFunctionBegin;
+  for (WorkVec *v : {&mark, &F, &places}) PetscCall(v->like(F0));
+  PetscCall(ISGetLocalSize(color, &n));
+  PetscCall(ISGetIndices(color, &index));
+  PetscCall(VecZeroEntries(mark));
+  for (PetscInt k = 0; k < n; k++)
+    if (InHalf(index[k], half)) PetscCall(VecSetValue(mark, index[k], 1 + index[k] % 1000 * 7919 % 13, INSERT_VALUES)); /* what they do shall not cancel */
+  PetscCall(ISRestoreIndices(color, &index));
+  PetscCall(VecAssemblyBegin(mark));
+  PetscCall(VecAssemblyEnd(mark));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(moved[k].like(F0));
+    PetscCall(VecWAXPY(moved[k], 1e-3, mark, x[k]));
+  }
+  PetscCall(EvaluateResidual(ts, ts->ptime, moved[0], moved[1], moved[2], F));
+  PetscCall(MatMult(ones, mark, places));
+  PetscCall(VecGetOwnershipRange(F, &first, NULL));
+  PetscInt found = PETSC_MAX_INT;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar place, PetscScalar f, PetscScalar f0) {
+      if (place == 0. && PetscAbsScalar(f - f0) > 1e-12 * (PetscAbsScalar(f) + PetscAbsScalar(f0))) found = PetscMin(found, first + i); /* sums over all may round otherwise */
+    },
+    Read(places), Read(F), Read(F0)));
+  PetscCallMPI(MPI_Allreduce(&found, row, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
+  if (*row == PETSC_MAX_INT) *row = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A matrix that comes from elsewhere may have no place for some derivatives: differences by colors put them in others' places, and roles are read from those */
+PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
+{
+  PetscInt n, row = -1;
+  IS      *color;
+  WorkVec  x[3], F0;
+
+  PetscFunctionBegin;
+  PetscCall(OffTheStart(ts, x));
+  PetscCall(F0.like(ts->vec_sol));
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+  PetscCall(ISColoringGetIS(colors, PETSC_USE_POINTER, &n, &color));
+  for (PetscInt c = 0; c < n; c++)
+    for (int half = 0; half < 2 * halvings && row < 0; half++) PetscCall(RowBeside(ts, ones, color[c], half, x, F0, &row));
+  PetscCall(ISColoringRestoreIS(colors, PETSC_USE_POINTER, &color));
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(Get(ts).is_set, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "The matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %" PetscInt_FMT
+             ", so that the roles of unknowns cannot be read from it. Use -snes_fd, which finds all places, give a matrix that has them (TSSetI2Jacobian()), or set the roles (TSHHT3SetIS())", row);
+  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: the matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %" PetscInt_FMT
+                        ": it is an approximation; -snes_fd finds all places\n", row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 /* *P: the matrix to use, or NULL to have one made */
@@ -129,8 +225,9 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   Differences *d = new Differences;
   I.differences                = d;
   const TSHHT3Statistics saved = I.stat;
+  const bool             found = !*P;
   d->ts                        = ts;
-  if (!*P) PetscCall(CreateMatrix(ts, P));
+  if (found) PetscCall(CreateMatrix(ts, P));
   PetscCall(MatDuplicate(*P, MAT_DO_NOT_COPY_VALUES, &d->part));
   PetscCall(MatColoringCreate(d->part, &mc));
   PetscCall(MatColoringSetDistance(mc, 2));
@@ -142,6 +239,10 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(Evaluate)), d));
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
+  if (!found) {
+    PetscCall(SetOnes(*P, d->part));
+    PetscCall(CheckPattern(ts, d->part, colors));
+  }
   PetscInt n;
   PetscCall(ISColoringGetColors(colors, NULL, &n, NULL));
   PetscCall(ISColoringDestroy(&colors));

@@ -83,6 +83,54 @@ TEST(Differences, GiveTheSameAnswer)
   }
 }
 
+/* A pendulum with a matrix for colored differences that has no place for its constraint's derivatives, or all places */
+TEST(Differences, MatricesWithoutPlaces)
+{
+  for (bool roles : {false, true})
+    for (bool all : {false, true}) {
+      const Pendulum p(-30., 0., .1);
+      TS             source, ts;
+      SNES           snes;
+      Vec            U, V;
+      Mat            P;
+      TSI2Function   function;
+      void          *ctx;
+      must(ProblemCreateTS(PETSC_COMM_SELF, p, &source, &U, &V));
+      must(TSGetI2Function(source, nullptr, &function, &ctx));
+      must(MatCreateSeqAIJ(PETSC_COMM_SELF, 3, 3, 3, nullptr, &P));
+      for (PetscInt i = 0; i < 3; i++)
+        for (PetscInt j = 0; j < 3; j++)
+          if (all || i == j) must(MatSetValue(P, i, j, 0, INSERT_VALUES));
+      must(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+      must(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+      must(TSCreate(PETSC_COMM_SELF, &ts));
+      must(TSSetType(ts, TSHHT3));
+      must(TSSetI2Function(ts, nullptr, function, ctx));
+      must(TS2SetSolution(ts, U, V));
+      must(TSGetSNES(ts, &snes));
+      must(SNESSetJacobian(snes, P, P, SNESComputeJacobianDefaultColor, nullptr));
+      if (roles) {
+        IS             is;
+        const PetscInt constraint = 2;
+        must(ISCreateGeneral(PETSC_COMM_SELF, 1, &constraint, PETSC_COPY_VALUES, &is));
+        must(TSHHT3SetIS(ts, TSHHT3_HOLONOMIC, is));
+        must(ISDestroy(&is));
+      }
+      Printed   out;
+      ErrorTrap trap;
+      const PetscErrorCode error = TSSetUp(ts);
+      EXPECT_EQ(error != 0, !all && !roles) << trap.message;
+      if (error) {
+        EXPECT_TRUE(trap.says("no place for derivatives of row")) << trap.message;
+      }
+      EXPECT_EQ(out.text().find("an approximation") != std::string::npos, !all && roles) << out.text();
+      must(TSDestroy(&ts));
+      must(TSDestroy(&source));
+      for (Vec *x : {&U, &V}) must(VecDestroy(x));
+      must(MatDestroy(&P));
+    }
+}
+
 /* The matrix D_r J D_c of the steps against PETSc's differences of the scaled residual. Where unknowns vanish PETSc's
    increments are too small for rounding, above all in the first step; the median does not see that. */
 TEST(Differences, SnesTestJacobian)
