@@ -31,10 +31,6 @@ namespace hht3
 namespace
 {
 
-/* After a step shorter than this part of the regular ones dV holds more rounding than misfit, which growth would amplify;
-   the spike is then one of the new, larger step's own order */
-constexpr PetscReal regular = 1e-3;
-
 /* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, and without
    damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
 PetscReal Least(const Integrator &I)
@@ -173,7 +169,6 @@ PetscErrorCode AdaptVelocities(TS ts)
   I.misfit = 0;
   if (I.order.now > 2) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.bent == Bend::Rates && I.corrector.matrix.have) PetscCall(ComputeBend(ts));
-  if (r > 2 && I.h_last < regular * I.h_regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
   I.misfit = 1 - r * r;

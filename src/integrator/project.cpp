@@ -296,8 +296,10 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* V0 to the nearest velocities that the constraints allow */
-PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared)
+/* U0 and V0 to the nearest ones that the constraints allow. The corrector has left of the constraints what is nothing in a step of the length of the last one:
+   a far shorter one would make it good within that time (BetweenRuns.GrowthFromAShortStepKeepsTheMultipliers). Positions that are off by more than the tolerance are the
+   application's, who was told so. */
+PetscErrorCode ProjectState(TS ts, Prepared *prepared)
 {
   Integrator &I = Get(ts);
   PetscReal   e, value;
@@ -305,6 +307,12 @@ PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared)
 
   PetscFunctionBegin;
   PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+  PetscCall(VecZeroEntries(I.A1));
+  PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
+  PetscCall(HolonomicRows(I, I.gamma, I.work));
+  PetscCall(SolveStart(ts, I.work, I.X));
+  PetscCall(Distance(ts, I.X, 1, &e));
+  if (e < 1) PetscCall(Move(I, I.U0, I.X));
   PetscCall(CheckVelocities(ts, true, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
   *prepared = PreparedBy(I, true);

@@ -12,9 +12,13 @@
 namespace hht3
 {
 
+constexpr PetscReal shrink = 0.1;  /* h below this times the last one calls for a consistent start, see Repair() */
+constexpr PetscReal seen   = 1e-6; /* part of the accelerations that growth may make of rounding: ten times as much comes by the velocities
+                                      (BetweenRuns.GrowthFromAShortStepKeepsTheMultipliers) */
+
 /*
   When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
-  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So the
+  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So positions and
   velocities of t_n are projected on the constraints and the step starts afresh, consistently, at the new h.
 */
 PetscErrorCode Repair(TS ts)
@@ -24,7 +28,7 @@ PetscErrorCode Repair(TS ts)
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
-  PetscCall(PetscInfo(ts, "h falls from %g to %g at t = %g: velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
+  PetscCall(PetscInfo(ts, "h changes from %g to %g at t = %g: positions and velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
   I.stat.restarts++;
   ResetOrder(ts);
   if (!I.repaired) {
@@ -35,21 +39,38 @@ PetscErrorCode Repair(TS ts)
     }
     I.repaired = PETSC_TRUE;
   }
-  PetscCall(ProjectVelocities(ts, &have));
+  PetscCall(ProjectState(ts, &have));
   PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are */
+static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
+{
+  Integrator     &I  = Get(ts);
+  const PetscReal h0 = I.h;
+  PetscReal       T, e;
+
+  PetscFunctionBegin;
+  I.h = 1;
+  PetscCall(CorrectionNorm(ts, I.A0, &e));
+  I.h = h0;
+  PetscCall(TimeScale(ts, &T));
+  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
+  *part               = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h) / a;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /*
-  A step so short that rounding of Phi, eps |q|/(beta h^2), would drown the accelerations: TSEvent may ask for one, or the
+  A step so short that rounding of Phi would drown the accelerations: TSEvent may ask for one, or the
   final time. q and q' advance by Taylor series, whose error is far below rounding of the corrector's, and accelerations
   and multipliers are made consistent anew.
 */
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 {
-  Integrator &I = Get(ts);
-  PetscReal   T, e;
+  const Integrator &I = Get(ts);
+  PetscReal         part;
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
@@ -57,14 +78,23 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
     /* the common case is decided without a reduction: no step of regular size is tiny */
     if (!I.count[TSHHT3_HOLONOMIC] || I.h_regular > 0) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  const PetscReal h0 = I.h;
-  I.h                = 1;
-  PetscCall(CorrectionNorm(ts, I.A0, &e));
-  I.h = h0;
-  PetscCall(TimeScale(ts, &T));
-  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
-  const PetscReal noise = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h);
-  *tiny                 = (PetscBool)(noise > 0.01 * a);
+  PetscCall(RoundingOfAccelerations(ts, h, &part));
+  *tiny = (PetscBool)(part > 0.01);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether to begin afresh at t_n, for a step of length h: where it is far shorter than the last one, or where growth would amplify what rounding has left in that one
+   of the lag of a_n and of the misfit of the velocities, which are stretched with h and h^2 */
+PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes)
+{
+  const Integrator &I = Get(ts);
+  PetscReal         part;
+
+  PetscFunctionBegin;
+  *yes = (PetscBool)(I.constraints() && h < shrink * I.h_last);
+  if (*yes || !I.count[TSHHT3_HOLONOMIC] || h <= I.h_last || !I.h_last) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(RoundingOfAccelerations(ts, I.h_last, &part));
+  *yes = (PetscBool)(part * h > seen * I.h_last);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

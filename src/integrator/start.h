@@ -31,8 +31,9 @@ constexpr PetscReal coasting = 0.1; /* of the run: the longest step where nothin
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V);
 PetscErrorCode TellUnfollowed(TS ts);
 
-/* V0 projected on the constraints and a consistent start from there, before a step far shorter than the last one */
+/* U0 and V0 projected on the constraints and a consistent start from there, before a step of another length than the last one, and when that is called for */
 PetscErrorCode Repair(TS ts);
+PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes);
 
 /* Whether a step of length h is so short that rounding would drown its accelerations; such a step by Taylor series: U1, V1, A1 and X as a corrected one would
    leave them */
@@ -48,8 +49,8 @@ PetscErrorCode NameRedundant(TS ts);
 /* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
 
-/* V0 to the nearest velocities that the constraints allow */
-PetscErrorCode ProjectVelocities(TS ts, Prepared *prepared);
+/* U0 and V0 to the nearest ones that the constraints allow */
+PetscErrorCode ProjectState(TS ts, Prepared *prepared);
 
 /* Everything of t_n from U0, V0: the common part of a start and of a repair */
 PetscErrorCode StartFromState(TS ts, Prepared have);

@@ -36,7 +36,6 @@ constexpr PetscInt max_tiny_row = 50;
    has them again and again */
 constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
 
-constexpr PetscReal shrink = 0.1; /* h below this times the last one calls for a consistent start, see Repair() */
 
 /* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
    a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. Accept() may have moved the time a little. */
@@ -166,12 +165,13 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
 PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
-  PetscBool   stage;
+  PetscBool   stage, repair = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
-  if (!*tiny && I.constraints() && ts->time_step < shrink * I.h_last && I.order.now == 2) PetscCall(Repair(ts));
+  if (!*tiny) PetscCall(WantsRepair(ts, ts->time_step, &repair));
+  if (repair) PetscCall(Repair(ts));
   if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
   I.h  = ts->time_step;
   I.t0 = ts->ptime;
