@@ -26,6 +26,8 @@ constexpr int       at_least = 9, at_most = 60; /* samples */
 constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
 constexpr PetscReal falling  = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
 constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
+/* Changes within the first samples alone, longer than this part of what is left of the run, are those of a ramp, which tell of no time but that: at least so much of it */
+constexpr PetscReal of_ramps = 0.03, no_faster = 10;
 constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
 /* Of the largest change of any row of its kind: less may be what rounding leaves of loads that cancel, with lever arms of up to 1e6 (Excitation.OfLoadsThatCancel) */
@@ -105,6 +107,7 @@ PetscErrorCode NoteExcitation(TS ts)
     PetscCall(NoteChanges(I, tau, F[0], F[1], c, &part));
     still = part > noticeable || (part > falling * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
   }
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar &T) { if (PetscRealPart(number) > 0 && PetscRealPart(T) >= of_ramps * stop) T = no_faster * stop; }, Read(c.number), Write(I.excitation)));
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
   PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= all_along) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
   PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));

@@ -198,14 +198,18 @@ constexpr PetscReal many = 1e3;
    a millionth of what things take (Query.Units) */
 PetscReal WithoutEnd(PetscReal t) { return t != 0 ? many * PetscAbsReal(t) : many * many; }
 
-/* 1/rate, at most the whole run where it has an end. Not what is left of it: differences over next to nothing are rounding */
-PetscReal TimeOf(TS ts, PetscReal rate)
+/* Constraints of what moves are differentiated over what it takes, though the run were so many times shorter: differences over parts of a run of next to nothing are
+   rounding (BetweenRuns.ShortRunsHaveTheirMultipliers). What would take more does not move. */
+constexpr PetscReal runs = 1e6;
+
+/* 1/rate, in place of one beyond so many runs the whole run where it has an end */
+PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 {
   const Integrator &I    = Get(ts);
   const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
   PetscReal         span = ends ? ts->max_time - I.t_begin : rate > 0 ? WithoutEnd(ts->ptime) : 1;
   if (I.excitation && I.fastest < span / many) span = many * I.fastest;
-  return rate > 0 ? PetscMin(1 / rate, span) : span;
+  return rate > 0 && 1 / rate < (ends ? within : 1) * span ? 1 / rate : span;
 }
 
 /* Coordinates whose size is less count as of this size */
@@ -237,7 +241,7 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
 
   PetscFunctionBegin;
   PetscCall(MostOfItsSize(ts, Get(ts).V0, &rate));
-  *T = TimeOf(ts, rate);
+  *T = TimeOf(ts, rate, 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,7 +266,8 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 
   PetscFunctionBegin;
   if (!I.lengths) {
-    PetscCall(TimeScale(ts, T));
+    PetscCall(MostOfItsSize(ts, I.V0, &local[0]));
+    *T = TimeOf(ts, local[0], runs);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(OwnLengths(ts, others, &local[1], &local[2]));
@@ -272,7 +277,7 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
     },
     Read(I.V0), Read(I.ymax)));
   PetscCallMPI(MPI_Allreduce(local, all, 3, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  *T = TimeOf(ts, PetscMax(all[0], all[1] / PetscMax(all[2], least)));
+  *T = TimeOf(ts, PetscMax(all[0], all[1] / PetscMax(all[2], least)), runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
