@@ -171,11 +171,17 @@ namespace
 {
 
 /* The largest error of the multiplier of a pendulum that falls from 90 degrees, of g/L times 3 cos(theta) at most: y alone tells it */
-double errorOfTension(const std::string &options, int every = 0)
+double errorOfTension(const std::string &options, int every = 0, const Array &stops = {})
 {
   const Pendulum p(-90., 0., 2.);
   Simulation     run(p, options);
   double         error = 0.;
+  if (!stops.empty()) {
+    Array at{0.};
+    at.insert(at.end(), stops.begin(), stops.end());
+    at.push_back(2.);
+    must(TSSetTimeSpan(run.ts, (PetscInt)at.size(), at.data()));
+  }
   run.watch = [&](Simulation &r, PetscInt step, double) {
     const Array u = r.u();
     if (step) widen(error, std::abs(u[2] + 3. * p.m * p.g * u[1] / (p.L * p.L)));
@@ -207,6 +213,91 @@ TEST(BetweenRuns, ShortStepsKeepTheMultipliers)
     MEASURED("alpha %s: %.1e of the tension", alpha, error);
     EXPECT_LT(error, 1e-4) << alpha;
   }
+}
+
+/* A step far shorter than the others, the first one, one that an output time cuts off, or one to an event, leaves rounding in what the next ones stretch with h and h^2 */
+TEST(BetweenRuns, GrowthFromAShortStepKeepsTheMultipliers)
+{
+  for (const char *order : {"2", "auto"})
+    for (const char *growth : {"10", "2"}) {
+      const std::string o = tolerance(1e-6) + "-ts_hhtdae_order " + order + " -ts_adapt_clip 0.1," + growth + " ";
+      const double      whole = errorOfTension(o);
+      for (const char *first : {"1e-5", "1e-6", "1e-8", "1e-11"}) {
+        const double error = errorOfTension(o + "-ts_dt " + first);
+        EXPECT_LT(error, 3. * whole) << o << first;
+      }
+      for (double gap : {1e-4, 1e-5, 1e-7, 1e-9}) {
+        const double error = errorOfTension(o, 0, {0.6, 0.6 + gap, 1.1, 1.1 + gap});
+        EXPECT_LT(error, 3. * whole) << o << gap;
+      }
+      MEASURED("%s: %.1e of the tension", o.c_str(), whole);
+    }
+}
+
+namespace
+{
+
+/* On a pivot at 0.5 sin(t) */
+struct MovedPendulum : Problem {
+  const double g = 9.81;
+  explicit MovedPendulum(double end)
+  {
+    name = "pendulum on a moving pivot";
+    n    = 3;
+    t1   = end;
+    role = {TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  void initial(double *u, double *v) const override
+  {
+    u[0] = 1., u[1] = u[2] = 0.;
+    v[0] = 0.5, v[1] = -3., v[2] = 0.;
+  }
+  void residual(double t, const double *u, const double *, const double *a, double *f) const override
+  {
+    const double x = u[0] - 0.5 * std::sin(t);
+    f[0]           = a[0] + u[2] * x;
+    f[1]           = a[1] + u[2] * u[1] + g;
+    f[2]           = (x * x + u[1] * u[1] - 1.) / 2.;
+  }
+  void jacobian(double t, const double *u, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    const double x = u[0] - 0.5 * std::sin(t);
+    for (int k = 0; k < 2; k++) {
+      J.add(k, k, sa + u[2]);
+      J.add(k, 2, k ? u[1] : x);
+      J.add(2, k, k ? u[1] : x);
+    }
+    J.add(2, 2, 0.);
+  }
+  double tension(double t, const Array &u, const Array &v) const
+  {
+    const double x = u[0] - 0.5 * std::sin(t), w = v[0] - 0.5 * std::cos(t);
+    return w * w + v[1] * v[1] - g * u[1] + 0.5 * std::sin(t) * x;
+  }
+};
+
+} // namespace
+
+/* The rest of a run tells nothing of how fast its motions are, neither does what is left of one at a restart */
+TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
+{
+  const auto largest = [](double end, int every) {
+    const MovedPendulum p(end);
+    Simulation          run(p, tolerance(1e-6));
+    double              error = 0.;
+    run.watch = [&](Simulation &r, PetscInt step, double t) {
+      if (step) widen(error, std::abs(r.u()[2] - p.tension(t, r.u(), r.v())));
+      if (every && step % every == 0) must(TSRestartStep(r.ts));
+    };
+    must(run.solve());
+    return error;
+  };
+  for (double end : {1e-2, 1e-3, 1e-4}) {
+    const double error = largest(end, 0);
+    MEASURED("run of %g: tension off by %.1e of 9", end, error);
+    EXPECT_LT(error, 0.01) << end;
+  }
+  EXPECT_LT(largest(0.5, 3), 0.3); /* of 38 */
 }
 
 /* What the integrator itself has left is no fault of the user's */
