@@ -241,6 +241,13 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode ReadCheckpoint(TS ts)
+{
+  PetscFunctionBegin;
+  if (Get(ts).resume_file[0]) PetscCall(TSSetUp(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SetCheckpointVec(TS ts, Vec extra)
 {
   Integrator &I = Get(ts);
@@ -336,7 +343,8 @@ PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
   Level: intermediate
 
   Note:
-  Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones. A file of another
+  Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones, before `TSSetUp()` not yet: the set-up reads the file,
+  until then `TSGetTime()` and `TS2GetSolution()` give what was there before. Queries of scenes set up. A file of another
   problem, method, version or number of ranks is refused. Other tolerances and other options of the solvers are taken, and reported.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`

@@ -12,6 +12,8 @@ PetscErrorCode CheckpointSave(TS ts, const char file[]);
 
 /* Before the set-up it is only noted, and read at its end */
 PetscErrorCode CheckpointLoad(TS ts, const char file[]);
+/* A file that has been noted only is read now, by the set-up: for queries between CheckpointLoad() and the first step */
+PetscErrorCode ReadCheckpoint(TS ts);
 
 /* At the beginning of a step; the monitor does it after the last one */
 PetscErrorCode CheckCheckpointFile(TS ts); /* before the run: whether it can be written */

@@ -188,6 +188,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(EvaluateAt);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
+  HHT3_COMPOSE(ReadCheckpoint);
   HHT3_COMPOSE(SetCheckpointVec);
   HHT3_COMPOSE(SetCoordinateChange);
   HHT3_COMPOSE(SetLengths);

@@ -155,36 +155,6 @@ PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* The consistent state nearest to where ts is, with the axes of its angles */
-PetscErrorCode CompleteBy(TS ts, Runtime &R, Vec A, TS *copy)
-{
-  PetscReal t;
-  Vec       U, V;
-  PetscFunctionBegin;
-  PetscCall(TSGetTime(ts, &t));
-  PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, copy));
-  PetscCall(TSHHT3EvaluateAt(*copy, t, U, V, A));
-  PetscCall(VecCopy(RunOf(*copy)->axes, R.axes));
-  PetscCall(UseAxes(R));
-  PetscCall(KeepStart(ts, A));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Complete(TS ts, Runtime &R)
-{
-  TS  copy = nullptr;
-  Vec U, A;
-  PetscFunctionBegin;
-  PetscCall(TSGetSolution(ts, &U));
-  PetscCall(VecDuplicate(U, &A));
-  const PetscErrorCode failed = CompleteBy(ts, R, A, &copy); /* dropped rows may be violated there: the two go all the same */
-  PetscCall(VecDestroy(&A));
-  PetscCall(TSDestroy(&copy));
-  PetscCall(failed);
-  PetscFunctionReturn(0);
-}
-
 PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
   PetscReal from;
@@ -192,7 +162,7 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscCall(TSGetTime(ts, &from));
   PetscCall(FollowMotions(R, from, t, U, V));
   PetscCall(TSSetTime(ts, t));
-  PetscCall(Complete(ts, R));
+  PetscCall(ToNearestConsistent(ts));
   PetscFunctionReturn(0);
 }
 

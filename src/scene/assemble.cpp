@@ -293,8 +293,6 @@ PetscErrorCode Assemble(Model &M)
   const Hold hold = M.continues ? Hold::None : Hold::FixedStart; /* fixed_start is of the start */
   if (s.start.assembly == Assembly::Report) {
     PetscCall(Report(s, m, M.continues));
-    /* A run leaves constraints of velocities as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact. */
-    if (M.continues && s.started.velocity_misfit > 0) PetscCall(ProjectVelocities(M, hold));
     PetscFunctionReturn(0);
   }
   if (s.started.misfit > 0) {

@@ -76,6 +76,15 @@ PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode ReadCheckpoint(TS ts)
+{
+  PetscErrorCode (*read)(TS);
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3ReadCheckpoint_C", &read));
+  if (read) PetscCall(read(ts));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
 {
   Runtime  *R = RunOf(ts);
@@ -133,6 +142,41 @@ PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy)
   PetscFunctionReturn(0);
 }
 
+namespace
+{
+
+PetscErrorCode CompleteBy(TS ts, Runtime &R, Vec A, TS *copy)
+{
+  PetscReal t;
+  Vec       U, V;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, copy));
+  PetscCall(TSHHT3EvaluateAt(*copy, t, U, V, A));
+  PetscCall(VecCopy(RunOf(*copy)->axes, R.axes));
+  PetscCall(UseAxes(R));
+  PetscCall(KeepStart(ts, A));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode ToNearestConsistent(TS ts)
+{
+  Runtime &R    = *RunOf(ts);
+  TS       copy = nullptr;
+  Vec      U, A;
+  PetscFunctionBegin;
+  PetscCall(TSGetSolution(ts, &U));
+  PetscCall(VecDuplicate(U, &A));
+  const PetscErrorCode failed = CompleteBy(ts, R, A, &copy); /* dropped rows may be violated there: the two go all the same */
+  PetscCall(VecDestroy(&A));
+  PetscCall(TSDestroy(&copy));
+  PetscCall(failed);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Scene::createTS(TS *ts, TS from)
 {
   Runtime  *old;
@@ -140,6 +184,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
   Vec       U, V;
   PetscFunctionBegin;
   PetscCall(FindRun(*this, from, "Scene::createTS()", &old));
+  PetscCall(ReadCheckpoint(from));
   PetscCall(TSGetTime(from, &t));
   PetscCall(TS2GetSolution(from, &U, &V));
   if (journal_) {
@@ -159,6 +204,8 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     Vec X, Y;
     PetscCall(TS2GetSolution(*ts, &X, &Y));
     PetscCall(CarryAngles(*old, U, V, *RunOf(*ts), X, Y));
+    /* A run leaves constraints of velocities as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfModesAndLinks) */
+    if (M.scene.started.velocity_misfit > 0) PetscCall(ToNearestConsistent(*ts));
     PetscFunctionReturn(0);
   }
   PetscCall(createTS(ts));

@@ -206,6 +206,7 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   PetscBool ours;
   Vec       U, V;
   PetscFunctionBegin;
+  PetscCall(ReadCheckpoint(ts));
   w.clear();
   w.R = RunOf(ts);
   PetscCheck(w.R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "Linearization::take(): the TS is not one of a scene, Scene::createTS() makes them");
@@ -233,6 +234,7 @@ PetscErrorCode Linearization::take(TS ts)
 {
   PetscReal t;
   PetscFunctionBegin;
+  PetscCall(ReadCheckpoint(ts));
   PetscCall(TSGetTime(ts, &t));
   PetscCall(take(ts, t));
   PetscFunctionReturn(0);

@@ -117,6 +117,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   TSType    type;
   Work     &w = *work_;
   PetscFunctionBegin;
+  PetscCall(ReadCheckpoint(ts));
   w.R = RunOf(ts);
   PetscCheck(w.R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "Snapshot::take(): the TS is not one of a scene, Scene::createTS() makes them");
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
@@ -155,6 +156,7 @@ PetscErrorCode Snapshot::take(TS ts)
 {
   PetscReal t;
   PetscFunctionBegin;
+  PetscCall(ReadCheckpoint(ts));
   PetscCall(TSGetTime(ts, &t));
   PetscCall(take(ts, t));
   PetscFunctionReturn(0);

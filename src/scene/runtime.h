@@ -152,6 +152,8 @@ PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
    multipliers of the start; the caller destroys it */
 PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R);
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy);
+PetscErrorCode ReadCheckpoint(TS ts);      /* a file that TSHHT3CheckpointLoad() has noted for the set-up */
+PetscErrorCode ToNearestConsistent(TS ts); /* the state of a run that has not begun, in the metric of its mass matrix, with the axes of its angles */
 PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, which has its multipliers */
 /* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has
    found them, null if none was needed */
