@@ -204,7 +204,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     Vec X, Y;
     PetscCall(TS2GetSolution(*ts, &X, &Y));
     PetscCall(CarryAngles(*old, U, V, *RunOf(*ts), X, Y));
-    /* A run leaves constraints of velocities as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfModesAndLinks) */
+    /* A run leaves constraints of velocities as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfALinkWithoutMass) */
     if (M.scene.started.velocity_misfit > 0) PetscCall(ToNearestConsistent(*ts));
     PetscFunctionReturn(0);
   }

@@ -99,6 +99,49 @@ TEST(Continue, AJointTakesHold)
   must(TSDestroy(&ts));
 }
 
+/* What hangs on a link without mass keeps its momenta: two free bodies that dock by it */
+TEST(Continue, ImpactOfALinkWithoutMass)
+{
+  Scene           s(PETSC_COMM_SELF);
+  const Parameter docked = s.parameter("docked", 0);
+  const double    mass[3] = {5, 3, 0};
+  const Matrix3   inertia[3] = {Vector3(0.3, 0.4, 0.5).asDiagonal(), Vector3(0.1, 0.12, 0.14).asDiagonal(), Matrix3::Zero()};
+  const Vector3   place[3] = {{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}}, spin[3] = {{0, 0, 0.2}, {0, 0.1, -0.05}, {0, 0, 0.2}}, velocity[3] = {{0.1, 0, 0}, {0, 0, 0}, {0.1, 0.1, 0}};
+  Body            body[3];
+  for (int k = 0; k < 3; k++) {
+    RigidBody b;
+    b.mass             = mass[k];
+    b.inertia          = inertia[k];
+    b.position         = place[k];
+    b.velocity         = velocity[k];
+    b.angular_velocity = spin[k];
+    body[k]            = s.add(std::string(1, "abl"[k]), b);
+  }
+  s.add("link", Fixed{s.marker(body[2]), s.marker(body[0], {0.5, 0, 0})});
+  s.add("dock", [docked, i = s.marker(body[2]), j = s.marker(body[1], {-0.5, 0, 0})] { return docked > 0 ? std::optional<Spherical>(Spherical{i, j}) : std::nullopt; });
+  const auto momenta = [&](TS ts, Vector3 *P, Vector3 *L) {
+    P->setZero();
+    L->setZero();
+    for (int k = 0; k < 2; k++) {
+      const Motion x = of(ts, s.marker(body[k]));
+      *P += mass[k] * x.velocity;
+      *L += mass[k] * x.position.cross(x.velocity) + x.axes * inertia[k] * x.axes.transpose() * x.angular_velocity;
+    }
+  };
+  SceneRun run(s, 1e-8, tolerance(1e-8));
+  Vector3  P[2], L[2];
+  TS       ts;
+  must(run.solve());
+  momenta(run.ts, &P[0], &L[0]);
+  must(s.set("docked", 1));
+  must(s.createTS(&ts, run.ts));
+  momenta(ts, &P[1], &L[1]);
+  EXPECT_LT((P[1] - P[0]).norm(), 1e-10);
+  EXPECT_LT((L[1] - L[0]).norm(), 1e-9);
+  EXPECT_GT((of(ts, s.marker(body[1])).velocity).norm(), 0.01);
+  must(TSDestroy(&ts));
+}
+
 /* Rows of a user's that count no angles may come and go, too: a guide of expressions, of positions and of velocities */
 TEST(Continue, AUserConstraintTakesHold)
 {

@@ -1,4 +1,5 @@
 /* Scenes that go on from a checkpoint: the same bits, and what is recorded goes on in the same files; what users' functions do wrong */
+#include "hhtdae/query.h"
 #include "scene/model.h"
 #include "scene_output.h"
 
@@ -127,6 +128,35 @@ TEST(SceneResume, FilesGoOn)
 {
   breakAndResume("0.013");
   breakAndResume("0");
+}
+
+/* Queries between TSHHT3CheckpointLoad() and the first step */
+TEST(SceneResume, QueriesSeeTheFile)
+{
+  TemporaryFile file("queried.checkpoint");
+  Motion        m[4];
+  Snapshot      now;
+  Rods          rods(2), again(2), third(2);
+  SceneRun      run(rods.scene, 0.6, accurate), next(again.scene, 1, accurate), last(third.scene, 1, accurate);
+  TS            ts;
+  PetscReal     t;
+  must(run.solve());
+  must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+  must(now.take(run.ts));
+  must(now.motion(rods.tip[1], &m[0]));
+  must(TSHHT3CheckpointLoad(next.ts, file.name.c_str()));
+  must(now.take(next.ts));
+  must(now.motion(again.tip[1], &m[1]));
+  EXPECT_NEAR(now.time(), 0.6, 1e-12);
+  EXPECT_LT((m[1].position - m[0].position).norm(), 1e-12);
+  must(TSHHT3CheckpointLoad(last.ts, file.name.c_str()));
+  must(third.scene.createTS(&ts, last.ts));
+  must(TSGetTime(ts, &t));
+  EXPECT_NEAR(t, 0.6, 1e-12);
+  must(now.take(ts));
+  must(now.motion(third.tip[1], &m[2]));
+  EXPECT_LT((m[2].position - m[0].position).norm(), 1e-7);
+  must(TSDestroy(&ts));
 }
 
 /* With a checkpoint after every step */
