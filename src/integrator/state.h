@@ -91,6 +91,7 @@ struct StepState {
   PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
+  PetscReal        h_given     = 0;           /* of steps of fixed length, by the user */
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
   Ahead            ahead       = Ahead::Unknown; /* of what the start has not seen */

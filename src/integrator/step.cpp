@@ -147,7 +147,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
-  ts->time_step = I.h_next = next;
+  ts->time_step = I.h_next = I.fixed_h && ts->ptime == stop && I.h_given > 0 ? I.h_given : next; /* that to the stop made up for rounding, and would be taken for what the user wants */
   if (!tiny) I.h_proven = PetscMax(h, I.h_proven);
   if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
@@ -160,6 +160,15 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   PetscCall(TellUnfollowed(ts));
   PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TSSolve() cuts a step that is longer than the run */
+void NoteGivenStep(TS ts)
+{
+  Integrator     &I    = Get(ts);
+  const PetscReal rest = HHT3NextStop(ts) - ts->ptime;
+
+  if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
 }
 
 PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
@@ -297,6 +306,7 @@ PetscErrorCode Step(TS ts)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(CheckpointIfDue(ts));
   PetscCall(Begin(ts));
+  if (I.fixed_h) NoteGivenStep(ts);
   PetscCall(LookFurther(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {

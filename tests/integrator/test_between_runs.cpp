@@ -109,6 +109,25 @@ TEST(BetweenRuns, ANewRunAtTheSameTime)
   EXPECT_NEAR((double)(run.statistics().steps - before), (double)fresh.statistics().steps, 2.);
 }
 
+/* What the last step of a part made up for is not taken over into the next part, where it would be made up for a hundred times */
+TEST(BetweenRuns, FixedStepsInParts)
+{
+  for (double part : {.1, .01, .0005}) { /* also of less than a step */
+    Simulation run(oscillator(), fixedSteps(1e-3));
+    for (int k = 1; k <= 16; k++) {
+      must(TSSetMaxTime(run.ts, k * part));
+      must(run.solve());
+    }
+    EXPECT_EQ(run.statistics().steps, part < 1e-3 ? 16 : (PetscInt)std::lround(16 * part / 1e-3)) << part;
+    if (part > 1e-3) EXPECT_NEAR(run.statistics().h_min, 1e-3, 1e-12) << part;
+    must(TSSetTimeStep(run.ts, 5e-4)); /* another one, by the user */
+    must(TSSetMaxTime(run.ts, 16 * part + 0.1));
+    const PetscInt before = run.statistics().steps;
+    must(run.solve());
+    EXPECT_EQ(run.statistics().steps - before, 200) << part;
+  }
+}
+
 /* A load of period 1 does not see the time set back by 1 */
 TEST(BetweenRuns, TimeSetBack)
 {
