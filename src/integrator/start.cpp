@@ -100,20 +100,68 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Local errors in units of the tolerance that steps from the start leave, by its rates: of coordinates |k| h^3 q''', of states k_s h^3 s''' with |s''|^2/|s'| in place of
+   s''', or |s''|^1.5/|s|^0.5 where s' passes through 0, but no more than s changes by s'', gamma_s h^2 s'' (FirstStep.StatesInAnyUnitOfTime, BetweenRuns.RestartsOfStates) */
+struct StartErrors {
+  PetscReal coordinates = 0, states = 0; /* over h^3 */
+  PetscReal change = 0;                  /* of states, over h^2 */
+  PetscReal at(PetscReal h) const { return PetscSqrtReal(PetscSqr(coordinates * h * h * h) + (change > 0 ? PetscSqr(PetscMin(states * h * h * h, change * h * h)) : 0)); }
+  PetscReal step(PetscReal e) const /* that leaves no more of either */
+  {
+    const PetscReal q = coordinates > 0 ? PetscPowReal(e / coordinates, (PetscReal)1 / 3) : PETSC_MAX_REAL;
+    return change > 0 ? PetscMin(q, PetscMax(PetscPowReal(e / states, (PetscReal)1 / 3), PetscSqrtReal(e / change))) : q;
+  }
+};
+
+PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal h = I.h;
+  PetscReal       sum[3] = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
+  WorkVec         x;
+
+  PetscFunctionBegin;
+  *e = {};
+  PetscCall(x.like(rate));
+  PetscCall(VecCopy(rate, x));
+  if (I.count[TSHHT3_STATE]) {
+    PetscCall(ForSome(
+      I.states,
+      [&](PetscInt, PetscScalar s2, PetscScalar s1, PetscScalar y, PetscScalar w, PetscScalar &q) {
+        sum[0] += PetscSqr(PetscRealPart(s1 * w));
+        sum[1] += PetscSqr(PetscRealPart(s2 * w));
+        sum[2] += PetscSqr(PetscRealPart(y * w));
+        q = 0;
+      },
+      Read(rate), Read(I.V0), Read(I.ymax), Read(I.weight), Write(x)));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  }
+  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
+  PetscCall(CorrectionNorm(ts, x, &e->coordinates));
+  I.h               = h;
+  const PetscReal s = PetscSqrtReal(sum[1] / PetscMax(I.norm_size, 1));
+  e->change         = I.p.gamma_s * s;
+  const PetscReal by_rate = sum[0] > 0 ? PetscSqrtReal(sum[1] / sum[0]) : PETSC_MAX_REAL, by_size = sum[2] > 0 ? PetscPowReal(sum[1] / sum[2], 0.25) : PETSC_MAX_REAL;
+  const PetscReal faster  = PetscMin(by_rate, by_size);
+  e->states               = faster < PETSC_MAX_REAL ? PetscAbsReal(I.p.k_s) * s * faster : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run. Not longer than loads and motions allow
    that depend on time alone: of their period the error of a longer one might know nothing (Excitation.TheFirstStepFollowsTheLoad). */
 PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
 {
   Integrator &I = Get(ts);
-  PetscReal   e3, e2;
+  StartErrors e;
+  PetscReal   e2;
 
   PetscFunctionBegin;
+  PetscCall(ErrorsOfStart(ts, rate, &e));
   I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, rate, &e3));
   PetscCall(CorrectionNorm(ts, I.A0, &e2));
   const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
-  PetscReal       h3 = e3 > 0 ? 0.5 * PetscPowReal(e3, (PetscReal)-1 / 3) : PETSC_MAX_REAL;
-  if (e3 <= 0 && e2 > 0) h3 = PetscPowReal(e2, -0.5);
+  PetscReal       h3 = e.step(0.125);
+  if (h3 >= PETSC_MAX_REAL && e2 > 0) h3 = PetscPowReal(e2, -0.5);
   *h = PetscMin(h3, PetscMin(span / 10, I.fastest));
   *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,7 +191,8 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   Integrator        &I = Get(ts);
   Predictor         &p = I.predictor;
   const PetscReal    h = ts->time_step;
-  PetscReal          e, T;
+  StartErrors        errors;
+  PetscReal          T;
 
   PetscFunctionBegin;
   PetscCall(PredictorReset(ts));
@@ -151,9 +200,9 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   I.h_last      = h;
   I.have_misfit = PETSC_FALSE;
   I.bent        = Bend::None;
-  PetscCall(CorrectionNorm(ts, rate, &e));
-  e *= h;
-  I.corrector.wlte = e;
+  PetscCall(ErrorsOfStart(ts, rate, &errors));
+  const PetscReal e = errors.at(h);
+  I.corrector.wlte  = e;
   PetscCall(TimeScaleOfAccelerations(ts, rate, &T));
   if (I.fixed_h ? h * h * h > T * T : e > 100) { /* fixed steps know no tolerance: of the coordinates */
     PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));

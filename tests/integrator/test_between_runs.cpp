@@ -224,6 +224,69 @@ TEST(BetweenRuns, RestartsKeepTheMultipliers)
     }
 }
 
+namespace
+{
+
+/* A state that follows cos(3 t/T) within T */
+struct Follower : Problem {
+  const double T;
+  explicit Follower(double unit) : T(unit)
+  {
+    name = "follower";
+    n    = 1;
+    t1   = 5. * unit;
+    role = {TSHHT3_STATE};
+  }
+  void initial(double *u, double *v) const override { u[0] = v[0] = 0.; }
+  void residual(double t, const double *u, const double *v, const double *, double *f) const override { f[0] = v[0] - (std::cos(3. * t / T) - u[0]) / T; }
+  void jacobian(double, const double *, const double *, const double *, double sv, double, Entries &J) const override { J.add(0, 0, sv + 1. / T); }
+  double exact(double t) const
+  {
+    const double x = t / T;
+    return (std::cos(3. * x) + 3. * std::sin(3. * x) - std::exp(-x)) / 10.;
+  }
+};
+
+double errorOfFollower(const Follower &p, const std::string &options, int every, PetscInt *steps, double *first)
+{
+  Simulation run(p, options);
+  double     error = 0.;
+  run.watch = [&](Simulation &r, PetscInt step, double t) {
+    if (step == 1) *first = t / p.T;
+    widen(error, std::abs(r.u()[0] - p.exact(t)));
+    if (every && step % every == every - 1) must(TSRestartStep(r.ts));
+  };
+  must(run.solve());
+  *steps = run.statistics().steps;
+  return error;
+}
+
+} // namespace
+
+TEST(FirstStep, StatesInAnyUnitOfTime)
+{
+  PetscInt     steps[2];
+  double       first[2];
+  const double error = errorOfFollower(Follower(1.), tolerance(1e-6), 0, &steps[0], &first[0]);
+  for (double unit : {1e-6, 1e3, 1e9}) {
+    EXPECT_NEAR(errorOfFollower(Follower(unit), tolerance(1e-6), 0, &steps[1], &first[1]), error, 0.02 * error) << unit;
+    EXPECT_NEAR((double)steps[1], (double)steps[0], 2.) << unit;
+    EXPECT_NEAR(first[1], first[0], 0.01 * first[0]) << unit;
+  }
+}
+
+/* Steps from a restart are of second order, though s changes by far more than the tolerance within one */
+TEST(BetweenRuns, RestartsOfStates)
+{
+  PetscInt steps;
+  double   first;
+  for (double eps : {1e-4, 1e-5, 1e-6, 1e-7}) {
+    const double once = errorOfFollower(Follower(1.), tolerance(eps), 0, &steps, &first), often = errorOfFollower(Follower(1.), tolerance(eps), 10, &steps, &first);
+    MEASURED("%g: error %.1e, with restarts %.1e", eps, once, often);
+    EXPECT_LT(often, 1.5 * once) << eps;
+  }
+}
+
 /* Where something else than the error test keeps steps short the corrector's part of the tolerance, divided by h^2, is not left in the multipliers */
 TEST(BetweenRuns, ShortStepsKeepTheMultipliers)
 {
