@@ -30,6 +30,7 @@ constexpr double unchanged = 0.999;               /* part of the forces: a step 
 constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
 constexpr int    still_for = 10;        /* of the longest steps in a row at rest: what is left is noise, up to */
 constexpr double noise = 1e-3;          /* of the forces, as of a stiff mesh far from the origin (Equilibrium.AMeshFarFromTheOrigin) */
+constexpr double of_rounding = 1e6;     /* of forces that are nothing but rounding, which is to be found at rest then (FullBody.UnloadedInEquilibrium) */
 constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
 constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
@@ -53,17 +54,37 @@ struct Attempt {
   double reach = INFINITY, work[2] = {0, 0};
 };
 
+/* The forces that rounding of the coordinates makes */
+PetscErrorCode Rounding(Equilibrium &E, double *force)
+{
+  Unbalanced   at;
+  PetscRandom  random;
+  PetscFunctionBegin;
+  PetscCall(PetscRandomCreate(E.R.scene.comm, &random));
+  PetscCall(PetscRandomSetInterval(random, -PETSC_MACHINE_EPSILON, PETSC_MACHINE_EPSILON));
+  PetscCall(VecSetRandom(E.d, random));
+  PetscCall(PetscRandomDestroy(&random));
+  PetscCall(VecPointwiseMult(E.d, E.d, E.U));
+  PetscCall(VecWAXPY(E.next, 1, E.d, E.U));
+  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.zero, E.start));
+  PetscCall(VecAXPY(E.start, -1, E.F));
+  PetscCall(E.measure(E.start, at));
+  *force = at.force;
+  PetscFunctionReturn(0);
+}
+
 /* What forces are held against: weights and whatever acts at the start; and a time in which they move things a little
  */
 PetscErrorCode Scales(Equilibrium &E, double *h)
 {
   const SceneData &s = E.R.scene;
   Unbalanced       at;
-  double           lightest = INFINITY;
+  double           lightest = INFINITY, rounded;
   PetscFunctionBegin;
   PetscCall(E.residual(E.U));
   PetscCall(E.measure(E.F, at));
-  E.scale = at.force;
+  PetscCall(Rounding(E, &rounded));
+  E.scale = std::max(at.force, of_rounding * rounded);
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
     if (b.mass > 0 && !b.massless) lightest = std::min(lightest, b.mass);
@@ -104,6 +125,47 @@ PetscErrorCode Newton(Equilibrium &E, double *reach)
   if (reason < 0) PetscFunctionReturn(0);
   PetscCall(E.reach(E.d, reach));
   if (*reach <= 1) PetscCall(VecAXPY(E.next, -1, E.d));
+  PetscFunctionReturn(0);
+}
+
+/* What rolls does not slip on the way from U to next: the rows of velocities along the straight line, integrated (SceneEquilibrium.AnEccentricWheelRolls) */
+PetscErrorCode RollAlong(Equilibrium &E, double h)
+{
+  constexpr double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, weight[3] = {5. / 18, 8. / 18, 5. / 18}; /* Gauss, Legendre */
+  const IS         rows = E.R.roles[TSHHT3_NONHOLONOMIC];
+  const PetscInt  *i;
+  PetscInt         all, own;
+  double           slip;
+  PetscFunctionBegin;
+  PetscCall(ISGetSize(rows, &all));
+  if (!all) PetscFunctionReturn(0);
+  PetscCall(ISGetLocalSize(rows, &own));
+  for (int round = 0; round < 30; round++) {
+    PetscCall(VecWAXPY(E.V, -1, E.U, E.next));
+    PetscCall(VecScale(E.V, 1 / h));
+    PetscCall(VecSet(E.undamped, 0));
+    for (int k = 0; k < 3; k++) {
+      PetscCall(VecWAXPY(E.A, at[k] * h, E.V, E.U));
+      PetscCall(Residual(E.R, E.t, E.A, E.V, E.zero, E.F));
+      PetscCall(VecAXPY(E.undamped, weight[k], E.F));
+      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* motions of velocities stand still */
+      PetscCall(VecAXPY(E.undamped, -weight[k], E.F));
+    }
+    const PetscScalar *v;
+    PetscScalar       *f;
+    PetscCall(VecSet(E.F, 0));
+    PetscCall(ISGetIndices(rows, &i));
+    PetscCall(VecGetArrayRead(E.undamped, &v));
+    PetscCall(VecGetArray(E.F, &f));
+    for (PetscInt k = 0; k < own; k++) f[i[k] - E.R.start] = v[i[k] - E.R.start];
+    PetscCall(VecRestoreArray(E.F, &f));
+    PetscCall(VecRestoreArrayRead(E.undamped, &v));
+    PetscCall(ISRestoreIndices(rows, &i));
+    PetscCall(VecNorm(E.F, NORM_INFINITY, &slip));
+    if (!(slip * h > 1e-12 * E.size)) break;
+    PetscCall(KSPSolve(E.ksp, E.F, E.d));
+    PetscCall(VecAXPY(E.next, -1, E.d));
+  }
   PetscFunctionReturn(0);
 }
 
@@ -159,8 +221,10 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
   PetscCall(VecCopy(E.U, E.next));
   PetscCall(Newton(E, &a.reach));
   if (!(a.reach <= 1)) PetscFunctionReturn(0);
+  PetscCall(RollAlong(E, h));
   PetscCall(Correct(E, h, before, a, after));
   if (!a.good) PetscFunctionReturn(0);
+  if (a.corrections > 0) PetscCall(RollAlong(E, h));
   PetscCall(VecWAXPY(E.d, -1, E.next, E.U));
   PetscCall(E.reach(E.d, &a.reach));
   PetscCall(E.residual(E.next));

@@ -1,6 +1,9 @@
 /* Static equilibrium where forces set in along the way: contacts and stops. */
+#include "hhtdae/analyses.h"
 #include "hhtdae/helpers.h"
+#include "hhtdae/query.h"
 #include "scene/kernels/contact_law.h"
+#include "scene_output.h"
 #include "scene_start.h"
 
 using namespace hhtest;
@@ -61,6 +64,37 @@ TEST(SceneEquilibrium, ABallOnAPlane)
         const double d = s.depth();
         EXPECT_NEAR(ElasticForce<double>(Law(stiffness, exponent, 1e-4), d), g, 1e-6 * g) << exponent << " " << stiffness << " " << z << ": " << d;
       }
+}
+
+/* A wheel whose centre of mass is 0.3 m beside its centre rolls down an incline until that hangs above the contact: it moves as far as it turns */
+TEST(SceneEquilibrium, AnEccentricWheelRolls)
+{
+  const double slope = 0.3, R = 0.5, e = 0.3, spin = 1, weight = 4 * g;
+  for (double stiffness : {0., 5., 50.}) {
+    Scene     s(PETSC_COMM_SELF, Space::Planar);
+    RigidBody b;
+    b.mass     = 4;
+    b.inertia  = inertia::disc(4, R);
+    b.position = {0, R, 0};
+    b.center   = {e * std::cos(spin), e * std::sin(spin), 0};
+    s.gravity({g * std::sin(slope), -g * std::cos(slope), 0});
+    const Body   wheel = s.add("wheel", b);
+    const Marker i = s.marker(wheel), j = s.marker(s.ground()), hook = s.marker(s.ground(), {-2, R, 0});
+    s.add("roll", hhtdae::RollingDisc{i, j, R});
+    if (stiffness > 0) s.add("spring", SpringDamper{i, hook, stiffness, 0, 0.5});
+    SceneRun run(s, 1, "");
+    must(StaticEquilibrium(run.ts, 0));
+    Snapshot now;
+    double   x, turn;
+    must(now.take(run.ts));
+    must(now.value(Measure::displacement(i, 0), &x));
+    must(now.value(Measure::angle(i, j), &turn));
+    EXPECT_NEAR(x, -R * turn, 1e-9) << stiffness;
+    const double angle  = spin + turn; /* moments about the contact */
+    const double moment = weight * (e * std::cos(angle) * -std::cos(slope) - (R + e * std::sin(angle)) * std::sin(slope)) + stiffness * (x + 2 - 0.5) * R;
+    EXPECT_NEAR(moment, 0, 1e-6 * weight) << stiffness;
+    EXPECT_GT(std::abs(x), 0.1) << stiffness;
+  }
 }
 
 /* The same with the end of a travel: from the stop itself, and from the air */
