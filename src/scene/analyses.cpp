@@ -1,7 +1,7 @@
 /*
   Analyses that move a run which has not begun. Positions that meet the constraints and motions of a time, by Newton's method on the scene's own matrix with rates of zero,
 
-    (F_u + s F_u'') d = (0, Phi),   s large: the smallest d in the metric of the masses,
+    (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: the smallest d in the metric of the masses,
 
   cut short where bodies would go far. Velocities, accelerations and multipliers are those of a consistent start from there.
 */
@@ -18,6 +18,8 @@ namespace
 {
 
 constexpr double heavy = 1099511627776.; /* 2^40: masses against stiffnesses */
+constexpr double rates = 0.7310585786300049; /* 1/s, of states: the row of one that integrates what it does not change would be zero without; no round number, which a rate
+                                               might be (Analyses.KinematicsBesideIntegrators) */
 constexpr int    most_iterations = 100, most_cuts = 6;
 constexpr double largest_part = 1; /* rad, of a motion between two assemblies: far enough from half a turn; CountedAngles.KinematicsOverManyTurns */
 constexpr double still = 1e-13; /* parts of the scene's size, radians: a move that is rounding */
@@ -65,7 +67,7 @@ struct Assembling : StillSystem {
   PetscErrorCode direction(double *part)
   {
     PetscFunctionBegin;
-    PetscCall(Jacobian(R, t, U, zero, zero, 0, heavy, J));
+    PetscCall(Jacobian(R, t, U, zero, zero, rates, heavy, J));
     PetscCall(move(d, part));
     PetscFunctionReturn(0);
   }

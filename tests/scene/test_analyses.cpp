@@ -304,6 +304,29 @@ TEST(Analyses, KinematicsInAnyUnitsOfLength)
   }
 }
 
+/* A state whose rate does not depend on itself */
+TEST(Analyses, KinematicsBesideIntegrators)
+{
+  Scene         s(PETSC_COMM_SELF);
+  const Matrix3 x = hhtest::axesAlong(Vector3(1, 0, 0));
+  const Body    slider = s.add("slider", RigidBody());
+  const Marker  i = s.marker(slider, Vector3::Zero(), x), j = s.marker(s.ground(), Vector3::Zero(), x);
+  s.add("rail", Translational{i, j});
+  s.add("drive", TranslationalMotion{i, j, TimeFunction::polynomial({0, 0.5, 1})});
+  s.state("way", Expression{{Measure::displacement(i, 0)}, [](const Real *m) { return m[0]; }}, 0.25);
+  s.start().assembly = Assembly::Project;
+  OwnTS run(s);
+  for (double t : {0.5, 1.}) {
+    Snapshot now;
+    Motion   m;
+    must(Kinematics(run.ts, t));
+    must(now.take(run.ts));
+    must(now.motion(i, &m));
+    EXPECT_NEAR(m.position(0), 0.5 * t + t * t, 1e-9) << t;
+    EXPECT_NEAR(m.velocity(0), 0.5 + 2 * t, 1e-7) << t;
+  }
+}
+
 /* What rounding leaves of velocities that are zero, or small ones, are no measure of how fast a motion becomes; nor are those of other bodies */
 TEST(Analyses, KinematicsWhereAMotionHasStoodStill)
 {
