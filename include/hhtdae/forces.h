@@ -206,7 +206,8 @@ struct DistanceStop { /* of the distance of the origins; with upper alone a rope
 };
 
 /* friction in a revolute, translational, cylindrical or spherical joint, from its reaction: moment mu r N or force mu N
-   against the relative motion, regularized */
+   against the relative motion, regularized. Where redundant constraints are dropped, anywhere in the mechanism, reactions are one choice of many, which
+   depends on how the mechanism is turned in space, and so does the friction: use joints that leave more freedom. */
 struct JointFriction {
   Element joint;
   double  coefficient   = 0;

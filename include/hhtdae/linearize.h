@@ -14,9 +14,9 @@
 
   x: displacements and small rotations of bodies in space axes, and all other unknowns as they are. M, C and K are those of this moment: modes
   are motions where the state is at rest, or steady as seen from space. An axisymmetric rotor at speed is, a swinging rod is not.
-  Modal and nodal coordinates of flexible bodies are in the bodies' own axes. One whose rotation joints and motions determine, a blade on a driven
-  hub, may turn; of one that is free to turn, a flexible shaft in bearings, the equations change within a revolution, and eigenvalues at speed are
-  wrong: rigid discs with beams between them are such a rotor in space axes.
+  Modal and nodal coordinates of flexible bodies are in the bodies' own axes. Of one that turns, a blade on a driven hub or a flexible shaft in
+  bearings, the equations change within a revolution, and eigenvalues at speed are wrong without a word: flap and lag of a blade come out as if they
+  were one. Rigid discs with beams between them are a rotor in space axes; of a blade a run in time tells the frequencies.
   All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */
 #ifndef HHTDAE_LINEARIZE_H

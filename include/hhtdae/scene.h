@@ -254,9 +254,10 @@ public:
 
   /* A run that goes on where another one of this scene is: its time, positions, velocities and states, angles over full turns; with
      parameters, and elements that may be missing, as they are now. Velocities that joints of now forbid are lost, in the metric of
-     the masses, as in a plastic impact, unless start().assembly is Off; positions that they forbid are an error as at any start.
+     the mass matrix, as in a plastic impact, unless start().assembly is Off; positions that they forbid are an error as at any start.
      Elements that count angles over full turns or follow a curve may not come or go, which is an error: torsional springs, RotationalStop, Screw, Coupler,
-     gears, racks, PointOnCurve, constraints and forces of the user's that read angles. RotationalMotion may. */
+     gears, racks, PointOnCurve, constraints and forces of the user's that read angles. RotationalMotion may, but not one of accelerations.
+     Files are begun anew: give the run other names. */
   PetscErrorCode createTS(TS *ts, TS from);
 
   /* TSSolve(), output. */

@@ -20,7 +20,7 @@
   Notes:
   The paper's form (9a) divides M q'' at t_{n+1} by 1+alpha and averages all other forces between both ends of the step. Where
   M depends on q and alpha is not 0 it is of first order. The second-order form satisfies the equations of motion at t_{n+1}
-  and averages an algorithmic acceleration. For constant M both are the same method.
+  and averages an algorithmic acceleration. For constant M both are the same method, but for rows of constraints that read q'', of which the paper's form makes a method of first order.
 
 .seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetRadius()`
 @*/
@@ -160,7 +160,8 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
   do not, a motion with h omega near one or above is active, for which orders above 2 are not stable at small damping: then it is HHT for a while.
   A fixed order of 3 or more has no such guard: it suits smooth or well damped motion alone.
 
-  In smooth motion positions, velocities, and at constant steps accelerations and multipliers converge with the order. A change of h leaves an error in accelerations and multipliers that is one
+  In smooth motion positions, velocities, and at constant steps accelerations and multipliers converge with the order, where error control chooses the first steps: at
+  given steps these, of order two, leave an error of h^3. A change of h leaves an error in accelerations and multipliers that is one
   order lower for as many steps as the order has. They do not enter the error test.
 
   Orders above 2 need the second-order form. They need the attitudes of as many steps within half a turn, where there are local rotation vectors (`TSHHT3SetRotations()`): of fast spins the order is lower.
