@@ -84,13 +84,16 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 }
 
 /* Whether to begin afresh at t_n, for a step of length h: where it is far shorter than the last one, or where growth would amplify what rounding has left in that one
-   of the lag of a_n and of the misfit of the velocities, which are stretched with h and h^2 */
+   of the lag of a_n and of the misfit of the velocities, which are stretched with h and h^2. At given steps orders above two, whose steps have no such misfit, do
+   better without (HigherOrder.StepFarShorterThanTheOthers). */
 PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes)
 {
   const Integrator &I = Get(ts);
   PetscReal         part;
 
   PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (I.order.now > 2 && I.fixed_h) PetscFunctionReturn(PETSC_SUCCESS);
   *yes = (PetscBool)(I.constraints() && h < shrink * I.h_last);
   if (*yes || !I.count[TSHHT3_HOLONOMIC] || h <= I.h_last || !I.h_last) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, I.h_last, &part));
