@@ -147,13 +147,13 @@ PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first h: a local error of an eighth of the tolerance from q'''; without one, from q'' or the length of the run. Not longer than loads and motions allow
+/* The first h: a local error of an eighth of the tolerance from q''' and from what q'' itself tells of its second derivative; without these, the length of the run. Not longer than loads and motions allow
    that depend on time alone: of their period the error of a longer one might know nothing (Excitation.TheFirstStepFollowsTheLoad). */
 PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
 {
   Integrator &I = Get(ts);
   StartErrors e;
-  PetscReal   e2;
+  PetscReal   e2, T;
 
   PetscFunctionBegin;
   PetscCall(ErrorsOfStart(ts, rate, &e));
@@ -161,7 +161,8 @@ PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
   PetscCall(CorrectionNorm(ts, I.A0, &e2));
   const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
   PetscReal       h3 = e.step(0.125);
-  if (h3 >= PETSC_MAX_REAL && e2 > 0) h3 = PetscPowReal(e2, -0.5);
+  PetscCall(TimeScaleOfAccelerations(ts, I.A0, &T));
+  if (e2 > 0 && T < PETSC_MAX_REAL) h3 = PetscMin(h3, PetscPowReal(0.125 * T * T / e2, 0.25)); /* q'''' as large as q''/T^2: from rest q''' is rounding (FirstStep.FromRest) */
   *h = PetscMin(h3, PetscMin(span / 10, I.fastest));
   *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);

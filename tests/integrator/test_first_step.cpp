@@ -1,5 +1,7 @@
 /* A first step that the user has set stands, however it was set; otherwise it is chosen, whether options were read or not */
+#include "integrator/start.h"
 #include "support.h"
+#include <vector>
 
 using namespace hhtest;
 
@@ -62,6 +64,26 @@ TEST(FirstStep, IsChosenWithoutAWordOfTheUser)
   MEASURED("first step %g", chosen);
   EXPECT_GT(std::abs(chosen - .1), 1e-3); /* or the tests below would show nothing */
   EXPECT_EQ(q.first(), chosen);
+}
+
+/* From rest accelerations begin to change with the square of the time: the first step is one like those that follow, whatever rounding makes of its rates */
+TEST(FirstStep, FromRest)
+{
+  for (double eps : {1e-3, 1e-5, 1e-7, 1e-9}) {
+    const Pendulum      p(-90., 0., 1.);
+    Simulation          run(p, tolerance(eps));
+    std::vector<double> t;
+    must(TSSetTimeStep(run.ts, hht3::unset_step));
+    PetscInt            rejected = 0;
+    run.watch = [&](Simulation &r, PetscInt step, double now) {
+      t.push_back(now);
+      if (step == 1) must(TSGetStepRejections(r.ts, &rejected));
+    };
+    must(run.solve());
+    MEASURED("%g: first step %.2e, the sixth %.2e", eps, t[1] - t[0], t[6] - t[5]);
+    EXPECT_EQ(rejected, 0) << eps;
+    EXPECT_GT(t[1] - t[0], 0.3 * (t[6] - t[5])) << eps;
+  }
 }
 
 /* Of fixed length it knows no tolerance: the start is as good as the method at any */
