@@ -79,7 +79,7 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
 {
   const SceneData &s = E.R.scene;
   Unbalanced       at;
-  double           lightest = INFINITY, rounded;
+  double           lightest = INFINITY, rounded = 0;
   PetscFunctionBegin;
   PetscCall(E.residual(E.U));
   PetscCall(E.measure(E.F, at));
