@@ -118,13 +118,15 @@ PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
   Integrator     &I = Get(ts);
   const PetscReal h = I.h;
   PetscReal       sum[3] = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
+  Vec             coordinates = rate;
   WorkVec         x;
 
   PetscFunctionBegin;
   *e = {};
-  PetscCall(x.like(rate));
-  PetscCall(VecCopy(rate, x));
   if (I.count[TSHHT3_STATE]) {
+    PetscCall(x.like(rate));
+    PetscCall(VecCopy(rate, x));
+    coordinates = x;
     PetscCall(ForSome(
       I.states,
       [&](PetscInt, PetscScalar s2, PetscScalar s1, PetscScalar y, PetscScalar w, PetscScalar &q) {
@@ -137,7 +139,7 @@ PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   }
   I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, x, &e->coordinates));
+  PetscCall(CorrectionNorm(ts, coordinates, &e->coordinates));
   I.h               = h;
   const PetscReal s = PetscSqrtReal(sum[1] / PetscMax(I.norm_size, 1));
   e->change         = I.p.gamma_s * s;
