@@ -27,44 +27,33 @@ struct Write {
   PetscScalar   &operator[](PetscInt i) const { return x[i]; }
 };
 
-/* Several vectors of which each is read, or written: x[j] is the entry of the j-th one */
-template <class Entry, class One>
-struct Each {
+/* Several vectors that are read: x[j] is the entry of the j-th one */
+struct ReadEach {
   static constexpr int most = 8;
   int                  n    = 0;
   Vec                  vec[most];
-  Entry               *x[most];
+  const PetscScalar   *x[most];
 
   struct Entries {
-    Entry *const *x;
-    PetscInt      i;
-    Entry        &operator[](int j) const { return x[j][i]; }
+    const PetscScalar *const *x;
+    PetscInt                  i;
+    const PetscScalar        &operator[](int j) const { return x[j][i]; }
   };
   void           add(Vec v) { vec[n++] = v; }
   Entries        operator[](PetscInt i) const { return {x, i}; }
   PetscErrorCode get()
   {
     PetscFunctionBegin;
-    for (int j = 0; j < n; j++) {
-      One one(vec[j]);
-      PetscCall(one.get());
-      x[j] = one.x;
-    }
+    for (int j = 0; j < n; j++) PetscCall(VecGetArrayRead(vec[j], &x[j]));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscErrorCode restore()
   {
     PetscFunctionBegin;
-    for (int j = 0; j < n; j++) {
-      One one(vec[j]);
-      one.x = x[j];
-      PetscCall(one.restore());
-    }
+    for (int j = 0; j < n; j++) PetscCall(VecRestoreArrayRead(vec[j], &x[j]));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };
-using ReadEach  = Each<const PetscScalar, Read>;
-using WriteEach = Each<PetscScalar, Write>;
 
 /* get() or restore() of all arrays */
 template <class Call, class... Arrays>

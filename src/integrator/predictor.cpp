@@ -12,6 +12,7 @@
 #include "events.h"
 #include "formulas.h"
 #include "predictor.h"
+#include "sweeps.h"
 
 namespace hht3
 {
@@ -34,32 +35,66 @@ PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The step at t1 is accepted: new differences D_0 ... D_{have+1} from the old ones, D_0 ... D_have. miss[k]: of degree k at t1, over the product
-   of the times that its differences span; sum of squares by the weights, which are zero for unknowns that do not count. */
-PetscErrorCode NewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
+/* New differences D_0 ... D_{have+1} from the new values x and the old ones, D_0 ... D_have, in place, and sums of squares of the misses by the weights.
+   The number of differences is the template's, for a loop without inner branches. */
+template <int have>
+struct NewDifferences {
+  const PetscScalar *x, *w;
+  PetscScalar       *D[have + 2];
+  PetscReal          inverse[have + 1]; /* of the times that the differences span */
+  Four               squares[have + 1] = {};
+
+  template <class At>
+  HHT3_INLINE void operator()(const At &at)
+  {
+    const Four weight = at.get(w);
+    Four       now    = at.get(x);
+    for (int k = 0; k <= have; k++) {
+      const Four old = at.get(D[k]);
+      at.put(D[k], now);
+      now               = (now - old) * inverse[k];
+      const Four missed = now * weight;
+      squares[k] += missed * missed;
+    }
+    at.put(D[have + 1], now);
+  }
+};
+
+/* The step at t1 is accepted. miss[k]: of degree k at t1, over the product of the times that its differences span; weights of unknowns that do not
+   count are zero. */
+template <int have>
+PetscErrorCode Renew(const Integrator &I, Predictor &p, PetscReal miss[])
 {
-  static_assert(max_degree + 2 <= WriteEach::most);
-  const Vec rates = I.count[TSHHT3_STATE] ? I.V1 : I.X;
-  PetscReal inverse[max_degree + 1];
-  Sum       squares[max_degree + 1];
-  WriteEach D;
+  NewDifferences<have> sweep;
+  const bool           states = I.count[TSHHT3_STATE]; /* for which s' counts: a copy of X has them */
+  const Vec            x      = states ? p.D[have + 1] : I.X;
+  PetscInt             n;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k <= have + 1; k++) D.add(p.D[k]);
-  for (PetscInt k = 0; k <= have; k++) inverse[k] = 1 / (I.t1 - p.t[k]);
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar x, PetscScalar rate, PetscScalar w, auto d) {
-      PetscScalar now = RoleOf(I, i) == TSHHT3_STATE ? rate : x; /* a, lambda, V, F as they are, of states s' */
-      for (PetscInt k = 0; k <= have; k++) {
-        const PetscScalar next = (now - d[k]) * inverse[k];
-        d[k] = now;
-        now  = next;
-        squares[k].add(i, PetscSqr(now * w));
-      }
-      d[have + 1] = now;
-    },
-    Read(I.X), Read(rates), Read(I.weight), D));
-  for (PetscInt k = 0; k <= have; k++) miss[k] = squares[k].total();
+  if (states) {
+    PetscCall(VecCopy(I.X, x));
+    PetscCall(ForSome(I.states, [](PetscInt, PetscScalar rate, PetscScalar &now) { now = rate; }, Read(I.V1), Write(x)));
+  }
+  PetscCall(VecGetLocalSize(x, &n));
+  PetscCall(VecGetArrayRead(x, &sweep.x));
+  PetscCall(VecGetArrayRead(I.weight, &sweep.w));
+  for (int k = 0; k <= have + 1; k++) PetscCall(VecGetArray(p.D[k], &sweep.D[k]));
+  for (int k = 0; k <= have; k++) sweep.inverse[k] = 1 / (I.t1 - p.t[k]);
+  sweep = Sweep(n, sweep);
+  for (int k = 0; k <= have; k++) miss[k] = Total(sweep.squares[k]);
+  for (int k = 0; k <= have + 1; k++) PetscCall(VecRestoreArray(p.D[k], &sweep.D[k]));
+  PetscCall(VecRestoreArrayRead(I.weight, &sweep.w));
+  PetscCall(VecRestoreArrayRead(x, &sweep.x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RenewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
+{
+  static constexpr PetscErrorCode (*of[])(const Integrator &, Predictor &, PetscReal[]) = {Renew<0>, Renew<1>, Renew<2>, Renew<3>, Renew<4>, Renew<5>};
+  static_assert(sizeof(of) / sizeof(of[0]) == max_degree + 1, "one for each number of differences");
+
+  PetscFunctionBegin;
+  PetscCall(of[have](I, p, miss));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,7 +153,7 @@ PetscErrorCode PredictorUpdate(TS ts)
 
   PetscFunctionBegin;
   if (!p.D[have + 1]) PetscCall(VecDuplicate(I.X, &p.D[have + 1]));
-  PetscCall(NewDifferences(I, p, have, miss));
+  PetscCall(RenewDifferences(I, p, have, miss));
   for (PetscInt k = have; k >= 0; k--) p.t[k + 1] = p.t[k];
   p.t[0]      = I.t1;
   p.available = PetscMin(have + 1, keep);
