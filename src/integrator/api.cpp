@@ -306,8 +306,9 @@ PetscErrorCode TSHHT3SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal 
 
   Notes:
   Row i of the residual is the equation of unknown i. Unknowns that no index set names are coordinates. If no index set is
-  given at all the roles are detected from dF/dU, dF/dU' and dF/dU'' at the start. Overlapping sets and indices that the rank
-  does not own are errors, raised in `TSSetUp()`.
+  given at all the roles are detected from dF/dU, dF/dU' and dF/dU'' at the start. Overlapping sets, indices that the rank
+  does not own, rows of constraints that depend on accelerations and of holonomic ones that depend on velocities are errors,
+  raised in `TSSetUp()`, which asks the residual three times for that.
 
 .seealso: `TSHHT3`, `TSHHT3GetIS()`
 @*/

@@ -5,7 +5,9 @@
   constraint has to be known along the motion without q'': first-order states by their rates, variables and force states by their definitions, where these
   depend on positions, states and time only. In rows of positions they would change with q'' in any case, and would take no part of the constraint's force.
 
-  The residual tells what depends on what, at the set-up and where there are such unknowns beside constraints.
+  The residual tells what depends on what, at the set-up and where there are such unknowns beside constraints. Where the application has named the roles
+  of unknowns, it also tells whether rows of constraints depend on rates that their role does not have: such a row would be scaled and differentiated as
+  what it is not.
 */
 #include "entries.h"
 #include "equations.h"
@@ -26,8 +28,9 @@ bool IsDefined(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_
 
 /* A state near the initial one, its residual, and others beside it */
 struct Dependence {
-  TS      ts;
-  WorkVec U, V, A, F, other, moved;
+  TS        ts;
+  WorkVec   U, V, A, F, other, moved;
+  PetscReal noise = 0; /* rows that change by less have not changed */
 
   explicit Dependence(TS t) : ts(t) {}
 
@@ -53,7 +56,18 @@ struct Dependence {
     PetscCall(VecCopy(x, moved));
     PetscCall(Shake(moved, 1e-3, 14, which));
     PetscCall(EvaluateResidual(ts, ts->ptime, x == (Vec)U ? moved : U, x == (Vec)V ? moved : V, x == (Vec)A ? moved : A, other));
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar g) { if (f != g && !PetscIsInfOrNanScalar(f) && !PetscIsInfOrNanScalar(g)) changed(i); }, Read(F), Read(other)));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar g) { if (PetscAbsScalar(f - g) > noise && !PetscIsInfOrNanScalar(f) && !PetscIsInfOrNanScalar(g)) changed(i); }, Read(F), Read(other)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* Sums in another order, by threads, make a residual that is not the same twice */
+  PetscErrorCode measureNoise()
+  {
+    PetscFunctionBegin;
+    PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, other));
+    PetscCall(VecAXPY(other, -1, F));
+    PetscCall(VecNorm(other, NORM_INFINITY, &noise));
+    noise *= 1e3;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };
@@ -63,6 +77,32 @@ PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
 {
   PetscFunctionBegin;
   PetscCall(FirstWhere([&](PetscInt i, PetscScalar) { return (size_t)i < mark.size() && mark[(size_t)i]; }, row, Read(ts->vec_sol)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows of constraints must not depend on accelerations, holonomic ones not on velocities. Which they are said to be, which they are by what they depend on. */
+PetscErrorCode RefuseRates(TS ts, Dependence &d)
+{
+  Integrator &I           = Get(ts);
+  PetscInt    of_velocity = -1, of_acceleration = -1;
+
+  PetscFunctionBegin;
+  for (int time = 0; time < 2; time++) {
+    std::vector<char> velocity(I.role.size(), 0), acceleration(I.role.size(), 0);
+    PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { velocity[i] = RoleOf(I, i) == TSHHT3_HOLONOMIC; }));
+    PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
+    PetscCall(FirstRow(ts, velocity, &of_velocity));
+    PetscCall(FirstRow(ts, acceleration, &of_acceleration));
+    if (of_velocity < 0 && of_acceleration < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(d.measureNoise());
+    if (d.noise == 0) break;
+  }
+  PetscCheck(of_acceleration < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "Row %" PetscInt_FMT " is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown "
+             "TSHHT3_VARIABLE if the row defines it",
+             of_acceleration);
+  PetscCheck(of_velocity < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "Row %" PetscInt_FMT " is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC", of_velocity);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,9 +188,10 @@ PetscErrorCode CheckDependence(TS ts)
 
   PetscFunctionBegin;
   I.follow = PETSC_FALSE;
-  if (!I.constraints() || defined + I.count[TSHHT3_STATE] == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.constraints() || (!I.is_set && defined + I.count[TSHHT3_STATE] == 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(d.begin());
-  PetscCall(RefuseHolonomic(ts, d));
+  if (I.is_set) PetscCall(RefuseRates(ts, d));
+  if (defined + I.count[TSHHT3_STATE]) PetscCall(RefuseHolonomic(ts, d));
   if (defined && I.count[TSHHT3_NONHOLONOMIC]) {
     PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i); }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) uses[i] = 1; }));
     PetscCall(FirstRow(ts, uses, &row));

@@ -111,6 +111,49 @@ TEST(Roles, AnODECarriesNoRoleMachinery)
   EXPECT_EQ(I.constraints(), 0);
 }
 
+/* A velocity-level row that is named holonomic would be scaled by 1/(beta h^2), and its multiplier be wrong without a word */
+TEST(Roles, RowsThatAreNotWhatTheyAreNamed)
+{
+  struct Differentiated : Pendulum {
+    int times;
+    explicit Differentiated(int n) : times(n) {}
+    void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+    {
+      Pendulum::residual(t, u, v, a, f);
+      f[2] = u[0] * v[0] + u[1] * v[1];
+      if (times == 2) f[2] = u[0] * a[0] + u[1] * a[1] + v[0] * v[0] + v[1] * v[1];
+    }
+  };
+  for (const auto &[times, says, role] :
+       {std::make_tuple(1, "depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC", TSHHT3_HOLONOMIC),
+        std::make_tuple(2, "depends on accelerations", TSHHT3_HOLONOMIC),
+        std::make_tuple(2, "depends on accelerations", TSHHT3_NONHOLONOMIC)}) {
+    const Differentiated p(times);
+    Simulation           run(p, "");
+    setIS(run.ts, role, {2});
+    ErrorTrap trap;
+    EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_WRONG);
+    EXPECT_TRUE(trap.says("Row 2")) << trap.message;
+    EXPECT_TRUE(trap.says(says)) << trap.message;
+  }
+}
+
+/* Sums that threads make in another order every time are no dependence */
+TEST(Roles, ResidualsThatRoundDifferentlyAreNoOtherRoles)
+{
+  struct Noisy : Pendulum {
+    mutable int calls = 0;
+    void        residual(double t, const double *u, const double *v, const double *a, double *f) const override
+    {
+      Pendulum::residual(t, u, v, a, f);
+      f[2] += 1e-16 * (++calls % 7);
+    }
+  } p;
+  Simulation run(p, "");
+  setIS(run.ts, TSHHT3_HOLONOMIC, {2});
+  must(TSSetUp(run.ts));
+}
+
 TEST(Roles, OverlapIsRefused)
 {
   const Pendulum p;
