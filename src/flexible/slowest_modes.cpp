@@ -22,6 +22,7 @@ constexpr PetscReal accuracy = 1e-10;
 constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes) */
 constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
+constexpr int       refinements = 5; /* of a shape, at most */
 constexpr PetscInt  workspace = 100; /* percent more than MUMPS estimates, ICNTL(14): pivots change places where constraints are (FullBodyRanks.SlowestModes) */
 constexpr PetscReal as_fast  = 1e-2; /* part of the value: modes that close may be of one value, of which each combination is one, found with less digits */
 constexpr PetscReal apart    = 0.1;  /* part of its norm that a shape has beside those of modes as fast, or it is none of its own (SmallBodies.SlowestModesOfAFreeBody) */
@@ -122,40 +123,89 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscFunctionReturn(0);
 }
 
-/* || (value^2 M + value C + K) x || of the balanced operators, relative to the forces of rates: of inertia and damping, and the rates of states */
-PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, PetscReal *part)
+/* (value^2 M + value C + K) x of the balanced operators, real and imaginary part, and its norm relative to the forces of rates: of inertia and damping, and
+   the rates of states */
+PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, Vec sum[2], PetscReal *part)
 {
   const std::complex<double> power[3] = {1, m.value, m.value * m.value};
-  Vec                        x[2], sum[2], product;
+  Vec                        x, product;
   PetscReal                  norm, left = 0, rates = 0;
   PetscFunctionBegin;
+  PetscCall(VecDuplicate(by.D, &x));
   PetscCall(VecDuplicate(by.D, &product));
+  for (int imaginary = 0; imaginary < 2; imaginary++) PetscCall(VecSet(sum[imaginary], 0));
   for (int imaginary = 0; imaginary < 2; imaginary++) {
     PetscScalar *put;
-    PetscCall(VecDuplicate(by.D, &x[imaginary]));
-    PetscCall(VecDuplicate(by.D, &sum[imaginary]));
-    PetscCall(VecSet(sum[imaginary], 0));
-    PetscCall(VecGetArrayWrite(x[imaginary], &put));
+    PetscCall(VecGetArrayWrite(x, &put));
     for (std::size_t i = 0; i < m.shape.size(); i++) put[i] = imaginary ? m.shape[i].imag() : m.shape[i].real();
-    PetscCall(VecRestoreArrayWrite(x[imaginary], &put));
-    PetscCall(VecPointwiseDivide(x[imaginary], x[imaginary], by.D));
-  }
-  for (int k = 0; k < 3; k++)
-    for (int imaginary = 0; imaginary < 2; imaginary++) {
-      PetscCall(MatMult(by.operators[k], x[imaginary], product));
+    PetscCall(VecRestoreArrayWrite(x, &put));
+    PetscCall(VecPointwiseDivide(x, x, by.D));
+    for (int k = 0; k < 3; k++) {
+      PetscCall(MatMult(by.operators[k], x, product));
       PetscCall(VecAXPY(sum[imaginary], power[k].real(), product));
       PetscCall(VecAXPY(sum[1 - imaginary], imaginary ? -power[k].imag() : power[k].imag(), product));
       PetscCall(VecNorm(product, NORM_2, &norm));
       if (k > 0) rates += std::norm(power[k]) * norm * norm;
     }
+  }
   for (int imaginary = 0; imaginary < 2; imaginary++) {
     PetscCall(VecNorm(sum[imaginary], NORM_2, &norm));
     left += norm * norm;
-    PetscCall(VecDestroy(&sum[imaginary]));
-    PetscCall(VecDestroy(&x[imaginary]));
   }
+  PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&product));
   *part = PetscSqrtReal(left / rates);
+  PetscFunctionReturn(0);
+}
+
+/* A factor of shift^2 M + shift C + K, balanced */
+PetscErrorCode Factor(const Balanced &by, PetscReal shift, KSP *ksp)
+{
+  Mat T;
+  PC  pc;
+  PetscFunctionBegin;
+  PetscCall(MatDuplicate(by.operators[0], MAT_COPY_VALUES, &T));
+  PetscCall(MatAXPY(T, shift, by.operators[1], DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatAXPY(T, shift * shift, by.operators[2], DIFFERENT_NONZERO_PATTERN));
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)T), ksp));
+  PetscCall(KSPSetOptionsPrefix(*ksp, "scene_modes_st_"));
+  PetscCall(KSPSetType(*ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(*ksp, &pc));
+  PetscCall(PCSetType(pc, PCLU));
+#if defined(PETSC_HAVE_MUMPS)
+  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+#endif
+  PetscCall(KSPSetFromOptions(*ksp));
+  PetscCall(GiveRoom(*ksp, T));
+  PetscCall(KSPSetOperators(*ksp, T, T));
+  PetscCall(MatDestroy(&T));
+  PetscFunctionReturn(0);
+}
+
+/* Residual inverse iteration (Neumaier, SIAM J. Numer. Anal. 22, 1985) at the value as it is: takes from a slow shape what the search has left of fast ones,
+   1e-10 of whose stiffness exceeds the inertia of a stiff body on a soft spring. A value that is none keeps its residual. */
+PetscErrorCode Refine(const Balanced &by, KSP factor, Vec sum[2], Mode *m, PetscReal *part)
+{
+  Mode      better = *m;
+  PetscReal left   = *part;
+  PetscFunctionBegin;
+  for (int k = 0; k < refinements && left <= *part && left > balanced; k++) {
+    *m    = better;
+    *part = left;
+    for (int imaginary = 0; imaginary < 2; imaginary++) {
+      const PetscScalar *d;
+      PetscCall(KSPSolve(factor, sum[imaginary], sum[imaginary]));
+      PetscCall(VecPointwiseMult(sum[imaginary], sum[imaginary], by.D));
+      PetscCall(VecGetArrayRead(sum[imaginary], &d));
+      for (std::size_t i = 0; i < m->shape.size(); i++) better.shape[i] -= imaginary ? std::complex<double>(0, d[i]) : std::complex<double>(d[i], 0);
+      PetscCall(VecRestoreArrayRead(sum[imaginary], &d));
+    }
+    PetscCall(Unbalanced(by, better, sum, &left));
+  }
+  if (left < *part) {
+    *m    = better;
+    *part = left;
+  }
   PetscFunctionReturn(0);
 }
 
@@ -170,26 +220,38 @@ PetscErrorCode Destroy(Balanced *b)
 /* Motions that nothing drives back, as far as this can be told beside other modes and the shift */
 bool AtRest(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { return std::abs(m.value) < at_rest * std::max(std::abs(modes.back().value), std::abs(shift)); }
 
-/* Each mode that is no rigid motion in the equations, balanced as they are where it is: next to a shift far from it rigid motions weigh too much */
-PetscErrorCode Worst(const Mat given[3], PetscReal shift, const std::vector<Mode> &modes, PetscReal *worst, PetscReal *frequency)
+/* Each mode that is no rigid motion in the equations, balanced as they are where it is: next to a shift far from it rigid motions weigh too much. Shapes
+   that do not satisfy them well enough are refined. */
+PetscErrorCode Worst(const Linearization &of, const Mat given[3], PetscReal shift, std::vector<Mode> *modes, PetscReal *worst, PetscReal *frequency)
 {
   Balanced  by;
+  KSP       factor = nullptr;
+  Vec       sum[2];
   PetscReal at = 0, left = 0;
   PetscFunctionBegin;
   *worst = *frequency = 0;
-  for (const Mode &m : modes) {
+  for (Vec &v : sum) PetscCall(MatCreateVecs(given[0], nullptr, &v));
+  for (Mode &m : *modes) {
     const PetscReal here = std::abs(m.value);
-    if (AtRest(m, modes, shift)) continue;
+    if (AtRest(m, *modes, shift)) continue;
     if (!(here <= beside * at)) {
+      PetscCall(KSPDestroy(&factor));
       PetscCall(Destroy(&by));
       PetscCall(Balance(given, here, &by));
       at = here;
     }
-    PetscCall(Unbalanced(by, m, &left));
+    PetscCall(Unbalanced(by, m, sum, &left));
+    if (left > balanced) {
+      if (!factor) PetscCall(Factor(by, at, &factor));
+      PetscCall(Refine(by, factor, sum, &m, &left));
+      PetscCall(of.normalize(&m));
+    }
     if (left <= *worst) continue;
     *worst     = left;
     *frequency = m.frequency();
   }
+  for (Vec &v : sum) PetscCall(VecDestroy(&v));
+  PetscCall(KSPDestroy(&factor));
   PetscCall(Destroy(&by));
   PetscFunctionReturn(0);
 }
@@ -398,13 +460,13 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCall(SlepcInitialized(&ready));
   if (!ready) PetscCall(SlepcInitializeNoArguments());
   PetscCall(Search(of, given, shift, count, modes));
-  PetscCall(Worst(given, shift, *modes, &left, &frequency));
+  PetscCall(Worst(of, given, shift, modes, &left, &frequency));
   PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
   const PetscReal slowest = Slowest(*modes, shift);
   if (slowest > beside * std::abs(shift) && (left > balanced || slowest == std::abs(modes->front().value))) { /* about rigid motions only where need be */
     shift = std::copysign(slowest, shift);
     PetscCall(Search(of, given, shift, count, modes));
-    PetscCall(Worst(given, shift, *modes, &left, &frequency));
+    PetscCall(Worst(of, given, shift, modes, &left, &frequency));
     PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
   }
   PetscCheck((PetscInt)modes->size() >= count, comm, PETSC_ERR_NOT_CONVERGED,

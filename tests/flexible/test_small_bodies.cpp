@@ -183,6 +183,39 @@ TEST(SmallBodies, SlowestModesOfAFreeBody)
   }
 }
 
+/* A whole body on a hinge and a soft spring: what a search leaves of fast shapes in the slow one has far more stiffness than that has inertia */
+TEST(SmallBodies, SlowestModesOfAStiffBodyOnASoftSpring)
+{
+  for (double stiffness : {3., 300.}) {
+    Scene                scene(PETSC_COMM_SELF);
+    Made                 made({{6, 1, 1}, {1, 0.03, 0.03}}); /* steel */
+    FullFeBody           fe;
+    FullBody             b;
+    TorsionalSpringDamper spring;
+    b.law         = FeLaw::Small;
+    b.attachments = both().attachments;
+    must(fe.add(scene, "beam", made.model, b));
+    const Matrix3 axes = axesAlong({0, 1, 0});
+    spring.i           = scene.marker(fe.attachment("left"), Vector3::Zero(), axes);
+    spring.j           = scene.marker(scene.ground(), {0, 0.015, 0.015}, axes);
+    spring.stiffness   = stiffness;
+    scene.add("hinge", Revolute{spring.i, spring.j});
+    scene.add("spring", spring);
+    const Taken       t(scene);
+    std::vector<Mode> all, slow;
+    must(t.small.modes(&all));
+    const double rigid = std::sqrt(stiffness / (7850 * 0.03 * 0.03 * (1. / 3 + 0.03 * 0.03 / 12))); /* consistent masses have the exact inertia */
+    for (int count : {1, 3, 6})
+      for (double shift : {1., 10., 100.}) {
+        SCOPED_TRACE(text("%g N m/rad: %d modes about %g 1/s", stiffness, count, shift));
+        must(SlowestModes(t.small, count, &slow, shift));
+        ASSERT_EQ((int)slow.size(), count);
+        EXPECT_NEAR(std::abs(slow[0].value), rigid, 1e-3 * rigid);
+        for (int k = 0; k < count; k++) EXPECT_NEAR(std::abs(slow[k].value), std::abs(all[k].value), 1e-5 * std::abs(all[k].value)) << k;
+      }
+  }
+}
+
 /* With options that lose all digits an error, no wrong modes */
 TEST(SmallBodies, SlowestModesAreChecked)
 {
