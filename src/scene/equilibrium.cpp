@@ -24,13 +24,10 @@ namespace
 
 constexpr int    equilibrium_iterations = 2000;
 constexpr double balanced       = 1e-10; /* of forces, times the largest of the scene; of constraints, times its size */
-constexpr double largest_growth = 8, longest = 1e6; /* of h: in one step, and from its first value */
+constexpr double largest_growth = 8;  /* of h in one step */
 constexpr double downhill_growth = 2; /* of h in one step on the way down a hollow */
-constexpr double unchanged = 0.999;               /* part of the forces: a step that leaves more has been taken back */
-constexpr double rounding = 1e-5, at_rest = 1e-9;  /* forces that may be rounding, if a step moves no more than this */
-constexpr int    still_for = 10;        /* of the longest steps in a row at rest: what is left is noise, up to */
-constexpr double noise = 1e-3;          /* of the forces, as of a stiff mesh far from the origin (Equilibrium.AMeshFarFromTheOrigin) */
-constexpr double of_rounding = 1e6;     /* of forces that are nothing but rounding, which is to be found at rest then (FullBody.UnloadedInEquilibrium) */
+constexpr double at_rest = 1e-9;        /* a step that moves no more than this */
+constexpr double noise   = 10;          /* times the forces that rounding of the coordinates makes: no step comes nearer (Equilibrium.AMeshFarFromTheOrigin) */
 constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
 constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
@@ -79,12 +76,11 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
 {
   const SceneData &s = E.R.scene;
   Unbalanced       at;
-  double           lightest = INFINITY, rounded = 0;
+  double           lightest = INFINITY;
   PetscFunctionBegin;
   PetscCall(E.residual(E.U));
   PetscCall(E.measure(E.F, at));
-  PetscCall(Rounding(E, &rounded));
-  E.scale = std::max(at.force, of_rounding * rounded);
+  E.scale = at.force;
   for (const BodyData &b : s.bodies) {
     E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
     if (b.mass > 0 && !b.massless) lightest = std::min(lightest, b.mass);
@@ -238,32 +234,31 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 /*
   Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong (SceneEquilibrium.StrongDamping), h need
   not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
-  against the forces has been Newton's towards a saddle. Nor are forces to be waited for that are rounding. A step that its corrections have
-  taken back to where it began has gone too far into forces that set in on its way: h shrinks (SceneEquilibrium.ABallOnAPlane).
+  against the forces has been Newton's towards a saddle.
 */
-double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbalanced &after)
+double Growth(const Attempt &a, double before, const Unbalanced &after)
 {
   const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
-  if (after.step <= at_rest && after.force <= rounding * E.scale) return largest_growth;
-  if (after.step <= at_rest && after.force <= noise * E.scale && a.corrections == 0) return std::max(falling, downhill_growth);
-  if (after.step <= at_rest) return a.corrections > 0 && after.force > unchanged * before ? 0.25 : falling;
   if (a.work[0] <= 0) return 0.25;
   const bool in_hollow = a.work[1] > 0 && a.work[1] < a.work[0];
   return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);
 }
 
-/* Stiff springs leave rounding that is no small part of the weights: there it is the step that has to vanish. */
-bool Balanced(const Equilibrium &E, const Unbalanced &at, double h, int *still)
+/* Stiff springs and meshes leave rounding that is no small part of the weights: what it makes of the forces where the scene stands is as good as zero. */
+PetscErrorCode Balanced(Equilibrium &E, const Unbalanced &at, bool *found)
 {
-  const bool met = at.misfit <= balanced * E.size && at.other <= 1e-8 * std::max(1.0, E.scale);
-  *still         = met && at.force <= noise * E.scale && at.step <= at_rest && h >= longest / 2 ? *still + 1 : 0; /* the longest steps: in short ones a strong damper is at rest, too */
-  return met && (at.force <= balanced * E.scale || (at.force <= rounding * E.scale && at.step <= 1e-12 && h >= 1e3) || *still >= still_for);
+  double rounded = 0;
+  PetscFunctionBegin;
+  *found = false;
+  if (at.misfit > balanced * E.size || at.other > 1e-8 * std::max(1.0, E.scale)) PetscFunctionReturn(0);
+  if (at.force > balanced * E.scale) PetscCall(Rounding(E, &rounded));
+  *found = at.force <= std::max(balanced * E.scale, noise * rounded);
+  PetscFunctionReturn(0);
 }
 
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
   double  h = 0, first, before;
-  int     still = 0;
   Attempt a;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
@@ -279,8 +274,8 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
       h /= 4;
       continue;
     }
-    *found = Balanced(E, at, h / first, &still);
-    h      = std::min(longest * first, h * Growth(E, a, before, at));
+    PetscCall(Balanced(E, at, found));
+    h     *= Growth(a, before, at);
     before = at.force;
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.zero));

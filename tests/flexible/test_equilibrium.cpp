@@ -1,4 +1,5 @@
 /* Static equilibrium of thin parts: large rotations in few corrections, and not at a state that is not stable. */
+#include "hhtdae/helpers.h"
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "scene/model.h"
@@ -50,6 +51,37 @@ struct Plank {
 };
 
 } // namespace
+
+/* What rounding leaves of the forces of a stiff mesh moves a soft spring by more than any step at rest. By hand: m g L/2 cos(angle) = k angle. */
+TEST(Equilibrium, AStiffBodyOnASoftSpring)
+{
+  for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
+    FeModel               model(PETSC_COMM_WORLD);
+    FullFeBody            fe;
+    FullBody              b;
+    Scene                 scene(PETSC_COMM_WORLD);
+    TorsionalSpringDamper spring;
+    const Matrix3         axes = axesAlong({0, 1, 0});
+    BoxBuilder({{6, 1, 1}, {1, 0.03, 0.03}, {2e11, 0.3, 7850}}, &model);
+    b.law = law;
+    b.attachments.resize(1);
+    b.attachments[0].name = "left";
+    must(fe.add(scene, "beam", model, b));
+    spring.i         = scene.marker(fe.attachment("left"), Vector3::Zero(), axes);
+    spring.j         = scene.marker(scene.ground(), {0, 0.015, 0.015}, axes);
+    spring.stiffness = 30;
+    scene.add("hinge", Revolute{spring.i, spring.j});
+    scene.add("spring", spring);
+    scene.gravity({0, 0, -9.81});
+    scene.start().equilibrium = true;
+    must(scene.setUp());
+    const double moment = 7850 * 0.03 * 0.03 * 9.81 / 2;
+    double       angle  = 0;
+    for (int k = 0; k < 50; k++) angle += (moment * std::cos(angle) - 30 * angle) / (moment * std::sin(angle) + 30);
+    const Matrix3 A = DataOf(scene).bodies[fe.attachment("left").id].A;
+    EXPECT_NEAR(std::atan2(-A(2, 0), A(0, 0)), angle, 1e-3 * angle) << (law == FeLaw::Small ? "small" : "large"); /* and a bending of 1e-4 of it */
+  }
+}
 
 /* Positions of some 100 m leave rounding in the forces of a stiff mesh, here 1e-4 of the load, of which no step comes any nearer to zero */
 TEST(Equilibrium, AMeshFarFromTheOrigin)
