@@ -12,11 +12,17 @@
 
     M x'' + C x' + K x = b f,
 
-  x: displacements and small rotations of bodies in space axes, and all other unknowns as they are. M, C and K are those of this moment: modes
-  are motions where the state is at rest, or steady as seen from space. An axisymmetric rotor at speed is, a swinging rod is not.
-  Modal and nodal coordinates of flexible bodies are in the bodies' own axes. Of one that turns, a blade on a driven hub or a flexible shaft in
-  bearings, the equations change within a revolution, and eigenvalues at speed are wrong without a word: flap and lag of a blade come out as if they
-  were one. Rigid discs with beams between them are a rotor in space axes; of a blade a run in time tells the frequencies.
+  x: displacements and small rotations of bodies, and all other unknowns as they are. M, C and K are those of this moment: modes are motions where
+  the state is at rest, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
+
+    the body that take() is given         a driven hub for its blades, the rotor for a shaft that is not round; modes in axes of a round rotor are
+                                          those in space, faster or slower by its speed
+    flexible bodies                       without one, where all flexible bodies that turn do so alike: modal coordinates are in axes of the body
+    nothing                               else, and where take() is given the ground: an axisymmetric rotor of rigid discs at speed is steady as
+                                          seen from space
+
+  A swinging rod is steady from nowhere. Flexible bodies that turn with different angular velocities are not, either; a notice says so. Loads and
+  measures of space axes turn with the axes.
   All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */
 #ifndef HHTDAE_LINEARIZE_H
@@ -73,9 +79,9 @@ public:
   Linearization &operator=(const Linearization &) = delete;
 
   /* The state of a run of Scene::createTS(), at time t between the ends of its last step (TSHHT3EvaluateAt()); before the first one the start. The
-     run does not notice. */
-  PetscErrorCode take(TS ts, PetscReal t);
-  PetscErrorCode take(TS ts); /* at the end of the last step */
+     run does not notice. axes: of x, see above */
+  PetscErrorCode take(TS ts, PetscReal t, Body axes = {});
+  PetscErrorCode take(TS ts, Body axes = {}); /* at the end of the last step */
 
   /* All modes, by increasing |value|: dense algebra, for scenes of up to 1000 unknowns. A motion that nothing drives back has value 0. */
   PetscErrorCode modes(std::vector<Mode> *all) const;

@@ -92,9 +92,10 @@ void BindLinearize(py::module_ &m)
     });
   py::class_<Linearized>(m, "Linearization")
     .def(py::init<>())
-    .def("take", [](Linearized &l, py::object ts, py::object t) {
-      l.ts = FromTS(ToTS(ts));
-      Check(t.is_none() ? l.get().take(ToTS(ts)) : l.get().take(ToTS(ts), t.cast<double>()));
+    .def("take", [](Linearized &l, py::object ts, py::object t, py::object axes) {
+      const Body of = axes.is_none() ? Body() : ToHandle<Body>(axes, "axes");
+      l.ts          = FromTS(ToTS(ts));
+      Check(t.is_none() ? l.get().take(ToTS(ts), of) : l.get().take(ToTS(ts), t.cast<double>(), of));
     })
     .def("close", [](Linearized &l) {
       l.small.reset();

@@ -16,6 +16,7 @@ struct Linearization::Work {
   TS                         start = nullptr;   /* of a run that has not begun: one that has made the first step in its place */
   Runtime                   *R = nullptr;
   double                     t = 0, size = 1; /* of the scene */
+  Vector3                    spin = Vector3::Zero(), spin_rate = Vector3::Zero(); /* of the axes of displacements and rotations */
   Vec                        state[3] = {};   /* u, u', u'' */
   Mat                        M = nullptr, C = nullptr, K = nullptr;
   Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
@@ -30,6 +31,7 @@ struct Linearization::Work {
 
   PetscErrorCode check(const char *call) const;
   PetscErrorCode check(const char *call, const Mode &m) const; /* collective */
+  PetscErrorCode chooseAxes(Body of);
   PetscErrorCode differentiate();
   PetscErrorCode chooseUnits();
   PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double *x) const; /* how a measure changes */

@@ -11,6 +11,10 @@
   rotation vectors v and a are the angular velocity w and acceleration: exp([x]) A turns with w + x' + x cross w, so that T_00 = G^-1,
   T_11 = T_22 = 1, T_10 = T_21 = -[w], T_20 = -[w'].
 
+  x may be in axes that turn with W and at this moment are those of space: of displacements and rotations T_kl becomes the sum over m of T_km S_ml with
+
+    S_00 = S_11 = S_22 = 1,    S_10 = [W],    S_21 = 2 [W],    S_20 = [W'] + [W][W]
+
   T_00^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
 */
 #include "euler.h"
@@ -67,9 +71,51 @@ void LocalRates(const double *x, const double *w, const double *alpha, Matrix3 T
   T[2][0]           = -Cross<double>(Vector3(alpha[0], alpha[1], alpha[2]));
 }
 
+/* What vectors in axes of a spin are in space, with their rates */
+struct Turning {
+  Matrix3 S[3][3];
+
+  Turning(const Vector3 &spin, const Vector3 &rate)
+  {
+    const Matrix3 W = Cross<double>(spin);
+    for (auto &row : S)
+      for (Matrix3 &x : row) x.setZero();
+    for (int k = 0; k < 3; k++) S[k][k].setIdentity();
+    S[1][0] = W;
+    S[2][1] = 2 * W;
+    S[2][0] = Cross<double>(rate) + W * W;
+  }
+
+  void before(Matrix3 T[3][3]) const
+  {
+    for (int k = 2; k >= 0; k--)
+      for (int l = 0; l <= k; l++) {
+        Matrix3 sum = Matrix3::Zero();
+        for (int m = l; m <= k; m++) sum += T[k][m] * S[m][l];
+        T[k][l] = sum;
+      }
+  }
+};
+
+/* T_kl of n unknowns from `first` on */
+PetscErrorCode PutTurn(Linearization::Work &w, PetscInt first, int n, const Matrix3 T[3][3])
+{
+  const PetscInt rows[3] = {first, first + 1, first + 2};
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++)
+    for (int l = 0; l <= k; l++) {
+      double by_rows[9];
+      for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) by_rows[n * i + j] = T[k][l](i, j);
+      PetscCall(MatSetValues(w.turn[k][l], n, rows, n, rows, by_rows, INSERT_VALUES));
+    }
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode MakeTurns(Linearization::Work &w)
 {
   Runtime      &R = *w.R;
+  const Turning by(w.spin, w.spin_rate);
   const double *s[3];
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(w.state[k], &s[k]));
@@ -80,16 +126,16 @@ PetscErrorCode MakeTurns(Linearization::Work &w)
     }
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &body = R.bodies.body[b];
+    const PetscInt   at   = body.first + 3;
+    if (Coordinates(body.kind)) PetscCall(PutTurn(w, R.start + body.first, GroupSize(body.kind, 0), by.S));
     if (!TurnsInSpace(body.kind)) continue;
-    const PetscInt at = body.first + 3, rows[3] = {R.start + at, R.start + at + 1, R.start + at + 2};
-    Matrix3        T[3][3];
+    Matrix3 T[3][3];
     (R.bodies.local ? LocalRates : AngleRates)(s[0] + at, s[1] + at, s[2] + at, T);
-    for (int k = 0; k < 3; k++)
-      for (int l = 0; l <= k; l++) {
-        const Matrix3 by_rows = T[k][l].transpose();
-        PetscCall(MatSetValues(w.turn[k][l], 3, rows, 3, rows, by_rows.data(), INSERT_VALUES));
-      }
+    by.before(T);
+    PetscCall(PutTurn(w, R.start + at, 3, T));
   }
+  for (const auto &e : R.scene.extensions)
+    for (PetscInt i = 0; e->vectors() && i < e->coordinates(); i += 3) PetscCall(PutTurn(w, e->start[R.rank] + i, 3, by.S));
   for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(w.state[k], &s[k]));
   for (int k = 0; k < 3; k++)
     for (int l = 0; l <= k; l++) {
@@ -136,6 +182,42 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
   foreign = (PetscInt)m.shape.size() != R->n;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &foreign, 1, MPI_INT, MPI_MAX, comm()));
   PetscCheck(!foreign, comm(), PETSC_ERR_ARG_WRONG, "%s: the mode's shape has not the unknowns of this linearization, but %d (of this rank, which has %d); take a mode of its own", call, (int)m.shape.size(), (int)R->n);
+  PetscFunctionReturn(0);
+}
+
+/* Of the body that is asked for; else of flexible bodies, whose modal coordinates turn with them, where all that turn do it alike */
+PetscErrorCode Linearization::Work::chooseAxes(Body of)
+{
+  constexpr double alike = 1e-6; /* of the spin */
+  const SceneData &s     = R->scene;
+  Vec              at[3] = {state[0], state[1], state[2]};
+  Motion           m;
+  bool             one = true;
+  PetscFunctionBegin;
+  spin.setZero();
+  spin_rate.setZero();
+  PetscCheck(of.id < 0 || s.valid(of), comm(), PETSC_ERR_ARG_WRONG, "Linearization::take(): the body whose axes are asked for is not one of this scene");
+  if (of.id == -1) PetscFunctionReturn(0); /* the ground */
+  PetscCall(moved.take(*R, t, at));
+  if (of.id >= 0) {
+    PetscCall(moved.motion(of, &m));
+    spin      = m.angular_velocity;
+    spin_rate = m.angular_acceleration;
+    PetscFunctionReturn(0);
+  }
+  for (std::size_t b = 0; b < s.bodies.size(); b++) {
+    if (!s.bodies[b].flexible) continue;
+    PetscCall(moved.motion(Body{(PetscInt)b, s.number}, &m));
+    const double larger = std::max(spin.norm(), m.angular_velocity.norm());
+    if (spin.norm() > 0 && (m.angular_velocity - spin).norm() > alike * larger) one = false;
+    spin      = m.angular_velocity;
+    spin_rate = m.angular_acceleration;
+  }
+  if (one && spin.norm() > 0) PetscCall(PetscInfo(nullptr, "scene: small motions in axes that turn with the flexible bodies, %g rad/s about (%g, %g, %g)\n", spin.norm(), spin(0) / spin.norm(), spin(1) / spin.norm(), spin(2) / spin.norm()));
+  if (one) PetscFunctionReturn(0);
+  spin.setZero();
+  spin_rate.setZero();
+  PetscCall(PetscPrintf(comm(), "scene: flexible bodies turn with different angular velocities: in no axes do they stand still, and modes at speed are wrong\n"));
   PetscFunctionReturn(0);
 }
 
@@ -199,7 +281,7 @@ PetscErrorCode Linearization::Work::chooseUnits()
 Linearization::Linearization() : work_(std::make_unique<Work>()) {}
 Linearization::~Linearization() = default;
 
-PetscErrorCode Linearization::take(TS ts, PetscReal t)
+PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
 {
   Work     &w = *work_;
   PetscInt  steps;
@@ -225,18 +307,19 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t)
   w.size = SceneSize(w.R->scene);
   if (!(w.size > 0)) w.size = 1;
   PetscCall(RolesOf(*w.R, w.role));
+  PetscCall(w.chooseAxes(axes));
   PetscCall(w.differentiate());
   PetscCall(w.chooseUnits());
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Linearization::take(TS ts)
+PetscErrorCode Linearization::take(TS ts, Body axes)
 {
   PetscReal t;
   PetscFunctionBegin;
   PetscCall(ReadCheckpoint(ts));
   PetscCall(TSGetTime(ts, &t));
-  PetscCall(take(ts, t));
+  PetscCall(take(ts, t, axes));
   PetscFunctionReturn(0);
 }
 

@@ -290,6 +290,60 @@ TEST(Linearize, WhirlOfARotor)
     }
 }
 
+/* The same rotor as seen from itself: backward whirl is faster by the speed, forward whirl slower; what is along or about the axis is as it was */
+TEST(Linearize, WhirlInTheAxesOfTheRotor)
+{
+  const double It = 0.3, Ia = 0.5, Ib = 0.1, stiffness = 200, spin = 7;
+  Scene        scene(PETSC_COMM_SELF);
+  RigidBody    r     = body(4, {It, It, Ia});
+  r.angular_velocity = {0, 0, spin};
+  const Body   rotor = scene.add("rotor", r), bearing = scene.add("bearing", body(1, {Ib, Ib, Ib}));
+  const Marker j     = scene.marker(bearing);
+  scene.add("axle", Revolute{scene.marker(rotor), j});
+  scene.add("mount", Bushing{j, scene.marker(scene.ground()), Vector3(1e4, 1e4, 2e4), Vector3(stiffness, stiffness, 90)});
+  SceneRun          run(scene, 1, tolerance(1e-8));
+  Linearization     small;
+  std::vector<Mode> modes;
+  must(small.take(run.ts, rotor));
+  must(small.modes(&modes));
+  const auto          w = frequencies(modes);
+  const double        I = It + Ib, root = std::sqrt(Ia * Ia * spin * spin + 4 * I * stiffness), across = std::sqrt(1e4 / 5);
+  std::vector<double> expected = {(root - Ia * spin) / (2 * I) + spin, (root + Ia * spin) / (2 * I) - spin, std::sqrt(90 / Ib), across - spin, across + spin, std::sqrt(2e4 / 5)};
+  std::sort(expected.begin(), expected.end());
+  ASSERT_EQ(w.size(), expected.size());
+  for (std::size_t n = 0; n < w.size(); n++) EXPECT_NEAR(w[n], expected[n], 1e-6 * expected[n]);
+}
+
+/* A rod on a ball joint at a distance e from the axis of a hub that a motion drives: across the plane of rotation W sqrt(1 + 3 e/2 L), in it
+   W sqrt(3 e/2 L). In space axes nothing stands still. */
+TEST(Linearize, ARigidBladeOnADrivenHub)
+{
+  const double speed = 12, L = 2, e = 0.3, mass = 1.5;
+  for (const Vector3 &up : {Vector3(0, 0, 1), Vector3(0.6, 0, 0.8)}) {
+    Scene         scene(PETSC_COMM_SELF);
+    const Matrix3 A     = axesAlong(up);
+    RigidBody     h     = body(1, {1, 1, 1}), b = body(mass, {1e-4, mass * L * L / 12, mass * L * L / 12}, A * Vector3(e + L / 2, 0, 0));
+    h.angular_velocity  = b.angular_velocity = speed * up;
+    b.velocity          = speed * up.cross(b.position);
+    h.rotation          = b.rotation = A;
+    const Body   hub    = scene.add("hub", h), blade = scene.add("blade", b);
+    const Marker axis   = scene.marker(hub), ground = scene.marker(scene.ground(), {0, 0, 0}, A);
+    scene.add("bearing", Revolute{axis, ground});
+    scene.add("drive", RotationalMotion{axis, ground, TimeFunction::polynomial({0, speed})});
+    scene.add("hinge", Spherical{scene.marker(blade, {-L / 2, 0, 0}), scene.marker(hub, {e, 0, 0})});
+    SceneRun          run(scene, 1, tolerance(1e-8));
+    Linearization     small;
+    std::vector<Mode> modes;
+    must(run.solve());
+    must(small.take(run.ts, hub));
+    must(small.modes(&modes));
+    const auto w = frequencies(modes, 1e-2 * speed);
+    ASSERT_EQ(w.size(), 2u); /* a thin rod turns freely about its own axis */
+    EXPECT_NEAR(w[0], speed * std::sqrt(1.5 * e / L), 1e-5 * speed);
+    EXPECT_NEAR(w[1], speed * std::sqrt(1 + 1.5 * e / L), 2e-5 * speed); /* it is a little thick */
+  }
+}
+
 /* A disc that rolls straight on: I (I + m r^2) s^2 = I m g r - I_a (I_a + m r^2) rate^2 for its inclination, unstable below a speed */
 TEST(Linearize, RollingDisc)
 {

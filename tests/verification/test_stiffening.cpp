@@ -2,6 +2,7 @@
 #include "beam_bodies.h"
 #include "hhtdae/analyses.h"
 #include "hhtdae/flexible.h"
+#include "hhtdae/linearize.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
 #include "scene_watch.h"
@@ -176,4 +177,28 @@ TEST(Stiffening, SouthwellsFrequencies)
   MEASURED("%.4f rad/s, of a beam %.4f, without stiffening %.4f", with, exact, without);
   EXPECT_NEAR(with, exact, 5e-3 * exact);
   EXPECT_GT(std::abs(without - exact), 0.05 * exact);
+}
+
+/* As seen from the arm, which the linearization chooses by itself: in the plane of rotation the square of the frequency is that across less the speed's */
+TEST(Stiffening, SouthwellsFrequenciesOfALinearization)
+{
+  FeModel           model(PETSC_COMM_SELF);
+  Scene             scene(PETSC_COMM_SELF);
+  hhtex::BeamEnds   ends;
+  Linearization     small;
+  std::vector<Mode> modes;
+  must(ReadSolidBeam(hhtex::SpinningArm(), &model));
+  must(AddModalBeam(scene, model, 10, 1, 8, &ends, Tie::Average, true));
+  hhtex::SpinUp(scene, ends);
+  SceneRun run(scene, 40, tolerance(1e-7));
+  must(run.solve());
+  must(small.take(run.ts));
+  must(small.modes(&modes));
+  const double unit = std::sqrt(1.4e4 / 1.2) / 100, speed = hhtex::spin_speed, across = flapping(speed / unit) * unit, in_plane = std::sqrt(across * across - speed * speed);
+  std::vector<double> found;
+  for (const Mode &m : modes)
+    if (std::abs(m.value) > 1e-3 * speed) found.push_back(std::abs(m.value));
+  MEASURED("at %g rad/s in the plane %.5f, across %.5f; of a beam %.5f, %.5f", speed, found[0], found[1], in_plane, across);
+  EXPECT_NEAR(found[0], in_plane, 5e-3 * in_plane);
+  EXPECT_NEAR(found[1], across, 5e-3 * across);
 }

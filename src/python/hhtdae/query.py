@@ -174,14 +174,15 @@ class Excitation:
 class Linearization:
     """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
 
-    x are displacements and small rotations of bodies in space axes, and all other unknowns. M, C and K are those of this moment: modes are motions where the state
-    is at rest, or steady as seen from space, with M, C and K that do not change. An axisymmetric rotor at speed is, a swinging rod is not; nor is a mechanism
-    that is steady as seen from a frame that a motion turns: its eigenvalues are wrong, a bead in a turning hoop vibrates with another frequency.
+    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: modes are motions where the state is at rest,
+    or steady as seen from the axes that x is in. These are at this moment those of space and turn with the body `axes` (a driven hub for its blades); without one,
+    with the flexible bodies where all that turn do so alike; else, or where `axes` is `scene.ground`, they stand still: an axisymmetric rotor of rigid discs at
+    speed is steady as seen from space. A swinging rod is steady from nowhere. Modes in axes of a round rotor are those in space, faster or slower by its speed.
     """
 
-    def __init__(self, run, time=None):
+    def __init__(self, run, time=None, axes=None):
         self._core = _core.Linearization()
-        self._core.take(run._open(), None if time is None else number(time, "time"))
+        self._core.take(run._open(), None if time is None else number(time, "time"), axes)
 
     def modes(self, count=None, shift=1.):
         """Natural modes, a list of `Mode` by increasing abs(value): all by dense algebra, for scenes of up to 1000 unknowns; or the `count` slowest by

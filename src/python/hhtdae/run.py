@@ -379,10 +379,10 @@ class Run(Channels):
         """What the run is doing at a time of its last step, see `Snapshot`. Collective."""
         return Snapshot(self, time)
 
-    def linearize(self, time: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from space, see `Linearization`. Flexible bodies that are
-        free to turn, shafts in bearings, are not steady at speed: their modes turn with them. Collective."""
-        return Linearization(self, time)
+    def linearize(self, time: Any = None, axes: Any = None) -> Linearization:
+        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from the body `axes`, from flexible bodies or from
+        space: see `Linearization`. Collective."""
+        return Linearization(self, time, axes)
 
     # ---- the rest ----
 
