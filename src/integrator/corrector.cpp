@@ -69,9 +69,11 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
+  PetscBool   once;
 
   PetscFunctionBegin;
-  c.matrix.want = (PetscBool)c.matrix.due(EffectiveStep(I), c);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &once)); /* one solve, which has to be the step's own */
+  c.matrix.want = (PetscBool)(c.matrix.due(EffectiveStep(I), c) || (once && EffectiveStep(I) != c.matrix.h));
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
   if (c.from_rest) PetscCall(ChoosePrediction(ts));
   PetscCall(Iterate(ts, converged));

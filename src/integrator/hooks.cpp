@@ -72,6 +72,35 @@ PetscErrorCode ChecksCorrections(SNESLineSearch ls, PetscBool *checks)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char left_behind[] = "hhtdae: backtracking in place of no choice";
+
+/* A line search cannot be made typeless again: backtracking is what SNESSetType() would have chosen, marked as nobody's choice */
+PetscErrorCode LeaveBacktracking(SNESLineSearch ls)
+{
+  PetscContainer mark;
+
+  PetscFunctionBegin;
+  PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHBT));
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)ls), &mark));
+  PetscCall(PetscObjectCompose((PetscObject)ls, left_behind, (PetscObject)mark));
+  PetscCall(PetscContainerDestroy(&mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a type has been chosen: not so where backtracking is still what has been left behind */
+PetscErrorCode LineSearchChosen(SNESLineSearch ls, PetscBool *chosen)
+{
+  PetscObject mark;
+  PetscBool   bt;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)ls, left_behind, &mark));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHBT, &bt));
+  *chosen = (PetscBool)(((PetscObject)ls)->type_name && !(mark && bt));
+  PetscCall(PetscObjectCompose((PetscObject)ls, left_behind, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode RemoveLineSearch(TS ts, SNES snes)
 {
   SNESLineSearch ls;
@@ -82,8 +111,7 @@ PetscErrorCode RemoveLineSearch(TS ts, SNES snes)
   Get(ts).hooks.line_search = PETSC_FALSE;
   PetscCall(SNESGetLineSearch(snes, &ls));
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
-  /* a line search cannot be made typeless again: backtracking is what SNESSetType() would have chosen */
-  if (shell) PetscCall(SNESLineSearchSetType(ls, SNESLINESEARCHBT));
+  if (shell) PetscCall(LeaveBacktracking(ls));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,7 +169,7 @@ PetscErrorCode HooksLineSearch(TS ts)
   SNESLineSearch ls;
   SNESType       now;
   char           type[256];
-  PetscBool      newton, checks = PETSC_FALSE;
+  PetscBool      newton, chosen = PETSC_FALSE, checks = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
@@ -150,7 +178,9 @@ PetscErrorCode HooksLineSearch(TS ts)
   PetscCall(PetscOptionsGetString(((PetscObject)snes)->options, ((PetscObject)snes)->prefix, "-snes_type", type, sizeof(type), NULL));
   PetscCall(PetscStrcmp(type, SNESNEWTONLS, &newton));
   PetscCall(SNESGetLineSearch(snes, &ls));
-  if (!newton || ((PetscObject)ls)->type_name) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!newton) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LineSearchChosen(ls, &chosen));
+  if (chosen) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChecksCorrections(ls, &checks));
   PetscCall(SNESLineSearchSetType(ls, checks ? SNESLINESEARCHBASIC : SNESLINESEARCHSHELL));
   Get(ts).hooks.line_search = (PetscBool)!checks;

@@ -240,7 +240,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESNEWTONLS, &newton));
-  const bool shortened = newton ? !I.hooks.line_search && *reason == SNES_DIVERGED_LINE_SEARCH
+  const bool shortened = newton ? !I.hooks.line_search && (*reason == SNES_DIVERGED_LINE_SEARCH || (*reason == SNES_CONVERGED_SNORM_RELATIVE && !c.reason))
                                 : *reason == SNES_DIVERGED_TR_DELTA || *reason == SNES_DIVERGED_INNER || *reason == SNES_DIVERGED_DTOL;
   if (!shortened || !c.matrix.have || c.user_test) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: full steps after %s\n", SNESConvergedReasons[*reason]));
@@ -259,6 +259,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
     PetscCall(CountCorrection(ts, e, X, Y, F, &evaluated));
   }
   if (c.reason) *reason = c.reason;
+  PetscCall(SNESSetConvergedReason(ts->snes, *reason)); /* by which TSAdapt judges the step */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

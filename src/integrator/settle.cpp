@@ -5,10 +5,10 @@
   which nothing takes back where they have turned bodies that nothing damps.
 
   What the transient leaves of the velocities follows from the equations of motion, with constraints differentiated as for every start,
-  for q' = q'_0 + h q'' and q = q_0 + h q' in place of q'_0 and q_0, with h ten time constants: the implicit Euler method, which damps
-  what is faster than h. The run starts at the same time and place with these velocities. Where h is chosen by the error test, bodies move by
-  less than the tolerance in the course of such a transient: a slower one is resolved. That it was one shows in its accelerations, which are
-  gone; those of an oscillation would be as before.
+  for q' = q'_0 + h q'' and q = q_0 + h q' in place of q'_0 and q_0, with h ten and a hundred time constants: the implicit Euler method, which damps
+  what is faster than h. Slower motion has the same accelerations in both, and their difference tells the velocities that go. The run starts at the same time
+  and place without these, if the way that they would have gone is less than the tolerance: a transient that moves bodies farther is
+  resolved. That it was one shows in its accelerations, which are gone; those of an oscillation would be as before.
 */
 #include "entries.h"
 #include "estimate.h"
@@ -23,6 +23,7 @@ namespace
 
 constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
 constexpr PetscReal noticeable = 1e-6; /* part of the velocities, at rest of the tolerance: what is left of a transient grows with h in the first steps */
+constexpr PetscReal slower     = 10;   /* times that: the second step */
 constexpr PetscReal damped     = 0.5;  /* part of its accelerations that this step leaves of a transient: an eleventh. Of rounding it leaves all. */
 constexpr PetscReal against    = 0.5;  /* cosine of the angle between what accelerations are and what they lose */
 
@@ -53,27 +54,61 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A1: accelerations of the implicit step of length h from the start */
+PetscErrorCode ImplicitAccelerations(TS ts, PetscReal h, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, h, I.U0, I.V0, {false, Gamma::Near}, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The way of velocities that decay with a time constant, in tolerances of positions */
+PetscErrorCode WayOf(TS ts, Vec v, PetscReal tau, PetscReal *way)
+{
+  Integrator     &I   = Get(ts);
+  const PetscReal old = I.h;
+
+  PetscFunctionBegin;
+  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
+  PetscCall(CorrectionNorm(ts, v, way));
+  I.h = old;
+  *way *= tau / PetscAbsReal(I.p.k);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 /* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0 and an implicit
-   step of that kind damps its accelerations, V0 is what this step `leaves`, and the rest is to be made anew. Else all is as it was. */
+   step of that kind damps its accelerations, V0 is what the transient `leaves`, and the rest is to be made anew. Else all is as it was. */
 PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves)
 {
   Integrator &I = Get(ts);
-  PetscReal   before, after;
+  PetscReal   before, after, way;
+  WorkVec     gone;
 
   PetscFunctionBegin;
   *leaves = PETSC_FALSE;
   PetscCall(TimeConstant(ts, h, rate, tau));
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal euler = constants * *tau;
-  /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, {false, Gamma::Near}, leaves));
+  PetscCall(gone.like(I.V0));
+  PetscCall(ImplicitAccelerations(ts, euler, leaves));
   PetscCall(VecNorm(I.A0, NORM_2, &before));
   PetscCall(VecNorm(I.A1, NORM_2, &after));
   if (after >= damped * before) *leaves = PETSC_FALSE;
-  if (*leaves) PetscCall(VecAXPY(I.V0, euler, I.A1));
+  if (*leaves) {
+    PetscCall(VecCopy(I.A1, gone));
+    PetscCall(ImplicitAccelerations(ts, slower * euler, leaves));
+    PetscCall(VecAXPY(gone, -1, I.A1));
+    PetscCall(VecScale(gone, euler / (1 - 1 / slower)));
+    PetscCall(WayOf(ts, gone, *tau, &way));
+    if (!(way < 1)) *leaves = PETSC_FALSE;
+  }
+  if (*leaves) PetscCall(VecAXPY(I.V0, 1, gone));
   else PetscCall(VecCopy(I.X0, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

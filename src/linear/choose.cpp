@@ -64,6 +64,31 @@ static PetscErrorCode SetByProgram(PC pc, PetscBool *by_program)
   PetscFunctionReturn(0);
 }
 
+/* Whether the preconditioner that the user has chosen, if any, is a solver by itself */
+static PetscErrorCode IsSolver(KSP ksp, PC pc, PetscBool by_program, PetscBool *solver)
+{
+  PetscOptions options;
+  const char  *prefix, *const solvers[] = {PCLU, PCCHOLESKY, PCSVD, PCQR, PCREDUNDANT};
+  char         type[64] = "";
+  PetscBool    by_option, same;
+  PCType       set;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetOptions((PetscObject)ksp, &options));
+  PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
+  PetscCall(PetscOptionsGetString(options, prefix, "-pc_type", type, sizeof(type), &by_option));
+  if (!by_option && by_program) {
+    PetscCall(PCGetType(pc, &set));
+    PetscCall(PetscStrncpy(type, set, sizeof(type)));
+  }
+  *solver = type[0] ? PETSC_FALSE : PETSC_TRUE;
+  for (const char *name : solvers) {
+    PetscCall(PetscStrcmp(type, name, &same));
+    if (same) *solver = PETSC_TRUE;
+  }
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
 {
   PC        pc;
@@ -71,17 +96,17 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PCType    pc_type;
   PetscBool operators, triangle = PETSC_FALSE;
   Mat       P;
-  PetscBool pc_by_program = PETSC_FALSE, pc_by_option, package_by_program = PETSC_FALSE, package_by_option;
+  PetscBool pc_by_program = PETSC_FALSE, pc_by_option, package_by_program = PETSC_FALSE, package_by_option, solver = PETSC_TRUE;
 
   PetscFunctionBegin;
   *choice = LinearChoice();
   PetscCall(LinearTakeFactor(ksp, choice));
   PetscCall(KSPGetType(ksp, &ksp_type));
-  if (!ksp_type) PetscCall(KSPSetType(ksp, KSPPREONLY));
-
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetType(pc, &pc_type));
   PetscCall(SetByProgram(pc, &pc_by_program));
+  PetscCall(IsSolver(ksp, pc, pc_by_program, &solver));
+  if (!ksp_type) PetscCall(KSPSetType(ksp, solver ? KSPPREONLY : KSPGMRES)); /* GMRES is PETSc's own choice */
   PetscCall(LinearOptionGiven(ksp, "-pc_type", &pc_by_option));
   if (pc_by_program) PetscCall(PackageGiven(pc, &package_by_program));
   PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
