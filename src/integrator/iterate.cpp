@@ -240,7 +240,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESNEWTONLS, &newton));
-  const bool shortened = newton ? !I.hooks.line_search && (*reason == SNES_DIVERGED_LINE_SEARCH || (*reason == SNES_CONVERGED_SNORM_RELATIVE && !c.reason))
+  const bool shortened = newton ? !I.hooks.line_search && (*reason == SNES_DIVERGED_LINE_SEARCH || (*reason > 0 && !c.reason))
                                 : *reason == SNES_DIVERGED_TR_DELTA || *reason == SNES_DIVERGED_INNER || *reason == SNES_DIVERGED_DTOL;
   if (!shortened || !c.matrix.have || c.user_test) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: full steps after %s\n", SNESConvergedReasons[*reason]));

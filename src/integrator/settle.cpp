@@ -106,7 +106,7 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, Pet
     PetscCall(VecAXPY(gone, -1, I.A1));
     PetscCall(VecScale(gone, euler / (1 - 1 / slower)));
     PetscCall(WayOf(ts, gone, *tau, &way));
-    if (!(way < 1)) *leaves = PETSC_FALSE;
+    if (!I.fixed_h && !(way < 1)) *leaves = PETSC_FALSE; /* steps that are given resolve nothing */
   }
   if (*leaves) PetscCall(VecAXPY(I.V0, 1, gone));
   else PetscCall(VecCopy(I.X0, I.X));

@@ -135,6 +135,7 @@ TEST(Hooks, AnotherSetUpAfterReset)
   must(run.solve());
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
   EXPECT_EQ(run.statistics().restarts, 1);
+  EXPECT_EQ(lineSearchOf(snes), SNESLINESEARCHSHELL); /* backtracking in between was nobody's choice */
 }
 
 /* A SNES of the user's outlives the TS, with its own test in place */

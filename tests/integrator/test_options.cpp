@@ -306,6 +306,47 @@ TEST(Options, UsersLineSearchWins)
   }
 }
 
+/* Where nothing is left to be corrected PETSc's line searches and trust regions end as they like, without a test of convergence */
+TEST(Options, OtherSearchesAtEquilibrium)
+{
+  const Pendulum hanging(0., 0., 2.);
+  for (const char *type : {"-snes_linesearch_type bt", "-snes_linesearch_type cp", "-snes_linesearch_type l2", "-snes_type newtontr", "-snes_type ngmres -npc_snes_type newtonls"}) {
+    SCOPED_TRACE(type);
+    Simulation run(hanging, tolerance(1e-6) + type);
+    must(run.solve());
+    EXPECT_EQ(run.statistics().corrector_fails, 0);
+    EXPECT_NEAR(run.u()[0], 0, 1e-9);
+  }
+}
+
+/* PETSc's own Krylov method, in the place of a single product with what is no inverse */
+TEST(Options, APreconditionerHasAKrylovMethod)
+{
+  for (const auto &[type, method] : {std::make_pair("jacobi", KSPGMRES), std::make_pair("lu", KSPPREONLY), std::make_pair("svd", KSPPREONLY)}) {
+    const Chain p(3);
+    Simulation  run(p, tolerance(1e-5) + "-pc_type " + type);
+    SNES        snes;
+    KSP         ksp;
+    KSPType     in_use;
+    must(run.solve());
+    must(TSGetSNES(run.ts, &snes));
+    must(SNESGetKSP(snes, &ksp));
+    must(KSPGetType(ksp, &in_use));
+    EXPECT_STREQ(in_use, method) << type;
+  }
+}
+
+/* One solve a step needs the matrix of that step: q'' + 1e4 q = 1 on a coordinate that a slow one is free beside */
+TEST(Options, OneSolveOfALinearProblem)
+{
+  const Oscillators p({1., 100.}, {0., 0.}, false, 5.);
+  Simulation        one(p, tolerance(1e-6) + "-snes_type ksponly"), many(p, tolerance(1e-6));
+  must(one.solve());
+  must(many.solve());
+  EXPECT_LE(one.statistics().steps, 1.05 * many.statistics().steps);
+  EXPECT_LT(relativeDifference(one.u(), many.u()), 1e-4);
+}
+
 TEST(Options, SummaryLine)
 {
   const Pendulum p(-90., 0., .5);
