@@ -3,6 +3,9 @@
 #include "journal.h"
 #include "runtime.h"
 #include "start.h"
+#include "store.h"
+#include <limits>
+#include <typeinfo>
 
 namespace hhtdae
 {
@@ -44,6 +47,39 @@ PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
     b[k]->copyMemory(memory.data(), true);
   }
   PetscCall(KeepMemories(to));
+  PetscFunctionReturn(0);
+}
+
+/* The same in the description, by which assembly goes before there is a run: of elements whose parts are what they were */
+PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
+{
+  const auto                                   &before = from.scene.elements;
+  std::vector<double>                           x;
+  std::vector<int>                              found;
+  std::vector<std::pair<StoreBase *, PetscInt>> into;
+  PetscFunctionBegin;
+  for (std::size_t e = 0; e < std::min(before.size(), to.elements.size()); e++) {
+    const std::vector<Part> &a = before[e].parts, &b = to.elements[e].parts;
+    for (std::size_t k = 0; a.size() == b.size() && k < a.size(); k++) {
+      const std::size_t at = x.size();
+      const int         n  = b[k].store->memory();
+      if (!n || typeid(*a[k].store) != typeid(*b[k].store)) continue;
+      x.resize(at + n, 0.);
+      found.push_back(0);
+      for (const auto &batch : from.batches)
+        if (!found.back()) found.back() = batch->memoryOf(a[k].store, a[k].index, x.data() + at);
+      into.push_back({b[k].store, b[k].index});
+    }
+  }
+  /* the ranks that have an element have the same numbers of it */
+  if (from.size > 1) {
+    for (std::size_t i = 0, at = 0; i < into.size(); at += into[i++].first->memory())
+      if (!found[i]) std::fill_n(x.begin() + at, into[i].first->memory(), -std::numeric_limits<double>::infinity());
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x.data(), (PetscMPIInt)x.size(), MPI_DOUBLE, MPI_MAX, from.scene.comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found.data(), (PetscMPIInt)found.size(), MPI_INT, MPI_MAX, from.scene.comm));
+  }
+  for (std::size_t i = 0, at = 0; i < into.size(); at += into[i++].first->memory())
+    if (found[i]) into[i].first->remember(into[i].second, x.data() + at);
   PetscFunctionReturn(0);
 }
 
@@ -196,6 +232,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.continues    = true;
     M.begin        = t;
     M.number.owner = old->number.owner;
+    PetscCall(CarryTurns(*old, M.scene));
     PetscErrorCode failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);
     journal_->stale = true; /* this model is of this run alone; the next one from the start is described anew */

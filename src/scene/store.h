@@ -47,6 +47,8 @@ public:
   virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
   virtual bool          symmetric(PetscInt) const { return false; } /* its part of the matrix, where nothing else breaks that */
   virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
+  virtual int           memory() const { return 0; } /* numbers that an instance remembers of accepted steps */
+  virtual void          remember(PetscInt, double *) {} /* these in place of what the description tells */
   virtual int           inputs() const                    = 0;
   virtual ScalarRef     input(PetscInt e, int i) const    = 0;
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
@@ -88,6 +90,8 @@ public:
   PetscInt  marker(PetscInt e, int k) const override { return all[e].marker[k]; }
   PetscInt  element(PetscInt e) const override { return all[e].element; }
   bool      carried(PetscInt e) const override { return all[e].carried; }
+  int       memory() const override { return K::memory; }
+  void      remember(PetscInt e, double *x) override { CopyMemory<K>(all[e], x, true); }
   int       inputs() const override { return K::inputs; }
   ScalarRef input(PetscInt e, int i) const override { return all[e].input[i]; }
 

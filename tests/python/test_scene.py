@@ -416,6 +416,22 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(finals[0][0], finals[1][0], delta=1e-8)
         self.assertEqual(finals[0][1], finals[1][1])
 
+    def test_states_beside_motions_of_accelerations(self):
+        """Their speeds are states, too: what a rate is given is its own state, and none is described twice"""
+        for parameters in (False, True):
+            scene = h.Scene()
+            p = scene.parameter("p", 1.) if parameters else None
+            wheel = scene.rigid_body("wheel", mass=1)
+            i, j = wheel.marker(), scene.ground.marker()
+            scene.add("bearing", h.Revolute(i, j))
+            scene.add("drive", h.RotationalMotion(i, j, lambda t: 0 * t + 1, of="acceleration"))
+            scene.channel("x", h.value(scene.state("x", lambda x: -x, 1.)))
+            for value in (1., 2.) if parameters else (1.,):
+                if parameters:
+                    p.set(value)
+                run = scene.run(tolerance=1e-7, sample=.5).solve(1)
+                self.assertAlmostEqual(run["x"][-1], math.exp(-1), delta=1e-4)
+
     def test_channel_of_many_measures(self):
         """A channel needs no derivatives, and so may have more measures than there is room for derivatives"""
         scene = h.Scene()

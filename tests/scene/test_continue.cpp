@@ -203,6 +203,42 @@ TEST(Continue, NothingChanged)
   }
 }
 
+/* Where joints have turned by more than half a turn before a scene with parameters is described anew */
+TEST(Continue, TurnsOfGearsAndScrewsGoOn)
+{
+  for (Assembly assembly : {Assembly::Report, Assembly::Project}) {
+    Scene s(PETSC_COMM_SELF);
+    s.parameter("unused", 1);
+    s.start().assembly = assembly;
+    RigidBody a, b, n;
+    a.angular_velocity = {0, 0, 9};
+    b.position         = {1, 0, 0};
+    b.angular_velocity = {0, 0, -18};
+    n.position         = {0, 3, 0};
+    n.angular_velocity = {0, 0, 9};
+    n.velocity         = {0, 0, 9 * 0.2 / (2 * M_PI)};
+    const Body   first = s.add("first", a), second = s.add("second", b), nut = s.add("nut", n);
+    const Marker i1 = s.marker(first), j1 = s.marker(s.ground()), i2 = s.marker(second), j2 = s.marker(s.ground(), {1, 0, 0});
+    s.add("bearing", Revolute{i1, j1});
+    s.add("other bearing", Revolute{i2, j2});
+    s.add("gear", Gear{i1, j1, i2, j2, 0.5});
+    s.add("screw", Screw{s.marker(nut), s.marker(s.ground(), {0, 3, 0}), 0.2});
+    for (double until : {0.2, 0.63, 3.}) {
+      SceneRun half(s, until, tolerance(1e-8));
+      must(half.solve());
+      TS ts = goOn(s, half.ts, until + 1);
+      EXPECT_NEAR(of(ts, i1).angular_velocity(2), 9, 1e-6) << until;
+      EXPECT_NEAR(of(ts, i2).angular_velocity(2), -18, 1e-6) << until;
+      Snapshot now;
+      Motion   x;
+      must(now.take(ts));
+      must(now.motion(nut, &x));
+      EXPECT_NEAR(x.position(2), 9 * (until + 1) * 0.2 / (2 * M_PI), 1e-6) << until;
+      must(TSDestroy(&ts));
+    }
+  }
+}
+
 /* Nor does it change what a run from the start is, whether the run that goes on can be made or not */
 TEST(Continue, TheStartStaysTheStart)
 {

@@ -209,6 +209,7 @@ class Scene:
             described, converted = self._converted(what, name)
             given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
+            self._count_states(what)
             return self._enter(name, type(what), given)
         if not callable(what):
             raise TypeError("Scene.add(%r): %r is no body, joint, motion or force" % (name, what))
@@ -216,7 +217,12 @@ class Scene:
             first = what()
         if first is None:
             raise TypeError("Scene.add(%r): the function must return a body or an element at first, then its kind is known" % name)
+        self._count_states(first)
         return self._enter(name, type(first), self._later(lambda: self._fields_of(what(), type(first), name)))
+
+    def _count_states(self, what):
+        """A motion that is given by its acceleration has a state, its speed"""
+        self._states += getattr(what, "of", None) == "acceleration"
 
     def _fields_of(self, what, kind, name):
         if what is None and not issubclass(kind, (RigidBody, PointMass, FlexibleBody)):

@@ -36,8 +36,10 @@ void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec 
   if (s.of == MotionOf::Displacement) e.constrain<Displacement>({s.i, s.j}, d);
   if (s.of == MotionOf::Velocity) e.constrain<Velocity>({s.i, s.j}, d);
   if (s.of == MotionOf::Acceleration) {
-    const State w = scene.state(name.empty() ? "" : name + " speed", Rate(s.function), speed);
-    e.constrain<OfState>({s.i, s.j}, d, {ScalarRef{ScalarRef::State, w.id, 0}});
+    std::vector<ExpressionData> &states = DataOf(scene).states; /* Scene::state() would have it described twice where the scene is described anew */
+    const PetscInt               w      = (PetscInt)states.size();
+    states.push_back({name.empty() ? "state " + std::to_string(w) : name + " speed", Rate(s.function), speed});
+    e.constrain<OfState>({s.i, s.j}, d, {ScalarRef{ScalarRef::State, w, 0}});
   }
 }
 
