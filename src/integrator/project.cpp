@@ -245,6 +245,17 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same however short the run is; PETSC_MAX_REAL: nothing moves */
+PetscErrorCode TimeScaleOfVelocities(TS ts, Vec V, PetscReal *T)
+{
+  PetscReal rate;
+
+  PetscFunctionBegin;
+  PetscCall(MostOfItsSize(ts, V, &rate));
+  *T = rate > 0 ? 1 / rate : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A time in which accelerations alone move q by as much */
 PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
 {
