@@ -111,6 +111,9 @@ TEST(MotionEntries, BadFunctionsAreNamed)
   ExpectSays(p.errors(RotationalMotion{p.i, p.ground, root}), "derivatives inf");
   ExpectSays(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "inf at t = 0");
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root, MotionOf::Velocity}), "");
+  p.scene.start().time = 1; /* where it has begun before */
+  EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root}), "");
+  EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "");
 }
 
 TEST(MotionEntries, BadPairsAreNamed)

@@ -12,12 +12,12 @@ void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of)
 {
   e.require(f.error().empty(), "its function: " + f.error());
   if (!e.good()) return;
-  const TimeFunction::Value v = f(0);
-  e.require(std::isfinite(v.f), "its function is " + Text(v.f) + " at t = 0, must be finite");
+  const double              t    = e.scene().start.time;
+  const std::string         when = " at the start, t = " + Text(t) + (t == 0 ? " (another time is set before by Scene::start())" : "");
+  const TimeFunction::Value v    = f(t);
+  e.require(std::isfinite(v.f), "its function is " + Text(v.f) + when + ", must be finite");
   if (of == MotionOf::Displacement)
-    e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Text(v.f1) + " and " +
-                                                              Text(v.f2) +
-                                                              " at t = 0, a displacement needs them finite");
+    e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Text(v.f1) + " and " + Text(v.f2) + when + ", a displacement needs them finite");
 }
 
 /* f as the rate of a state */
