@@ -109,7 +109,7 @@ TEST(MotionEntries, BadFunctionsAreNamed)
   const TimeFunction pole =
       TimeFunction::formula([](const TimeFunction::Number &t) -> TimeFunction::Number { return 1.0 / t; });
   ExpectSays(p.errors(RotationalMotion{p.i, p.ground, root}), "derivatives inf");
-  ExpectSays(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "inf at t = 0");
+  ExpectSays(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "inf at the start, t = 0");
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root, MotionOf::Velocity}), "");
   p.scene.start().time = 1; /* where it has begun before */
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root}), "");

@@ -8,11 +8,11 @@ namespace hhtdae
 namespace
 {
 
-void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of)
+/* t: where the run starts */
+void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of, double t)
 {
   e.require(f.error().empty(), "its function: " + f.error());
   if (!e.good()) return;
-  const double              t    = e.scene().start.time;
   const std::string         when = " at the start, t = " + Text(t) + (t == 0 ? " (another time is set before by Scene::start())" : "");
   const TimeFunction::Value v    = f(t);
   e.require(std::isfinite(v.f), "its function is " + Text(v.f) + when + ", must be finite");
@@ -48,7 +48,7 @@ void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec 
 template <> Element Scene::enter(const std::string &name, const RotationalMotion &s)
 {
   ElementBuilder e(*this, name, "rotational motion", ElementData::Motion, s.i, s.j);
-  CheckFunction(e, s.function, s.of);
+  CheckFunction(e, s.function, s.of, start().time);
   if (e.good()) RequirePair(e, s.i, s.j, true);
   if (e.good()) {
     const double speed = AngleRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j));
@@ -61,7 +61,7 @@ template <> Element Scene::enter(const std::string &name, const TranslationalMot
 {
   ElementBuilder e(*this, name, "translational motion", ElementData::Motion, s.i, s.j);
   const int      axes = e.planar() ? 2 : 3;
-  CheckFunction(e, s.function, s.of);
+  CheckFunction(e, s.function, s.of, start().time);
   e.require(s.axis >= 0 && s.axis < axes,
             "axis is " + std::to_string(s.axis) +
                 (e.planar() ? ", must be 0 or 1 in a planar scene" : ", must be 0, 1 or 2"));
