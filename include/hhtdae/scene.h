@@ -192,7 +192,7 @@ public:
         ...
 
     All that was described is then described anew in the same order, so that what follows from it, lengths at the start for
-    example, is right. Runs that were made before keep what they had. A function of the state (of an Expression, say) that holds
+    example, is right. Markers of an element that may be missing are made outside of its function: others than at first are an error. Runs that were made before keep what they had. A function of the state (of an Expression, say) that holds
     a Parameter reads its present value at every evaluation: a controller may change it between steps; after a jump
     TSRestartStep() begins the integrator's history anew. A checkpoint is read with the values it was written with, or names the parameter.
   */

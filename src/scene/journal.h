@@ -11,6 +11,7 @@ namespace hhtdae
 
 struct Scene::Journal {
   std::vector<std::function<void(Scene &)>> calls;
+  std::vector<std::size_t>                  before; /* markers and bodies, attachments among them, at first before each call */
   std::map<std::string, Parameter>          parameters;
   std::vector<std::string>                  errors; /* of parameters themselves */
   bool                                      stale = false; /* a parameter has changed since the calls were made */

@@ -5,7 +5,18 @@
 namespace hhtdae
 {
 
-void Scene::record(std::function<void(Scene &)> call) { journal_->calls.push_back(std::move(call)); }
+namespace
+{
+
+std::size_t Handles(const SceneData &s) { return s.markers.size() + s.bodies.size(); }
+
+} // namespace
+
+void Scene::record(std::function<void(Scene &)> call)
+{
+  journal_->calls.push_back(std::move(call));
+  journal_->before.push_back(Handles(data()));
+}
 
 Parameter Scene::parameter(const std::string &name, double value)
 {
@@ -58,7 +69,14 @@ void Scene::describeAnew()
   for (ParameterData &p : s.parameters) p.described = *p.present;
   model_.swap(next);
   const Nested nested(*this);
-  for (const auto &call : journal_->calls) call(*this);
+  for (std::size_t k = 0; k < journal_->calls.size(); k++) {
+    const std::size_t first = s.elements.size(), errors = s.errors.size();
+    journal_->calls[k](*this);
+    if (k + 1 == journal_->calls.size() || Handles(s) == journal_->before[k + 1] || s.errors.size() > errors) continue;
+    s.errors.push_back((first < s.elements.size() ? s.elements.back().name : "what is described by a function") +
+                       ": its function makes other markers or attachments than at first, so that the handles of all later ones would stand for others; make them outside of it");
+    break;
+  }
   journal_->stale = false;
 }
 

@@ -162,6 +162,27 @@ TEST(Parameters, AnElementThatMayBeMissing)
   }
 }
 
+/* Handles are numbers: those of markers that come after one that is missing would stand for others */
+TEST(Parameters, MarkersOfAnElementThatMayBeMissing)
+{
+  Scene           s(PETSC_COMM_SELF);
+  const Parameter on = s.parameter("on", 1);
+  const Body      b  = s.add("bar", RigidBody{});
+  s.add("spring", [&s, on, b] { return on > 0 ? std::optional<SpringDamper>(SpringDamper{s.marker(b, {0.5, 0, 0}), s.marker(s.ground(), {0.5, 1, 0}), 100}) : std::nullopt; });
+  const Marker tip = s.marker(b, {1, 0, 0});
+  s.add("pull", SpringDamper{tip, s.marker(s.ground(), {1, 1, 0}), 1});
+  TS ts;
+  must(s.createTS(&ts));
+  must(TSDestroy(&ts));
+  must(s.set("on", 2)); /* there with another value: nothing changes */
+  must(s.createTS(&ts));
+  must(TSDestroy(&ts));
+  must(s.set("on", 0));
+  ErrorTrap trap;
+  EXPECT_NE(s.createTS(&ts), 0);
+  EXPECT_TRUE(trap.says("spring: its function makes other markers")) << trap.message;
+}
+
 /* A function of the state that holds a parameter reads it at every evaluation: a controller between steps */
 TEST(Parameters, AFunctionReadsThePresentValue)
 {

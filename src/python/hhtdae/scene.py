@@ -197,7 +197,7 @@ class Scene:
             For messages and results; an empty one becomes "body 7", "Revolute 3".
         what : RigidBody, PointMass, FlexibleBody, one of the elements, or a function without arguments that returns one
             A function is called again whenever parameters have changed. One of an element may return None: the element has its place, and nothing
-            acts. Numbers that are formulas of parameters need no function.
+            acts; its markers are made outside of it, as others are an error. Numbers that are formulas of parameters need no function.
 
         Returns
         -------
