@@ -382,6 +382,14 @@ TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
     EXPECT_LT(error, 0.01) << end;
   }
   EXPECT_LT(largest(0.5, 3), 0.3); /* of 38 */
+  for (double end : {1e-4, 1e-5}) { /* from rest: what has hardly begun to move */
+    const Pendulum p(60., 0., end);
+    Simulation     run(p, tolerance(1e-7));
+    Array          tension;
+    run.watch = [&](Simulation &r, PetscInt step, double) { if (step) tension.push_back(r.u()[2]); };
+    must(run.solve());
+    for (double x : tension) EXPECT_NEAR(x, tension[0], 0.01 * std::abs(tension[0])) << end;
+  }
 }
 
 /* A kick of a mass in oil: it goes m v/c in a thousandth of the step at hand, and an oscillator that has nothing to do with it goes on */
