@@ -216,12 +216,15 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   Integrator  &I = Get(ts);
   MatColoring  mc;
   ISColoring   colors;
-  PetscBool    triangle = PETSC_FALSE;
+  PetscBool    triangle = PETSC_FALSE, assembled = PETSC_TRUE;
 
   PetscFunctionBegin;
   if (*P) PetscCall(LinearStoresTriangle(*P, &triangle));
   PetscCheck(!triangle, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "A Jacobian from differences of the residual comes by columns, the matrix holds one triangle: use type %s, or give an I2Jacobian", MATAIJ);
+  if (*P) PetscCall(MatAssembled(*P, &assembled));
+  PetscCheck(assembled, PetscObjectComm((PetscObject)ts), PETSC_ERR_ORDER,
+             "The matrix for differences of the residual has never been assembled, so that its places are not known: put zeros where derivatives may be and assemble it, or use -snes_fd");
   Differences *d = new Differences;
   I.differences                = d;
   const TSHHT3Statistics saved = I.stat;

@@ -131,6 +131,36 @@ TEST(Differences, MatricesWithoutPlaces)
     }
 }
 
+TEST(Differences, AMatrixThatWasNeverAssembled)
+{
+  const Pendulum p(-30., 0., .1);
+  TS             source, ts;
+  SNES           snes;
+  Vec            U, V;
+  Mat            P;
+  TSI2Function   function;
+  void          *ctx;
+  must(ProblemCreateTS(PETSC_COMM_SELF, p, &source, &U, &V));
+  must(TSGetI2Function(source, nullptr, &function, &ctx));
+  must(MatCreateSeqAIJ(PETSC_COMM_SELF, 3, 3, 3, nullptr, &P));
+  must(MatSetUp(P));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, nullptr, function, ctx));
+  must(TS2SetSolution(ts, U, V));
+  must(TSGetSNES(ts, &snes));
+  must(SNESSetJacobian(snes, P, P, SNESComputeJacobianDefaultColor, nullptr));
+  {
+    ErrorTrap trap;
+    EXPECT_EQ(TSSetUp(ts), PETSC_ERR_ORDER);
+    EXPECT_TRUE(trap.says("never been assembled")) << trap.message;
+  }
+  must(TSDestroy(&ts));
+  must(TSDestroy(&source));
+  for (Vec *x : {&U, &V}) must(VecDestroy(x));
+  must(MatDestroy(&P));
+}
+
 /* The matrix D_r J D_c of the steps against PETSc's differences of the scaled residual. Where unknowns vanish PETSc's
    increments are too small for rounding, above all in the first step; the median does not see that. */
 TEST(Differences, SnesTestJacobian)
