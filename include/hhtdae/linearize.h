@@ -17,11 +17,11 @@
 
     the body that take() is given         a driven hub for its blades, the rotor for a shaft that is not round; modes in axes of a round rotor are
                                           those in space, faster or slower by its speed
-    flexible bodies                       without one, where all flexible bodies that turn do so alike: modal coordinates are in axes of the body
+    flexible bodies                       without one, where all of them turn alike: modal coordinates are in axes of the body
     nothing                               else, and where take() is given the ground: an axisymmetric rotor of rigid discs at speed is steady as
                                           seen from space
 
-  A swinging rod is steady from nowhere. Flexible bodies that turn with different angular velocities are not, either; a notice says so. Loads and
+  A swinging rod is steady from nowhere. Of flexible bodies that do not turn alike a notice says so. Loads and
   measures of space axes turn with the axes.
   All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */

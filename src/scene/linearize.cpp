@@ -185,39 +185,39 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
   PetscFunctionReturn(0);
 }
 
-/* Of the body that is asked for; else of flexible bodies, whose modal coordinates turn with them, where all that turn do it alike */
+/* Of the body that is asked for; else the mean of flexible bodies, whose modal coordinates turn with them, if all do so alike */
 PetscErrorCode Linearization::Work::chooseAxes(Body of)
 {
-  constexpr double alike = 1e-6; /* of the spin */
+  constexpr double alike = 1e-2, slow = 1e-4; /* of the fastest spin; of the slowest mode: a spin that is not seen in modes (SmallBodies.AxesOfSeveralBodies) */
   const SceneData &s     = R->scene;
   Vec              at[3] = {state[0], state[1], state[2]};
-  Motion           m;
-  bool             one = true;
+  double           fastest = 0, apart = 0, slowest = INFINITY;
+  std::vector<Motion> all;
   PetscFunctionBegin;
   spin.setZero();
   spin_rate.setZero();
   PetscCheck(of.id < 0 || s.valid(of), comm(), PETSC_ERR_ARG_WRONG, "Linearization::take(): the body whose axes are asked for is not one of this scene");
   if (of.id == -1) PetscFunctionReturn(0); /* the ground */
   PetscCall(moved.take(*R, t, at));
-  if (of.id >= 0) {
-    PetscCall(moved.motion(of, &m));
-    spin      = m.angular_velocity;
-    spin_rate = m.angular_acceleration;
-    PetscFunctionReturn(0);
-  }
   for (std::size_t b = 0; b < s.bodies.size(); b++) {
-    if (!s.bodies[b].flexible) continue;
-    PetscCall(moved.motion(Body{(PetscInt)b, s.number}, &m));
-    const double larger = std::max(spin.norm(), m.angular_velocity.norm());
-    if (spin.norm() > 0 && (m.angular_velocity - spin).norm() > alike * larger) one = false;
-    spin      = m.angular_velocity;
-    spin_rate = m.angular_acceleration;
+    if (of.id >= 0 ? (PetscInt)b != of.id : !s.bodies[b].flexible) continue;
+    all.emplace_back();
+    PetscCall(moved.motion(Body{(PetscInt)b, s.number}, &all.back()));
+    if (s.bodies[b].flexible && s.bodies[b].flexible->model->omega.size()) slowest = std::min(slowest, s.bodies[b].flexible->model->omega.minCoeff());
   }
-  if (one && spin.norm() > 0) PetscCall(PetscInfo(nullptr, "scene: small motions in axes that turn with the flexible bodies, %g rad/s about (%g, %g, %g)\n", spin.norm(), spin(0) / spin.norm(), spin(1) / spin.norm(), spin(2) / spin.norm()));
-  if (one) PetscFunctionReturn(0);
-  spin.setZero();
-  spin_rate.setZero();
-  PetscCall(PetscPrintf(comm(), "scene: flexible bodies turn with different angular velocities: in no axes do they stand still, and modes at speed are wrong\n"));
+  for (const Motion &m : all) {
+    fastest = std::max(fastest, m.angular_velocity.norm());
+    apart   = std::max(apart, (m.angular_velocity - all[0].angular_velocity).norm());
+  }
+  if (apart <= alike * fastest) {
+    for (const Motion &m : all) {
+      spin += m.angular_velocity / (double)all.size();
+      spin_rate += m.angular_acceleration / (double)all.size();
+    }
+    if (fastest > 0) PetscCall(PetscInfo(nullptr, "scene: small motions in axes that turn with (%g, %g, %g) rad/s\n", spin(0), spin(1), spin(2)));
+  } else if (fastest > slow * slowest) {
+    PetscCall(PetscPrintf(comm(), "scene: flexible bodies do not turn alike, and modes at speed are wrong in space axes: Linearization::take() can be given the body from which the motion is steady\n"));
+  }
   PetscFunctionReturn(0);
 }
 

@@ -216,6 +216,31 @@ TEST(SmallBodies, SlowestModesOfAStiffBodyOnASoftSpring)
   }
 }
 
+/* Axes turn with flexible bodies where all do so alike; else a notice, in whatever order they come, but of spins that no mode sees */
+TEST(SmallBodies, AxesOfSeveralBodies)
+{
+  const auto model = std::make_shared<ModalBody>(reduced(1, both(4)).modal);
+  const auto said  = [&](double first, double second) {
+    Scene   scene(PETSC_COMM_SELF);
+    Printed out;
+    for (double spin : {first, second}) {
+      FlexibleBody b;
+      b.model            = model;
+      b.angular_velocity = {0, 0, spin};
+      scene.add("", b);
+    }
+    const Taken t(scene);
+    return out.text().find("do not turn alike") != std::string::npos;
+  };
+  EXPECT_FALSE(said(0, 0));
+  EXPECT_FALSE(said(50, 50));
+  EXPECT_FALSE(said(50, 50.001));
+  EXPECT_FALSE(said(0, 1e-6));
+  EXPECT_TRUE(said(0, 50));
+  EXPECT_TRUE(said(50, 0));
+  EXPECT_TRUE(said(50, -50));
+}
+
 /* With options that lose all digits an error, no wrong modes */
 TEST(SmallBodies, SlowestModesAreChecked)
 {
