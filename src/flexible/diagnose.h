@@ -5,6 +5,7 @@
 #define HHTDAE_FLEXIBLE_DIAGNOSE_H
 
 #include "attachments.h"
+#include "scene/small_matrix.h"
 
 namespace hhtdae
 {

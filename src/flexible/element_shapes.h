@@ -16,6 +16,7 @@
 #define HHTDAE_FLEXIBLE_ELEMENT_SHAPES_H
 
 #include "hhtdae/flexible.h"
+#include "scene/small_matrix.h"
 #include <Eigen/Core>
 #include <array>
 

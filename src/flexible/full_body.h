@@ -8,6 +8,7 @@
 
 #include "hhtdae/flexible.h"
 #include "scene/extension.h"
+#include "scene/small_matrix.h"
 
 namespace hhtdae
 {

@@ -4,6 +4,7 @@
 
 #include "flexible/full_body.h"
 #include "scene/output/energy.h"
+#include "scene/small_matrix.h"
 
 namespace hhtdae
 {

@@ -10,6 +10,7 @@
 #define HHTDAE_FLEXIBLE_INVARIANTS_H
 
 #include "diagnose.h"
+#include "scene/small_matrix.h"
 
 namespace hhtdae
 {

@@ -4,6 +4,7 @@
 
 #include "diagnose.h"
 #include "modes.h"
+#include "scene/small_matrix.h"
 
 namespace hhtdae
 {

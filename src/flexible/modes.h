@@ -6,6 +6,7 @@
 #ifndef HHTDAE_FLEXIBLE_MODES_H
 #define HHTDAE_FLEXIBLE_MODES_H
 
+#include "scene/small_matrix.h"
 #include <Eigen/Core>
 #include <functional>
 #include <petscksp.h>

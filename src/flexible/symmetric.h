@@ -2,6 +2,7 @@
 #ifndef HHTDAE_FLEXIBLE_SYMMETRIC_H
 #define HHTDAE_FLEXIBLE_SYMMETRIC_H
 
+#include "scene/small_matrix.h"
 #include <Eigen/Core>
 
 namespace hhtdae

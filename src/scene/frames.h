@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_FRAMES_H
 
 #include "dual_vector.h"
+#include "small_matrix.h"
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
