@@ -70,6 +70,22 @@ static inline PetscReal HHT3NextStop(TS ts)
   return ts->max_time;
 }
 
+/* Points of a time span before the present time, whose solutions are not known to a run that begins or is resumed within it:
+   TSAdaptChoose() does not aim at them (Checkpoint.ResumesInATimeSpan) */
+static inline PetscErrorCode HHT3PassStops(TS ts)
+{
+  PetscFunctionBegin;
+#if PETSC_VERSION_LT(3, 23, 0)
+  if (!ts->tspan) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt &k = ts->tspan->spanctr; k < ts->tspan->num_span_times && ts->tspan->span_times[k] <= ts->ptime; k++)
+    if (ts->tspan->vecs_sol) PetscCall(VecSet(ts->tspan->vecs_sol[k], NAN));
+#else
+  if (!ts->eval_times) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt &k = ts->eval_times->time_point_idx; k < ts->eval_times->num_time_points && ts->eval_times->time_points[k] <= ts->ptime;) k++;
+#endif
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Since 3.21 TSRollBack() restores the solution from a copy made at the beginning of the step: it has to follow a change of
    coordinates of vec_sol within the step */
 static inline PetscErrorCode HHT3KeepForRollBack(TS ts)

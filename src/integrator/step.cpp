@@ -292,14 +292,34 @@ PetscErrorCode NoteState(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+namespace
+{
+
+/* Points that a resumed run has behind it, of a time span or ends of earlier runs, are where TSSolve() would go: its step is negative then. */
+PetscErrorCode PassStops(TS ts)
+{
+  const Integrator &I       = Get(ts);
+  const bool        resumed = I.have_step && I.stat.steps == I.checkpoint_steps;
+
+  PetscFunctionBegin;
+  PetscCall(HHT3PassStops(ts));
+  if (resumed && ts->time_step <= 0)
+    ts->time_step = ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP ? PetscMin(I.h_next, HHT3NextStop(ts) - ts->ptime) : I.h_next;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
 PetscErrorCode Step(TS ts)
 {
   Integrator &I          = Get(ts);
   PetscInt    rejections = 0;
   PetscBool   ok, tiny, accept = PETSC_TRUE;
-  PetscReal   next = ts->time_step;
+  PetscReal   next;
 
   PetscFunctionBegin;
+  PetscCall(PassStops(ts));
+  next = ts->time_step;
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
   if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));

@@ -238,6 +238,60 @@ TEST(Checkpoint, SaveAndLoad)
   EXPECT_EQ(second.v(), first.v());
 }
 
+/* Points of a time span that the run has behind it are not gone back for. */
+TEST(Checkpoint, ResumesInATimeSpan)
+{
+  const Pendulum p(-90., 0., 2.);
+  const File     file("span");
+  PetscReal      times[] = {0, 0.5, 1, 1.5, 2};
+  Simulation     first(p, tolerance(1e-6)), second(p, tolerance(1e-6));
+  for (Simulation *run : {&first, &second}) must(TSSetTimeSpan(run->ts, 5, times));
+  bool saved  = false;
+  first.watch = [&](Simulation &r, PetscInt, double t) {
+    if (t > 0.7 && !saved) must(TSHHT3CheckpointSave(r.ts, file.name.c_str()));
+    saved = t > 0.7;
+  };
+  must(first.solve());
+  must(TSHHT3CheckpointLoad(second.ts, file.name.c_str()));
+  must(second.solve());
+  EXPECT_EQ(second.t(), 2);
+  EXPECT_EQ(second.u(), first.u());
+  PetscInt n, m;
+  Vec     *x, *y;
+  must(TSGetTimeSpanSolutions(first.ts, &n, &x));
+  must(TSGetTimeSpanSolutions(second.ts, &m, &y));
+  ASSERT_EQ(n, 5);
+  ASSERT_EQ(m, 5);
+  for (int k = 2; k < 5; k++) {
+    PetscBool same;
+    must(VecEqual(x[k], y[k], &same));
+    EXPECT_TRUE(same) << k;
+  }
+}
+
+/* A program that calls TSSolve() for one stretch after another is asked for those again that the checkpoint has behind it */
+TEST(Checkpoint, ResumesInALoopOfSolves)
+{
+  const Pendulum p(-90., 0., 2.);
+  const File     file("loop");
+  Simulation     first(p, tolerance(1e-6)), second(p, tolerance(1e-6));
+  for (double end : {0.5, 1., 1.5, 2.}) {
+    must(TSSetMaxTime(first.ts, end));
+    must(first.solve());
+    if (end == 1) {
+      must(first.step());
+      must(TSHHT3CheckpointSave(first.ts, file.name.c_str()));
+    }
+  }
+  must(TSHHT3CheckpointLoad(second.ts, file.name.c_str()));
+  for (double end : {0.5, 1., 1.5, 2.}) {
+    must(TSSetMaxTime(second.ts, end));
+    must(second.solve());
+  }
+  EXPECT_EQ(second.t(), 2);
+  EXPECT_EQ(second.u(), first.u());
+}
+
 /* The file's own checksum (FNV-1a over all but its last eight bytes) made right again */
 static void seal(std::string &file)
 {
