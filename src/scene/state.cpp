@@ -76,10 +76,12 @@ PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
   PetscCallMPI(MPI_Allgatherv(mine.data(), n, MPI_DOUBLE, all.data(), count.data(), from.data(), MPI_DOUBLE, s.comm));
   for (std::size_t k = 0; k < all.size(); k += width) {
     BodyData &b = s.bodies[(std::size_t)all[k]];
-    b.r         = Eigen::Map<const Vector3>(&all[k + 1]);
     b.A         = Eigen::Map<const Matrix3>(&all[k + 4]);
-    b.v         = Eigen::Map<const Vector3>(&all[k + 13]);
     b.w         = Eigen::Map<const Vector3>(&all[k + 16]);
+    /* The description may have moved the centre of mass in the body: its origin stays where it is (Continue.AnotherCentreOfMass). */
+    const Vector3 moved = b.A * (b.center - R.scene.bodies[(std::size_t)all[k]].center);
+    b.r                 = Eigen::Map<const Vector3>(&all[k + 1]) + moved;
+    b.v                 = Eigen::Map<const Vector3>(&all[k + 13]) + b.w.cross(moved);
   }
   if (!sum.empty())
     PetscCallMPI(MPI_Allreduce(scalars.data(), sum.data(), (PetscMPIInt)sum.size(), MPI_DOUBLE, MPI_SUM, s.comm));

@@ -239,6 +239,40 @@ TEST(Continue, TurnsOfGearsAndScrewsGoOn)
   }
 }
 
+/* Load that shifts in a body: what has been seen of the body stays where it is and as fast as it is, and the body turns about its new centre of mass */
+TEST(Continue, AnotherCentreOfMass)
+{
+  Scene           s(PETSC_COMM_SELF);
+  const Parameter shift = s.parameter("shift", 0);
+  const Body      body  = s.add("body", [shift] {
+    RigidBody b;
+    b.position         = {1, 2, 3};
+    b.velocity         = {0.5, 0, 0};
+    b.angular_velocity = {0, 0, 2};
+    b.center           = {shift, 0, 0};
+    return b;
+  });
+  const Marker    at    = s.marker(body, {0.3, -0.2, 0});
+  SceneRun        half(s, 0.7, tolerance(1e-8));
+  must(half.solve());
+  const Motion before = of(half.ts, at);
+  must(s.set("shift", 0.4));
+  TS ts;
+  must(s.createTS(&ts, half.ts));
+  Motion after = of(ts, at);
+  EXPECT_LT((after.position - before.position).norm(), 1e-14);
+  EXPECT_LT((after.velocity - before.velocity).norm(), 1e-14);
+  must(TSDestroy(&ts));
+  ts = goOn(s, half.ts, 1.7);
+  /* about the centre, which goes on with the velocity that its place in the body had */
+  const double  angle = 2 * 0.7;
+  const Vector3 arm = 0.4 * Vector3(std::cos(angle), std::sin(angle), 0), centre = Vector3(1 + 0.5 * 0.7, 2, 3) + arm;
+  const Vector3 speed = Vector3(0.5, 0, 0) + Vector3(0, 0, 2).cross(arm);
+  const Vector3 from  = Eigen::AngleAxisd(2 * 1.7, Vector3::UnitZ()) * Vector3(0.3 - 0.4, -0.2, 0);
+  EXPECT_LT((of(ts, at).position - (centre + speed + from)).norm(), 1e-6);
+  must(TSDestroy(&ts));
+}
+
 /* Nor does it change what a run from the start is, whether the run that goes on can be made or not */
 TEST(Continue, TheStartStaysTheStart)
 {
