@@ -98,24 +98,54 @@ static std::vector<Planned> Sweep(AtvRuns runs)
   return plan;
 }
 
-/* Reference, reference at twice the step, and the sweep */
-static PetscErrorCode RunOthers(const AtvRuns &runs, bool sweep, AtvResults *results)
+/* What a process of its own does, and how this one takes over what it has found */
+struct Task {
+  std::function<bool(FILE *)> run, read;
+};
+
+static Task TaskOf(const Planned &planned, AtvRun *run)
+{
+  return {[=](FILE *file) { return !planned(run) && Write(*run, file); }, [=](FILE *file) { return Read(file, run) && !Done(*run); }};
+}
+
+static Task Conditioning(const AtvRuns &runs, AtvResults *results)
+{
+  std::vector<hhtstab::Conditions> *list = &results->condition;
+  return {[=, &runs](FILE *file) { return !runs.conditions(results->step, list) && WriteValues(*list, file); },
+          [=](FILE *file) {
+            if (!ReadValues(file, list)) return false;
+            for (size_t k = 0; k < list->size(); k++)
+              PetscCallAbort(PETSC_COMM_SELF, PetscPrintf(PETSC_COMM_SELF, "conditioning at h=%.0e: (a) %.1e, (b) %.1e, (c) %.1e\n", results->step[k],
+                                                          (*list)[k].a, (*list)[k].b, (*list)[k].c));
+            return true;
+          }};
+}
+
+static Task Motion(const AtvRuns &runs, const ReducedBody &body, const std::string &page)
+{
+  return {[=, &runs, &body](FILE *) { return !runs.page(body, page); },
+          [](FILE *) { return !PetscPrintf(PETSC_COMM_SELF, "the vehicle in motion\n"); }};
+}
+
+/* Reference, reference at twice the step, conditioning, the page in motion, and the sweep */
+static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, const std::string &page, bool sweep, AtvResults *results)
 {
   const auto reference = [&runs](const char *name, double step) -> Planned {
     return [=, &runs](AtvRun *run) { return runs.hht(name, 1e-8, step, LittleDamping, run, AtvRuns::Samples); };
   };
-  std::vector<Planned> plan = {reference("reference", 5e-5), reference("reference at twice the step", 1e-4)};
+  std::vector<Task> tasks = {TaskOf(reference("reference", 5e-5), &results->reference),
+                             TaskOf(reference("reference at twice the step", 1e-4), &results->check), Conditioning(runs, results)};
 
   PetscFunctionBegin;
-  if (sweep)
-    for (const Planned &p : Sweep(runs)) plan.push_back(p);
-  std::vector<AtvRun> all(plan.size());
+  if (!page.empty()) tasks.push_back(Motion(runs, body, page));
+  if (sweep) {
+    const std::vector<Planned> plan = Sweep(runs);
+    results->sweep.resize(plan.size());
+    for (size_t k = 0; k < plan.size(); k++) tasks.push_back(TaskOf(plan[k], &results->sweep[k]));
+  }
   PetscCall(SideBySide(
-      results->jobs, (int)plan.size(), [&](int k, FILE *file) { return !plan[k](&all[k]) && Write(all[k], file); },
-      [&](int k, FILE *file) { return Read(file, &all[k]) && !Done(all[k]); }));
-  results->reference = all[0];
-  results->check     = all[1];
-  results->sweep.assign(all.begin() + 2, all.end());
+      results->jobs, (int)tasks.size(), [&](int k, FILE *file) { return tasks[k].run(file); },
+      [&](int k, FILE *file) { return tasks[k].read(file); }));
   PetscFunctionReturn(0);
 }
 
@@ -147,13 +177,13 @@ static PetscErrorCode Run()
   runs.limit = limit;
   PetscCall(RunMain(runs, repeats, &results.main));
   results.jobs = (int)jobs;
-  PetscCall(RunOthers(runs, sweep, &results));
-
   results.step = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
-  PetscCall(runs.conditions(results.step, &results.condition));
-  for (size_t k = 0; k < results.step.size(); k++)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "conditioning at h=%.0e: (a) %.1e, (b) %.1e, (c) %.1e\n", results.step[k],
-                          results.condition[k].a, results.condition[k].b, results.condition[k].c));
+#if defined(HHTDAE_PAGE)
+  const std::string scene = std::string(out) + ".scene.html";
+#else
+  const std::string scene;
+#endif
+  PetscCall(RunOthers(runs, body, scene, sweep, &results));
 
   hhtex::Atv atv(PETSC_COMM_SELF, runs.model);
   atv.watchFrame();
@@ -162,13 +192,8 @@ static PetscErrorCode Run()
   PetscCall(stress.spots(results.reference, 10, &results.spots));
   results.found.resize(results.main.size());
   for (size_t i = 0; i < results.main.size(); i++) PetscCall(stress.spots(results.main[i], 10, &results.found[i]));
-  const std::string scene = std::string(out) + ".scene.html";
-#if defined(HHTDAE_PAGE)
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "the vehicle in motion\n"));
-  PetscCall(runs.page(body, scene));
-#endif
   PetscCall(AtvPage(results, atv, body, stress, scene).write(out));
-  std::remove(scene.c_str());
+  if (!scene.empty()) std::remove(scene.c_str());
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "page: %s\n", out));
   PetscFunctionReturn(0);
 }
