@@ -195,8 +195,12 @@ public:
   PetscErrorCode highest(PetscInt count, double distance, std::vector<HotSpot> *spots) const;
 
 private:
-  const ReducedBody  &body_;
-  std::vector<double> stress_, time_;
+  void follow() const; /* states that wait: several at a time are faster */
+
+  const ReducedBody          &body_;
+  mutable std::vector<double> stress_, time_, when_;
+  mutable Eigen::MatrixXd     state_; /* modal coordinates at the times when_ */
+  mutable Eigen::Index        waiting_ = 0;
 };
 
 /* Displacement and, where there are stress modes, stress at modal coordinates eta: a .vtu file for ParaView, in the axes of the FE

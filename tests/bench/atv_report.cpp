@@ -5,6 +5,7 @@ static char help[] =
     "  -frame <frame.h5>: the reduced frame, by atv_frame\n"
     "  -o <atv.html>: the page\n"
     "  -end <2>: s, a multiple of 0.02;  -repeats <3>: of the timed runs;  -sweep <true>: error against run time too\n"
+    "  -fine <false>: runs of the sweep that take IDA 6 to 10 s each, too\n"
     "  -limit <120>: CPU seconds after which a run of IDA counts as failed\n"
     "  -jobs <1>: of the reference's and the sweep's runs at a time; the timed ones run alone\n";
 
@@ -64,35 +65,41 @@ constexpr int sweep_samples = 5; /* errors at every fifth time of the reference:
 
 using Planned = std::function<PetscErrorCode(AtvRun *)>;
 
-static std::vector<Planned> Sweep(AtvRuns runs)
+static std::vector<Planned> Sweep(AtvRuns runs, bool fine)
 {
   struct Method {
     const char                            *name;
     std::function<PetscErrorCode(TS)>      configure;
-    std::vector<std::pair<double, double>> grid; /* tolerance, largest step */
+    std::vector<std::pair<double, double>> grid;      /* tolerance, largest step */
+    std::vector<std::pair<double, double>> fine = {}; /* of the fine sweep alone */
+  };
+  const auto gridOf = [fine](const auto &m) {
+    auto all = m.grid;
+    if (fine) all.insert(all.end(), m.fine.begin(), m.fine.end());
+    return all;
   };
   const Method methods[] = {
       {"hhtdae", nullptr, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
       {"hhtdae, paper's form", Paper, {{1e-4, 0}, {1e-5, 0}, {1e-6, 0}, {1e-7, 0}, {1e-8, 0}}},
-      {"hhtdae, steps limited", nullptr, {{1e-5, 2e-3}, {1e-5, 1e-3}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}}};
+      {"hhtdae, steps limited", nullptr, {{1e-5, 2e-3}, {1e-5, 1e-3}, {1e-5, 5e-4}, {1e-5, 2e-4}}, {{1e-6, 1e-4}}}};
   std::vector<Planned> plan;
 
   runs.dt *= sweep_samples;
   for (const Method &m : methods)
-    for (const auto &[eps, step] : m.grid)
+    for (const auto &[eps, step] : gridOf(m))
       plan.push_back([=, e = eps, h = step](AtvRun *run) { return runs.hht(m.name, e, h, m.configure, run); });
 #if defined(HHTDAE_HAVE_IDA)
   struct Foreign {
     const char                            *name;
     Form                                   form;
-    std::vector<std::pair<double, double>> grid;
+    std::vector<std::pair<double, double>> grid, fine;
   };
   const Foreign foreign[] = {
-      {"IDA, index 3", Form::Index3, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}, {1e-6, 0}}},
-      {"IDA, index 3, steps limited", Form::Index3, {{1e-4, 5e-4}, {1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}},
-      {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}}}};
+      {"IDA, index 3", Form::Index3, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}, {1e-6, 0}}, {}},
+      {"IDA, index 3, steps limited", Form::Index3, {{1e-4, 5e-4}, {1e-5, 5e-4}}, {{1e-5, 2e-4}, {1e-6, 1e-4}}},
+      {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}, {1e-4, 0}}, {{1e-5, 0}}}};
   for (const Foreign &m : foreign)
-    for (const auto &[eps, step] : m.grid)
+    for (const auto &[eps, step] : gridOf(m))
       plan.push_back([=, e = eps, h = step](AtvRun *run) { return runs.ida(m.name, e, h, m.form, run); });
 #endif
   return plan;
@@ -127,8 +134,16 @@ static Task Motion(const AtvRuns &runs, const ReducedBody &body, const std::stri
           [](FILE *) { return !PetscPrintf(PETSC_COMM_SELF, "the vehicle in motion\n"); }};
 }
 
-/* Reference, reference at twice the step, conditioning, the page in motion, and the sweep */
-static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, const std::string &page, bool sweep, AtvResults *results)
+constexpr PetscInt hot_spots = 10;
+
+static Task Spots(const AtvStress &stress, const AtvRun &run, std::vector<HotSpot> *spots)
+{
+  return {[=, &stress, &run](FILE *file) { return !stress.spots(run, hot_spots, spots) && WriteValues(*spots, file); },
+          [=](FILE *file) { return ReadValues(file, spots); }};
+}
+
+/* Reference, reference at twice the step, conditioning, the page in motion, hot spots of the timed runs, and the sweep */
+static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, const AtvStress &stress, const std::string &page, bool sweep, bool fine, AtvResults *results)
 {
   const auto reference = [&runs](const char *name, double step) -> Planned {
     return [=, &runs](AtvRun *run) { return runs.hht(name, 1e-8, step, LittleDamping, run, AtvRuns::Samples); };
@@ -138,8 +153,10 @@ static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, co
 
   PetscFunctionBegin;
   if (!page.empty()) tasks.push_back(Motion(runs, body, page));
+  results->found.resize(results->main.size());
+  for (size_t i = 0; i < results->main.size(); i++) tasks.push_back(Spots(stress, results->main[i], &results->found[i]));
   if (sweep) {
-    const std::vector<Planned> plan = Sweep(runs);
+    const std::vector<Planned> plan = Sweep(runs, fine);
     results->sweep.resize(plan.size());
     for (size_t k = 0; k < plan.size(); k++) tasks.push_back(TaskOf(plan[k], &results->sweep[k]));
   }
@@ -156,7 +173,7 @@ static PetscErrorCode Run()
   AtvResults  results;
   ReducedBody body;
   PetscInt    repeats = 3, jobs = 1;
-  PetscBool   sweep   = PETSC_TRUE;
+  PetscBool   sweep = PETSC_TRUE, fine = PETSC_FALSE;
   PetscReal   end = 2, limit = 120;
 
   PetscFunctionBeginUser;
@@ -167,6 +184,7 @@ static PetscErrorCode Run()
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-repeats", &repeats, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-jobs", &jobs, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
+  PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-fine", &fine, nullptr));
   const double intervals = end / (sweep_samples * runs.dt); /* of the sweep's samples, which are some of the reference's */
   PetscCheck(end > 0 && repeats > 0 && jobs > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end, -repeats and -jobs must be positive");
   PetscCheck(std::fabs(intervals - std::round(intervals)) < 1e-9, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end is %g s and must be a multiple of %g s",
@@ -178,20 +196,18 @@ static PetscErrorCode Run()
   PetscCall(RunMain(runs, repeats, &results.main));
   results.jobs = (int)jobs;
   results.step = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  hhtex::Atv atv(PETSC_COMM_SELF, runs.model);
+  atv.watchFrame();
+  PetscCall(atv.scene.setUp());
+  const AtvStress stress(body, atv);
 #if defined(HHTDAE_PAGE)
   const std::string scene = std::string(out) + ".scene.html";
 #else
   const std::string scene;
 #endif
-  PetscCall(RunOthers(runs, body, scene, sweep, &results));
+  PetscCall(RunOthers(runs, body, stress, scene, sweep, fine, &results));
 
-  hhtex::Atv atv(PETSC_COMM_SELF, runs.model);
-  atv.watchFrame();
-  PetscCall(atv.scene.setUp());
-  const AtvStress stress(body, atv);
-  PetscCall(stress.spots(results.reference, 10, &results.spots));
-  results.found.resize(results.main.size());
-  for (size_t i = 0; i < results.main.size(); i++) PetscCall(stress.spots(results.main[i], 10, &results.found[i]));
+  PetscCall(stress.spots(results.reference, hot_spots, &results.spots));
   PetscCall(AtvPage(results, atv, body, stress, scene).write(out));
   if (!scene.empty()) std::remove(scene.c_str());
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "page: %s\n", out));
