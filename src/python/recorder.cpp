@@ -48,7 +48,7 @@ PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
   resumed_ = false;
   if (times_.empty()) {
     PetscCall(add(ts, begin));
-    if (dt_ > 0) next_ = (PetscInt)std::floor(begin / dt_ * (1 + 1e-12)) + 1;
+    if (dt_ > 0) next_ = (PetscInt)std::floor((begin + 1e-12 * std::abs(begin)) / dt_) + 1;
   }
   if (dt_ <= 0) {
     if (t > times_.back()) PetscCall(add(ts, t));

@@ -196,6 +196,16 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(run.sample()["angle"], run["angle"][-1])
         self.assertEqual(len(scene.solve(0.1, sample=None).times), 0)
 
+    def test_samples_from_another_time(self):
+        """Samples are the start and whole multiples of their distance behind it, before zero too"""
+        for begin in (-1., -0.05, 0.3):
+            scene, rod, pin = pendulum()
+            scene.channel("angle", h.angle(rod.marker(), scene.ground.marker()), "rad")
+            scene.start(time=begin)
+            first = math.floor(begin / 0.1 + 1e-9) + 1
+            wanted = [begin] + [k / 10 for k in range(first, round(10 * begin + 5) + 1) if k / 10 <= begin + 0.5 + 1e-9]
+            np.testing.assert_allclose(scene.solve(begin + 0.5, sample=0.1).times, wanted, atol=1e-12)
+
     def test_parts_and_copies(self):
         """A run in parts, one that goes on from another, a checkpoint"""
         scene, rod, pin = pendulum()
