@@ -123,17 +123,19 @@ PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<Ho
   std::string            error;
   PetscInt64             total = 0, mine = (PetscInt64)n;
   PetscFunctionBegin;
-  follow();
   PetscCallMPI(MPI_Comm_size(body_.comm, &size));
   PetscCallMPI(MPI_Allreduce(&mine, &total, 1, MPIU_INT64, MPI_SUM, body_.comm));
   if (!total)
     error = "body " + body_.modal.name + " has no stress modes: there are no hot spots without AddStressModes()";
+  else if (n != body_.stress.node.size() || (waiting_ && state_.rows() != body_.stress.values.cols()))
+    error = "stress modes of body " + body_.modal.name + " were changed after its hot spots were begun";
   else if (!(distance >= 0))
     error = "a distance of hot spots is a number from 0 up";
   else if (n &&
            (body_.coordinates.size() != 3 * (std::size_t)body_.own || body_.label.size() != (std::size_t)body_.own))
     error = "body " + body_.modal.name + " has no coordinates of its nodes";
   PetscCall(Agree(body_.comm, error, PETSC_ERR_ARG_WRONG));
+  follow();
   for (std::size_t i = 0; i < n; i++) {
     const PetscInt node = body_.stress.node[i];
     const double  *x    = &body_.coordinates[3 * (std::size_t)node];

@@ -346,6 +346,7 @@ PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
   Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones, before `TSSetUp()` not yet: the set-up reads the file,
   until then `TSGetTime()` and `TS2GetSolution()` give what was there before. Queries of scenes set up. A file of another
   problem, method, version or number of ranks is refused. Other tolerances and other options of the solvers are taken, and reported.
+  Points of `TSSetTimeSpan()` behind the checkpoint are not gone back for: `TSGetTimeSpanSolutions()` gives vectors of NaN there.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`
 @*/

@@ -70,8 +70,8 @@ static inline PetscReal HHT3NextStop(TS ts)
   return ts->max_time;
 }
 
-/* Points of a time span before the present time, whose solutions are not known to a run that begins or is resumed within it:
-   TSAdaptChoose() does not aim at them (Checkpoint.ResumesInATimeSpan) */
+/* Points of a time span that a resumed run has behind it, so that TSAdaptChoose() does not aim at them. Their solutions are not known to it: not a number
+   (Checkpoint.ResumesInATimeSpan) */
 static inline PetscErrorCode HHT3PassStops(TS ts)
 {
   PetscFunctionBegin;

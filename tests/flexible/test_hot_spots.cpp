@@ -118,6 +118,34 @@ TEST(HotSpots, AgainstTheHistory)
   for (char t : taken) EXPECT_TRUE(t); /* all were asked for */
 }
 
+/* More nodes and states than are looked at together, against Eigen's product and the norm of the deviator */
+TEST(HotSpots, AgainstEigensProduct)
+{
+  HandMade             made(PETSC_COMM_SELF, 150, 5);
+  const ReducedBody   &body = made.body;
+  HotSpots             hot(body);
+  std::vector<HotSpot> spots;
+  std::vector<double>  stress;
+  const std::size_t    n = body.stress.node.size();
+  ASSERT_GT(n, 130u);
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero((Eigen::Index)n);
+  for (int step = 0; step < 21; step++) {
+    const Eigen::VectorXd eta = Numbers(5, 1, 300 + step), s = body.stress.values * eta;
+    must(hot.add(step, eta));
+    must(VonMises(body, eta, &stress));
+    for (Eigen::Index i = 0; i < (Eigen::Index)n; i++) {
+      const Eigen::Array3d direct = s.segment<3>(6 * i).array() - s.segment<3>(6 * i).mean(), shear = s.segment<3>(6 * i + 3);
+      const double         mises = std::sqrt(1.5 * (direct.square().sum() + 2 * shear.square().sum()));
+      EXPECT_NEAR(stress[(std::size_t)i], mises, 1e-12 * (1 + mises));
+      largest[i] = std::max(largest[i], mises);
+    }
+  }
+  must(hot.highest((PetscInt)n, 0, &spots));
+  ASSERT_EQ(spots.size(), n);
+  std::sort(largest.data(), largest.data() + n, std::greater<double>());
+  for (std::size_t k = 0; k < n; k++) EXPECT_NEAR(spots[k].stress, largest[(Eigen::Index)k], 1e-12 * (1 + largest[0])) << k;
+}
+
 TEST(HotSpots, TiesByLabelFirstTimeAndNothingYet)
 {
   HandMade             made(PETSC_COMM_SELF, 6, 1);
@@ -141,7 +169,10 @@ TEST(HotSpots, TiesByLabelFirstTimeAndNothingYet)
   }
   ErrorTrap trap;
   EXPECT_NE(hot.highest(3, -1, &spots), 0);
+  must(hot.add(4, Eigen::VectorXd::Constant(1, 5)));
   made.body.stress = StressModes();
+  EXPECT_NE(hot.highest(3, 1, &spots), 0); /* of a state that waits, and of stress modes that have gone */
+  EXPECT_TRUE(trap.says("changed")) << trap.message;
   HotSpots none(made.body);
   EXPECT_NE(none.highest(3, 1, &spots), 0);
   EXPECT_TRUE(trap.says("AddStressModes")) << trap.message;

@@ -262,6 +262,11 @@ TEST(Checkpoint, ResumesInATimeSpan)
   must(TSGetTimeSpanSolutions(second.ts, &m, &y));
   ASSERT_EQ(n, 5);
   ASSERT_EQ(m, 5);
+  for (int k = 0; k < 2; k++) { /* behind the checkpoint */
+    PetscReal norm;
+    must(VecNorm(y[k], NORM_2, &norm));
+    EXPECT_TRUE(std::isnan(norm)) << k;
+  }
   for (int k = 2; k < 5; k++) {
     PetscBool same;
     must(VecEqual(x[k], y[k], &same));
