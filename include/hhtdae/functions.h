@@ -63,7 +63,7 @@ struct Measure {
     Displacement,        /* of marker i from marker j (default: the space origin), component in frame */
     Distance,            /* |x_i - x_j| */
     Velocity,            /* of i relative to j (time derivative taken in space), component in frame */
-    Rate,                /* d Distance / dt */
+    Rate,                /* d Distance / dt; 0 where the markers coincide, which has no derivative there */
     Acceleration,        /* of i relative to j, component in frame */
     Angle,               /* of i's x axis about j's z axis, from j's x axis; in (-pi, pi] at the start, counted over full turns from there */
     AngularVelocity,     /* of i relative to j, component in frame */

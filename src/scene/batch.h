@@ -59,8 +59,8 @@ public:
   virtual void     copyMemory(double *, bool in) { (void)in; }
   /* out of one instance, by its number in the store that described it; false if it is not here */
   virtual bool memoryOf(const StoreBase *, PetscInt, double *) const { return false; }
-  /* The angle of a marker about the z axis of another, by their numbers in the scene, near time t, if an instance here counts its turns */
-  virtual bool countedAngle(PetscInt, PetscInt, double, double *) const { return false; }
+  /* The angle of a marker about the z axis of another, by their numbers in the scene, if an instance here counts its turns */
+  virtual bool countedAngle(PetscInt, PetscInt, double *) const { return false; }
 
 protected:
   std::vector<PetscInt> request_; /* numbers of the blocks, in the order of assembly */
@@ -155,21 +155,17 @@ struct InstancesOf {
 };
 
 /* Batch::countedAngle() of a kernel's instances */
-template <class K, class Instances> bool AngleOf(const Instances &all, const InstancesOf &of, PetscInt i, PetscInt j, double t, double *x)
+template <class K, class Instances> bool AngleOf(const Instances &all, const InstancesOf &of, PetscInt i, PetscInt j, double *x)
 {
   for (std::size_t n = 0; n < of.number.size(); n++)
-    if constexpr (K::says_angle) {
-      if (!of.joins(n, 0, i, j)) continue;
-      *x = K::angleAt(all[n].data, t);
-      return true;
-    } else if constexpr (K::angles > 0) {
+    if constexpr (K::angles > 0) {
       for (int k = 0; k < K::angles; k++) {
         if (!of.joins(n, k, i, j)) continue;
         *x = all[n].data.memory[k];
         return true;
       }
     }
-  (void)all, (void)i, (void)j, (void)t, (void)x;
+  (void)all, (void)i, (void)j, (void)x;
   return false;
 }
 

@@ -108,7 +108,7 @@ public:
   {
     for (Instance &e : all) x = CopyMemory<K>(e, x, in);
   }
-  bool     countedAngle(PetscInt i, PetscInt j, double t, double *x) const override { return AngleOf<K>(all, of, i, j, t, x); }
+  bool countedAngle(PetscInt i, PetscInt j, double *x) const override { return AngleOf<K>(all, of, i, j, x); }
 
   static constexpr bool curvedAtAll()
   {
@@ -118,7 +118,7 @@ public:
     return false;
   }
   Bodies     *bodies = nullptr;
-  InstancesOf of; /* where K::memory > 0 or K::says_angle */
+  InstancesOf of; /* where K::memory > 0 */
 
   /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
   static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)

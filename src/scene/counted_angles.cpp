@@ -64,6 +64,20 @@ double StartOf(const SceneData &s, PetscInt marker)
   return b < 0 || s.bodies[b].point ? 0 : std::atan2(s.bodies[b].A(1, 0), s.bodies[b].A(0, 0));
 }
 
+/* By what a motion has turned the angle since the start, if there is one that drives it */
+bool TurnOfMotion(const SceneData &s, double t, PetscInt i, PetscInt j, double *turn)
+{
+  double from, to;
+  for (const StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++) {
+      if (!store->drivenAngle(e, s.start.time, &from) || store->marker(e, 0) != i || store->marker(e, 1) != j) continue;
+      store->drivenAngle(e, t, &to);
+      *turn = to - from;
+      return true;
+    }
+  return false;
+}
+
 } // namespace
 
 /* In (-pi, pi] as the bodies are described; from there assembly and equilibrium have turned them by less than half a turn */
@@ -90,7 +104,7 @@ PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<Counte
 PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first)
 {
   const SceneData          &s    = R.scene;
-  double                    most = PETSC_NINFINITY, x;
+  double                    most = PETSC_NINFINITY, x, turn;
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
   if (s.planar) {
@@ -98,12 +112,32 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
     now[0].turned = StartOf(s, i) - StartOf(s, j);
   } else {
     for (const auto &b : R.batches)
-      if (b->countedAngle(i, j, t, &x)) most = std::max(most, x);
+      if (b->countedAngle(i, j, &x)) most = std::max(most, x);
     if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
     if (most > PETSC_NINFINITY) now[0].angle = most;
+    else if (TurnOfMotion(s, t, i, j, &turn)) now[0].angle = StartAngle(*R.model, Marker{i}, Marker{j}) + turn;
   }
   PetscCall(CountAngles(R, u, now));
   *first = now[0];
+  PetscFunctionReturn(0);
+}
+
+/* Planar bodies, which are described again with an angle in (-pi, pi] */
+static PetscErrorCode CarryPlanarAngles(const Runtime &from, Vec U, const Runtime &to, Vec X)
+{
+  const double *u;
+  double       *x;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArray(X, &x));
+  for (PetscInt b = 0; b < to.bodies.own; b++) {
+    const LocalBody &body = to.bodies.body[b];
+    if (body.kind != BodyKind::Planar) continue;
+    double &angle = x[body.first + 2];
+    angle         = Unwind<double>(angle, u[from.bodies.body[from.local_body[body.id]].first + 2]);
+  }
+  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(VecRestoreArrayRead(U, &u));
   PetscFunctionReturn(0);
 }
 
@@ -113,6 +147,7 @@ PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec 
   std::vector<Axes> axes;
   PetscFunctionBegin;
   to.asked = from.asked;
+  if (to.scene.planar) PetscCall(CarryPlanarAngles(from, U, to, X));
   PetscCall(MoveBodies(from, U, V));
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(CountAngles(from, u, to.asked));

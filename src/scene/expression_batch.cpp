@@ -92,7 +92,7 @@ void ExpressionBatch::accept(Bodies &B)
   for (Row &r : all_) r.f.arguments.accept(B);
 }
 
-bool ExpressionBatch::countedAngle(PetscInt i, PetscInt j, double, double *x) const
+bool ExpressionBatch::countedAngle(PetscInt i, PetscInt j, double *x) const
 {
   return std::any_of(all_.begin(), all_.end(), [&](const Row &r) { return r.f.arguments.countedAngle(i, j, x); });
 }

@@ -53,7 +53,7 @@ public:
   void     residual(Evaluation &e) override;
   void     jacobian(Evaluation &e) override;
   void     accept(Bodies &B) override;
-  bool     countedAngle(PetscInt i, PetscInt j, double t, double *x) const override;
+  bool     countedAngle(PetscInt i, PetscInt j, double *x) const override;
   bool     limitsSteps() const override;
   double   longestStep(const Evaluation &e) const override;
   PetscInt memory() const override;

@@ -68,7 +68,7 @@ public:
   {
     for (Instance &e : all) x = CopyMemory<K>(e, x, in);
   }
-  bool     countedAngle(PetscInt i, PetscInt j, double t, double *x) const override { return AngleOf<K>(all, of, i, j, t, x); }
+  bool countedAngle(PetscInt i, PetscInt j, double *x) const override { return AngleOf<K>(all, of, i, j, x); }
 
 protected:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }

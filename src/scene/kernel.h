@@ -78,7 +78,7 @@ template <class K, int M, int R> struct ConstraintBase {
   static constexpr unsigned depends = Everything(M);
   static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
   static constexpr bool     own_units = false;     /* rows are in units of the user's own, neither lengths nor sines */
-  static constexpr bool     says_angle = false;    /* countedAngle() tells the angle of marker 0 about z of marker 1 at any time */
+  static constexpr bool     says_angle     = false;     /* angleAt() tells the angle of marker 0 about z of marker 1 at any time */
   static constexpr bool     translates = false;    /* row r is component r of the second marker's position less that of the first, and nothing else */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;

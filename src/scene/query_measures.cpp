@@ -62,7 +62,9 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
   case Measure::Displacement: *x = axis.dot(d); break;
   case Measure::Distance: *x = d.norm(); break;
   case Measure::Velocity: *x = axis.dot(v); break;
-  case Measure::Rate: *x = d.dot(v) / d.norm(); break;
+  case Measure::Rate:
+    *x = d.norm() > 0 ? d.dot(v) / d.norm() : 0;
+    break;
   case Measure::Acceleration: *x = axis.dot(i.acceleration - j.acceleration); break;
   case Measure::AngularVelocity: *x = axis.dot(i.angular_velocity - j.angular_velocity); break;
   case Measure::AngularAcceleration: *x = axis.dot(i.angular_acceleration - j.angular_acceleration); break;

@@ -137,7 +137,7 @@ public:
       i.lambda = l.local(this->start[e]);
       i.group  = l.group(this->start[e], this->unknowns(e));
       batch->all.push_back(i);
-      if constexpr (K::memory > 0 || K::says_angle) batch->of.add(e);
+      if constexpr (K::memory > 0) batch->of.add(e);
     }
     batch->all.shrink_to_fit();
     if (!batch->all.empty()) batches.push_back(std::move(owner));

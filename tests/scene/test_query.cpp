@@ -101,6 +101,28 @@ TEST(Query, MeasuresAgreeWithChannels)
   }
 }
 
+/* Two balls that start at one place and part at 3 m/s: their distance has no rate there, and what is asked for is a number all the same */
+TEST(Query, RateOfMarkersThatCoincide)
+{
+  Scene      scene(PETSC_COMM_SELF);
+  PointMass  b;
+  const Body still     = scene.add("still", b);
+  b.velocity           = {3, 0, 0};
+  const Body    moving = scene.add("moving", b);
+  const Measure rate   = Measure::rate(scene.marker(moving), scene.marker(still));
+  scene.variable("rate", rate);
+  SceneRun run(scene, 1, "");
+  Snapshot now;
+  double   x;
+  must(now.take(run.ts, 0));
+  must(now.value(rate, &x));
+  EXPECT_EQ(x, 0);
+  must(run.solve());
+  must(now.take(run.ts));
+  must(now.value(rate, &x));
+  EXPECT_NEAR(x, 3, 1e-12);
+}
+
 /* Velocities and accelerations are the rates of positions and velocities, seen from space and from a moving marker */
 TEST(Query, MotionIsTheRateOfMotion)
 {

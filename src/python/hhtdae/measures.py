@@ -72,7 +72,7 @@ def velocity(i, component, j=None, frame=None):
 
 
 def rate(i, j):
-    """Time derivative of the distance of two markers."""
+    """Time derivative of the distance of two markers; 0 where they coincide, which has none there."""
     return Measure("rate", i, j)
 
 

@@ -82,7 +82,7 @@ public:
   {
     for (LocalFunction &f : functions) f.arguments.accept(B);
   }
-  bool countedAngle(PetscInt i, PetscInt j, double, double *x) const override
+  bool countedAngle(PetscInt i, PetscInt j, double *x) const override
   {
     return std::any_of(functions.begin(), functions.end(), [&](const LocalFunction &f) { return f.arguments.countedAngle(i, j, x); });
   }

@@ -54,7 +54,7 @@ T MarkerMeasure(Measure::Kind kind, int component, double remembered, const Mark
   case Measure::Rate: {
     const Vec3<T> w  = i.w.v - j->w.v;
     const T       dw = d.dot(w), l = sqrt(d.dot(d));
-    return dw / l;
+    return l > 0 ? dw / l : T(0);
   }
   case Measure::Acceleration:
     return ComponentIn<T>(frame, Difference<T>(i.a, j ? &j->a : nullptr), component);

@@ -29,7 +29,7 @@ public:
   {
     for (LocalMeasure &m : work_->own) m.accept(B);
   }
-  bool countedAngle(PetscInt i, PetscInt j, double, double *x) const override
+  bool countedAngle(PetscInt i, PetscInt j, double *x) const override
   {
     return std::any_of(work_->own.begin(), work_->own.end(), [&](const LocalMeasure &m) { return m.countedAngle(i, j, x); });
   }
