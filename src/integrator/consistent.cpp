@@ -48,6 +48,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   PetscReal          d, x;
   PetscInt           its;
   PetscMPIInt        failed;
+  PetscBool          unanswered = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(KSPSolve(c.ksp, c.F, c.d));
@@ -62,9 +63,10 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   if (!failed) PetscCall(VecAXPY(c.X, -1, c.d));
   PetscCall(VecNorm(c.d, NORM_2, &d));
   PetscCall(VecNorm(c.X, NORM_2, &x));
+  if (d == 0) PetscCall(IsUnanswered(c.d, c.F, &unanswered));
   PetscCall(TakeUnknowns(Get(ts), c));
   *e  = x > 0 ? d / x : d;
-  *ok = (PetscBool)(!failed && !PetscIsInfOrNanReal(d));
+  *ok = (PetscBool)(!failed && !unanswered && !PetscIsInfOrNanReal(d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -32,6 +32,9 @@ PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, 
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);
 PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e);
 
+/* Whether a linear solver has made nothing of a residual that is not zero, which is no solution whatever it says */
+PetscErrorCode IsUnanswered(Vec dX, Vec F, PetscBool *yes);
+
 /* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
 constexpr PetscReal of_rounding = 16;
 

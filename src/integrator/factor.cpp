@@ -77,6 +77,26 @@ PetscErrorCode SolverDefaults(TS ts, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+constexpr PetscReal petsc_abstol = 1e-50; /* PETSc's own, which tells whether the user has set one */
+
+/* An absolute tolerance ends a solve before it has begun where the residual, whose units differ from row to row and with h, is below it: a correction of zero, which proves
+   nothing (LinearSolves.AbsoluteTolerances). So solves end by the relative one alone. */
+static PetscErrorCode TakeTolerance(TS ts, KSP ksp)
+{
+  Hooks    &H = Get(ts).hooks;
+  PetscReal abstol;
+
+  PetscFunctionBegin;
+  PetscCall(KSPGetTolerances(ksp, NULL, &abstol, NULL, NULL));
+  if (abstol <= petsc_abstol) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!H.abstol_told)
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ksp_atol %g has no effect, as it would take every correction for zero whose residual is below it: -ksp_rtol rules\n", TSHHT3, (double)abstol));
+  H.abstol_told = PETSC_TRUE;
+  H.abstol      = abstol;
+  PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, 0, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* failed: of the last factorization on entry, of this one on return, the same on all ranks */
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed)
 {
@@ -88,6 +108,7 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFail
   /* a factor that failed may keep its error: PCSetUp_LU() forgives zero pivots alone, and MUMPS under PETSc forgives nothing */
   if (*failed) PetscCall(PCReset(pc));
   *failed = PC_NOERROR;
+  PetscCall(TakeTolerance(ts, ksp));
   PetscCall(KSPSetOperators(ksp, J, P));
   if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
   PetscCall(KSPSetUp(ksp));
@@ -157,6 +178,8 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   PetscCall(FailedReason(pc, &reason));
   PetscCall(KSPGetConvergedReason(ksp, &ended));
   if (!singular && reason) PetscCall(PetscSNPrintf(why, sizeof(why), "the preconditioner %s cannot treat this matrix, %s", pc_type, PCFailedReasons[reason]));
+  else if (!singular && ended > 0)
+    PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s and zero for a right-hand side that is not zero", ksp_type, pc_type, KSPConvergedReasons[ended]));
   else if (!singular) PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s", ksp_type, pc_type, KSPConvergedReasons[ended]));
   if (h > 0) PetscCall(PetscSNPrintf(step, sizeof(step), ", h = %g", (double)h));
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g%s: %s", (double)t, step, why));

@@ -115,6 +115,22 @@ PetscErrorCode RemoveLineSearch(TS ts, SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The absolute tolerance that Factor() has taken out, unless the user has set another one since */
+PetscErrorCode RestoreTolerance(TS ts, SNES snes)
+{
+  Hooks    &H = Get(ts).hooks;
+  KSP       ksp;
+  PetscReal abstol;
+
+  PetscFunctionBegin;
+  if (H.abstol <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetTolerances(ksp, NULL, &abstol, NULL, NULL));
+  if (abstol == 0) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, H.abstol, PETSC_DEFAULT, PETSC_DEFAULT));
+  H.abstol = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode RemoveJacobian(TS ts)
 {
   Hooks &H = Get(ts).hooks;
@@ -247,6 +263,7 @@ PetscErrorCode HooksRemove(TS ts)
   if (!H.snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RemoveTest(ts, H.snes));
   PetscCall(RemoveLineSearch(ts, H.snes));
+  PetscCall(RestoreTolerance(ts, H.snes));
   if (!Get(ts).corrector.user_lag) PetscCall(SNESSetLagJacobian(H.snes, H.lag));
   PetscCall(SNESSetCheckJacobianDomainError(H.snes, H.check_domain));
   H.snes->jacobiandomainerror = PETSC_FALSE;

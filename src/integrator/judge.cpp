@@ -275,16 +275,33 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 
 } // namespace
 
+/* The square: numbers of which it underflows may have answers that do */
+PetscErrorCode IsUnanswered(Vec dX, Vec F, PetscBool *yes)
+{
+  PetscReal d, f;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(dX, NORM_2, &d));
+  PetscCall(VecNorm(F, NORM_2, &f));
+  *yes = (PetscBool)(d == 0 && f * f > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
 PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);
-  PetscBool   proved;
+  PetscBool   proved, unanswered = PETSC_FALSE;
 
   PetscFunctionBegin;
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
+  if (e == 0 && !I.corrector.user_test) PetscCall(IsUnanswered(dX, F, &unanswered)); /* F is that of either end, where dX is zero */
+  if (unanswered) {
+    I.corrector.reason = SNES_DIVERGED_LINEAR_SOLVE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(NoteForces(ts, F, *evaluated));
   if (I.corrector.user_test) PetscCall(Measure(ts, e));
   else PetscCall(Judge(ts, e, X));

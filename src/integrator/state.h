@@ -62,6 +62,8 @@ struct Hooks {
   PetscErrorCode (*convergeddestroy)(void *) = nullptr;
   PetscInt  lag          = 1;
   PetscBool check_domain = PETSC_FALSE;
+  PetscReal abstol       = 0;           /* of the KSP; 0: none has been taken out */
+  PetscBool abstol_told  = PETSC_FALSE;
 };
 
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */

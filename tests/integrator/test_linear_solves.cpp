@@ -1,0 +1,87 @@
+/* Linear solvers of the user's that have solved nothing, whatever they say */
+#include "support.h"
+
+using namespace hhtest;
+
+namespace
+{
+
+PetscErrorCode nothing(PC, Vec, Vec y) { return VecZeroEntries(y); }
+
+const Pendulum &pendulum()
+{
+  static const Pendulum p(-90., 0., .5);
+  return p;
+}
+
+KSP solverOf(TS ts)
+{
+  SNES snes;
+  KSP  ksp;
+  must(TSGetSNES(ts, &snes));
+  must(SNESGetKSP(snes, &ksp));
+  return ksp;
+}
+
+} // namespace
+
+/* A residual below it is no solution: GMRES would make no iteration, and the predictor's values would stand */
+TEST(LinearSolves, AbsoluteTolerances)
+{
+  Simulation plain(pendulum(), tolerance(1e-5));
+  must(plain.solve());
+  for (const char *atol : {"1", "1e-3", "1e-12"}) {
+    Printed    out;
+    Simulation run(pendulum(), tolerance(1e-5) + "-ksp_type gmres -pc_type none -ksp_atol " + atol);
+    Vec        U, V;
+    must(VecDuplicate(run.U, &U));
+    must(VecDuplicate(run.U, &V));
+    run.watch = [&](Simulation &r, PetscInt step, double t) {
+      if (step == 5) must(TSHHT3EvaluateAt(r.ts, t - 1e-4, U, V, NULL));
+    };
+    must(run.solve());
+    EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-5) << atol;
+    EXPECT_LT(run.statistics().steps, plain.statistics().steps * 11 / 10) << atol;
+    EXPECT_EQ(out.text().find("hhtdae: -ksp_atol"), 0) << out.text();
+    EXPECT_EQ(out.text().find("has no effect"), out.text().rfind("has no effect")) << out.text(); /* said once */
+    must(VecDestroy(&U));
+    must(VecDestroy(&V));
+  }
+}
+
+/* The user's is in place again for another type */
+TEST(LinearSolves, AbsoluteTolerancesComeBack)
+{
+  Printed    out;
+  Simulation run(pendulum(), tolerance(1e-5) + "-ts_max_steps 2");
+  PetscReal  atol;
+  must(KSPSetTolerances(solverOf(run.ts), PETSC_DEFAULT, 1e-3, PETSC_DEFAULT, PETSC_DEFAULT));
+  must(run.solve());
+  must(KSPGetTolerances(solverOf(run.ts), NULL, &atol, NULL, NULL));
+  EXPECT_EQ(atol, 0);
+  must(TSSetType(run.ts, TSALPHA2));
+  must(KSPGetTolerances(solverOf(run.ts), NULL, &atol, NULL, NULL));
+  EXPECT_EQ(atol, 1e-3);
+}
+
+/* In the start, and where it begins on the way: a step is not accepted with the predictor's values */
+TEST(LinearSolves, ZeroIsNoSolution)
+{
+  for (bool from_start : {true, false}) {
+    Simulation run(pendulum(), tolerance(1e-5) + "-ts_max_reject 20");
+    const auto answerNothing = [&] {
+      PC pc;
+      must(KSPGetPC(solverOf(run.ts), &pc));
+      must(PCSetType(pc, PCSHELL));
+      must(PCShellSetApply(pc, nothing));
+    };
+    if (from_start) answerNothing();
+    else run.watch = [&](Simulation &, PetscInt step, double) { if (step == 10) answerNothing(); };
+    ErrorTrap trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_NOT_CONVERGED) << from_start;
+    EXPECT_TRUE(trap.says("zero for a right-hand side that is not zero")) << trap.message;
+    PetscInt steps;
+    must(TSGetStepNumber(run.ts, &steps));
+    EXPECT_EQ(steps, from_start ? 0 : 10);
+  }
+}
