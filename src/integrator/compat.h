@@ -70,18 +70,23 @@ static inline PetscReal HHT3NextStop(TS ts)
   return ts->max_time;
 }
 
-/* Points of a time span that a resumed run has behind it, so that TSAdaptChoose() does not aim at them. Their solutions are not known to it: not a number
-   (Checkpoint.ResumesInATimeSpan) */
-static inline PetscErrorCode HHT3PassStops(TS ts)
+/* Points of a time span that a run has behind it where it begins or is resumed, so that TSAdaptChoose() does not aim at them. Their solutions are not known to it: not a number
+   (Checkpoint.ResumesInATimeSpan, BetweenRuns.BeginInATimeSpan) */
+static inline PetscErrorCode HHT3PassStops(TS ts, PetscBool *passed)
 {
   PetscFunctionBegin;
+  *passed = PETSC_FALSE;
 #if PETSC_VERSION_LT(3, 23, 0)
   if (!ts->tspan) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt &k = ts->tspan->spanctr; k < ts->tspan->num_span_times && ts->tspan->span_times[k] <= ts->ptime; k++)
-    if (ts->tspan->vecs_sol) PetscCall(VecSet(ts->tspan->vecs_sol[k], NAN));
+  for (PetscInt &k = ts->tspan->spanctr; k < ts->tspan->num_span_times && ts->tspan->span_times[k] <= ts->ptime; k++) {
+    *passed = PETSC_TRUE;
+    if (!ts->tspan->vecs_sol) continue;
+    if (ts->tspan->span_times[k] == ts->ptime) PetscCall(VecCopy(ts->vec_sol, ts->tspan->vecs_sol[k]));
+    else PetscCall(VecSet(ts->tspan->vecs_sol[k], NAN));
+  }
 #else
   if (!ts->eval_times) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt &k = ts->eval_times->time_point_idx; k < ts->eval_times->num_time_points && ts->eval_times->time_points[k] <= ts->ptime;) k++;
+  for (PetscInt &k = ts->eval_times->time_point_idx; k < ts->eval_times->num_time_points && ts->eval_times->time_points[k] <= ts->ptime; k++) *passed = PETSC_TRUE;
 #endif
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,6 +94,7 @@ struct StepState {
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscReal        h_given     = 0;           /* of steps of fixed length, by the user */
+  PetscReal        h_first     = 0;           /* by the user, at the set-up */
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
   Ahead            ahead       = Ahead::Unknown; /* of what the start has not seen */

@@ -295,16 +295,20 @@ PetscErrorCode NoteState(TS ts)
 namespace
 {
 
-/* Points that a resumed run has behind it, of a time span or ends of earlier runs, are where TSSolve() would go: its step is negative then. */
+/* TSSolve() cuts the step to what is left until the next stop. Less than nothing is left where points of a time span, or ends of earlier runs, are behind the time at which a run begins
+   or is resumed: then the step is the one before. */
 PetscErrorCode PassStops(TS ts)
 {
   const Integrator &I       = Get(ts);
   const bool        resumed = I.have_step && I.stat.steps == I.checkpoint_steps;
+  PetscBool         passed;
 
   PetscFunctionBegin;
-  PetscCall(HHT3PassStops(ts));
-  if (resumed && ts->time_step <= 0)
-    ts->time_step = ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP ? PetscMin(I.h_next, HHT3NextStop(ts) - ts->ptime) : I.h_next;
+  PetscCall(HHT3PassStops(ts, &passed));
+  if (ts->time_step > 0 || !(passed || resumed)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.h_next > 0) ts->time_step = I.h_next;
+  else ts->time_step = I.auto_h ? unset_step : I.h_first;
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3NextStop(ts) - ts->ptime);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

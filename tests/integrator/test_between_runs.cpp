@@ -130,6 +130,39 @@ TEST(BetweenRuns, FixedStepsInParts)
   }
 }
 
+/* Points of a time span that are behind the beginning of a run have no solutions, and TSSolve() cuts the step to where they are */
+TEST(BetweenRuns, BeginInATimeSpan)
+{
+  for (const std::string &steps : {tolerance(1e-6), tolerance(1e-6) + "-ts_dt 1e-3", fixedSteps(1e-2)})
+    for (double begin : {0., 0.2, 0.5}) {
+      Simulation run(oscillator(), steps);
+      double     first = 0.;
+      PetscReal  times[] = {0., 0.5, 1.};
+      must(TSSetTimeSpan(run.ts, 3, times));
+      must(TSSetTime(run.ts, begin));
+      run.watch = [&](Simulation &, PetscInt step, double t) { if (step == 1) first = t - begin; };
+      must(run.solve());
+      EXPECT_EQ(run.t(), 1.);
+      EXPECT_NEAR(run.u()[0], std::cos(2. * (1. - begin)), 1e-3) << steps << begin;
+      if (steps.find("-ts_dt 1e-3") != std::string::npos) {
+        EXPECT_NEAR(first, 1e-3, 1e-12) << begin;
+      }
+      if (steps == fixedSteps(1e-2)) {
+        EXPECT_EQ(run.statistics().steps, std::lround(100 * (1. - begin))) << begin;
+      }
+      if (PETSC_VERSION_GE(3, 23, 0)) continue; /* which keeps no solutions for points behind */
+      PetscInt n;
+      Vec     *x;
+      must(TSGetTimeSpanSolutions(run.ts, &n, &x));
+      ASSERT_EQ(n, 3);
+      for (int k = 0; k < 3; k++) {
+        const double q = whole(x[k])[0];
+        if (times[k] < begin) EXPECT_TRUE(std::isnan(q)) << k;
+        else EXPECT_NEAR(q, std::cos(2. * (times[k] - begin)), 1e-3) << k;
+      }
+    }
+}
+
 /* A load of period 1 does not see the time set back by 1 */
 TEST(BetweenRuns, TimeSetBack)
 {
