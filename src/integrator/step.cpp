@@ -295,8 +295,8 @@ PetscErrorCode NoteState(TS ts)
 namespace
 {
 
-/* TSSolve() cuts the step to what is left until the next stop. Less than nothing is left where points of a time span, or ends of earlier runs, are behind the time at which a run begins
-   or is resumed: then the step is the one before. */
+/* TSSolve() cuts the step to what is left until the next stop. Nothing is left where it is called at the end of a run, less than nothing where points of a time span, or ends of earlier runs,
+   are behind the time at which a run begins or is resumed: then the step is the one before. */
 PetscErrorCode PassStops(TS ts)
 {
   const Integrator &I       = Get(ts);
@@ -305,7 +305,7 @@ PetscErrorCode PassStops(TS ts)
 
   PetscFunctionBegin;
   PetscCall(HHT3PassStops(ts, &passed));
-  if (ts->time_step > 0 || !(passed || resumed)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->time_step != 0 && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.h_next > 0) ts->time_step = I.h_next;
   else ts->time_step = I.auto_h ? unset_step : I.h_first;
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3NextStop(ts) - ts->ptime);

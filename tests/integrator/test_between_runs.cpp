@@ -130,13 +130,37 @@ TEST(BetweenRuns, FixedStepsInParts)
   }
 }
 
+/* TSSolve() where nothing is left of a run leaves no step size; what follows goes on as if it had not been called */
+TEST(BetweenRuns, SolvedAgainAtTheEnd)
+{
+  for (const std::string &steps : {tolerance(1e-6), tolerance(1e-6) + "-ts_dt 1e-3 ", fixedSteps(1e-2)}) {
+    Array    u;
+    PetscInt n = 0;
+    for (int again : {0, 1, 2}) {
+      Simulation run(oscillator(), steps);
+      for (int k = again ? 0 : 1; k <= 4; k++) {
+        must(TSSetMaxTime(run.ts, 0.25 * k));
+        for (int i = 0; i <= again; i++) must(run.solve());
+        EXPECT_EQ(run.reason(), TS_CONVERGED_TIME);
+      }
+      if (!again) {
+        u = run.u();
+        n = run.statistics().steps;
+      }
+      EXPECT_EQ(run.t(), 1.);
+      EXPECT_EQ(run.u(), u) << steps << again;
+      EXPECT_EQ(run.statistics().steps, n) << steps << again;
+    }
+  }
+}
+
 /* Points of a time span that are behind the beginning of a run have no solutions, and TSSolve() cuts the step to where they are */
 TEST(BetweenRuns, BeginInATimeSpan)
 {
   for (const std::string &steps : {tolerance(1e-6), tolerance(1e-6) + "-ts_dt 1e-3", fixedSteps(1e-2)})
     for (double begin : {0., 0.2, 0.5}) {
       Simulation run(oscillator(), steps);
-      double     first = 0.;
+      double     first   = 0.;
       PetscReal  times[] = {0., 0.5, 1.};
       must(TSSetTimeSpan(run.ts, 3, times));
       must(TSSetTime(run.ts, begin));
