@@ -156,6 +156,28 @@ PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The package that has met a zero pivot, unless it is known to exchange rows: the diagonal entries of multipliers are zero, and a matrix with such a pivot need not be singular */
+PetscErrorCode PackageInDoubt(TS ts, MatSolverType *package)
+{
+  KSP       ksp;
+  PC        pc;
+  Mat       P;
+  PetscBool factors, dense, known;
+
+  PetscFunctionBegin;
+  *package = NULL;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCGetOperators(pc, NULL, &P));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factors, PCLU, PCCHOLESKY, ""));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)P, &dense, MATSEQDENSE, MATMPIDENSE, ""));
+  if (!factors || dense) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCFactorGetMatSolverType(pc, package));
+  PetscCall(LinearExchangesRows(*package, &known));
+  if (known) *package = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Into the text of the failure; h = 0: it has nothing to do with a step */
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
 {
@@ -167,6 +189,7 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   KSPConvergedReason ended;
   PCFailedReason     reason;
   PetscBool          singular;
+  MatSolverType      package;
   char               why[256] = "the Newton matrix is singular", step[32] = "";
 
   PetscFunctionBegin;
@@ -177,6 +200,9 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   PetscCall(MatrixIsSingular(ts, &singular));
   PetscCall(FailedReason(pc, &reason));
   PetscCall(KSPGetConvergedReason(ksp, &ended));
+  PetscCall(PackageInDoubt(ts, &package));
+  if (singular && package)
+    PetscCall(PetscSNPrintf(why, sizeof(why), "the Newton matrix is singular, or a pivot of it too small for %s: -pc_factor_mat_solver_type mumps or klupair exchanges rows there", package));
   if (!singular && reason) PetscCall(PetscSNPrintf(why, sizeof(why), "the preconditioner %s cannot treat this matrix, %s", pc_type, PCFailedReasons[reason]));
   else if (!singular && ended > 0)
     PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s and zero for a right-hand side that is not zero", ksp_type, pc_type, KSPConvergedReasons[ended]));

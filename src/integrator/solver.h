@@ -20,9 +20,10 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFail
 /* After a solve by the run's solver. *other: another one takes its place, which has no factor yet */
 PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other);
 
-/* Why a matrix could not be factored: whether all its entries are numbers, whether it has no inverse, and a text for I.failure (h = 0: of no step) */
+/* Why a matrix could not be factored: whether all its entries are numbers, whether it has no inverse, the package that may be the cause if it has one, and a text for I.failure (h = 0: of no step) */
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
+PetscErrorCode PackageInDoubt(TS ts, MatSolverType *package);
 PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h);
 
 /* nodes.cpp: P has been evaluated at U; what TSHHT3SetNodes() has told of one matrix, for another one of the same rows */

@@ -290,6 +290,7 @@ PetscErrorCode NameRedundant(TS ts)
   char                  text[256] = "";
   size_t                used;
   PetscBool             numbers, is_singular;
+  MatSolverType         package;
 
   PetscFunctionBegin;
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
@@ -313,6 +314,11 @@ PetscErrorCode NameRedundant(TS ts)
   }
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.", (double)ts->ptime, text);
+  PetscCall(PackageInDoubt(ts, &package));
+  PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
+             "-pc_factor_mat_solver_type mumps or klupair exchanges rows there. If that fails, too, look for a coordinate without mass that no constraint holds",
+             package, (double)ts->ptime);
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
           "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g, and not by dependent constraints: look for a coordinate without mass that no constraint holds, "
           "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);

@@ -180,6 +180,19 @@ static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode LinearExchangesRows(const char package[], PetscBool *yes)
+{
+  PetscBool same;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  for (const char *name : {MATSOLVERMUMPS, LINEAR_MUMPSND, LINEAR_SMUMPSND, LINEAR_MUMPSMIXED, LINEAR_KLUPAIR, LINEAR_KLUPARTS, MATSOLVERKLU, MATSOLVERUMFPACK, MATSOLVERSUPERLU}) {
+    PetscCall(PetscStrcmp(package, name, &same));
+    if (same) *yes = PETSC_TRUE;
+  }
+  PetscFunctionReturn(0);
+}
+
 /* A package cannot be exchanged under a factor that exists, and PCSetFromOptions() may have made one by PETSc's own
    choice without a word of it: a change starts the preconditioner anew */
 static PetscErrorCode SetPackage(PC pc, const char package[])

@@ -76,6 +76,9 @@ PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle);
 /* Whether |y^T A x - x^T A y| is rounding for two fixed pseudo-random vectors: two products, no transpose */
 PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric);
 
+/* Whether a package is known to exchange rows where a pivot is zero */
+PetscErrorCode LinearExchangesRows(const char package[], PetscBool *yes);
+
 /* For a singular saddle-point matrix: global rows of multipliers that take part in linearly dependent constraints,
    from the null space of Phi_q^T by inverse iteration on the regularized matrix; at most max of them.
    Sets *n = 0 if no dependence is found. Collective; every rank gets the same list. */

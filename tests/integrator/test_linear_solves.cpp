@@ -49,6 +49,29 @@ TEST(LinearSolves, AbsoluteTolerances)
   }
 }
 
+/* Packages that exchange no rows, or not all, meet zeros on the diagonal of a matrix that has an inverse */
+TEST(LinearSolves, PackagesThatExchangeNoRows)
+{
+  const FourBar bars(2, .4);
+  for (const char *package : {"petsc", "superlu_dist"}) {
+    PetscBool there;
+    {
+      Mat P;
+      must(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &P));
+      must(MatGetFactorAvailable(P, package, MAT_FACTOR_LU, &there));
+      must(MatDestroy(&P));
+    }
+    if (!there) continue;
+    Simulation run(bars, tolerance(1e-5) + "-pc_type lu -pc_factor_mat_solver_type " + package);
+    ErrorTrap  trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_MAT_LU_ZRPVT);
+    EXPECT_TRUE(trap.says(std::string(package) + " has met a zero pivot")) << trap.message;
+    EXPECT_TRUE(trap.says("-pc_factor_mat_solver_type mumps or klupair")) << trap.message;
+    Simulation whole(bars, tolerance(1e-5) + "-pc_type lu -pc_factor_mat_solver_type klupair");
+    EXPECT_EQ(whole.solve(), 0);
+  }
+}
+
 /* The user's is in place again for another type */
 TEST(LinearSolves, AbsoluteTolerancesComeBack)
 {
