@@ -95,6 +95,13 @@ PetscErrorCode CheckProblem(TS ts)
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors%s",
              f ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
+  for (Vec x : {ts->vec_sol, ts->vec_dot}) { /* its entries are not in one array */
+    PetscBool nest;
+    PetscCall(PetscObjectTypeCompare((PetscObject)x, VECNEST, &nest));
+    PetscCheck(!nest, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+               "The %s is a vector of type %s, which TSHHT3 does not take: use type %s (VecSetType(), VecConcatenate()) in TS2SetSolution(), and index sets for its parts (VecGetSubVector())",
+               x == ts->vec_sol ? "solution" : "time derivative of the solution", VECNEST, VECSTANDARD);
+  }
   PetscInt n, m;
   PetscCall(VecGetSize(ts->vec_sol, &n));
   PetscCall(VecGetSize(ts->vec_dot, &m));

@@ -41,6 +41,24 @@ TEST(FrontDoor, FirstOrderPrograms)
   }
 }
 
+TEST(FrontDoor, NestedVectors)
+{
+  const Oscillators p({1., 2.}, {.1, .1}, false, 1.);
+  for (bool velocity : {false, true}) {
+    Simulation run(p, tolerance(1e-5));
+    Vec        part[2], nest;
+    for (Vec &x : part) must(VecCreateSeq(PETSC_COMM_SELF, 1, &x));
+    must(VecCreateNest(PETSC_COMM_SELF, 2, nullptr, part, &nest));
+    must(VecSet(nest, 0));
+    must(TS2SetSolution(run.ts, velocity ? run.U : nest, velocity ? nest : run.V));
+    for (Vec &x : part) must(VecDestroy(&x));
+    must(VecDestroy(&nest));
+    ErrorTrap trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_SUP);
+    EXPECT_TRUE(trap.says(std::string("The ") + (velocity ? "time derivative of the solution" : "solution") + " is a vector of type nest")) << trap.message;
+  }
+}
+
 TEST(FrontDoor, CheckpointAtTheEnd)
 {
   const Oscillators p({1., 2.}, {.1, .1}, false, 1.);
