@@ -90,6 +90,22 @@ PetscErrorCode CheckMultigrid(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Linear solves that go on from what others have left: of tolerances that follow norms of residuals, which the corrector does not take, the start would have the last one; and a matrix
+   that a solve has scaled is not the one with which corrections are proved */
+PetscErrorCode CheckSolves(TS ts)
+{
+  KSP       ksp;
+  PetscBool ew, scales;
+
+  PetscFunctionBegin;
+  PetscCall(SNESKSPGetUseEW(ts->snes, &ew));
+  PetscCheck(!ew, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_ksp_ew sets the tolerance of a linear solve by norms of residuals, which the corrector does not take; use -ksp_rtol");
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetDiagonalScale(ksp, &scales));
+  PetscCheck(!scales, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-ksp_diagonal_scale changes the Newton matrix, of which the corrector makes use after a solve; it is scaled already, and -pc_type jacobi scales a solve");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* PETSc's own number of iterations, which tells whether the user has set one */
 constexpr PetscInt petsc_max_it = 50;
 
@@ -181,6 +197,7 @@ PetscErrorCode TakeSNESSettings(TS ts)
   PetscFunctionBegin;
   PetscCall(CheckSNESType(ts));
   PetscCall(CheckMultigrid(ts));
+  PetscCall(CheckSolves(ts));
   PetscCall(OptionGiven((PetscObject)ts->snes, "-snes_max_it", &given));
   if (given || ts->snes->max_its != petsc_max_it) I.corrector.max_it = ts->snes->max_its;
   else I.corrector.max_it = CorrectorOptions().max_it;

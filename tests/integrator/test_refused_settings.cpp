@@ -184,6 +184,14 @@ TEST(RefusedSettings, SolversThatDoNotFit)
   }
 }
 
+/* They ended in multipliers off by percents, or in steps without end */
+TEST(RefusedSettings, SolvesThatGoOnFromOthers)
+{
+  expectRefused({"-ksp_type gmres -pc_type none -snes_ksp_ew", "-snes_ksp_ew"});
+  expectRefused({"-ksp_type gmres -ksp_diagonal_scale", "-ksp_diagonal_scale"});
+  expectRefused({"-ksp_type gmres -ksp_diagonal_scale -ksp_diagonal_scale_fix", "-ksp_diagonal_scale"});
+}
+
 /* PETSc's options for differences */
 TEST(RefusedSettings, JacobiansFromDifferences)
 {
