@@ -63,7 +63,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   if (!failed) PetscCall(VecAXPY(c.X, -1, c.d));
   PetscCall(VecNorm(c.d, NORM_2, &d));
   PetscCall(VecNorm(c.X, NORM_2, &x));
-  if (d == 0) PetscCall(IsUnanswered(c.d, c.F, &unanswered));
+  if (ts->snes->ksp == c.ksp) PetscCall(IsUnanswered(ts, c.d, c.F, false, &unanswered));
   PetscCall(TakeUnknowns(Get(ts), c));
   *e  = x > 0 ? d / x : d;
   *ok = (PetscBool)(!failed && !unanswered && !PetscIsInfOrNanReal(d));

@@ -32,8 +32,9 @@ PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, 
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved);
 PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e);
 
-/* Whether a linear solver has made nothing of a residual that is not zero, which is no solution whatever it says */
-PetscErrorCode IsUnanswered(Vec dX, Vec F, PetscBool *yes);
+/* Whether what the run's linear solver has made of a residual is zero, or too short, and so no solution whatever it says. F: the residual before the correction,
+   or after it, which shows whether it was zero alone */
+PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes);
 
 /* One sample of rounding (rounding.cpp) may miss what the four-bars of tests/stability/test_stiff.cpp have by this factor */
 constexpr PetscReal of_rounding = 16;

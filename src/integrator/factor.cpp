@@ -205,7 +205,7 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
     PetscCall(PetscSNPrintf(why, sizeof(why), "the Newton matrix is singular, or a pivot of it too small for %s: -pc_factor_mat_solver_type mumps or klupair exchanges rows there", package));
   if (!singular && reason) PetscCall(PetscSNPrintf(why, sizeof(why), "the preconditioner %s cannot treat this matrix, %s", pc_type, PCFailedReasons[reason]));
   else if (!singular && ended > 0)
-    PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s and zero for a right-hand side that is not zero", ksp_type, pc_type, KSPConvergedReasons[ended]));
+    PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s, and with zero or too little for the right-hand side: no solution", ksp_type, pc_type, KSPConvergedReasons[ended]));
   else if (!singular) PetscCall(PetscSNPrintf(why, sizeof(why), "the Krylov method %s with preconditioner %s ended with %s", ksp_type, pc_type, KSPConvergedReasons[ended]));
   if (h > 0) PetscCall(PetscSNPrintf(step, sizeof(step), ", h = %g", (double)h));
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the linear solve failed at t = %g%s: %s", (double)t, step, why));

@@ -384,7 +384,7 @@ static PetscErrorCode Finalize(void)
   <default,skip> or `SNESSetConvergenceTest()` puts the user's test in its place, and then they do. It makes full steps without a
   line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it counts always; the program's
   number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told from PETSc's defaults and want the option.
-  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, which is printed, and zero for a residual that is not zero is a failed solve.
+  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, which is printed, and zero, or less than can be the solution, for a residual that is not zero is a failed solve.
   -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. The default type of `TSAdapt`, also called hhtdae,
   is basic but for small gains of h, which it does not take since they cost a matrix, growth after failures, which it slows, and growth where nothing moves, where it
   waits for loads and motions that set in later. A step size

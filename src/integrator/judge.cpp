@@ -275,15 +275,29 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 
 } // namespace
 
-/* The square: numbers of which it underflows may have answers that do */
-PetscErrorCode IsUnanswered(Vec dX, Vec F, PetscBool *yes)
+/* The square: numbers of which it underflows may have answers that do. A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems):
+   the solution of J dX = F is no shorter than |F|/|J|. */
+PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
 {
-  PetscReal d, f;
+  KSP       ksp;
+  PC        pc;
+  Mat       J;
+  PetscReal d, f, norm;
+  PetscBool direct, has_norm;
 
   PetscFunctionBegin;
   PetscCall(VecNorm(dX, NORM_2, &d));
   PetscCall(VecNorm(F, NORM_2, &f));
   *yes = (PetscBool)(d == 0 && f * f > 0);
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
+  if (d == 0 || after || direct || Get(ts).linear.constraint) PetscFunctionReturn(PETSC_SUCCESS); /* PCHHTCONSTRAINT is not singular where its matrix is not */
+  PetscCall(KSPGetOperators(ksp, &J, NULL));
+  PetscCall(MatHasOperation(J, MATOP_NORM, &has_norm));
+  if (!has_norm) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatNorm(J, NORM_FROBENIUS, &norm));
+  *yes = (PetscBool)(f > 2 * norm * d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -297,7 +311,7 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
-  if (e == 0 && !I.corrector.user_test) PetscCall(IsUnanswered(dX, F, &unanswered)); /* F is that of either end, where dX is zero */
+  if (!I.corrector.user_test && (e == 0 || !*evaluated)) PetscCall(IsUnanswered(ts, dX, F, *evaluated, &unanswered));
   if (unanswered) {
     I.corrector.reason = SNES_DIVERGED_LINEAR_SOLVE;
     PetscFunctionReturn(PETSC_SUCCESS);
