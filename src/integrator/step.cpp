@@ -169,6 +169,7 @@ void NoteGivenStep(TS ts)
   const PetscReal rest = HHT3NextStop(ts) - ts->ptime;
 
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
+  else if (I.h_next == 0) I.h_given = I.h_first; /* the first run is shorter than a step */
 }
 
 PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)

@@ -130,6 +130,17 @@ TEST(BetweenRuns, FixedStepsInParts)
   }
 }
 
+/* The first part is shorter than a step, which counts for those that follow */
+TEST(BetweenRuns, FixedStepsAfterAShortPart)
+{
+  Simulation run(oscillator(), fixedSteps(1e-2));
+  for (double end : {0.005, 1.005}) {
+    must(TSSetMaxTime(run.ts, end));
+    must(run.solve());
+  }
+  EXPECT_EQ(run.statistics().steps, 101);
+}
+
 /* TSSolve() where nothing is left of a run leaves no step size; what follows goes on as if it had not been called */
 TEST(BetweenRuns, SolvedAgainAtTheEnd)
 {
