@@ -90,7 +90,8 @@ struct Attachment {
   Tie         tie = Tie::Rigid;
   bool        at_given = false;    /* else at the centroid of the nodes */
   Vector3     position = Vector3::Zero();
-  std::vector<double> weights = {}; /* of an average: one for each node of the set in the order of their global numbers; empty: equal */
+  /* of an average: one for each node of the set, in the ascending order of the nodes' labels, FeModel::label, which is the same on any number of ranks; empty: equal */
+  std::vector<double> weights = {};
 };
 
 enum class Method {
@@ -99,7 +100,9 @@ enum class Method {
   Static        /* constraint modes alone (Guyan) */
 };
 
-/* Forces on the FE model that the reduction keeps as a load case of the body, see ModalLoad of forces.h */
+/* Forces on the FE model that the reduction keeps as a load case of the body, see ModalLoad of forces.h. A load case brings no static (residual) vector into
+   the modes: deflections under it converge with their number. Where the static answer has to be exact, make an attachment of the loaded nodes (Tie::Average
+   stiffens nothing); kept nodes alone do not help. */
 struct LoadCase {
   std::string name;
   /* Pressure one, which pushes inwards, on the outer faces of elements whose nodes are all in this set; needs elements. If it follows, it stays normal
@@ -223,7 +226,7 @@ struct FullBody {
   FeLaw   law              = FeLaw::Large;
   Vector3 position         = Vector3::Zero();     /* of the origin of the FE model at the start, undeformed, space axes */
   Matrix3 rotation         = Matrix3::Identity(); /* axes of the FE model as columns */
-  Vector3 velocity         = Vector3::Zero();     /* of the origin of the FE model */
+  Vector3                 velocity         = Vector3::Zero();     /* of the origin of the FE model, space axes; of a FlexibleBody it is that of the centre of mass */
   Vector3 angular_velocity = Vector3::Zero();     /* space axes */
   double  mass_damping = 0, stiffness_damping = 0; /* C = a M + b K; with FeLaw::Large b must be 0 */
   std::vector<Attachment> attachments;
@@ -242,13 +245,16 @@ public:
   PetscErrorCode add(Scene &scene, const std::string &name, const FeModel &model, const FullBody &body);
   Body           attachment(const std::string &name) const; /* Body{} if there is none, which the scene will refuse by name */
 
-  /* positions of own nodes at time t within the last step, after scene.createTS(); space axes, 3 per node */
+  /* positions of own nodes at time t within the last step, or where the run stands: before the first step at the start, after StaticEquilibrium() in
+     equilibrium; after scene.createTS(); space axes, 3 per node */
   PetscErrorCode positions(TS ts, PetscReal t, std::vector<double> *x) const;
   /* displacements (from the undeformed body at the start) as a .vtu file. Collective */
   PetscErrorCode writeField(TS ts, PetscReal t, const std::string &file) const;
 
 private:
+  std::string                 name_;
   PetscInt                    scene_ = 0, extension_ = -1; /* numbers of the scene, and of the body among those of its kind */
+  std::weak_ptr<Model>        model_;                      /* the scene's, for messages */
   std::map<std::string, Body> frames_;
 };
 

@@ -119,11 +119,7 @@ struct ModalLoad {
 /*
   ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ----
 
-  With exponent 1 the force sets in smoothly: for d < o it has the factor 3 u^2 - 2 u^3, u = d/o. Of contacts o is 1e-4 of the radius, the
-  smaller one of two balls, the least semiaxis, the outer radius of a torus, a flexible body's radius of gyration where its nodes have none; of stops 1e-4 of
-  the travel, or, if it is open at one end, of the larger of its limit and the distance at the start (angles: 1e-4 rad). A contact that carries its
-  load within o is deeper than load/k. The factor s = 1 + damping d' ends smoothly, too: it is s for s >= 1/4, 0 for s <= -1/4, and in
-  between u^3 (1 - u/2)/2 with u = 2 s + 1/2.
+  The factor s = 1 + damping d' ends smoothly: it is s for s >= 1/4, 0 for s <= -1/4, and in between u^3 (1 - u/2)/2 with u = 2 s + 1/2.
 */
 struct ContactLaw {
   double stiffness = 1e5, exponent = 1.5;

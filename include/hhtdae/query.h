@@ -51,9 +51,11 @@ public:
 
   /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step. Accelerations, multipliers,
      variables and force states are those that belong to positions and velocities at t, TSHHT3EvaluateAt(), at about the cost of a
-     factorization between the ends of a step; at its end at none, and then with the error of the step's own. Before the first step it is the start, whose accelerations and
-     multipliers cost a consistent start and a step of a copy; after StaticEquilibrium() the equilibrium, with what the motions would have
-     moved held still. */
+     factorization between the ends of a step; at its end at none, and then with the error of the step's own, which is many times as large, as a rule. With
+     fast modes that hardly anything damps, of flexible bodies above all, it is the other way round: what the interpolation of positions misses comes out in
+     accelerations and reactions within the step times the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance. Before the first
+     step it is the start, whose accelerations and multipliers cost a consistent start and a step of a copy; after StaticEquilibrium() the equilibrium, with what
+     the motions would have moved held still. */
   PetscErrorCode take(TS ts, PetscReal t);
   PetscErrorCode take(TS ts); /* at the end of the last step */
   PetscReal      time() const;

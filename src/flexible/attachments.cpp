@@ -1,9 +1,11 @@
 /* Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom. */
 #include "attachments.h"
 #include "body_check.h"
+#include "exchange.h"
 #include "modes.h"
 #include "symmetric.h"
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <set>
 
 namespace hhtdae
@@ -57,7 +59,7 @@ PetscErrorCode OwnNodesOf(const FeModel &model, const std::string &set, const st
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode CountNodes(const FeModel &model, Tied *t, PetscInt *start)
+static PetscErrorCode CountNodes(const FeModel &model, Tied *t)
 {
   PetscInt mine = (PetscInt)t->node.size();
   struct {
@@ -67,8 +69,6 @@ static PetscErrorCode CountNodes(const FeModel &model, Tied *t, PetscInt *start)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(&mine, &t->count, 1, MPIU_INT, MPI_SUM, model.comm));
   PetscCheck(t->count > 0, model.comm, PETSC_ERR_ARG_WRONG, "Attachment %s: its node set is empty", t->name.c_str());
-  PetscCallMPI(MPI_Scan(&mine, start, 1, MPIU_INT, MPI_SUM, model.comm));
-  *start -= mine;
   best.count = (int)mine;
   PetscCallMPI(MPI_Comm_rank(model.comm, &best.rank));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &best, 1, MPI_2INT, MPI_MAXLOC, model.comm));
@@ -76,8 +76,25 @@ static PetscErrorCode CountNodes(const FeModel &model, Tied *t, PetscInt *start)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, const Tied &t, PetscInt start,
-                                 std::vector<double> *weight)
+PetscErrorCode WeightsOfNodes(const FeModel &model, const Attachment &a, const std::vector<PetscInt> &node,
+                              std::vector<double> *weight)
+{
+  std::vector<PetscInt> mine, all;
+
+  PetscFunctionBegin;
+  weight->assign(node.size(), 1.);
+  if (a.weights.empty()) PetscFunctionReturn(0);
+  for (PetscInt i : node) mine.push_back(NodeLabel(model, i));
+  PetscCall(GatherAll(model.comm, mine, &all));
+  std::sort(all.begin(), all.end());
+  PetscCheck(std::adjacent_find(all.begin(), all.end()) == all.end(), model.comm, PETSC_ERR_ARG_WRONG,
+             "Attachment %s: two nodes of its set have the same label, and weights go by labels", a.name.c_str());
+  for (std::size_t i = 0; i < mine.size(); i++)
+    (*weight)[i] = a.weights[std::lower_bound(all.begin(), all.end(), mine[i]) - all.begin()];
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, const Tied &t, std::vector<double> *weight)
 {
   bool   right = true;
   double sum   = 0;
@@ -89,7 +106,7 @@ static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, cons
              "Attachment %s: weights are for averages, this one is rigid", t.name.c_str());
   PetscCheck((PetscInt)a.weights.size() == t.count, model.comm, PETSC_ERR_ARG_SIZ,
              "Attachment %s: %d weights for %" PetscInt_FMT
-             " nodes; there has to be one for each node of the set, in the order of their numbers",
+             " nodes; there has to be one for each node of the set, in the order of their labels",
              t.name.c_str(), (int)a.weights.size(), t.count);
   for (double w : a.weights) {
     right = right && w >= 0 && w < PETSC_MAX_REAL;
@@ -97,7 +114,7 @@ static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, cons
   }
   PetscCheck(right && sum > 0, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
              "Attachment %s: weights have to be positive numbers or zero, and not all zero", t.name.c_str());
-  for (std::size_t i = 0; i < t.node.size(); i++) (*weight)[i] = a.weights[start + i];
+  PetscCall(WeightsOfNodes(model, a, t.node, weight));
   PetscFunctionReturn(0);
 }
 
@@ -157,7 +174,6 @@ static void SetRows(const FeModel &model, const std::vector<double> &weight, dou
 
 static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied *t)
 {
-  PetscInt            start;
   std::vector<double> weight;
   double              sum = 0;
   Vector3             centroid;
@@ -167,8 +183,8 @@ static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied
   t->name = a.name;
   t->tie  = a.tie;
   PetscCall(OwnNodesOf(model, a.set.empty() ? a.name : a.set, "Attachment " + a.name, &t->node));
-  PetscCall(CountNodes(model, t, &start));
-  PetscCall(GetWeights(model, a, *t, start, &weight));
+  PetscCall(CountNodes(model, t));
+  PetscCall(GetWeights(model, a, *t, &weight));
   PetscCall(Moments(model, *t, weight, &sum, &centroid, &J));
   PetscCall(CheckRotation(model, *t, J));
   t->position = a.at_given ? a.position : centroid;

@@ -47,7 +47,7 @@ namespace
 /* What one rank knows of a node of a set */
 struct SetNode {
   PetscInt node;
-  double   X[3];
+  double   X[3], weight;
 };
 
 std::string Fault(const FeModel &m, const FullBody &b)
@@ -95,11 +95,15 @@ PetscErrorCode BringElements(FullExtension &x)
 /* All nodes of an attachment on every rank, in the order of their numbers */
 PetscErrorCode Gather(const FeModel &m, const Attachment &a, std::vector<SetNode> *all)
 {
-  std::vector<SetNode> mine;
+  std::vector<PetscInt> own;
+  std::vector<double>   weight;
+  std::vector<SetNode>  mine;
   PetscFunctionBegin;
-  for (PetscInt n : m.sets.at(a.set.empty() ? a.name : a.set)) {
-    const double *X = &m.coordinates[3 * (n - m.first)];
-    mine.push_back({n, {X[0], X[1], X[2]}});
+  for (PetscInt n : m.sets.at(a.set.empty() ? a.name : a.set)) own.push_back(n - m.first);
+  PetscCall(WeightsOfNodes(m, a, own, &weight));
+  for (std::size_t i = 0; i < own.size(); i++) {
+    const double *X = &m.coordinates[3 * own[i]];
+    mine.push_back({m.first + own[i], {X[0], X[1], X[2]}, weight[i]});
   }
   PetscCall(GatherAll(m.comm, mine, all));
   std::sort(all->begin(), all->end(), [](const SetNode &p, const SetNode &q) { return p.node < q.node; });
@@ -120,7 +124,7 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
   *point     = Vector3::Zero();
   for (std::size_t i = 0; i < nodes.size(); i++) {
     t.node.push_back(nodes[i].node);
-    t.weight.push_back(a.weights.empty() ? 1 : a.weights[i]);
+    t.weight.push_back(nodes[i].weight);
     sum += t.weight.back();
     *point += t.weight.back() * Eigen::Map<const Vector3>(nodes[i].X);
   }
@@ -245,7 +249,9 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
     x->ties.back().frame = Marker{(PetscInt)DataOf(scene).markers.size() - 1};
     frames_[a.name]      = frame;
   }
+  name_      = name;
   scene_     = DataOf(scene).number;
+  model_     = SceneAccess::model(scene);
   extension_ = (PetscInt)DataOf(scene).extensions.size();
   DataOf(scene).extensions.push_back(std::move(x));
   PetscFunctionReturn(0);
@@ -254,7 +260,13 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
 Body FullFeBody::attachment(const std::string &name) const
 {
   const auto found = frames_.find(name);
-  return found == frames_.end() ? Body{} : found->second;
+  if (found != frames_.end()) return found->second;
+  if (const auto model = model_.lock()) {
+    std::string known;
+    for (const auto &f : frames_) known += (known.empty() ? "" : ", ") + f.first;
+    model->scene.errors.push_back("finite-element body " + name_ + ": it has no attachment " + name + (known.empty() ? ", in fact none" : ", but " + known));
+  }
+  return Body{};
 }
 
 namespace
@@ -275,19 +287,29 @@ PetscErrorCode Find(TS ts, PetscInt scene, PetscInt extension, const Runtime **R
 
 PetscErrorCode FullFeBody::positions(TS ts, PetscReal t, std::vector<double> *x) const
 {
-  Vec           U;
-  const double *u;
+  Vec                  now, U = nullptr;
+  PetscReal            present;
+  const double        *u;
   const Runtime       *R;
   const FullExtension *e;
+  PetscErrorCode (*read)(TS);
   PetscFunctionBegin;
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3ReadCheckpoint_C", &read)); /* a file that waits for the set-up */
+  if (read) PetscCall(read(ts));
   PetscCall(Find(ts, scene_, extension_, &R, &e));
-  PetscCall(TSGetSolution(ts, &U));
-  PetscCall(VecDuplicate(U, &U));
-  PetscCall(TSHHT3Interpolate(ts, t, U, nullptr, nullptr));
-  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(TSGetSolution(ts, &now));
+  PetscCall(TSGetTime(ts, &present));
+  if (t != present) { /* where the run is, there need not be a step: before the first one, in equilibrium, after a restart */
+    PetscCall(VecDuplicate(now, &U));
+    const PetscErrorCode failed = TSHHT3Interpolate(ts, t, U, nullptr, nullptr);
+    if (failed) PetscCall(VecDestroy(&U));
+    PetscCall(failed);
+    now = U;
+  }
+  PetscCall(VecGetArrayRead(now, &u));
   const double *own = u + e->start[R->rank] - R->start;
   x->assign(own, own + e->coordinates());
-  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(now, &u));
   PetscCall(VecDestroy(&U));
   PetscFunctionReturn(0);
 }

@@ -180,6 +180,7 @@ PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscCall(RelaxAt(R, t, U, &iterations));
   PetscCall(TSSetTime(ts, t));
   PetscCall(KeepStart(ts, V)); /* accelerations are zero as velocities are */
+  PetscCall(StartWithMotions(ts));
   PetscFunctionReturn(0);
 }
 

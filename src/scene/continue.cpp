@@ -213,6 +213,51 @@ PetscErrorCode ToNearestConsistent(TS ts)
   PetscFunctionReturn(0);
 }
 
+/* Rows of constraints that are not met at rest, or not for long: those of motions that do not stand still */
+static PetscErrorCode Moving(Runtime &R, double t, Vec U, Vec V, PetscBool *moving)
+{
+  const double soon = 1e-6 * std::max(1., std::abs(t));
+  Vec          now, later, rows;
+  double       most;
+  PetscFunctionBegin;
+  *moving = PETSC_FALSE;
+  PetscCall(VecDuplicate(U, &now));
+  PetscCall(VecDuplicate(U, &later));
+  PetscCall(Residual(R, t, U, V, V, now));
+  PetscCall(Residual(R, t + soon, U, V, V, later));
+  PetscCall(VecAXPY(later, -1, now));
+  for (const auto &[role, F] : {std::pair(TSHHT3_HOLONOMIC, later), std::pair(TSHHT3_NONHOLONOMIC, now)}) {
+    PetscCall(VecGetSubVector(F, R.roles[role], &rows));
+    PetscCall(VecNorm(rows, NORM_INFINITY, &most));
+    PetscCall(VecRestoreSubVector(F, R.roles[role], &rows));
+    if (most > 0) *moving = PETSC_TRUE;
+  }
+  PetscCall(VecDestroy(&now));
+  PetscCall(VecDestroy(&later));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode StartWithMotions(TS ts)
+{
+  Runtime     &R = *RunOf(ts);
+  PetscReal    t;
+  Vec          U, V;
+  const char  *prefix;
+  PetscBool    moving, chosen;
+  PetscOptions options;
+  PetscFunctionBegin;
+  PetscCall(TSGetOptionsPrefix(ts, &prefix));
+  PetscCall(PetscObjectGetOptions((PetscObject)ts, &options));
+  PetscCall(PetscOptionsHasName(options, prefix, "-ts_hhtdae_start", &chosen));
+  if (chosen) PetscFunctionReturn(0);
+  if (R.scene.start.assembly == Assembly::Off) PetscFunctionReturn(0);
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(Moving(R, t, U, V, &moving));
+  if (moving) PetscCall(TSHHT3SetStart(ts, TSHHT3_START_PROJECT));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Scene::createTS(TS *ts, TS from)
 {
   Runtime  *old;

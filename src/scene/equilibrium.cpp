@@ -51,17 +51,28 @@ struct Attempt {
   double reach = INFINITY, work[2] = {0, 0};
 };
 
-/* The forces that rounding of the coordinates makes */
+/* The forces that rounding makes of the coordinates, and of places of bodies, which are held against those of markers (Stops.ALoadOnAStopAnywhere) */
 PetscErrorCode Rounding(Equilibrium &E, double *force)
 {
-  Unbalanced   at;
-  PetscRandom  random;
+  Unbalanced    at;
+  PetscRandom   random;
+  const double *u;
+  double       *d;
   PetscFunctionBegin;
   PetscCall(PetscRandomCreate(E.R.scene.comm, &random));
   PetscCall(PetscRandomSetInterval(random, -PETSC_MACHINE_EPSILON, PETSC_MACHINE_EPSILON));
   PetscCall(VecSetRandom(E.d, random));
   PetscCall(PetscRandomDestroy(&random));
-  PetscCall(VecPointwiseMult(E.d, E.d, E.U));
+  PetscCall(VecGetArrayRead(E.U, &u));
+  std::vector<double> size(u, u + E.R.n);
+  PetscCall(VecRestoreArrayRead(E.U, &u));
+  for (PetscInt b = 0; b < E.R.bodies.own; b++) {
+    const LocalBody &k = E.R.bodies.body[b];
+    for (int c = 0; c < std::min(PlanarScene(k.kind) ? 2 : 3, Coordinates(k.kind)); c++) size[k.first + c] = std::max(std::abs(size[k.first + c]), E.size);
+  }
+  PetscCall(VecGetArray(E.d, &d));
+  for (PetscInt i = 0; i < E.R.n; i++) d[i] *= size[i];
+  PetscCall(VecRestoreArray(E.d, &d));
   PetscCall(VecWAXPY(E.next, 1, E.d, E.U));
   PetscCall(Residual(E.R, E.t, E.next, E.zero, E.zero, E.start));
   PetscCall(VecAXPY(E.start, -1, E.F));
@@ -274,6 +285,7 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
       h /= 4;
       continue;
     }
+    E.scale = std::max(E.scale, at.force); /* variables that carry loads may begin at zero (SceneEquilibrium.ALoopThroughAVariable) */
     PetscCall(Balanced(E, at, found));
     h     *= Growth(a, before, at);
     before = at.force;

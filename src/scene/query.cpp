@@ -168,7 +168,7 @@ PetscErrorCode Snapshot::Work::hasBody(PetscInt body) const
 {
   PetscFunctionBegin;
   PetscCheck(body < (PetscInt)R->local_body.size(), scene().comm, PETSC_ERR_ARG_WRONGSTATE,
-             "Snapshot: body %s came too late: the scene is fixed from createTS() or setUp() on; ask for attachments and nodes, Scene::attachment() and node(), before",
+             "Snapshot: body %s came too late: the scene is fixed from its set-up or first run on; ask flexible bodies for their attachments and nodes, attachment() and node(), before",
              scene().bodyName(body).c_str());
   PetscFunctionReturn(0);
 }
@@ -178,7 +178,7 @@ PetscErrorCode Snapshot::Work::hasElement(PetscInt element) const
   const ElementData &e     = scene().elements[element];
   const auto         known = [](const Part &p) { return p.index < (PetscInt)p.store->start.size(); };
   PetscFunctionBegin;
-  PetscCheck(std::all_of(e.parts.begin(), e.parts.end(), known), scene().comm, PETSC_ERR_ARG_WRONGSTATE, "Snapshot: element %s came too late: the scene is fixed from createTS() or setUp() on",
+  PetscCheck(std::all_of(e.parts.begin(), e.parts.end(), known), scene().comm, PETSC_ERR_ARG_WRONGSTATE, "Snapshot: element %s came too late: the scene is fixed from its set-up or first run on",
              e.name.c_str());
   PetscFunctionReturn(0);
 }

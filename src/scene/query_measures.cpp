@@ -113,7 +113,7 @@ PetscErrorCode Snapshot::value(const Measure &m, double *x)
   if (of_element) PetscCall(w.hasElement(m.target));
   if (m.kind == Measure::Value || m.kind == Measure::StateValue)
     PetscCheck(m.target < (PetscInt)(m.kind == Measure::Value ? N.variable : N.state).size(), s.comm, PETSC_ERR_ARG_WRONGSTATE,
-               "Snapshot::value(): the %s came too late: the scene is fixed from createTS() or setUp() on", m.kind == Measure::Value ? "variable" : "state");
+               "Snapshot::value(): the %s came too late: the scene is fixed from its set-up or first run on", m.kind == Measure::Value ? "variable" : "state");
   if (of_element && s.elements[m.target].parts.empty()) PetscFunctionReturn(0); /* absent */
   switch (m.kind) {
   case Measure::Time: *x = w.t; break;

@@ -10,14 +10,37 @@ namespace hhtdae
 namespace
 {
 
+constexpr int    scalings = 3, refinements = 5;
+constexpr double backward = 1e-13; /* error, of the largest terms */
+
 /* One pattern for all frequencies, which is analyzed once */
 struct Response {
-  Mat K = nullptr, A = nullptr; /* K with the pattern of M, too; the system */
-  Vec b = nullptr, x = nullptr;
+  Mat K = nullptr, A = nullptr; /* K with the pattern of M, too; the system, rows and columns times D */
+  Vec b = nullptr, x = nullptr, D = nullptr, residual = nullptr, change = nullptr;
   KSP ksp = nullptr;
 };
 
-/* A = [S -w C; w C S], S = K - w^2 M */
+/* A <- D A D with largest entries of rows and columns near one (Ruiz 2001): a body's stiffness stands beside the ones of constraints, and pivots are chosen
+   by size (Response.AStiffBodyOnRigidTies). */
+PetscErrorCode Scale(Response &r)
+{
+  PetscFunctionBegin;
+  PetscCall(VecSet(r.D, 1));
+  for (int k = 0; k < scalings; k++) {
+    PetscScalar *d;
+    PetscInt     n;
+    PetscCall(MatGetRowMaxAbs(r.A, r.change, nullptr));
+    PetscCall(VecGetLocalSize(r.change, &n));
+    PetscCall(VecGetArray(r.change, &d));
+    for (PetscInt i = 0; i < n; i++) d[i] = d[i] > 0 ? 1 / std::sqrt(d[i]) : 1;
+    PetscCall(VecRestoreArray(r.change, &d));
+    PetscCall(MatDiagonalScale(r.A, r.change, r.change));
+    PetscCall(VecPointwiseMult(r.D, r.D, r.change));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* A = D [S -w C; w C S] D, S = K - w^2 M */
 PetscErrorCode DynamicStiffness(const Linearization::Work &w, double omega, Response &r)
 {
   Mat S, up, down, nest;
@@ -33,6 +56,9 @@ PetscErrorCode DynamicStiffness(const Linearization::Work &w, double omega, Resp
   PetscCall(MatConvert(nest, MATAIJ, r.A ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r.A));
   PetscCall(MatDestroy(&nest));
   for (Mat *x : {&S, &up, &down}) PetscCall(MatDestroy(x));
+  if (!r.D)
+    for (Vec *x : {&r.b, &r.x, &r.D, &r.residual, &r.change}) PetscCall(MatCreateVecs(r.A, x, nullptr));
+  PetscCall(Scale(r));
   PetscFunctionReturn(0);
 }
 
@@ -45,7 +71,6 @@ PetscErrorCode Begin(const Linearization::Work &w, double omega, const std::vect
   PetscCall(MatScale(r.K, 0));
   PetscCall(MatAXPY(r.K, 1, w.K, DIFFERENT_NONZERO_PATTERN));
   PetscCall(DynamicStiffness(w, omega, r));
-  PetscCall(MatCreateVecs(r.A, &r.x, &r.b));
   PetscCall(VecSet(r.b, 0));
   PetscCall(VecGetArray(r.b, &put));
   std::copy(load.begin(), load.end(), put);
@@ -65,21 +90,48 @@ PetscErrorCode End(Response &r)
 {
   PetscFunctionBegin;
   for (Mat *x : {&r.K, &r.A}) PetscCall(MatDestroy(x));
-  for (Vec *x : {&r.b, &r.x}) PetscCall(VecDestroy(x));
+  for (Vec *x : {&r.b, &r.x, &r.D, &r.residual, &r.change}) PetscCall(VecDestroy(x));
   PetscCall(KSPDestroy(&r.ksp));
+  PetscFunctionReturn(0);
+}
+
+/* x with A x = D b, refined until what is left is rounding */
+PetscErrorCode Refined(const Linearization::Work &w, double omega, Response &r)
+{
+  double norm, left, size, most;
+  PetscFunctionBegin;
+  PetscCall(MatNorm(r.A, NORM_INFINITY, &norm));
+  PetscCall(VecPointwiseMult(r.residual, r.D, r.b));
+  PetscCall(VecNorm(r.residual, NORM_INFINITY, &most));
+  PetscCall(VecSet(r.x, 0));
+  left = most;
+  for (int k = 0; k <= refinements && left > backward * most; k++) {
+    KSPConvergedReason reason;
+    PetscCall(KSPSolve(r.ksp, r.residual, r.change));
+    PetscCall(KSPGetConvergedReason(r.ksp, &reason));
+    PetscCheck(reason > 0, w.comm(), PETSC_ERR_NOT_CONVERGED, "Linearization::response(): no solution at %g rad/s (%s): an undamped mode has that frequency, or a body that nothing holds is pushed at 0 rad/s",
+               omega, KSPConvergedReasons[reason]);
+    PetscCall(VecAXPY(r.x, 1, r.change));
+    PetscCall(VecPointwiseMult(r.residual, r.D, r.b));
+    PetscCall(VecNorm(r.residual, NORM_INFINITY, &most));
+    PetscCall(MatMult(r.A, r.x, r.change));
+    PetscCall(VecAXPY(r.residual, -1, r.change));
+    PetscCall(VecNorm(r.residual, NORM_INFINITY, &left));
+    PetscCall(VecNorm(r.x, NORM_INFINITY, &size));
+    most += norm * size;
+  }
+  PetscCheck(left <= 1e3 * backward * most, w.comm(), PETSC_ERR_NOT_CONVERGED,
+             "Linearization::response(): the linear solver leaves %g of the load at %g rad/s; take another one, -scene_response_pc_factor_mat_solver_type mumps for example", left / most, omega);
+  PetscCall(VecPointwiseMult(r.x, r.x, r.D));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Solve(const Linearization::Work &w, double omega, Response &r, std::vector<std::complex<double>> &x)
 {
-  KSPConvergedReason reason;
-  const double      *get;
-  const std::size_t  n = (std::size_t)w.R->n;
+  const double     *get;
+  const std::size_t n = (std::size_t)w.R->n;
   PetscFunctionBegin;
-  PetscCall(KSPSolve(r.ksp, r.b, r.x));
-  PetscCall(KSPGetConvergedReason(r.ksp, &reason));
-  PetscCheck(reason > 0, w.comm(), PETSC_ERR_NOT_CONVERGED, "Linearization::response(): no solution at %g rad/s (%s): an undamped mode has that frequency, or a body that nothing holds is pushed at 0 rad/s",
-             omega, KSPConvergedReasons[reason]);
+  PetscCall(Refined(w, omega, r));
   x.resize(n);
   PetscCall(VecGetArrayRead(r.x, &get));
   for (std::size_t i = 0; i < n; i++) x[i] = {get[i], get[n + i]};

@@ -153,6 +153,7 @@ PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R)
 PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R);
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy);
 PetscErrorCode ReadCheckpoint(TS ts);      /* a file that TSHHT3CheckpointLoad() has noted for the set-up */
+PetscErrorCode StartWithMotions(TS ts);    /* a run from rest, where a motion moves something: its start finds the velocities, unless the user says how it is to start */
 PetscErrorCode ToNearestConsistent(TS ts); /* the state of a run that has not begun, in the metric of its mass matrix, with the axes of its angles */
 PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, which has its multipliers */
 /* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has

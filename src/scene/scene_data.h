@@ -162,7 +162,7 @@ struct SceneData {
   bool valid(Element e) const { return mine(e) && e.id >= 0 && e.id < (PetscInt)elements.size(); }
   void refuseLate(const std::string &what) /* an error if the scene is fixed already */
   {
-    if (fixed) errors.push_back(what + " came too late: the scene is fixed from createTS() or setUp() on");
+    if (fixed) errors.push_back(what + " came too late: the scene is fixed from its set-up or first run on");
   }
   Vector3 gravityAt(double t) const; /* less the ground's acceleration */
   /* at the start */

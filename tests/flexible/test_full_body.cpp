@@ -175,6 +175,51 @@ TEST(FullBody, UnloadedInEquilibrium)
   }
 }
 
+/* Where no step has been made the nodes are where the run stands: at the start, and in the shape of static equilibrium */
+TEST(FullBody, PositionsBeforeTheFirstStep)
+{
+  const double L = 2, g = 9.81;
+  for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
+    Beam8      beam({4, 1, 1}, {1e5, 0, 2});
+    Scene      scene(PETSC_COMM_WORLD);
+    FullBody   b;
+    FullFeBody fe;
+    b.law         = law;
+    b.attachments = {{"left"}};
+    scene.gravity({g, 0, 0}); /* along the beam */
+    must(fe.add(scene, "beam", beam.model, b));
+    const Marker left = scene.marker(fe.attachment("left"));
+    const auto   l    = DataOf(scene).frame(left);
+    scene.add("clamp", Fixed{left, scene.marker(scene.ground(), l.x, l.R)});
+    SceneRun run(scene, 1, "");
+    Array    x;
+    must(fe.positions(run.ts, 0, &x));
+    EXPECT_EQ(x, beam.model.coordinates);
+    must(StaticEquilibrium(run.ts, 0));
+    must(fe.positions(run.ts, 0, &x));
+    ASSERT_EQ(x.size(), beam.model.coordinates.size());
+    for (PetscInt n : beam.model.sets["right"]) EXPECT_NEAR(x[3 * n] - L, 2 * g * L * L / (2 * 1e5), 1e-2 * 2 * g * L * L / (2 * 1e5));
+    ErrorTrap trap;
+    EXPECT_NE(fe.positions(run.ts, 0.5, &x), 0);
+    EXPECT_TRUE(trap.says("There is no step")) << trap.message;
+  }
+}
+
+/* By the body's name, with the attachments that there are */
+TEST(FullBody, UnknownAttachment)
+{
+  Beam8      beam;
+  Scene      scene(PETSC_COMM_WORLD);
+  FullFeBody fe;
+  FullBody   b;
+  b.attachments = {{"left"}, {"right"}};
+  must(fe.add(scene, "beam", beam.model, b));
+  scene.marker(fe.attachment("middle"));
+  ErrorTrap trap;
+  EXPECT_NE(scene.setUp(), 0);
+  EXPECT_TRUE(trap.says("finite-element body beam: it has no attachment middle, but left, right")) << trap.message;
+}
+
 TEST(FullBody, RefusesByName)
 {
   const auto refused = [](const std::function<void(FeModel &, FullBody &)> &spoil, const char *why) {

@@ -355,7 +355,7 @@ TEST(KeptNodes, DynamicsUnderPressure)
   EXPECT_LT(off, 1e-3);
 }
 
-/* A block on springs that its bottom nodes press: the model's stiffness and the contact's, which is linear beyond its onset, and the weight of each node */
+/* A block on springs that its bottom nodes press: the model's stiffness and the contact's, and the weight of each node */
 TEST(KeptNodes, ABlockOnThePlane)
 {
   Small       s;

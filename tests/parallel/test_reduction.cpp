@@ -1,7 +1,11 @@
 /* Reductions on all ranks together and on every rank alone */
 #include "box_model.h"
+#include "fe_mesh.h"
 #include "hhtdae/flexible.h"
+#include "scene/model.h"
 #include "support.h"
+#include <algorithm>
+#include <numeric>
 
 using namespace hhtest;
 using namespace hhtdae;
@@ -163,6 +167,45 @@ TEST(ReductionRanks, AttachmentOnAllRanks)
     EXPECT_LT((a.modal.omega - s.modal.omega).cwiseQuotient(s.modal.omega).cwiseAbs().maxCoeff(), 1e-10);
     EXPECT_LT(shapeOff(a, s), 1e-6);
   }
+}
+
+/* Nodes of a mesh get their global numbers from the partition; weights go by labels, which are the same on any number of ranks: here the attachment's default
+   position is the weighted centroid, at an end whose nodes are all alike but for their places */
+TEST(ReductionRanks, WeightsGoByLabels)
+{
+  MeshBox box{ElementType::Brick20, 7, 2, 2};
+  FeModel together(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
+  must(readBox(together, box));
+  must(readBox(alone, box));
+  std::vector<std::pair<PetscInt, Vector3>> nodes;
+  for (PetscInt n : alone.sets["right"]) nodes.push_back({alone.label[n], Eigen::Map<const Vector3>(&alone.coordinates[3 * n])});
+  std::sort(nodes.begin(), nodes.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
+  Attachment right;
+  right.name       = "right";
+  right.tie        = Tie::Average;
+  Vector3 centroid = Vector3::Zero();
+  double  sum      = 0;
+  for (const auto &n : nodes) {
+    right.weights.push_back(1 + sum);
+    centroid += right.weights.back() * n.second;
+    sum += 0.3 + 0.01 * sum;
+  }
+  centroid /= std::accumulate(right.weights.begin(), right.weights.end(), 0.);
+  ReducedBody a, s;
+  Reduction   r;
+  r.attachments = {Attachment{"left"}, right};
+  r.modes       = 4;
+  must(Reduce(together, r, &a));
+  must(Reduce(alone, r, &s));
+  EXPECT_LT((a.modal.attachments[1].position - centroid).norm(), 1e-12);
+  EXPECT_LT((s.modal.attachments[1].position - centroid).norm(), 1e-12);
+  EXPECT_LT((a.modal.omega - s.modal.omega).cwiseQuotient(s.modal.omega).cwiseAbs().maxCoeff(), 1e-8);
+  Scene      scene(PETSC_COMM_WORLD);
+  FullFeBody fe;
+  FullBody   b;
+  b.attachments = {right};
+  must(fe.add(scene, "whole", together, b));
+  EXPECT_LT((DataOf(scene).frame(scene.marker(fe.attachment("right"))).x - centroid).norm(), 1e-12);
 }
 
 TEST(ReductionRanks, ErrorsOnAllRanks)

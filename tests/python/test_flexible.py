@@ -186,6 +186,57 @@ class Beam(unittest.TestCase):
         np.testing.assert_allclose(whole.positions(run)[:, 2] - self.model.coordinates[:, 2], -0.5 * 9.81 * 0.01**2, atol=1e-8)
         self.assertAlmostEqual(run["z"][-1], -0.5 * 9.81 * 0.01**2, delta=1e-8)
 
+    def test_whole_model_before_the_first_step(self):
+        """Nodes, fields and meshes where no step has been made: at the start, and in the shape of static equilibrium"""
+        scene = h.Scene(gravity=(0, 0, -9.81))
+        whole = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law="small", attachments=[flexible.Attachment("root"), flexible.Attachment("tip", tie="average")]))
+        scene.add("clamp", h.Fixed(whole.attachment("root").marker(), scene.ground.marker()))
+        tip = whole.attachment("tip").marker()
+        np.testing.assert_allclose(whole.positions(scene.run()), self.model.coordinates, atol=1e-14)
+        run = scene.run().equilibrium()
+        moved = whole.positions(run) - self.model.coordinates
+        sag = run.snapshot().motion(tip).position[2]
+        self.assertAlmostEqual(sag, -9.81 * MASS * L**3 / (8 * E * D**4 / 12), delta=0.02 * abs(sag))
+        self.assertAlmostEqual(moved[self.model.sets["tip"], 2].mean(), sag, delta=1e-9 * abs(sag))
+        file = os.path.join(self.folder.name, "static.vtu")
+        whole.write_field(run, file)
+        self.assertGreater(os.path.getsize(file), 1000)
+        with self.assertRaisesRegex(h.Error, "There is no step"):
+            whole.positions(run, 0.1)
+
+    def test_weights_in_the_order_of_labels(self):
+        """The default position of an average is the weighted centroid"""
+        order = np.argsort(self.model.label[self.model.sets["tip"]])
+        weights = np.linspace(1, 5, len(order))
+        body = flexible.reduce(self.model, [flexible.Attachment("tip", tie="average", weights=weights)], modes=4)
+        x = self.model.coordinates[self.model.sets["tip"][order]]
+        np.testing.assert_allclose(body.modal().attachments["tip"], weights @ x / weights.sum(), atol=1e-12)
+
+    def test_unknown_attachment(self):
+        """Of a whole model, by the body's name and with the attachments that there are"""
+        scene = h.Scene()
+        whole = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(attachments=[flexible.Attachment("root"), flexible.Attachment("tip")]))
+        whole.attachment("middle").marker()
+        with self.assertRaisesRegex(h.Error, "beam: it has no attachment middle, but root, tip"):
+            scene.run()
+
+    def test_response_of_a_stiff_body(self):
+        """Near a resonance, damped by 2e-4 of critical damping: against dense matrices with the root held. Stiffness and constraints differ by 1e11."""
+        model = flexible.FeModel.from_mesh(beam_mesh(os.path.join(self.folder.name, "coarse.msh"), L, D, D, (5, 1, 1)), flexible.Material(E, 0.3, RHO))
+        scene = h.Scene()
+        whole = flexible.FullFeBody(scene, "beam", model, flexible.FullBody(law="small", mass_damping=0.1, attachments=[flexible.Attachment("root"), flexible.Attachment("tip", tie="average")]))
+        scene.add("clamp", h.Fixed(whole.attachment("root").marker(), scene.ground.marker()))
+        tip = whole.attachment("tip").marker()
+        w = 2 * np.pi * np.array([5., 20., 41.17, 263.])
+        found = scene.run().linearize().response(h.Excitation.force(tip, (0, 0, 1)), h.displacement(tip, "z"), w)
+        K, M = (np.array(A.convert("dense").getDenseArray()) for A in (model.K.copy(), model.M.copy()))
+        free = np.setdiff1d(np.arange(3 * model.nodes), np.add.outer(3 * model.sets["root"], np.arange(3)).ravel())
+        nodes, load = model.sets["tip"], np.zeros(3 * model.nodes)
+        load[3 * nodes + 2] = 1 / len(nodes)
+        exact = [load[free] @ np.linalg.solve((K + (0.1j * x - x * x) * M)[np.ix_(free, free)], load[free]) for x in w]
+        np.testing.assert_allclose(found.real, np.real(exact), rtol=1e-5)
+        np.testing.assert_allclose(found.imag, np.imag(exact), rtol=1e-3)
+
     def test_mistakes(self):
         try:
             import scipy.sparse
@@ -208,6 +259,7 @@ class Beam(unittest.TestCase):
                                  (lambda: flexible.reduce(self.model, [], node_sets="tip"), TypeError, "list of names"),
                                  (lambda: flexible.FullFeBody(h.Scene(), "b", self.body), TypeError, "must be of a FeModel"),
                                  (lambda: h.Scene().add("b", h.FlexibleBody(self.body, damping=(100, 0.01))), ValueError, "list of .frequency, ratio."),
+                                 (lambda: h.Scene().add("b", h.FlexibleBody(self.body, damping=0.02, ratios=[0.1] * len(self.body.frequencies))), ValueError, "damping and ratios are both given"),
                                  (lambda: flexible.reduce(self.model, [flexible.Attachment("hub")]), h.Error, "hub"),
                                  (lambda: flexible.Attachment("tip", tie="glue")._fields(), ValueError, "rigid"),
                                  (lambda: flexible.FeModel.from_mesh("no such.msh", STEEL), h.Error, "no such.msh")):

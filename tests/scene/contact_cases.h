@@ -8,19 +8,18 @@
 namespace hhtdae
 {
 
-inline ContactLawData MakeLaw(double k, double e, double c, double mu, double vs, double onset = .1)
+inline ContactLaw MakeLaw(double k, double e, double c, double mu, double vs)
 {
-  ContactLawData law;
+  ContactLaw law;
   law.stiffness     = k;
   law.exponent      = e;
   law.damping       = c;
   law.friction      = mu;
   law.slip_velocity = vs;
-  law.onset         = onset;
   return law;
 }
 
-inline ContactLawData SomeLaw(Random &random)
+inline ContactLaw SomeLaw(Random &random)
 {
   const double exponents[] = {1, 1.5, 2, 2.2};
   const double e           = exponents[(int)random(0, 3.999)];

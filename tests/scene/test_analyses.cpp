@@ -148,6 +148,43 @@ TEST(Analyses, MotionsAreHeldStill)
   EXPECT_NEAR(l.force(0), 0, 1e-9) << "no force makes anything faster";
 }
 
+/* A base that a motion shakes, with a mass on a spring on it: the run from equilibrium begins with the velocity of the base, by call and by the scene */
+TEST(Analyses, ARunFromEquilibriumGoesWithItsMotions)
+{
+  const double a = 1e-3, w = 7, mass = 2, k = 500, g = 10;
+  for (bool by_scene : {false, true}) {
+    Scene      scene(PETSC_COMM_SELF);
+    RigidBody  one;
+    const Body base        = scene.add("base", one);
+    one.mass               = mass;
+    one.position           = {0, 0, 0.5};
+    const Body   top       = scene.add("top", one);
+    const Marker on_ground = scene.marker(scene.ground()), on_base = scene.marker(base), on_top = scene.marker(top);
+    scene.add("guide", Translational{on_base, on_ground});
+    scene.add("drive", TranslationalMotion{on_base, on_ground, TimeFunction::harmonic(a, w)});
+    scene.add("column", Translational{on_top, on_base});
+    SpringDamper spring{on_top, on_base};
+    spring.stiffness = k;
+    spring.length    = 0.5;
+    scene.add("spring", spring);
+    scene.gravity({0, 0, -g});
+    scene.start().equilibrium = by_scene;
+    scene.start().assembly    = Assembly::Project;
+    OwnTS    run(scene);
+    Snapshot now;
+    Motion   x;
+    if (!by_scene) must(StaticEquilibrium(run.ts, 0));
+    must(TSSetTolerances(run.ts, 1e-9, nullptr, 1e-9, nullptr));
+    must(TSSetMaxTime(run.ts, 2));
+    must(scene.solve(run.ts));
+    must(now.take(run.ts));
+    must(now.motion(on_top, &x));
+    /* z'' = W^2 (a sin wt - z) about equilibrium, from rest */
+    const double W = std::sqrt(k / mass), t = 2, forced = a * W * W / (W * W - w * w);
+    EXPECT_NEAR(x.position(2), 0.5 - mass * g / k + forced * (std::sin(w * t) - w / W * std::sin(W * t)), 2e-5);
+  }
+}
+
 /* Answers are those of the state that there is: after it was changed by hand, those of the changed one */
 TEST(Analyses, AStateThatWasChangedByHand)
 {

@@ -56,7 +56,6 @@ TYPED_TEST(ContactKernel, UndampedForceHasAPotential)
   for (int k = 0; k < 30; k++) {
     Encounter<TypeParam> s(random);
     s.d.law.damping = s.d.law.friction = 0;
-    s.d.law.onset                      = k % 2 ? .1 : 1;
     const DynamicVector rate           = Difference([&](double h) { return s.energyAfter(h); });
     EXPECT_NEAR(s.power(), -rate(0), 1e-7 * (1 + std::abs(rate(0))));
   }

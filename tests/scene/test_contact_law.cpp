@@ -17,27 +17,16 @@ TEST(ContactLaw, RampIsTwiceContinuouslyDifferentiable)
   EXPECT_NEAR(slope, 1, 1e-9);
 }
 
-TEST(ContactLaw, LinearLawSetsInSmoothly)
-{
-  const ContactLawData law = MakeLaw(7, 1, 0, 0, 1, .1);
-  EXPECT_NEAR(ElasticForce<double>(law, .1), .7, 1e-15);
-  EXPECT_NEAR(ElasticForce<double>(law, .5), 3.5, 1e-15);
-  using T = Dual<1>;
-  EXPECT_NEAR(ElasticForce<T>(law, T(.1 - 1e-12, 0)).derivatives()(0), 7, 1e-9);
-  EXPECT_NEAR(ElasticForce<T>(law, T(1e-12, 0)).derivatives()(0), 0, 1e-9);
-  for (double d = .001; d < .1; d += .001) EXPECT_GT(ElasticForce<T>(law, T(d, 0)).derivatives()(0), 0);
-}
-
 TEST(ContactLaw, ExponentsByTheirShortCuts)
 {
-  for (double e : {1.5, 1.5000001})
+  for (double e : {1., 1.0000001, 1.5, 1.5000001})
     EXPECT_NEAR(ElasticForce<double>(MakeLaw(2, e, 0, 0, 1), .3), 2 * std::pow(.3, e), 1e-14);
 }
 
 /* parting fast, the force is zero, where Hunt and Crossley's would pull; at rest N = k d^e, damped 1 + c d' */
 TEST(ContactLaw, DampingFactor)
 {
-  const ContactLawData law = MakeLaw(10, 2, 2, 0, 1);
+  const ContactLaw     law = MakeLaw(10, 2, 2, 0, 1);
   const Vec3<double>   n(0, 0, 1);
   const double         elastic = 10 * .2 * .2;
   auto                 N = [&](double rate) { return ContactForce<double>(law, .2, n, Vec3<double>(1, 2, -rate))(2); };
@@ -51,7 +40,7 @@ TEST(ContactLaw, DampingFactor)
 
 TEST(ContactLaw, FrictionLimit)
 {
-  const ContactLawData law = MakeLaw(10, 1.5, 0, .4, 1e-2);
+  const ContactLaw     law = MakeLaw(10, 1.5, 0, .4, 1e-2);
   const Vec3<double>   n(0, 0, 1);
   const double         N = 10 * std::pow(.25, 1.5);
   Vec3<double>         F = ContactForce<double>(law, .25, n, Vec3<double>(.6, -.8, 5));
@@ -95,7 +84,7 @@ TEST(ContactLaw, SpeedAfterImpact)
 {
   for (double e : {1., 1.5, 2.}) {
     const double c = .3, u = 2;
-    const Bounce ball{{{1, 2}, MakeLaw(1e3, e, c, .5, 1, 1e-3)}, 0};
+    const Bounce ball{{{1, 2}, MakeLaw(1e3, e, c, .5, 1)}, 0};
     double       y = 0, v = -u;
     for (int k = 0; k < 1000000 && !(v > 0 && y > 0); k++) ball.step(y, v, 1e-5);
     auto G = [&](double s) { return s / c - std::log(1 + c * s) / (c * c); };

@@ -71,14 +71,14 @@ class FlexibleBody(Spec):
     position, rotation : (3,), (3, 3)
         Of the origin and axes (columns) of the FE model, space axes.
     velocity, angular_velocity : (3,)
-        Of the undeformed centre of mass, space axes.
+        Velocity of the undeformed centre of mass, space axes; that of a `hhtdae.flexible.FullBody` is of the origin of its FE model.
     mass : str
         "full", "partial" (without the terms quadratic in the modes) or "constant" (of the undeformed body).
     damping : float or sequence of (frequency, ratio)
         Ratio of critical, of all modes or by bands up to a frequency in cycles per unit of time: of the modes of `model`, those of the free body. Held somewhere,
         it vibrates more slowly in other modes, whose ratios are smaller: that of a cantilever's first mode is a fourteenth.
     ratios : (modes,), optional
-        The same, mode by mode.
+        The same, mode by mode, in place of `damping`.
     deformation, deformation_rate : (modes,), optional
         Modal coordinates at the start.
     """
@@ -106,6 +106,8 @@ class FlexibleBody(Spec):
             out["damping"] = [(np.inf, float(out["damping"]))] if out["damping"] else []
         elif len(out["damping"]) and np.shape(out["damping"])[1:] != (2,):
             raise ValueError("damping is %r, must be a ratio, or a list of (frequency, ratio)" % (self.damping,))
+        if self.ratios is not None and len(out["damping"]):
+            raise ValueError("damping and ratios are both given: the one is for all modes or by bands of frequency, the other mode by mode; give one of them")
         return out
 
 

@@ -52,7 +52,7 @@ class Attachment:
     position : (3,), optional
         Default: the centroid of the nodes.
     weights : sequence of float, optional
-        Of an average, in the order of the nodes' global numbers; default: equal.
+        Of an average, in the ascending order of the nodes' labels (`FeModel.label`), which is the same on any number of ranks; default: equal.
     """
     name: str
     set: str = ""
@@ -344,7 +344,9 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
     pressures : dict of load cases
         ``{name: set}`` or ``{name: (set, follows)}``: pressure one on the outer faces whose nodes are all in the set; it follows the surface, or not.
     nodal_loads : dict of load cases
-        ``{name: {label: (fx, fy, fz)}}``.
+        ``{name: {label: (fx, fy, fz)}}``. A load case of either kind brings no static (residual) vector into the modes: deflections under
+        it converge with their number. Where the static answer has to be exact, make an attachment of the loaded nodes (tie "average" stiffens nothing); kept
+        nodes alone do not help.
 
     Returns
     -------
@@ -404,6 +406,9 @@ class FullBody:
     """An FE model as a body of a scene, 3 coordinates a node, at the start.
 
     law : "large" (St. Venant-Kirchhoff material, total Lagrangian) or "small" (about the position at the start)
+    position, rotation : of the origin and axes (columns) of the FE model, undeformed, space axes
+    velocity : of the origin of the FE model, space axes; that of a `hhtdae.FlexibleBody` is of the centre of mass
+    angular_velocity : space axes
     mass_damping, stiffness_damping : C = a M + b K; with "large" b must be 0
     """
     law: str = "large"
@@ -438,15 +443,16 @@ class FullFeBody:
         return Body(self._scene, self._core.attachment(name), "%s.%s" % (self.name, name))
 
     def positions(self, run, time=None):
-        """Positions of own nodes at a time within the last step, (own, 3), space axes."""
+        """Positions of own nodes, (own, 3), space axes, at a time within the last step or where the run is (default): before the first step at the start,
+        after ``run.equilibrium()`` in equilibrium."""
         return self._core.positions(run._open(), run.time if time is None else time)
 
     def write_field(self, run, file, time=None):
-        """Displacements as a .vtu file."""
+        """Displacements as a .vtu file, at a time as of `positions`."""
         self._core.write_field(run._open(), run.time if time is None else time, str(file))
 
     def to_meshio(self, run, time=None):
-        """A meshio.Mesh of the body at a time within the last step: its undeformed nodes with their displacements. On one rank."""
+        """A meshio.Mesh of the body at a time as of `positions`: its undeformed nodes with their displacements. On one rank."""
         m = self._model
         placed = np.asarray(self._placed[0]) + m.coordinates @ np.asarray(self._placed[1]).T
         return _mesh(m.comm, placed, m.elements, {"label": m.label, "displacement": self.positions(run, time) - placed})

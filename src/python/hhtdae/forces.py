@@ -67,7 +67,8 @@ class NonlinearTorsionalSpring(_Joint):
 @_spec
 class Bushing(_Joint):
     """Six springs and dampers in j's axes: force f_0 - K d - C v, moment m_0 - K_t phi - C_t w on i's body about i's origin, for displacements d and
-    rotations phi of i in j. Components: force and moment on i in j's axes.
+    rotations phi of i in j. Rotations stay below half a turn: beyond it the moment has the wrong sign, also in planar scenes (a TorsionalSpringDamper counts
+    turns). Components: force and moment on i in j's axes.
 
     stiffness, torsional_stiffness : (3,), force per length, moment per radian, not negative
     damping, torsional_damping : (3,), force per velocity, moment per angular velocity, not negative
@@ -83,8 +84,8 @@ class Bushing(_Joint):
 
 @_spec
 class Beam(_Joint):
-    """Timoshenko beam without mass from j (x = 0) to i (x = length) along the markers' x axes; linear in its mean frame. Components: force and moment
-    on i in the mean frame. Planar scenes need E, area and Izz alone.
+    """Timoshenko beam without mass from j (x = 0) to i (x = length) along the markers' x axes; linear in its mean frame, for rotations of i
+    against j below half a turn: beyond it the torque has the wrong sign. Components: force and moment on i in the mean frame. Planar scenes need E, area and Izz alone.
 
     length : negative: the distance at the start
     E, G : Young's modulus, shear modulus
@@ -108,7 +109,8 @@ class Beam(_Joint):
 
 @_spec
 class UserForce(Spec):
-    """Force and moment on i's body, formulas in the axes of a marker. Components: force, then moment.
+    """Force and moment on i's body, formulas in the axes of a marker. Components: force, then moment. The error test sees a force where a step ends: one that acts
+    along a short piece of the way, where() of a position, wants steps shorter than that piece, options={"ts_adapt_dt_max": ...}.
 
     force, moment : three formulas each, or None
     frame : Marker, default: space axes
@@ -137,6 +139,9 @@ class UserScalarForce(_Joint):
 @_spec
 class ModalLoad(Spec):
     """A load case of a flexible body times a formula, in the axes of the body. Component: the scale.
+
+    Deflections converge with the number of modes. Where the static answer has to be exact, make an attachment of the loaded nodes, see
+    `hhtdae.flexible.reduce`.
 
     body : flexible Body
     load : name of the load case
@@ -279,7 +284,8 @@ class DistanceStop(_Joint):
 
 @_spec
 class JointFriction(Spec):
-    """Friction in a joint (Revolute, Translational, Cylindrical, Spherical) from its reaction N: moment mu r N or force mu N, regularized.
+    """Friction in a joint (Revolute, Translational, Cylindrical, Spherical) from its reaction force N: moment mu r N or force mu N, regularized.
+    Reaction moments add nothing.
 
     joint : Element
     coefficient : mu

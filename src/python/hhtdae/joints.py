@@ -155,7 +155,7 @@ class PointOnCurve(_Joint):
     """Origin of i on a curve in j's axes, a twice continuously differentiable spline through points.
 
     points : (n, 3)
-    closed : bool"""
+    closed : bool; an open curve goes on as a straight line beyond its ends"""
     points: Sequence[Vector]
     closed: bool = False
 

@@ -51,7 +51,11 @@ class Snapshot:
     """The state of a run at a time of its last step, made by `Run.snapshot`: answers questions that nobody has asked for beforehand.
 
     Accelerations and multipliers at a time within a step are those that belong to positions and velocities there, which costs about a factorization; at
-    the end of a step they are the step's own, at no cost and with an error many times as large. An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
+    the end of a step they are the step's own, at no cost and with an error many times as large, as a rule. With fast modes that hardly anything damps, of
+    flexible bodies above all, it is the other way round: what the interpolation of positions misses comes out in accelerations and reactions within the
+    step times the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance.
+
+    An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
     counted from there: make a channel of it, see `angle`. All calls are collective.
     """
 

@@ -346,7 +346,8 @@ class Run(Channels):
         return values if len(values) else np.empty((0, len(self._signature)))
 
     def sample(self, time: Any = None) -> Dict[str, float]:
-        """Values of all channels at a time of the last step (default: its end), by name; before the first step at the start."""
+        """Values of all channels at a time of the last step (default: its end), by name; before the first step at the start. About accelerations and
+        reactions within steps see `Snapshot`."""
         x = self.scene._core.sample(self._open(), self._at(time))
         return dict(zip([name for name, _ in self._signature], x))
 

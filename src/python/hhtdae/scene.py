@@ -405,7 +405,9 @@ class Scene:
         tolerance : float, optional
             Of the error of positions in every step, relative and absolute (PETSc's default: 1e-4).
         sample : float or None
-            Time between samples of the channels; 0: the end of every step, which costs nothing; None: nothing is recorded.
+            Time between samples of the channels; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
+            within steps are more accurate than those at their ends, as a rule, but not with fast modes that hardly anything damps, of flexible bodies
+            above all: see `Snapshot`. Those are better sampled at the ends of steps, or with a smaller tolerance.
         after : Run, optional
             The run goes on where that one is, with parameters as they are now.
         options : dict, optional

@@ -32,7 +32,7 @@ template <> Element Scene::enter(const std::string &name, const SpherePlane &s)
 {
   ElementBuilder e = Entry(*this, name, "sphere-plane contact", s.i, s.j, s.law, Round::I);
   RequirePositive(e, "radius", s.radius);
-  e.load<Contact<SpherePlaneShape>>({s.i, s.j}, {{s.radius, PlaneNormal(e)}, CheckedLaw(e, s.law, s.radius)}, {},
+  e.load<Contact<SpherePlaneShape>>({s.i, s.j}, {{s.radius, PlaneNormal(e)}, CheckedLaw(e, s.law)}, {},
                                     s.state);
   return e.done();
 }
@@ -42,7 +42,7 @@ template <> Element Scene::enter(const std::string &name, const EllipsoidPlane &
   ElementBuilder e = Entry(*this, name, "ellipsoid-plane contact", s.i, s.j, s.law, Round::No);
   for (int k = 0; k < 3; k++) RequirePositive(e, Component("semiaxis", k), s.semiaxes(k));
   const EllipsoidPlaneShape::Data shape{{s.semiaxes(0), s.semiaxes(1), s.semiaxes(2)}, PlaneNormal(e)};
-  e.load<Contact<EllipsoidPlaneShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law, s.semiaxes.minCoeff())}, {}, s.state);
+  e.load<Contact<EllipsoidPlaneShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();
 }
 
@@ -52,8 +52,7 @@ template <> Element Scene::enter(const std::string &name, const TorusPlane &s)
   e.require(!e.planar(), "a planar scene has no torus; a wheel is a SpherePlane with the outer radius");
   RequirePositive(e, "radius", s.radius);
   RequirePositive(e, "tube radius", s.tube);
-  const double size = s.radius + s.tube;
-  e.load<Contact<TorusPlaneShape>>({s.i, s.j}, {{s.radius, s.tube}, CheckedLaw(e, s.law, size)}, {}, s.state);
+  e.load<Contact<TorusPlaneShape>>({s.i, s.j}, {{s.radius, s.tube}, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();
 }
 
@@ -62,8 +61,7 @@ template <> Element Scene::enter(const std::string &name, const SphereSphere &s)
   ElementBuilder e = Entry(*this, name, "sphere-sphere contact", s.i, s.j, s.law, Round::Both);
   RequirePositive(e, "radius of i", s.radius_i);
   RequirePositive(e, "radius of j", s.radius_j);
-  const double size = std::min(s.radius_i, s.radius_j);
-  e.load<Contact<SphereSphereShape>>({s.i, s.j}, {{s.radius_i, s.radius_j}, CheckedLaw(e, s.law, size)}, {}, s.state);
+  e.load<Contact<SphereSphereShape>>({s.i, s.j}, {{s.radius_i, s.radius_j}, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();
 }
 
@@ -75,7 +73,7 @@ template <> Element Scene::enter(const std::string &name, const SphereBox &s)
   if (e.planar())
     shape.half[2] = std::numeric_limits<double>::infinity(); /* the nearest face is never above or below */
   for (int k = 0; k < (e.planar() ? 2 : 3); k++) RequirePositive(e, Component("half length", k), s.half(k));
-  e.load<Contact<SphereBoxShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law, s.radius)}, {}, s.state);
+  e.load<Contact<SphereBoxShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();
 }
 

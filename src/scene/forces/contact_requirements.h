@@ -8,8 +8,7 @@
 namespace hhtdae
 {
 
-/* size: of the smaller of two shapes, of a travel */
-inline ContactLawData CheckedLaw(ElementBuilder &e, const ContactLaw &law, double size)
+inline const ContactLaw &CheckedLaw(ElementBuilder &e, const ContactLaw &law)
 {
   RequirePositive(e, "stiffness", law.stiffness);
   RequireNotNegative(e, "damping", law.damping);
@@ -17,10 +16,7 @@ inline ContactLawData CheckedLaw(ElementBuilder &e, const ContactLaw &law, doubl
   RequirePositive(e, "slip velocity", law.slip_velocity);
   e.require(std::isfinite(law.exponent) && law.exponent >= 1,
             "exponent is " + Show(law.exponent) + ", must be 1 or more (Hertz: 1.5)");
-  ContactLawData d;
-  static_cast<ContactLaw &>(d) = law;
-  d.onset                      = 1e-4 * size; /* far less than a penetration that matters to a body of this size */
-  return d;
+  return law;
 }
 
 } // namespace hhtdae

@@ -108,7 +108,7 @@ std::vector<PetscInt> PlacesOf(ElementBuilder &e, const ModalBody &m, const Node
   return places;
 }
 
-template <class Shape> void Put(ElementBuilder &e, Marker i, Marker j, std::shared_ptr<const ContactNodes> nodes, const typename Shape::Data &shape, const ContactLawData &law)
+template <class Shape> void Put(ElementBuilder &e, Marker i, Marker j, std::shared_ptr<const ContactNodes> nodes, const typename Shape::Data &shape, const ContactLaw &law)
 {
   typename NodeContactStore<Shape>::Item item;
   item.marker[0] = i.id;
@@ -140,8 +140,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
   if (x.radius_j != 0) RequirePositive(e, "radius_j", x.radius_j);
   const auto                 &model  = s.bodies[x.body.id].flexible->model;
   const std::vector<PetscInt> places = PlacesOf(e, *model, x);
-  const double                size   = x.radius > 0 ? x.radius : std::sqrt(model->inertia().trace() / (2 * model->mass)); /* radius of gyration */
-  const ContactLawData        law    = CheckedLaw(e, x.law, size);
+  const ContactLaw            law    = CheckedLaw(e, x.law);
   if (!e.good()) return e.done();
   if (x.radius_j == 0) Put<SpherePlaneShape>(e, at, x.j, MakeContactNodes(model, places), {x.radius, 2}, law);
   else Put<SphereSphereShape>(e, at, x.j, MakeContactNodes(model, places), {x.radius, x.radius_j}, law);

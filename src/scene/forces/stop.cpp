@@ -8,27 +8,16 @@ namespace hhtdae
 namespace
 {
 
-/* size: of a travel that counts, for the smooth onset of a linear law */
-StopData CheckedStop(ElementBuilder &e, double lower, double upper, const ContactLaw &law, double size)
+StopData CheckedStop(ElementBuilder &e, double lower, double upper, const ContactLaw &law)
 {
   StopData d{};
   e.require(!std::isnan(lower) && !std::isnan(upper) && lower <= upper, "lower is " + Show(lower) + " and upper " + Show(upper) + ", must be numbers with lower <= upper");
   e.require(std::isfinite(lower) || std::isfinite(upper), "neither lower nor upper is given");
   e.require(law.friction == 0, "friction coefficient is " + Show(law.friction) + ", a stop has none");
-  if (std::isfinite(lower) && std::isfinite(upper) && upper > lower) size = upper - lower;
   d.lower = lower;
   d.upper = upper;
-  d.law   = CheckedLaw(e, law, size);
+  d.law   = CheckedLaw(e, law);
   return d;
-}
-
-/* of lengths, where the travel is open at one end */
-double Size(const ElementBuilder &e, Marker i, Marker j, double lower, double upper)
-{
-  double size = e.good() ? (e.frame(i).x - e.frame(j).x).norm() : 0;
-  for (double x : {lower, upper})
-    if (std::isfinite(x)) size = std::max(size, std::abs(x));
-  return size > 0 ? size : 1;
 }
 
 } // namespace
@@ -41,7 +30,7 @@ template <> Element Scene::enter(const std::string &name, const RotationalStop &
   RequireTurning(e, s.j, "j");
   if (e.good())
     e.require(AngleDefined(e.frame(s.i), e.frame(s.j)), "the x axis of marker i is along the z axis of j, the angle about it is undefined; turn marker i");
-  StopData d = CheckedStop(e, s.lower, s.upper, s.law, 1);
+  StopData d = CheckedStop(e, s.lower, s.upper, s.law);
   if (e.good()) d.memory[0] = PrincipalAngle<double>(e.frame(s.i), e.frame(s.j));
   e.load<TurnStop>({s.i, s.j}, d, {}, s.state);
   return e.done();
@@ -54,7 +43,7 @@ template <> Element Scene::enter(const std::string &name, const TranslationalSto
   RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
   e.require(s.axis >= 0 && s.axis < 3, "axis is " + std::to_string(s.axis) + ", must be 0, 1 or 2");
   e.require(!e.planar() || s.axis < 2, "axis is 2, which is normal to the plane of a planar scene");
-  StopData d = CheckedStop(e, s.lower, s.upper, s.law, Size(e, s.i, s.j, s.lower, s.upper));
+  StopData d = CheckedStop(e, s.lower, s.upper, s.law);
   d.axis     = s.axis;
   e.load<AdvanceStop>({s.i, s.j}, d, {}, s.state);
   return e.done();
@@ -66,7 +55,7 @@ template <> Element Scene::enter(const std::string &name, const DistanceStop &s)
   RequireTwoBodies(e, s.i, s.j);
   e.require(!(s.lower < 0), "lower is " + Show(s.lower) + ", a distance is not negative");
   e.require(s.lower > 0 || std::isfinite(s.upper), "neither lower nor upper is given");
-  const StopData d = CheckedStop(e, s.lower, s.upper, s.law, Size(e, s.i, s.j, s.lower, s.upper));
+  const StopData d = CheckedStop(e, s.lower, s.upper, s.law);
   e.load<LengthStop>({s.i, s.j}, d, {}, s.state);
   return e.done();
 }

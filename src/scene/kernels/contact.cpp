@@ -7,7 +7,7 @@ namespace
 {
 
 /* F and its derivatives by depth, normal and slip velocity */
-Vector3 LawDerivatives(const ContactLawData &law, const Touch<double> &t, const Vector3 &v, Matrix<3, 7> &L)
+Vector3 LawDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, Matrix<3, 7> &L)
 {
   using T = Dual<7>;
   Vec3<T> n, slip;
@@ -26,7 +26,7 @@ Vector3 LawDerivatives(const ContactLawData &law, const Touch<double> &t, const 
 
 } // namespace
 
-Vector3 ContactDerivatives(const ContactLawData &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
+Vector3 ContactDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
                            const Twist<double> *w, Matrix<12, 12> &frames, Matrix<12, 12> &twists)
 {
   Matrix<3, 7>  L;

@@ -35,7 +35,7 @@ struct ContactMovement {
 };
 
 /* The force on i at slip velocity v, and the derivatives of both wrenches, by the chain rule: the law along the 7 of (d, n, v) */
-Vector3 ContactDerivatives(const ContactLawData &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
+Vector3 ContactDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
                            const Twist<double> *w, Matrix<12, 12> &frames, Matrix<12, 12> &twists);
 
 template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
@@ -43,7 +43,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
   static constexpr bool        needs_rotation = Shape::axes_of_j; /* spheres have no axes */
   struct Data {
     typename Shape::Data shape;
-    ContactLawData       law;
+    ContactLaw           law;
   };
 
   template <class T> static bool touches(const Data &d, const Frame<T> *f, Touch<T> &t)
@@ -90,18 +90,13 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     place<T>(f, t.p, F, on);
   }
 
-  /* Until a body is as deep in a ball or box as a step may end, or, being deep, a little deeper: on the other side
-     there is no force, so that the end of a step may lie there as well. Their distance along a straight flight is
-     convex: it never shrinks faster than now. */
+  /* Of balls and boxes */
   template <class S = Shape, class = decltype(S::through(std::declval<const typename S::Data &>()))>
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
     Touch<double> t;
     Shape::template touch<double>(d.shape, f, t);
-    const double most = Shape::through(d.shape), way = std::max(most - t.depth, 0.25 * most),
-                 closing = -t.n.dot(slip<double>(f, w, t.p));
-    const double speed   = closing + std::sqrt(closing * closing + 2 * acceleration * way);
-    return speed > 0 ? 2 * way / speed : std::numeric_limits<double>::infinity();
+    return LongestApproach(Shape::through(d.shape), t.depth, -t.n.dot(slip<double>(f, w, t.p)), acceleration);
   }
 
   /* of the elastic part of the force */

@@ -15,13 +15,12 @@
 
 #include "friction_slip.h"
 #include "hhtdae/forces.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace hhtdae
 {
-
-struct ContactLawData : ContactLaw {
-  double onset = 0; /* penetration within which the linear law (exponent 1) sets in smoothly */
-};
 
 /* max(0, s), exact outside |s| < w; in between the slope rises from 0 to 1 by the cubic 3 u^2 - 2 u^3 */
 template <class T> T SmoothRamp(const T &s)
@@ -33,16 +32,12 @@ template <class T> T SmoothRamp(const T &s)
   return u * u * u * (T(1) - T(0.5) * u) * T(2 * w);
 }
 
-/* k d^e for d > 0. With e = 1 the kink at d = 0 is taken away by the factor 3 u^2 - 2 u^3, u = d/onset, until u = 1. */
-template <class T> T ElasticForce(const ContactLawData &law, const T &d)
+/* k d^e for d > 0 */
+template <class T> T ElasticForce(const ContactLaw &law, const T &d)
 {
   using std::pow;
   using std::sqrt;
-  if (law.exponent == 1) {
-    if (Plain(d) >= law.onset) return T(law.stiffness) * d;
-    const T u = d * T(1 / law.onset);
-    return T(law.stiffness) * d * u * u * (T(3) - T(2) * u);
-  }
+  if (law.exponent == 1) return T(law.stiffness) * d;
   if (law.exponent == 1.5) {
     const T root = sqrt(d);
     return T(law.stiffness) * d * root;
@@ -52,16 +47,19 @@ template <class T> T ElasticForce(const ContactLawData &law, const T &d)
 }
 
 /* the work that it takes to get to d > 0: the integral of ElasticForce() */
-inline double ElasticEnergy(const ContactLawData &law, double d)
+inline double ElasticEnergy(const ContactLaw &law, double d) { return law.stiffness * std::pow(d, law.exponent + 1) / (law.exponent + 1); }
+
+/* How long a step may be until bodies that close in at a speed are as deep in each other as a step may end, `most`, or, being deep, a little deeper: on
+   the other side there is no force, so that the end of a step may lie there as well. Their distance along a straight flight is convex: it never shrinks
+   faster than now. */
+inline double LongestApproach(double most, double depth, double closing, double acceleration)
 {
-  const double e = law.exponent, k = law.stiffness, o = law.onset;
-  if (e == 1 && d < o) return k * d * d * (d / o) * (d / o) * (0.75 - 0.4 * d / o);
-  if (e == 1) return k * (0.5 * d * d - 0.15 * o * o);
-  return k * std::pow(d, e + 1) / (e + 1);
+  const double way = std::max(most - depth, 0.25 * most), speed = closing + std::sqrt(closing * closing + 2 * acceleration * way);
+  return speed > 0 ? 2 * way / speed : std::numeric_limits<double>::infinity();
 }
 
 /* F for d > 0, in the axes of n and v */
-template <class T> Vec3<T> ContactForce(const ContactLawData &law, const T &d, const Vec3<T> &n, const Vec3<T> &v)
+template <class T> Vec3<T> ContactForce(const ContactLaw &law, const T &d, const Vec3<T> &n, const Vec3<T> &v)
 {
   const T approach = -n.dot(v);
   const T s        = T(1) + T(law.damping) * approach;

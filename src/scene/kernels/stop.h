@@ -15,7 +15,7 @@ namespace hhtdae
 struct StopData {
   double         memory[1]; /* of an angle */
   double         lower, upper;
-  ContactLawData law;
+  ContactLaw     law;
   int            axis;
 
   bool   free(double s) const { return s >= lower && s <= upper; }
@@ -107,6 +107,13 @@ struct LengthStop : LineForce<LengthStop> {
     c[0] = T(0) - StopForce<T>(d, line.length, line.rate(w));
   }
   static double energy(const Data &d, const Frame<double> *f) { return StopEnergy(d, Line<double>(f).length); }
+
+  /* A least distance is that of two balls, which must not pass through each other (Stops.NothingFliesThroughALeastDistance). */
+  static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
+  {
+    const Line<double> line(f);
+    return d.lower > 0 ? LongestApproach(0.25 * d.lower, d.lower - line.length, -line.rate(w), acceleration) : std::numeric_limits<double>::infinity();
+  }
 
   template <int Z>
   static void jacobian(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on,

@@ -295,7 +295,7 @@ PetscErrorCode MakePage(Runtime &R, const OutputSettings &o, std::unique_ptr<Tas
   if (o.page.empty()) PetscFunctionReturn(0);
   PetscCheck(!PageHead().empty(), R.scene.comm, PETSC_ERR_SUP, "cannot write the page %s: the library was built without %s", o.page.c_str(), PageLacks());
   PetscCheck(R.scene.channels.size() == ChannelOwners(R).size(), R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "channel %s came too late: the scene is fixed from createTS() or setUp() on", R.scene.channels.back().name.c_str());
+             "channel %s came too late: the scene is fixed from its set-up or first run on", R.scene.channels.back().name.c_str());
   auto page = std::make_unique<Page>(R, o);
   PetscCall(page->begin(R));
   task = std::move(page);

@@ -136,7 +136,7 @@ PetscErrorCode MakeTable(Runtime &R, const OutputSettings &o, std::unique_ptr<Ta
   PetscCheck(!R.scene.channels.empty(), R.scene.comm, PETSC_ERR_ARG_WRONGSTATE, "%s was asked for, but the scene has no channels: Scene::channel() makes them",
              o.csv.empty() ? o.file.c_str() : o.csv.c_str());
   PetscCheck(R.scene.channels.size() == ChannelOwners(R).size(), R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "channel %s came too late: the scene is fixed from createTS() or setUp() on", R.scene.channels.back().name.c_str());
+             "channel %s came too late: the scene is fixed from its set-up or first run on", R.scene.channels.back().name.c_str());
   task = std::make_unique<Table>(R, o);
   PetscFunctionReturn(0);
 }
