@@ -21,7 +21,7 @@ struct Response {
 };
 
 /* A <- D A D with largest entries of rows and columns near one (Ruiz 2001): a body's stiffness stands beside the ones of constraints, and pivots are chosen
-   by size (Response.AStiffBodyOnRigidTies). */
+   by size (test_response_of_a_stiff_body of tests/python). */
 PetscErrorCode Scale(Response &r)
 {
   PetscFunctionBegin;

@@ -194,7 +194,7 @@ TEST(CountedAngles, GoOnWithTheRun)
       const Marker i = scene.marker(wheel), j = scene.marker(scene.ground());
       scene.add("axle", Revolute{i, j});
       SceneRun run(scene, 2.3, "");
-      if (asked) EXPECT_NEAR(angleOf(run.ts, i, j), 0, 1e-12);
+      if (asked) { EXPECT_NEAR(angleOf(run.ts, i, j), 0, 1e-12); }
       must(run.solve());
       if (parameters) must(scene.set("mass", 2));
       TS next;
