@@ -130,32 +130,12 @@ PetscErrorCode FollowTolerances(TS ts, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of the squares of d by the weights on this rank, in four parts: they need not wait for one another, and lose less to rounding */
-static PetscErrorCode WeightedSquares(const Integrator &I, Vec d, PetscReal *sum)
-{
-  const PetscScalar *x, *w;
-  PetscReal          part[4] = {};
-  PetscInt           n, i = 0;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(d, &n));
-  PetscCall(VecGetArrayRead(d, &x));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (; i + 4 <= n; i += 4)
-    for (int k = 0; k < 4; k++) part[k] += PetscSqr(x[i + k] * w[i + k]);
-  for (; i < n; i++) part[i % 4] += PetscSqr(x[i] * w[i]);
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(d, &x));
-  *sum = (part[0] + part[1]) + (part[2] + part[3]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* From this rank's sum of squares of a correction by the weights to its norm. Multipliers have no weight, but must be numbers: 0
    times Inf or NaN is NaN. */
-PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
+PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, PetscReal *e)
 {
   Integrator     &I = Get(ts);
-  const PetscReal q = PetscAbsReal(I.p.k) * I.h * I.h, s = I.p.gamma_s * I.h;
+  const PetscReal q = PetscAbsReal(I.p.k) * h * h, s = I.p.gamma_s * h;
   PetscReal       states = 0;
 
   PetscFunctionBegin;
@@ -164,14 +144,13 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
-PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e)
+PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e)
 {
-  PetscReal sum = 0;
+  Sum squares;
 
   PetscFunctionBegin;
-  PetscCall(WeightedSquares(Get(ts), dX, &sum));
-  PetscCall(ReduceCorrection(ts, dX, sum, e));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar d, PetscScalar w) { squares.add(i, PetscSqr(d * w)); }, Read(dX), Read(Get(ts).weight)));
+  PetscCall(ReduceCorrection(ts, dX, squares.total(), h, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

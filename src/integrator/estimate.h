@@ -12,11 +12,11 @@ namespace hht3
 PetscErrorCode UpdateWeights(TS ts, Vec U);
 PetscErrorCode FollowTolerances(TS ts, Vec U);
 
-/* A correction in units of the tolerance: the change of the error estimate that it makes, (40) */
-PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal *e);
+/* A correction in units of the tolerance: the change of the error estimate that it makes in a step of length h, (40); for h = 1 |k| times the weighted norm */
+PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e);
 
 /* The same from this rank's sum of squares by the weights */
-PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal *e);
+PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, PetscReal *e);
 
 /* to = dX times the squares of its weights: a product with it is that of corrections, whose norm is CorrectionNorm() but for a factor */
 PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);

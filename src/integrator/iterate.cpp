@@ -118,7 +118,7 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
     if (it) PetscCall(VecAYPX(I.before, -1, X));
     Y = I.before;
   }
-  if (it) PetscCall(CorrectionNorm(ts, Y, &e));
+  if (it) PetscCall(CorrectionNorm(ts, Y, I.h, &e));
   PetscCall(SNESGetFunction(snes, &F, NULL, NULL));
   if (!newton && it && I.corrector.matrix.have) {
     WorkVec   next;

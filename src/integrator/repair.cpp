@@ -48,14 +48,11 @@ PetscErrorCode Repair(TS ts)
 /* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are */
 static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
 {
-  Integrator     &I  = Get(ts);
-  const PetscReal h0 = I.h;
-  PetscReal       T, e;
+  const Integrator &I = Get(ts);
+  PetscReal         T, e;
 
   PetscFunctionBegin;
-  I.h = 1;
-  PetscCall(CorrectionNorm(ts, I.A0, &e));
-  I.h = h0;
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
   PetscCall(TimeScale(ts, &T));
   const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
   *part               = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h) / a;

@@ -59,7 +59,7 @@ PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
   PetscFunctionBegin;
   *e = 0;
   PetscCall(AnswerOf(ts, r, dX, &solved));
-  if (solved) PetscCall(CorrectionNorm(ts, dX, e));
+  if (solved) PetscCall(CorrectionNorm(ts, dX, Get(ts).h, e));
   if (PetscIsInfOrNanReal(*e)) *e = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

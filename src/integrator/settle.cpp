@@ -32,18 +32,15 @@ constexpr PetscReal against    = 0.5;  /* cosine of the angle between what accel
    against the accelerations, and three matrices are saved. */
 PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
 {
-  Integrator     &I   = Get(ts);
-  const PetscReal old = I.h;
-  PetscReal       v, a, j;
-  PetscScalar     aj, aa;
-  WorkVec         weighted;
+  Integrator &I = Get(ts);
+  PetscReal   v, a, j;
+  PetscScalar aj, aa;
+  WorkVec     weighted;
 
   PetscFunctionBegin;
-  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, I.V0, &v));
-  PetscCall(CorrectionNorm(ts, I.A0, &a));
-  PetscCall(CorrectionNorm(ts, rate, &j));
-  I.h  = old;
+  PetscCall(CorrectionNorm(ts, I.V0, 1, &v));
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &a));
+  PetscCall(CorrectionNorm(ts, rate, 1, &j));
   *tau = a > 0 && h * j > constants * a && h * h * j > noticeable * (v > 0 ? v : 1 / h) ? a / j : 0;
   if (*tau <= 0 || v > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(weighted.like(I.A0));
@@ -63,20 +60,6 @@ PetscErrorCode ImplicitAccelerations(TS ts, PetscReal h, PetscBool *ok)
   /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, h, I.U0, I.V0, {false, Gamma::Near}, ok));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The way of velocities that decay with a time constant, in tolerances of positions */
-PetscErrorCode WayOf(TS ts, Vec v, PetscReal tau, PetscReal *way)
-{
-  Integrator     &I   = Get(ts);
-  const PetscReal old = I.h;
-
-  PetscFunctionBegin;
-  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, v, way));
-  I.h = old;
-  *way *= tau / PetscAbsReal(I.p.k);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,7 +88,8 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, Pet
     PetscCall(ImplicitAccelerations(ts, slower * euler, leaves));
     PetscCall(VecAXPY(gone, -1, I.A1));
     PetscCall(VecScale(gone, euler / (1 - 1 / slower)));
-    PetscCall(WayOf(ts, gone, *tau, &way));
+    PetscCall(CorrectionNorm(ts, gone, 1, &way));
+    way *= *tau / PetscAbsReal(I.p.k); /* of velocities that decay with this time constant, in tolerances of positions */
     if (!I.fixed_h && !(way < 1)) *leaves = PETSC_FALSE; /* steps that are given resolve nothing */
   }
   if (*leaves) PetscCall(VecAXPY(I.V0, 1, gone));

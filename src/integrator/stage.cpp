@@ -234,7 +234,7 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   PetscCall(VecRestoreArrayRead(dX, &d));
   PetscCall(VecRestoreArray(X, &x));
   PetscCall(FinishStage(I, X));
-  PetscCall(ReduceCorrection(ts, dX, Total(sum), e));
+  PetscCall(ReduceCorrection(ts, dX, Total(sum), I.h, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -117,11 +117,10 @@ struct StartErrors {
 
 PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
 {
-  Integrator     &I = Get(ts);
-  const PetscReal h = I.h;
-  PetscReal       sum[3] = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
-  Vec             coordinates = rate;
-  WorkVec         x;
+  Integrator &I           = Get(ts);
+  PetscReal   sum[3]      = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
+  Vec         coordinates = rate;
+  WorkVec     x;
 
   PetscFunctionBegin;
   *e = {};
@@ -140,9 +139,7 @@ PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
       Read(rate), Read(I.V0), Read(I.ymax), Read(I.weight), Write(x)));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   }
-  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, coordinates, &e->coordinates));
-  I.h               = h;
+  PetscCall(CorrectionNorm(ts, coordinates, 1, &e->coordinates));
   const PetscReal s = PetscSqrtReal(sum[1] / PetscMax(I.norm_size, 1));
   e->change         = I.p.gamma_s * s;
   const PetscReal by_rate = sum[0] > 0 ? PetscSqrtReal(sum[1] / sum[0]) : PETSC_MAX_REAL, by_size = sum[2] > 0 ? PetscPowReal(sum[1] / sum[2], 0.25) : PETSC_MAX_REAL;
@@ -161,8 +158,7 @@ PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
 
   PetscFunctionBegin;
   PetscCall(ErrorsOfStart(ts, rate, &e));
-  I.h = 1; /* CorrectionNorm() is |k| h^2 times the weighted norm */
-  PetscCall(CorrectionNorm(ts, I.A0, &e2));
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &e2));
   const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
   PetscReal       h3 = e.step(0.125);
   PetscCall(TimeScaleOfAccelerations(ts, I.A0, &T));
