@@ -18,55 +18,6 @@ namespace hht3
 namespace
 {
 
-struct Ends { /* of the step, read-only */
-  const PetscScalar *u0, *v0, *a0, *x0, *begin; /* begin: q'_n as the step takes it, v0 or what VelocitiesAtBegin() has left in the base */
-};
-
-/* The parts of U1, V1, A1 that do not depend on X, from (2) and from the average that the form asks for. a_n and w_n were made
-   by a step of length h_last; their lag behind the true values is stretched to the present h, without which a change of h
-   costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true value, so that nothing
-   changes. */
-template <bool all>
-struct BaseOfCoordinates {
-  PetscReal          h, kq, kv, r, cn, c0; /* kq, kv: of a_n in (2a), (2b) */
-  Ends               e;
-  const float       *moves;
-  PetscScalar       *u, *v, *a;
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at) const
-  {
-    const Four zero = {0, 0, 0, 0}, a0 = at.get(e.a0), an = a0 + r * (at.get(e.x0) - a0), v0 = at.get(e.begin);
-    Four       u1 = at.get(e.u0) + (h * v0 + kq * an), v1 = v0 + kv * an, a1 = cn * an - c0 * a0;
-    if (!all) {
-      const auto moving = at.get(moves) != 0;
-      u1                = moving ? u1 : zero;
-      v1                = moving ? v1 : zero;
-      a1                = moving ? a1 : zero;
-    }
-    at.put(u, u1);
-    at.put(v, v1);
-    at.put(a, a1);
-  }
-};
-
-PetscErrorCode BaseOfStates(const Integrator &I)
-{
-  const Parameters &p = I.p;
-  const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1;
-
-  PetscFunctionBegin;
-  PetscCall(ForSome(
-    I.states,
-    [&](PetscInt, PetscScalar u0, PetscScalar v0, PetscScalar x0, PetscScalar &u, PetscScalar &v) {
-      const PetscScalar wn = v0 + r * (x0 - v0);
-      u                    = u0 + h * (1 - p.gamma_s) * wn;
-      v                    = (p.am_s * wn - p.af_s * v0) / (1 - p.af_s);
-    },
-    Read(I.U0), Read(I.V0), Read(I.X0), Write(I.base[0]), Write(I.base[1])));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* q'_n less its misfit and what a change of coordinates has bent, misfit.cpp */
 PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 {
@@ -238,15 +189,17 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual */
+/* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual. The parts of U1, V1, A1 that do not depend on
+   X come from (2) and from the average that the form asks for. a_n and w_n were made by a step of length h_last; their lag behind the true values is stretched
+   to the present h, without which a change of h costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true
+   value, so that nothing changes. */
 PetscErrorCode PrepareStage(TS ts)
 {
-  Integrator     &I = Get(ts);
-  const bool      paper = I.form == TSHHT3_FORM_PAPER, changed = I.misfit != 0 || I.bent == Bend::Velocities;
-  const PetscReal cn = paper ? 0 : I.p.am / (1 - I.p.af), c0 = paper ? 0 : I.p.af / (1 - I.p.af);
-  Ends            e;
-  PetscScalar    *b[3];
-  PetscInt        n;
+  Integrator       &I     = Get(ts);
+  const Parameters &p     = I.p;
+  const bool        paper = I.form == TSHHT3_FORM_PAPER;
+  const PetscReal   h = I.h, r = I.h_last > 0 ? h / I.h_last : 1, kq = OldPosition(p, h), kv = OldVelocity(p, h);
+  const PetscReal   cn = paper ? 0 : p.am / (1 - p.af), c0 = paper ? 0 : p.af / (1 - p.af);
 
   PetscFunctionBegin;
   I.stage_id = 0;
@@ -254,26 +207,24 @@ PetscErrorCode PrepareStage(TS ts)
     PetscCall(PrepareBDF(ts));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (changed) PetscCall(VelocitiesAtBegin(I, I.base[1]));
-  PetscCall(VecGetLocalSize(I.U0, &n));
-  PetscCall(VecGetArrayRead(I.U0, &e.u0));
-  PetscCall(VecGetArrayRead(I.V0, &e.v0));
-  PetscCall(VecGetArrayRead(I.A0, &e.a0));
-  PetscCall(VecGetArrayRead(I.X0, &e.x0));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &b[k]));
-  e.begin = changed ? b[1] : e.v0;
-  const auto sweep = [&](auto base) {
-    base = {I.h, OldPosition(I.p, I.h), OldVelocity(I.p, I.h), I.h_last > 0 ? I.h / I.h_last : 1, cn, c0, e, I.moves.data(), b[0], b[1], b[2]};
-    Sweep(n, base);
-  };
-  if (I.moves.empty()) sweep(BaseOfCoordinates<true>());
-  else sweep(BaseOfCoordinates<false>());
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(I.base[k], &b[k]));
-  PetscCall(VecRestoreArrayRead(I.X0, &e.x0));
-  PetscCall(VecRestoreArrayRead(I.A0, &e.a0));
-  PetscCall(VecRestoreArrayRead(I.V0, &e.v0));
-  PetscCall(VecRestoreArrayRead(I.U0, &e.u0));
-  if (I.count[TSHHT3_STATE]) PetscCall(BaseOfStates(I));
+  PetscCall(VelocitiesAtBegin(I, I.base[1]));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar a0, PetscScalar x0, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const TSHHT3Role  role  = RoleOf(I, i);
+      const PetscScalar begin = v; /* q'_n as the step takes it */
+      u = v = a = 0;
+      if (role == TSHHT3_COORDINATE) {
+        const PetscScalar an = a0 + r * (x0 - a0);
+        u                    = u0 + (h * begin + kq * an);
+        v                    = begin + kv * an;
+        a                    = cn * an - c0 * a0;
+      } else if (role == TSHHT3_STATE) {
+        const PetscScalar wn = v0 + r * (x0 - v0);
+        u                    = u0 + h * (1 - p.gamma_s) * wn;
+        v                    = (p.am_s * wn - p.af_s * v0) / (1 - p.af_s);
+      }
+    },
+    Read(I.U0), Read(I.V0), Read(I.A0), Read(I.X0), Write(I.base[0]), Write(I.base[1]), Write(I.base[2])));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

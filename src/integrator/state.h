@@ -146,7 +146,7 @@ struct Integrator : StepState {
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;
-  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see BaseOfCoordinates */
+  Vec       base[3] = {}; /* of U1, V1, A1: what does not depend on X, see PrepareStage() */
   PetscObjectId    stage_id = 0; /* X to which U1, V1, A1 belong, and its state then; 0: to none */
   PetscObjectState stage_state = 0;
   Vec       before = nullptr; /* iterate before a correction, for types of SNES that do not keep their corrections */
