@@ -135,7 +135,6 @@ void ResetOrder(TS ts)
   static_cast<OrderState &>(o) = OrderState();
   o.t[0]                       = ts->ptime;
   I.p                          = I.hht;
-  I.scaled_h                   = 0;
 }
 
 /* The accepted step is about to become t_n, its beginning a part of the past, and o.next the order */
@@ -205,8 +204,7 @@ PetscErrorCode UseOrder(TS ts)
   }
   o.ready = o.now;
   Spans(o, I.t1, tau);
-  I.p        = o.now > 2 ? BDFParameters(o.now, I.h, tau) : I.hht;
-  I.scaled_h = 0;
+  I.p = o.now > 2 ? BDFParameters(o.now, I.h, tau) : I.hht;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -194,7 +194,6 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
   PetscCall(CheckFinite(ts, file));
   I.stage_id = 0;
-  I.scaled_h = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
   PetscCall(CompareOptions(ts, file, words));
   PetscCall(TellingResidual(ts, is));

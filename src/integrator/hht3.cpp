@@ -181,7 +181,7 @@ PetscErrorCode Reset(TS ts)
   I.role.clear();
   I.moves.clear();
   I.states.clear();
-  I.holonomic.clear();
+  I.constrained.clear();
   if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* it is chosen again, unless the user has set one since */
   static_cast<StepState &>(I)                = StepState();
   static_cast<CorrectorState &>(I.corrector) = CorrectorState();
@@ -191,7 +191,6 @@ PetscErrorCode Reset(TS ts)
   static_cast<OrderState &>(I.order)         = OrderState();
   I.p                                        = I.hht;
   I.linear_chosen = PETSC_FALSE;
-  I.scaled_h      = 0;
   I.scaled_state  = 0;
   I.scaled_operator = 0;
   I.stage_id      = 0;

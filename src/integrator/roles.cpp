@@ -269,11 +269,11 @@ PetscErrorCode SetUpRoles(TS ts)
   if (I.count[TSHHT3_COORDINATE] == n) I.role = std::vector<unsigned char>(); /* an ODE: no roles to look up */
   I.moves.resize(I.role.size());
   I.states.clear();
-  I.holonomic.clear();
+  I.constrained.clear();
   for (size_t i = 0; i < I.role.size(); i++) {
     I.moves[i] = I.role[i] == TSHHT3_COORDINATE ? 1 : 0;
     if (I.role[i] == TSHHT3_STATE) I.states.push_back((PetscInt)i);
-    if (I.role[i] == TSHHT3_HOLONOMIC) I.holonomic.push_back((PetscInt)i);
+    if (IsConstraint(I, (PetscInt)i)) I.constrained.push_back((PetscInt)i);
   }
   PetscCall(PetscInfo(ts, "roles %s: %" PetscInt_FMT " coordinates, %" PetscInt_FMT " states, %" PetscInt_FMT " holonomic, %" PetscInt_FMT " velocity-level constraints, %" PetscInt_FMT " variables, %" PetscInt_FMT " force states\n",
                       I.is_set ? "set" : "detected", I.count[0], I.count[1], I.count[2], I.count[3], I.count[4], I.count[5]));

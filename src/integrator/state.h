@@ -124,19 +124,18 @@ struct Integrator : StepState {
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
-  std::vector<PetscInt>      states, holonomic; /* local unknowns that are first-order states, multipliers of holonomic constraints */
+  std::vector<PetscInt>      states, constrained; /* local unknowns that are first-order states, multipliers of constraints */
   PetscInt                   count[TSHHT3_NUM_ROLES] = {};       /* global */
   PetscBool                  follow = PETSC_FALSE; /* constraints of velocities depend on variables, see variables.cpp */
   PetscBool                  definitions_use_acceleration = PETSC_FALSE; /* a row other than of motion has d/dU'' */
   PetscInt                   constraints() const { return count[TSHHT3_HOLONOMIC] + count[TSHHT3_NONHOLONOMIC]; }
   /* the same answer on every rank, also on one without unknowns, whose list of roles is empty too */
-  bool coordinatesAnd(TSHHT3Role other) const
+  bool coordinatesAlone() const
   {
     for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
-      if (r != TSHHT3_COORDINATE && r != other && count[r]) return false;
+      if (r != TSHHT3_COORDINATE && count[r]) return false;
     return true;
   }
-  bool coordinatesAlone() const { return coordinatesAnd(TSHHT3_COORDINATE); }
 
   /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
@@ -166,7 +165,6 @@ struct Integrator : StepState {
 
   /* the matrix */
   Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
-  PetscReal     scaled_h = 0;                 /* for which row stands */
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */
