@@ -13,6 +13,7 @@
 #include "settings.h"
 #include "solver.h"
 #include "start.h"
+#include "work_vec.h"
 
 namespace hht3
 {
@@ -160,34 +161,25 @@ Prepared PreparedBy(const Integrator &I, bool moved)
   return {!I.count[TSHHT3_NONHOLONOMIC] || !moved, moved ? Gamma::Near : Gamma::Made};
 }
 
-/* The fastest and the largest of the coordinates that were named as lengths, on this rank; they are left out of `others` */
-PetscErrorCode OwnLengths(TS ts, std::vector<char> &others, PetscReal *v, PetscReal *y)
+/* Sizes of the coordinates, with the largest of those that were named as lengths in place of each of them */
+PetscErrorCode SizesByLengths(TS ts, Vec size)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *rate, *size;
-  const PetscInt    *index;
-  PetscInt           n, first, end, least, most;
+  Integrator &I = Get(ts);
+  PetscInt    n, first, end, least, most;
+  PetscReal   largest;
 
   PetscFunctionBegin;
-  *v = *y = 0;
-  PetscCall(VecGetOwnershipRange(I.V0, &first, &end));
-  others.assign((size_t)(end - first), 1);
+  PetscCall(VecGetOwnershipRange(size, &first, &end));
   PetscCall(ISGetLocalSize(I.lengths, &n));
   PetscCall(ISGetMinMax(I.lengths, &least, &most));
   PetscCheck(n == 0 || (least >= first && most < end), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "TSHHT3SetLengths(): unknown %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT,
              least < first ? least : most, first, end - 1);
-  PetscCall(ISGetIndices(I.lengths, &index));
-  PetscCall(VecGetArrayRead(I.V0, &rate));
-  PetscCall(VecGetArrayRead(I.ymax, &size));
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt i = index[k] - first;
-    others[(size_t)i] = 0;
-    *v                = PetscMax(*v, PetscAbsScalar(rate[i]));
-    *y                = PetscMax(*y, PetscRealPart(size[i]));
-  }
-  PetscCall(VecRestoreArrayRead(I.ymax, &size));
-  PetscCall(VecRestoreArrayRead(I.V0, &rate));
-  PetscCall(ISRestoreIndices(I.lengths, &index));
+  PetscCall(VecZeroEntries(size));
+  PetscCall(VecISSet(size, I.lengths, 1));
+  PetscCall(VecPointwiseMult(size, size, I.ymax));
+  PetscCall(VecMax(size, NULL, &largest));
+  PetscCall(VecCopy(I.ymax, size));
+  PetscCall(VecISSet(size, I.lengths, largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,7 +208,7 @@ PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 PetscReal LeastSize(TS ts) { return PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); }
 
 /* The largest of coordinates' rates or accelerations, each by the coordinate's size */
-PetscErrorCode MostOfItsSize(TS ts, Vec x, PetscReal *most)
+PetscErrorCode MostOfItsSize(TS ts, Vec x, Vec size, PetscReal *most)
 {
   Integrator     &I     = Get(ts);
   const PetscReal least = LeastSize(ts);
@@ -227,7 +219,7 @@ PetscErrorCode MostOfItsSize(TS ts, Vec x, PetscReal *most)
     [&](PetscInt i, PetscScalar v, PetscScalar y) {
       if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
     },
-    Read(x), Read(I.ymax)));
+    Read(x), Read(size)));
   PetscCallMPI(MPI_Allreduce(&local, most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -240,7 +232,7 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscReal rate;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, Get(ts).V0, &rate));
+  PetscCall(MostOfItsSize(ts, Get(ts).V0, Get(ts).ymax, &rate));
   *T = TimeOf(ts, rate, 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,7 +243,7 @@ PetscErrorCode TimeScaleOfVelocities(TS ts, Vec V, PetscReal *T)
   PetscReal rate;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, V, &rate));
+  PetscCall(MostOfItsSize(ts, V, Get(ts).ymax, &rate));
   *T = rate > 0 ? 1 / rate : PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -262,7 +254,7 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
   PetscReal most;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, A, &most));
+  PetscCall(MostOfItsSize(ts, A, Get(ts).ymax, &most));
   *T = most > 0 ? 1 / PetscSqrtReal(most) : PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -270,25 +262,19 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
 /* The same with the largest length in place of each: one near 0 in millimetres moves by much more than 1 in a short time (Units.ForcesOfTheStart) */
 PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 {
-  Integrator       &I     = Get(ts);
-  const PetscReal   least = LeastSize(ts);
-  PetscReal         local[3] = {0, 0, 0}, all[3]; /* of what is no length; fastest and largest length */
-  std::vector<char> others;
+  Integrator &I    = Get(ts);
+  Vec         size = I.ymax;
+  PetscReal   rate;
+  WorkVec     by_lengths;
 
   PetscFunctionBegin;
-  if (!I.lengths) {
-    PetscCall(MostOfItsSize(ts, I.V0, &local[0]));
-    *T = TimeOf(ts, local[0], runs);
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.lengths) {
+    PetscCall(by_lengths.like(I.ymax));
+    PetscCall(SizesByLengths(ts, by_lengths));
+    size = by_lengths;
   }
-  PetscCall(OwnLengths(ts, others, &local[1], &local[2]));
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar v, PetscScalar y) {
-      if (IsCoordinate(I, i) && others[(size_t)i]) local[0] = PetscMax(local[0], PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
-    },
-    Read(I.V0), Read(I.ymax)));
-  PetscCallMPI(MPI_Allreduce(local, all, 3, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  *T = TimeOf(ts, PetscMax(all[0], all[1] / PetscMax(all[2], least)), runs);
+  PetscCall(MostOfItsSize(ts, I.V0, size, &rate));
+  *T = TimeOf(ts, rate, runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
