@@ -17,7 +17,7 @@
 #include "change.h"
 #include "entries.h"
 #include "work_vec.h"
-#include <utility>
+#include <petscblaslapack.h>
 #include <vector>
 
 namespace hht3
@@ -74,33 +74,14 @@ Motion Recall(const Integrator &I)
   return m;
 }
 
-/* Solves A^T y = b for three right-hand sides, in place */
-void SolveTransposed(PetscInt n, PetscReal A[max_basis][max_basis], PetscReal b[3][max_basis])
-{
-  for (PetscInt c = 0; c < n; c++) { /* rows of A^T are columns of A */
-    PetscInt p = c;
-    for (PetscInt r = c + 1; r < n; r++)
-      if (PetscAbsReal(A[c][r]) > PetscAbsReal(A[c][p])) p = r;
-    for (PetscInt k = 0; k < n; k++) std::swap(A[k][c], A[k][p]);
-    for (int s = 0; s < 3; s++) std::swap(b[s][c], b[s][p]);
-    for (PetscInt r = c + 1; r < n; r++) {
-      const PetscReal f = A[c][r] / A[c][c];
-      for (PetscInt k = c; k < n; k++) A[k][r] -= f * A[k][c];
-      for (int s = 0; s < 3; s++) b[s][r] -= f * b[s][c];
-    }
-  }
-  for (int s = 0; s < 3; s++)
-    for (PetscInt r = n - 1; r >= 0; r--) {
-      for (PetscInt k = r + 1; k < n; k++) b[s][r] -= A[k][r] * b[s][k];
-      b[s][r] /= A[r][r];
-    }
-}
-
 /* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
-void Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
+PetscErrorCode Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
 {
   PetscReal       L[max_basis][max_basis] = {}, y[3][max_basis], power = 1;
   const PetscReal z = x / m.unit, u = m.unit;
+  PetscBLASInt    n, sides = 3, stride = max_basis, pivots[max_basis], failed;
+
+  PetscFunctionBegin;
   for (PetscInt j = 0; j < m.n; j++, power *= z) {
     y[0][j] = power;
     y[1][j] = u * power * z / (j + 1);
@@ -113,98 +94,78 @@ void Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
         L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
     }
   }
-  SolveTransposed(m.n, L, y);
+  PetscCall(PetscBLASIntCast(m.n, &n));
+  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &y[0][0], &stride, &failed)); /* of L^T, as it reads columns */
+  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_LIB, "The polynomial through the last steps cannot be evaluated: LAPACK's gesv returns %d", (int)failed);
   for (int s = 0; s < 3; s++)
     for (PetscInt i = 0; i < m.n; i++) {
       w[s][i] = 0;
       for (PetscInt k = 0; k < m.n; k++) w[s][i] += y[s][k] * m.to_values[k][i];
     }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the map is given, what came of it, and which entries it has changed in any triple */
 struct Mapping {
   enum : unsigned char { Triple = 1, Acceleration = 2 };
-  Vec                        old[3] = {}, now[3] = {};
+  WorkVec                    old[3], now[3];
   std::vector<unsigned char> changed;
+
+  PetscErrorCode like(Vec U)
+  {
+    PetscInt n;
+
+    PetscFunctionBegin;
+    for (int k = 0; k < 3; k++) {
+      PetscCall(old[k].like(U));
+      PetscCall(now[k].like(U));
+    }
+    PetscCall(VecGetLocalSize(U, &n));
+    changed.assign((size_t)n, 0);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
 };
-
-PetscErrorCode CreateMapping(const Integrator &I, Mapping *map)
-{
-  PetscInt n;
-
-  PetscFunctionBegin;
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecDuplicate(I.U0, &map->old[k]));
-    PetscCall(VecDuplicate(I.U0, &map->now[k]));
-  }
-  PetscCall(VecGetLocalSize(I.U0, &n));
-  map->changed.assign(n, 0);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode DestroyMapping(Mapping *map)
-{
-  PetscFunctionBegin;
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecDestroy(&map->old[k]));
-    PetscCall(VecDestroy(&map->now[k]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* From old to now at t_n + x */
 PetscErrorCode Apply(TS ts, Mapping &map, PetscReal x)
 {
-  Integrator        &I = Get(ts);
-  const PetscScalar *a, *b;
+  Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) PetscCall(VecCopy(map.old[k], map.now[k]));
   PetscCall((*I.change.map)(ts, ts->ptime + x, map.now[0], map.now[1], map.now[2], I.change.ctx));
   for (int k = 0; k < 3; k++) {
-    PetscCall(VecGetArrayRead(map.old[k], &a));
-    PetscCall(VecGetArrayRead(map.now[k], &b));
-    for (size_t i = 0; i < map.changed.size(); i++)
-      if (a[i] != b[i]) map.changed[i] |= k == 2 ? Mapping::Triple | Mapping::Acceleration : Mapping::Triple;
-    PetscCall(VecRestoreArrayRead(map.now[k], &b));
-    PetscCall(VecRestoreArrayRead(map.old[k], &a));
+    const unsigned char what = k == 2 ? Mapping::Triple | Mapping::Acceleration : Mapping::Triple;
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar a, PetscScalar b) { if (a != b) map.changed[i] |= what; }, Read(map.old[k]), Read(map.now[k])));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The motion at t_n + x; what is not a coordinate as at t_n, without accelerations */
-PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, Vec to[3])
+PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkVec (&to)[3])
 {
-  const PetscScalar *stored[max_basis], *u0, *v0;
-  PetscScalar       *y[3];
-  PetscReal          w[3][max_basis];
-  PetscInt           n;
+  PetscReal w[3][max_basis];
+  ReadEach  stored;
 
   PetscFunctionBegin;
-  Weights(m, x, w);
-  PetscCall(VecGetLocalSize(I.U0, &n));
-  PetscCall(VecGetArrayRead(I.U0, &u0));
-  PetscCall(VecGetArrayRead(I.V0, &v0));
-  for (PetscInt j = 0; j < m.n; j++) PetscCall(VecGetArrayRead(m.stored[j], &stored[j]));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArrayWrite(to[k], &y[k]));
-  for (PetscInt i = 0; i < n; i++) {
-    const bool  moves  = IsCoordinate(I, i);
-    PetscScalar sum[3] = {0, 0, 0};
-    for (PetscInt j = 0; moves && j < m.n; j++)
-      for (int s = 0; s < 3; s++) sum[s] += w[s][j] * stored[j][i];
-    y[0][i] = moves ? u0[i] + x * v0[i] + sum[2] : u0[i];
-    y[1][i] = v0[i] + sum[1];
-    y[2][i] = sum[0];
-  }
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayWrite(to[k], &y[k]));
-  for (PetscInt j = 0; j < m.n; j++) PetscCall(VecRestoreArrayRead(m.stored[j], &stored[j]));
-  PetscCall(VecRestoreArrayRead(I.V0, &v0));
-  PetscCall(VecRestoreArrayRead(I.U0, &u0));
+  PetscCall(Weights(m, x, w));
+  for (PetscInt j = 0; j < m.n; j++) stored.add(m.stored[j]);
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, ReadEach::Entries y, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const bool  moves  = IsCoordinate(I, i);
+      PetscScalar sum[3] = {0, 0, 0};
+      for (int j = 0; moves && j < m.n; j++)
+        for (int s = 0; s < 3; s++) sum[s] += w[s][j] * y[j];
+      u = moves ? u0 + x * v0 + sum[2] : u0;
+      v = v0 + sum[1];
+      a = sum[0];
+    },
+    Read(I.U0), Read(I.V0), stored, Write(to[0]), Write(to[1]), Write(to[2])));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* New values of q'' (slopes at the second of a double node) at the nodes */
-PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, Vec value[])
+PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec value[])
 {
   Integrator     &I = Get(ts);
   const PetscReal d = 0.01 * m.unit;
@@ -249,11 +210,7 @@ PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
     PetscCall(Apply(ts, map, 0));
     PetscCall(VecAXPY(I.bend, -sign / (2 * m.unit), map.now[2]));
   }
-  PetscScalar *b;
-  PetscCall(VecGetArray(I.bend, &b));
-  for (size_t i = 0; i < map.changed.size(); i++)
-    if (!(map.changed[i] & Mapping::Acceleration)) b[i] = 0; /* rounding */
-  PetscCall(VecRestoreArray(I.bend, &b));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &b) { if (!(map.changed[i] & Mapping::Acceleration)) b = 0; /* rounding */ }, Write(I.bend)));
   I.bent = Bend::Rates;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -297,7 +254,7 @@ void NewDifferences(const Motion &m, PetscInt i, const PetscScalar *const value[
 }
 
 /* Takes over what has changed; in the paper's form q''_n is a_n but for a start */
-PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const Vec value[])
+PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const WorkVec value[])
 {
   const PetscScalar *w[max_basis], *now[3];
   PetscScalar       *D[max_basis], *x, *to[3];
@@ -343,26 +300,12 @@ PetscErrorCode MapStart(TS ts)
   Mapping     map;
 
   PetscFunctionBegin;
-  PetscCall(CreateMapping(I, &map));
+  PetscCall(map.like(I.U0));
   PetscCall(VecZeroEntries(I.A0));
   PetscCall(MapState(ts, map));
   PetscCall(CheckRoles(ts, map));
   PetscCall(VecCopy(map.now[0], I.U0));
   PetscCall(VecCopy(map.now[1], I.V0));
-  PetscCall(DestroyMapping(&map));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode MapAll(TS ts, const Motion &m, Mapping &map, Vec value[])
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(MapNodes(ts, m, map, value));
-  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
-  PetscCall(MapState(ts, map));
-  PetscCall(CheckRoles(ts, map));
-  PetscCall(TakeOver(I, m, map, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -372,15 +315,16 @@ PetscErrorCode MapHistory(TS ts)
   Integrator  &I = Get(ts);
   const Motion m = Recall(I);
   Mapping      map;
-  Vec          value[max_basis];
+  WorkVec      value[max_basis];
 
   PetscFunctionBegin;
-  PetscCall(CreateMapping(I, &map));
-  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDuplicate(I.U0, &value[k]));
-  const PetscErrorCode failed = MapAll(ts, m, map, value);
-  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(VecDestroy(&value[k]));
-  PetscCall(DestroyMapping(&map));
-  PetscCall(failed);
+  PetscCall(map.like(I.U0));
+  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(value[k].like(I.U0));
+  PetscCall(MapNodes(ts, m, map, value));
+  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(TakeOver(I, m, map, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
