@@ -212,4 +212,25 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x from the matrix and the solver of the run, which makes a factor where it has none. ok: it is a solution */
+PetscErrorCode SolveOfTheRun(TS ts, Vec b, Vec x, PetscBool *ok)
+{
+  KSP                ksp;
+  KSPConvergedReason reason;
+  PetscReal          norm;
+  PetscBool          other = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  while (other) {
+    PetscCall(KSPSolve(ksp, b, x));
+    Get(ts).stat.solves++;
+    PetscCall(KSPGetConvergedReason(ksp, &reason));
+    PetscCall(GiveUpKrylov(ts, &other));
+  }
+  PetscCall(VecNorm(x, NORM_INFINITY, &norm));
+  *ok = (PetscBool)(reason >= 0 && !PetscIsInfOrNanReal(norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace hht3

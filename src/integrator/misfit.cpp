@@ -39,39 +39,10 @@ PetscReal Least(const Integrator &I)
   return I.count[TSHHT3_STATE] ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
 }
 
-/* r = scale times the rows of holonomic constraints of F, added to what is there */
-PetscErrorCode AddHolonomicRows(const Integrator &I, PetscReal scale, Vec F, Vec r)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &x) { if (I.role[i] == TSHHT3_HOLONOMIC) x += scale * f; }, Read(F), Write(r)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
 {
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (!IsCoordinate(I, i)) x = 0; }, Write(d)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode TrySolve(TS ts, Vec dV, PetscBool *ok)
-{
-  Integrator        &I = Get(ts);
-  KSP                ksp;
-  KSPConvergedReason reason;
-  PetscReal          norm;
-  PetscBool          other = PETSC_TRUE;
-
-  PetscFunctionBegin;
-  PetscCall(SNESGetKSP(ts->snes, &ksp));
-  while (other) { /* a factor is made in the solve */
-    PetscCall(KSPSolve(ksp, I.gamma, dV));
-    I.stat.solves++;
-    PetscCall(KSPGetConvergedReason(ksp, &reason));
-    PetscCall(GiveUpKrylov(ts, &other));
-  }
-  PetscCall(VecNorm(dV, NORM_INFINITY, &norm));
-  *ok = (PetscBool)(reason >= 0 && !PetscIsInfOrNanReal(norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -87,14 +58,31 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetReusePreconditioner(ksp, &reuse));
   PetscCall(KSPSetReusePreconditioner(ksp, PETSC_TRUE));
-  PetscCall(TrySolve(ts, dV, &ok));
+  PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));
   PetscCall(KSPSetReusePreconditioner(ksp, reuse));
   if (!ok) {
     PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-    PetscCall(TrySolve(ts, dV, &ok));
+    PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));
   }
   if (!ok) PetscCall(VecZeroEntries(dV));
   else PetscCall(KeepCoordinates(I, dV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma: the derivative of holonomic constraints at t_n along a direction, and by time where it is that of the motion, as a central difference over tau */
+PetscErrorCode ChangeOfConstraints(TS ts, Vec direction, PetscReal tau, bool with_time)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(VecZeroEntries(I.gamma));
+  PetscCall(VecZeroEntries(I.A1));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    const PetscReal scale = sign / (2 * tau);
+    PetscCall(VecWAXPY(I.U1, sign * tau, direction, I.U0));
+    PetscCall(EvaluateResidual(ts, with_time ? ts->ptime + sign * tau : ts->ptime, I.U1, I.V0, I.A1, I.work));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &g) { if (I.role[i] == TSHHT3_HOLONOMIC) g += scale * f; }, Read(I.work), Write(I.gamma)));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,13 +98,7 @@ PetscErrorCode ComputeBend(TS ts)
   PetscCall(VecNorm(I.U0, NORM_INFINITY, &u));
   if (!(d > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal tau = 1e-5 * PetscClipInterval(u, 1e-3, 1) / d;
-  PetscCall(VecZeroEntries(I.gamma));
-  PetscCall(VecZeroEntries(I.A1));
-  for (int sign = -1; sign <= 1; sign += 2) {
-    PetscCall(VecWAXPY(I.U1, sign * tau, I.bend, I.U0));
-    PetscCall(EvaluateResidual(ts, ts->ptime, I.U1, I.V0, I.A1, I.work));
-    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
-  }
+  PetscCall(ChangeOfConstraints(ts, I.bend, tau, false));
   PetscCall(SolveNormal(ts, I.bend));
   I.bent = Bend::Velocities;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -132,13 +114,7 @@ PetscErrorCode MeasureMisfit(TS ts)
 
   PetscFunctionBegin;
   if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
-  PetscCall(VecZeroEntries(I.gamma));
-  PetscCall(VecZeroEntries(I.A1));
-  for (int sign = -1; sign <= 1; sign += 2) {
-    PetscCall(VecWAXPY(I.U1, sign * tau, I.V0, I.U0));
-    PetscCall(EvaluateResidual(ts, ts->ptime + sign * tau, I.U1, I.V0, I.A1, I.work));
-    PetscCall(AddHolonomicRows(I, sign / (2 * tau), I.work, I.gamma));
-  }
+  PetscCall(ChangeOfConstraints(ts, I.V0, tau, true));
   PetscCall(SolveNormal(ts, I.dV));
   I.have_misfit = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

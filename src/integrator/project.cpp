@@ -21,14 +21,6 @@ namespace hht3
 namespace
 {
 
-/* Copies the rows of holonomic constraints of F into R and clears the others */
-PetscErrorCode HolonomicRows(const Integrator &I, Vec F, Vec R)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &r) { r = RoleOf(I, i) == TSHHT3_HOLONOMIC ? f : 0; }, Read(F), Write(R)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Weighted root mean square of the entries of d that belong to coordinates, times s: in units of the tolerance */
 PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
 {
@@ -52,24 +44,31 @@ PetscErrorCode Move(const Integrator &I, Vec y, Vec d)
 
 PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
 {
-  SNES               snes = ts->snes;
-  KSP                ksp;
-  Mat                P;
-  KSPConvergedReason reason;
-  PetscBool          other = PETSC_TRUE;
+  KSP       ksp;
+  Mat       P;
+  PetscBool ok;
 
   PetscFunctionBegin;
-  PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(SNESGetJacobian(snes, NULL, &P, NULL, NULL));
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   if (Get(ts).unfactored) PetscCall(NameRedundant(ts));
   PetscCall(KSPSetOperators(ksp, P, P));
-  while (other) { /* a factor is made in the solve */
-    PetscCall(KSPSolve(ksp, rhs, d));
-    Get(ts).stat.solves++;
-    PetscCall(KSPGetConvergedReason(ksp, &reason));
-    PetscCall(GiveUpKrylov(ts, &other));
-  }
-  if (reason < 0) PetscCall(NameRedundant(ts));
+  PetscCall(SolveOfTheRun(ts, rhs, d, &ok));
+  if (!ok) PetscCall(NameRedundant(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X: what U0 is off the nearest positions that the constraints allow, e of it in units of the tolerance; their violation stands in work */
+PetscErrorCode MissOfPositions(TS ts, PetscReal *e)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0)); /* leaves no accelerations */
+  PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &r) { r = RoleOf(I, i) == TSHHT3_HOLONOMIC ? f : 0; }, Read(I.gamma), Write(I.work)));
+  PetscCall(SolveStart(ts, I.work, I.X));
+  PetscCall(Distance(ts, I.X, 1, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -114,11 +113,7 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
   PetscFunctionBegin;
   for (int it = 0; it < 20; it++) {
     last = e;
-    PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-    PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
-    PetscCall(HolonomicRows(I, I.gamma, I.work));
-    PetscCall(SolveStart(ts, I.work, I.X));
-    PetscCall(Distance(ts, I.X, 1, &e));
+    PetscCall(MissOfPositions(ts, &e));
     PetscCall(WorstRow(ts, I.work, &row, &value));
     if (it == 0) {
       e0        = e;
@@ -308,12 +303,7 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared)
   PetscInt    row;
 
   PetscFunctionBegin;
-  PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-  PetscCall(VecZeroEntries(I.A1));
-  PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
-  PetscCall(HolonomicRows(I, I.gamma, I.work));
-  PetscCall(SolveStart(ts, I.work, I.X));
-  PetscCall(Distance(ts, I.X, 1, &e));
+  PetscCall(MissOfPositions(ts, &e));
   if (e < 1) PetscCall(Move(I, I.U0, I.X));
   PetscCall(CheckVelocities(ts, true, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));

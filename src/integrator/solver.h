@@ -20,6 +20,9 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFail
 /* After a solve by the run's solver. *other: another one takes its place, which has no factor yet */
 PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other);
 
+/* x from the matrix and the solver of the run, which makes a factor where it has none. ok: it is a solution */
+PetscErrorCode SolveOfTheRun(TS ts, Vec b, Vec x, PetscBool *ok);
+
 /* Why a matrix could not be factored: whether all its entries are numbers, whether it has no inverse, the package that may be the cause if it has one, and a text for I.failure (h = 0: of no step) */
 PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers);
 PetscErrorCode MatrixIsSingular(TS ts, PetscBool *yes);
