@@ -10,6 +10,7 @@
 */
 #include "bdf.h"
 #include "dense.h"
+#include "entries.h"
 #include "rotations.h"
 
 namespace hht3
@@ -18,38 +19,8 @@ namespace hht3
 namespace
 {
 
-/* Basis of the cubic Hermite polynomial on [0, 1] at x, for values and for h times slopes */
-struct Hermite {
-  PetscReal y0, y1, d0, d1;
-  Hermite(PetscReal x, PetscReal h)
-  {
-    const PetscReal z = 1 - x;
-    y0                = z * z * (1 + 2 * x);
-    y1                = x * x * (1 + 2 * z);
-    d0                = h * x * z * z;
-    d1                = -h * x * x * z;
-  }
-  PetscScalar operator()(PetscScalar a, PetscScalar da, PetscScalar b, PetscScalar db) const
-  {
-    return y0 * a + d0 * da + y1 * b + d1 * db;
-  }
-};
-
-void At(const Integrator &I, PetscReal x, const Hermite &H, PetscInt n, const PetscScalar *const s0[], const PetscScalar *const s1[],
-        PetscScalar *u, PetscScalar *v, PetscScalar *a)
-{
-  const PetscReal z = 1 - x;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscScalar u0 = s0[0][i], v0 = s0[1][i], a0 = s0[2][i], u1 = s1[0][i], v1 = s1[1][i], a1 = s1[2][i];
-    const TSHHT3Role  r = RoleOf(I, i);
-    if (u) u[i] = IsDifferential(r) ? H(u0, v0, u1, v1) : z * u0 + x * u1;
-    if (v) v[i] = r == TSHHT3_COORDINATE ? H(v0, a0, v1, a1) : z * v0 + x * v1;
-    if (a) a[i] = z * a0 + x * a1;
-  }
-}
-
-/* A polynomial of order k, as a sum of vectors */
-struct Sum {
+/* The value of a polynomial, as a sum of vectors */
+struct WeightedSum {
   PetscInt           n = 0;
   PetscReal          weight[max_order + 2];
   Vec                vec[max_order + 2];
@@ -81,12 +52,12 @@ struct Sum {
 };
 
 /* Through the values at t_{n+1}, t_n, ... of U or U' */
-Sum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Vec past[])
+WeightedSum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Vec past[])
 {
   const Order   &o = I.order;
   const PetscInt k = o.now;
   PetscReal      node[max_order + 1] = {}, weight[max_order + 1];
-  Sum            sum;
+  WeightedSum    sum;
 
   node[0] = I.t1;
   for (PetscInt j = 1; j <= k; j++) node[j] = o.t[j - 1];
@@ -97,12 +68,12 @@ Sum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Ve
 
 /* Through `end` at t_{n+1} and the values whose divided differences the predictor keeps:
    N(t) + (end - N(t_{n+1})) pi(t)/pi(t_{n+1}) with Newton's polynomial N and the product pi of all (t - t_j) */
-Sum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
+WeightedSum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
 {
   const Predictor &p = I.predictor;
   const PetscInt   n = PetscMin(p.available + 1, I.order.now);
   PetscReal        pi = 1, pi1 = 1, here[max_order + 1], there[max_order + 1];
-  Sum              sum;
+  WeightedSum      sum;
 
   for (PetscInt j = 0; j < n; j++) {
     here[j]  = pi;
@@ -115,35 +86,60 @@ Sum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
   return sum;
 }
 
-/* Any of u, v, a may be null */
-PetscErrorCode AtHigherOrder(const Integrator &I, PetscReal t, PetscInt n, PetscScalar *u, PetscScalar *v, PetscScalar *a)
-{
-  Sum U = ThroughStates(I, t, I.U1, I.U0, I.order.U), V = ThroughStates(I, t, I.V1, I.V0, I.order.V), X = ThroughUnknowns(I, t, I.X);
+/* The second half of the basis of cubic Hermite polynomials on [0, 1], which grows from 0 to 1 */
+PetscReal HermiteEnd(PetscReal x) { return x * x * (1 + 2 * (1 - x)); }
 
-  PetscFunctionBegin;
-  PetscCall(U.get());
-  PetscCall(V.get());
-  PetscCall(X.get());
-  for (PetscInt i = 0; i < n; i++) {
-    const TSHHT3Role r = RoleOf(I, i);
-    if (u) u[i] = IsDifferential(r) ? U[i] : X[i];
-    if (v) v[i] = r == TSHHT3_COORDINATE ? V[i] : r == TSHHT3_STATE ? X[i] : 0;
-    if (a) a[i] = r == TSHHT3_COORDINATE ? X[i] : 0;
-  }
-  PetscCall(X.restore());
-  PetscCall(V.restore());
-  PetscCall(U.restore());
-  PetscFunctionReturn(PETSC_SUCCESS);
+/* The cubic Hermite polynomial of values and slopes at both ends of the step */
+WeightedSum Hermite(const Integrator &I, PetscReal x, Vec y0, Vec d0, Vec y1, Vec d1)
+{
+  const PetscReal z = 1 - x;
+  WeightedSum     sum;
+
+  sum.add(HermiteEnd(z), y0);
+  sum.add(I.h * x * z * z, d0);
+  sum.add(HermiteEnd(x), y1);
+  sum.add(-I.h * x * x * z, d1);
+  return sum;
 }
 
-/* After At() */
-void AtRotations(const Integrator &I, PetscReal x, const Hermite &H, const PetscScalar *const s0[], const PetscScalar *const s1[], PetscScalar *u)
+WeightedSum Linear(PetscReal x, Vec y0, Vec y1)
 {
-  for (PetscInt i : I.rotations.at) {
-    PetscScalar v[3];
-    for (int k = 0; k < 3; k++) v[k] = H(s0[1][i + k], s0[2][i + k], s1[1][i + k], s1[2][i + k]);
-    InterpolateCommutator(I, x, H.y1, s0[1] + i, s1[1] + i, v, u + i);
-  }
+  WeightedSum sum;
+  sum.add(1 - x, y0);
+  sum.add(x, y1);
+  return sum;
+}
+
+/* The polynomials by what they are of: q and s, q', q'', s', and what is algebraic */
+struct Polynomials {
+  WeightedSum differential, velocity, acceleration, rate, algebraic;
+};
+
+Polynomials OfStep(const Integrator &I, PetscReal t)
+{
+  const PetscReal x = StepFraction(I, t), inside = PetscClipInterval(t, I.t0, I.t1);
+
+  if (I.order.accepted <= 2) return {Hermite(I, x, I.U0, I.V0, I.U1, I.V1), Hermite(I, x, I.V0, I.A0, I.V1, I.A1), Linear(x, I.A0, I.A1), Linear(x, I.V0, I.V1), Linear(x, I.U0, I.U1)};
+  const WeightedSum unknowns = ThroughUnknowns(I, inside, I.X);
+  return {ThroughStates(I, inside, I.U1, I.U0, I.order.U), ThroughStates(I, inside, I.V1, I.V0, I.order.V), unknowns, unknowns, unknowns};
+}
+
+/* The rotation vectors among U, of order two, after all coordinates */
+PetscErrorCode AtRotations(const Integrator &I, PetscReal x, WeightedSum velocity, Vec U)
+{
+  Read  v0(I.V0), v1(I.V1);
+  Write u(U);
+
+  PetscFunctionBegin;
+  PetscCall(WithArrays(
+    [&] {
+      for (PetscInt i : I.rotations.at) {
+        const PetscScalar v[3] = {velocity[i], velocity[i + 1], velocity[i + 2]};
+        InterpolateCommutator(I, x, HermiteEnd(x), &v0[i], &v1[i], v, &u[i]);
+      }
+    },
+    velocity, v0, v1, u));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
@@ -157,11 +153,9 @@ bool IsRolledBackTo(TS ts, PetscReal t) { return !Get(ts).have_step && ts->stepr
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
-  Integrator        &I = Get(ts);
-  Vec                out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0}, end[3] = {I.U1, I.V1, I.A1};
-  PetscScalar       *o[3]   = {};
-  const PetscScalar *s0[3], *s1[3];
-  PetscInt           n, size;
+  Integrator &I = Get(ts);
+  const Vec   out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0};
+  PetscInt    n, size;
 
   PetscFunctionBegin;
   if (IsRolledBackTo(ts, t)) {
@@ -178,23 +172,11 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(VecGetLocalSize(x, &size));
     PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
   }
-  const PetscReal x = StepFraction(I, t);
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecGetArrayRead(begin[k], &s0[k]));
-    PetscCall(VecGetArrayRead(end[k], &s1[k]));
-    if (out[k]) PetscCall(VecGetArrayWrite(out[k], &o[k]));
-  }
-  if (I.order.accepted > 2) PetscCall(AtHigherOrder(I, PetscClipInterval(t, I.t0, I.t1), n, o[0], o[1], o[2]));
-  else {
-    const Hermite H(x, I.h);
-    At(I, x, H, n, s0, s1, o[0], o[1], o[2]);
-    if (o[0]) AtRotations(I, x, H, s0, s1, o[0]);
-  }
-  for (int k = 0; k < 3; k++) {
-    if (out[k]) PetscCall(VecRestoreArrayWrite(out[k], &o[k]));
-    PetscCall(VecRestoreArrayRead(end[k], &s1[k]));
-    PetscCall(VecRestoreArrayRead(begin[k], &s0[k]));
-  }
+  const Polynomials p = OfStep(I, t);
+  if (U) PetscCall(ForEntries([&](PetscInt i, PetscScalar &u, PetscScalar differential, PetscScalar algebraic) { u = IsDifferential(RoleOf(I, i)) ? differential : algebraic; }, Write(U), p.differential, p.algebraic));
+  if (V) PetscCall(ForEntries([&](PetscInt i, PetscScalar &v, PetscScalar velocity, PetscScalar rate) { v = IsCoordinate(I, i) ? velocity : RoleOf(I, i) == TSHHT3_STATE ? rate : 0; }, Write(V), p.velocity, p.rate));
+  if (A) PetscCall(ForEntries([&](PetscInt i, PetscScalar &a, PetscScalar acceleration) { a = IsCoordinate(I, i) ? acceleration : 0; }, Write(A), p.acceleration));
+  if (U && I.order.accepted <= 2) PetscCall(AtRotations(I, StepFraction(I, t), p.velocity, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
