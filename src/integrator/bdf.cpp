@@ -25,12 +25,6 @@ namespace
    count so many times more in the velocities of the next one */
 constexpr PetscReal too_short = 0.2;
 
-/* tau_1, tau_2, ... for a step to t1 */
-void Spans(const Order &o, PetscReal t1, PetscReal tau[])
-{
-  for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
-}
-
 /* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
 PetscReal MisfitOfHistory(const Order &o, const BDF &b)
 {
@@ -90,6 +84,12 @@ PetscErrorCode LeaveBDF(TS ts)
 }
 
 } // namespace
+
+/* tau_1, tau_2, ... for a step to t1 */
+void Spans(const Order &o, PetscReal t1, PetscReal tau[])
+{
+  for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
+}
 
 PetscErrorCode SetUpOrder(TS ts)
 {

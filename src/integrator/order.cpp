@@ -89,12 +89,6 @@ void SweepDifferences(PetscInt n, NormType type, const PetscReal weight[kinds][m
   }
 }
 
-/* tau_1, ... of the step at hand */
-void SpansOfStep(const Integrator &I, PetscReal tau[])
-{
-  for (PetscInt j = 0; j <= I.order.past; j++) tau[j] = I.t1 - I.order.t[j];
-}
-
 /* S_m as far as the history goes, S[m]; those beyond are -1 */
 PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
 {
@@ -110,7 +104,7 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
     std::copy_n(o.S, max_order + 2, S);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  SpansOfStep(I, tau);
+  Spans(I.order, I.t1, tau);
   for (PetscInt s = 0; s < kinds && lowest + s < points; s++) DifferenceWeights(lowest + s, tau, weight[s]);
   const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
   PetscCall(VecGetLocalSize(I.U1, &n));
@@ -148,7 +142,7 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscFunctionBegin;
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
-  SpansOfStep(I, tau);
+  Spans(I.order, I.t1, tau);
   PetscCall(ScaledDifferences(ts, NORM_2, c->S));
   for (PetscInt m = lowest; m < lowest + kinds; m++)
     if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], forgets * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
@@ -214,7 +208,7 @@ PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
   PetscReal      tau[max_order + 2], S[max_order + 4];
 
   PetscFunctionBegin;
-  SpansOfStep(I, tau);
+  Spans(I.order, I.t1, tau);
   PetscCall(ScaledDifferences(ts, type, S));
   *wlte = ErrorFactor(k, tau) * S[k + 1];
   PetscFunctionReturn(PETSC_SUCCESS);

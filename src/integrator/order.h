@@ -17,6 +17,9 @@ void ResetOrder(TS ts);
 PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 
+/* tau_1, tau_2, ... for a step to t1 */
+void Spans(const Order &o, PetscReal t1, PetscReal tau[]);
+
 /* Of the attempt: its local error in units of the tolerance */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte);
 

@@ -71,10 +71,8 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
-  if (!I.count[TSHHT3_HOLONOMIC] || h > 1e-4 * I.h_regular) {
-    /* the common case is decided without a reduction: no step of regular size is tiny */
-    if (!I.count[TSHHT3_HOLONOMIC] || I.h_regular > 0) PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  /* the common case is decided without a reduction: no step of regular size is tiny */
+  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > 1e-4 * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
   *tiny = (PetscBool)(part > 0.01);
   PetscFunctionReturn(PETSC_SUCCESS);
