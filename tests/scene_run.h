@@ -13,7 +13,6 @@ inline std::unique_ptr<hhtdae::Runtime> layOut(const hhtdae::Scene &s)
 {
   auto R = std::make_unique<hhtdae::Runtime>(hhtdae::SceneAccess::model(s));
   must(hhtdae::Layout(*R));
-  must(hhtdae::StoreTriangle(*R));
   return R;
 }
 

@@ -48,7 +48,6 @@ public:
   void     initial(double *x, double *y) const override;
   void     startFrom(const double *x, const double *y) override;
   bool     vectors() const override { return true; }
-  bool     symmetric() const override { return true; } /* as K and M of the model are */
   void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
   PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *mesh) const override; /* full_surface.cpp */
 

@@ -41,7 +41,7 @@ class Batch
 public:
   virtual ~Batch() = default;
   virtual void pattern(Pattern &p) = 0;       /* asks for blocks */
-  virtual void resolve(const Pattern &p, bool again = false); /* their slots; again: they will be asked for once more */
+  virtual void resolve(const Pattern &p); /* their slots */
   virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
   virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
   /* after an accepted step; bodies have moved there */
@@ -67,11 +67,10 @@ protected:
   std::vector<Slot>     slot_;
 };
 
-inline void Batch::resolve(const Pattern &p, bool again)
+inline void Batch::resolve(const Pattern &p)
 {
   slot_.resize(request_.size());
   for (std::size_t i = 0; i < request_.size(); i++) slot_[i] = p.slot(request_[i]);
-  if (again) return;
   std::vector<PetscInt>().swap(request_);
 }
 

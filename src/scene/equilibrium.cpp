@@ -337,7 +337,6 @@ PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M)
   Vec        U, V;
   PetscFunctionBegin;
   PetscCall(Layout(R));
-  PetscCall(StoreTriangle(R));
   PetscCall(VecCreate(s.comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));

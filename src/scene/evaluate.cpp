@@ -126,10 +126,6 @@ PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
   Mat       diagonal = aij, off = nullptr;
   PetscInt  n;
   PetscFunctionBegin;
-  if (R.triangle) {
-    PetscCall(FillTriangle(R, e, aij, [&] { AddAll(R, e); }));
-    PetscFunctionReturn(0);
-  }
   if (R.size > 1) PetscCall(MatMPIAIJGetSeqAIJ(aij, &diagonal, &off, nullptr));
   MatInfo info;
   PetscCall(MatSeqAIJGetArrayWrite(diagonal, &e.sink.diagonal));
@@ -163,8 +159,7 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
   R.bodies.move(local[0], local[1]);
   R.bodies.gravity = R.scene.gravityAt(t);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, nullptr, sv, sa};
-  if (R.triangle) PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQSBAIJ, MATMPISBAIJ, ""));
-  else PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQAIJ, MATMPIAIJ, ""));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQAIJ, MATMPIAIJ, ""));
   if (ours) {
     PetscCall(Fill(R, e, J));
   } else {

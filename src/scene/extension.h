@@ -22,7 +22,6 @@ public:
   virtual void     startFrom(const double *u, const double *v) = 0; /* these become the initial coordinates and velocities */
   virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
   virtual bool     vectors() const { return false; } /* the coordinates are vectors in space axes, three behind one another */
-  virtual bool     symmetric() const { return false; } /* forces have a potential, damping is a constant symmetric matrix */
   /* What a page shows of it, at most so many nodes; none where its shape is not known. Collective */
   virtual PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *) const
   {

@@ -221,7 +221,7 @@ template <class K, int M, int C> struct Force {
   static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0, angles = 0;
   static constexpr unsigned depends = Everything(M); /* what components() and apply() use */
   static constexpr unsigned acts    = Everything(M); /* Position(k): a force at k, Rotation(k): a moment at k */
-  static constexpr bool     damped = true, symmetric = false, needs_rotation = true, says_angle = false;
+  static constexpr bool     damped = true, needs_rotation = true, says_angle = false;
   static constexpr bool     carriable = true; /* its description lets the user carry the components as force states */
   using Data = Empty;
 

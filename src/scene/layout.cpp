@@ -288,7 +288,12 @@ PetscErrorCode MakePattern(Runtime &R)
   for (auto &b : R.batches) b->pattern(R.pattern);
   R.projection.pattern(R.pattern, R.bodies);
   R.body_slot.resize(bodies);
-  PetscCall(ResolvePattern(R, false, R.model->wants_triangle));
+  R.pattern.build(R.start, R.n);
+  for (std::size_t i = 0; i < R.body_slot.size(); i++) R.body_slot[i] = R.pattern.slot((PetscInt)i);
+  R.projection.resolve(R.pattern);
+  for (auto &b : R.batches) b->resolve(R.pattern);
+  PetscCall(R.pattern.createMat(R.scene.comm, R.n, &R.J));
+  R.pattern.release();
   PetscFunctionReturn(0);
 }
 

@@ -29,14 +29,13 @@ namespace
 
 constexpr double apart = 1099511627776.; /* 2^40: of what the shifts multiply, nothing else is left in the digits */
 
-/* F_u, F_u' or F_u'' in MATAIJ: the matrix with the shifts, less F_u */
+/* F_u, F_u' or F_u'': the matrix with the shifts, less F_u */
 PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv, double sa, Mat less, Mat *out)
 {
   Mat J;
   PetscFunctionBegin;
   PetscCall(MatDuplicate(R.J, MAT_DO_NOT_COPY_VALUES, &J));
   PetscCall(Jacobian(R, t, s[0], s[1], s[2], sv, sa, J));
-  if (R.triangle) PetscCall(MatConvert(J, MATAIJ, MAT_INPLACE_MATRIX, &J));
   if (less) {
     PetscCall(MatAXPY(J, -1, less, SAME_NONZERO_PATTERN));
     PetscCall(MatScale(J, 1 / (sv + sa)));

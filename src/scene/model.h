@@ -26,9 +26,6 @@ struct Model {
   Numbering   number;
   std::vector<Matrix3> described; /* attitudes of the bodies, before assembly and equilibrium moved them */
   PetscInt    n = 0, start = 0; /* own unknowns, global number of the first */
-  /* one triangle of the matrix: asked for; else why all of it is stored */
-  bool        wants_triangle = false;
-  std::string full_because;
 };
 
 struct SceneAccess {
@@ -53,8 +50,6 @@ BodyKind       KindOf(const SceneData &s, const BodyData &b);
 PetscInt       CoordinatesOf(const SceneData &s, const BodyData &b); /* modal ones too */
 /* expressions.cpp: variables, states, user's forces */
 PetscMPIInt OwnerOf(const Model &M, const Expression &e);
-/* triangle.cpp: whether one triangle of the matrix, MATSBAIJ, is wanted, and why not */
-PetscErrorCode WantTriangle(Model &M);
 /* check.cpp: everything that is wrong with the description, as one error */
 PetscErrorCode CheckDescription(SceneData &s);
 PetscErrorCode CheckUnchanged(const SceneData &s, const StartPolicy &start);

@@ -26,7 +26,6 @@ PetscErrorCode DeclareSceneOptions()
                                       "scene_page_frames",
                                       "scene_page_nodes",
                                       "scene_balance",
-                                      "scene_symmetric_storage",
                                       nullptr};
   PetscFunctionBegin;
   PetscCall(TSHHT3DeclareOptions(names));

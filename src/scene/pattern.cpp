@@ -4,20 +4,17 @@
 namespace hhtdae
 {
 
-/* Columns of each row group, sorted, then offsets of every block; of one triangle from the diagonal on */
-void Pattern::build(PetscInt start, PetscInt n, bool triangle)
+/* Columns of each row group, sorted, then offsets of every block */
+void Pattern::build(PetscInt start, PetscInt n)
 {
   struct Column {
     PetscInt group;
     bool     diagonal;
     PetscInt at; /* first entry in the row, of its part of the matrix */
   };
-  triangle_ = triangle;
   const std::size_t     groups = group.size();
   std::vector<PetscInt> first(groups + 1, 0);
-  const auto            stored = [&](const Request &r) {
-    return r.row >= 0 && !toFrame(r) && group[r.row].own && (!triangle || group[r.column].global >= group[r.row].global);
-  };
+  const auto            stored = [&](const Request &r) { return r.row >= 0 && !toFrame(r) && group[r.row].own; };
   for (const Request &r : request_)
     if (stored(r)) first[r.row + 1]++;
   for (std::size_t g = 0; g < groups; g++) first[g + 1] += first[g];
@@ -33,7 +30,6 @@ void Pattern::build(PetscInt start, PetscInt n, bool triangle)
   };
   const auto width = [&](const Column &c) { return c.diagonal ? 1 : group[c.group].size; };
   std::vector<PetscInt> width_own(groups, 0), width_other(groups, 0);
-  std::vector<char>     shrinks(groups, 0); /* one triangle, and a whole block on the diagonal */
   di.assign(n + 1, 0);
   oi.assign(n + 1, 0);
   for (std::size_t g = 0; g < groups; g++) {
@@ -48,9 +44,8 @@ void Pattern::build(PetscInt start, PetscInt n, bool triangle)
       columns[k].at = sum;
       sum += width(columns[k]);
     }
-    shrinks[g] = triangle && last[g] > first[g] && columns[first[g]].group == (PetscInt)g && !columns[first[g]].diagonal;
     for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
-      di[group[g].local + r + 1] = width_own[g] - (shrinks[g] ? r : 0);
+      di[group[g].local + r + 1] = width_own[g];
       oi[group[g].local + r + 1] = width_other[g];
     }
   }
@@ -65,9 +60,8 @@ void Pattern::build(PetscInt start, PetscInt n, bool triangle)
     for (PetscInt r = 0; r < group[g].size && group[g].own; r++) {
       PetscInt d = di[group[g].local + r], o = oi[group[g].local + r];
       for (PetscInt k = first[g]; k < last[g]; k++) {
-        const Group   &c    = group[columns[k].group];
-        const bool     half = shrinks[g] && k == first[g];
-        for (PetscInt e = columns[k].diagonal || half ? r : 0; e < (columns[k].diagonal ? r + 1 : c.size); e++) {
+        const Group &c = group[columns[k].group];
+        for (PetscInt e = columns[k].diagonal ? r : 0; e < (columns[k].diagonal ? r + 1 : c.size); e++) {
           if (c.own) dj[d++] = c.global + e - start;
           else oj[o++] = c.global + e;
         }
@@ -80,11 +74,9 @@ void Pattern::build(PetscInt start, PetscInt n, bool triangle)
     Slot          &s = slot_[q];
     s = Slot();
     if (!stored(request_[q])) continue;
-    s.off     = !group[c].own;
-    s.shrinks = shrinks[g] && !s.off;
-    s.upper   = s.shrinks && c == g;
-    s.stride  = s.off ? width_other[g] : width_own[g] - (s.shrinks ? 1 : 0);
     const auto found = std::lower_bound(columns.begin() + first[g], columns.begin() + last[g], Column{c, false, 0}, before);
+    s.off            = !group[c].own;
+    s.stride         = (s.off ? width_other : width_own)[g];
     s.diagonal       = found->diagonal;
     s.base           = (s.off ? oi : di)[group[g].local] + found->at;
   }
@@ -104,10 +96,9 @@ PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(MatCreate(comm, A));
   PetscCall(MatSetSizes(*A, n, n, PETSC_DETERMINE, PETSC_DETERMINE));
-  PetscCall(MatSetType(*A, triangle_ ? MATSBAIJ : MATAIJ));
+  PetscCall(MatSetType(*A, MATAIJ));
   if (size == 1) {
-    if (triangle_) PetscCall(MatSeqSBAIJSetPreallocationCSR(*A, 1, di.data(), dj.data(), nullptr));
-    else PetscCall(MatSeqAIJSetPreallocationCSR(*A, di.data(), dj.data(), nullptr));
+    PetscCall(MatSeqAIJSetPreallocationCSR(*A, di.data(), dj.data(), nullptr));
   } else {
     /* one list of global columns per row, sorted */
     PetscInt start;
@@ -124,8 +115,7 @@ PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const
       std::sort(j.begin() + begin, j.end());
       i[r + 1] = (PetscInt)j.size();
     }
-    if (triangle_) PetscCall(MatMPISBAIJSetPreallocationCSR(*A, 1, i.data(), j.data(), nullptr));
-    else PetscCall(MatMPIAIJSetPreallocationCSR(*A, i.data(), j.data(), nullptr));
+    PetscCall(MatMPIAIJSetPreallocationCSR(*A, i.data(), j.data(), nullptr));
   }
   PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
   PetscFunctionReturn(0);

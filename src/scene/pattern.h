@@ -21,17 +21,14 @@ struct Group {
   int      at    = 0;
 };
 
-/* Where a block goes: entry (r, c) at base + r stride + c of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix.
-   Of one triangle a row is shorter by one than the row above it where both begin on the diagonal: there the stride falls by one a
-   row, and of the block on the diagonal the upper part has a place. */
+/* Where a block goes: entry (r, c) at base + r stride + c of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix */
 struct Slot {
-  PetscInt base   = -1; /* -1: the rows belong to another rank, or the block is below the diagonal of one triangle */
+  PetscInt base   = -1; /* -1: the rows belong to another rank */
   PetscInt stride = 0;
   bool     off    = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
-  bool     shrinks = false, upper = false;
   bool     frame = false; /* of an attachment's frame: in the array of the projection */
 
-  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, shrinks, upper, frame}; }
+  Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, frame}; }
 };
 
 class Pattern
@@ -56,7 +53,7 @@ public:
     return (PetscInt)request_.size() - 1;
   }
   /* diagonal entries that no element asks for are left out: multipliers have none */
-  void build(PetscInt start, PetscInt n, bool triangle = false);
+  void build(PetscInt start, PetscInt n);
   Slot slot(PetscInt number) const { return slot_[number]; }
   /* f(number, row, column) for all blocks of attachments' frames that were asked for; and where such a block goes, after build() */
   template <class F> void ofFrames(F f) const
@@ -70,7 +67,7 @@ public:
   /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
   std::vector<PetscInt> di, dj, oi, oj;
 
-  /* SEQAIJ or MPIAIJ with this pattern, of one triangle SEQSBAIJ or MPISBAIJ; other types get it through MatConvert by the caller */
+  /* SEQAIJ or MPIAIJ with this pattern; other types get it through MatConvert by the caller */
   PetscErrorCode createMat(MPI_Comm comm, PetscInt n, Mat *A) const;
 
 private:
@@ -81,7 +78,6 @@ private:
   bool toFrame(const Request &r) const { return r.row >= 0 && (group[r.row].frame >= 0 || group[r.column].frame >= 0); }
   std::vector<Request> request_;
   std::vector<Slot>    slot_;
-  bool                 triangle_ = false;
 };
 
 /* Adds blocks to the arrays of a matrix */
@@ -93,9 +89,7 @@ struct Sink {
   {
     if (s.base < 0) return;
     double *p = (s.frame ? frame : s.off ? off : diagonal) + s.base;
-    if (s.shrinks) {
-      addShrinking(s, B, rows, columns, p);
-    } else if (s.diagonal) {
+    if (s.diagonal) {
       for (int r = 0; r < rows && r < columns; r++, p += s.stride) *p += B(r, r);
     } else if (columns == 3) {
       for (int r = 0; r < rows; r++, p += s.stride)
@@ -103,21 +97,6 @@ struct Sink {
     } else {
       for (int r = 0; r < rows; r++, p += s.stride)
         for (int c = 0; c < columns; c++) p[c] += B(r, c);
-    }
-  }
-
-private:
-  template <class Block> static void addShrinking(const Slot &s, const Block &B, int rows, int columns, double *p)
-  {
-    PetscInt stride = s.stride;
-    if (s.diagonal) {
-      for (int r = 0; r < rows && r < columns; r++, p += stride--) *p += B(r, r);
-    } else if (columns == 3 && !s.upper) {
-      for (int r = 0; r < rows; r++, p += stride--)
-        for (int c = 0; c < 3; c++) p[c] += B(r, c);
-    } else {
-      for (int r = 0; r < rows; r++, p += stride--)
-        for (int c = s.upper ? r : 0; c < columns; c++) p[c] += B(r, c);
     }
   }
 };

@@ -129,12 +129,11 @@ void Projection::pattern(Pattern &p, const Bodies &B)
   }
 }
 
-void Projection::resolve(Pattern &p, bool again)
+void Projection::resolve(Pattern &p)
 {
   for (const auto &x : of_) p.put(x.first, x.second);
   slot_.resize(request_.size());
   for (std::size_t i = 0; i < request_.size(); i++) slot_[i] = p.slot(request_[i]);
-  if (again) return;
   std::vector<PetscInt>().swap(request_);
   std::vector<std::pair<PetscInt, Slot>>().swap(of_);
 }

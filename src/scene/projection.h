@@ -21,7 +21,7 @@ class Projection
 public:
   /* when all elements have asked for their blocks: asks for those of the bodies */
   void pattern(Pattern &p, const Bodies &B);
-  void resolve(Pattern &p, bool again);
+  void resolve(Pattern &p);
   bool empty() const { return of_.empty() && carriers_ == 0; }
 
   /* around what elements add; the loads on frames are complete, and the bodies' own blocks come after it */

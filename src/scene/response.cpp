@@ -81,7 +81,7 @@ PetscErrorCode Begin(const Linearization::Work &w, double omega, const std::vect
   PetscCall(KSPSetOperators(r.ksp, r.A, r.A));
   PetscCall(KSPGetPC(r.ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
-  PetscCall(ChoosePackage(r.A, pc, false));
+  PetscCall(ChoosePackage(r.A, pc));
   PetscCall(KSPSetFromOptions(r.ksp));
   PetscFunctionReturn(0);
 }

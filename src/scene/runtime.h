@@ -46,10 +46,6 @@ struct Runtime {
   std::vector<double>    u, v, a; /* local unknowns, where there are others */
 
   Mat  J = nullptr;
-  /* one triangle of it, and off-diagonal values of own rows, which PETSc takes row by row there */
-  bool                  triangle = false;
-  std::vector<PetscInt> off_start, off_column;
-  std::vector<double>   off_value;
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
   bool changing = false; /* between the test that asked for other axes and their commit */
@@ -141,10 +137,6 @@ PetscErrorCode FinishOutput(Runtime &R);
 constexpr PetscInt recorded = 68; /* numbers by which a recording goes on */
 PetscErrorCode     SaveOutput(Runtime &R, double *x);
 PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
-/* triangle.cpp: one triangle of the matrix, MATSBAIJ, where nothing breaks its symmetry */
-PetscErrorCode StoreTriangle(Runtime &R); /* after Layout() */
-PetscErrorCode ResolvePattern(Runtime &R, bool triangle, bool again);
-PetscErrorCode FillTriangle(Runtime &R, Evaluation &e, Mat J, const std::function<void()> &add);
 /* ts.cpp: a run from the start, which the TS owns; the run of this scene that the TS owns, for the call that is named */
 PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts);
 PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R);

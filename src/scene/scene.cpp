@@ -231,7 +231,6 @@ PetscErrorCode Scene::setUp()
     PetscCall(DropRedundant(M));
     PetscCall(CheckInertia(s));
     PetscCall(Number(M));
-    PetscCall(WantTriangle(M));
     if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
     if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
     s.start_given = start_;

@@ -8,7 +8,7 @@
 namespace hhtdae
 {
 
-PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle); /* still.cpp: of a matrix that is factored outside of the integrator */
+PetscErrorCode ChoosePackage(Mat J, PC pc); /* still.cpp: of a matrix that is factored outside of the integrator */
 /* options.cpp */
 PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);

@@ -15,14 +15,14 @@ StillSystem::~StillSystem()
   for (Vec *x : {&U, &V, &A, &zero, &F, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* As the integrator would: KLU where it is there, which it is on one rank alone; else, and of one triangle, MUMPS through the package that gives
+/* As the integrator would: KLU where it is there, which it is on one rank alone; else MUMPS through the package that gives
    it more room where pivots change with the length of a step (AnalysesRanks.HangingChain) */
-PetscErrorCode ChoosePackage(Mat J, PC pc, bool triangle)
+PetscErrorCode ChoosePackage(Mat J, PC pc)
 {
   PetscFunctionBegin;
   for (const char *package : {"klupair", MATSOLVERKLU, "mumpsnd", MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST}) {
     PetscBool is;
-    PetscCall(MatGetFactorAvailable(J, package, triangle ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &is));
+    PetscCall(MatGetFactorAvailable(J, package, MAT_FACTOR_LU, &is));
     if (!is) continue;
     PetscCall(PCFactorSetMatSolverType(pc, package));
     break;
@@ -44,8 +44,8 @@ PetscErrorCode StillSystem::create(Vec begin, const char *prefix)
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPSetOperators(ksp, J, J));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, R.triangle ? PCCHOLESKY : PCLU));
-  PetscCall(ChoosePackage(J, pc, R.triangle));
+  PetscCall(PCSetType(pc, PCLU));
+  PetscCall(ChoosePackage(J, pc));
   PetscCall(KSPSetFromOptions(ksp));
   PetscFunctionReturn(0);
 }

@@ -45,7 +45,6 @@ public:
   virtual bool          isExplicit() const { return false; } /* a constraint of the description alone, which a run meets without unknowns */
   virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
   virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
-  virtual bool          symmetric(PetscInt) const { return false; } /* its part of the matrix, where nothing else breaks that */
   virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
   virtual int           memory() const { return 0; } /* numbers that an instance remembers of accepted steps */
   virtual void          remember(PetscInt, double *) {} /* these in place of what the description tells */
@@ -111,7 +110,6 @@ public:
   bool          isHolonomic() const override { return K::holonomic; }
   bool          usesVelocities() const override { return !K::holonomic; }
   bool          curves() const override { return ConstraintBatch<K>::curvedAtAll(); }
-  bool          symmetric(PetscInt) const override { return K::holonomic && !K::inputs; }
   int           rows() const override { return K::rows; }
   unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
@@ -160,7 +158,6 @@ public:
   bool          isConstraint() const override { return false; }
   bool          isHolonomic() const override { return false; }
   bool          usesVelocities() const override { return K::damped; }
-  bool          symmetric(PetscInt e) const override { return !turns() && K::symmetric && !K::inputs && !this->carried(e); }
   int           rows() const override { return K::count; }
   unsigned char active(PetscInt) const override { return 0; }
 
@@ -171,13 +168,6 @@ public:
   }
 
 private:
-  /* a wrench that goes with axes of a marker need not be a gradient by finite turns */
-  static constexpr bool turns()
-  {
-    for (int k = 0; k < K::markers; k++)
-      if (Depends(K::depends, 2 * k + 1)) return true;
-    return false;
-  }
   template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried) const
   {
     auto                  *batch = new B;

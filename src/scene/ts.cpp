@@ -37,7 +37,7 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
   PetscReal factor = 0;
   Vec       begin;
   PetscFunctionBegin;
-  if (R.turns && R.bodies.local && !R.triangle) PetscCall(TSHHT3GetRotationFactor(ts, &factor, &begin)); /* which is not symmetric */
+  if (R.turns && R.bodies.local) PetscCall(TSHHT3GetRotationFactor(ts, &factor, &begin));
   if (factor > 0) PetscCall(NoteBeginning(R, begin));
   R.bodies.commutator = sv * factor;
   const PetscErrorCode failed = Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); });
@@ -202,7 +202,6 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
   Runtime &R   = *run;
   PetscFunctionBegin;
   PetscCall(Guarded([&] { return Layout(R); }));
-  PetscCall(StoreTriangle(R));
   PetscCall(VecCreate(R.scene.comm, &U));
   PetscCall(VecSetSizes(U, R.n, PETSC_DETERMINE));
   PetscCall(VecSetType(U, VECSTANDARD));

@@ -73,7 +73,6 @@ PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
   if (c.turning) PetscCall(PetscViewerASCIIPrintf(viewer, "  rotations: %s\n", s.start.rotations == Rotations::Local ? "local rotation vectors" : "Euler angles"));
   if (R && R->turns && !R->bodies.local) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->reframed));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  matrix: %s\n", M.wants_triangle ? "one triangle" : ("all of it, " + M.full_because).c_str()));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);
 }

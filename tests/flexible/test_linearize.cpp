@@ -218,19 +218,6 @@ TEST(Linearize, SteepForces)
   }
 }
 
-/* One triangle of the matrix */
-TEST(Linearize, SymmetricStorage)
-{
-  std::vector<Mode> modes[2];
-  for (int half = 0; half < 2; half++) {
-    Options in(half ? "-scene_symmetric_storage true" : "-scene_symmetric_storage false");
-    Rods    rods(4);
-    modes[half] = Started(rods.scene).modes();
-  }
-  ASSERT_EQ(modes[0].size(), modes[1].size());
-  for (std::size_t k = 0; k < modes[0].size(); k++) EXPECT_LT(std::abs(modes[0][k].value - modes[1][k].value), 1e-9);
-}
-
 /* An angle of half a turn, which is pi on one side and -pi on the other */
 TEST(Linearize, AngleOfHalfATurn)
 {

@@ -39,7 +39,7 @@ struct RelativeDerivatives {
 void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDerivatives &by, Matrix<12, 12> &frames, Matrix<12, 12> *twists);
 
 template <class K, bool Damped> struct RelativeForce : Force<K, 2, 6> {
-  static constexpr bool damped = Damped, symmetric = !Damped;
+  static constexpr bool damped = Damped;
 
   template <class T> static Relative<T> relative(const Frame<T> *f, const Twist<T> *w, Mat3<T> &E)
   {

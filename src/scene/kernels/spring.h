@@ -74,7 +74,7 @@ template <class K> struct LineForce : Force<K, 2, 1> {
  * without velocities */
 template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
   static constexpr const char *name   = Damped ? "spring-damper" : "spring";
-  static constexpr bool        damped = Damped, symmetric = !Damped;
+  static constexpr bool        damped = Damped;
   struct Data {
     double stiffness, damping, length, preload;
   };

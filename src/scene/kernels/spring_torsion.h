@@ -66,7 +66,7 @@ template <class K> struct TurnForce : Force<K, 2, 1> {
 /* M = preload - k (angle - free angle) - c angle' */
 template <bool Damped> struct LinearTorsion : TurnForce<LinearTorsion<Damped>> {
   static constexpr const char *name   = Damped ? "torsional spring-damper" : "torsional spring";
-  static constexpr bool        damped = Damped, symmetric = !Damped;
+  static constexpr bool        damped = Damped;
   struct Data {
     double memory[1];
     double stiffness, damping, angle, preload;
