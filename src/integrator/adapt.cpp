@@ -2,6 +2,7 @@
   The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
   than it says. It is replaced by any other type, as by -ts_adapt_type basic.
 */
+#include "compat.h"
 #include "estimate.h"
 #include "order.h"
 #include "start.h"
@@ -33,7 +34,7 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 }
 
 /* Of the tolerance: nothing moves, or evenly */
-constexpr PetscReal negligible = 1e-6;
+constexpr PetscReal negligible = 1e-3;
 constexpr PetscReal waiting    = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
 constexpr PetscReal regular    = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
 
@@ -41,12 +42,28 @@ constexpr PetscReal regular    = 0.1; /* of the steps before a failure: so far t
 PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
 {
   Integrator     &I        = Get(ts);
-  const PetscReal furthest = PetscMin(PetscMax(waiting * h, regular * I.h_regular), PetscMax(h, coasting * (ts->max_time - I.t_begin)));
+  const PetscReal furthest = PetscMin(PetscMax(waiting * h, regular * I.h_regular), coasting * (ts->max_time - I.t_begin));
 
   PetscFunctionBegin;
   if (*next <= furthest) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.fastest >= PETSC_MAX_REAL && I.ahead == Ahead::Unknown) PetscCall(LookAhead(ts, I.t1, I.U1, I.V1));
   if (I.fastest < PETSC_MAX_REAL || I.ahead == Ahead::Loads) *next = furthest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last steps before a time that one has to end at are of one length: a step that is cut short there changes h at once, which leaves an error in
+   the multipliers for as many steps as the history has (LastSteps.AreOfOneLength) */
+constexpr PetscReal last_steps = 10;
+
+PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
+{
+  const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h);
+
+  PetscFunctionBegin;
+  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || !(rest > *next && rest <= last_steps * *next)) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal steps = PetscCeilReal(rest / *next - 1e-6);
+  PetscCall(PetscInfo(ts, "the last %g steps before a given time are of one length, %g in place of %g\n", (double)steps, (double)(rest / steps), (double)*next));
+  *next = rest / steps;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -63,6 +80,7 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
+  PetscCall(ShareTheRest(ts, h, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

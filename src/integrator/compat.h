@@ -58,16 +58,19 @@ typedef MatFDColoringFn *HHT3ColoringFunction;
 /* An error unless the PETSc that runs is one that this library was built for; version.cpp */
 PetscErrorCode HHT3CheckPetscVersion(void);
 
-/* The next point that TSAdaptChoose() aims at with TS_EXACTFINALTIME_MATCHSTEP: of a time span, or the final time */
-static inline PetscReal HHT3NextStop(TS ts)
+/* The first point after t that a step has to end at with TS_EXACTFINALTIME_MATCHSTEP: of a time span, or the final time */
+static inline PetscReal HHT3StopAfter(TS ts, PetscReal t)
 {
+  const PetscReal  least = t + 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t);
+  PetscInt         n     = 0, k = 0;
+  const PetscReal *point = NULL;
 #if PETSC_VERSION_LT(3, 23, 0)
-  if (ts->tspan && ts->tspan->spanctr < ts->tspan->num_span_times) return ts->tspan->span_times[ts->tspan->spanctr];
+  if (ts->tspan) n = ts->tspan->num_span_times, k = ts->tspan->spanctr, point = ts->tspan->span_times;
 #else
-  if (ts->eval_times && ts->eval_times->time_point_idx < ts->eval_times->num_time_points)
-    return ts->eval_times->time_points[ts->eval_times->time_point_idx];
+  if (ts->eval_times) n = ts->eval_times->num_time_points, k = ts->eval_times->time_point_idx, point = ts->eval_times->time_points;
 #endif
-  return ts->max_time;
+  while (k < n && point[k] <= least) k++;
+  return k < n ? point[k] : ts->max_time;
 }
 
 /* Points of a time span that a run has behind it where it begins or is resumed, so that TSAdaptChoose() does not aim at them. Their solutions are not known to it: not a number

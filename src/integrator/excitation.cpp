@@ -117,10 +117,10 @@ PetscErrorCode NoteExcitation(TS ts)
 }
 
 /* I.ahead: whether the rest of the run, from U and V at t, has loads or motions that set in, of which the start has seen nothing. Samples at multiples of the
-   golden section, nowhere further apart than 0.09 of the rest */
+   golden section, nowhere further apart than coasting of the rest */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 {
-  constexpr int   samples = 12;
+  constexpr int   samples = 89;
   Integrator     &I       = Get(ts);
   const PetscReal rest    = ts->max_time - t;
   PetscReal       part = 0, change = 0;

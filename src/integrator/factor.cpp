@@ -80,7 +80,7 @@ PetscErrorCode SolverDefaults(TS ts, KSP ksp)
 constexpr PetscReal petsc_abstol = 1e-50; /* PETSc's own, which tells whether the user has set one */
 
 /* An absolute tolerance ends a solve before it has begun where the residual, whose units differ from row to row and with h, is below it: a correction of zero, which proves
-   nothing (LinearSolves.AbsoluteTolerances). So solves end by the relative one alone. */
+   nothing (LinearSolves.AbsoluteTolerances; PETSc's own does so where a motion dies away, LinearSolves.AMotionThatDiesAway). So solves end by the relative one alone. */
 static PetscErrorCode TakeTolerance(TS ts, KSP ksp)
 {
   Hooks    &H = Get(ts).hooks;
@@ -88,11 +88,12 @@ static PetscErrorCode TakeTolerance(TS ts, KSP ksp)
 
   PetscFunctionBegin;
   PetscCall(KSPGetTolerances(ksp, NULL, &abstol, NULL, NULL));
-  if (abstol <= petsc_abstol) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!H.abstol_told)
+  if (abstol <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (abstol > petsc_abstol && !H.abstol_told) {
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ksp_atol %g has no effect, as it would take every correction for zero whose residual is below it: -ksp_rtol rules\n", TSHHT3, (double)abstol));
-  H.abstol_told = PETSC_TRUE;
-  H.abstol      = abstol;
+    H.abstol_told = PETSC_TRUE;
+  }
+  H.abstol = abstol;
   PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, 0, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

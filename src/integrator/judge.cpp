@@ -275,8 +275,10 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 
 } // namespace
 
-/* The square: numbers of which it underflows may have answers that do. A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems):
-   the solution of J dX = F is no shorter than |F|/|J|. */
+/* Norms whose squares underflow are none: answers to numbers that small may be zero, and a motion that dies away gets there (LinearSolves.AMotionThatDiesAway) */
+constexpr PetscReal least_norm = 1e-150;
+
+/* A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems): the solution of J dX = F is no shorter than |F|/|J|. */
 PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
 {
   KSP       ksp;
@@ -286,9 +288,9 @@ PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
   PetscBool direct, has_norm;
 
   PetscFunctionBegin;
-  PetscCall(VecNorm(dX, NORM_2, &d));
+  PetscCall(VecNorm(dX, NORM_INFINITY, &d));
   PetscCall(VecNorm(F, NORM_2, &f));
-  *yes = (PetscBool)(d == 0 && f * f > 0);
+  *yes = (PetscBool)(d == 0 && f > least_norm);
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
@@ -297,7 +299,8 @@ PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
   PetscCall(MatHasOperation(J, MATOP_NORM, &has_norm));
   if (!has_norm) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatNorm(J, NORM_FROBENIUS, &norm));
-  *yes = (PetscBool)(f > 2 * norm * d);
+  PetscCall(VecNorm(dX, NORM_2, &d));
+  *yes = (PetscBool)(f > 2 * norm * PetscMax(d, least_norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

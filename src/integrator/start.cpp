@@ -159,7 +159,7 @@ PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
   PetscFunctionBegin;
   PetscCall(ErrorsOfStart(ts, rate, &e));
   PetscCall(CorrectionNorm(ts, I.A0, 1, &e2));
-  const PetscReal span = HHT3NextStop(ts) < PETSC_MAX_REAL / 2 ? HHT3NextStop(ts) - ts->ptime : 1;
+  const PetscReal span = HHT3StopAfter(ts, ts->ptime) < PETSC_MAX_REAL / 2 ? HHT3StopAfter(ts, ts->ptime) - ts->ptime : 1;
   PetscReal       h3 = e.step(0.125);
   PetscCall(TimeScaleOfAccelerations(ts, I.A0, &T));
   if (e2 > 0 && T < PETSC_MAX_REAL) h3 = PetscMin(h3, PetscPowReal(0.125 * T * T / e2, 0.25)); /* q'''' as large as q''/T^2: from rest q''' is rounding (FirstStep.FromRest) */
@@ -174,8 +174,8 @@ PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  const bool unset = ts->time_step == unset_step || ts->time_step == HHT3NextStop(ts) - ts->ptime;
-  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_step, HHT3NextStop(ts) - ts->ptime);
+  const bool unset = ts->time_step == unset_step || ts->time_step == HHT3StopAfter(ts, ts->ptime) - ts->ptime;
+  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
   else if (I.auto_h && unset) {
     PetscCall(FirstStep(ts, rate, &ts->time_step));
     PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));

@@ -27,7 +27,7 @@ PetscErrorCode Start(TS ts);
 
 /* How fast loads and motions are that depend on time alone, excitation.cpp */
 PetscErrorCode NoteExcitation(TS ts);
-constexpr PetscReal coasting = 0.1; /* of the run: the longest step where nothing moves, though loads or motions follow time */
+constexpr PetscReal coasting = 0.02; /* of the run: the longest step where nothing moves, though loads or motions follow time */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V);
 PetscErrorCode TellUnfollowed(TS ts);
 

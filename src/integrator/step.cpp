@@ -138,7 +138,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
 {
   Integrator     &I    = Get(ts);
   const PetscReal h    = I.h;
-  const PetscReal stop = HHT3NextStop(ts);
+  const PetscReal stop = HHT3StopAfter(ts, ts->ptime);
 
   PetscFunctionBegin;
   PetscCall(TrueAcceleration(I));
@@ -147,7 +147,13 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
-  ts->time_step = I.h_next = I.fixed_h && ts->ptime == stop && I.h_given > 0 ? I.h_given : next; /* that to the stop made up for rounding, and would be taken for what the user wants */
+  ts->time_step = I.h_next = next;
+  /* the step to the stop was what was left, and would be taken for what the user wants */
+  if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
+    const PetscReal rest = HHT3StopAfter(ts, stop) - stop;
+    I.h_next = ts->time_step = I.h_given;
+    if (rest > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(I.h_given, rest); /* BetweenRuns.FixedStepsInATimeSpan */
+  }
   if (!tiny) I.h_proven = PetscMax(h, I.h_proven);
   if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
@@ -166,7 +172,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
 void NoteGivenStep(TS ts)
 {
   Integrator     &I    = Get(ts);
-  const PetscReal rest = HHT3NextStop(ts) - ts->ptime;
+  const PetscReal rest = HHT3StopAfter(ts, ts->ptime) - ts->ptime;
 
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
   else if (I.h_next == 0) I.h_given = I.h_first; /* the first run is shorter than a step */
@@ -306,10 +312,14 @@ PetscErrorCode PassStops(TS ts)
 
   PetscFunctionBegin;
   PetscCall(HHT3PassStops(ts, &passed));
+  /* of PETSc 3.18, whatever the integrator (Events.ThatGoBackAreRefused) */
+  PetscCheck(ts->time_step > 0 || !HHT3EventActive(ts), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the handler see which way it goes",
+             (double)ts->time_step, (double)ts->ptime);
   if (ts->time_step != 0 && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.h_next > 0) ts->time_step = I.h_next;
   else ts->time_step = I.auto_h ? unset_step : I.h_first;
-  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3NextStop(ts) - ts->ptime);
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

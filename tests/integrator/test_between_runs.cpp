@@ -1,5 +1,6 @@
 /* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
 #include "support.h"
+#include <array>
 
 using namespace hhtest;
 
@@ -141,6 +142,31 @@ TEST(BetweenRuns, FixedStepsAfterAShortPart)
   EXPECT_EQ(run.statistics().steps, 101);
 }
 
+/* Points nearer to each other than a step, and steps that do not fit between them */
+TEST(BetweenRuns, FixedStepsInATimeSpan)
+{
+  const Oscillators p({1.}, {0.}, false, 1.);
+  PetscReal         times[] = {0., 0.1, 0.105, 0.3, 0.32, 0.33, 0.5, 1.};
+  for (const char *h : {"0.03", "0.15", "0.004"}) {
+    Simulation run(p, "-ts_adapt_type none -ts_dt " + std::string(h) + " ");
+    PetscInt   n;
+    Vec       *x;
+    must(TSSetTimeSpan(run.ts, 8, times));
+    must(run.solve());
+    must(TSGetTimeSpanSolutions(run.ts, &n, &x));
+    ASSERT_EQ(n, 8);
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscScalar *q;
+      Array              exact(1), v(1), a(1);
+      ASSERT_TRUE(p.reference(times[k], exact.data(), v.data(), a.data()));
+      must(VecGetArrayRead(x[k], &q));
+      EXPECT_NEAR(q[0], exact[0], 1e-2) << h << " " << times[k];
+      must(VecRestoreArrayRead(x[k], &q));
+    }
+    EXPECT_EQ(run.t(), 1.) << h;
+  }
+}
+
 /* TSSolve() where nothing is left of a run leaves no step size; what follows goes on as if it had not been called */
 TEST(BetweenRuns, SolvedAgainAtTheEnd)
 {
@@ -235,6 +261,31 @@ TEST(Events, WhatTheyLeaveIsUnderTheErrorTest)
 }
 
 /* Monitors are called where an event has taken a step back, too */
+/* PETSc 3.18 goes astray where a function crosses zero against its direction, and asks for steps back: an error, not a run without end */
+TEST(Events, ThatGoBackAreRefused)
+{
+  struct Fall : Problem {
+    Fall()
+    {
+      name = "fall";
+      n    = 1;
+      t1   = 2.3;
+      role = {TSHHT3_COORDINATE};
+    }
+    void initial(double *u, double *v) const override { u[0] = 1., v[0] = 0.; }
+    void residual(double, const double *, const double *, const double *a, double *f) const override { f[0] = a[0] + 9.81; }
+    void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override { J.add(0, 0, sa); }
+  } fall;
+  const auto height = [](TS, PetscReal, Vec U, PetscScalar *f, void *) { return VecGetValues(U, 1, std::array<PetscInt, 1>{0}.data(), f); };
+  Simulation run(fall, tolerance(1e-6));
+  PetscInt   up        = 1;
+  PetscBool  terminate = PETSC_FALSE;
+  ErrorTrap  trap;
+  must(TSSetEventHandler(run.ts, 1, &up, &terminate, height, leave, nullptr));
+  if (run.solve()) EXPECT_NE(trap.message.find("set direction 0"), std::string::npos) << trap.message;
+  else EXPECT_NEAR(run.u()[0], 1. - 9.81 * 2.3 * 2.3 / 2., 1e-6);
+}
+
 TEST(Events, SamplesInMonitors)
 {
   const Switched p(0.);
@@ -458,6 +509,28 @@ TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
     must(run.solve());
     for (double x : tension) EXPECT_NEAR(x, tension[0], 0.01 * std::abs(tension[0])) << end;
   }
+}
+
+/* What a run ends with, and what it has at given times between: a step cut short there would leave the multipliers far off, more so the higher the order */
+TEST(LastSteps, AreOfOneLength)
+{
+  for (const char *order : {"2", "auto"})
+    for (double end : {2., 2.03, 2.07, 2.11}) {
+      const MovedPendulum p(end);
+      Simulation          run(p, tolerance(1e-5) + "-ts_hhtdae_order " + order);
+      double              on_the_way = 0., last = 0., t_last = 0.;
+      Array               h;
+      run.watch = [&](Simulation &r, PetscInt step, double t) {
+        last = std::abs(r.u()[2] - p.tension(t, r.u(), r.v()));
+        if (step && t < 0.8 * end) widen(on_the_way, last);
+        h.push_back(t - t_last);
+        t_last = t;
+      };
+      must(run.solve());
+      MEASURED("order %s to %g: tension off by %.1e at the end, by %.1e before", order, end, last, on_the_way);
+      EXPECT_LT(last, 1.1 * on_the_way) << order << end;
+      for (size_t k = h.size() - 4; k < h.size(); k++) EXPECT_GT(h[k], 0.85 * h[k - 1]) << order << end;
+    }
 }
 
 /* A kick of a mass in oil: it goes m v/c in a thousandth of the step at hand, and an oscillator that has nothing to do with it goes on */

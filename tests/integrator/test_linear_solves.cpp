@@ -145,3 +145,16 @@ TEST(LinearSolves, ZeroIsNoSolution)
     EXPECT_EQ(steps, from_start ? 0 : 10);
   }
 }
+
+/* Answers as small as rounding can tell, and smaller, are answers: a motion that dies away takes no more steps than another */
+TEST(LinearSolves, AMotionThatDiesAway)
+{
+  for (const char *solver : {"", "-ksp_type gmres -pc_type jacobi"}) {
+    const Oscillators p({1e4}, {0.}, false, 600.);
+    Simulation        run(p, fixedSteps(1.) + "-ts_hhtdae_radius 0 -ts_rtol 1e-13 -ts_atol 1e-13 " + solver);
+    must(run.solve());
+    EXPECT_EQ(run.statistics().steps, 600) << solver;
+    EXPECT_EQ(run.statistics().corrector_fails, 0) << solver;
+    EXPECT_LT(std::abs(run.u()[0]), 1e-150) << solver;
+  }
+}
