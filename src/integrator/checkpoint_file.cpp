@@ -1,4 +1,5 @@
 #include "checkpoint_file.h"
+#include "linear/hash.h"
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
@@ -20,26 +21,17 @@ struct Header {
 };
 
 constexpr char         magic[8] = {'h', 'h', 't', 'd', 'a', 'e', 'c', 'p'};
-constexpr std::int32_t version  = 11;
+constexpr std::int32_t version  = 12;
 
 /* Files of versions 1 to 3 began with this number and their version, big-endian */
 constexpr unsigned char old_magic[4] = {0x00, 0x12, 0x7b, 0xaa};
 
 constexpr size_t message = 1 << 26; /* bytes from rank to rank at once: MPI counts in int */
 
-/* FNV-1a */
-struct Checksum {
-  std::uint64_t sum = 14695981039346656037ull;
-  void          add(const char *x, size_t n)
-  {
-    for (size_t i = 0; i < n; i++) sum = (sum ^ (unsigned char)x[i]) * 1099511628211ull;
-  }
-};
-
 /* Rank 0's file. Once something has failed nothing more is done, but ranks go on talking to one another. */
 struct Stream {
   std::FILE *f = nullptr;
-  Checksum   sum;
+  Hash       sum;
   int        error = 0; /* errno */
 
   void open(const char *name, const char *mode)
@@ -50,14 +42,14 @@ struct Stream {
   void write(const void *x, size_t n)
   {
     if (error || !n) return;
-    sum.add(static_cast<const char *>(x), n);
+    sum.add(x, n);
     if (std::fwrite(x, 1, n, f) != n) error = errno ? errno : EIO;
   }
   void read(void *x, size_t n)
   {
     if (error || !n) return;
     if (std::fread(x, 1, n, f) != n) error = EIO;
-    else sum.add(static_cast<const char *>(x), n);
+    else sum.add(x, n);
   }
   /* With everything on the disk */
   void finish()

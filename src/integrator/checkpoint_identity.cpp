@@ -7,6 +7,7 @@
 #include "corrector.h"
 #include "entries.h"
 #include "equations.h"
+#include "linear/hash.h"
 #include "linear/linear.h"
 #include "work_vec.h"
 
@@ -19,14 +20,6 @@ namespace
 /* Residuals at the state in the file that differ by more than this part of the largest row's belong to another problem: rounding of
    another machine is far below it. */
 constexpr PetscReal other_problem = 1e-11;
-
-/* FNV-1a */
-std::uint64_t Hash(const void *x, size_t n)
-{
-  std::uint64_t sum = 14695981039346656037ull;
-  for (size_t i = 0; i < n; i++) sum = (sum ^ static_cast<const unsigned char *>(x)[i]) * 1099511628211ull;
-  return sum;
-}
 
 } // namespace
 
@@ -46,7 +39,7 @@ PetscErrorCode Identify(TS ts, Identity *id)
   id->forces = I.F0 != nullptr;
   id->p      = I.hht;
   id->order  = I.order.max;
-  id->roles  = Hash(I.role.data(), I.role.size());
+  id->roles  = Hash().add(I.role.data(), I.role.size()).sum;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

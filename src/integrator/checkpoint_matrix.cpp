@@ -8,6 +8,7 @@
 #include "formulas.h"
 #include "jacobian.h"
 #include "linear/archive.h"
+#include "linear/hash.h"
 #include "linear/linear.h"
 #include <cstdint>
 #include <vector>
@@ -45,12 +46,7 @@ PetscErrorCode Rows(Mat A, std::vector<PetscScalar> &values, std::vector<PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-std::uint64_t PatternHash(const std::vector<PetscInt> &x)
-{
-  std::uint64_t sum = 14695981039346656037ull;
-  for (const PetscInt i : x) sum = (sum ^ (std::uint64_t)i) * 1099511628211ull;
-  return sum;
-}
+std::uint64_t PatternHash(const std::vector<PetscInt> &x) { return Hash().add(x.data(), x.size() * sizeof(PetscInt)).sum; }
 
 PetscErrorCode SetRows(Mat A, const std::vector<PetscScalar> &values, const std::vector<PetscInt> &columns)
 {

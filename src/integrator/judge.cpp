@@ -166,7 +166,7 @@ PetscErrorCode FailUnproved(TS ts)
   if (I.corrector.wrong_jacobian) I.corrector.blames += 1;
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
                           "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
-                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two",
+                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two. If it is right, roles found at the start hold no longer: TSHHT3SetIS()",
                           (double)I.t1, (double)I.h, (double)I.verify.largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -42,7 +42,12 @@ private:
   static void read(py::handle g, double &x, const std::string &w) { x = To<double>(g, w, "a number"); }
   static void read(py::handle g, int &x, const std::string &w) { x = To<int>(g, w, "a whole number"); }
   static void read(py::handle g, PetscInt64 &x, const std::string &w) { x = To<PetscInt64>(g, w, "a whole number"); }
-  static void read(py::handle g, bool &x, const std::string &w) { x = To<bool>(g, w, "True or False"); }
+  static void read(py::handle g, bool &x, const std::string &w)
+  {
+    if (!py::isinstance<py::bool_>(g) && std::string(py::str(py::type::of(g).attr("__name__"))).rfind("bool", 0) != 0) /* numpy's too; a number is one that stands in the wrong place */
+      throw py::type_error(w + " must be True or False, not " + std::string(py::repr(g)));
+    x = g.cast<bool>();
+  }
   static void read(py::handle g, std::string &x, const std::string &w) { x = To<std::string>(g, w, "a text"); }
   static void read(py::handle g, Body &x, const std::string &w) { x = ToHandle<Body>(g, w); }
   static void read(py::handle g, Marker &x, const std::string &w) { x = ToHandle<Marker>(g, w); }

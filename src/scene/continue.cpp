@@ -31,6 +31,23 @@ std::vector<Batch *> ThatRemember(const Runtime &R)
   return all;
 }
 
+/* The first element with memories that is in one of the two alone, or has others */
+std::string ComeOrGone(const SceneData &from, const SceneData &to)
+{
+  const auto memory = [](const SceneData &s, std::size_t e) {
+    int n = 0;
+    if (e < s.elements.size())
+      for (const Part &p : s.elements[e].parts) n += p.store->memory();
+    return n;
+  };
+  for (std::size_t e = 0; e < std::max(from.elements.size(), to.elements.size()); e++)
+    if (memory(from, e) != memory(to, e)) {
+      const ElementData &of = (e < to.elements.size() ? to : from).elements[e];
+      return std::string(of.type) + " " + of.name + " has";
+    }
+  return "some have";
+}
+
 /* Angles over full turns and points on curves, which go on from where they are */
 PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
 {
@@ -40,7 +57,9 @@ PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
   for (std::size_t k = 0; same && k < a.size(); k++) same = a[k]->memory() == b[k]->memory();
   if (to.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, to.scene.comm));
   PetscCheck(same, to.scene.comm, PETSC_ERR_SUP,
-             "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve: let others come and go");
+             "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: let joints, motions or forces come and go in their place (of "
+             "velocities, to lock a shaft), or change a parameter of an element that stays",
+             ComeOrGone(from.scene, to.scene).c_str());
   for (std::size_t k = 0; k < a.size(); k++) {
     std::vector<double> memory(a[k]->memory());
     a[k]->copyMemory(memory.data(), false);

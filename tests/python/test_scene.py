@@ -600,6 +600,37 @@ class Questions(unittest.TestCase):
 
 
 class Mistakes(unittest.TestCase):
+    def test_numbers_are_no_flags(self):
+        """As the third argument of a term, which is whether it is an angle, and not its factor"""
+        scene = h.Scene(planar=True)
+        a, b = scene.rigid_body("a", inertia=(0, 0, 1.)), scene.rigid_body("b", inertia=(0, 0, 1.))
+        with self.assertRaisesRegex(TypeError, "rotation must be True or False, not 1.0"):
+            scene.add("c", h.Coupler([h.Term(a.marker(), scene.ground.marker(), 1.), h.Term(b.marker(), scene.ground.marker(), -3.)]))
+        with self.assertRaisesRegex(TypeError, "planar must be True or False"):
+            h.Scene(planar=3.)
+        scene.add("c", h.Coupler([h.Term(a.marker(), scene.ground.marker(), np.bool_(True)), h.Term(b.marker(), scene.ground.marker(), factor=-3.)]))
+
+    def test_directions_of_no_length(self):
+        with self.assertRaisesRegex(ValueError, "axes_along"):
+            h.axes_along((0, 0, 0))
+        with self.assertRaisesRegex(ValueError, "rotation"):
+            h.rotation((0, 0, 0), 1.)
+
+    def test_what_counts_turns_cannot_come_in_a_run(self):
+        scene = h.Scene(planar=True)
+        lock = scene.parameter("lock", 1.)
+        a, b = scene.rigid_body("a", inertia=(0, 0, 2.), angular_velocity=(0, 0, 1.)), scene.rigid_body("b", inertia=(0, 0, 1.))
+        g, ma, mb = scene.ground.marker(), a.marker(), b.marker()
+        scene.add("ra", h.Revolute(ma, g))
+        scene.add("rb", h.Revolute(mb, g))
+        scene.add("clutch", lambda: h.Coupler([h.Term(ma, g), h.Term(mb, g, factor=-1.)]) if lock.get() else None)
+        scene.set(lock=0.)
+        run = scene.run(tolerance=1e-6).solve(1.)
+        scene.set(lock=1.)
+        scene.start(assembly="project")
+        with self.assertRaisesRegex(Exception, "clutch"):
+            scene.run(after=run).solve(2.)
+
     def test_all_that_is_wrong_is_told(self):
         scene = h.Scene()
         b = scene.add("beam", h.RigidBody(mass=-1., inertia=(1, 1, 5)))

@@ -117,7 +117,7 @@ TYPED_TEST(ContactKernel, BeginsContinuously)
       K::jacobian(s.d, s.f, s.w, 0, nullptr, on, J);
       const double now = J.frames.cwiseAbs().maxCoeff();
       EXPECT_LT(checks::ToVector<2>(on).norm(), 200 * std::pow(depth, exponent));
-      if (exponent > 1) EXPECT_LT(now, .2 * before); /* like d^(e-1) at least */
+      if (exponent > 1) { EXPECT_LT(now, .2 * before); } /* like d^(e-1) at least */
       EXPECT_GT(now, 0);
       before = now;
     }

@@ -151,10 +151,18 @@ class Shape:
         raise ValueError("colour is %r, must be a number 0xRRGGBB or '#rrggbb'" % (self.colour,))
 
 
+def _direction(x, of):
+    """x as a unit vector."""
+    x = np.asarray(x, dtype=float)
+    length = np.linalg.norm(x)
+    if not (x.shape == (3,) and 0 < length < np.inf):
+        raise ValueError(f"{of} must be a direction, three numbers that are not all zero, not {x.tolist()}")
+    return x / length
+
+
 def axes_along(z, x=None):
     """Right-handed orthonormal axes, as columns, whose z axis is along a direction of any length, and x as near to `x` as can be."""
-    z = np.asarray(z, dtype=float)
-    z = z / np.linalg.norm(z)
+    z = _direction(z, "axes_along: z")
     given = np.zeros(3) if x is None else np.asarray(x, dtype=float)
     p = given - z.dot(given) * z
     if not np.linalg.norm(p) > 1e-8 * np.linalg.norm(given):
@@ -167,8 +175,7 @@ def axes_along(z, x=None):
 
 def rotation(axis, angle):
     """The matrix of a rotation about an axis of any length, by an angle in radians."""
-    a = np.asarray(axis, dtype=float)
-    a = a / np.linalg.norm(a)
+    a = _direction(axis, "rotation: the axis")
     K = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 

@@ -161,7 +161,10 @@ class ContactLaw(Spec):
     exponent : of the penetration d
     damping : time per length
     friction : Coulomb's coefficient
-    slip_velocity : of the regularization friction tanh(v / slip_velocity)"""
+    slip_velocity : of the regularization friction tanh(v / slip_velocity)
+
+    The numbers given are for metres, newtons and seconds; other units want others. Steps follow a contact as far as its penetration stands out of the tolerance:
+    if it does not, impacts gain or lose energy, and what is fast flies through."""
     stiffness: Number = 1e5
     exponent: Number = 1.5
     damping: Number = 0.

@@ -72,13 +72,15 @@ class _Two(Spec):
 
 @_spec
 class Gear(_Two):
-    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its value at the start."""
+    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its value at the start. Its torques are about the joints' axes; the forces of teeth, which
+    bearings feel, are those of `GearMesh`."""
     ratio: Number = 1.
 
 
 @_spec
 class RackAndPinion(_Two):
-    """Couples an advance with an angle: advance_2 - radius angle_1 keeps its value at the start."""
+    """Couples an advance with an angle: advance_2 - radius angle_1 keeps its value at the start. The force of the teeth acts along the axis of the advance, the torque about
+    that of the angle; bearings feel those of `RackMesh`."""
     radius: Number = 1.
 
 
@@ -198,7 +200,9 @@ class RotationalMotion(Spec):
     """Prescribes the angle of i about z_j.
 
     function : of time: a number, a `TimeFunction`, a formula of time(), or a Python function of t, which is traced; radians
-    of : "displacement", "velocity" or "acceleration": what the function is"""
+    of : "displacement", "velocity" or "acceleration": what the function is
+
+    A velocity or acceleration that comes and goes while nothing else moves may lie between two steps, and what it leaves is lost: see `time`."""
     i: Any
     j: Any
     function: Union[float, TimeFunction, Expression, Callable]

@@ -50,7 +50,7 @@ def _row(k, name):
 def time():
     """Time.
 
-    Steps see loads at their ends: a pulse while nothing moves may lie between two of them if it is shorter than a tenth of the run.
+    Steps see loads at their ends: a pulse while nothing moves may lie between two of them if it is shorter than a fortieth of the run.
     ``options={"ts_adapt_dt_max": 0.1}`` holds steps below a part of its duration, see `Scene.run`.
     """
     return Measure("time")

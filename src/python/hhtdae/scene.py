@@ -130,6 +130,8 @@ class Scene:
 
     def __init__(self, gravity: Optional[Sequence[float]] = None, planar: bool = False, comm: Any = None) -> None:
         self.comm = PETSc.COMM_WORLD if comm is None else PETSc.Comm(comm)
+        if not isinstance(planar, (bool, np.bool_)):
+            raise TypeError(f"Scene: planar must be True or False, not {planar!r}")
         self._core = _core.Scene(self.comm, bool(planar))
         self._keep = [self.comm]  # what the C++ part refers to and does not own: callbacks and functions that describe
         self._channels = []
@@ -197,7 +199,8 @@ class Scene:
             For messages and results; an empty one becomes "body 7", "Revolute 3".
         what : RigidBody, PointMass, FlexibleBody, one of the elements, or a function without arguments that returns one
             A function is called again whenever parameters have changed. One of an element may return None: the element has its place, and nothing
-            acts; its markers are made outside of it, as others are an error. Numbers that are formulas of parameters need no function.
+            acts; its markers are made outside of it, as others are an error. Within a run, `run(after=)`, elements that count angles over full turns or follow curves
+            cannot come or go: couplers, gears, torsion springs, constraints of angles. Numbers that are formulas of parameters need no function.
 
         Returns
         -------
@@ -403,7 +406,9 @@ class Scene:
         Parameters
         ----------
         tolerance : float, optional
-            Of the error of positions in every step, relative and absolute (PETSc's default: 1e-4).
+            Of the error of positions in every step, in their units and radians, times the largest of one and what the coordinates reach (PETSc's default: 1e-4).
+            Where everything moves by micrometres, in metres, or where a contact a hundred metres away gives way by millimetres, it has to be as much smaller, or
+            what is smaller than the tolerance is not there.
         sample : float or None
             Time between samples of the channels; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
             within steps are more accurate than those at their ends, as a rule, but not with fast modes that hardly anything damps, of flexible bodies
