@@ -2,7 +2,6 @@
   The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
   than it says. It is replaced by any other type, as by -ts_adapt_type basic.
 */
-#include "compat.h"
 #include "estimate.h"
 #include "order.h"
 #include "start.h"
@@ -51,22 +50,6 @@ PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last steps before a time that one has to end at are of one length: a step that is cut short there changes h at once, which leaves an error in
-   the multipliers for as many steps as the history has (LastSteps.AreOfOneLength) */
-constexpr PetscReal last_steps = 10;
-
-PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
-{
-  const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h);
-
-  PetscFunctionBegin;
-  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || !(rest > *next && rest <= last_steps * *next)) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal steps = PetscCeilReal(rest / *next - 1e-6);
-  PetscCall(PetscInfo(ts, "the last %g steps before a given time are of one length, %g in place of %g\n", (double)steps, (double)(rest / steps), (double)*next));
-  *next = rest / steps;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
 PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
 {
@@ -80,7 +63,6 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
-  PetscCall(ShareTheRest(ts, h, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -62,7 +62,7 @@ PetscErrorCode HHT3CheckPetscVersion(void);
 static inline PetscReal HHT3StopAfter(TS ts, PetscReal t)
 {
   const PetscReal  least = t + 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t);
-  PetscInt         n     = 0, k = 0;
+  PetscInt         n = 0, k = 0;
   const PetscReal *point = NULL;
 #if PETSC_VERSION_LT(3, 23, 0)
   if (ts->tspan) n = ts->tspan->num_span_times, k = ts->tspan->spanctr, point = ts->tspan->span_times;

@@ -41,7 +41,7 @@ class Batch
 public:
   virtual ~Batch() = default;
   virtual void pattern(Pattern &p) = 0;       /* asks for blocks */
-  virtual void resolve(const Pattern &p); /* their slots */
+  virtual void resolve(const Pattern &p);     /* their slots */
   virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
   virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
   /* after an accepted step; bodies have moved there */

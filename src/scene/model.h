@@ -25,7 +25,7 @@ struct Model {
   PetscMPIInt rank = 0, size = 1;
   Numbering   number;
   std::vector<Matrix3> described; /* attitudes of the bodies, before assembly and equilibrium moved them */
-  PetscInt    n = 0, start = 0; /* own unknowns, global number of the first */
+  PetscInt             n = 0, start = 0; /* own unknowns, global number of the first */
 };
 
 struct SceneAccess {

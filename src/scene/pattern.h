@@ -25,7 +25,7 @@ struct Group {
 struct Slot {
   PetscInt base   = -1; /* -1: the rows belong to another rank */
   PetscInt stride = 0;
-  bool     off    = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
+  bool     off = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
   bool     frame = false; /* of an attachment's frame: in the array of the projection */
 
   Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, frame}; }

@@ -44,7 +44,7 @@ public:
   virtual bool          usesVelocities() const { return true; }
   virtual bool          isExplicit() const { return false; } /* a constraint of the description alone, which a run meets without unknowns */
   virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
-  virtual bool          curves() const { return true; } /* reactions change with the markers' frames */
+  virtual bool          curves() const { return true; }           /* reactions change with the markers' frames */
   virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
   virtual int           memory() const { return 0; } /* numbers that an instance remembers of accepted steps */
   virtual void          remember(PetscInt, double *) {} /* these in place of what the description tells */

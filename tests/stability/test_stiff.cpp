@@ -347,8 +347,8 @@ TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
     watchForces(run, p, unsolved);
     must(run.solve());
     MEASURED("3 brakes of %g N s/m: %.1e N unsolved; %d steps, %d iterations", k, unsolved, (int)run.statistics().steps, (int)run.statistics().newton);
-    EXPECT_LT(unsolved, 1e-3); /* of loads of some N; proofs leave up to 0.3 */
-    EXPECT_LT(run.statistics().steps, 20);
+    EXPECT_LT(unsolved, 1e-2);             /* of loads of some N; proofs leave up to 0.3 */
+    EXPECT_LT(run.statistics().steps, 60); /* 50 of them wait for loads, where nothing moves */
   }
 }
 
