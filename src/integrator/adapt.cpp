@@ -2,6 +2,7 @@
   The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
   than it says. It is replaced by any other type, as by -ts_adapt_type basic.
 */
+#include "compat.h"
 #include "estimate.h"
 #include "order.h"
 #include "start.h"
@@ -50,6 +51,20 @@ PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A step that is cut short where one has to end changes h at once, which leaves an error in the multipliers for as many steps as the history has: the last
+   steps before are of one length (LastSteps.AreOfOneLength) */
+PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
+{
+  const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h), equal = 1e-6; /* but for rounding */
+
+  PetscFunctionBegin;
+  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || rest < (1 - equal) * *next || rest > last_steps * *next) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal steps = PetscCeilReal(rest / *next - equal);
+  if (steps * *next - rest > equal * rest) PetscCall(PetscInfo(ts, "the last %g steps before a given time are of one length, %g in place of %g\n", (double)steps, (double)(rest / steps), (double)*next));
+  *next = rest / steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
 PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
 {
@@ -63,6 +78,7 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
+  PetscCall(ShareTheRest(ts, h, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -26,6 +26,7 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
 PetscErrorCode NoteError(TS ts);
 
 PetscErrorCode CreateAdapt(TSAdapt adapt);
+constexpr PetscReal last_steps = 10; /* before a time at which a step has to end: of one length, and their change of h is seen by whoever reads the multipliers there */
 PetscErrorCode LookFurther(TS ts); /* before the attempts from t_n, where the run goes on beyond its old end */
 
 /* Before an attempt from t_n */

@@ -18,8 +18,10 @@
   derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
   spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
+#include "compat.h"
 #include "entries.h"
 #include "equations.h"
+#include "estimate.h"
 #include "formulas.h"
 #include "solver.h"
 #include "stage.h"
@@ -31,12 +33,15 @@ namespace hht3
 namespace
 {
 
-/* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, and without
-   damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
-PetscReal Least(const Integrator &I)
+/* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, as does whoever reads the multipliers where a run
+   ends (Analyses.KinematicsOfAFourBar), and without damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
+PetscReal Least(TS ts)
 {
-  const PetscReal least = 1e-3;
-  return I.count[TSHHT3_STATE] ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
+  const Integrator &I     = Get(ts);
+  const PetscReal   least = 1e-3;
+  const bool        last  = ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3StopAfter(ts, ts->ptime) - ts->ptime <= (last_steps + 0.5) * I.h;
+
+  return I.count[TSHHT3_STATE] || last ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
 }
 
 PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
@@ -145,7 +150,7 @@ PetscErrorCode AdaptVelocities(TS ts)
   I.misfit = 0;
   if (I.order.now > 2) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.bent == Bend::Rates && I.corrector.matrix.have) PetscCall(ComputeBend(ts));
-  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(I) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(ts) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
   I.misfit = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);

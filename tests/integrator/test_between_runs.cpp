@@ -514,6 +514,28 @@ TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
   }
 }
 
+/* What a run ends with, and what it has at given times between: a step cut short there would leave the multipliers far off, more so the higher the order */
+TEST(LastSteps, AreOfOneLength)
+{
+  for (const char *order : {"2", "auto"})
+    for (double end : {2., 2.03, 2.07, 2.11}) {
+      const MovedPendulum p(end);
+      Simulation          run(p, tolerance(1e-5) + "-ts_hhtdae_order " + order);
+      double              on_the_way = 0., last = 0., t_last = 0.;
+      Array               h;
+      run.watch = [&](Simulation &r, PetscInt step, double t) {
+        last = std::abs(r.u()[2] - p.tension(t, r.u(), r.v()));
+        if (step && t < 0.8 * end) widen(on_the_way, last);
+        h.push_back(t - t_last);
+        t_last = t;
+      };
+      must(run.solve());
+      MEASURED("order %s to %g: tension off by %.1e at the end, by %.1e before", order, end, last, on_the_way);
+      EXPECT_LT(last, 1.1 * on_the_way) << order << end;
+      for (size_t k = h.size() - 4; k < h.size(); k++) EXPECT_GT(h[k], 0.85 * h[k - 1]) << order << end;
+    }
+}
+
 /* A kick of a mass in oil: it goes m v/c in a thousandth of the step at hand, and an oscillator that has nothing to do with it goes on */
 TEST(BetweenRuns, AKickOfADampedMass)
 {

