@@ -9,6 +9,7 @@
 #include "checkpoint.h"
 #include "compat.h"
 #include "corrector.h"
+#include "dense.h"
 #include "entries.h"
 #include "equations.h"
 #include "estimate.h"
@@ -21,6 +22,7 @@
 #include "stage.h"
 #include "start.h"
 #include "step.h"
+#include "work_vec.h"
 #include <utility>
 
 namespace hht3
@@ -36,6 +38,21 @@ constexpr PetscInt max_tiny_row = 50;
    has them again and again */
 constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
 
+
+/* -ts_exact_final_time interpolate leaves the solution at the end of a run in the vector that TSSolve() was given, and takes it for that at the end of the last step
+   when it is called again with it (BetweenRuns.GoOnFromInterpolatedEnds) */
+PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)
+{
+  WorkVec x;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (ts->exact_final_time != TS_EXACTFINALTIME_INTERPOLATE || !(ts->solvetime > Get(ts).t0 && ts->solvetime < Get(ts).t1)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(x.like(ts->vec_sol));
+  PetscCall(Interpolate(ts, ts->solvetime, x, NULL, NULL));
+  PetscCall(VecEqual(ts->vec_sol, x, yes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
    a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. Accept() may have moved the time a little. */
@@ -58,6 +75,10 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecEqual(ts->vec_sol, U, &same_u));
   PetscCall(VecEqual(ts->vec_dot, V, &same_v));
+  if (!same_u && I.have_step && !ts->steprollback) {
+    PetscCall(IsInterpolatedEnd(ts, &same_u));
+    if (same_u) PetscCall(VecCopy(U, ts->vec_sol));
+  }
   *changed = (PetscBool)(!same_u || !same_v);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -536,6 +536,37 @@ TEST(LastSteps, AreOfOneLength)
     }
 }
 
+/* Parts that end between steps go on from the end of the last step: the same digits as in one run, also from a checkpoint */
+TEST(BetweenRuns, GoOnFromInterpolatedEnds)
+{
+  const MovedPendulum p(2.);
+  const std::string   file = "interpolated_" + std::to_string(getpid()) + ".cp", options = tolerance(1e-6) + "-ts_exact_final_time ";
+  Simulation          one(p, options + "stepover"), parts(p, options + "interpolate"), resumed(p, options + "stepover -ts_hhtdae_resume " + file);
+  for (double t : {0.1, 2.}) { /* the first step knows of the first part alone */
+    must(TSSetMaxTime(one.ts, t));
+    must(one.solve());
+  }
+  for (int k = 1; k <= 20; k++) {
+    const double t = 0.1 * k;
+    must(TSSetMaxTime(parts.ts, t));
+    must(TSSolve(parts.ts, parts.U));
+    const Array u = whole(parts.U);
+    EXPECT_NEAR(std::hypot(u[0] - 0.5 * std::sin(t), u[1]), 1., 1e-6) << k;
+    if (k == 10) must(TSHHT3CheckpointSave(parts.ts, file.c_str()));
+  }
+  must(resumed.solve());
+  std::remove(file.c_str());
+  EXPECT_EQ(parts.statistics().restarts, 1);
+  for (Simulation *run : {&parts, &resumed}) {
+    PetscReal t, t_one;
+    must(TSGetTime(run->ts, &t));
+    must(TSGetTime(one.ts, &t_one));
+    EXPECT_EQ(t, t_one);
+    EXPECT_EQ(run->statistics().steps, one.statistics().steps);
+  }
+  EXPECT_EQ(resumed.u(), one.u());
+}
+
 /* A kick of a mass in oil: it goes m v/c in a thousandth of the step at hand, and an oscillator that has nothing to do with it goes on */
 TEST(BetweenRuns, AKickOfADampedMass)
 {
