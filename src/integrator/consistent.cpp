@@ -120,6 +120,25 @@ PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A rate on which no equation depends there, as that of a damper that is out of contact, has h C alone in its column and would become rounding over h: it is zero
+   (Start.RatesThatMeanNothingAtFirst). none: F at first, then 1 where that is so. */
+PetscErrorCode LeaveRates(TS ts, Consistent &c, Vec none)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (!I.count[TSHHT3_STATE]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c.its == 0) PetscCall(VecCopy(c.F, none));
+  if (c.its == 1)
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar d, PetscScalar x, PetscScalar &g) { g = RoleOf(I, i) == TSHHT3_STATE && f == g && PetscAbsScalar(d) > 0.5 * PetscAbsScalar(x); },
+                         Read(c.F), Read(c.d), Read(c.X), Write(none)));
+  if (c.its > 0) {
+    PetscCall(ForEntries([&](PetscInt, PetscScalar g, PetscScalar &f, PetscScalar &x) { if (g != 0.) f = x = 0; }, Read(none), Write(c.F), Write(c.X)));
+    PetscCall(TakeUnknowns(I, c));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* F at X */
 PetscErrorCode Residual(TS ts, Consistent &c)
 {
@@ -192,10 +211,12 @@ static PetscErrorCode WithOwnFactors(Consistent &c)
 /* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.failed, where that was the linear solver. */
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
-  PetscReal e = 0, last, first = 0, forces;
+  PetscReal e = 0, last, first = 0, forces = 0;
   PetscBool renew = (PetscBool)!have_matrix, other, balanced;
+  WorkVec   none;
 
   PetscFunctionBegin;
+  if (Get(ts).count[TSHHT3_STATE]) PetscCall(none.like(c.X));
   *ok = PETSC_TRUE;
   PetscCall(TakeUnknowns(Get(ts), c));
   for (c.its = c.ksp_its = 0; c.its < max_it;) {
@@ -206,6 +227,7 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     PetscCall(CheckNumbers(ts, c.t, {c.F, c.U, c.V, c.A}, ok));
     *why = Get(ts).failure;
     if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(LeaveRates(ts, c, none));
     last = e;
     PetscCall(CorrectUnknowns(ts, c, &e, ok));
     PetscCall(LinearGiveUpKrylov(c.ksp, c.P, c.linear, &other));

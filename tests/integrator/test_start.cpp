@@ -417,3 +417,70 @@ TEST(Start, FirstStepIsChosen)
     EXPECT_GT(second / first, .5);
   }
 }
+
+namespace
+{
+
+/* A mass on two springs in series, between which a damper acts from 0.3 s on: only then the rate of the place between them stands in an equation */
+struct LateDamper : Problem {
+  static constexpr double k = 500., soft = 10., c = 40., g = 9.81, on = 0.3;
+
+  LateDamper()
+  {
+    name = "late damper";
+    n    = 2;
+    t1   = 0.5;
+    role = {TSHHT3_COORDINATE, TSHHT3_STATE};
+  }
+  static double damper(double t) { return t < on ? 0. : c; }
+  void          initial(double *u, double *v) const override
+  {
+    u[0] = 0.5, u[1] = 0.5 * k / (k + soft);
+    v[0] = v[1] = 0.;
+  }
+  void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+  {
+    f[0] = a[0] + g + k * (u[0] - u[1]);
+    f[1] = damper(t) * v[1] + soft * u[1] + k * (u[1] - u[0]);
+  }
+  void jacobian(double t, const double *, const double *, const double *, double sv, double sa, Entries &J) const override
+  {
+    J.add(0, 0, sa + k);
+    J.add(0, 1, -k);
+    J.add(1, 0, -k);
+    J.add(1, 1, sv * damper(t) + soft + k);
+  }
+  /* In closed form until the damper acts, from there by many steps of the classical method of Runge and Kutta; good to 9 digits */
+  double exact() const
+  {
+    const double          w = std::sqrt(k * soft / (k + soft)), mid = -g / (w * w), amplitude = 0.5 - mid, q = mid + amplitude * std::cos(w * on);
+    std::array<double, 3> y{q, -amplitude * w * std::sin(w * on), q * k / (k + soft)};
+    const auto            rate = [](const std::array<double, 3> &x) { return std::array<double, 3>{x[1], -g - k * (x[0] - x[2]), -(soft * x[2] + k * (x[2] - x[0])) / c}; };
+    const int             steps = 10000;
+    const double          h     = (t1 - on) / steps;
+    for (int i = 0; i < steps; i++) {
+      std::array<double, 3> sum = y, x = y;
+      for (const auto &[weight, next] : {std::array<double, 2>{1. / 6., .5}, {1. / 3., .5}, {1. / 3., 1.}, {1. / 6., 0.}}) {
+        const auto f = rate(x);
+        for (int j = 0; j < 3; j++) sum[j] += weight * h * f[j], x[j] = y[j] + next * h * f[j];
+      }
+      y = sum;
+    }
+    return y[0];
+  }
+};
+
+} // namespace
+
+/* It had rounding over 1e-28 for its rate */
+TEST(Start, RatesThatMeanNothingAtFirst)
+{
+  const LateDamper p;
+  for (double eps : {1e-5, 1e-7}) {
+    Simulation run(p, tolerance(eps), PETSC_COMM_SELF, true);
+    must(run.solve());
+    MEASURED("tolerance %g: off by %.1e after %d steps", eps, run.u()[0] - p.exact(), (int)run.statistics().steps);
+    EXPECT_NEAR(run.u()[0], p.exact(), 100. * eps);
+    EXPECT_LT(run.statistics().steps, 400);
+  }
+}
