@@ -70,7 +70,8 @@ public:
   PetscErrorCode modes(Body flexible, std::vector<double> *coordinates);
 
   /* What an element, joint, motion or force, does to the body of a marker: its force and its moment about the marker's origin, in the
-     axes of another marker (default: space axes). Zero if it does not touch that body. */
+     axes of another marker (default: space axes). Zero if it does not touch that body. Of a flexible body: to the attachment that the marker is on, or
+     by loads and contacts of its modes, which have no attachment, to all of it; an error if it touches another attachment alone. */
   PetscErrorCode load(Element e, Marker on, Load *x, Marker axes = {});
 
   /* An angle counts full turns: from the start in planar scenes and where an element, a channel or an expression reads it, else from the first

@@ -113,10 +113,7 @@ std::string CheckLoad(const SceneData &s, const Measure &m)
   if (!Good(s, m.i)) return "its marker is not one of this scene";
   if (m.frame.id != -1 && !Good(s, m.frame)) return "marker `frame` is not one of this scene";
   const ElementData &e = s.elements[m.target];
-  for (const Part &p : e.parts)
-    for (int k = 0; k < p.store->markers(); k++)
-      if (s.markers[p.store->marker(p.index, k)].body == s.markers[m.i.id].body) return "";
-  return e.parts.empty() ? "" : std::string(e.type) + " " + e.name + " does not act on " + s.bodyName(s.markers[m.i.id].body);
+  return e.parts.empty() || s.loadedBody(e, s.markers[m.i.id].body) > -2 ? "" : std::string(e.type) + " " + e.name + " does not act on " + s.bodyName(s.markers[m.i.id].body);
 }
 
 std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)

@@ -33,16 +33,28 @@ bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
   return e.bodies.marker[marker].body == e.bodies.marker[m.i].body;
 }
 
+/* i's body, or where the element does not act on that attachment its flexible body, on whose modes it may act */
+PetscInt LoadedBody(const LocalMeasure &m, const Evaluation &e)
+{
+  const PetscInt body = e.bodies.marker[m.i].body, carrier = e.bodies.body[body].carrier;
+  if (carrier < 0) return body;
+  for (const auto &p : m.probes)
+    for (int k = 0; k < p->markers(); k++)
+      if (OnBody(e, m, p->marker(k))) return body;
+  return e.bodies.carriers[carrier].body;
+}
+
 /* the force on i's body, or moment about i's origin, of a joint or of any element */
 Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
 {
   const Vector3  x = e.bodies.frame(m.i).x;
   Wrench<double> on[kMarkers];
-  Vector3        sum = Vector3::Zero();
+  Vector3        sum  = Vector3::Zero();
+  const PetscInt body = LoadedBody(m, e);
   for (const auto &p : m.probes) {
     p->loads(e, on);
     for (int k = 0; k < p->markers(); k++) {
-      if (!OnBody(e, m, p->marker(k))) continue;
+      if (e.bodies.marker[p->marker(k)].body != body) continue;
       if (m.kind == Measure::JointForce || m.kind == Measure::ElementForce)
         sum += on[k].f;
       else

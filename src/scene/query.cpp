@@ -293,6 +293,10 @@ PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
   Motion             at_marker;
   PetscFunctionBegin;
   PetscCall(hasElement(element));
+  PetscInt       elsewhere;
+  const PetscInt loaded = scene().loadedBody(e, scene().markers[on].body, &elsewhere);
+  PetscCheck(elsewhere < 0, scene().comm, PETSC_ERR_ARG_WRONG, "Snapshot: %s %s acts on %s, not on %s, which is another part of the same flexible body: ask at a marker there", e.type, e.name.c_str(),
+             scene().bodyName(elsewhere).c_str(), scene().bodyName(scene().markers[on].body).c_str());
   PetscCall(checkMemory(element));
   PetscCall(motion(on, &at_marker));
   PetscCall(FromOwner(*R, ownerOfElement(e), numbers, 6, [&](double *y) {
@@ -303,8 +307,7 @@ PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
       std::vector<Wrench<double>> wrench(p->markers());
       p->loads(ev, wrench.data());
       for (int k = 0; k < p->markers(); k++) {
-        const PetscInt body = R->bodies.body[R->bodies.marker[p->marker(k)].body].id;
-        if (body != scene().markers[on].body) continue;
+        if (R->bodies.body[R->bodies.marker[p->marker(k)].body].id != loaded) continue;
         f += wrench[k].f;
         m += wrench[k].m + (R->bodies.frame(p->marker(k)).x - at_marker.position).cross(wrench[k].f);
       }

@@ -141,6 +141,21 @@ Vector3 SceneData::gravityAt(double t) const
   return g;
 }
 
+PetscInt SceneData::loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere) const
+{
+  const PetscInt carrier = body >= 0 ? bodies[body].carrier : -1;
+  PetscInt       loaded  = -2, other = -1;
+  for (const Part &p : e.parts)
+    for (int k = 0; k < p.store->markers(); k++) {
+      const PetscInt b = markers[p.store->marker(p.index, k)].body;
+      if (b == body) loaded = body;
+      else if (carrier >= 0 && b == carrier && loaded == -2) loaded = carrier;
+      else if (carrier >= 0 && b >= 0 && bodies[b].carrier == carrier) other = b;
+    }
+  if (elsewhere) *elsewhere = loaded == -2 ? other : -1;
+  return loaded;
+}
+
 Frame<double> SceneData::frame(Marker m) const
 {
   const MarkerData &k = markers[m.id];

@@ -94,6 +94,40 @@ class Beam(unittest.TestCase):
             scene.add("beam", h.FlexibleBody(body.modal())).node(999)
             scene.run()
 
+    def test_loads_of_a_body_balance(self):
+        """Clamp, force at the tip, pressure, contact and weight at rest, all about the clamp; what acts on another attachment is not zero but an error"""
+        body = flexible.reduce(self.model, [flexible.Attachment("root"), flexible.Attachment("tip", tie="average")], modes=12, node_sets=["tip"], pressures={"pull": ("tip", False)})
+        scene = h.Scene(gravity=(0, 0, -9.81))
+        b = scene.add("beam", h.FlexibleBody(body.modal()))
+        root, tip = b.attachment("root").marker(), b.attachment("tip").marker()
+        clamp = scene.add("clamp", h.Fixed(root, scene.ground.marker()))
+        force = scene.add("force", h.UserForce(tip, force=[0, 20., -300.]))
+        pull = scene.add("pull", h.ModalLoad(b, "pull", -1e5))
+        touch = scene.add("touch", h.NodeContact(b, scene.ground.marker((0, 0, -D / 2 - 1e-4)), law=h.ContactLaw(stiffness=1e6)))
+        scene.channel("touch", h.element_force(touch, tip, "z"))
+        run = scene.run().equilibrium()
+        now = run.snapshot()
+        loads = [now.load(clamp, root), now.load(pull, root), now.load(touch, root)]
+        at_tip, arm = now.load(force, tip), now.motion(tip).position
+        weight = np.array([0, 0, -9.81 * MASS])
+        self.assertGreater(loads[2].force[2], 10.)
+        self.assertAlmostEqual(run.sample()["touch"], loads[2].force[2], delta=1e-9)
+        np.testing.assert_allclose(now.load(touch, tip).force, loads[2].force, atol=1e-9)
+        np.testing.assert_allclose(sum(x.force for x in loads) + at_tip.force + weight, 0, atol=1e-6)
+        centre = np.array([0.5, 0, now.motion(b).position[2]])
+        moment = sum(x.moment for x in loads) + at_tip.moment + np.cross(arm, at_tip.force) + np.cross(centre, weight)
+        np.testing.assert_allclose(moment, 0, atol=2e-3 * 300)
+        with self.assertRaisesRegex(h.Error, "acts on beam.tip, not on beam.root"):
+            now.load(force, root)
+
+    def test_stress_of_another_model(self):
+        """As many nodes, elsewhere"""
+        body = flexible.reduce(self.model, [flexible.Attachment("root")], modes=4)
+        other = flexible.FeModel.from_mesh(beam_mesh(os.path.join(self.folder.name, "longer.msh"), 1.2 * L, D, D), STEEL)
+        with self.assertRaisesRegex(h.Error, "the model that was reduced"):
+            body.add_stress_modes(other)
+        body.add_stress_modes(self.model)
+
     def test_deflection_and_stress(self):
         """A force at the tip: F L^3 / (3 E I) and, half way, the stress of the outer fibre; fields and files"""
         scene = h.Scene()

@@ -405,7 +405,9 @@ class HotSpots:
 class FullBody:
     """An FE model as a body of a scene, 3 coordinates a node, at the start.
 
-    law : "large" (St. Venant-Kirchhoff material, total Lagrangian) or "small" (about the position at the start)
+    law : "large" (St. Venant-Kirchhoff material, total Lagrangian; elements are integrated in full, also CalculiX's C3D20R, which become
+        some per cent stiffer than in K) or "small" (about the position at the start, from which
+        the body must not turn by more than a few degrees)
     position, rotation : of the origin and axes (columns) of the FE model, undeformed, space axes
     velocity : of the origin of the FE model, space axes; that of a `hhtdae.FlexibleBody` is of the centre of mass
     angular_velocity : space axes

@@ -91,7 +91,8 @@ class Snapshot:
 
     def load(self, element, on, axes=None):
         """`Load`: what a joint, motion or force does to the body of the marker `on`, its moment about that marker's origin, in the axes of another marker
-        (default: space)."""
+        (default: space). Of a flexible body: to the attachment that the marker is on, or by ``ModalLoad`` and ``NodeContact``, which have no attachment, to all
+        of it; `Error` if the element touches another attachment alone."""
         return Load(*self._core.load(element, on, axes))
 
     def modes(self, body):
