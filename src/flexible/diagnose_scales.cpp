@@ -116,7 +116,8 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
   PetscCall(LocalProduct(X, Y, &M));
   PetscCall(SumOverRanks(model.comm, &K));
   PetscCall(SumOverRanks(model.comm, &M));
-  const VectorXd       scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  /* at the two points across an element of reduced integration squares are constants: what is left has no mass (Calculix.OneReducedElementAcross) */
+  const VectorXd       scale = M.diagonal().cwiseMax(1e-8 * s->mass).cwiseSqrt().cwiseInverse();
   const MatrixXd       Ms    = scale.asDiagonal() * M * scale.asDiagonal();
   const SymmetricEigen mass(0.5 * (Ms + Ms.transpose()));
   PetscInt             from = 0; /* fields that few or flat nodes do not tell apart */

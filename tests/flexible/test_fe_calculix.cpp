@@ -245,6 +245,36 @@ TEST(Calculix, IncompatibleModesHaveNodesOfTheirOwn)
   EXPECT_SAYS(Refused(folder.name + "/brick"), "and C3D8I, which are not read; take C3D20");
 }
 
+/* Whose mass is singular: at the points of integration the square of y is a constant. Free modes, and those beside a rigid end, against the ones that ccx prints. */
+TEST(Calculix, OneReducedElementAcross)
+{
+  if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
+  Folder  folder;
+  MeshBox box;
+  box.type = ElementType::Brick20;
+  box.nx = 6, box.ny = 1, box.nz = 1;
+  box.lx = 0.6, box.ly = 0.03, box.lz = 0.02;
+  const std::string deck = DeckOf(MeshWriter(box).text(false), box.type, "C3D20R");
+  folder.write("bar.inp", deck + store);
+  folder.write("print.inp", deck + "*STEP\n*FREQUENCY\n10\n*END STEP\n");
+  ASSERT_TRUE(folder.ccx("bar"));
+  ASSERT_TRUE(folder.ccx("print"));
+  const std::vector<double> printed = PrintedByCcx(folder.read("print.dat"));
+  ASSERT_EQ(printed.size(), 10u);
+  FeModel model(PETSC_COMM_SELF);
+  must(model.readCalculix(folder.name + "/bar"));
+  for (const bool held : {false, true}) {
+    Reduction   r;
+    ReducedBody b;
+    if (held) r.attachments = {{"Left"}};
+    else
+      r.method = Method::FreeFree;
+    r.modes = 6;
+    must(Reduce(model, r, &b));
+    for (std::size_t k = 0; k < 3; k++) EXPECT_NEAR(b.mode[k].frequency, printed[6 + k], (held ? 1e-2 : 1e-5) * printed[6 + k]);
+  }
+}
+
 /* Point masses, springs and wedges are in the matrices alone: what needs elements does without them by no accident. Reduced elements are taken as they are. */
 TEST(Calculix, ElementsThatAreNotAllOfTheModel)
 {
