@@ -67,6 +67,8 @@ class Beam(unittest.TestCase):
         self.assertAlmostEqual(first.frequency, clamped_free(L, D, D, E, RHO), delta=0.01 * first.frequency)
         slow = small.modes(2, shift=500.)
         self.assertAlmostEqual(slow[0].frequency, first.frequency, delta=1e-6 * first.frequency)
+        with self.assertRaisesRegex(TypeError, "damping is True"):
+            scene.add("damped", h.FlexibleBody(modal, damping=True))
         with self.assertRaisesRegex(h.Error, "attachment"):
             scene = h.Scene()
             b = scene.add("beam", h.FlexibleBody(modal))

@@ -75,8 +75,8 @@ class FlexibleBody(Spec):
     mass : str
         "full", "partial" (without the terms quadratic in the modes) or "constant" (of the undeformed body).
     damping : float or sequence of (frequency, ratio)
-        Ratio of critical, of all modes or by bands up to a frequency in cycles per unit of time: of the modes of `model`, those of the free body. Held somewhere,
-        it vibrates more slowly in other modes, whose ratios are smaller: that of a cantilever's first mode is a fourteenth.
+        Ratio of critical, of all modes or by bands up to a frequency in cycles per unit of time, the last ratio also beyond: of the modes of `model`,
+        those of the free body. Held somewhere, it vibrates more slowly in other modes, whose ratios are smaller: that of a cantilever's first mode is a fourteenth.
     ratios : (modes,), optional
         The same, mode by mode, in place of `damping`.
     deformation, deformation_rate : (modes,), optional
@@ -102,6 +102,8 @@ class FlexibleBody(Spec):
             out["model"] = self.model.modal()
         if not isinstance(out["model"], _core.ModalBody):
             raise TypeError("the model of a flexible body is %r, must be one of hhtdae.flexible" % (self.model,))
+        if isinstance(out["damping"], (bool, np.bool_)):
+            raise TypeError("damping is %r, must be a ratio of critical damping, or a list of (frequency, ratio)" % (self.damping,))
         if np.ndim(out["damping"]) == 0:
             out["damping"] = [(np.inf, float(out["damping"]))] if out["damping"] else []
         elif len(out["damping"]) and np.shape(out["damping"])[1:] != (2,):
