@@ -25,8 +25,10 @@ PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);
 PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
 PetscErrorCode NoteError(TS ts);
 
+/* Before a time at which a step has to end: of one length, and their change of h is seen by whoever reads the multipliers there */
+constexpr PetscReal last_steps = 10;
+
 PetscErrorCode CreateAdapt(TSAdapt adapt);
-constexpr PetscReal last_steps = 10; /* before a time at which a step has to end: of one length, and their change of h is seen by whoever reads the multipliers there */
 PetscErrorCode LookFurther(TS ts); /* before the attempts from t_n, where the run goes on beyond its old end */
 
 /* Before an attempt from t_n */

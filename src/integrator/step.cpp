@@ -38,7 +38,6 @@ constexpr PetscInt max_tiny_row = 50;
    has them again and again */
 constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
 
-
 /* -ts_exact_final_time interpolate leaves the solution at the end of a run in the vector that TSSolve() was given, and takes it for that at the end of the last step
    when it is called again with it (BetweenRuns.GoOnFromInterpolatedEnds) */
 PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)

@@ -144,7 +144,7 @@ Vector3 SceneData::gravityAt(double t) const
 PetscInt SceneData::loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere) const
 {
   const PetscInt carrier = body >= 0 ? bodies[body].carrier : -1;
-  PetscInt       loaded  = -2, other = -1;
+  PetscInt       loaded = -2, other = -1;
   for (const Part &p : e.parts)
     for (int k = 0; k < p.store->markers(); k++) {
       const PetscInt b = markers[p.store->marker(p.index, k)].body;

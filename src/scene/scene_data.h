@@ -149,7 +149,7 @@ struct SceneData {
   ~SceneData();
   /* Where an element loads a body: there; where that is an attachment on which it does not act, its flexible body, on whose modes it may act; -2: neither.
      elsewhere: another attachment of that body on which it acts then, or -1 */
-  PetscInt loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere = nullptr) const;
+  PetscInt    loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere = nullptr) const;
   std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
   /* Whether a body takes no moment, and what it is then called in messages */
   bool        turnless(PetscInt b) const { return b >= 0 && (bodies[b].point || bodies[b].forces_alone); }

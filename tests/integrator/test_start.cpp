@@ -455,7 +455,7 @@ struct LateDamper : Problem {
   {
     const double          w = std::sqrt(k * soft / (k + soft)), mid = -g / (w * w), amplitude = 0.5 - mid, q = mid + amplitude * std::cos(w * on);
     std::array<double, 3> y{q, -amplitude * w * std::sin(w * on), q * k / (k + soft)};
-    const auto            rate = [](const std::array<double, 3> &x) { return std::array<double, 3>{x[1], -g - k * (x[0] - x[2]), -(soft * x[2] + k * (x[2] - x[0])) / c}; };
+    const auto            rate  = [](const std::array<double, 3> &x) { return std::array<double, 3>{x[1], -g - k * (x[0] - x[2]), -(soft * x[2] + k * (x[2] - x[0])) / c}; };
     const int             steps = 10000;
     const double          h     = (t1 - on) / steps;
     for (int i = 0; i < steps; i++) {
