@@ -45,7 +45,7 @@ struct Runtime {
   std::vector<double>    send, receive;
   std::vector<double>    u, v, a; /* local unknowns, where there are others */
 
-  Mat       J                       = nullptr;
+  Mat  J = nullptr;
   IS   roles[TSHHT3_NUM_ROLES] = {};
   Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
   bool changing = false; /* between the test that asked for other axes and their commit */
