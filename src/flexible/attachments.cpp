@@ -3,8 +3,7 @@
 #include "body_check.h"
 #include "exchange.h"
 #include "modes.h"
-#include "symmetric.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <set>
 
@@ -144,7 +143,7 @@ static PetscErrorCode Moments(const FeModel &model, const Tied &t, const std::ve
 
 static PetscErrorCode CheckRotation(const FeModel &model, const Tied &t, const Matrix3 &J)
 {
-  const Vector3 moments = Eigen::SelfAdjointEigenSolver<Matrix3>(J).eigenvalues();
+  const Vector3 moments = SymmetricEigen(J).values;
 
   PetscFunctionBegin;
   PetscCheck(t.count > 1, model.comm, PETSC_ERR_ARG_WRONG,

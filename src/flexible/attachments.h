@@ -8,6 +8,7 @@
 #define HHTDAE_FLEXIBLE_ATTACHMENTS_H
 
 #include "hhtdae/flexible.h"
+#include "scene/products.h"
 #include "scene/small_matrix.h"
 #include <Eigen/Dense>
 

@@ -9,7 +9,7 @@
   change of the basis. Options: -eps_ncv, -eps_tol, -eps_max_it (restarts), monitors; -eps_krylov_block <vectors>.
 */
 #include "modes.h"
-#include "symmetric.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -65,7 +65,7 @@ static PetscErrorCode SolveShifted(EPS eps, const MatrixXd &MW, MatrixXd *W)
 static PetscErrorCode Gram(EPS eps, const Columns &A, const MatrixXd &B, MatrixXd *G)
 {
   PetscFunctionBegin;
-  PetscCall(LocalProduct(A, B, G));
+  *G = A.transpose() * B;
   PetscCall(SumOverRanks(PetscObjectComm((PetscObject)eps), G));
   PetscFunctionReturn(0);
 }
@@ -76,7 +76,7 @@ static PetscErrorCode TakeOut(const MatrixXd &H, BlockKrylov *b)
   MatrixXd part;
 
   PetscFunctionBegin;
-  PetscCall(Combine(b->V.leftCols(b->deflated + b->k), H, &part));
+  part = b->V.leftCols(b->deflated + b->k) * H;
   b->W -= part;
   PetscCall(Multiply(b->M, b->W, &b->MW));
   PetscFunctionReturn(0);
@@ -107,9 +107,9 @@ static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov 
   *back            = s.asDiagonal() * U.transpose() * scale.asDiagonal();
   *all             = gram.values.cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.vectors.transpose() *
          scale.asDiagonal();
-  PetscCall(Combine(b->W, S, &G));
+  G = b->W * S;
   b->W.swap(G);
-  PetscCall(Combine(b->MW, S, &G));
+  G = b->MW * S;
   b->MW.swap(G);
   PetscFunctionReturn(0);
 }
@@ -196,7 +196,7 @@ static PetscErrorCode Restart(PetscInt keep, BlockKrylov *b)
   MatrixXd X;
 
   PetscFunctionBegin;
-  PetscCall(Combine(b->V.middleCols(b->deflated, b->k), b->Y.leftCols(keep), &X));
+  X = b->V.middleCols(b->deflated, b->k) * b->Y.leftCols(keep);
   b->V.middleCols(b->deflated, keep) = X;
   b->k = b->looked = keep;
   b->T             = b->theta.head(keep).asDiagonal();

@@ -1,7 +1,7 @@
 /* What is left to choose of modes, chosen so that it does not depend on the ranks: the combinations of modes of equal
    frequencies, and signs. */
 #include "craig_bampton.h"
-#include "symmetric.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 

@@ -1,8 +1,7 @@
 /* The scales of a body: mass, extent, rigid motions, stiffness; and what they tell of supports and units. */
 #include "diagnose.h"
 #include "modes.h"
-#include "symmetric.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 
@@ -72,17 +71,16 @@ static PetscErrorCode Extents(const FeModel &model, BodyScales *s)
 
 static PetscErrorCode RigidBasis(const FeModel &model, BodyScales *s)
 {
-  const Matrix3                                inertia = s->moments.trace() * Matrix3::Identity() - s->moments;
-  const Eigen::SelfAdjointEigenSolver<Matrix3> principal(inertia);
+  const SymmetricEigen principal(s->moments.trace() * Matrix3::Identity() - s->moments);
 
   PetscFunctionBegin;
-  PetscCheck(principal.eigenvalues()[0] > 1e-10 * principal.eigenvalues()[2], model.comm, PETSC_ERR_ARG_WRONG,
+  PetscCheck(principal.values[0] > 1e-10 * principal.values[2], model.comm, PETSC_ERR_ARG_WRONG,
              "All mass of the FE model is on one line, its least moment of inertia is %g; it needs an extent across",
-             principal.eigenvalues()[0]);
+             principal.values[0]);
   s->frame.setZero();
   s->frame.topLeftCorner<3, 3>() = Matrix3::Identity() / std::sqrt(s->mass);
   for (int k = 0; k < 3; k++)
-    s->frame.block<3, 1>(3, 3 + k) = principal.eigenvectors().col(k) / std::sqrt(principal.eigenvalues()[k]);
+    s->frame.block<3, 1>(3, 3 + k) = principal.vectors.col(k) / std::sqrt(principal.values[k]);
   s->rigid.resize(3 * model.own, 6);
   for (PetscInt i = 0; i < model.own; i++)
     s->rigid.middleRows(3 * i, 3) = RigidMotion(NodePosition(model, i), s->center) * s->frame;
@@ -107,13 +105,13 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
   /* rigid motions are taken out in M */
   MatrixXd part;
   PetscCall(Multiply(model.M, s->rigid, &Y));
-  PetscCall(LocalProduct(Y, X, &part));
+  part = Y.transpose() * X;
   PetscCall(SumOverRanks(model.comm, &part));
   X -= s->rigid * part;
   PetscCall(Multiply(model.K, X, &Y));
-  PetscCall(LocalProduct(X, Y, &K));
+  K = X.transpose() * Y;
   PetscCall(Multiply(model.M, X, &Y));
-  PetscCall(LocalProduct(X, Y, &M));
+  M = X.transpose() * Y;
   PetscCall(SumOverRanks(model.comm, &K));
   PetscCall(SumOverRanks(model.comm, &M));
   /* at the two points across an element of reduced integration squares are constants: what is left has no mass (Calculix.OneReducedElementAcross) */

@@ -38,11 +38,11 @@ static PetscErrorCode LocalSums(const FeModel &model, const BodyScales &scales, 
       sums->row(c) += Mpart[c].colwise().sum();
     }
     for (int d = 0; d < 3; d++) {
-      PetscCall(LocalProduct(X, Mpart[d], &product));
+      product = X.transpose() * Mpart[d];
       for (int c = 0; c < 3; c++) sums->row(3 + 3 * c + d) += product.row(c);
     }
     for (int p = 0; p < 6; p++) {
-      PetscCall(LocalProduct(part[first_component[p]], Mpart[second_component[p]], &product));
+      product = part[first_component[p]].transpose() * Mpart[second_component[p]];
       sums->middleRows(12 + p * n, n) += product;
     }
   }

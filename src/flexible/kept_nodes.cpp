@@ -5,7 +5,7 @@
 #include "kept_nodes.h"
 #include "attachments.h"
 #include "exchange.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <map>
 #include <set>
@@ -109,7 +109,7 @@ PetscErrorCode FillNodes(const FeModel &model, const KeptNodes &kept, const Matr
   std::vector<Matrix3> inverse(n, Matrix3::Zero());
   for (Eigen::Index k = 0; k < n; k++) {
     const Matrix3 moments = Eigen::Map<const Matrix3>(J.col(k).data());
-    const Vector3 values  = Eigen::SelfAdjointEigenSolver<Matrix3>(moments).eigenvalues();
+    const Vector3 values  = SymmetricEigen(moments).values;
     ModalNode    &node    = body->nodes[k];
     node.label            = kept.label[k];
     node.turns            = values[0] > on_a_line * values[2];

@@ -114,10 +114,10 @@ struct Sums {
   }
 };
 
-/* A point of a face: natural coordinates, their derivatives along the face, weight */
+/* A point of a face: the shape functions of the element, their derivatives along the face, weight */
 struct FacePoint {
-  Vector3 at, s, t;
-  double  weight;
+  VectorXd N, s, t;
+  double   weight;
 };
 
 /* Three by three points of Gauss; of triangles in coordinates that collapse one side of the square (Duffy), so that polynomials of degree four are exact */
@@ -125,54 +125,48 @@ template <class Shape> std::vector<FacePoint> PointsOf(int f)
 {
   const double           x[3] = {-std::sqrt(.6), 0, std::sqrt(.6)}, w[3] = {5. / 9, 8. / 9, 5. / 9};
   const Vector3          c[3] = {Shape::place(Shape::face[f][0]), Shape::place(Shape::face[f][1]), Shape::place(Shape::face[f][Shape::perface - 1])};
+  const Vector3          s = c[1] - c[0], t = c[2] - c[0];
   std::vector<FacePoint> points;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) {
-      const double u = (1 + x[i]) / 2, v = (1 + x[j]) / 2;
-      FacePoint    p;
-      p.s      = c[1] - c[0];
-      p.t      = c[2] - c[0];
-      p.at     = c[0] + (Shape::perface == 3 ? u * (1 - v) : u) * p.s + v * p.t;
-      p.weight = w[i] * w[j] / 4 * (Shape::perface == 3 ? 1 - v : 1);
-      points.push_back(p);
+      const double                u = (1 + x[i]) / 2, v = (1 + x[j]) / 2;
+      const Vector3               at = c[0] + (Shape::perface == 3 ? u * (1 - v) : u) * s + v * t;
+      fe::Values<Shape::nodes>    N;
+      fe::Gradients<Shape::nodes> d;
+      Shape::shape(at, N);
+      Shape::gradient(at, d);
+      points.push_back({N, d.transpose() * s, d.transpose() * t, w[i] * w[j] / 4 * (Shape::perface == 3 ? 1 - v : 1)});
     }
   return points;
 }
 
-template <class Shape>
-void AddFace(const FeElement &e, int face, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes, PetscInt m, const Vector3 &center, Sums *sum)
+void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes, PetscInt m,
+             const Vector3 &center, Sums *sum)
 {
-  constexpr int               n = Shape::nodes;
-  Eigen::Matrix<double, 3, n> x;
-  MatrixXd                    U(3, n * m), moved, changed; /* modes of node a in columns a m .. */
-  for (int a = 0; a < n; a++) {
-    const PetscInt place  = nodes.place(e.node[a]);
-    x.col(a)              = Eigen::Map<const Vector3>(&X[3 * place]);
+  const PetscInt n = (PetscInt)points[0].N.size();
+  MatrixXd       x(3, n), U(3, n * m), moved, changed; /* modes of node a in columns a m .. */
+  for (PetscInt a = 0; a < n; a++) {
+    const PetscInt place   = nodes.place(e.node[a]);
+    x.col(a)               = Eigen::Map<const Vector3>(&X[3 * place]);
     U.middleCols(a * m, m) = Eigen::Map<const MatrixXd>(&modes[3 * m * place], 3, m);
   }
-  const auto along = [&](const fe::Values<n> &N) {
+  const auto along = [&](const VectorXd &N) {
     MatrixXd u = MatrixXd::Zero(3, m);
-    for (int a = 0; a < n; a++) u += N(a) * U.middleCols(a * m, m);
+    for (PetscInt a = 0; a < n; a++) u += N(a) * U.middleCols(a * m, m);
     return u;
   };
-  const std::vector<FacePoint> points = PointsOf<Shape>(face);
-  const bool                   follows = sum->modal_gradient.size() > 0;
+  const bool follows = sum->modal_gradient.size() > 0;
   if (follows) {
     moved.resize(3 * (Eigen::Index)points.size(), m);
     changed.resize(3 * (Eigen::Index)points.size(), m);
   }
   for (std::size_t q = 0; q < points.size(); q++) {
-    const FacePoint &p = points[q];
-    fe::Values<n>    N;
-    fe::Gradients<n> d;
-    Shape::shape(p.at, N);
-    Shape::gradient(p.at, d);
-    const fe::Values<n> Ns = d.transpose() * p.s, Nt = d.transpose() * p.t;
-    const Vector3       xs = x * Ns, xt = x * Nt, y = x * N - center;
-    const MatrixXd      phi = along(N);
+    const FacePoint &p  = points[q];
+    const Vector3    xs = x * p.s, xt = x * p.t, y = x * p.N - center;
+    const MatrixXd   phi = along(p.N);
     sum->add(-p.weight * xs.cross(xt), y, phi);
     if (!follows) continue;
-    const MatrixXd df = p.weight * (Cross(xt) * along(Ns) - Cross(xs) * along(Nt));
+    const MatrixXd df = p.weight * (Cross(xt) * along(p.s) - Cross(xs) * along(p.t));
     sum->force_gradient += df;
     sum->moment_gradient.noalias() += Cross(y) * df;
     moved.middleRows<3>(3 * (Eigen::Index)q)   = phi;
@@ -199,7 +193,7 @@ PetscErrorCode AddFaces(const FeModel &model, const ResolvedLoad &load, const Bo
   if (m) PetscCall(nodes.bring((int)(3 * m), own.data(), modes.data()));
   for (const auto &f : load.faces) {
     const FeElement &e = model.elements[f.element];
-    fe::WithShape(e.type, [&](auto shape) { AddFace<decltype(shape)>(e, f.face, nodes, X, modes, m, scales.center, sum); });
+    AddFace(e, fe::WithShape(e.type, [&](auto shape) { return PointsOf<decltype(shape)>(f.face); }), nodes, X, modes, m, scales.center, sum);
   }
   PetscFunctionReturn(0);
 }

@@ -1,6 +1,6 @@
 /* Mass, inertia, frequencies and invariants that no body has; see modal_check.h. */
 #include "flexible/modal_check.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <set>
 
 namespace hhtdae
@@ -36,8 +36,7 @@ std::string Impossible(const ModalBody &m)
   for (Eigen::Index k = 0; k < m.omega.size(); k++)
     if (!(m.omega[k] > 0))
       return "a frequency that is not positive, of mode " + std::to_string(k) + " (rigid-body modes are left out)";
-  const Eigen::SelfAdjointEigenSolver<Matrix3> moments(m.moments, Eigen::EigenvaluesOnly);
-  if (!Symmetric(m.moments) || moments.eigenvalues()[0] < -rounding * m.moments.norm())
+  if (!Symmetric(m.moments) || SymmetricEigen(m.moments).values[0] < -rounding * m.moments.norm())
     return "moments of inertia that no distribution of mass has (not symmetric, or with a negative eigenvalue)";
   std::set<std::string> names;
   for (const ModalAttachment &a : m.attachments)

@@ -63,38 +63,6 @@ PetscErrorCode Multiply(Mat A, const MatrixXd &X, MatrixXd *Y)
   PetscFunctionReturn(0);
 }
 
-using Columns = Eigen::Ref<const MatrixXd>;
-
-/* By PETSc's dense matrices and not by Eigen: BLAS uses what the processor has, whatever flags we were compiled with */
-static PetscErrorCode BlasProduct(bool transposed, const Columns &A, const Columns &B, MatrixXd *C)
-{
-  Mat a, b, c;
-
-  PetscFunctionBegin;
-  C->setZero(transposed ? A.cols() : A.rows(), B.cols());
-  if (!A.size() || !B.size()) PetscFunctionReturn(0);
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, A.rows(), A.cols(), const_cast<double *>(A.data()), &a));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, B.rows(), B.cols(), const_cast<double *>(B.data()), &b));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, C->rows(), C->cols(), C->data(), &c));
-  if (A.rows()) PetscCall(MatDenseSetLDA(a, A.outerStride()));
-  if (B.rows()) PetscCall(MatDenseSetLDA(b, B.outerStride()));
-  for (Mat m : {a, b, c}) {
-    PetscCall(MatAssemblyBegin(m, MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(m, MAT_FINAL_ASSEMBLY));
-  }
-  PetscCall(MatProductCreateWithMat(a, b, nullptr, c));
-  PetscCall(MatProductSetType(c, transposed ? MATPRODUCT_AtB : MATPRODUCT_AB));
-  PetscCall(MatProductSetFromOptions(c));
-  PetscCall(MatProductSymbolic(c));
-  PetscCall(MatProductNumeric(c));
-  for (Mat *m : {&a, &b, &c}) PetscCall(MatDestroy(m));
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode LocalProduct(const Columns &A, const Columns &B, MatrixXd *C) { return BlasProduct(true, A, B, C); }
-
-PetscErrorCode Combine(const Columns &A, const Columns &B, MatrixXd *C) { return BlasProduct(false, A, B, C); }
-
 PetscErrorCode SumOverRanks(MPI_Comm comm, MatrixXd *A)
 {
   PetscMPIInt count;

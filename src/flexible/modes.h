@@ -6,6 +6,7 @@
 #ifndef HHTDAE_FLEXIBLE_MODES_H
 #define HHTDAE_FLEXIBLE_MODES_H
 
+#include "scene/products.h"
 #include "scene/small_matrix.h"
 #include <Eigen/Core>
 #include <functional>
@@ -28,10 +29,6 @@ constexpr PetscInt block_columns = 32; /* multiplied or solved at a time */
 PetscErrorCode Multiply(Mat A, const MatrixXd &X, MatrixXd *Y);
 /* Y = A X for the columns [from, from + count) of X */
 PetscErrorCode MultiplyColumns(Mat A, const MatrixXd &X, PetscInt from, PetscInt count, MatrixXd *Y);
-/* A^T B of this rank's rows alone */
-PetscErrorCode LocalProduct(const Eigen::Ref<const MatrixXd> &A, const Eigen::Ref<const MatrixXd> &B, MatrixXd *C);
-/* A B, B the same on all ranks */
-PetscErrorCode Combine(const Eigen::Ref<const MatrixXd> &A, const Eigen::Ref<const MatrixXd> &B, MatrixXd *C);
 PetscErrorCode SumOverRanks(MPI_Comm comm, MatrixXd *A);
 
 /* ---- progress and time ---- */

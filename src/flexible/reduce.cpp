@@ -69,7 +69,7 @@ static PetscErrorCode TakeOutRigid(const FeModel &model, const BodyScales &scale
 
   PetscFunctionBegin;
   PetscCall(Multiply(model.M, scales.rigid, &Mr));
-  PetscCall(LocalProduct(Mr, *X, &part));
+  part = Mr.transpose() * (*X);
   PetscCall(SumOverRanks(model.comm, &part));
   X->noalias() -= scales.rigid * part;
   for (std::size_t a = 0; a < tied.size(); a++) {
@@ -155,7 +155,7 @@ static PetscErrorCode CombineInPlace(const MatrixXd &Y, MatrixXd *x)
   PetscFunctionBegin;
   for (PetscInt from = 0; from < rows; from += step) {
     const PetscInt count = std::min(step, rows - from);
-    PetscCall(Combine(x->middleRows(from, count), Y, &part));
+    part = x->middleRows(from, count) * Y;
     x->block(from, 0, count, Y.cols()) = part;
   }
   x->conservativeResize(Eigen::NoChange, Y.cols());

@@ -7,7 +7,7 @@
 */
 #include "craig_bampton.h"
 #include "scene/complement.h"
-#include "symmetric.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -35,14 +35,14 @@ static PetscErrorCode Project(const FeModel &model, const BodyScales &scales, co
   for (PetscInt from = 0; from < n; from += block_columns) {
     const PetscInt count = std::min(block_columns, n - from);
     PetscCall(MultiplyColumns(model.K, T, from, count, &AT));
-    PetscCall(LocalProduct(T, AT, &part));
+    part = T.transpose() * AT;
     pair->K.middleCols(from, count) = part;
     PetscCall(MultiplyColumns(model.M, T, from, count, &AT));
-    PetscCall(LocalProduct(T, AT, &part));
+    part = T.transpose() * AT;
     pair->M.middleCols(from, count) = part;
   }
   PetscCall(Multiply(model.M, scales.rigid, &AT));
-  PetscCall(LocalProduct(T, AT, &pair->rigid));
+  pair->rigid = T.transpose() * AT;
   PetscCall(SumOverRanks(model.comm, &pair->K));
   PetscCall(SumOverRanks(model.comm, &pair->M));
   PetscCall(SumOverRanks(model.comm, &pair->rigid));
@@ -131,7 +131,7 @@ static PetscErrorCode TurnKept(const FeModel &model, const BodyScales &scales, c
     const auto first = std::lower_bound(kept.begin(), kept.end(), from);
     if (to - from == 1 || first == kept.end() || *first >= to) continue;
     some = Y->middleCols(from, to - from);
-    PetscCall(Combine(space.x, some, &X));
+    X = space.x * some;
     PetscCall(TurnEqual(model, scales, 0, to - from, &X, &some));
     Y->middleCols(from, to - from) = some;
   }

@@ -44,7 +44,7 @@ static PetscErrorCode ForceResidual(const FeModel &model, const ReductionSpace &
   MatrixXd x, Mx;
 
   PetscFunctionBegin;
-  PetscCall(Combine(space.x, space.Y.middleCols(from, count), &x));
+  x = space.x * space.Y.middleCols(from, count);
   PetscCall(Multiply(model.K, x, r));
   PetscCall(Multiply(model.M, x, &Mx));
   *r -= Mx * space.lambda.segment(from, count).asDiagonal();

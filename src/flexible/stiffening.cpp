@@ -4,7 +4,7 @@
 #include "flexible/body_check.h"
 #include "flexible/element.h"
 #include "flexible/exchange.h"
-#include "flexible/symmetric.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 
 namespace hhtdae
@@ -100,19 +100,19 @@ PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied
   PetscCall(FactorInterior(model, in, scales, &solver.ksp));
   PetscCall(ConstraintModes(model, tied, in, solver.ksp, &modes));
   PetscCall(Multiply(model.K, modes, &product));
-  PetscCall(LocalProduct(modes, product, &K));
+  K = modes.transpose() * product;
   PetscCall(SumOverRanks(model.comm, &K));
 
   PetscCall(CentrifugalForces(model, scales, &centrifugal));
   f.leftCols(velocities) = centrifugal;
   held.rightCols(n).setIdentity();
-  PetscCall(LocalProduct(scales.rigid, f, &part)); /* what rigid accelerations balance */
+  part = scales.rigid.transpose() * f; /* what rigid accelerations balance */
   PetscCall(SumOverRanks(model.comm, &part));
   part += RigidOfAttachments(tied, scales).transpose() * held;
   PetscCall(Multiply(model.M, scales.rigid, &rigid));
   f -= rigid * part;
 
-  PetscCall(LocalProduct(modes, f, &part));
+  part = modes.transpose() * f;
   PetscCall(SumOverRanks(model.comm, &part));
   *u = modes * SolveFree(K, held + part, scales.length);
   PetscCall(SolveBlock(solver.ksp, InteriorRows(in, f), &x));

@@ -1,7 +1,7 @@
 /* What can be wrong with a description, found before anything is numbered and reported all at once. */
 #include "measures.h"
 #include "runtime.h"
-#include <Eigen/Eigenvalues>
+#include "symmetric.h"
 #include <cmath>
 #include <set>
 #include <sstream>
@@ -88,7 +88,7 @@ private:
             "inertia is not symmetric (off by " + Text(skew) +
                 "); products of inertia have the same sign on both sides");
     if (skew > 1e-10 * scale) return;
-    const Vector3     I      = Eigen::SelfAdjointEigenSolver<Matrix3>(b.inertia).eigenvalues();
+    const Vector3     I      = SymmetricEigen(b.inertia).values;
     const std::string values = "principal moments of inertia are " + Text(I);
     if (I(0) < -1e-12 * scale) {
       require(false, who, values + ", must be positive");

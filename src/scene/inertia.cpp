@@ -3,8 +3,9 @@
   constraints allow: so what has no inertia has to follow from the constraints, Phi_q N of full column rank for the movements N
   without inertia.
 */
+#include "products.h"
 #include "start.h"
-#include <Eigen/Eigenvalues>
+#include "symmetric.h"
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseQR>
 #include <algorithm>
@@ -25,16 +26,16 @@ Eigen::MatrixXd TurnsWithout(const SceneData &s, const BodyData &b)
 {
   if (b.point) return Eigen::MatrixXd(3, 0);
   if (s.planar) return b.inertia(2, 2) > 0 ? Eigen::MatrixXd(3, 0) : Eigen::MatrixXd(Vector3::UnitZ());
-  const Eigen::SelfAdjointEigenSolver<Matrix3> principal(b.inertia);
-  int                                          n = 0;
-  while (n < 3 && principal.eigenvalues()(n) <= none * principal.eigenvalues()(2)) n++;
-  return principal.eigenvectors().leftCols(n);
+  const SymmetricEigen principal(b.inertia);
+  int                  n = 0;
+  while (n < 3 && principal.values(n) <= none * principal.values(2)) n++;
+  return principal.vectors.leftCols(n);
 }
 
 double LeastMoment(const SceneData &s, const BodyData &b)
 {
   if (s.planar) return b.inertia(2, 2);
-  return Eigen::SelfAdjointEigenSolver<Matrix3>(b.inertia, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  return SymmetricEigen(b.inertia).values(0);
 }
 
 bool HasAll(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && TurnsWithout(s, b).cols() == 0); }

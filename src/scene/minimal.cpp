@@ -16,6 +16,7 @@
 */
 #include "complement.h"
 #include "linearization.h"
+#include "products.h"
 #include <Eigen/Core>
 #include <petscblaslapack.h>
 #include <algorithm>

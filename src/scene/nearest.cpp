@@ -8,6 +8,7 @@
   diagonal, lets the matrix be positive definite where constraints are redundant; what it costs in accuracy the
   iteration around it makes good.
 */
+#include "products.h"
 #include "start.h"
 #include <Eigen/Dense>
 

@@ -1,5 +1,5 @@
 #include "scene/output/mesh.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 
@@ -121,10 +121,10 @@ void Default(Mesh &m, const SceneData &s, PetscInt id, const std::vector<PetscIn
   Vector3         semi = Vector3::Constant(0.02 * size);
   Matrix3         axes = Matrix3::Identity();
   if (!b.point && !s.planar && b.mass > 0) {
-    const Eigen::SelfAdjointEigenSolver<Matrix3> principal(b.inertia);
-    const Vector3                                I = principal.eigenvalues();
+    const SymmetricEigen principal(b.inertia);
+    const Vector3        I = principal.values;
     for (int k = 0; k < 3; k++) semi(k) = std::max(0.005 * size, std::sqrt(std::max(0.0, 2.5 * (I.sum() - 2 * I(k)) / b.mass)));
-    axes = principal.eigenvectors();
+    axes = principal.vectors;
     if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
   }
   Builder octahedron(m, id, Vector3::Zero(), axes);

@@ -1,7 +1,7 @@
 #include "scene/output/page_description.h"
 #include "scene/output/json.h"
 #include "scene/output/page_surface.h"
-#include <Eigen/Eigenvalues>
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cstring>
 
@@ -63,10 +63,10 @@ std::string BoxOfInertia(const SceneData &s, PetscInt id)
 {
   const BodyData &b = s.bodies[id];
   if (b.point || s.planar || !(b.mass > 0) || b.carrier >= 0) return "";
-  const Eigen::SelfAdjointEigenSolver<Matrix3> principal(b.inertia);
-  const Vector3                                I    = principal.eigenvalues();
-  Matrix3                                      axes = principal.eigenvectors();
-  Vector3                                      half;
+  const SymmetricEigen principal(b.inertia);
+  const Vector3        I    = principal.values;
+  Matrix3              axes = principal.vectors;
+  Vector3              half;
   for (int k = 0; k < 3; k++) half(k) = std::sqrt(std::max(0.0, 1.5 * (I.sum() - 2 * I(k)) / b.mass));
   if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
   return half.allFinite() && half.maxCoeff() > 0 ? ShapeText("box", half, id, Vector3::Zero(), axes) : "";

@@ -1,4 +1,5 @@
 #include "scene/output/page_surface.h"
+#include "scene/products.h"
 #include <algorithm>
 #include <cmath>
 

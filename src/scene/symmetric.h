@@ -1,0 +1,35 @@
+/* Eigenvalues of symmetric matrices in ascending order, and their vectors, by LAPACK: Eigen's solver takes seconds to compile. */
+#ifndef HHTDAE_SCENE_SYMMETRIC_H
+#define HHTDAE_SCENE_SYMMETRIC_H
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <limits>
+#include <petscblaslapack.h>
+
+namespace hhtdae
+{
+
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+  bool            found; /* not where entries are no numbers; values and vectors are none then */
+
+  /* The lower triangle of A is read. */
+  explicit SymmetricEigen(const Eigen::MatrixXd &A) : values(A.rows()), vectors(A), found(true)
+  {
+    PetscBLASInt    n = (PetscBLASInt)A.rows(), size = std::max<PetscBLASInt>(1, 34 * n), info = 0;
+    Eigen::VectorXd work(size);
+    if (!n) return;
+    found = A.template triangularView<Eigen::Lower>().toDenseMatrix().allFinite();
+    if (found) LAPACKsyev_("V", "L", &n, vectors.data(), &n, values.data(), work.data(), &size, &info);
+    found = found && !info;
+    if (found) return;
+    values.setConstant(std::numeric_limits<double>::quiet_NaN());
+    vectors.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+};
+
+} // namespace hhtdae
+
+#endif
