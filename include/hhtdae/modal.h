@@ -75,10 +75,10 @@ struct ModalBody {
 
   PetscInt modes() const { return (PetscInt)omega.size(); }
   Matrix3  inertia() const { return moments.trace() * Matrix3::Identity() - moments; } /* undeformed, about the centre of mass */
-  PetscInt attachment(const std::string &name) const                                   /* its index, -1: there is none */
+  PetscInt attachment(const std::string &called) const                                 /* its index, -1: there is none */
   {
     for (std::size_t i = 0; i < attachments.size(); i++)
-      if (attachments[i].name == name) return (PetscInt)i;
+      if (attachments[i].name == called) return (PetscInt)i;
     return -1;
   }
   PetscInt node(PetscInt label) const /* likewise */

@@ -62,7 +62,7 @@ void Transfer(TS ts, Archive &a)
 bool FlagsAreFlags(const Integrator &I)
 {
   const CorrectorState &c = I.corrector;
-  for (const PetscBool *x : {&I.have_step, &I.have_misfit, &I.repaired, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
+  for (const PetscBool *x : {&I.have_step, &I.at_begin, &I.have_misfit, &I.repaired, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
                              &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
     if (!IsFlag(*x)) return false;
   return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) &&
@@ -210,7 +210,7 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   Archive     a;
 
   PetscFunctionBegin;
-  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
+  PetscCheck(I.have_step || I.at_begin, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
   PetscTryMethod(ts, "TSHHT3CheckpointPrepare_C", (TS), (ts));
   PetscCall(Gather(ts, a));
   PetscCall(CheckpointFileWrite(PetscObjectComm((PetscObject)ts), file, a.data));
@@ -315,7 +315,8 @@ PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
   then agrees to the accuracy of the tolerance, and -info says so: matrices that give no rows (shell, nest), and preconditioners that
   keep something of which nothing is known. These are all but `hhtconstraint` and the direct solvers that are chosen by default, also where they are
   the solvers within `hhtconstraint`; "mumpsnd" on several ranks repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of
-  their own (dsp) start anew. The file carries a checksum.
+  their own (dsp) start anew. The file carries a checksum. After an error within a step, of a callback for one, the state that the
+  step began with is written.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
 @*/

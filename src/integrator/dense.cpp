@@ -147,8 +147,8 @@ PetscErrorCode AtRotations(const Integrator &I, PetscReal x, WeightedSum velocit
 /* Where t lies in the last step: 0 to 1, and these at its ends exactly */
 PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
 
-/* Monitors are called when an event has taken the step back, too: then the state is that of t_n, and nothing is known of other times */
-bool IsRolledBackTo(TS ts, PetscReal t) { return !Get(ts).have_step && ts->steprollback && t == ts->ptime; }
+/* Monitors are called when an event has taken the step back, too, and after an error users look for what went before it: then the state is that of t_n, and nothing is known of other times */
+bool IsBeginOfStep(TS ts, PetscReal t) { return !Get(ts).have_step && Get(ts).at_begin && t == ts->ptime; }
 
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
@@ -158,7 +158,7 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscInt    n, size;
 
   PetscFunctionBegin;
-  if (IsRolledBackTo(ts, t)) {
+  if (IsBeginOfStep(ts, t)) {
     for (int k = 0; k < 3; k++)
       if (out[k]) PetscCall(VecCopy(begin[k], out[k]));
     PetscFunctionReturn(PETSC_SUCCESS);

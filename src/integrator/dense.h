@@ -12,7 +12,7 @@ PetscReal StepFraction(const Integrator &I, PetscReal t);
 
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
-bool           IsRolledBackTo(TS ts, PetscReal t);
+bool           IsBeginOfStep(TS ts, PetscReal t);
 PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 
 /* The matrix, solver and vectors of EvaluateAt() */

@@ -210,7 +210,7 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   Sampler    *S  = NULL;
 
   PetscFunctionBegin;
-  PetscCheck(I.have_step || IsRolledBackTo(ts, t), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
+  PetscCheck(I.have_step || IsBeginOfStep(ts, t), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   const PetscReal x = StepFraction(I, t);
   if (I.have_step && x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
   if (S) {
@@ -266,7 +266,8 @@ PetscErrorCode SamplerDestroy(Integrator &I)
   solver is the one chosen for the run, by the same options.
 
   At both ends of the step, the values of the step itself are returned, to the last bit. The run is not changed, and nothing is
-  added to its counters; -log_view shows the samples as HHT3Sample.
+  added to its counters; -log_view shows the samples as HHT3Sample. Where a step was rolled back, or ended by an error, only the
+  state that it began with is known, at the present time.
 
   Where the equations cannot be solved (a singular position, a Jacobian without an assembled matrix), accelerations and multipliers
   are interpolated linearly, and -info says so.

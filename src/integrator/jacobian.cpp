@@ -77,9 +77,12 @@ PetscErrorCode SetUpJacobian(TS ts)
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
   if (has && !wanted) {
     if (P) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCheck(!shell, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, 
-               "The SNES of the TS has no matrix, and the TS has no DM to make one: TSSetI2Jacobian() was given a function without a matrix, or another TS with the same SNES was reset");
-    PetscCall(DMCreateMatrix(dm, &P));
+    if (shell) PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL)); /* that of the TS itself makes none, one of the application may */
+    const PetscErrorCode none = DMCreateMatrix(dm, &P);
+    if (shell) PetscCall(PetscPopErrorHandler());
+    PetscCheck(!shell || !none, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+               "The SNES of the TS has no matrix, and the TS has no DM that makes one: TSSetI2Jacobian() was given a function without a matrix, or another TS with the same SNES was reset");
+    PetscCall(none);
     PetscCall(SNESSetJacobian(snes, J ? J : P, P, NULL, NULL));
     PetscCall(MatDestroy(&P));
   } else if (!Get(ts).differences) PetscCall(SetUpDifferences(ts, dm, has && pattern ? NULL : P, has && pattern ? PETSC_TRUE : shell));

@@ -79,6 +79,7 @@ struct StepState {
   PetscReal        t_begin     = 0;       /* of the run */
   TSStepStatus     status      = TS_STEP_INCOMPLETE;
   PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
+  PetscBool        at_begin    = PETSC_FALSE; /* U0, V0 and A0 are the state from which the next step goes: it has been taken back, or an error has ended it */
   PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
   PetscBool        have_misfit = PETSC_FALSE; /* dV belongs to t_n */
   Bend             bent        = Bend::None;

@@ -74,7 +74,7 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecEqual(ts->vec_sol, U, &same_u));
   PetscCall(VecEqual(ts->vec_dot, V, &same_v));
-  if (!same_u && I.have_step && !ts->steprollback) {
+  if (!same_u && I.have_step) {
     PetscCall(IsInterpolatedEnd(ts, &same_u));
     if (same_u) PetscCall(VecCopy(U, ts->vec_sol));
   }
@@ -107,6 +107,8 @@ PetscErrorCode Commit(TS ts)
   std::swap(I.U1, I.U0);
   std::swap(I.V1, I.V0);
   std::swap(I.A1, I.A0);
+  I.have_step   = PETSC_FALSE;
+  I.at_begin    = PETSC_TRUE;
   I.h_last      = I.h;
   I.have_misfit = PETSC_FALSE;
   I.bent        = Bend::None;
@@ -123,26 +125,26 @@ PetscErrorCode Begin(TS ts)
 
   PetscFunctionBegin;
   if (!ts->steprestart) {
-    if (ts->steprollback) PetscCall(StateWasChanged(ts, I.t0, I.U0, I.V0, &changed));
-    else if (I.have_step) PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &changed));
-    else if (!I.stat.restarts) changed = PETSC_TRUE;
+    if (I.have_step) PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &changed));
+    else if (I.at_begin) PetscCall(StateWasChanged(ts, I.t0, I.U0, I.V0, &changed));
+    else changed = PETSC_TRUE;
     if (changed) PetscCall(PetscInfo(ts, "the solution or the time was changed from outside: restart\n"));
   }
   I.own_start = PETSC_FALSE;
-  if (ts->steprestart && I.have_step && !ts->steprollback) {
+  if (ts->steprestart && I.have_step) {
     PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &I.own_start));
     I.own_start = (PetscBool)!I.own_start;
   }
   if (ts->steprestart || changed) {
-    I.have_step = PETSC_FALSE;
+    I.have_step = I.at_begin = PETSC_FALSE;
     PetscCall(Start(ts));
-  } else if (I.have_step && !ts->steprollback) {
+    I.at_begin = PETSC_TRUE;
+  } else if (I.have_step) {
     PetscCall(Commit(ts));
     if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
     PetscCall(ReferToState(ts));
   }
   if (!ts->steprestart && !changed) PetscCall(FollowTolerances(ts, I.U0));
-  I.have_step = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -327,7 +329,7 @@ namespace
 PetscErrorCode PassStops(TS ts)
 {
   const Integrator &I       = Get(ts);
-  const bool        resumed = I.have_step && I.stat.steps == I.checkpoint_steps;
+  const bool        resumed = (I.have_step || I.at_begin) && I.stat.steps == I.checkpoint_steps;
   PetscBool         passed;
 
   PetscFunctionBegin;

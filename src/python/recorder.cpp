@@ -25,6 +25,9 @@ PetscErrorCode Destroy(void **ctx)
   PetscFunctionReturn(0);
 }
 
+/* The first multiple of dt after t */
+PetscInt64 After(PetscReal t, double dt) { return (PetscInt64)std::floor((t + 1e-12 * std::abs(t)) / dt) + 1; }
+
 } // namespace
 
 PetscErrorCode Recorder::add(TS ts, PetscReal t)
@@ -34,6 +37,15 @@ PetscErrorCode Recorder::add(TS ts, PetscReal t)
   times_.push_back(t);
   values_.insert(values_.end(), one_.begin(), one_.end());
   PetscFunctionReturn(0);
+}
+
+void Recorder::resume(PetscReal t)
+{
+  const std::size_t width = times_.empty() ? 0 : values_.size() / times_.size();
+  while (!times_.empty() && times_.back() > t + 1e-12 * std::abs(t)) times_.pop_back();
+  values_.resize(width * times_.size());
+  if (dt_ > 0) next_ = After(t, dt_);
+  resumed_ = true;
 }
 
 /* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. Times that lie within
@@ -48,7 +60,7 @@ PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
   resumed_ = false;
   if (times_.empty()) {
     PetscCall(add(ts, begin));
-    if (dt_ > 0) next_ = (PetscInt)std::floor((begin + 1e-12 * std::abs(begin)) / dt_) + 1;
+    if (dt_ > 0) next_ = After(begin, dt_);
   }
   if (dt_ <= 0) {
     if (t > times_.back()) PetscCall(add(ts, t));

@@ -263,9 +263,9 @@ PetscErrorCode MeasureMisfit(SceneData &s, std::vector<Misfit> &m)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool going_on)
+PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool going_on, double left)
 {
-  const double tol = s.start.tolerance;
+  const double tol = std::max(s.start.tolerance, left);
   PetscFunctionBegin;
   const std::string positions = WorstPositions(s, m, tol), velocities = going_on ? "" : WorstVelocities(s, m, tol);
   PetscCheck(positions.empty() && velocities.empty(), s.comm, PETSC_ERR_ARG_WRONG,
@@ -292,7 +292,7 @@ PetscErrorCode Assemble(Model &M)
   PetscCall(MeasureMisfit(s, m));
   const Hold hold = M.continues ? Hold::None : Hold::FixedStart; /* fixed_start is of the start */
   if (s.start.assembly == Assembly::Report) {
-    PetscCall(Report(s, m, M.continues));
+    PetscCall(Report(s, m, M.continues, M.left));
     PetscFunctionReturn(0);
   }
   if (s.started.misfit > 0) {

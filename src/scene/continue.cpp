@@ -174,15 +174,16 @@ PetscErrorCode KeepStart(TS ts, Vec A)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy)
+PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy)
 {
   Runtime  &R = *RunOf(ts);
   PetscBool same[2] = {PETSC_FALSE, PETSC_FALSE};
-  PetscReal t;
+  PetscReal now;
   Vec       U, V;
   PetscFunctionBegin;
   *copy = nullptr;
-  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TSGetTime(ts, &now));
+  PetscCheck(t == now, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Time %g: the run has not begun, and its state is that of t = %g", (double)t, (double)now);
   PetscCall(TS2GetSolution(ts, &U, &V));
   if (R.start_state[2] && t == R.start_time) {
     PetscCall(VecEqual(U, R.start_state[0], &same[0]));
@@ -280,12 +281,13 @@ PetscErrorCode StartWithMotions(TS ts)
 PetscErrorCode Scene::createTS(TS *ts, TS from)
 {
   Runtime  *old;
-  PetscReal t;
+  PetscReal t, atol, rtol;
   Vec       U, V;
   PetscFunctionBegin;
   PetscCall(FindRun(*this, from, "Scene::createTS()", &old));
   PetscCall(ReadCheckpoint(from));
   PetscCall(TSGetTime(from, &t));
+  PetscCall(TSGetTolerances(from, &atol, nullptr, &rtol, nullptr));
   PetscCall(TS2GetSolution(from, &U, &V));
   if (journal_) {
     journal_->stale = true;
@@ -296,6 +298,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.continues    = true;
     M.begin        = t;
     M.number.owner = old->number.owner;
+    M.left         = 1e-2 * (atol + rtol) / std::max(SceneSize(M.scene), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
     PetscCall(CarryTurns(*old, M.scene));
     PetscErrorCode failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);
@@ -305,13 +308,19 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     Vec X, Y;
     PetscCall(TS2GetSolution(*ts, &X, &Y));
     PetscCall(CarryAngles(*old, U, V, *RunOf(*ts), X, Y));
-    /* A run leaves constraints of velocities as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfALinkWithoutMass) */
-    if (M.scene.started.velocity_misfit > 0) PetscCall(ToNearestConsistent(*ts));
+    /* A run leaves constraints as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfALinkWithoutMass) */
+    if (M.scene.started.misfit > 0 || M.scene.started.velocity_misfit > 0) PetscCall(ToNearestConsistent(*ts));
     PetscFunctionReturn(0);
   }
   PetscCall(createTS(ts));
   PetscCall(CopyState(*old, from, *RunOf(*ts), *ts));
   PetscCall(TSSetTime(*ts, t));
+  /* Velocities at the end of a step meet constraints to second order, those that a run begins with have to meet them (Continue.ChainOfRuns) */
+  PetscInt steps, rows[2];
+  PetscCall(TSGetStepNumber(from, &steps));
+  PetscCall(ISGetSize(RunOf(*ts)->roles[TSHHT3_HOLONOMIC], &rows[0]));
+  PetscCall(ISGetSize(RunOf(*ts)->roles[TSHHT3_NONHOLONOMIC], &rows[1]));
+  if (steps && rows[0] + rows[1] && data().start.assembly != Assembly::Off) PetscCall(ToNearestConsistent(*ts));
   PetscFunctionReturn(0);
 }
 

@@ -298,8 +298,7 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
   if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, w.state[0], w.state[1], w.state[2]));
   else {
-    PetscCall(TSGetTime(ts, &t));
-    PetscCall(StateOfStart(ts, w.state, &w.start));
+    PetscCall(StateOfStart(ts, t, w.state, &w.start));
     if (w.start) w.R = RunOf(w.start);
   }
   w.t    = t;

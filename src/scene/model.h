@@ -21,6 +21,7 @@ struct Model {
   SceneData   scene; /* once compiled: assembled, in equilibrium if that was asked for, without redundant rows */
   bool        compiled = false;
   bool        continues = false; /* from where another run was, at this time, with its owners of bodies */
+  double      left      = 0;     /* by that run's tolerance, of misfits of positions: parts of the scene's size */
   double      begin     = 0;
   PetscMPIInt rank = 0, size = 1;
   Numbering   number;

@@ -150,7 +150,7 @@ PetscErrorCode ToNearestConsistent(TS ts); /* the state of a run that has not be
 PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, which has its multipliers */
 /* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has
    found them, null if none was needed */
-PetscErrorCode StateOfStart(TS ts, Vec state[3], TS *copy);
+PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy);
 
 } // namespace hhtdae
 

@@ -379,3 +379,61 @@ TEST(Checkpoint, UnwritableDirectoryIsAnError)
   ErrorTrap trap;
   EXPECT_NE(TSHHT3CheckpointSave(run.ts, "/no/such/directory/file"), 0);
 }
+
+namespace
+{
+
+/* The residual of a simulation, which fails once, at a call that is counted */
+struct FailsOnce {
+  TSI2Function f   = nullptr;
+  void        *ctx = nullptr;
+  long         calls = 0, at;
+
+  FailsOnce(Simulation &run, long call) : at(call)
+  {
+    must(TSGetI2Function(run.ts, nullptr, &f, &ctx));
+    must(TSSetI2Function(run.ts, nullptr, evaluate, this));
+  }
+  static PetscErrorCode evaluate(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *self)
+  {
+    auto &x = *static_cast<FailsOnce *>(self);
+    return ++x.calls == x.at ? PETSC_ERR_USER : x.f(ts, t, U, V, A, F, x.ctx);
+  }
+};
+
+} // namespace
+
+/* What was reached before an error in a callback can be looked at, saved, and gone on from, with the digits of a run without error */
+TEST(Checkpoints, AfterAnErrorOfTheApplication)
+{
+  const Pendulum p(-90., 0., .5);
+  const auto     options = tolerance(1e-6) + "-ts_max_time 0.5 ";
+  Simulation     plain(p, options);
+  const auto     expected = record(plain);
+  ASSERT_GT(expected.size(), 30u);
+  for (const long call : {200, 201, 202, 203, 204, 205}) {
+    Simulation run(p, options), other(p, options);
+    FailsOnce  residual(run, call);
+    File       file("error");
+    {
+      ErrorTrap trap;
+      EXPECT_EQ(run.solve(), PETSC_ERR_USER) << call;
+    }
+    PetscInt steps;
+    must(TSGetStepNumber(run.ts, &steps));
+    ASSERT_GT(steps, 3);
+    const Step &reached = expected[steps - 1];
+    EXPECT_EQ(reached, (Step{run.t(), run.u(), run.v(), run.a()})) << call;
+    Vec x;
+    must(VecDuplicate(run.U, &x));
+    must(TSHHT3EvaluateAt(run.ts, run.t(), nullptr, nullptr, x));
+    EXPECT_EQ(whole(x), reached.a) << call;
+    must(VecDestroy(&x));
+    must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+    must(run.solve());
+    EXPECT_EQ(run.u(), plain.u()) << call;
+    must(TSHHT3CheckpointLoad(other.ts, file.name.c_str()));
+    must(other.solve());
+    EXPECT_EQ(other.u(), plain.u()) << call;
+  }
+}

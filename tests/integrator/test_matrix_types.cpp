@@ -2,6 +2,7 @@
 #include "matrix_types.h"
 #include "triangle.h"
 #include <cstdio>
+#include <petscdmshell.h>
 #include <unistd.h>
 
 using namespace hhtest;
@@ -113,5 +114,56 @@ TEST(MatrixTypes, CholeskyOfAnUnsymmetricMatrix)
     Simulation run(*p[k], tolerance(1e-4) + "-pc_type cholesky");
     must(run.step());
     EXPECT_EQ(out.says("-pc_type cholesky takes one triangle of a matrix that is not symmetric"), k == 0) << out.text();
+  }
+}
+
+/* A DMShell of the application gives the matrix, as one of any other type does; one that gives none is an error that says so. x'' + 4 x = 0 */
+TEST(MatrixTypes, OfADMShell)
+{
+  for (const bool gives : {true, false}) {
+    DM  dm;
+    Vec U, V;
+    Mat A;
+    TS  ts;
+    must(VecCreateSeq(PETSC_COMM_SELF, 3, &U));
+    must(VecDuplicate(U, &V));
+    must(VecSet(U, 1.));
+    must(VecSet(V, 0.));
+    must(MatCreateSeqAIJ(PETSC_COMM_SELF, 3, 3, 1, nullptr, &A));
+    for (PetscInt i = 0; i < 3; i++) must(MatSetValue(A, i, i, 0., INSERT_VALUES));
+    must(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    must(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    must(DMShellCreate(PETSC_COMM_SELF, &dm));
+    if (gives) must(DMShellSetMatrix(dm, A));
+    else must(DMShellSetCreateMatrix(dm, [](DM, Mat *) { return (PetscErrorCode)PETSC_ERR_SUP; }));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetDM(ts, dm));
+    must(TSSetType(ts, TSHHT3));
+    must(TSSetI2Function(
+        ts, nullptr, [](TS, PetscReal, Vec x, Vec, Vec a, Vec F, void *) { return VecWAXPY(F, 4., x, a); }, nullptr));
+    must(TSSetI2Jacobian(
+        ts, nullptr, nullptr,
+        [](TS, PetscReal, Vec, Vec, Vec, PetscReal, PetscReal shift, Mat, Mat P, void *) {
+          must(MatZeroEntries(P));
+          return MatShift(P, 4. + shift);
+        },
+        nullptr));
+    must(TS2SetSolution(ts, U, V));
+    must(TSSetMaxTime(ts, 1.));
+    must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+    must(TSSetTolerances(ts, 1e-7, nullptr, 1e-7, nullptr));
+    if (gives) {
+      must(TSSolve(ts, nullptr));
+      EXPECT_NEAR(whole(U)[1], std::cos(2.), 1e-4);
+    } else {
+      ErrorTrap trap;
+      EXPECT_EQ(TSSolve(ts, nullptr), PETSC_ERR_ARG_WRONGSTATE);
+      EXPECT_TRUE(trap.says("no DM that makes one")) << trap.message;
+    }
+    must(TSDestroy(&ts));
+    must(DMDestroy(&dm));
+    must(VecDestroy(&U));
+    must(VecDestroy(&V));
+    must(MatDestroy(&A));
   }
 }

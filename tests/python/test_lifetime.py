@@ -56,6 +56,23 @@ class Keeping(unittest.TestCase):
         gc.collect()
         self.assertIsNone(watch())
 
+    def test_run_with_events(self):
+        """Its TS looks at it after every step, and must not keep it: closed or dropped it goes, and its scene with it"""
+        for close in (True, False):
+            scene = h.Scene(gravity=(0, 0, -1))
+            height = h.displacement(scene.add("b", h.PointMass(position=(0, 0, 0.1))).marker(), 2)
+            scene.channel("z", height)
+            run = scene.run(tolerance=1e-5)
+            run.event(height)
+            run.solve(0.5)
+            watch = weakref.ref(run), weakref.ref(scene)
+            if close:
+                run.close()
+            del run, scene, height
+            gc.collect()
+            oscillator().run().close()
+            self.assertEqual((watch[0](), watch[1]()), (None, None))
+
     def test_snapshot_and_operators_outlive(self):
         run = oscillator().solve(0.2)
         now, small = run.snapshot(), run.linearize()

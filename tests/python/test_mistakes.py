@@ -38,6 +38,16 @@ class Scales(unittest.TestCase):
         self.assertLess(scales(lambda x: np.tanh(x / 1e-4), [0.])[0], 1e-2)
 
 
+    def test_accelerations(self):
+        """An oscillator of 1e9 rad/s, called and traced: the differences over accelerations of 1e18 do not drown"""
+        w = 1e9
+        runs = [h.solve_mechanism(lambda t, q, v, a: [a[0] + w * w * q[0]], (0, 12 / w), [1.], [0.], trace=trace) for trace in (False, True)]
+        for s in runs:
+            self.assertTrue(s.success, s.message)
+            self.assertAlmostEqual(s.q[0, -1], np.cos(12.), delta=5e-3)
+        self.assertLess(abs(runs[0].statistics.steps - runs[1].statistics.steps), 5)
+
+
 class Arguments(unittest.TestCase):
     def test_tolerances(self):
         for name in ("rtol", "atol", "max_step", "first_step"):

@@ -206,6 +206,15 @@ class Runs(unittest.TestCase):
             wanted = [begin] + [k / 10 for k in range(first, round(10 * begin + 5) + 1) if k / 10 <= begin + 0.5 + 1e-9]
             np.testing.assert_allclose(scene.solve(begin + 0.5, sample=0.1).times, wanted, atol=1e-12)
 
+    def test_samples_beyond_32_bits(self):
+        scene = h.Scene()
+        ball = scene.add("ball", h.PointMass(velocity=(2, 0, 0)))
+        scene.channel("x", h.displacement(ball.marker(), 0))
+        scene.start(time=1.7e9)
+        run = scene.run(sample=0.125).solve(1.7e9 + 1)
+        np.testing.assert_array_equal(run.times, 1.7e9 + 0.125 * np.arange(9))
+        np.testing.assert_allclose(run["x"], 0.25 * np.arange(9), atol=1e-6)
+
     def test_parts_and_copies(self):
         """A run in parts, one that goes on from another, a checkpoint"""
         scene, rod, pin = pendulum()
@@ -274,6 +283,27 @@ class Runs(unittest.TestCase):
             other.add("rod", h.PointMass())
             with self.assertRaises(h.Error):
                 other.run().load(file)
+
+    def test_samples_after_a_checkpoint(self):
+        """What was recorded beyond the checkpoint's time is gone, and with another load on the way from there other values come in its place"""
+        with tempfile.TemporaryDirectory() as folder:
+            for sample in (0., 0.05):
+                scene = h.Scene()
+                push = scene.parameter("push", 0.)
+                m = scene.add("ball", h.PointMass(velocity=(1, 0, 0))).marker()
+                scene.add("push", h.UserForce(m, force=[push, 0, 0]))
+                scene.channel("x", h.displacement(m, 0))
+                run, file = scene.run(sample=sample), os.path.join(folder, "state")
+                run.solve(0.5).save(file)
+                before = run.times
+                run.solve(1.)
+                run.load(file)
+                np.testing.assert_array_equal(run.times, before)
+                scene.set(push=2.)
+                run.restart()
+                run.solve(1.)
+                np.testing.assert_allclose(run["x"], run.times + np.maximum(run.times - 0.5, 0)**2, atol=1e-6)
+                self.assertTrue(np.all(np.diff(run.times) > 0))
 
     def test_events(self):
         """A stone that falls through 0.5 m, and one that a switch at 0.75 m makes weightless"""
@@ -600,6 +630,23 @@ class Questions(unittest.TestCase):
 
 
 class Mistakes(unittest.TestCase):
+    def test_all_parameters_or_none(self):
+        scene = h.Scene()
+        a, b = scene.parameter("a", 1.), scene.parameter("b", 2.)
+        for wrong in (dict(a=10., c=1.), dict(a=20., b="x"), dict(a=30., b=None)):
+            with self.assertRaises((h.Error, TypeError, ValueError)):
+                scene.set(**wrong)
+            self.assertEqual((a.get(), b.get()), (1., 2.))
+
+    def test_times_of_a_run_that_has_not_begun(self):
+        scene = h.Scene()
+        scene.add("ball", h.PointMass())
+        run = scene.run()
+        run.snapshot(0.)
+        for what in (run.snapshot, run.linearize, run.sample):
+            with self.assertRaisesRegex(h.Error, "has not begun"):
+                what(5.)
+
     def test_numbers_are_no_flags(self):
         """As the third argument of a term, which is whether it is an angle, and not its factor"""
         scene = h.Scene(planar=True)
@@ -654,7 +701,7 @@ class Mistakes(unittest.TestCase):
         self.assertEqual(run.steps, 3)
         fresh = scene.run()
         self.assertAlmostEqual(fresh.sample()["x"], fresh.snapshot().value(h.displacement(centre, 0)))
-        with self.assertRaisesRegex(h.Error, "no step to interpolate"):
+        with self.assertRaisesRegex(h.Error, "has not begun"):
             fresh.sample(1.)
         with self.assertRaisesRegex(ValueError, "tolerance is -1"):
             scene.run(tolerance=-1)

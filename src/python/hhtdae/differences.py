@@ -9,8 +9,13 @@ def differences(f, x, rows, scale):
 
 
 def slopes(f, x, rows):
-    """The same of a function that is linear: over 1, or the number itself, where rounding is least"""
-    return _over(f, x, rows, np.maximum(1., np.abs(x)))
+    """The same of a function that is linear: over 1, or the number itself, and where that drowns in the rounding of large values, over as much as these are"""
+    increments = np.maximum(1., np.abs(x))
+    J, size = _over(f, x, rows, increments), np.max(np.abs(f(x)), initial=0.)
+    drowned = np.max(np.abs(J), axis=0, initial=0.) * increments < 1e-6 * size
+    if not np.any(drowned) or not np.isfinite(size):
+        return J
+    return np.where(drowned, _over(f, x, rows, np.where(drowned, np.maximum(increments, size), increments)), J)
 
 
 def _over(f, x, rows, increments):

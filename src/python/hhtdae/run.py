@@ -103,6 +103,7 @@ class Run(Channels):
         if tolerance is not None:
             tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], Signs(), []
+        self._now = None  # a snapshot for the formulas of events
         self._before, self._numbers = None, None  # state, and parameters, at the last event before its actions
         self._ended = False  # by a terminal event in the last solve()
         self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
@@ -212,7 +213,7 @@ class Run(Channels):
         self._signs.add(direction)
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
-            self._open().setPostStep(self._look)
+            self._open().setPostStep(_look_of(weakref.ref(self)))
             if self.steps:
                 self._project_restarts()
 
@@ -403,7 +404,7 @@ class Run(Channels):
             integrator.checkpoint_load(ts, file)
             self._project_restarts()
         if self._recorder:
-            self._recorder.resume()
+            self._recorder.resume(self.time)
         return self
 
     def close(self) -> None:
@@ -412,7 +413,7 @@ class Run(Channels):
             self._not_solving("close")
             self._left = self.time, self.steps, self.statistics
             self.ts.destroy()
-        self.ts = None
+        self.ts = self._now = None
 
     def __enter__(self):
         return self
@@ -422,6 +423,15 @@ class Run(Channels):
 
     def __repr__(self):
         return "<closed run>" if not self.ts else "<run at t = %.6g, %d steps, %d samples>" % (self.time, self.steps, len(self.times))
+
+
+def _look_of(run):
+    """The run's look after a step, for its TS, which must not hold the run: the snapshot holds the TS, out of sight of Python's garbage collector"""
+    def look(ts):
+        alive = run()
+        if alive is not None:
+            alive._look(ts)
+    return look
 
 
 def _remove(folder, process):

@@ -173,8 +173,9 @@ class Scene:
         What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
         which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
         """
-        for name, value in values.items():
-            self._core.set(name, number(value, "parameter " + name))
+        values = {name: number(value, "parameter " + name) for name, value in values.items()}
+        for name in sorted(values, key=lambda name: name in self._parameters):  # all or none: one that there is not is an error before others are set
+            self._core.set(name, values[name])
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""

@@ -33,7 +33,6 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   PetscFunctionBegin;
   Runtime *run;
   PetscInt steps;
-  PetscReal now;
   TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(CheckUnchanged(data(), start_));
@@ -43,8 +42,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
     PetscCall(VecSetType(x, VECSTANDARD));
   }
   PetscCall(TSGetStepNumber(ts, &steps));
-  PetscCall(TSGetTime(ts, &now));
-  if (!steps && t == now) PetscCall(StateOfStart(ts, W, &copy));
+  if (!steps) PetscCall(StateOfStart(ts, t, W, &copy));
   else PetscCall((ChannelsFollowFromEquations(*run) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
   Runtime &R = copy ? *RunOf(copy) : *run;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
