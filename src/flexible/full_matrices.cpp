@@ -1,5 +1,6 @@
 /* A finite-element body by its matrices: M (x'' - g) + (a M + b K) x' + K (x - X), rows of own nodes. */
 #include "flexible/full_nodes.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 
 namespace hhtdae
@@ -7,6 +8,34 @@ namespace hhtdae
 
 namespace
 {
+
+constexpr double much = 0.1; /* rad: strains are wrong by half of its square */
+
+/* The mean rotation of a body from its displacements, sum r x d = J w, as long as it is small */
+class MeanRotation
+{
+public:
+  void setUp(const double *X, std::size_t nodes)
+  {
+    Matrix3 J = Matrix3::Zero();
+    for (std::size_t i = 0; i < nodes; i++) center_ += place(X, i) / (double)nodes;
+    for (std::size_t i = 0; i < nodes; i++) {
+      const Vector3 r = place(X, i) - center_;
+      J += r.squaredNorm() * Matrix3::Identity() - r * r.transpose();
+    }
+    const SymmetricEigen principal(J);
+    for (int k = 0; nodes && k < 3; k++)
+      if (principal.values[k] > 1e-10 * principal.values[2]) inverse_ += Matrix3(principal.vectors.col(k) * principal.vectors.col(k).transpose()) / principal.values[k];
+  }
+  Vector3 moment(const double *X, std::size_t i, const Vector3 &d) const { return (place(X, i) - center_).cross(d); }
+  double  angle(const Vector3 &moment) const { return (inverse_ * moment).norm(); }
+
+private:
+  Vector3 center_  = Vector3::Zero();
+  Matrix3 inverse_ = Matrix3::Zero();
+
+  static Vector3 place(const double *X, std::size_t i) { return Eigen::Map<const Vector3>(X + 3 * i); }
+};
 
 class MatrixBatch : public Batch
 {
@@ -19,6 +48,7 @@ public:
   {
     for (PetscInt n : x.near) near.push_back(PlaceNode(x, l, n));
     own = (PetscInt)(std::lower_bound(x.near.begin(), x.near.end(), x.model->first) - x.near.begin());
+    if (looks()) mean_.setUp(&x.near_x[3 * own], (std::size_t)x.model->own);
   }
 
   void pattern(Pattern &p) override
@@ -47,6 +77,22 @@ public:
     for (std::size_t k = 0; k < slot_.size(); k++) ev.sink.add(slot_[k], Matrix3(m * x.block_M[k] + s * x.block_K[k]), 3, 3);
   }
 
+  /* Steps are as long as they may be, but a body that has turned too far for its law is told, once (FullBody.TurnsTooFarForSmallDisplacements) */
+  bool   limitsSteps() const override { return looks(); }
+  double longestStep(const Evaluation &ev) const override
+  {
+    Vector3 moment = Vector3::Zero();
+    if (told_) return std::numeric_limits<double>::infinity();
+    for (PetscInt n = 0; n < x.model->own; n++) moment += mean_.moment(&x.near_x[3 * own], (std::size_t)n, displacement(ev, own + n));
+    told_ = mean_.angle(moment) > much;
+    if (told_)
+      PetscCallAbort(PETSC_COMM_SELF, PetscPrintf(PETSC_COMM_SELF,
+                                                  "scene: at t = %g full body %s has turned by more than %g rad since the start: with law small its strains are those of a body that does not turn, and wrong by %g; "
+                                                  "use law large\n",
+                                                  ev.t, x.name.c_str(), much, 0.5 * much * much));
+    return std::numeric_limits<double>::infinity();
+  }
+
   void addTo(Balance &B, const Evaluation &ev) const override
   {
     for (PetscInt n = 0; n < x.model->own; n++) {
@@ -66,6 +112,10 @@ public:
   }
 
 private:
+  MeanRotation mean_; /* of the first rank's part */
+  mutable bool told_ = false;
+
+  bool    looks() const { return x.model->first == 0 && x.model->own > 2; }
   Vector3 displacement(const Evaluation &ev, PetscInt k) const { return At(ev.u, near[k]) - Eigen::Map<const Vector3>(&x.near_x[3 * k]); }
 };
 

@@ -103,6 +103,43 @@ TEST(FullBody, RigidMotionMakesNoForce)
   }
 }
 
+/* A body of law small that turns by more than 0.1 rad about its length, or across it, is told once */
+TEST(FullBody, TurnsTooFarForSmallDisplacements)
+{
+  struct Case {
+    FeLaw  law;
+    int    axis;
+    double angle;
+    int    lines;
+  };
+  for (const Case &c : {Case{FeLaw::Small, 2, 0.2, 1}, {FeLaw::Small, 0, 0.2, 1}, {FeLaw::Small, 2, 0.09, 0}, {FeLaw::Large, 2, 0.2, 0}}) {
+    Beam8      beam({2, 1, 1}, {1e6, 0.3, 2});
+    Scene      scene(PETSC_COMM_WORLD);
+    FullFeBody fe;
+    FullBody   b;
+    TS         ts;
+    TSAdapt    adapt;
+    b.law                      = c.law;
+    b.angular_velocity[c.axis] = 1;
+    must(fe.add(scene, "beam", beam.model, b));
+    must(scene.createTS(&ts));
+    must(TSSetMaxTime(ts, c.angle));
+    must(TSSetTolerances(ts, 1e-5, nullptr, 1e-5, nullptr));
+    must(TSGetAdapt(ts, &adapt));
+    must(TSAdaptSetStepLimits(adapt, PETSC_DEFAULT, 0.02)); /* it is told between steps */
+    testing::internal::CaptureStdout();
+    must(scene.solve(ts));
+    const std::string said = testing::internal::GetCapturedStdout();
+    const auto        at   = said.find("full body beam has turned");
+    EXPECT_EQ(at != std::string::npos, c.lines == 1) << said;
+    if (c.lines) {
+      EXPECT_EQ(said.find("has turned", at + 20), std::string::npos) << said;
+      EXPECT_NE(said.find("law large", at), std::string::npos) << said;
+    }
+    must(TSDestroy(&ts));
+  }
+}
+
 /* The position of a marker on a frame follows what its nodes do: ties are met, and average what they say */
 TEST(FullBody, TiesHold)
 {
