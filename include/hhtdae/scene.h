@@ -11,7 +11,8 @@
     PetscCall(scene.solve(ts));
 
   Units are the user's own, but consistent; angles are in radians. Building a scene never fails: what is wrong with it is reported
-  by name, all of it at once, as a PETSc error from setUp(), createTS() or solve(), whichever comes first. Every rank describes the
+  by name, all of it at once, as a PETSc error from setUp(), createTS() or solve(), whichever comes first. Exceptions of the user's own
+  functions that are tried as they are added, laws of springs and motions in time, come from add(). Every rank describes the
   same scene in the same order; METIS gives each rank its part of the bodies.
 */
 #ifndef HHTDAE_SCENE_H

@@ -87,6 +87,15 @@ class Arguments(unittest.TestCase):
         self.assertEqual(len(seen), run.steps)
         self.assertEqual(seen[-1], (run.steps, 1.))
 
+    def test_ends_that_are_no_times(self):
+        scene = h.Scene()
+        scene.add("mass", h.PointMass())
+        for end in (np.inf, np.nan):
+            with self.assertRaisesRegex(ValueError, "until is"):
+                scene.run().solve(end)
+        with self.assertRaisesRegex(ValueError, "t_span .*finite"):
+            h.solve_mechanism(lambda t, q, v, a: [a[0], a[1]], (0, np.inf), [0, 0], [0, 0])
+
     def test_values(self):
         with self.assertRaisesRegex(ValueError, "t_eval"):
             stone(t_eval=[0, float("nan"), 1])

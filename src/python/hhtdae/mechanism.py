@@ -158,6 +158,8 @@ class _Problem:
         self.n, self.args = len(self.q0), tuple(args)
         if not self.t1 > self.t0:
             raise ValueError("t_span is (%g, %g): its end must come after its begin" % (self.t0, self.t1))
+        if not np.isfinite([self.t0, self.t1]).all():
+            raise ValueError("t_span is (%g, %g): both ends must be finite; the second is the latest, where an event is to end the run" % (self.t0, self.t1))
         if not np.all(np.isfinite(self.q0)) or not np.all(np.isfinite(self.v0)):
             raise ValueError("q0 and v0 must be finite, are %s and %s" % (self.q0, self.v0))
         if len(self.v0) != self.n:

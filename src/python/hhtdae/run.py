@@ -137,6 +137,8 @@ class Run(Channels):
         self._not_solving("solve")
         ts = self._open()
         until = number(until, "solve(): until")
+        if not until < np.inf:
+            raise ValueError("solve(): until is %r, must be finite: the time at which the run ends at the latest, where an event is to end it" % until)
         if not until >= ts.getTime():
             raise ValueError("the run is at t = %g and cannot go back to %g" % (ts.getTime(), until))
         if until == ts.getTime():
