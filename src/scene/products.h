@@ -1,6 +1,6 @@
 /*
   Products of matrices of which a size is known at run time alone, by BLAS and as values: an operator that is found within this namespace in place of Eigen's,
-  which has kernels of its own for every kind of operand. These took a quarter of the time to compile the library, and BLAS uses what the processor has.
+  which compiles kernels of its own for every kind of operand, in every source. BLAS uses what the processor has, whatever flags we were compiled with.
 */
 #ifndef HHTDAE_SCENE_PRODUCTS_H
 #define HHTDAE_SCENE_PRODUCTS_H
