@@ -39,7 +39,7 @@ PetscErrorCode CheckInput(const FeModel &model, const ReducedBody &body)
     problem = "the body has " + std::to_string(body.modal.modes()) + " modes, but " +
               std::to_string(body.shape.cols()) + " columns of their shapes";
   if (problem.empty() && body.coordinates.size() == model.coordinates.size()) {
-    const Eigen::Map<const VectorXd> was(body.coordinates.data(), (Eigen::Index)body.coordinates.size()), is(model.coordinates.data(), (Eigen::Index)model.coordinates.size());
+    const Eigen::Map<const Eigen::VectorXd> was(body.coordinates.data(), (Eigen::Index)body.coordinates.size()), is(model.coordinates.data(), (Eigen::Index)model.coordinates.size());
     if (was.size() && (was - is).cwiseAbs().maxCoeff() > 1e-6 * is.cwiseAbs().maxCoeff()) problem = "the nodes of the model from \"" + model.source + "\" are not where those of the body were: stress needs the model that was reduced";
   }
   if (problem.empty() && (int)model.materials.size() == 0)

@@ -18,6 +18,7 @@
   T_00^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
 */
 #include "euler.h"
+#include "extension.h"
 #include "linearization.h"
 #include "start.h"
 
