@@ -1,6 +1,7 @@
 #!/bin/sh
-# setup.sh PACKAGE... [--optional PACKAGE...] [--later PACKAGE...]: installs the Debian packages that are missing, but for those that only other
-# targets need: they are part of the command for those who have to ask somebody else to install.
+# setup.sh PACKAGE... [--optional PACKAGE...] [--meanwhile PACKAGE...] [--later PACKAGE...]: installs the Debian packages that are missing, but for those
+# that the target installs while it compiles, and those that only other targets need: both are part of the command for those who have to ask
+# somebody else to install.
 # Silent and fast when there are none; touches no package lists then. Optional packages may be unknown to the system.
 set -eu
 
@@ -12,10 +13,11 @@ missing() {
   done
 }
 
-required='' optional='' later='' kind=required
+required='' optional='' meanwhile='' later='' kind=required
 for package; do
   case $package in
     --optional) kind=optional ;;
+    --meanwhile) kind=meanwhile ;;
     --later) kind=later ;;
     *) eval "$kind=\"\$$kind $package\"" ;;
   esac
@@ -24,16 +26,18 @@ done
 required=$(missing $required)
 # shellcheck disable=SC2086
 optional=$(missing $optional)
-[ -n "$required$optional" ] || exit 0
+# shellcheck disable=SC2086
+meanwhile=$(missing $meanwhile)
+[ -n "$required$optional$meanwhile" ] || exit 0
 
 if [ "$(id -u)" = 0 ]; then
   root=''
 elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
   root=sudo
-elif [ -n "$required" ]; then
+elif [ -n "$required$meanwhile" ]; then
   echo 'setup: Debian packages are missing, and only root may install them; once:' >&2
   # shellcheck disable=SC2086
-  install="apt-get update && apt-get install -y --no-install-recommends$required$optional$(missing $later)"
+  install="apt-get update && apt-get install -y --no-install-recommends$required$optional$meanwhile$(missing $later)"
   if command -v sudo >/dev/null; then echo "sudo sh -c '$install'"; else echo "su -c '$install'"; fi
   exit 1
 else
@@ -41,6 +45,7 @@ else
   exit 0
 fi
 
+[ -n "$required$optional" ] || exit 0
 apt() { $root env DEBIAN_FRONTEND=noninteractive apt-get -q -o Dpkg::Use-Pty=0 "$@" </dev/null; }
 
 # A line for every tenth part of: packages fetched, unpacked, set up
