@@ -33,17 +33,27 @@ static PetscErrorCode Paper(TS ts) { return TSHHT3SetForm(ts, TSHHT3_FORM_PAPER)
 
 static PetscErrorCode LittleDamping(TS ts) { return TSHHT3SetAlpha(ts, -0.05); }
 
-/* The three integrators of the comparison in turn, as often as asked; the median of the times */
+/* Runs of the comparison, at its steps, whose samples take runs of their own */
+struct Timed {
+  const char                       *name;
+  std::function<PetscErrorCode(TS)> configure;
+
+  PetscErrorCode run(const AtvRuns &runs, AtvRuns::Of of, AtvRun *run) const { return runs.hht(name, 1e-5, 5e-4, configure, run, of); }
+};
+static const Timed timed[] = {{"hhtdae, second-order form", nullptr}, {"hhtdae, paper's form", Paper}};
+
+/* They and IDA in turn, as often as asked; the median of the times */
 static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector<AtvRun> *all)
 {
   std::vector<std::vector<double>> times;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < repeats; k++) {
-    all->assign(2, AtvRun());
-    const AtvRuns::Of of = k + 1 < repeats ? AtvRuns::Time : AtvRuns::Both;
-    PetscCall(runs.hht("hhtdae, second-order form", 1e-5, 5e-4, nullptr, &(*all)[0], of));
-    PetscCall(runs.hht("hhtdae, paper's form", 1e-5, 5e-4, Paper, &(*all)[1], of));
+    all->clear();
+    for (const Timed &t : timed) {
+      all->emplace_back();
+      PetscCall(t.run(runs, AtvRuns::Time, &all->back()));
+    }
 #if defined(HHTDAE_HAVE_IDA)
     all->emplace_back();
     PetscCall(runs.ida("IDA, index 3 (as GSTIFF)", 1e-4, 5e-4, Form::Index3, &all->back()));
@@ -136,13 +146,23 @@ static Task Motion(const AtvRuns &runs, const ReducedBody &body, const std::stri
 
 constexpr PetscInt hot_spots = 10;
 
-static Task Spots(const AtvStress &stress, const AtvRun &run, std::vector<HotSpot> *spots)
+/* Of a run of the comparison: its samples, where they are still to be made, and its hot spots */
+static Task Spots(const AtvRuns &runs, const AtvStress &stress, const Timed *still, AtvRun *run, std::vector<HotSpot> *spots)
 {
-  return {[=, &stress, &run](FILE *file) { return !stress.spots(run, hot_spots, spots) && WriteValues(*spots, file); },
-          [=](FILE *file) { return ReadValues(file, spots); }};
+  return {[=, &runs, &stress](FILE *file) {
+            AtvRun sampled = *run;
+            return !(still && still->run(runs, AtvRuns::Samples, &sampled)) && !stress.spots(sampled, hot_spots, spots) && Write(sampled, file) && WriteValues(*spots, file);
+          },
+          [=](FILE *file) {
+            AtvRun sampled;
+            if (!Read(file, &sampled) || !ReadValues(file, spots)) return false;
+            run->time = sampled.time;
+            run->x    = sampled.x;
+            return true;
+          }};
 }
 
-/* Reference, reference at twice the step, conditioning, the page in motion, hot spots of the timed runs, and the sweep */
+/* Reference, reference at twice the step, conditioning, the page in motion, samples and hot spots of the timed runs, and the sweep */
 static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, const AtvStress &stress, const std::string &page, bool sweep, bool fine, AtvResults *results)
 {
   const auto reference = [&runs](const char *name, double step) -> Planned {
@@ -154,7 +174,7 @@ static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, co
   PetscFunctionBegin;
   if (!page.empty()) tasks.push_back(Motion(runs, body, page));
   results->found.resize(results->main.size());
-  for (size_t i = 0; i < results->main.size(); i++) tasks.push_back(Spots(stress, results->main[i], &results->found[i]));
+  for (size_t i = 0; i < results->main.size(); i++) tasks.push_back(Spots(runs, stress, i < std::size(timed) ? &timed[i] : nullptr, &results->main[i], &results->found[i]));
   if (sweep) {
     const std::vector<Planned> plan = Sweep(runs, fine);
     results->sweep.resize(plan.size());
