@@ -111,6 +111,10 @@ PETSC_EXTERN PetscErrorCode TSHHT3GetRotationFactor(TS, PetscReal *, Vec *);
 typedef PetscErrorCode (*TSHHT3StepLimit)(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStepLimit(TS, TSHHT3StepLimit, void *);
 
+/* What the application calls an unknown and its row, for messages */
+typedef PetscErrorCode (*TSHHT3RowName)(TS ts, PetscInt row, char name[], size_t len, void *ctx);
+PETSC_EXTERN PetscErrorCode TSHHT3SetRowName(TS, TSHHT3RowName, void *);
+
 /* The results */
 PETSC_EXTERN PetscErrorCode TSHHT3GetAcceleration(TS, Vec *);
 PETSC_EXTERN PetscErrorCode TSHHT3Interpolate(TS, PetscReal, Vec, Vec, Vec);

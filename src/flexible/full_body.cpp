@@ -22,6 +22,14 @@ PetscInt FullExtension::number(PetscInt node) const
 
 PetscInt FullExtension::multiplier(PetscMPIInt r, PetscInt i) const { return start[r] + 3 * (node_first[r + 1] - node_first[r]) + i; }
 
+std::string FullExtension::nameOf(PetscMPIInt rank, PetscInt unknown) const
+{
+  static const char axis[] = "xyz";
+  const PetscInt    node   = node_first[rank] + unknown / 3;
+  if (node >= node_first[rank + 1]) return "an attachment of body " + name;
+  return std::string(1, axis[unknown % 3]) + " of node " + std::to_string(node) + " (from 0) of body " + name;
+}
+
 void FullExtension::initial(double *x, double *y) const
 {
   std::copy(u.begin(), u.end(), x);

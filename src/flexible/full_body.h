@@ -51,6 +51,8 @@ public:
   void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
   PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *mesh) const override; /* full_surface.cpp */
 
+  std::string    nameOf(PetscMPIInt rank, PetscInt unknown) const override;
+
   PetscMPIInt ownerOf(PetscInt node) const;
   PetscInt    number(PetscInt node) const; /* global number of its first coordinate, once start is known */
   PetscInt    multiplier(PetscMPIInt rank, PetscInt i) const; /* global number */

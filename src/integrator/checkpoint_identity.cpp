@@ -9,6 +9,7 @@
 #include "equations.h"
 #include "linear/hash.h"
 #include "linear/linear.h"
+#include "rows.h"
 #include "work_vec.h"
 
 namespace hht3
@@ -126,6 +127,7 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
 {
   PetscReal scale = 0, rows[2] = {0, 0}, pair[2] = {0, 0};
   PetscInt  start, bad = HHT3_INT_MAX, first;
+  RowLabel  label;
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(was, &start, NULL));
@@ -143,10 +145,11 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
   if (first == bad) rows[0] = pair[0], rows[1] = pair[1];
   if (first == HHT3_INT_MAX) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscCall(LabelRow(ts, first, &label));
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED,
-          "Checkpoint %s belongs to another problem: in its state the residual of row %" PetscInt_FMT " was %g, in this run it is %g. Resume the problem that wrote it; "
+          "Checkpoint %s belongs to another problem: in its state the residual of row %s was %g, in this run it is %g. Resume the problem that wrote it; "
           "what its residual depends on besides the state has to be in the vector of TSHHT3SetCheckpointVec()",
-          file, first, (double)rows[0], (double)rows[1]);
+          file, label.text, (double)rows[0], (double)rows[1]);
 }
 
 PetscErrorCode CheckFinite(TS ts, const char file[])

@@ -8,6 +8,7 @@
 #include "equations.h"
 #include "jacobian.h"
 #include "linear/linear.h"
+#include "rows.h"
 #include "work_vec.h"
 #include <cstdint>
 #include <vector>
@@ -189,6 +190,7 @@ PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
 {
   PetscInt n, row = -1;
   IS      *color;
+  RowLabel label;
   WorkVec  x[3], F0;
 
   PetscFunctionBegin;
@@ -200,11 +202,11 @@ PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
     for (int half = 0; half < 2 * halvings && row < 0; half++) PetscCall(RowBeside(ts, ones, color[c], half, x, F0, &row));
   PetscCall(ISColoringRestoreIS(colors, PETSC_USE_POINTER, &color));
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LabelRow(ts, row, &label));
   PetscCheck(Get(ts).is_set, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "The matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %" PetscInt_FMT
-             ", so that the roles of unknowns cannot be read from it. Use -snes_fd, which finds all places, give a matrix that has them (TSSetI2Jacobian()), or set the roles (TSHHT3SetIS())", row);
-  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: the matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %" PetscInt_FMT
-                        ": it is an approximation; -snes_fd finds all places\n", row));
+             "The matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %s"
+             ", so that the roles of unknowns cannot be read from it. Use -snes_fd, which finds all places, give a matrix that has them (TSSetI2Jacobian()), or set the roles (TSHHT3SetIS())", label.text);
+  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: the matrix for differences of the residual (the DM's, or yours) has no place for derivatives of row %s: it is an approximation; -snes_fd finds all places\n", label.text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

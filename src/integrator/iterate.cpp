@@ -8,6 +8,7 @@
 #include "estimate.h"
 #include "hooks.h"
 #include "linear/linear.h"
+#include "rows.h"
 #include "settings.h"
 #include "solver.h"
 #include "stage.h"
@@ -19,33 +20,6 @@ namespace hht3
 
 namespace
 {
-
-const char *RoleName(const Integrator &I, PetscInt local)
-{
-  static const char *const names[] = {"the equation of motion of a coordinate", "the equation of a first-order state",
-                                      "a holonomic constraint", "a velocity-level constraint",
-                                      "the definition of a variable", "the definition of a force state"};
-  return names[RoleOf(I, local)];
-}
-
-/* The first row of the residual that is not a number, for the message */
-PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F)
-{
-  Integrator &I = Get(ts);
-  PetscInt    start, end, row;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(F, &start, &end));
-  PetscCall(FirstWhere([](PetscInt, PetscScalar f) { return PetscIsInfOrNanScalar(f); }, &row, Read(F)));
-  if (row >= 0) {
-    const bool mine = row >= start && row < end;
-    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the application's residual is not a number at t = %g, first in row %" PetscInt_FMT "%s%s", (double)t, row,
-                            mine ? ", " : "", mine ? RoleName(I, row - start) : ""));
-  } else {
-    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "a correction is not a number at t = %g", (double)t));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The full step, and no residual after the last one: (40) needs the correction alone. The judgement is handed to SNES by
    ConvergenceTest(). */

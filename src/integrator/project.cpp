@@ -10,6 +10,7 @@
 #include "consistent.h"
 #include "entries.h"
 #include "equations.h"
+#include "rows.h"
 #include "settings.h"
 #include "solver.h"
 #include "start.h"
@@ -87,6 +88,7 @@ PetscErrorCode WorstRow(TS ts, Vec R, PetscInt *row, PetscReal *value)
 PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
 {
   Integrator &I = Get(ts);
+  RowLabel    label;
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "start: %s violate the constraints by %g of the tolerance, most in row %" PetscInt_FMT " (%g)%s\n", what,
@@ -94,11 +96,11 @@ PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal
   /* within a run the velocities are consistent to the order of the method only, which is no fault of the user's */
   const bool within = ts->steps > 0;
   if (e > (within ? 100 : 1) && !I.own_start && I.start_policy == TSHHT3_START_REPORT) {
+    PetscCall(LabelRow(ts, row, &label));
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                           "hhtdae: at t = %g the %s%s violate the constraints: the nearest consistent ones are %.3g "
-                          "tolerances away%s; the largest violation is %.3g, in row %" PetscInt_FMT
-                          ". Give consistent values, or use -ts_hhtdae_start project.\n",
-                          (double)ts->ptime, within ? "" : "initial ", what, (double)e, unit, (double)value, row));
+                          "tolerances away%s; the largest violation is %.3g, in row %s. Give consistent values, or use -ts_hhtdae_start project.\n",
+                          (double)ts->ptime, within ? "" : "initial ", what, (double)e, unit, (double)value, label.text));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,6 +110,7 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
   Integrator     &I = Get(ts);
   PetscReal       e = PETSC_MAX_REAL, last, value = 0, e0 = 0, worst = 0;
   PetscInt        row = 0, worst_row = 0;
+  RowLabel        label;
   const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
 
   PetscFunctionBegin;
@@ -126,11 +129,11 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     *current = PETSC_FALSE;
   }
   PetscCall(ReportMisfit(ts, "positions", "", e0, worst_row, worst, project));
-  if (project && e > 1e-3)
-    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-            "The initial positions cannot be projected on the constraints: after the last correction row %" PetscInt_FMT
-            " is still violated by %g. Check that the mechanism can be assembled.", row, (double)value);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (!project || e <= 1e-3) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LabelRow(ts, row, &label));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+          "The initial positions cannot be projected on the constraints: after the last correction row %s is still violated by %g. Check that the mechanism can be assembled.", label.text,
+          (double)value);
 }
 
 /* Leaves gamma of the given velocities */

@@ -15,6 +15,7 @@
 #include "linear/linear.h"
 #include "random.h"
 #include "roles.h"
+#include "rows.h"
 #include "work_vec.h"
 #include <algorithm>
 #include <vector>
@@ -164,6 +165,7 @@ PetscErrorCode RunProbes(TS ts, Probe &probe)
   PetscCall(VecCopy(ts->vec_dot, I.V1));
   PetscCall(VecZeroEntries(I.A1));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
+  PetscCall(RefuseBadMatrix(ts, P)); /* roles read from it would be wrong ones */
   PetscCall(Shake(I.U1, 1e-4, 1));
   PetscCall(Shake(I.V1, 1e-3, 2));
   PetscCall(Shake(I.A1, 1e-3, 3));
@@ -177,14 +179,16 @@ PetscErrorCode Detect(TS ts, const Probe &p)
 {
   Integrator &I = Get(ts);
   PetscInt    start;
+  RowLabel    label;
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
   for (size_t i = 0; i < I.role.size(); i++) {
-    const PetscInt row = start + (PetscInt)i;
-    PetscCheck(p.row_a[i] || p.row_v[i] || p.row_u[i], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "Row %" PetscInt_FMT " of the residual depends on no unknown", row);
-    PetscCheck(!p.col_a[i] || p.row_a[i], PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
-               "Unknown %" PetscInt_FMT " has inertia, but row %" PetscInt_FMT " of the residual contains no acceleration: row i must be the equation that belongs to unknown i", row, row);
+    const bool empty = !p.row_a[i] && !p.row_v[i] && !p.row_u[i], misplaced = p.col_a[i] && !p.row_a[i];
+    if (empty || misplaced) PetscCall(LabelRow(ts, start + (PetscInt)i, &label));
+    PetscCheck(!empty, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "Row %s of the residual depends on no unknown", label.text);
+    PetscCheck(!misplaced, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
+               "Unknown %s has inertia, but its row of the residual contains no acceleration: row i must be the equation that belongs to unknown i", label.text);
     if (p.col_a[i]) I.role[i] = TSHHT3_COORDINATE;
     else if (p.col_v[i]) I.role[i] = TSHHT3_STATE;
     else if (p.self[i] || p.row_a[i]) I.role[i] = TSHHT3_VARIABLE;

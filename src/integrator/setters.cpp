@@ -7,6 +7,7 @@
 #include "dense.h"
 #include "estimate.h"
 #include "rotations.h"
+#include "rows.h"
 #include "settings.h"
 
 namespace hht3
@@ -195,6 +196,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(SetRotations);
   HHT3_COMPOSE(GetRotationFactor);
   HHT3_COMPOSE(SetStepLimit);
+  HHT3_COMPOSE(SetRowName);
 #undef HHT3_COMPOSE
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,6 +17,7 @@
 #include "predictor.h"
 #include "proofs.h"
 #include "rotations.h"
+#include "rows.h"
 #include "settings.h"
 #include "solver.h"
 #include "stage.h"
@@ -283,15 +284,15 @@ PetscErrorCode NameRedundant(TS ts)
   std::vector<PetscInt> list;
   PetscInt              start, n = 0, rows[20];
   Mat                   P;
-  char                  text[256] = "";
+  char                  text[1024] = "";
+  RowLabel              label;
   size_t                used;
-  PetscBool             numbers, is_singular;
+  PetscBool             is_singular;
   MatSolverType         package;
 
   PetscFunctionBegin;
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(MatrixHasNumbers(P, &numbers));
-  PetscCheck(numbers, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g", (double)ts->ptime);
+  PetscCall(RefuseNoNumbers(ts, P));
   PetscCall(MatrixIsSingular(ts, &is_singular));
   if (!is_singular) PetscCall(ExplainLinearFailure(ts, ts->ptime, 0));
   PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
@@ -305,8 +306,9 @@ PetscErrorCode NameRedundant(TS ts)
     PetscCall(ISDestroy(&multipliers));
   }
   for (PetscInt i = 0; i < n; i++) {
+    PetscCall(LabelRow(ts, rows[i], &label));
     PetscCall(PetscStrlen(text, &used));
-    if (used < sizeof(text) - 16) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%" PetscInt_FMT, i ? ", " : "", rows[i]));
+    if (used < sizeof(text) - sizeof(label.text)) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%s", i ? ", " : "", label.text));
   }
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.", (double)ts->ptime, text);
@@ -452,6 +454,7 @@ static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
 {
   PetscReal value = 0, found;
   PetscInt  row, first;
+  RowLabel  label;
 
   PetscFunctionBegin;
   PetscCall(FirstWhere([](PetscInt, PetscScalar v) { return PetscIsInfOrNanScalar(v); }, &row, Read(x)));
@@ -459,7 +462,8 @@ static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
   PetscCall(VecGetOwnershipRange(x, &first, NULL));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar v) { if (first + i == row) value = PetscIsNanScalar(v) ? 2 : PetscRealPart(v) > 0 ? 1 : -1; }, Read(x)));
   PetscCallMPI(MPI_Allreduce(&value, &found, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %" PetscInt_FMT " is %s at t = %g: set it (TS2SetSolution())", what, row,
+  PetscCall(LabelRow(ts, row, &label));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %s is %s at t = %g: set it (TS2SetSolution())", what, label.text,
           found > 1 ? "not a number (NaN)" : found > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
 }
 

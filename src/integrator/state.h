@@ -49,6 +49,12 @@ struct StepLimit {
   void           *ctx   = nullptr;
 };
 
+/* Names of rows, rows.cpp */
+struct RowNames {
+  TSHHT3RowName name = nullptr;
+  void         *ctx  = nullptr;
+};
+
 /* hooks.cpp: what stands in the SNES, and what stood there before */
 struct Hooks {
   SNES      snes        = nullptr;     /* that has them */
@@ -177,6 +183,7 @@ struct Integrator : StepState {
   Change    change;
   StepLimit limit;
   Rotations rotations;
+  RowNames  names;
   Hooks     hooks;
   PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
   PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */

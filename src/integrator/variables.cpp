@@ -13,6 +13,7 @@
 #include "equations.h"
 #include "random.h"
 #include "roles.h"
+#include "rows.h"
 #include "work_vec.h"
 #include <vector>
 
@@ -85,6 +86,7 @@ PetscErrorCode RefuseRates(TS ts, Dependence &d)
 {
   Integrator &I           = Get(ts);
   PetscInt    of_velocity = -1, of_acceleration = -1;
+  RowLabel    label;
 
   PetscFunctionBegin;
   for (int time = 0; time < 2; time++) {
@@ -97,12 +99,13 @@ PetscErrorCode RefuseRates(TS ts, Dependence &d)
     PetscCall(d.measureNoise());
     if (d.noise == 0) break;
   }
+  PetscCall(LabelRow(ts, of_acceleration >= 0 ? of_acceleration : of_velocity, &label));
   PetscCheck(of_acceleration < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "Row %" PetscInt_FMT " is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown "
+             "Row %s is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown "
              "TSHHT3_VARIABLE if the row defines it",
-             of_acceleration);
+             label.text);
   PetscCheck(of_velocity < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "Row %" PetscInt_FMT " is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC", of_velocity);
+             "Row %s is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC", label.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,15 +114,17 @@ PetscErrorCode RefuseHolonomic(TS ts, Dependence &d)
   Integrator       &I = Get(ts);
   std::vector<char> bad(I.role.size(), 0);
   PetscInt          row;
+  RowLabel          label;
 
   PetscFunctionBegin;
   if (!I.count[TSHHT3_HOLONOMIC]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i) || RoleOf(I, i) == TSHHT3_STATE; }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_HOLONOMIC) bad[i] = 1; }));
   PetscCall(FirstRow(ts, bad, &row));
+  PetscCall(LabelRow(ts, row, &label));
   PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "The holonomic constraint of row %" PetscInt_FMT " depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
+             "The holonomic constraint of row %s depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
              "Make it a coordinate without mass, with its equation as one more constraint",
-             row);
+             label.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,6 +135,7 @@ PetscErrorCode RefuseFast(TS ts, Dependence &d)
   std::vector<char> fast(I.role.size(), 0), bad(I.role.size(), 0);
   const auto        defined = [&](PetscInt i) { if (IsDefined(I, i)) fast[i] = 1; };
   PetscInt          row, before = -1, now = 0;
+  RowLabel          label;
 
   PetscFunctionBegin;
   PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, defined));
@@ -148,10 +154,11 @@ PetscErrorCode RefuseFast(TS ts, Dependence &d)
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
   }
   PetscCall(FirstRow(ts, bad, &row));
+  PetscCall(LabelRow(ts, row, &label));
   PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "The velocity-level constraint of row %" PetscInt_FMT " depends on a variable or force state that itself depends on velocities, accelerations or multipliers. "
+             "The velocity-level constraint of row %s depends on a variable or force state that itself depends on velocities, accelerations or multipliers. "
              "Write these velocities into the row instead",
-             row);
+             label.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,16 +168,18 @@ PetscErrorCode CheckSweeps(TS ts, Dependence &d)
   Integrator       &I = Get(ts);
   std::vector<char> bad(I.role.size(), 0);
   PetscInt          row;
+  RowLabel          label;
 
   PetscFunctionBegin;
   PetscCall(VecCopy(d.U, d.moved));
   PetscCall(ResidualAlong(ts, ts->ptime, d.moved, d.V, d.A, d.other));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar f) { if (IsDefined(I, i) && PetscAbsScalar(f) > 1e-8 * (1 + PetscAbsScalar(u))) bad[i] = 1; }, Read(d.moved), Read(d.other)));
   PetscCall(FirstRow(ts, bad, &row));
+  PetscCall(LabelRow(ts, row, &label));
   PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "Row %" PetscInt_FMT " defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide "
+             "Row %s defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide "
              "the row by the factor of V",
-             row);
+             label.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

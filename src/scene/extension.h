@@ -28,6 +28,7 @@ public:
     (void)most_nodes;
     return 0;
   }
+  virtual std::string nameOf(PetscMPIInt rank, PetscInt unknown) const = 0; /* of the unknowns of a rank, for messages */
   PetscInt         unknowns() const { return coordinates() + multipliers(); }
 
   std::vector<PetscInt> start; /* global number of the first unknown on every rank; numbering.cpp */

@@ -49,6 +49,8 @@ PetscMPIInt    OwnerOf(const Model &M, const StoreBase &s, PetscInt e);
 PetscErrorCode Number(Model &M);
 BodyKind       KindOf(const SceneData &s, const BodyData &b);
 PetscInt       CoordinatesOf(const SceneData &s, const BodyData &b); /* modal ones too */
+/* unknown_name.cpp: by its global number, for messages; the same on every rank */
+std::string UnknownName(const Model &M, PetscInt row);
 /* expressions.cpp: variables, states, user's forces */
 PetscMPIInt OwnerOf(const Model &M, const Expression &e);
 /* check.cpp: everything that is wrong with the description, as one error */

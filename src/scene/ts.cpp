@@ -195,6 +195,16 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscFunctionReturn(0);
 }
 
+static PetscErrorCode RowName(TS, PetscInt row, char name[], size_t len, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    PetscCall(PetscStrncpy(name, UnknownName(*static_cast<Runtime *>(ctx)->model, row).c_str(), len));
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
 {
   Vec      U, V, F;
@@ -222,6 +232,7 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) PetscCall(TSHHT3SetIS(*ts, (TSHHT3Role)r, R.roles[r]));
   PetscCall(AttachReframing(R, *ts));
   PetscCall(AttachStepLimit(R, *ts));
+  PetscCall(TSHHT3SetRowName(*ts, RowName, &R));
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&V));
   PetscCall(VecDestroy(&F));

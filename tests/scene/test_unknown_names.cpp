@@ -1,0 +1,100 @@
+/* What the integrator's messages call the unknowns of a scene */
+#include "scene/model.h"
+#include "scene_start.h"
+#include <set>
+
+using namespace hhtdae;
+using namespace hhtest;
+
+namespace
+{
+
+/* Two rods on pins, with a variable, a state and a force carried as one: redundant rows of the second pin are dropped */
+struct Rods {
+  Scene    scene;
+  Body     first, second;
+  bool     torn = false;
+
+  explicit Rods(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
+  {
+    RigidBody b;
+    b.mass     = 2;
+    b.inertia  = Vector3(.1, .1, .1).asDiagonal();
+    b.position = {1, 0, 0};
+    first      = scene.add("upper", b);
+    b.position = {3, 0, 0};
+    second     = scene.add("lower", b);
+    scene.add("hinge", Revolute{scene.marker(first, {-1, 0, 0}), scene.marker(scene.ground())});
+    scene.add("knee", Revolute{scene.marker(second, {-1, 0, 0}), scene.marker(first, {1, 0, 0})});
+    const State   s = scene.state("valve", Expression{{}, [](const Real *) -> Real { return 0; }}, 0);
+    scene.variable("pressure", Expression{{Measure::value(s)}, [](const Real *k) -> Real { return k[0]; }});
+    UserForce f;
+    f.i     = scene.marker(second);
+    f.force = {Expression{{Measure::time()}, [this](const Real *k) -> Real { return torn && k[0].value() > .05 ? Real(NAN) : Real(0); }}, Expression(Measure::value(s)), Expression(Measure::value(s))};
+    f.state = true;
+    scene.add("thrust", f);
+    scene.gravity({0, -9.81, 0});
+  }
+};
+
+std::vector<std::string> namesOf(Scene &scene)
+{
+  std::vector<std::string> all;
+  must(scene.setUp());
+  for (PetscInt i = 0; i < ModelOf(scene).number.first.back(); i++) all.push_back(UnknownName(ModelOf(scene), i));
+  return all;
+}
+
+} // namespace
+
+TEST(UnknownNames, InSpace)
+{
+  Rods                           r;
+  const std::vector<std::string> n = namesOf(r.scene), expected = {"x of body upper", "y of body upper", "z of body upper", "rotation 1 of body upper", "rotation 2 of body upper", "rotation 3 of body upper"};
+  ASSERT_EQ(n.size(), 12u + 10 + 3 + 2);
+  EXPECT_EQ(std::vector<std::string>(n.begin(), n.begin() + 6), expected);
+  EXPECT_EQ(n[11], "rotation 3 of body lower");
+  EXPECT_EQ(n[12].rfind("revolute hinge: row 1 of 5 (", 0), 0u) << n[12];
+  EXPECT_EQ(n[16].rfind("revolute hinge: row 5 of 5 (", 0), 0u) << n[16];
+  EXPECT_EQ(n[21].rfind("revolute knee: row 5 of 5 (", 0), 0u) << n[21];
+  EXPECT_NE(n[22].find("component 1 of "), std::string::npos) << n[22];
+  EXPECT_NE(n[24].find(" thrust"), std::string::npos) << n[24];
+  EXPECT_EQ(n[25], "variable pressure");
+  EXPECT_EQ(n[26], "state valve");
+}
+
+TEST(UnknownNames, InThePlane)
+{
+  Rods                           r(Space::Planar);
+  const std::vector<std::string> n = namesOf(r.scene);
+  ASSERT_EQ(n.size(), 6u + 4 + 3 + 2);
+  EXPECT_EQ(n[1], "y of body upper");
+  EXPECT_EQ(n[5], "angle of body lower");
+  EXPECT_EQ(n[9].rfind("revolute knee: row 2 of 2 (", 0), 0u) << n[9];
+}
+
+/* Of rows that are dropped there are no unknowns: those behind keep their own names */
+TEST(UnknownNames, BesideDroppedRows)
+{
+  Rods r;
+  r.scene.add("again", Revolute{r.scene.marker(r.first, {-1, 0, .5}), r.scene.marker(r.scene.ground(), {0, 0, .5})});
+  r.scene.start().redundant = Redundant::Drop;
+  const std::vector<std::string> n = namesOf(r.scene);
+  EXPECT_EQ(n.size(), 12u + 10 + 3 + 2);
+  std::set<std::string> all(n.begin(), n.end());
+  EXPECT_EQ(all.size(), n.size());
+}
+
+TEST(UnknownNames, OfAForceThatIsNoNumber)
+{
+  Rods r;
+  TS   ts;
+  r.torn = true;
+  must(r.scene.createTS(&ts));
+  must(TSSetMaxTime(ts, 1));
+  must(TSSetMaxSNESFailures(ts, 3));
+  ErrorTrap trap;
+  EXPECT_NE(r.scene.solve(ts), 0);
+  EXPECT_TRUE(trap.says("component 1 of ") && trap.says(" thrust)")) << trap.message;
+  TSDestroy(&ts);
+}
