@@ -4,6 +4,7 @@
   and the correction fails. Errors of PETSc's (a package that is not there, a defect) go up.
 */
 #include "linear/linear.h"
+#include "rows.h"
 #include "solver.h"
 
 namespace hht3
@@ -189,11 +190,15 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   PCType             pc_type;
   KSPConvergedReason ended;
   PCFailedReason     reason;
-  PetscBool          singular;
+  PetscBool          bad, singular;
   MatSolverType      package;
+  Mat                P;
   char               why[256] = "the Newton matrix is singular", step[32] = "";
 
   PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(NameBadMatrix(ts, t, P, &bad));
+  if (bad) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPGetType(ksp, &ksp_type));

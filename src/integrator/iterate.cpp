@@ -58,17 +58,19 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 {
   Integrator &I = Get(ts);
   Vec         F;
+  PetscReal   norm;
 
   PetscFunctionBegin;
   I.corrector.no_solve = (PetscBool)(reason == SNES_DIVERGED_LINEAR_SOLVE || reason == SNES_DIVERGED_JACOBIAN_DOMAIN);
-  if (I.corrector.no_solve) {
+  if (reason == SNES_DIVERGED_DTOL) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
+  PetscCall(VecNorm(F, NORM_2, &norm));
+  if (PetscIsInfOrNanReal(norm)) {
+    PetscCall(NameBadRow(ts, I.t1, F));
+  } else if (I.corrector.no_solve) {
     PetscCall(ExplainLinearFailure(ts, I.t1, I.h));
-  } else if (reason != SNES_DIVERGED_DTOL) {
-    PetscCall(SNESGetFunction(ts->snes, &F, NULL, NULL));
-    PetscReal norm;
-    PetscCall(VecNorm(F, NORM_2, &norm));
-    if (PetscIsInfOrNanReal(norm)) PetscCall(NameBadRow(ts, I.t1, F));
-    else PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "SNES stopped with %s at t = %g, h = %g", SNESConvergedReasons[reason], (double)I.t1, (double)I.h));
+  } else {
+    PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "SNES stopped with %s at t = %g, h = %g", SNESConvergedReasons[reason], (double)I.t1, (double)I.h));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

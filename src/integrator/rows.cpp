@@ -67,12 +67,13 @@ PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An error where the application's Jacobian is not a number */
-PetscErrorCode RefuseBadMatrix(TS ts, Mat P)
+/* The first row of the matrix that is not a number, into I.failure */
+PetscErrorCode NameBadMatrix(TS ts, PetscReal t, Mat P, PetscBool *bad)
 {
-  PetscInt row;
-  RowLabel label;
-  WorkVec  x, y;
+  Integrator &I = Get(ts);
+  PetscInt    row;
+  RowLabel    label;
+  WorkVec     x, y;
 
   PetscFunctionBegin;
   PetscCall(x.like(ts->vec_sol));
@@ -80,8 +81,20 @@ PetscErrorCode RefuseBadMatrix(TS ts, Mat P)
   PetscCall(VecSet(x, 1));
   PetscCall(MatMult(P, x, y));
   PetscCall(FirstBad(y, &row));
+  *bad = (PetscBool)(row >= 0);
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LabelRow(ts, row, &label));
-  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g, first in row %s", (double)ts->ptime, label.text);
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g, first in row %s", (double)t, label.text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode RefuseBadMatrix(TS ts, Mat P)
+{
+  PetscBool bad;
+
+  PetscFunctionBegin;
+  PetscCall(NameBadMatrix(ts, ts->ptime, P, &bad));
+  PetscCheck(!bad, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "There is no start: %s", Get(ts).failure);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,7 +112,7 @@ PetscErrorCode RefuseNoNumbers(TS ts, Mat P)
   PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, A, F));
   PetscCall(FirstBad(F, &row));
   if (row >= 0) PetscCall(NameBadRow(ts, ts->ptime, F));
-  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "There are no accelerations and multipliers of the start: %s", I.failure);
+  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "There is no start: %s", I.failure);
   PetscCall(RefuseBadMatrix(ts, P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -14,6 +14,7 @@ struct RowLabel {
 
 PetscErrorCode LabelRow(TS ts, PetscInt row, RowLabel *label);
 PetscErrorCode NameBadRow(TS ts, PetscReal t, Vec F);
+PetscErrorCode NameBadMatrix(TS ts, PetscReal t, Mat P, PetscBool *bad);
 PetscErrorCode RefuseBadMatrix(TS ts, Mat P);
 PetscErrorCode RefuseNoNumbers(TS ts, Mat P);
 PetscErrorCode SetRowName(TS ts, TSHHT3RowName name, void *ctx);

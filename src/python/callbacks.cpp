@@ -1,4 +1,4 @@
-/* Functions of the integrator that call the application's: longest step, change of coordinates, rotations. The TS owns the Python functions. */
+/* Functions of the integrator that call the application's: longest step, names of rows, change of coordinates, rotations. The TS owns the Python functions. */
 #include "bind.h"
 #include "hhtdae/hhtdae.h"
 
@@ -29,6 +29,17 @@ PetscErrorCode LongestStep(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h
   PetscFunctionBegin;
   PetscCall(Guarded([&] {
     *h = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), t, FromVec(U), FromVec(V), FromVec(A))).cast<double>();
+    return PetscErrorCode(0);
+  }));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode RowName(TS, PetscInt row, char name[], size_t len, void *ctx)
+{
+  PetscFunctionBegin;
+  PetscCall(Guarded([&] {
+    const std::string is = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(row)).cast<std::string>();
+    PetscCall(PetscStrncpy(name, is.c_str(), len));
     return PetscErrorCode(0);
   }));
   PetscFunctionReturn(0);
@@ -94,6 +105,11 @@ void BindCallbacks(py::module_ &m)
     auto *own = new Functions{{f}};
     Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python step limit", own));
     Check(TSHHT3SetStepLimit(ToTS(ts), LongestStep, own));
+  });
+  m.def("set_row_name", [](py::object ts, py::object f) {
+    auto *own = new Functions{{f}};
+    Check(OwnedBy((PetscObject)ToTS(ts), "hhtdae python row names", own));
+    Check(TSHHT3SetRowName(ToTS(ts), RowName, own));
   });
   m.def("set_coordinate_change", [](py::object ts, py::object test, py::object map, py::object commit) {
     auto *own = new Functions{{test, map, commit}};

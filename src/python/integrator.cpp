@@ -115,6 +115,7 @@ void BindIntegrator(py::module_ &m)
     return used == PETSC_TRUE;
   });
   m.def("checkpoint_save", [](py::object ts, const std::string &file) { Check(TSHHT3CheckpointSave(ToTS(ts), file.c_str())); });
+  m.def("set_from_options", [](py::object ts) { Check(TSSetFromOptions(ToTS(ts))); });
   m.def("set_up", [](py::object ts) { Check(TSSetUp(ToTS(ts))); });
   m.def("checkpoint_load", [](py::object ts, const std::string &file) { Check(TSHHT3CheckpointLoad(ToTS(ts), file.c_str())); });
   m.def("set_checkpoint_vec", [](py::object ts, py::object x) { Check(TSHHT3SetCheckpointVec(ToTS(ts), x.is_none() ? nullptr : ToVec(x))); });

@@ -25,7 +25,7 @@ struct Torn : Pendulum {
   void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, hhtex::Entries &e) const override
   {
     Pendulum::jacobian(t, u, v, a, sv, sa, e);
-    if (t >= from && matrix) e.add(1, 1, NAN);
+    e.add(1, 1, t >= from && matrix ? NAN : 0);
   }
 };
 
@@ -51,7 +51,8 @@ TEST(RowNames, OfWhatIsNoNumberAtTheStart)
 
 TEST(RowNames, OfWhatIsNoNumberLater)
 {
-  expectSays(messageOf(Torn(.2, false), true), "first in row 1 (y of the bob), the equation of motion");
+  expectSays(messageOf(Torn(.2, false), true), "residual is not a number at t = 0.2, first in row 1 (y of the bob), the equation of motion");
+  expectSays(messageOf(Torn(.2, true), true), "Jacobian (TSSetI2Jacobian()) is not a number at t = 0.2, first in row 1 (y of the bob)");
 }
 
 TEST(RowNames, OfInitialValues)

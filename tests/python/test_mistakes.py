@@ -66,6 +66,15 @@ class Arguments(unittest.TestCase):
                 warnings.simplefilter("error")
                 solve(options={"-ts_hhtdae_alpha": -0.1, "ts_max_steps": 1000, "snes_max_it": 20})
 
+    def test_options_with_values_that_cannot_be(self):
+        scene = h.Scene()
+        scene.add("mass", h.PointMass())
+        for solve in (lambda **k: stone(**k), lambda **k: scene.solve(1., **k)):
+            for name, value, says in (("ts_hhtdae_alpha", 0.5, r"^alpha = 0.5 is not in \[-1/3, 0\]$"), ("ts_hhtdae_form", "best", "^Unknown option best for -ts_hhtdae_form"),
+                                      ("ksp_type", "nosuch", "nosuch$")):
+                with self.assertRaisesRegex(h.Error, says):
+                    solve(options={name: value})
+
     def test_of_runs(self):
         scene = h.Scene()
         x = h.displacement(scene.add("mass", h.PointMass()).marker(), 0)
@@ -164,8 +173,25 @@ class Arguments(unittest.TestCase):
     def test_rows_of_messages(self):
         """Rows that depend on one another are named as those of the user's function"""
         rod = lambda t, q: q[0]**2 + q[1]**2 - 1
-        with self.assertRaisesRegex(h.Error, r"in rows 0 of constraints\(\), 1 of constraints\(\) depend on one another"):
+        with self.assertRaisesRegex(h.Error, r"in rows 2 \(constraints\(\)\[0\]\), 3 \(constraints\(\)\[1\]\) depend on one another"):
             stone(constraints=lambda t, q: [rod(t, q), 2 * rod(t, q)])
+
+    def test_names_of_rows(self):
+        def torn(row, t_torn):
+            def residual(t, q, v, a):
+                f = [a[0], a[1] + G]
+                if t > t_torn:
+                    f[row] = math.nan
+                return f
+            return residual
+
+        rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1])
+        self.assertIn(r"row 1 (q[1])", stone(torn(1, 0.1), **rod).message)
+        scene = h.Scene()
+        mass = scene.add("weight", h.PointMass())
+        scene.add("wind", h.UserForce(mass.marker(), force=(h.callback(lambda t: math.nan if t > 0.1 else 0., h.time()), 0., 0.)))
+        with self.assertRaisesRegex(h.Error, r"row 0 \(x of body weight\)"):
+            scene.solve(1.)
 
     def test_constraint_jacobian(self):
         rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1])

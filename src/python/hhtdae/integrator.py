@@ -12,7 +12,7 @@ from . import _core
 __all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_order",
            "get_role", "get_rotation_factor", "interpolate", "move_back", "set_alpha", "set_checkpoint_vec", "set_coordinate_change",
            "set_corrector_tolerance", "set_form", "set_lengths", "set_nodes", "set_order", "set_predictor_degree", "set_radius", "set_reuse", "set_role",
-           "set_rotations", "set_start", "set_step_limit", "statistics"]
+           "set_rotations", "set_row_name", "set_start", "set_step_limit", "statistics"]
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,11 @@ def set_start(ts, start):
 def set_step_limit(ts, function):
     """The longest step from a state that the application allows: function(ts, t, u, v, a) returns it."""
     _core.set_step_limit(ts, function)
+
+
+def set_row_name(ts, function):
+    """What an unknown and its row are called in messages: function(row) returns it by its global number, "" for no name."""
+    _core.set_row_name(ts, function)
 
 
 def set_coordinate_change(ts, test, map, commit=None):

@@ -1,7 +1,5 @@
 """Equations of motion that one has written oneself, solved by one call in the manner of scipy.integrate.solve_ivp."""
 
-import re
-
 import numpy as np
 from petsc4py import PETSc
 
@@ -135,7 +133,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         ts = _create(problem, rtol, atol, max_step, first_step, start, trace)
         output = _Output(problem, t_eval, dense_output, events)
         output.attach(ts)
-        ts.setFromOptions()
+        _core.set_from_options(ts)
         try:
             status, message = _solve(ts, problem, output)
             result = output.result(ts, status, message)
@@ -180,6 +178,13 @@ class _Problem:
             self.find_scales(self.t0, self.q0, self.v0, np.zeros(self.n))
             if self.m and constraint_jacobian is not None:
                 self.check_gradient()
+
+    def name(self, row):
+        """Of an unknown and its row of the whole system, by the user's functions, for messages"""
+        for name, n in (("q", self.n), ("constraints()", self.m), ("velocity_constraints()", self.k)):
+            if row < n:
+                return "%s[%d]" % (name, row)
+            row -= n
 
     def _shaped(self, x, shape, what):
         if np.iscomplexobj(x):
@@ -237,17 +242,6 @@ class _Problem:
             raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
                              % (self.t0, row, column, given[row, column], found[row, column]))
 
-    def own_rows(self, message):
-        """Rows of the whole system in a message, as those of the user's functions"""
-        def own(match):
-            row = int(match.group())
-            for name, size in (("residual()", self.n), ("constraints()", self.m), ("velocity_constraints()", self.k)):
-                if row < size:
-                    return "%d of %s" % (row, name)
-                row -= size
-            return match.group()
-        return re.sub(r"\brows? \d+(, \d+)*(?!\d|, \d| of)", lambda rows: re.sub(r"\d+", own, rows.group()), message)
-
     def massless(self):
         """A remark about accelerations that the residual does not know at the begin, for messages"""
         M = slopes(lambda x: self.residual(self.t0, self.q0, self.v0, x), np.zeros(self.n), self.n)
@@ -289,6 +283,7 @@ def _create(p, rtol, atol, max_step, first_step, start, trace):
     integrator.set_role(ts, "coordinate", range(p.n))
     integrator.set_role(ts, "holonomic", range(p.n, p.n + p.m))
     integrator.set_role(ts, "nonholonomic", range(p.n + p.m, p.size))
+    integrator.set_row_name(ts, p.name)
     integrator.set_start(ts, start)
     return ts
 
@@ -389,8 +384,8 @@ def _solve(ts, p, output):
             raise error.__cause__
         lines = [line.split("] ", 1)[-1] for line in str(error).splitlines()]
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
-            raise Error(error.ierr, p.own_rows(lines[-1]) + p.massless(), lines[1:-1]) from None
-        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), p.own_rows(lines[-1]))
+            raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
+        return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:

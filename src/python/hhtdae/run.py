@@ -120,7 +120,7 @@ class Run(Channels):
                 self._recorder.attach(self.ts)
             else:
                 _core.attach_signals(self.ts)
-            self.ts.setFromOptions()
+            _core.set_from_options(self.ts)
 
     def _open(self):
         if not self.ts:  # also one that was destroyed by hand
