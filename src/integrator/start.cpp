@@ -284,8 +284,9 @@ PetscErrorCode NameRedundant(TS ts)
   std::vector<PetscInt> list;
   PetscInt              start, n = 0, rows[20];
   Mat                   P;
-  char                  text[1024] = "";
   RowLabel              label;
+  constexpr PetscInt    named     = 4;
+  char                  text[256] = "", names[named * sizeof(label.text)] = "";
   size_t                used;
   PetscBool             is_singular;
   MatSolverType         package;
@@ -306,12 +307,16 @@ PetscErrorCode NameRedundant(TS ts)
     PetscCall(ISDestroy(&multipliers));
   }
   for (PetscInt i = 0; i < n; i++) {
-    PetscCall(LabelRow(ts, rows[i], &label));
     PetscCall(PetscStrlen(text, &used));
-    if (used < sizeof(text) - sizeof(label.text)) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%s", i ? ", " : "", label.text));
+    if (used < sizeof(text) - 16) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%" PetscInt_FMT, i ? ", " : "", rows[i]));
+    if (!I.names.name || i >= named) continue;
+    PetscCall(LabelRow(ts, rows[i], &label));
+    PetscCall(PetscStrlen(names, &used));
+    PetscCall(PetscSNPrintf(names + used, sizeof(names) - used, "%s %s", i ? "," : " Rows", label.text));
   }
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.", (double)ts->ptime, text);
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text,
+             names, I.names.name && n > named ? ", ..." : "");
   PetscCall(PackageInDoubt(ts, &package));
   PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
