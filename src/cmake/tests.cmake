@@ -41,6 +41,13 @@ function(hhtdae_test_program folder)
     target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
     target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
     target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
+    if(HHTDAE_TOGETHER AND NOT folder MATCHES "^(linear|stability)$") # these are few
+      list(LENGTH sources count)
+      math(EXPR count "(${count} + 3) / 4")
+      hhtdae_together(${folder} ${count} ${sources})
+      set_target_properties(${folder}_tests PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP UNITY_BUILD_CODE_BEFORE_INCLUDE "#include \"support.h\"")
+      target_compile_options(${folder}_tests PRIVATE -Wno-subobject-linkage) # fixtures in nameless namespaces
+    endif()
     if(NOT page_lacks AND folder MATCHES "^(scene|flexible|parallel)$") # pages are unpacked by zlib
       target_compile_definitions(${folder}_tests PRIVATE HHTDAE_PAGE)
       target_link_libraries(${folder}_tests PRIVATE ZLIB::ZLIB)

@@ -85,7 +85,7 @@ static PetscErrorCode run(Mat A, const char package[], PetscInt coordinates, Tim
 }
 
 static PetscErrorCode family(const char title[], const std::vector<PetscInt> &sizes, double limit,
-                             const std::function<Entries(PetscInt)>  &generate,
+                             const std::function<Triplets(PetscInt)>  &generate,
                              const std::function<PetscInt(PetscInt)> &coordinates)
 {
   bool skip = false;
@@ -98,7 +98,7 @@ static PetscErrorCode family(const char title[], const std::vector<PetscInt> &si
       Mat        A;
       Times      t;
       if (old && skip) continue;
-      Entries entries = generate(size);
+      Triplets entries = generate(size);
       PetscCall(create_matrix(entries, &A));
       PetscCall(run(A, package, coordinates(size), &t));
       PetscCall(PetscPrintf(PETSC_COMM_SELF,

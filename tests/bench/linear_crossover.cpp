@@ -96,14 +96,14 @@ static PetscErrorCode chosen(Mat A, std::string *name)
 }
 
 static PetscErrorCode measure_family(const char title[], const std::vector<PetscInt> &sizes, double limit,
-                                     const std::function<Entries(PetscInt)> &generate)
+                                     const std::function<Triplets(PetscInt)> &generate)
 {
   bool skip[num_solvers] = {};
 
   PetscFunctionBeginUser;
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s\n", title));
   for (PetscInt size : sizes) {
-    Entries     entries = generate(size);
+    Triplets     entries = generate(size);
     Mat         A;
     LinearWork  work;
     std::string choice;

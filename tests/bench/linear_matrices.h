@@ -10,7 +10,7 @@
 #include <petscmat.h>
 #include <vector>
 
-struct Entries {
+struct Triplets {
   PetscInt                 n = 0;
   std::vector<PetscInt>    row, col;
   std::vector<PetscScalar> val;
@@ -29,7 +29,7 @@ struct Entries {
 };
 
 /* Entries of the same place are added up */
-inline PetscErrorCode create_matrix(const Entries &e, Mat *A)
+inline PetscErrorCode create_matrix(const Triplets &e, Mat *A)
 {
   std::vector<PetscInt> row = e.row, col = e.col; /* PETSc sorts them in place */
 
@@ -47,10 +47,10 @@ inline PetscErrorCode create_matrix(const Entries &e, Mat *A)
   the other three, and a revolute joint (two multipliers) to the body before. Unknowns: all coordinates, then all
   multipliers.
 */
-inline Entries chain(PetscInt bodies, PetscInt modes)
+inline Triplets chain(PetscInt bodies, PetscInt modes)
 {
   const PetscInt size = 3 + modes;
-  Entries        e;
+  Triplets        e;
   e.n = bodies * (size + 2);
   for (PetscInt b = 0; b < bodies; ++b) {
     const PetscInt q = b * size, before = q - size, lambda = bodies * size + 2 * b;
@@ -76,9 +76,9 @@ inline Entries chain(PetscInt bodies, PetscInt modes)
   two bodies have the same orientation. loops > 0 closes a ring of so many bodies, again and again, by spherical joints.
   Unknowns: all coordinates, then all multipliers.
 */
-inline Entries spatial_chain(PetscInt bodies, PetscInt loops = 0)
+inline Triplets spatial_chain(PetscInt bodies, PetscInt loops = 0)
 {
-  Entries    e;
+  Triplets    e;
   const auto joint = [&e](PetscInt first, PetscInt second, PetscInt rows) {
     const PetscInt body[2] = {first, second};
     for (PetscInt d = 0; d < rows; ++d) {
@@ -106,13 +106,13 @@ inline Entries spatial_chain(PetscInt bodies, PetscInt loops = 0)
 }
 
 /* nx * ny * nz cubic bricks, M + beta h^2 K, the face x = 0 held by three multipliers per node */
-inline Entries block(PetscInt nx, PetscInt ny, PetscInt nz, bool clamped)
+inline Triplets block(PetscInt nx, PetscInt ny, PetscInt nz, bool clamped)
 {
   using namespace elasticblock;
   const PetscInt NX = nx + 1, NY = ny + 1, NZ = nz + 1;
   const double   h[3] = {1.0 / nx, 1.0 / nx, 1.0 / nx}, stiffness = 0.075;
   BrickMatrix    K, M;
-  Entries        e;
+  Triplets        e;
   brick_matrices({1.0, 0.3, 1.0}, h, false, K, M);
   e.n = 3 * NX * NY * NZ;
   for (PetscInt k = 0; k < nz; ++k)

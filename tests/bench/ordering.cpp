@@ -106,7 +106,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-nz", &nz, NULL));
   PetscCall(PetscOptionsGetBool(NULL, NULL, "-clamped", &clamped, NULL));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-only", only, sizeof only, NULL));
-  Entries entries = block(nx, ny, nz, clamped);
+  Triplets entries = block(nx, ny, nz, clamped);
   PetscCall(create_matrix(entries, &A));
   PetscCall(PetscPrintf(PETSC_COMM_SELF, "block of %d x %d x %d bricks, %s, %d unknowns\n", (int)nx, (int)ny, (int)nz,
                         clamped ? "clamped by multipliers" : "free", (int)entries.n));

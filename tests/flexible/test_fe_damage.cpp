@@ -40,7 +40,7 @@ std::string Replaced(std::string text, const std::string &what, const std::strin
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
-std::string Box(bool four)
+std::string BoxMesh(bool four)
 {
   MeshBox box;
   box.nx = box.ny = box.nz = 1;
@@ -136,7 +136,7 @@ TEST(Damage, NumbersOfMeshes)
 {
   for (bool four : {true, false}) {
     FeModel           model(PETSC_COMM_SELF);
-    const std::string good = Box(four);
+    const std::string good = BoxMesh(four);
     for (const char *word : {"1e400", "0.05abc", "nan", "0x1"})
       EXPECT_SAYS(RefusedMesh(Replaced(good, "9 9 9", std::string("9 9 ") + word)), "a finite number is expected");
     EXPECT_SAYS(RefusedMesh(Replaced(good, "9 9 9", "9 9")), "a finite number is expected");
@@ -149,10 +149,10 @@ TEST(Damage, NumbersOfMeshes)
 TEST(Damage, LargePhysicalTags)
 {
   const std::string tag = "1073741825", other = "2147483647"; /* 2^30 + 1, 2^31 - 1 */
-  std::string       mesh = Replaced(Box(false), "2 1 \"left\"", "2 " + tag + " \"left\"");
+  std::string       mesh = Replaced(BoxMesh(false), "2 1 \"left\"", "2 " + tag + " \"left\"");
   mesh                   = Replaced(mesh, "2 2 \"right\"", "2 " + other + " \"right\"");
   FeModel straight(PETSC_COMM_SELF), large(PETSC_COMM_SELF);
-  must(readText(straight, Box(false)));
+  must(readText(straight, BoxMesh(false)));
   mesh = Replaced(mesh, " 3 2 1 7 ", " 3 2 " + tag + " 7 ");
   mesh = Replaced(mesh, " 3 2 2 8 ", " 3 2 " + other + " 8 ");
   must(readText(large, mesh));
@@ -160,13 +160,13 @@ TEST(Damage, LargePhysicalTags)
   EXPECT_EQ(large.sets["left"].size(), 4u);
   EXPECT_SAYS(RefusedMesh(Replaced(mesh, " 3 2 " + other, " 3 2 -2147483648")), "32 bits");
   FeModel tags(PETSC_COMM_SELF); /* of nodes */
-  must(readText(tags, Replaced(Box(false), "1000000 9", "2147483647 9")));
+  must(readText(tags, Replaced(BoxMesh(false), "1000000 9", "2147483647 9")));
 }
 
 /* Elements on one face are told apart before their pairs are listed. */
 TEST(Damage, ManyElementsOnOneFace)
 {
-  std::string       mesh = Box(true), copies;
+  std::string       mesh = BoxMesh(true), copies;
   const std::size_t from = mesh.rfind('\n', mesh.find("$EndElements") - 2) + 1;
   const std::string one  = mesh.substr(from, mesh.find('\n', from) + 1 - from);
   for (int k = 0; k < 20000; k++) copies += std::to_string(100 + k) + one.substr(one.find(' '));

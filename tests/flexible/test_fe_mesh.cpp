@@ -75,7 +75,7 @@ std::string refusal(const std::string &text, const Materials &materials = {{"", 
   return trap.message;
 }
 
-#define EXPECT_SAYS(message, part) EXPECT_NE((message).find(part), std::string::npos) << (message)
+#define EXPECT_MESH_SAYS(message, part) EXPECT_NE((message).find(part), std::string::npos) << (message)
 
 bool gmshIsThere() { return std::system("gmsh --version > /dev/null 2>&1") == 0; }
 
@@ -376,11 +376,11 @@ TEST(FeMeshErrors, Files)
     EXPECT_NE(model.readMesh("/tmp", {{"", softSteel()}}), 0);
     EXPECT_TRUE(trap.says("no plain file")) << trap.message;
   }
-  EXPECT_SAYS(refusal(""), "empty");
-  EXPECT_SAYS(refusal("solid\nfacet normal 0 0 1\n"), "no mesh of Gmsh");
-  EXPECT_SAYS(refusal("$MeshFormat\n4 0 8\n$EndMeshFormat\n"), "4.1 and 2.2");
-  EXPECT_SAYS(refusal("$MeshFormat\n4.1 1 8\n"), "ends too early");
-  EXPECT_SAYS(refusal("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"), "no section $Nodes");
+  EXPECT_MESH_SAYS(refusal(""), "empty");
+  EXPECT_MESH_SAYS(refusal("solid\nfacet normal 0 0 1\n"), "no mesh of Gmsh");
+  EXPECT_MESH_SAYS(refusal("$MeshFormat\n4 0 8\n$EndMeshFormat\n"), "4.1 and 2.2");
+  EXPECT_MESH_SAYS(refusal("$MeshFormat\n4.1 1 8\n"), "ends too early");
+  EXPECT_MESH_SAYS(refusal("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"), "no section $Nodes");
 }
 
 /* A file that is cut off anywhere is refused, and nothing worse happens */
@@ -401,37 +401,37 @@ TEST(FeMeshErrors, Elements)
 {
   const std::string text = MeshWriter(MeshBox{ElementType::Tetrahedron4, 1, 1, 1}).text(true);
   /* six tetrahedra, of which the first has the nodes 1 3 9 27 and the number 6 */
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 3 1 9 27")),
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 3 1 9 27")),
               "element 6 (tetrahedron with 4 nodes) is turned inside out");
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 4711")), "node 4711");
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9")), "integer is expected");
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 x")), "integer is expected");
-  EXPECT_SAYS(refusal(replaced(text, "\n1 1 1\n", "\n1 nan 1\n")), "finite number");
-  EXPECT_SAYS(refusal(replaced(text, "\n1\n3\n", "\n1\n1\n")), "node 1 is there twice");
-  EXPECT_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 6 6\n")), "prism with 6 nodes");
-  EXPECT_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 7 6\n")), "pyramid with 5 nodes");
-  EXPECT_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 77 6\n")), "type 77");
-  EXPECT_SAYS(refusal(replaced(text, "3 5 4 6\n", "2 5 3 6\n")), "none of its 11 elements is a volume element");
-  EXPECT_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 4 7\n")), "should be $EndElements");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 4711")), "node 4711");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9")), "integer is expected");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 x")), "integer is expected");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n1 1 1\n", "\n1 nan 1\n")), "finite number");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n1\n3\n", "\n1\n1\n")), "node 1 is there twice");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 6 6\n")), "prism with 6 nodes");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 7 6\n")), "pyramid with 5 nodes");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 77 6\n")), "type 77");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "2 5 3 6\n")), "none of its 11 elements is a volume element");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 4 7\n")), "should be $EndElements");
   /* a flat element */
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 7")), "has no volume");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 7")), "has no volume");
   /* an element twice */
   const size_t      a = text.rfind("\n7 ") + 2, b = text.rfind("\n8 ");
   const std::string second = text.substr(a, b - a);
-  EXPECT_SAYS(refusal(replaced(text, "\n6 1 3 9 27 ", "\n6" + second)), "elements 6, 7 and 10 share one face");
+  EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27 ", "\n6" + second)), "elements 6, 7 and 10 share one face");
 }
 
 TEST(FeMeshErrors, Materials)
 {
   const std::string text = MeshWriter(MeshBox{ElementType::Brick8, 2, 1, 1, 1, 1, 1, true}).text(true);
   const Material    m    = softSteel();
-  EXPECT_SAYS(refusal(text, {}), "no material");
-  EXPECT_SAYS(refusal(text, {{"stone", m}, {"", m}}), "no such physical volume; there are: \"solid\", \"other\"");
-  EXPECT_SAYS(refusal(text, {{"left", m}, {"", m}}), "no such physical volume");
-  EXPECT_SAYS(refusal(text, {{"solid", m}}), "none is given for physical volume \"other\"");
-  EXPECT_SAYS(refusal(text, {{"", {-1, .3, 1}}}), "Young's modulus -1");
-  EXPECT_SAYS(refusal(text, {{"", {1, .5, 1}}}), "Poisson's ratio 0.5");
-  EXPECT_SAYS(refusal(text, {{"", {1, .3, 0}}}), "density 0");
-  EXPECT_SAYS(refusal(text, {{"", {std::nan(""), .3, 1}}}), "Young's modulus");
-  EXPECT_SAYS(refusal(text, {{"", {INFINITY, .3, 1}}}), "finite");
+  EXPECT_MESH_SAYS(refusal(text, {}), "no material");
+  EXPECT_MESH_SAYS(refusal(text, {{"stone", m}, {"", m}}), "no such physical volume; there are: \"solid\", \"other\"");
+  EXPECT_MESH_SAYS(refusal(text, {{"left", m}, {"", m}}), "no such physical volume");
+  EXPECT_MESH_SAYS(refusal(text, {{"solid", m}}), "none is given for physical volume \"other\"");
+  EXPECT_MESH_SAYS(refusal(text, {{"", {-1, .3, 1}}}), "Young's modulus -1");
+  EXPECT_MESH_SAYS(refusal(text, {{"", {1, .5, 1}}}), "Poisson's ratio 0.5");
+  EXPECT_MESH_SAYS(refusal(text, {{"", {1, .3, 0}}}), "density 0");
+  EXPECT_MESH_SAYS(refusal(text, {{"", {std::nan(""), .3, 1}}}), "Young's modulus");
+  EXPECT_MESH_SAYS(refusal(text, {{"", {INFINITY, .3, 1}}}), "finite");
 }

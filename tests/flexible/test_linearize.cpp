@@ -132,7 +132,7 @@ TEST(Linearize, DoublePendulum)
       EXPECT_LT(std::abs(b.rotation(2) / a.rotation(2) - v(1) / v(0)), 1e-7);
       EXPECT_LT(std::abs(b.displacement(0) / a.displacement(0) - (v(0) + v(1) / 2) / (v(0) / 2)), 1e-7);
       EXPECT_NEAR(a.share + b.share, 1, 1e-9);
-      EXPECT_NEAR(a.share, v(0) * v(0) / 3 / (v.transpose() * M * v), 1e-7);
+      EXPECT_NEAR(a.share, v(0) * v(0) / 3 / v.dot(M * v), 1e-7);
       Complex height, sway;
       must(start.small.value(modes[i], Measure::displacement(elbow, 0), &sway));
       must(start.small.value(modes[i], Measure::displacement(elbow, 1), &height));

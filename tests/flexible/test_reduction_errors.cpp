@@ -36,7 +36,7 @@ std::string failure(const FeModel &model, const Reduction &reduction)
   return failed ? trap.message : "";
 }
 
-#define EXPECT_SAYS(message, part) EXPECT_NE((message).find(part), std::string::npos) << (message)
+#define EXPECT_REDUCTION_SAYS(message, part) EXPECT_NE((message).find(part), std::string::npos) << (message)
 
 void setEntry(Mat A, PetscInt i, PetscInt j, double value, InsertMode mode = INSERT_VALUES)
 {
@@ -67,7 +67,7 @@ Box hinge()
 TEST(ReductionErrors, NoMatrices)
 {
   FeModel empty(PETSC_COMM_SELF);
-  EXPECT_SAYS(failure(empty, Reduction()), "read a mesh or matrices first");
+  EXPECT_REDUCTION_SAYS(failure(empty, Reduction()), "read a mesh or matrices first");
 }
 
 /* Geometric stiffening is made of the stress in elements, while something holds the body */
@@ -77,11 +77,11 @@ TEST(ReductionErrors, Stiffening)
   Reduction r  = both();
   r.stiffening = true;
   r.attachments.clear();
-  EXPECT_SAYS(failure(m.model, r), "geometric stiffening needs an attachment");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "geometric stiffening needs an attachment");
   r = both();
   r.stiffening = true;
   m.model.elements.clear();
-  EXPECT_SAYS(failure(m.model, r), "geometric stiffening needs elements");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "geometric stiffening needs elements");
 }
 
 TEST(ReductionErrors, MassOfANode)
@@ -89,11 +89,11 @@ TEST(ReductionErrors, MassOfANode)
   Made none(bar());
   clearNode(none.model.M, 17);
   const std::string zero = failure(none.model, both());
-  EXPECT_SAYS(zero, "no mass or a negative one");
-  EXPECT_SAYS(zero, "18"); /* labels count from 1 */
+  EXPECT_REDUCTION_SAYS(zero, "no mass or a negative one");
+  EXPECT_REDUCTION_SAYS(zero, "18"); /* labels count from 1 */
   Made less(bar());
   for (int c = 0; c < 3; c++) setEntry(less.model.M, 3 * 20 + c, 3 * 20 + c, -1.);
-  EXPECT_SAYS(failure(less.model, both()), "M: 21;");
+  EXPECT_REDUCTION_SAYS(failure(less.model, both()), "M: 21;");
 }
 
 TEST(ReductionErrors, FormOfTheMass)
@@ -101,10 +101,10 @@ TEST(ReductionErrors, FormOfTheMass)
   Made m(bar());
   setEntry(m.model.M, 30, 31, 1e-3);
   setEntry(m.model.M, 31, 30, 1e-3);
-  EXPECT_SAYS(failure(m.model, both()), "3 x 3 identity");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "3 x 3 identity");
   Made unequal(bar());
   setEntry(unequal.model.M, 30, 30, 1.);
-  EXPECT_SAYS(failure(unequal.model, both()), "node(s): 11;");
+  EXPECT_REDUCTION_SAYS(failure(unequal.model, both()), "node(s): 11;");
 }
 
 TEST(ReductionErrors, NodeWithoutStiffness)
@@ -112,7 +112,7 @@ TEST(ReductionErrors, NodeWithoutStiffness)
   Made m(bar());
   clearNode(m.model.K, 13);
   const std::string message = failure(m.model, both());
-  EXPECT_SAYS(message, "1 node(s) of the FE model have no stiffness: 14");
+  EXPECT_REDUCTION_SAYS(message, "1 node(s) of the FE model have no stiffness: 14");
 }
 
 TEST(ReductionErrors, Parts)
@@ -121,8 +121,8 @@ TEST(ReductionErrors, Parts)
   box.present = [](int i, int, int) { return i != 2 && i != 3; };
   Made              m(box);
   const std::string message = failure(m.model, both());
-  EXPECT_SAYS(message, "falls into 2 parts");
-  EXPECT_SAYS(message, "27 nodes with node 1; 27 nodes with node 28");
+  EXPECT_REDUCTION_SAYS(message, "falls into 2 parts");
+  EXPECT_REDUCTION_SAYS(message, "27 nodes with node 1; 27 nodes with node 28");
   /* tied to one attachment they are one body */
   Reduction joined;
   m.builder.addSet("all ends", [](const Vector3 &x) { return x[0] < 1e-9 || x[0] > 0.5 - 1e-9; });
@@ -139,18 +139,18 @@ TEST(ReductionErrors, Mechanism)
   Reduction held;
   held.attachments          = {attach("left")};
   const std::string message = failure(m.model, held);
-  EXPECT_SAYS(message, "mechanism");
+  EXPECT_REDUCTION_SAYS(message, "mechanism");
   /* the far edge of the second block moves most: x = 0.4, y = 0.2 has the nodes with the highest numbers */
-  EXPECT_SAYS(message, std::to_string(m.model.nodes));
+  EXPECT_REDUCTION_SAYS(message, std::to_string(m.model.nodes));
   held.attachments[0].tie = Tie::Average;
-  EXPECT_SAYS(failure(m.model, held), std::to_string(m.model.nodes));
+  EXPECT_REDUCTION_SAYS(failure(m.model, held), std::to_string(m.model.nodes));
   Reduction free;
-  EXPECT_SAYS(failure(m.model, free), "mechanism");
+  EXPECT_REDUCTION_SAYS(failure(m.model, free), "mechanism");
   free.attachments = {attach("left")};
   free.method      = Method::FreeFree;
-  EXPECT_SAYS(failure(m.model, free), "mechanism");
+  EXPECT_REDUCTION_SAYS(failure(m.model, free), "mechanism");
   /* both sides held: the hinge is a joint between two rigid attachments, seen in the reduced pair */
-  EXPECT_SAYS(failure(m.model, both()), "mechanism");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "mechanism");
 }
 
 TEST(ReductionErrors, Supports)
@@ -158,38 +158,38 @@ TEST(ReductionErrors, Supports)
   Made spring(bar());
   setEntry(spring.model.K, 3 * 40, 3 * 40, 1e4, ADD_VALUES); /* soft: the diagonal of K is some 1e9 */
   const std::string message = failure(spring.model, both());
-  EXPECT_SAYS(message, "not free of supports");
-  EXPECT_SAYS(message, "41");
+  EXPECT_REDUCTION_SAYS(message, "not free of supports");
+  EXPECT_REDUCTION_SAYS(message, "41");
   Made           clamped(bar());
   const PetscInt rows[3] = {0, 1, 2};
   must(MatZeroRowsColumns(clamped.model.K, 3, rows, 1e9, nullptr, nullptr));
   setEntry(clamped.model.K, 0, 3, -1., ADD_VALUES); /* coupled still, so that it is not a part of its own */
   setEntry(clamped.model.K, 3, 0, -1., ADD_VALUES);
-  EXPECT_SAYS(failure(clamped.model, both()), "supports");
+  EXPECT_REDUCTION_SAYS(failure(clamped.model, both()), "supports");
 }
 
 TEST(ReductionErrors, WrongCoordinates)
 {
   Made m(bar());
   for (std::size_t i = 0; i < m.model.coordinates.size(); i += 3) m.model.coordinates[i] *= 1000; /* mm among m */
-  EXPECT_SAYS(failure(m.model, both()), "correct the coordinates");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "correct the coordinates");
 }
 
 TEST(ReductionErrors, NotSymmetric)
 {
   Made m(bar());
   setEntry(m.model.K, 3, 7, 1e8, ADD_VALUES);
-  EXPECT_SAYS(failure(m.model, both()), "K of the FE model is not symmetric");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "K of the FE model is not symmetric");
 }
 
 TEST(ReductionErrors, NotANumber)
 {
   Made m(bar());
   setEntry(m.model.K, 3, 3, std::nan(""));
-  EXPECT_SAYS(failure(m.model, both()), "not numbers");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "not numbers");
   Made n(bar());
   n.model.coordinates[5] = INFINITY;
-  EXPECT_SAYS(failure(n.model, both()), "finite coordinates");
+  EXPECT_REDUCTION_SAYS(failure(n.model, both()), "finite coordinates");
 }
 
 /* Poisson's ratio above a half: a negative bulk modulus */
@@ -198,7 +198,7 @@ TEST(ReductionErrors, NegativeStiffness)
   Box box              = bar();
   box.material.poisson = 0.51;
   Made m(box);
-  EXPECT_SAYS(failure(m.model, both()), "negative");
+  EXPECT_REDUCTION_SAYS(failure(m.model, both()), "negative");
 }
 
 TEST(ReductionErrors, MassOnALine)
@@ -206,7 +206,7 @@ TEST(ReductionErrors, MassOnALine)
   Made m(bar());
   for (PetscInt i = 0; i < m.model.own; i++) m.model.coordinates[3 * i + 1] = m.model.coordinates[3 * i + 2] = 0;
   Reduction r;
-  EXPECT_SAYS(failure(m.model, r), "on one line");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "on one line");
 }
 
 /* ---- errors of attachments and of what is asked for ---- */
@@ -224,37 +224,37 @@ TEST(ReductionErrors, Attachments)
     r.attachments = attachments;
     return failure(m.model, r);
   };
-  EXPECT_SAYS(with({attach("nowhere")}), "no node set 'nowhere'; its sets are: all, half, left");
-  EXPECT_SAYS(with({attach("none")}), "empty");
-  EXPECT_SAYS(with({attach("node")}), "single node has no rotation");
-  EXPECT_SAYS(with({attach("node", Tie::Average)}), "three nodes");
-  EXPECT_SAYS(with({attach("line")}), "without stiffness");
-  EXPECT_SAYS(with({attach("line", Tie::Average)}), "not defined");
-  EXPECT_SAYS(with({attach("left"), attach("half")}), "left and half overlap: node 1 ");
-  EXPECT_SAYS(with({attach("half", Tie::Average), attach("left")}), "left and half overlap");
-  EXPECT_SAYS(with({attach("left"), attach("left")}), "two attachments of the name left");
-  EXPECT_SAYS(with({attach("all")}), "nothing is left to deform");
+  EXPECT_REDUCTION_SAYS(with({attach("nowhere")}), "no node set 'nowhere'; its sets are: all, half, left");
+  EXPECT_REDUCTION_SAYS(with({attach("none")}), "empty");
+  EXPECT_REDUCTION_SAYS(with({attach("node")}), "single node has no rotation");
+  EXPECT_REDUCTION_SAYS(with({attach("node", Tie::Average)}), "three nodes");
+  EXPECT_REDUCTION_SAYS(with({attach("line")}), "without stiffness");
+  EXPECT_REDUCTION_SAYS(with({attach("line", Tie::Average)}), "not defined");
+  EXPECT_REDUCTION_SAYS(with({attach("left"), attach("half")}), "left and half overlap: node 1 ");
+  EXPECT_REDUCTION_SAYS(with({attach("half", Tie::Average), attach("left")}), "left and half overlap");
+  EXPECT_REDUCTION_SAYS(with({attach("left"), attach("left")}), "two attachments of the name left");
+  EXPECT_REDUCTION_SAYS(with({attach("all")}), "nothing is left to deform");
   Attachment named = attach("again", Tie::Average);
   named.set        = "left";
-  EXPECT_SAYS(with({attach("left", Tie::Average), named}), "depend on each other");
+  EXPECT_REDUCTION_SAYS(with({attach("left", Tie::Average), named}), "depend on each other");
   named.set = "right";
   named.weights.assign(8, 1.);
-  EXPECT_SAYS(with({named}), "8 weights for 9 nodes");
+  EXPECT_REDUCTION_SAYS(with({named}), "8 weights for 9 nodes");
   named.weights.assign(9, 1.);
   named.weights[3] = -1;
-  EXPECT_SAYS(with({named}), "positive");
+  EXPECT_REDUCTION_SAYS(with({named}), "positive");
   named.weights.assign(9, 0.);
-  EXPECT_SAYS(with({named}), "not all zero");
+  EXPECT_REDUCTION_SAYS(with({named}), "not all zero");
   named.weights[0] = named.weights[1] = 1;
-  EXPECT_SAYS(with({named}), "on a line");
+  EXPECT_REDUCTION_SAYS(with({named}), "on a line");
   named.weights.assign(9, 1.);
   named.tie = Tie::Rigid;
-  EXPECT_SAYS(with({named}), "weights are for averages");
+  EXPECT_REDUCTION_SAYS(with({named}), "weights are for averages");
   named.weights.clear();
   named.at_given = true;
   named.position = Vector3(NAN, 0, 0);
-  EXPECT_SAYS(with({named}), "not finite");
-  EXPECT_SAYS(with({Attachment()}), "no name");
+  EXPECT_REDUCTION_SAYS(with({named}), "not finite");
+  EXPECT_REDUCTION_SAYS(with({Attachment()}), "no name");
   /* averages may share nodes */
   Reduction   r;
   ReducedBody body;
@@ -268,16 +268,16 @@ TEST(ReductionErrors, WhatIsAskedFor)
   Made      m(bar());
   Reduction r = both();
   r.modes     = -7;
-  EXPECT_SAYS(failure(m.model, r), "-7");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "-7");
   r       = both();
   r.modes = PETSC_DEFAULT;
-  EXPECT_SAYS(failure(m.model, r), "max_frequency, which is not set");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "max_frequency, which is not set");
   r               = both();
   r.max_frequency = -1;
-  EXPECT_SAYS(failure(m.model, r), "max_frequency is -1");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "max_frequency is -1");
   r      = both(4);
   r.keep = {0, 10};
-  EXPECT_SAYS(failure(m.model, r), "mode 10, but there are 10 elastic modes");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "mode 10, but there are 10 elastic modes");
   r.keep = {-1};
-  EXPECT_SAYS(failure(m.model, r), "mode -1");
+  EXPECT_REDUCTION_SAYS(failure(m.model, r), "mode -1");
 }

@@ -107,19 +107,19 @@ Array rowScale(const Problem &p, double t, const State &s)
   return scale;
 }
 
-struct Factory {
+struct ProblemCase {
   const char                               *name;
   std::function<std::unique_ptr<Problem>()> make;
 };
 
-void PrintTo(const Factory &f, std::ostream *out) { *out << f.name; }
+void PrintTo(const ProblemCase &f, std::ostream *out) { *out << f.name; }
 
-template <class P, class... Args> Factory make(const char *name, Args... args)
+template <class P, class... Args> ProblemCase make(const char *name, Args... args)
 {
   return {name, [=] { return std::unique_ptr<Problem>(new P(args...)); }};
 }
 
-class ProblemTest : public testing::TestWithParam<Factory>
+class ProblemTest : public testing::TestWithParam<ProblemCase>
 {
 protected:
   std::unique_ptr<Problem> problem = GetParam().make();
@@ -421,7 +421,7 @@ INSTANTIATE_TEST_SUITE_P(
                     make<Chain>("Chain", (PetscInt)7), make<Chain>("ChainAtAnAngle", (PetscInt)1, -30.),
                     make<DoublePendulum>("DoublePendulum"), make<SpringPendulum>("SpringPendulum", 1e4),
                     make<SliderCrank>("SliderCrank"), make<HeavyTop>("HeavyTop"), make<Fekete>("Fekete")),
-    [](const testing::TestParamInfo<Factory> &info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<ProblemCase> &info) { return std::string(info.param.name); });
 
 /* The report measures differences against the reference in the scales it documents */
 TEST(ProblemReport, ErrorsAreRelativeToTheReference)

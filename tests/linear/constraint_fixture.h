@@ -27,7 +27,7 @@ protected:
   Vec      b = NULL, x = NULL;
   PetscInt n = 0, coordinates = 0;
 
-  void create(const Entries &e, PetscInt of_them_coordinates)
+  void create(const Triplets &e, PetscInt of_them_coordinates)
   {
     n           = e.n;
     coordinates = of_them_coordinates;

@@ -16,7 +16,7 @@
 struct Rows {
   Mat        A;
   LinearRows rows;
-  explicit Rows(const Entries &entries)
+  explicit Rows(const Triplets &entries)
   {
     PetscBool done;
     EXPECT_EQ(create_matrix(entries, &A), 0);
@@ -51,7 +51,7 @@ inline PetscInt zero_pivots(const Rows &A, const LinearPivots &p)
   return zeros;
 }
 
-inline LinearPivots pivots_of(const Entries &entries, PetscInt zeros_left = 0)
+inline LinearPivots pivots_of(const Triplets &entries, PetscInt zeros_left = 0)
 {
   const Rows   A(entries);
   LinearPivots p;
@@ -62,10 +62,10 @@ inline LinearPivots pivots_of(const Entries &entries, PetscInt zeros_left = 0)
 }
 
 /* [D B; C 0] with as many as three quarters of multipliers, unsymmetric values, entries over six orders of magnitude */
-inline Entries random_saddle(std::mt19937 &random, PetscInt coordinates, PetscInt multipliers)
+inline Triplets random_saddle(std::mt19937 &random, PetscInt coordinates, PetscInt multipliers)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  Entries                                e;
+  Triplets                                e;
   e.n = coordinates + multipliers;
   for (PetscInt i = 0; i < coordinates; ++i) e.add(i, i, std::pow(10.0, 3 * uniform(random)));
   for (PetscInt k = 0; k < coordinates; ++k)
@@ -93,7 +93,7 @@ protected:
   void SetUp() override
   {
     PetscBool available;
-    Entries   entries = chain(1, 0);
+    Triplets   entries = chain(1, 0);
     Mat       probe;
     OK(create_matrix(entries, &probe));
     OK(MatGetFactorAvailable(probe, LINEAR_KLUPAIR, MAT_FACTOR_LU, &available));
@@ -107,7 +107,7 @@ protected:
     OK(MatDestroy(&A));
   }
 
-  void factor(const Entries &entries, IS order = NULL)
+  void factor(const Triplets &entries, IS order = NULL)
   {
     OK(MatDestroy(&F));
     OK(MatDestroy(&A));

@@ -79,7 +79,7 @@ TEST_F(ConstraintPC, FollowsTheMatrix)
 /* Constraints that say the same thing twice: the solve fails, and says so */
 TEST_F(ConstraintPC, DependentConstraintsFail)
 {
-  Entries e = block(2, 2, 2, true);
+  Triplets e = block(2, 2, 2, true);
   for (PetscInt d = 0; d < 3; d++) e.add_symmetric(d, e.n++, 1.0);
   create(e, 81);
   nodes(3);

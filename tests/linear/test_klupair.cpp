@@ -10,7 +10,7 @@ namespace
 
 TEST_F(KluPair, SolvesChainsNetsAndBlocks)
 {
-  for (const Entries &e : {chain(1, 0), chain(300, 0), chain(10, 40), spatial_chain(1), spatial_chain(300),
+  for (const Triplets &e : {chain(1, 0), chain(300, 0), chain(10, 40), spatial_chain(1), spatial_chain(300),
                            spatial_chain(320, 8), block(4, 4, 4, true), block(5, 5, 5, false)}) {
     factor(e);
     EXPECT_EQ(error(), MAT_FACTOR_NOERROR);
@@ -97,7 +97,7 @@ TEST_F(KluPair, KeepsItsPivots)
 TEST_F(KluPair, GivesUpBadPivots)
 {
   for (double left : {0.0, 1e-13}) {
-    const Entries      e = spatial_chain(40);
+    const Triplets      e = spatial_chain(40);
     const LinearPivots p = pivots_of(e);
     factor(e);
     for (PetscInt lambda = 240; lambda < e.n; lambda += 10) {
@@ -119,7 +119,7 @@ TEST_F(KluPair, GivesUpBadPivots)
 TEST_F(KluPair, PivotsAsPlannedThatLetEntriesGrow)
 {
   for (bool rows : {false, true}) {
-    Entries e;
+    Triplets e;
     e.n = 14;
     for (PetscInt i = 0; i < e.n; ++i) {
       e.add(i, i, 1.0);
@@ -138,7 +138,7 @@ TEST_F(KluPair, PivotsAsPlannedThatLetEntriesGrow)
 TEST_F(KluPair, PlansAnewWhenTheFillGrows)
 {
   const PetscInt n = 400;
-  Entries        e;
+  Triplets        e;
   e.n = n + 1;
   e.add(n, n, 1.0);
   for (PetscInt i = 0; i < n; ++i) {
@@ -177,7 +177,7 @@ TEST_F(KluPair, AnotherPatternIsAnalysedAnew)
 {
   factor(spatial_chain(30));
   Mat     B;
-  Entries e = spatial_chain(30);
+  Triplets e = spatial_chain(30);
   e.add_symmetric(0, 100, 0.3);
   OK(create_matrix(e, &B));
   OK(MatLUFactorNumeric(F, B, &info));
@@ -206,7 +206,7 @@ TEST_F(KluPair, AnotherMatrixOfThePattern)
 
 TEST_F(KluPair, SingularMatricesAreReported)
 {
-  Entries empty = chain(5, 0), twice = chain(5, 0), both;
+  Triplets empty = chain(5, 0), twice = chain(5, 0), both;
   empty.add(empty.n, empty.n, 0.0);
   ++empty.n;
   const PetscInt row = twice.n++;
@@ -215,7 +215,7 @@ TEST_F(KluPair, SingularMatricesAreReported)
   both.add(0, 0, 1.0);
   both.add_symmetric(0, 1, 1.0);
   both.add_symmetric(0, 2, 1.0);
-  for (const Entries &e : {empty, twice, both}) {
+  for (const Triplets &e : {empty, twice, both}) {
     factor(e);
     EXPECT_EQ(error(), MAT_FACTOR_NUMERIC_ZEROPIVOT);
   }
@@ -224,7 +224,7 @@ TEST_F(KluPair, SingularMatricesAreReported)
 /* As interiors of ranks are that hold multipliers alone, the unknowns of which are all at the border of the next rank */
 TEST_F(KluPair, MatrixWithoutEntries)
 {
-  Entries nothing;
+  Triplets nothing;
   nothing.n = 6;
   factor(nothing);
   EXPECT_EQ(error(), MAT_FACTOR_NUMERIC_ZEROPIVOT);
@@ -252,7 +252,7 @@ TEST_F(KluPair, SolverFailsAndRecovers)
   PC                 pc;
   Vec                b, x;
   KSPConvergedReason reason;
-  Entries            e      = chain(5, 0);
+  Triplets            e      = chain(5, 0);
   const PetscInt     lambda = 15;
   OK(create_matrix(e, &A));
   OK(KSPCreate(PETSC_COMM_SELF, &ksp));
@@ -287,7 +287,7 @@ TEST_F(KluPair, SolverFailsAndRecovers)
 
 TEST_F(KluPair, OrderingsSolveAndSayTheirName)
 {
-  const Entries e = block(6, 6, 6, true);
+  const Triplets e = block(6, 6, 6, true);
   for (const char *name : {"amd", "metis"}) {
     OK(PetscOptionsSetValue(NULL, "-mat_klupair_ordering", name));
     factor(e);
@@ -300,7 +300,7 @@ TEST_F(KluPair, OrderingsSolveAndSayTheirName)
 TEST_F(KluPair, AutomaticOrderingIsTheBetterOne)
 {
   double fill[3];
-  for (const Entries &e : {block(8, 8, 8, true), chain(300, 0)}) {
+  for (const Triplets &e : {block(8, 8, 8, true), chain(300, 0)}) {
     int k = 0;
     for (const char *name : {"auto", "amd", "metis"}) {
       MatInfo got;
@@ -318,7 +318,7 @@ TEST_F(KluPair, GivenOrderingIsFollowed)
 {
   IS            row, col;
   MatInfo       own, natural;
-  const Entries e = block(6, 6, 6, false);
+  const Triplets e = block(6, 6, 6, false);
   factor(e);
   OK(MatGetInfo(F, MAT_LOCAL, &own));
   OK(MatGetOrdering(A, MATORDERINGNATURAL, &row, &col));
@@ -336,7 +336,7 @@ TEST_F(KluPair, BlocksOfAReducibleMatrix)
   std::mt19937          random(17);
   const PetscInt        n = 300;
   std::vector<PetscInt> name(n);
-  Entries               e;
+  Triplets               e;
   MatInfo               got;
   e.n = n;
   for (PetscInt i = 0; i < n; ++i) name[i] = i;

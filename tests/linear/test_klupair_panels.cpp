@@ -9,10 +9,10 @@ namespace
 
 /* A body with modes, dense and with values that are not symmetric, that carries others by constraints on all modes;
    each of these carries a little chain */
-Entries modal_carrier(std::mt19937 &random, PetscInt modes, PetscInt attachments)
+Triplets modal_carrier(std::mt19937 &random, PetscInt modes, PetscInt attachments)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  Entries                                e;
+  Triplets                                e;
   e.n            = modes;
   const auto add = [&](PetscInt i, PetscInt j, double v) {
     e.add(i, j, v);
@@ -37,11 +37,11 @@ Entries modal_carrier(std::mt19937 &random, PetscInt modes, PetscInt attachments
 }
 
 /* Diagonal blocks, dense in themselves, with entries from each to those after it; unknowns shuffled */
-Entries dense_blocks(std::mt19937 &random, PetscInt blocks, PetscInt size)
+Triplets dense_blocks(std::mt19937 &random, PetscInt blocks, PetscInt size)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   std::vector<PetscInt>                  name(blocks * size);
-  Entries                                e;
+  Triplets                                e;
   e.n = blocks * size;
   for (PetscInt i = 0; i < e.n; ++i) name[i] = i;
   std::shuffle(name.begin(), name.end(), random);
@@ -117,7 +117,7 @@ protected:
 TEST_F(KluPairPanels, SameSolutionsForChangingValues)
 {
   std::mt19937 random(5);
-  for (const Entries &e : {modal_carrier(random, 60, 8), modal_carrier(random, 130, 3), modal_carrier(random, 80, 1),
+  for (const Triplets &e : {modal_carrier(random, 60, 8), modal_carrier(random, 130, 3), modal_carrier(random, 80, 1),
                            chain(6, 50), block(5, 5, 5, true)}) {
     factor(e);
     for (int k = 0; k < 4; ++k) {
@@ -141,7 +141,7 @@ TEST_F(KluPairPanels, RandomSaddlePoints)
   int          met = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const PetscInt dense = 40 + 3 * trial;
-    Entries        e     = random_saddle(random, 150, 20 + 3 * trial);
+    Triplets        e     = random_saddle(random, 150, 20 + 3 * trial);
     for (PetscInt i = 0; i < dense; ++i)
       for (PetscInt j = 0; j < dense; ++j) e.add(i, j, std::cos((double)(i * i + 3 * j + trial)));
     factor(e);
@@ -171,10 +171,10 @@ TEST_F(KluPairPanels, SeveralDiagonalBlocks)
 }
 
 /* [A I; I B], of which A and B are diagonally dominant */
-Entries coupled_blocks(std::mt19937 &random, PetscInt n)
+Triplets coupled_blocks(std::mt19937 &random, PetscInt n)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  Entries                                e;
+  Triplets                                e;
   e.n = 2 * n;
   for (PetscInt i = 0; i < n; ++i) {
     for (PetscInt j = 0; j < n; ++j)
@@ -229,7 +229,7 @@ TEST_F(KluPairPanels, AtOnceForManySolves)
 TEST_F(KluPairPanels, SingularMatricesAreReported)
 {
   std::mt19937  random(13);
-  const Entries e = modal_carrier(random, 80, 2);
+  const Triplets e = modal_carrier(random, 80, 2);
   for (const char *panels : {"true", "false"})
     for (double value : {0.0, (double)NAN, (double)INFINITY}) {
       OK(PetscOptionsSetValue(NULL, "-mat_klupair_panels", panels));
@@ -253,7 +253,7 @@ TEST_F(KluPairPanels, SingularMatricesAreReported)
 TEST_F(KluPairPanels, OnlyWhereTheyPay)
 {
   std::mt19937 random(15);
-  for (const Entries &e : {chain(300, 0), spatial_chain(300), spatial_chain(320, 8), chain(100, 5)}) {
+  for (const Triplets &e : {chain(300, 0), spatial_chain(300), spatial_chain(320, 8), chain(100, 5)}) {
     factor(e);
     again();
     EXPECT_NE(view().find("no dense panels: they would not pay"), std::string::npos) << view();

@@ -15,7 +15,7 @@ TEST(KluPairPivots, DiagonalStaysWhereItHasValues)
 
 TEST(KluPairPivots, EveryMultiplierHasItsCoordinate)
 {
-  for (const Entries &e :
+  for (const Triplets &e :
        {chain(1, 0), chain(50, 0), chain(5, 12), spatial_chain(60), spatial_chain(64, 8), block(3, 3, 3, true)}) {
     const LinearPivots p = pivots_of(e);
     EXPECT_EQ(p.pairs, p.zeros);
@@ -29,7 +29,7 @@ TEST(KluPairPivots, EveryMultiplierHasItsCoordinate)
 TEST(KluPairPivots, LongExchange)
 {
   const PetscInt n = 3000;
-  Entries        e;
+  Triplets        e;
   e.n = 2 * n;
   for (PetscInt i = 0; i < n; ++i) {
     e.add(i, i, 1.0);
@@ -43,7 +43,7 @@ TEST(KluPairPivots, LongExchange)
 
 TEST(KluPairPivots, ExplicitZerosAreNoPivots)
 {
-  Entries e;
+  Triplets e;
   e.n = 4;
   for (PetscInt i = 0; i < 2; ++i) e.add(i, i, 1.0);
   e.add(2, 2, 0.0);
@@ -57,7 +57,7 @@ TEST(KluPairPivots, ExplicitZerosAreNoPivots)
 
 TEST(KluPairPivots, LargeEntryIsPreferred)
 {
-  Entries e;
+  Triplets e;
   e.n = 4;
   for (PetscInt i = 0; i < 3; ++i) {
     e.add(i, i, 1.0);
@@ -68,7 +68,7 @@ TEST(KluPairPivots, LargeEntryIsPreferred)
 
 TEST(KluPairPivots, TwoUnknownsWithoutDiagonal)
 {
-  Entries e;
+  Triplets e;
   e.n = 3;
   e.add(2, 2, 1.0);
   e.add_symmetric(0, 1, 1.0);
@@ -78,7 +78,7 @@ TEST(KluPairPivots, TwoUnknownsWithoutDiagonal)
 /* No two rows exchange their pivots here: a cycle of three */
 TEST(KluPairPivots, UnsymmetricCycle)
 {
-  Entries e;
+  Triplets e;
   e.n = 3;
   for (PetscInt i = 0; i < 3; ++i) e.add(i, (i + 1) % 3, 1.0);
   EXPECT_EQ(pivots_of(e).col, (std::vector<PetscInt>{1, 2, 0}));
@@ -87,7 +87,7 @@ TEST(KluPairPivots, UnsymmetricCycle)
 /* Two multipliers of one coordinate, and a row without any entry */
 TEST(KluPairPivots, SingularByItsPattern)
 {
-  Entries e;
+  Triplets e;
   e.n = 4;
   e.add(0, 0, 1.0);
   e.add_symmetric(1, 0, 1.0);

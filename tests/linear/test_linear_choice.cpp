@@ -67,7 +67,7 @@ protected:
 
   void SetUp() override
   {
-    Entries few = chain(100, 0), many = block(8, 8, 8, true);
+    Triplets few = chain(100, 0), many = block(8, 8, 8, true);
     OK(create_matrix(few, &small));
     OK(create_matrix(many, &large));
     if (!has(small, MATSOLVERKLU, MAT_FACTOR_LU) || !has(large, "mumpsnd", MAT_FACTOR_CHOLESKY))
@@ -82,7 +82,7 @@ protected:
 
 TEST_F(LinearChoiceTest, ChainTakesKLUPair)
 {
-  Entries entries = chain(1000, 0); /* 5000 unknowns */
+  Triplets entries = chain(1000, 0); /* 5000 unknowns */
   Mat     A;
   OK(create_matrix(entries, &A));
   for (bool symmetric : {true, false}) {
@@ -148,7 +148,7 @@ TEST_F(LinearChoiceTest, LargeFactorsAreSingle)
 /* 645 unknowns with one dense block want MUMPS, 5000 in a chain do not: size alone does not decide */
 TEST_F(LinearChoiceTest, DenseBlockTakesMUMPS)
 {
-  Entries entries = chain(1, 640);
+  Triplets entries = chain(1, 640);
   Mat     A;
   OK(create_matrix(entries, &A));
   EXPECT_EQ(choose(A, true, {}, nothing).package, "mumpsnd");

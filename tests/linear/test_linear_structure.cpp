@@ -71,7 +71,7 @@ LinearWork work_by_elimination(Mat A, const std::vector<PetscInt> &order)
 
 TEST(LinearOrdering, IsAPermutationAndSavesFill)
 {
-  Entries entries = block(8, 8, 8, false);
+  Triplets entries = block(8, 8, 8, false);
   Mat     A;
   OK(create_matrix(entries, &A));
   const std::vector<PetscInt> order = order_of(A, MATORDERINGMETISND), again = order_of(A, MATORDERINGMETISND);
@@ -89,7 +89,7 @@ TEST(LinearOrdering, IsAPermutationAndSavesFill)
 
 TEST(LinearOrdering, RegistrationTwiceChangesNothing)
 {
-  Entries entries = chain(5, 0);
+  Triplets entries = chain(5, 0);
   Mat     A;
   OK(create_matrix(entries, &A));
   const std::vector<PetscInt> before = order_of(A, MATORDERINGMETISND);
@@ -101,7 +101,7 @@ TEST(LinearOrdering, RegistrationTwiceChangesNothing)
 
 TEST(LinearOrdering, DiagonalMatrixHasNoEdges)
 {
-  Entries entries;
+  Triplets entries;
   Mat     A;
   entries.n = 4;
   for (PetscInt i = 0; i < 4; ++i) entries.add(i, i, 1.0 + i);
@@ -113,7 +113,7 @@ TEST(LinearOrdering, DiagonalMatrixHasNoEdges)
 /* The direction of the permutation shows in the fill of PETSc's own factorization */
 TEST(LinearOrdering, PetscFactorsWithLessFill)
 {
-  Entries       entries = block(5, 5, 5, false);
+  Triplets       entries = block(5, 5, 5, false);
   Mat           A, F;
   IS            row, col;
   MatFactorInfo factor_info;
@@ -138,7 +138,7 @@ TEST(LinearWork, AgreesWithElimination)
 {
   std::mt19937 random(7);
   for (int trial = 0; trial < 10; ++trial) {
-    Entries entries;
+    Triplets entries;
     Mat     A;
     entries.n = 40;
     for (PetscInt i = 0; i < 40; ++i) entries.add(i, i, 1.0);
@@ -157,7 +157,7 @@ TEST(LinearWork, AgreesWithElimination)
 
 TEST(LinearWork, StopsAtItsLimit)
 {
-  Entries     entries = block(6, 6, 6, false);
+  Triplets     entries = block(6, 6, 6, false);
   Mat         A;
   LinearGraph graph;
   LinearWork  work;
@@ -175,7 +175,7 @@ TEST(LinearWork, StopsAtItsLimit)
 
 TEST(LinearSymmetry, IsSeen)
 {
-  Entries   entries = chain(200, 3);
+  Triplets   entries = chain(200, 3);
   Mat       A;
   PetscBool symmetric;
   OK(create_matrix(entries, &A));
@@ -199,7 +199,7 @@ TEST(LinearSymmetry, IsSeen)
 TEST(LinearSymmetry, OneWrongEntryIsSeen)
 {
   for (double relative : {1e-9, 1e-6, 1.0}) {
-    Entries   entries = chain(200, 3);
+    Triplets   entries = chain(200, 3);
     Mat       A;
     PetscBool symmetric;
     entries.add(301, 300, relative); /* row and column of one body, entries of order one */
@@ -212,7 +212,7 @@ TEST(LinearSymmetry, OneWrongEntryIsSeen)
 
 /* ---- redundant constraints ---- */
 
-std::vector<PetscInt> dependent(const Entries &entries, PetscInt first_multiplier, PetscInt max = 100)
+std::vector<PetscInt> dependent(const Triplets &entries, PetscInt first_multiplier, PetscInt max = 100)
 {
   Mat                   A;
   IS                    multipliers;
@@ -230,14 +230,14 @@ std::vector<PetscInt> dependent(const Entries &entries, PetscInt first_multiplie
 TEST(LinearDependent, NoneInARegularMatrix)
 {
   for (PetscInt bodies : {1, 10, 300}) {
-    Entries entries = chain(bodies, 0);
+    Triplets entries = chain(bodies, 0);
     EXPECT_TRUE(dependent(entries, 3 * bodies).empty()) << bodies;
   }
 }
 
 TEST(LinearDependent, DoubledConstraint)
 {
-  Entries        entries = chain(10, 0);
+  Triplets        entries = chain(10, 0);
   const PetscInt first = 30, twice = first + 8, row = entries.n++;
   for (size_t k = 0, size = entries.row.size(); k < size; ++k)
     if (entries.row[k] == twice) entries.add_symmetric(row, entries.col[k], -3.0 * entries.val[k]);
@@ -247,7 +247,7 @@ TEST(LinearDependent, DoubledConstraint)
 /* Two independent dependences at once, of very different scale: all rows of both are named, and no others */
 TEST(LinearDependent, TwoDependencesOfDifferentScale)
 {
-  Entries        entries = chain(40, 0);
+  Triplets        entries = chain(40, 0);
   const PetscInt first = 120, a = first + 3, b = first + 30, c = first + 51, ab = entries.n++, cc = entries.n++;
   for (size_t k = 0, size = entries.row.size(); k < size; ++k) {
     if (entries.row[k] == a) entries.add_symmetric(ab, entries.col[k], entries.val[k]);
@@ -261,7 +261,7 @@ TEST(LinearDependent, TwoDependencesOfDifferentScale)
 /* A loop: distances of three points on a line fixed pairwise, x2-x1, x3-x2, x1-x3; the fourth constraint is apart */
 TEST(LinearDependent, Loop)
 {
-  Entries e;
+  Triplets e;
   e.n                 = 8;
   const double mass[] = {1e3, 2.0, 1e-2, 5.0};
   for (PetscInt i = 0; i < 4; ++i) e.add(i, i, mass[i]);
@@ -275,7 +275,7 @@ TEST(LinearDependent, Loop)
 
 TEST(LinearDependent, MultiplierWithoutCoordinates)
 {
-  Entries        entries = chain(3, 0);
+  Triplets        entries = chain(3, 0);
   const PetscInt empty   = entries.n++;
   entries.add(empty, empty, 0.0);
   EXPECT_EQ(dependent(entries, 9), (std::vector<PetscInt>{empty}));

@@ -76,9 +76,9 @@ struct Solver {
 };
 
 /* The stiffness of a rod, held at its ends: its condition grows like n^2 */
-Entries rod(PetscInt n)
+Triplets rod(PetscInt n)
 {
-  Entries e;
+  Triplets e;
   e.n = n;
   for (PetscInt i = 0; i < n; i++) {
     e.add(i, i, 2.);
@@ -88,9 +88,9 @@ Entries rod(PetscInt n)
 }
 
 /* The first node of a block held twice */
-Entries redundant()
+Triplets redundant()
 {
-  Entries e = block(4, 4, 4, true);
+  Triplets e = block(4, 4, 4, true);
   for (PetscInt d = 0; d < 3; ++d) {
     const PetscInt row = e.n++;
     e.add_symmetric(row, d, 2.0);
@@ -113,7 +113,7 @@ protected:
   }
   void TearDown() override { OK(MatDestroy(&A)); }
 
-  void create(const Entries &e)
+  void create(const Triplets &e)
   {
     OK(MatDestroy(&A));
     OK(create_matrix(e, &A));

@@ -61,7 +61,7 @@ protected:
 
   void SetUp() override
   {
-    Entries entries = block(6, 6, 6, true);
+    Triplets entries = block(6, 6, 6, true);
     OK(create_matrix(entries, &A));
     if (!has(A, "mumpsnd", MAT_FACTOR_LU)) GTEST_SKIP() << "this PETSc was built without MUMPS";
   }
@@ -124,7 +124,7 @@ TEST_F(MumpsND, OrderingIsNoWorseThanTheBuiltInOnes)
 /* A constraint given twice: the factorization fails instead of returning one of many solutions */
 TEST_F(MumpsND, SingularMatrixIsReported)
 {
-  Entries entries = block(4, 4, 4, true);
+  Triplets entries = block(4, 4, 4, true);
   for (PetscInt d = 0; d < 3; ++d) {
     const PetscInt row = entries.n++;
     entries.add_symmetric(row, d, 2.0); /* the first node is held already */

@@ -29,7 +29,7 @@ protected:
   {
     IS is;
     OK(TSHHT3Initialize());
-    const Entries e = block(4, 3, 3, true);
+    const Triplets e = block(4, 3, 3, true);
     n               = e.n;
     OK(create_matrix(e, &A));
     OK(MatCreateVecs(A, &x, &b));
@@ -144,7 +144,7 @@ TEST(NodeProduct, OneUnsymmetricEntry)
   PetscBool             usable;
   PetscScalar           entry;
   const PetscInt        first = 3 * 10 * 21 * 21, second = first + 3;
-  const Entries         e = block(20, 20, 20, false);
+  const Triplets         e = block(20, 20, 20, false);
   std::vector<PetscInt> node;
   OK(TSHHT3Initialize());
   OK(create_matrix(e, &A));
@@ -207,7 +207,7 @@ TEST_F(NodeProductTest, RoundingIsMeasured)
 {
   const PetscInt first = coordinates;
   OK(MatDestroy(&A));
-  Entries e = block(4, 3, 3, false);
+  Triplets e = block(4, 3, 3, false);
   OK(create_matrix(e, &A));
   /* 1e10 (A - its row sums of each component) + 1 leaves rigid translations the stiffness of the springs alone */
   for (PetscInt i = 0; i < first; i++) {

@@ -9,7 +9,7 @@ namespace hhtest
 {
 
 /* Rows begin to end - 1 on this rank */
-inline Mat distributed(const ::Entries &e, PetscInt begin, PetscInt end)
+inline Mat distributed(const Triplets &e, PetscInt begin, PetscInt end)
 {
   Mat                      A;
   std::vector<PetscInt>    row, col;
@@ -29,7 +29,7 @@ inline Mat distributed(const ::Entries &e, PetscInt begin, PetscInt end)
 }
 
 /* All rows but few on the first ranks, so that one of three has next to nothing */
-inline Mat distributed(const ::Entries &e)
+inline Mat distributed(const Triplets &e)
 {
   PetscMPIInt rank, size;
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);

@@ -15,7 +15,6 @@ namespace kluparts_test
 {
 
 using namespace hhtest;
-using Triplets = ::Entries; /* the examples have a type of this name, too */
 
 inline int ranks()
 {

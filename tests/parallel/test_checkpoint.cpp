@@ -8,17 +8,17 @@ using namespace hhtest;
 namespace
 {
 
-struct End {
+struct Fallen {
   Array            u, v;
   TSHHT3Statistics s;
 };
 
-End fall(MPI_Comm comm, const std::string &options, int bodies = 12)
+Fallen fall(MPI_Comm comm, const std::string &options, int bodies = 12)
 {
   Rods     rods(bodies, comm);
   SceneRun run(rods.scene, 0.4, " -ts_rtol 1e-6 -ts_atol 1e-6 " + options);
   Vec      U, V;
-  End      e;
+  Fallen      e;
   must(run.solve());
   must(TS2GetSolution(run.ts, &U, &V));
   must(TSHHT3GetStatistics(run.ts, &e.s));
@@ -32,14 +32,14 @@ void repeat(const std::string &options)
   SCOPED_TRACE(options);
   const SharedFile  file(".checkpoint");
   const std::string every = " -ts_hhtdae_checkpoint " + file.name + " -ts_hhtdae_checkpoint_every ";
-  const End         plain = fall(PETSC_COMM_WORLD, options);
+  const Fallen         plain = fall(PETSC_COMM_WORLD, options);
   ASSERT_GT(plain.s.steps, 30);
-  const End writing = fall(PETSC_COMM_WORLD, options + every + "1 ");
+  const Fallen writing = fall(PETSC_COMM_WORLD, options + every + "1 ");
   EXPECT_EQ(plain.u, writing.u);
   EXPECT_EQ(plain.v, writing.v);
   for (int stop : {5, 17, 28}) {
     fall(PETSC_COMM_WORLD, options + every + std::to_string(stop) + " -ts_max_steps " + std::to_string(stop) + " ");
-    const End resumed = fall(PETSC_COMM_WORLD, options + " -ts_hhtdae_resume " + file.name + " ");
+    const Fallen resumed = fall(PETSC_COMM_WORLD, options + " -ts_hhtdae_resume " + file.name + " ");
     EXPECT_EQ(plain.u, resumed.u) << stop;
     EXPECT_EQ(plain.v, resumed.v) << stop;
     EXPECT_EQ(plain.s.newton, resumed.s.newton) << stop;

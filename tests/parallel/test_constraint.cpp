@@ -27,7 +27,7 @@ protected:
     must(TSHHT3Initialize());
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
     MPI_Comm_size(PETSC_COMM_WORLD, &size);
-    const ::Entries e = block(NX - 1, NY - 1, NZ - 1, true);
+    const Triplets e = block(NX - 1, NY - 1, NZ - 1, true);
     begin           = 3 * (nodes * rank / size);
     end             = rank == size - 1 ? e.n : 3 * (nodes * (rank + 1) / size);
     A               = distributed(e, begin, end);

@@ -121,7 +121,7 @@ TEST_F(MumpsMixedRanks, AnEntryBeyondTheRange)
 {
   PetscInt n;
   must(MatGetSize(A, &n, nullptr));
-  const ::Entries e = block(6, 5, 4, true);
+  const Triplets e = block(6, 5, 4, true);
   setOnLast(n - 1, e.col.back(), 1e60);
   setOnLast(e.col.back(), n - 1, 1e60);
   use("smumpsnd", PCCHOLESKY);
@@ -153,7 +153,7 @@ TEST_F(MumpsMixedRanks, NoRoom)
 
 TEST_F(MumpsMixedRanks, Singular)
 {
-  ::Entries e = block(4, 4, 4, true);
+  Triplets e = block(4, 4, 4, true);
   for (PetscInt d = 0; d < 3; d++) { /* the first node is held already */
     const PetscInt row = e.n++;
     e.add_symmetric(row, d, 2.);

@@ -33,7 +33,7 @@ protected:
     must(MatDestroy(&A));
   }
 
-  void distribute(const ::Entries &e)
+  void distribute(const Triplets &e)
   {
     must(MatDestroy(&A));
     A = distributed(e);

@@ -10,7 +10,7 @@ namespace
 
 using Build = std::function<void(Scene &)>;
 
-struct End {
+struct ChainEnd {
   Array            x, v; /* of markers at the centre and beside it, of all bodies in their order */
   TSHHT3Statistics s;
 };
@@ -25,7 +25,7 @@ Body addRod(Scene &scene, const Vector3 &from, const Vector3 &to)
   return scene.add("", b);
 }
 
-End run(MPI_Comm comm, Space space, const Build &build, double end, const std::string &options)
+ChainEnd run(MPI_Comm comm, Space space, const Build &build, double end, const std::string &options)
 {
   Scene scene(comm, space);
   build(scene);
@@ -45,7 +45,7 @@ End run(MPI_Comm comm, Space space, const Build &build, double end, const std::s
     }
   for (std::size_t k = 0; k < velocity.size(); k++) scene.channel("v" + std::to_string(k), velocity[k]);
   SceneRun            r(scene, end, options);
-  End                 e;
+  ChainEnd                 e;
   std::vector<double> all;
   must(r.solve());
   must(scene.sample(r.ts, end, all));
@@ -55,14 +55,14 @@ End run(MPI_Comm comm, Space space, const Build &build, double end, const std::s
   return e;
 }
 
-End compare(const char *what, Space space, const Build &build, double end, int steps, const char *more = "")
+ChainEnd compare(const char *what, Space space, const Build &build, double end, int steps, const char *more = "")
 {
   constexpr double  q       = 1e-10;
   const std::string options = fixedSteps(end / steps) + "-ts_hhtdae_corrector_tolerance 1e-7 -ts_hhtdae_alpha -0.1 " + more;
   int               size, rank;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  const End all   = run(PETSC_COMM_WORLD, space, build, end, options),
+  const ChainEnd all   = run(PETSC_COMM_WORLD, space, build, end, options),
             self  = run(PETSC_COMM_SELF, space, build, end, options);
   const double dx = relativeDifference(all.x, self.x), dv = relativeDifference(all.v, self.v);
   if (rank == 0)
@@ -73,7 +73,7 @@ End compare(const char *what, Space space, const Build &build, double end, int s
   EXPECT_LT(dx, q);
   EXPECT_LT(dv, 10 * q);
   /* it has moved */
-  const End start = run(PETSC_COMM_SELF, space, build, end / steps, options);
+  const ChainEnd start = run(PETSC_COMM_SELF, space, build, end / steps, options);
   EXPECT_GT(relativeDifference(all.x, start.x), 1e-3);
   return all;
 }
@@ -211,9 +211,9 @@ TEST(SceneRanks, Net)
 /* Past attitudes with the bodies of every rank; some turn too far for order 5 */
 TEST(SceneRanks, HigherOrder)
 {
-  const End e = compare("net of 4 x 5, order 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100, "-ts_hhtdae_order 5 ");
+  const ChainEnd e = compare("net of 4 x 5, order 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100, "-ts_hhtdae_order 5 ");
   EXPECT_GT(e.s.of_order[5], 80);
-  const End t = compare("bodies turning over, order 5", Space::Spatial, turning, 2.4, 160, "-ts_hhtdae_order 5 ");
+  const ChainEnd t = compare("bodies turning over, order 5", Space::Spatial, turning, 2.4, 160, "-ts_hhtdae_order 5 ");
   EXPECT_GT(t.s.of_order[3] + t.s.of_order[4] + t.s.of_order[5], 50);
 }
 
@@ -226,7 +226,7 @@ TEST(SceneRanks, BodiesTurningOver)
       s.start().rotations = rotations;
       turning(s);
     };
-    const End e = compare(rotations == Rotations::Local ? "bodies turning over" : "the same in Euler angles", Space::Spatial, with, 2.4, 160);
+    const ChainEnd e = compare(rotations == Rotations::Local ? "bodies turning over" : "the same in Euler angles", Space::Spatial, with, 2.4, 160);
     EXPECT_EQ(e.s.changes > 0, rotations == Rotations::Euler313);
   }
 }
@@ -236,7 +236,7 @@ TEST(SceneRanks, BodiesTurningOver)
 TEST(SceneRanks, ChosenSteps)
 {
   const std::string options = tolerance(1e-6);
-  const End         all     = run(PETSC_COMM_WORLD, Space::Spatial, hanging<Spherical>(8), 0.5, options),
+  const ChainEnd         all     = run(PETSC_COMM_WORLD, Space::Spatial, hanging<Spherical>(8), 0.5, options),
             self            = run(PETSC_COMM_SELF, Space::Spatial, hanging<Spherical>(8), 0.5, options);
   EXPECT_NEAR((double)all.s.steps, (double)self.s.steps, 3);
   EXPECT_LT(relativeDifference(all.x, self.x), 1e-6);

@@ -7,7 +7,7 @@
 #include <limits>
 
 using namespace hhtdae;
-using Number = TimeFunction::Number;
+using Formula = TimeFunction::Number;
 
 namespace
 {
@@ -159,7 +159,7 @@ TEST(TimeFunctions, SplineConvergesWithFourthOrder)
 TEST(TimeFunctions, FormulasAreDifferentiatedExactly)
 {
   const TimeFunction f =
-      TimeFunction::formula([](const Number &t) -> Number { return sin(2.0 * t) * exp(-t) + 1.0 / (2.0 + t * t); });
+      TimeFunction::formula([](const Formula &t) -> Formula { return sin(2.0 * t) * exp(-t) + 1.0 / (2.0 + t * t); });
   for (double t : {-.7, 0., .4, 3.}) {
     const TimeFunction::Value v = f(t);
     const double              s = std::sin(2 * t), c = std::cos(2 * t), e = std::exp(-t), r = 1 / (2 + t * t);
@@ -172,7 +172,7 @@ TEST(TimeFunctions, FormulasAreDifferentiatedExactly)
 
 TEST(TimeFunctions, FormulasMayBranchAndBeConstant)
 {
-  const TimeFunction f = TimeFunction::formula([](const Number &t) -> Number {
+  const TimeFunction f = TimeFunction::formula([](const Formula &t) -> Formula {
     if (t < 1.0) return t * t * t;
     return sqrt(t);
   });
@@ -180,7 +180,7 @@ TEST(TimeFunctions, FormulasMayBranchAndBeConstant)
   EXPECT_NEAR(f(4).f, 2, 1e-15);
   EXPECT_NEAR(f(4).f1, .25, 1e-15);
   EXPECT_NEAR(f(4).f2, -1. / 32, 1e-15);
-  const TimeFunction c = TimeFunction::formula([](const Number &) -> Number { return Number(7); });
+  const TimeFunction c = TimeFunction::formula([](const Formula &) -> Formula { return Formula(7); });
   EXPECT_EQ(c(2).f, 7);
   EXPECT_EQ(c(2).f1, 0);
   EXPECT_EQ(c(2).f2, 0);
@@ -215,7 +215,7 @@ TEST(TimeFunctions, BadInputIsNamed)
   says(TimeFunction::spline({0, 1, 1}, {0, 1, 2}), "1 is followed by 1");
   says(TimeFunction::spline({0, 1, kNaN}, {0, 1, 2}), "finite");
   says(TimeFunction::spline({0, 1e-310, 2e-310}, {0, 1, 0}), "too close");
-  says(TimeFunction::formula(std::function<Number(const Number &)>()), "empty");
+  says(TimeFunction::formula(std::function<Formula(const Formula &)>()), "empty");
   says(TimeFunction::values({}), "empty");
 }
 
@@ -225,7 +225,7 @@ TEST(TimeFunctions, NotANumberPassesThrough)
   for (const TimeFunction &f : {TimeFunction::polynomial({1, 2}), TimeFunction::harmonic(1, 1),
                                 TimeFunction::step5(0, 0, 1, 1), TimeFunction::spline({0, 1, 2}, {0, 1, 0})})
     EXPECT_TRUE(std::isnan(f(kNaN).f));
-  const TimeFunction late = TimeFunction::formula([](const Number &t) -> Number { return log(1.0 - t); });
+  const TimeFunction late = TimeFunction::formula([](const Formula &t) -> Formula { return log(1.0 - t); });
   EXPECT_TRUE(std::isfinite(late(.5).f));
   EXPECT_TRUE(std::isnan(late(2).f));
 }

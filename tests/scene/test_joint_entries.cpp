@@ -116,7 +116,7 @@ TEST(JointEntries, Rows)
   ExpectRows(Line(), {2, 0}, {1, 0});
   ExpectRows(RollingSphere{}, {1, 2});
   ExpectRows(KnifeEdge{}, {1, 1});
-  ExpectRows(RollingDisc{}, kRefused, {1, 1}); /* in space it would lie flat */
+  ExpectRows(hhtdae::RollingDisc{}, kRefused, {1, 1}); /* in space it would lie flat */
 }
 
 TEST(JointEntries, RefuseOneBodyAndPointMasses)
@@ -152,10 +152,10 @@ TEST(JointEntries, RefuseNumbers)
              "the markers coincide at the start");
   ExpectSays(Errors<RollingSphere>([](Fixture &, RollingSphere &s) { s.radius = -1; }),
              "radius is -1, must be positive");
-  ExpectSays(Errors<RollingDisc>([](Fixture &, RollingDisc &s) { s.radius = 0; }), "radius is 0");
-  ExpectSays(Errors<RollingDisc>([](Fixture &, RollingDisc &) {}), "the disc lies flat on the plane");
+  ExpectSays(Errors<hhtdae::RollingDisc>([](Fixture &, hhtdae::RollingDisc &s) { s.radius = 0; }), "radius is 0");
+  ExpectSays(Errors<hhtdae::RollingDisc>([](Fixture &, hhtdae::RollingDisc &) {}), "the disc lies flat on the plane");
   const auto upright = [](Fixture &f) { return f.scene.marker(f.body, {0, 0, 0}, About(Vector3::UnitX(), M_PI / 2)); };
-  EXPECT_EQ(Errors<RollingDisc>([&](Fixture &f, RollingDisc &s) { s.i = upright(f); }), "");
+  EXPECT_EQ(Errors<hhtdae::RollingDisc>([&](Fixture &f, hhtdae::RollingDisc &s) { s.i = upright(f); }), "");
   ExpectSays(Errors<KnifeEdge>([&](Fixture &f, KnifeEdge &s) { s.i = upright(f); }), "y_i is normal to the plane");
   ExpectSays(Errors<PointOnCurve>([](Fixture &, PointOnCurve &) {}), "point on curve it: the curve has 0 points");
 }
@@ -242,7 +242,7 @@ TEST(JointRuns, WheelOnAnIncline)
     b.rotation       = planar ? Matrix3(Matrix3::Identity()) : About(Vector3::UnitX(), -M_PI / 2); /* z_i is y */
     b.position       = r * normal;
     const Body wheel = scene.add("wheel", b);
-    scene.add("rolls", RollingDisc{scene.marker(wheel), scene.marker(scene.ground(), {0, 0, 0}, R), r});
+    scene.add("rolls", hhtdae::RollingDisc{scene.marker(wheel), scene.marker(scene.ground(), {0, 0, 0}, R), r});
     scene.gravity(planar ? Vector3(0, -g, 0) : Vector3(0, 0, -g));
     const Final end(scene, T);
     EXPECT_LT((end[wheel].r - b.position - s * R.col(0)).norm(), 1e-5);
@@ -434,7 +434,7 @@ TEST(JointRuns, RollingKeepsMomentumAndEnergy)
 {
   FlyTogether(RollingSphere{{}, {}, .3}, {.2, .1, .3}, About({1, 2, 3}, 1));
   FlyTogether(RollingSphere{{}, {}, .3}, {.2, .1, -.3}, About({1, 2, 3}, 1));
-  FlyTogether(RollingDisc{{}, {}, .3}, {.2, .1, .3 * std::cos(.2)}, About(Vector3::UnitX(), M_PI / 2 + .2));
+  FlyTogether(hhtdae::RollingDisc{{}, {}, .3}, {.2, .1, .3 * std::cos(.2)}, About(Vector3::UnitX(), M_PI / 2 + .2));
   FlyTogether(KnifeEdge{}, {.2, .1, 0}, About(Vector3::UnitX(), .4));
 }
 
@@ -445,7 +445,7 @@ TEST(JointRuns, PlanarJointsKeepMomentumAndEnergy)
   FlyTogether(Translational{}, {.3, 0, 0}, none, Space::Planar);
   FlyTogether(Fixed{}, {0, 0, 0}, none, Space::Planar);
   FlyTogether(PointDistance{}, {.3, .2, 0}, turn, Space::Planar);
-  FlyTogether(RollingDisc{{}, {}, .3}, {.2, .3, 0}, turn, Space::Planar);
+  FlyTogether(hhtdae::RollingDisc{{}, {}, .3}, {.2, .3, 0}, turn, Space::Planar);
   PointOnCurve wire;
   wire.points = {{-1, 0, 0}, {-.4, .3, 0}, {0, 0, 0}, {.5, -.1, 0}, {1, .4, 0}};
   FlyTogether(wire, {0, 0, 0}, turn, Space::Planar);

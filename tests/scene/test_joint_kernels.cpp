@@ -36,7 +36,7 @@ TEST(JointKernels, AxesDerivatives)
 namespace
 {
 
-Mat3<double> About(const Vec3<double> &axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
+Mat3<double> AboutAxis(const Vec3<double> &axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
 /* i and j somewhere, with parallel axes; i is at `local` in j's axes and turned by `turn` in them */
 struct Pair {
@@ -99,12 +99,12 @@ TEST(JointKernels, MultipliersOfAxesAreMoments)
   for (int k = 0; k < 10; k++) {
     const double       spin = random(-3, 3);
     const Vec3<double> z    = Vec3<double>::UnitZ();
-    const Pair         about_z(random, random.vector(), About(z, spin)), aligned(random, random.vector());
+    const Pair         about_z(random, random.vector(), AboutAxis(z, spin)), aligned(random, random.vector());
     for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(about_z, r), about_z.j(r));
     for (int r = 0; r < 3; r++) ExpectMoment(Reaction<Orient>(aligned, r), aligned.j(r));
     ExpectMoment(Reaction<OrientInPlane>(aligned, 0), aligned.j(2));
     const Pair cross(random, {0, 0, 0},
-                     About(z, spin) * About(Vec3<double>::UnitX(), M_PI / 2) * About(z, random(-3, 3)));
+                     AboutAxis(z, spin) * AboutAxis(Vec3<double>::UnitX(), M_PI / 2) * AboutAxis(z, random(-3, 3)));
     ExpectMoment(Reaction<AxesPerpendicular<2, 2>>(cross, 0), cross.j(2).cross(Vec3<double>(cross.f[0].R.col(2))));
   }
 }
@@ -113,7 +113,7 @@ TEST(JointKernels, MultipliersOfAxesAreMoments)
 TEST(JointKernels, AlignmentsHaveTwoBranches)
 {
   Random     random(4);
-  const Pair flipped(random, {0, 0, 0}, About(Vec3<double>::UnitX(), M_PI));
+  const Pair flipped(random, {0, 0, 0}, AboutAxis(Vec3<double>::UnitX(), M_PI));
   for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(flipped, r), -flipped.j(r));
 }
 
@@ -125,11 +125,11 @@ TEST(JointKernels, ConstantVelocityTurnsBothShaftsAlike)
   const Vec3<double> z = Vec3<double>::UnitZ(), x = Vec3<double>::UnitX();
   for (int k = 0; k < 20; k++) {
     const double       bend = random(-1.2, 1.2), spin = random(-10, 10), other = random(.1, 2), plane = random(-3, 3);
-    const Mat3<double> B    = About({std::cos(plane), std::sin(plane), 0}, bend);
-    const Mat3<double> turn = About(z, -spin) * B * About(z, spin), flip = About(x, M_PI);
+    const Mat3<double> B    = AboutAxis({std::cos(plane), std::sin(plane), 0}, bend);
+    const Mat3<double> turn = AboutAxis(z, -spin) * B * AboutAxis(z, spin), flip = AboutAxis(x, M_PI);
     double             phi;
     const Pair         alike(random, {0, 0, 0}, turn), away(random, {0, 0, 0}, turn * flip);
-    const Pair         apart(random, {0, 0, 0}, turn * About(z, other));
+    const Pair         apart(random, {0, 0, 0}, turn * AboutAxis(z, other));
     EqualRotation<false>::value<double>({}, alike.f, 0, &phi);
     EXPECT_NEAR(phi, 0, 1e-14);
     EqualRotation<true>::value<double>({}, away.f, 0, &phi);

@@ -9,7 +9,7 @@ using namespace hhtdae;
 namespace
 {
 
-const TimeFunction kWave = TimeFunction::harmonic(.7, 2, .3, .1);
+const TimeFunction kDrive = TimeFunction::harmonic(.7, 2, .3, .1);
 
 /* two frames between which the angle is well defined: curvature grows like 1/sin^2 of the angle between x_i and z_j */
 void Separate(Random &random, Frame<double> *f)
@@ -20,12 +20,12 @@ void Separate(Random &random, Frame<double> *f)
 MotionData Turning(Random &random, Frame<double> *f)
 {
   Separate(random, f);
-  return {kWave, 2};
+  return {kDrive, 2};
 }
 
 std::function<MotionData(Random &)> Along(int axis)
 {
-  return [axis](Random &) { return MotionData{kWave, axis}; };
+  return [axis](Random &) { return MotionData{kDrive, axis}; };
 }
 
 /* Frames that move and turn smoothly in time, and their exact twists */
@@ -188,7 +188,7 @@ TEST(MotionKernels, RateRowsAgreeWithAutomaticDifferentiation)
 TEST(MotionKernels, VelocityRowIsTheTimeDerivativeOfTheDisplacementRow)
 {
   const TimeFunction rate = TimeFunction::values([](double t) {
-    const TimeFunction::Value v = kWave(t);
+    const TimeFunction::Value v = kDrive(t);
     return TimeFunction::Value{v.f1, v.f2, 0};
   });
   Random             random(8);
@@ -204,8 +204,8 @@ TEST(MotionKernels, VelocityRowIsTheTimeDerivativeOfTheDisplacementRow)
     const DynamicVector derivative = Difference([&](double t) {
       const Frame<double> at[2] = {i.frame(t), j.frame(t)};
       DynamicVector       phi(2);
-      DrivenAngle::value<double>({kWave, 2}, at, t, &phi(0));
-      DrivenAdvance::value<double>({kWave, 1}, at, t, &phi(1));
+      DrivenAngle::value<double>({kDrive, 2}, at, t, &phi(0));
+      DrivenAdvance::value<double>({kDrive, 1}, at, t, &phi(1));
       return phi;
     });
     EXPECT_NEAR(turning, derivative(0), 1e-8 * (1 + std::abs(turning)));
@@ -251,10 +251,10 @@ TEST(MotionKernels, TheMultiplierIsTheDrive)
   const Frame<double> j    = random.frame();
   const Frame<double> f[2] = {Turned(j, .7, {.1, .2, .3}), j};
   Matrix<1, 12>       J;
-  DrivenAngle::gradient({kWave, 2}, f, 0, J);
+  DrivenAngle::gradient({kDrive, 2}, f, 0, J);
   EXPECT_NEAR((-J.segment<3>(3).transpose() - j.R.col(2)).norm(), 0, 1e-14);
   EXPECT_EQ(J.segment<3>(0).norm(), 0);
-  DrivenAdvance::gradient({kWave, 1}, f, 0, J);
+  DrivenAdvance::gradient({kDrive, 1}, f, 0, J);
   EXPECT_NEAR((-J.segment<3>(0).transpose() - j.R.col(1)).norm(), 0, 1e-14);
   EXPECT_EQ(J.segment<3>(3).norm(), 0);
 }

@@ -10,12 +10,12 @@ namespace
 {
 
 /* Two rods on pins, with a variable, a state and a force carried as one: redundant rows of the second pin are dropped */
-struct Rods {
+struct NamedRods {
   Scene    scene;
   Body     first, second;
   bool     torn = false;
 
-  explicit Rods(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
+  explicit NamedRods(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
     RigidBody b;
     b.mass     = 2;
@@ -49,7 +49,7 @@ std::vector<std::string> namesOf(Scene &scene)
 
 TEST(UnknownNames, InSpace)
 {
-  Rods                           r;
+  NamedRods                           r;
   const std::vector<std::string> n = namesOf(r.scene), expected = {"x of body upper", "y of body upper", "z of body upper", "rotation 1 of body upper", "rotation 2 of body upper", "rotation 3 of body upper"};
   ASSERT_EQ(n.size(), 12u + 10 + 3 + 2);
   EXPECT_EQ(std::vector<std::string>(n.begin(), n.begin() + 6), expected);
@@ -66,7 +66,7 @@ TEST(UnknownNames, InSpace)
 
 TEST(UnknownNames, InThePlane)
 {
-  Rods                           r(Space::Planar);
+  NamedRods                           r(Space::Planar);
   const std::vector<std::string> n = namesOf(r.scene);
   ASSERT_EQ(n.size(), 6u + 4 + 3 + 2);
   EXPECT_EQ(n[1], "y of body upper");
@@ -77,7 +77,7 @@ TEST(UnknownNames, InThePlane)
 /* Of rows that are dropped there are no unknowns: those behind keep their own names */
 TEST(UnknownNames, BesideDroppedRows)
 {
-  Rods r;
+  NamedRods r;
   r.scene.add("again", Revolute{r.scene.marker(r.first, {-1, 0, .5}), r.scene.marker(r.scene.ground(), {0, 0, .5})});
   r.scene.start().redundant = Redundant::Drop;
   const std::vector<std::string> n = namesOf(r.scene);
@@ -88,7 +88,7 @@ TEST(UnknownNames, BesideDroppedRows)
 
 TEST(UnknownNames, OfAForceThatIsNoNumber)
 {
-  Rods r;
+  NamedRods r;
   TS   ts;
   r.torn = true;
   must(r.scene.createTS(&ts));

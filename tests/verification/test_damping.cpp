@@ -14,8 +14,8 @@ namespace
 {
 
 using Real   = long double; /* least squares square the condition */
-using State  = std::array<Real, 3>;
-using Matrix = std::array<State, 3>;
+using Values  = std::array<Real, 3>;
+using Matrix = std::array<Values, 3>;
 
 struct Method {
   Real am, af, gamma, beta;
@@ -44,15 +44,15 @@ Matrix amplification(const Method &m, Real hw)
   return A;
 }
 
-State next(const Matrix &A, const State &x)
+Values next(const Matrix &A, const Values &x)
 {
-  State y = {0, 0, 0};
+  Values y = {0, 0, 0};
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) y[i] += A[i][j] * x[j];
   return y;
 }
 
-Real size(const State &x) { return std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2])}); }
+Real size(const Values &x) { return std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2])}); }
 
 /* Roots of z^3 + c2 z^2 + c1 z + c0 by simultaneous iteration; the largest */
 Real largestRoot(Real c0, Real c1, Real c2)
@@ -91,10 +91,10 @@ struct Oscillator : Oscillators { /* with any initial state */
 
 /* x_0..x_{N-1} of a run with h = 1. The tolerance is so small that the run starts from a_0 = q''_0, which excites the
    third root. */
-std::vector<State> states(double hw, double q0, double v0, const std::string &options, const Method &m, int N)
+std::vector<Values> states(double hw, double q0, double v0, const std::string &options, const Method &m, int N)
 {
   const Oscillator   p(hw, q0, v0, N);
-  std::vector<State> x;
+  std::vector<Values> x;
   Simulation         run(p, fixedSteps(1.) + options + " -ts_rtol 1e-13 -ts_atol 1e-13");
   run.watch = [&](Simulation &r, PetscInt, double) { x.push_back({r.u()[0], r.v()[0], 0}); };
   must(run.solve());
@@ -108,7 +108,7 @@ std::vector<State> states(double hw, double q0, double v0, const std::string &op
 
 /* The matrix that maps each x_n to x_{n+1} best, from the runs' first states; of the trapezoidal rule the one for (q, h
  * q') */
-Matrix fit(const std::vector<std::vector<State>> &runs, int pairs, bool two)
+Matrix fit(const std::vector<std::vector<Values>> &runs, int pairs, bool two)
 {
   Real S[3][3] = {}, T[3][3] = {};
   for (const auto &x : runs) {
@@ -149,11 +149,11 @@ void compare(const char *name, const std::string &options, const Method &m)
   for (double hw : {1e-2, 3e-2, 1e-1, .3, 1., 3., 10., 30., 100., 1e3, 1e4}) {
     SCOPED_TRACE(text("%s, h w = %g", name, hw));
     const Matrix                          A    = amplification(m, hw);
-    const std::vector<std::vector<State>> runs = {states(hw, 1., 0., options, m, N), states(hw, 0., hw, options, m, N),
+    const std::vector<std::vector<Values>> runs = {states(hw, 1., 0., options, m, N), states(hw, 0., hw, options, m, N),
                                                   states(hw, .6, -.8 * hw, options, m, N)};
     Real                                  difference = 0;
     for (const auto &x : runs) {
-      State y = x[0];
+      Values y = x[0];
       for (int n = 0; n < N; n++, y = next(A, y))
         difference = std::max(difference, std::max(std::abs(x[n][0] - y[0]), std::abs(x[n][1] - y[1])) / size(x[0]));
     }

@@ -11,12 +11,12 @@ namespace
 {
 
 /* Runs a scene to `end`; values of its variables and states by their handles */
-class SceneRun
+class ExpressionRun
 {
 public:
   TS ts = nullptr;
 
-  SceneRun(Scene &s, double end, const std::string &options) : s_(s)
+  ExpressionRun(Scene &s, double end, const std::string &options) : s_(s)
   {
     must(s.createTS(&ts));
     must(TSSetMaxTime(ts, end));
@@ -27,8 +27,8 @@ public:
     must(TS2GetSolution(ts, &U, nullptr));
     u = whole(U);
   }
-  ~SceneRun() { TSDestroy(&ts); }
-  SceneRun(const SceneRun &) = delete;
+  ~ExpressionRun() { TSDestroy(&ts); }
+  ExpressionRun(const ExpressionRun &) = delete;
   double operator()(Variable v) const { return u[ModelOf(s_).number.variable[v.id]]; }
   double operator()(State x) const { return u[ModelOf(s_).number.state[x.id]]; }
   double position(Body b, int c) const { return u[ModelOf(s_).number.body[b.id] + c]; }
@@ -106,7 +106,7 @@ TEST(Expressions, ControlledPendulum)
   for (Space space : {Space::Planar, Space::Spatial})
     for (bool state : {false, true}) {
       MotorPendulum p(state, space);
-      SceneRun      run(p.scene, .5, tight);
+      ExpressionRun      run(p.scene, .5, tight);
       MEASURED("%s, %s: angle off by %.1e, rate by %.1e, filter by %.1e", space == Space::Planar ? "planar" : "spatial",
                state ? "carried" : "eliminated", std::abs(run(p.angle) - exact[0]), std::abs(run(p.rate) - exact[1]),
                std::abs(run(p.filtered) - exact[2]));
@@ -123,7 +123,7 @@ TEST(Expressions, OrderOfTheControlledPendulum)
   Array      error;
   for (int steps : {100, 200, 400}) {
     MotorPendulum p(false);
-    SceneRun      run(p.scene, .5, fixedSteps(.5 / steps));
+    ExpressionRun      run(p.scene, .5, fixedSteps(.5 / steps));
     error.push_back(std::hypot(run(p.angle) - exact[0], run(p.filtered) - exact[2]));
   }
   MEASURED("errors %.2e %.2e %.2e", error[0], error[1], error[2]);
@@ -139,7 +139,7 @@ TEST(Expressions, AnglesCountTurns)
     b.angular_velocity   = {0, 0, 3};
     const Body     wheel = s.add("wheel", b);
     const Variable angle = s.variable("angle", Measure::angle(s.marker(wheel), s.marker(s.ground())));
-    SceneRun       run(s, 5, tight + " -ts_adapt_dt_max 0.25 ");
+    ExpressionRun       run(s, 5, tight + " -ts_adapt_dt_max 0.25 ");
     EXPECT_NEAR(run(angle), 15, 1e-6);
   }
 }
@@ -163,7 +163,7 @@ TEST(Expressions, ReactionsOfACantilever)
     m.push_back(s.variable("", Measure::jointMoment(clamp, c)));
     g.push_back(s.variable("", Measure::jointForce(clamp, c, wall)));
   }
-  SceneRun      run(s, .01, tight);
+  ExpressionRun      run(s, .01, tight);
   const Vector3 force(0, 0, mass * gravity), moment(0, -mass * gravity * length, 0), local = R.transpose() * force;
   for (int c = 0; c < 3; c++) {
     EXPECT_NEAR(run(f[c]), force(c), 1e-8);
@@ -220,7 +220,7 @@ struct Drifting {
 TEST(Expressions, CarriedAndEliminatedAgree)
 {
   Drifting e(false), c(true);
-  SceneRun eliminated(e.scene, 1.5, tight), carried(c.scene, 1.5, tight);
+  ExpressionRun eliminated(e.scene, 1.5, tight), carried(c.scene, 1.5, tight);
   for (int k = 0; k < 3; k++) {
     EXPECT_NEAR(eliminated.position(e.a, k), carried.position(c.a, k), 1e-7);
     EXPECT_NEAR(eliminated(e.momentum[k]), 0, 1e-8);
@@ -248,7 +248,7 @@ TEST(Expressions, AddedMass)
                        Expression{{}, [](const Real *) -> Real { return 0.; }}};
     s.add("added mass", f);
     const Variable v = s.variable("a", a);
-    SceneRun       run(s, 1, tight + form);
+    ExpressionRun       run(s, 1, tight + form);
     EXPECT_NEAR(run(v), -gravity * 2 / 5, 1e-8) << form;
     EXPECT_NEAR(run.position(body, 1), -gravity * .4 / 2, 1e-7) << form;
   }

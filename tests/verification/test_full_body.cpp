@@ -12,7 +12,7 @@ using namespace hhtest;
 namespace
 {
 
-std::string fixed(double h)
+std::string fixedAt(double h)
 {
   return text(" -ts_dt %.17g -ts_adapt_type none -ts_max_steps 10000000 -ts_rtol 1e-6 -ts_atol 1e-6 ", h);
 }
@@ -90,7 +90,7 @@ TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
   scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
   scene.channel("z", Measure::displacement(scene.marker(fe.attachment("tip")), 2));
   Array       time;
-  const Array z = history(scene, 30 * 50 * h, fixed(h) + " -ts_hhtdae_alpha -0.001 ", "z", &time);
+  const Array z = history(scene, 30 * 50 * h, fixedAt(h) + " -ts_hhtdae_alpha -0.001 ", "z", &time);
 
   double      sag = 0, amplitude = 0;
   std::size_t last = z.size() - 10 * 50;
@@ -319,7 +319,7 @@ TEST(FullBodyDynamics, EnergyAndMomentumOfAFreeBody)
     must(fe.add(scene, "block", m.model, b));
     scene.output().balance      = true;
     scene.output().balance_file = file.name;
-    SceneRun run(scene, 1, fixed(4e-3 / (1 << k)) + " -ts_hhtdae_alpha 0 -ts_hhtdae_corrector_tolerance 1e-3 ");
+    SceneRun run(scene, 1, fixedAt(4e-3 / (1 << k)) + " -ts_hhtdae_alpha 0 -ts_hhtdae_corrector_tolerance 1e-3 ");
     must(run.solve());
     const CSV   table(file.text());
     const Array energy = table.column("total"), lx = table.column("Lx"), ly = table.column("Ly"),
@@ -433,7 +433,7 @@ TEST(FullBodyDynamics, BarInFastRotation)
     scene.add("clamp", Fixed{scene.marker(ends.root), axis});
     scene.channel("x", Measure::displacement(scene.marker(ends.tip), 0, axis, axis));
     const double h    = 2e-3 / (1 << k);
-    const Array  x    = history(scene, 1.6, fixed(h) + " -ts_hhtdae_alpha -0.3 -ts_hhtdae_corrector_tolerance 1e-4 ", "x");
+    const Array  x    = history(scene, 1.6, fixedAt(h) + " -ts_hhtdae_alpha -0.3 -ts_hhtdae_corrector_tolerance 1e-4 ", "x");
     double       mean = 0;
     const auto   n    = (std::size_t)(0.5 / h);
     for (std::size_t i = x.size() - n; i < x.size(); i++) mean += (x[i] - bar.length) / (double)n;
@@ -461,7 +461,7 @@ TEST(FullBodyModes, ClampedBeam)
   b.attachments       = hhtex::BeamAttachments();
   must(fe.add(scene, "beam", m.model, b));
   scene.add("clamp", Fixed{scene.marker(fe.attachment("root")), scene.marker(scene.ground())});
-  SceneRun run(scene, 1, fixed(1e-4));
+  SceneRun run(scene, 1, fixedAt(1e-4));
   must(small.take(run.ts));
   must(SlowestModes(small, 4, &modes));
   MEASURED("circular frequency %.9g, of the matrices %.9g; damping ratio %.6g", std::abs(modes[0].value), omega, modes[0].dampingRatio());
@@ -484,7 +484,7 @@ TEST(FullBodyModes, FreeBeam)
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> expected(dense(m.model.K, rows), dense(m.model.M, rows), Eigen::EigenvaluesOnly);
   b.law = FeLaw::Small;
   must(fe.add(scene, "beam", m.model, b));
-  SceneRun run(scene, 1, fixed(1e-4));
+  SceneRun run(scene, 1, fixedAt(1e-4));
   must(small.take(run.ts));
   must(SlowestModes(small, 12, &modes));
   std::vector<double> found;

@@ -81,13 +81,13 @@ void expectOrders(const Problem &p, double h, Multipliers lambda, bool others = 
     }
 }
 
-struct Vectors {
+struct StateVectors {
   Vec U, V, A;
-  explicit Vectors(Vec like)
+  explicit StateVectors(Vec like)
   {
     for (Vec *x : {&U, &V, &A}) must(VecDuplicate(like, x));
   }
-  ~Vectors()
+  ~StateVectors()
   {
     for (Vec *x : {&U, &V, &A}) VecDestroy(x);
   }
@@ -97,7 +97,7 @@ struct Vectors {
 std::array<double, 4> betweenSteps(const Problem &p, int k, double h)
 {
   Simulation            run(p, strict() + ofOrder(k));
-  Vectors               x(run.U);
+  StateVectors               x(run.U);
   std::array<double, 4> worst = {};
   growTo(run, h);
   while (run.t() < p.t1 - h) {
@@ -159,7 +159,7 @@ TEST(HigherOrder, DenseOutputMeetsTheStep)
 {
   const UserVars p(1.);
   Simulation     run(p, tolerance(1e-6) + " -ts_hhtdae_order auto ");
-  Vectors        x(run.U);
+  StateVectors        x(run.U);
   Array          u = run.u(), v = run.v(), a;
   double         t = 0.;
   while (run.t() < p.t1) {

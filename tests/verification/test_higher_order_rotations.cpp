@@ -13,7 +13,7 @@ using namespace hhtdae;
 namespace
 {
 
-Matrix3 skew(const Vector3 &x) { return (Matrix3() << 0, -x(2), x(1), x(2), 0, -x(0), -x(1), x(0), 0).finished(); }
+Matrix3 crossMatrix(const Vector3 &x) { return (Matrix3() << 0, -x(2), x(1), x(2), 0, -x(0), -x(1), x(0), 0).finished(); }
 
 /* About the joint or, without one, the centre of mass; in axes of the body, which at the start are those of space */
 struct Spinning {
@@ -32,15 +32,15 @@ struct Motion {
   Vector3 w, alpha, force;
 };
 
-class Exact
+class ExactTop
 {
 public:
-  explicit Exact(const Spinning &b)
+  explicit ExactTop(const Spinning &b)
       : b_(b), solution_([this](long double, const long double *y, long double *f) { rates(y, f); }, 0.L, 0.1L / b.spin.norm(),
                          {1, 0, 0, 0, 1, 0, 0, 0, 1, b.spin(0), b.spin(1), b.spin(2)})
   {
   }
-  Exact(const Exact &) = delete;
+  ExactTop(const ExactTop &) = delete;
   Motion at(double t)
   {
     const auto  y = solution_.at(t);
@@ -88,7 +88,7 @@ struct Body1 {
     scene.start().rotations = rotations;
     scene.gravity(b.weight / b.mass);
     r.mass             = b.mass;
-    r.inertia          = Matrix3(b.J.asDiagonal()) + b.mass * skew(b.c) * skew(b.c);
+    r.inertia          = Matrix3(b.J.asDiagonal()) + b.mass * crossMatrix(b.c) * crossMatrix(b.c);
     r.center           = b.c;
     r.angular_velocity = b.spin;
     r.velocity         = b.spin.cross(b.c);
@@ -104,7 +104,7 @@ using Errors = std::array<double, 4>;
 
 struct BodyRun {
   Body1    body;
-  Exact    exact;
+  ExactTop    exact;
   SceneRun run;
   Vec      U, V, A;
 
@@ -185,7 +185,7 @@ const Case cases[] = {{"heavy top", heavy_top, 1.2e-3}, {"tumbling top", tumblin
 TEST(HigherOrderRotations, ReferenceAgainstClosedForm)
 {
   const Spinning b{1, {2, 2, 3}, {0, 0, 0}, {0, 0, 0}, {1, .5, 4}, 3};
-  Exact          exact(b);
+  ExactTop          exact(b);
   const Vector3  L = b.J.asDiagonal() * b.spin;
   const Matrix3  A = Eigen::AngleAxisd(b.end / 2 * L.norm(), L.normalized()).toRotationMatrix() * Eigen::AngleAxisd(-.5 * 4 * b.end, Vector3::UnitZ()).toRotationMatrix();
   EXPECT_LT((exact.at(b.end).A - A).norm(), 1e-13);
@@ -241,13 +241,13 @@ struct SpatialChain {
   }
 };
 
-struct Snapshot {
+struct Remembered {
   double t;
   Array  u, v;
-  bool   operator==(const Snapshot &o) const { return t == o.t && u == o.u && v == o.v; }
+  bool   operator==(const Remembered &o) const { return t == o.t && u == o.u && v == o.v; }
 };
 
-Snapshot stateOf(TS ts)
+Remembered stateOf(TS ts)
 {
   Vec       U, V;
   PetscReal t;
@@ -273,7 +273,7 @@ TEST(HigherOrderRotations, CheckpointsRepeatTheRun)
     for (int at : {3, 6, 25}) {
       SCOPED_TRACE(std::string(which) + " " + std::to_string(at));
       const std::string  options = tolerance(1e-6) + " -ts_hhtdae_order " + which + " ";
-      std::vector<Snapshot> states;
+      std::vector<Remembered> states;
       SpatialChain       a, b;
       SceneRun           plain(a.scene, 10, options);
       for (int k = 0; k < at; k++) must(TSStep(plain.ts));
@@ -302,11 +302,11 @@ TEST(HigherOrderRotations, RollBack)
   SceneRun     run(chain.scene, 10, fixedSteps(4e-3) + " -ts_hhtdae_corrector_tolerance 1e-6 -ts_hhtdae_order 5 ");
   for (int k = 0; k < 40; k++) {
     must(TSStep(run.ts));
-    const Snapshot first = stateOf(run.ts);
+    const Remembered first = stateOf(run.ts);
     must(TSRollBack(run.ts));
     must(TSSetTimeStep(run.ts, 4e-3));
     must(TSStep(run.ts));
-    const Snapshot second = stateOf(run.ts);
+    const Remembered second = stateOf(run.ts);
     EXPECT_NEAR(second.t, first.t, 1e-14);
     for (PetscInt i = 0; i < 18; i++) EXPECT_NEAR(second.u[i], first.u[i], 1e-9) << k << " " << i;
   }
