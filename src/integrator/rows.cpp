@@ -37,7 +37,7 @@ PetscErrorCode FirstBad(Vec F, PetscInt *row)
 /* Nothing for a row < 0 */
 PetscErrorCode LabelRow(TS ts, PetscInt row, RowLabel *label)
 {
-  const RowNames &names = Get(ts).names;
+  const RowNames &names                          = Get(ts).names;
   char            name[sizeof(label->text) - 32] = "";
 
   PetscFunctionBegin;

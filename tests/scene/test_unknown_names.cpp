@@ -11,9 +11,9 @@ namespace
 
 /* Two rods on pins, with a variable, a state and a force carried as one: redundant rows of the second pin are dropped */
 struct NamedRods {
-  Scene    scene;
-  Body     first, second;
-  bool     torn = false;
+  Scene scene;
+  Body  first, second;
+  bool  torn = false;
 
   explicit NamedRods(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
@@ -26,7 +26,7 @@ struct NamedRods {
     second     = scene.add("lower", b);
     scene.add("hinge", Revolute{scene.marker(first, {-1, 0, 0}), scene.marker(scene.ground())});
     scene.add("knee", Revolute{scene.marker(second, {-1, 0, 0}), scene.marker(first, {1, 0, 0})});
-    const State   s = scene.state("valve", Expression{{}, [](const Real *) -> Real { return 0; }}, 0);
+    const State s = scene.state("valve", Expression{{}, [](const Real *) -> Real { return 0; }}, 0);
     scene.variable("pressure", Expression{{Measure::value(s)}, [](const Real *k) -> Real { return k[0]; }});
     UserForce f;
     f.i     = scene.marker(second);
@@ -49,7 +49,7 @@ std::vector<std::string> namesOf(Scene &scene)
 
 TEST(UnknownNames, InSpace)
 {
-  NamedRods                           r;
+  NamedRods                      r;
   const std::vector<std::string> n = namesOf(r.scene), expected = {"x of body upper", "y of body upper", "z of body upper", "rotation 1 of body upper", "rotation 2 of body upper", "rotation 3 of body upper"};
   ASSERT_EQ(n.size(), 12u + 10 + 3 + 2);
   EXPECT_EQ(std::vector<std::string>(n.begin(), n.begin() + 6), expected);
@@ -66,7 +66,7 @@ TEST(UnknownNames, InSpace)
 
 TEST(UnknownNames, InThePlane)
 {
-  NamedRods                           r(Space::Planar);
+  NamedRods                      r(Space::Planar);
   const std::vector<std::string> n = namesOf(r.scene);
   ASSERT_EQ(n.size(), 6u + 4 + 3 + 2);
   EXPECT_EQ(n[1], "y of body upper");
@@ -79,7 +79,7 @@ TEST(UnknownNames, BesideDroppedRows)
 {
   NamedRods r;
   r.scene.add("again", Revolute{r.scene.marker(r.first, {-1, 0, .5}), r.scene.marker(r.scene.ground(), {0, 0, .5})});
-  r.scene.start().redundant = Redundant::Drop;
+  r.scene.start().redundant        = Redundant::Drop;
   const std::vector<std::string> n = namesOf(r.scene);
   EXPECT_EQ(n.size(), 12u + 10 + 3 + 2);
   EXPECT_EQ(std::set<std::string>(n.begin(), n.end()).size(), n.size());
@@ -89,7 +89,7 @@ TEST(UnknownNames, BesideDroppedRows)
 TEST(UnknownNames, OfAForceThatIsNoNumber)
 {
   NamedRods r;
-  TS   ts;
+  TS        ts;
   r.torn = true;
   must(r.scene.createTS(&ts));
   must(TSSetMaxTime(ts, 1));
