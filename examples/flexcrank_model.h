@@ -37,13 +37,19 @@ struct SimeonRod {
     mixed(2, 0) = line * 16 / (pi * pi * pi);
     mixed(3, 0) = -line * (8 / (pi * pi * pi) - 1 / pi);
     mixed(3, 1) = -line / (2 * pi);
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix4d> modes(K, M);
-    V = modes.eigenvectors();
+    /* bending is uncoupled; stretching is two by two, V = L^-T U with M = L L^T and U of L^-1 K L^-T */
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> stretching;
+    const Eigen::Matrix2d                          L = M.bottomRightCorner<2, 2>().llt().matrixL(), inverse = L.inverse();
+    stretching.computeDirect(inverse * K.bottomRightCorner<2, 2>() * inverse.transpose());
+    V << Eigen::Matrix2d(M.topLeftCorner<2, 2>().diagonal().cwiseSqrt().cwiseInverse().asDiagonal()), Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero(),
+        inverse.transpose() * stretching.eigenvectors();
+    Eigen::Vector4d squares;
+    squares << K.diagonal().head<2>().cwiseQuotient(M.diagonal().head<2>()), stretching.eigenvalues();
 
     body.name   = "rod";
     body.mass   = mass;
     body.center = {length / 2, 0, 0};
-    body.omega  = modes.eigenvalues().cwiseSqrt();
+    body.omega  = squares.cwiseSqrt();
     /* a line but for its thickness in the plane; inertia about its own axis plays no part */
     const double xx = mass * length * length / 12, own = inertia - mass * length * length / 4;
     body.moments    = hhtdae::Vector3(xx, own - xx, 1e-7).asDiagonal();

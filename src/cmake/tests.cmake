@@ -27,19 +27,27 @@ set(serial_environment ${test_environment} OMPI_MCA_ess_singleton_isolated=1 OMP
                        OMPI_MCA_sharedfp=individual HWLOC_COMPONENTS=-gl,-opencl)
 list(APPEND test_environment HWLOC_COMPONENTS=-gl,-opencl)
 
+# What all test programs link: their main program, and solvers of Eigen's that take seconds to compile
+if(GTest_FOUND)
+  file(GLOB common_sources CONFIGURE_DEPENDS tests/*.cpp)
+  add_library(test_common OBJECT EXCLUDE_FROM_ALL ${common_sources})
+  target_include_directories(test_common PRIVATE include)
+  target_compile_options(test_common PRIVATE -O1)
+  target_link_libraries(test_common PRIVATE PkgConfig::PETSC MPI::MPI_CXX Eigen3::Eigen GTest::gtest)
+endif()
+
 # hhtdae_test_program(folder): <folder>_tests from tests/<folder>/*.cpp; sets <folder>_found
 function(hhtdae_test_program folder)
   file(GLOB sources CONFIGURE_DEPENDS tests/${folder}/*.cpp)
-  file(GLOB common CONFIGURE_DEPENDS tests/*.cpp)
+  set(common)
   if(folder STREQUAL verification) # the laws of Newton and Euler for the bodies of a scene
-    file(GLOB balance CONFIGURE_DEPENDS tests/balance/*.cpp)
-    list(APPEND common ${balance})
+    file(GLOB common CONFIGURE_DEPENDS tests/balance/*.cpp)
   endif()
   set(${folder}_found FALSE PARENT_SCOPE)
   if(sources AND GTest_FOUND)
     hhtdae_program(${folder}_tests OPEN PRECOMPILED precompiled_for_tests ${sources} ${common})
     target_include_directories(${folder}_tests PRIVATE src tests tests/${folder})
-    target_link_libraries(${folder}_tests PRIVATE GTest::gtest)
+    target_link_libraries(${folder}_tests PRIVATE test_common GTest::gtest)
     target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
     if(HHTDAE_TOGETHER AND NOT folder MATCHES "^(linear|stability)$") # these are few
       list(LENGTH sources count)

@@ -2,9 +2,9 @@
 #ifndef HHTDAE_TEST_FE_IMPORT_CASES_H
 #define HHTDAE_TEST_FE_IMPORT_CASES_H
 
+#include "dense.h"
 #include "fe_mesh.h"
 #include "hhtdae/flexible.h"
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -37,10 +37,9 @@ inline std::vector<double> Frequencies(const FeModel &model, const std::vector<P
   for (PetscInt n = 0; n < model.nodes; n++)
     for (int c = 0; c < 3 && !std::count(held.begin(), held.end(), n); c++) rows.push_back(3 * n + c);
   const Eigen::MatrixXd K = Dense(model.K)(rows, rows), M = Dense(model.M)(rows, rows);
-  Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(K, M, Eigen::EigenvaluesOnly);
-  std::vector<double>                                       f;
-  for (Eigen::Index k = held.empty() ? 6 : 0; k < solver.eigenvalues().size(); k++)
-    f.push_back(std::sqrt(solver.eigenvalues()[k]) / (2 * PETSC_PI));
+  const Eigen::VectorXd     squares = hhtest::EigenvaluesOf(K, M);
+  std::vector<double>       f;
+  for (Eigen::Index k = held.empty() ? 6 : 0; k < squares.size(); k++) f.push_back(std::sqrt(squares[k]) / (2 * PETSC_PI));
   return f;
 }
 

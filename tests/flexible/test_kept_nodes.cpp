@@ -1,10 +1,10 @@
 /* Kept nodes and load cases of reduced bodies, against the finite-element model that they come from: its stiffness, its volume, its dynamics. */
+#include "dense.h"
 #include "fe_mesh.h"
 #include "hhtdae/flexible.h"
 #include "reduction_cases.h"
 #include "scene/model.h"
 #include "scene_output.h"
-#include <Eigen/Dense>
 #include <numeric>
 
 using namespace hhtest;
@@ -167,11 +167,11 @@ TEST(KeptNodes, StaticsOfTheModel)
       const MatrixXd            M     = dense(s.model.M);
       Eigen::Matrix<double, 6, 1> work;
       work << Vector3::Zero(), load;
-      all += M * rigid * (rigid.transpose() * M * rigid).ldlt().solve(work);
+      all += M * rigid * hhtest::SolveDense(rigid.transpose() * M * rigid, work);
       for (std::size_t a = 0; a < free.size(); a++) f.segment<3>(3 * a) = all.segment<3>(3 * free[a]);
     } else
       f.segment<3>(3 * at) = load;
-    const VectorXd u = Kff.ldlt().solve(f);
+    const VectorXd u = hhtest::SolveDense(Kff, f);
     Scene          scene(PETSC_COMM_SELF);
     FlexibleBody   b;
     b.model          = model;
@@ -344,11 +344,11 @@ TEST(KeptNodes, DynamicsUnderPressure)
         for (int a = 0; a < 4; a++) f.segment<3>(3 * e.node[4 + a]) -= (1 + sign[a][0] * u) * (1 + sign[a][1] * v) / 4 * xu.cross(xv);
       }
   }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eig(dense(s.model.K), dense(s.model.M));
-  VectorXd                                                 u = VectorXd::Zero(f.size());
+  const hhtest::DenseModes eig = hhtest::ModesOf(dense(s.model.K), dense(s.model.M));
+  VectorXd                 u   = VectorXd::Zero(f.size());
   for (Eigen::Index k = 0; k < f.size(); k++) {
-    const double q = eig.eigenvectors().col(k).dot(f) * p, o = std::sqrt(std::max(0.0, eig.eigenvalues()(k)));
-    u += eig.eigenvectors().col(k) * (k < 6 ? q * (t / w - std::sin(w * t) / (w * w)) : q * (std::sin(w * t) - w / o * std::sin(o * t)) / (o * o - w * w));
+    const double q = eig.vectors.col(k).dot(f) * p, o = std::sqrt(std::max(0.0, eig.values(k)));
+    u += eig.vectors.col(k) * (k < 6 ? q * (t / w - std::sin(w * t) / (w * w)) : q * (std::sin(w * t) - w / o * std::sin(o * t)) / (o * o - w * w));
   }
   const double off = (Eigen::Map<const VectorXd>(x.data(), u.size()) - u).norm() / u.norm();
   MEASURED("displacement %.3e, relative difference %.2e", u.cwiseAbs().maxCoeff(), off);
@@ -403,7 +403,7 @@ TEST(KeptNodes, ABlockOnThePlane)
   for (PetscInt i : {(PetscInt)0, (PetscInt)11})
     for (int d : {0, 1}) K(3 * i + d, 3 * i + d) += 1;
   f += dense(s.model.M) * down;
-  const VectorXd u = K.ldlt().solve(f);
+  const VectorXd u = hhtest::SolveDense(K, f);
   double         off = 0, most = 0;
   for (PetscInt i = 0; i < s.model.nodes; i++) {
     off  = std::max(off, std::abs(x[i] - place(s.model, i)(2) - u(3 * i + 2)));

@@ -2,10 +2,10 @@
   The residuals of reduced modes as bounds, on models whose full spectrum is computed densely: the theorems of
   Krylov-Weinstein and Temple-Kato hold for every mode kept, and the residual is not much larger than the error.
 */
+#include "dense.h"
 #include "box_model.h"
 #include "flexible/attachments.h"
 #include "support.h"
-#include <Eigen/Eigenvalues>
 
 using namespace hhtest;
 using namespace hhtdae;
@@ -71,10 +71,8 @@ VectorXd spectrum(const FeModel &model, const Reduction &r, const ReducedBody &b
     if (P.col(k).squaredNorm() > 0) used.push_back(k);
   MatrixXd T(n, used.size());
   for (std::size_t k = 0; k < used.size(); k++) T.col(k) = P.col(used[k]);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> full(T.transpose() * dense(model.K) * T,
-                                                                T.transpose() * dense(model.M) * T,
-                                                                Eigen::EigenvaluesOnly);
-  return full.eigenvalues().tail(full.eigenvalues().size() - 6);
+  const VectorXd all = hhtest::EigenvaluesOf(T.transpose() * dense(model.K) * T, T.transpose() * dense(model.M) * T);
+  return all.tail(all.size() - 6);
 }
 
 struct Reduced {

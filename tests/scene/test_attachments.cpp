@@ -1,5 +1,6 @@
 /* Attachments of flexible bodies, which have no unknowns: their motion and matrix against differences, their results against a part without mass that a fixed
    joint holds to the attachment, whose coordinates and multipliers are unknowns. */
+#include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
 #include "hhtdae/query.h"
 #include "modal_cloud.h"
@@ -74,7 +75,9 @@ struct Tangle {
       scene.add("touch", SphereSphere{a, f, 4, 4, law});
       scene.add("ground contact", SpherePlane{c, ground, 6, law, true});
       const Vector3 from = DataOf(scene).frame(e).x, to = DataOf(scene).frame(g).x;
-      const Matrix3 along = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitX(), to - from).toRotationMatrix();
+      const Matrix3 z = hhtdae::axesAlong(to - from);
+      Matrix3       along;
+      along << z.col(2), z.col(0), z.col(1);
       scene.add("beam", Beam{scene.markerAt(part, to, along), scene.markerAt(scene.attachment(two, "hub"), from, along), -1, 100, 40, 1, 2, 3, 4, 0, 0, 0.1});
       scene.add("distance", PointDistance{a, g});
     } else {

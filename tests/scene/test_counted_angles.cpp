@@ -1,4 +1,5 @@
 /* Angles over full turns in questions to a run, in PETSc's events, in kinematics and in runs that go on from others. */
+#include "hhtdae/helpers.h"
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -21,7 +22,7 @@ struct Wheel {
   explicit Wheel(double speed = 0, Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
     const Vector3 z = space == Space::Planar ? Vector3(0, 0, 1) : Vector3(Vector3(1, 2, 2) / 3);
-    const Matrix3 R = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), z).toRotationMatrix();
+    const Matrix3 R = hhtdae::axesAlong(z);
     RigidBody     b;
     b.rotation         = R;
     b.angular_velocity = speed * z;

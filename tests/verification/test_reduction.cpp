@@ -1,10 +1,10 @@
 /*
   Reduced bodies against published frequencies, against the full model, and against static solutions by dense algebra.
 */
+#include "dense.h"
 #include "box_model.h"
 #include "flexible/attachments.h"
 #include "support.h"
-#include <Eigen/Eigenvalues>
 #include <fstream>
 #include <sstream>
 #include <unistd.h>
@@ -97,7 +97,7 @@ MatrixXd dense(Mat A)
 
 VectorXd frequencies(const MatrixXd &K, const MatrixXd &M)
 {
-  const VectorXd l = Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(K, M, Eigen::EigenvaluesOnly).eigenvalues();
+  const VectorXd l = hhtest::EigenvaluesOf(K, M);
   return l.cwiseMax(0).cwiseSqrt() / (2 * PETSC_PI);
 }
 
@@ -136,9 +136,9 @@ struct Dense {
     MatrixXd u(n, 6);
     for (PetscInt i = 0; i < model.nodes; i++)
       u.middleRows(3 * i, 3) = RigidMotion(NodePosition(model, i), body.modal.center);
-    R                 = P.colPivHouseholderQr().solve(u);
+    R                 = hhtest::LeastSquares(P, u);
     const MatrixXd mR = R.transpose() * M * R;
-    R                 = (R * Eigen::LLT<MatrixXd>(mR).matrixU().solve(MatrixXd::Identity(6, 6))).eval();
+    R                 = (R * hhtest::ModesOf(MatrixXd::Identity(6, 6), mR).vectors).eval();
   }
   /* least squares by the normal equations */
   void average(const FeModel &model, const Attachment &a, const Vector3 &position, std::size_t row)
@@ -152,14 +152,14 @@ struct Dense {
       w.segment<3>(3 * s)              = Vector3::Constant(a.weights.empty() ? 1. : a.weights[s]);
     }
     Q.middleRows(6 * row, 6) =
-        (A.transpose() * w.asDiagonal() * A).ldlt().solve(A.transpose() * w.asDiagonal() * S) * P;
+        hhtest::SolveDense(A.transpose() * w.asDiagonal() * A, A.transpose() * w.asDiagonal() * S) * P;
   }
   /* Elastic displacements, orthogonal to rigid motions in M, under forces that are in equilibrium */
   MatrixXd solve(const MatrixXd &f) const
   {
     const MatrixXd MR = M * R;
     const double   s  = K.diagonal().maxCoeff() / M.diagonal().maxCoeff() * 1e-3;
-    return (K + s * MR * MR.transpose()).ldlt().solve(f);
+    return hhtest::SolveDense(K + s * MR * MR.transpose(), f);
   }
 };
 
@@ -311,7 +311,7 @@ TEST(ReducedFrequencies, GuyanIsStaticCondensation)
   const Dense    full(model, r, body);
   const PetscInt n = (PetscInt)full.K.rows(), i = n - 12;
   MatrixXd       T(n, 12);
-  T << -full.K.topLeftCorner(i, i).ldlt().solve(full.K.topRightCorner(i, 12)), MatrixXd::Identity(12, 12);
+  T << -hhtest::SolveDense(full.K.topLeftCorner(i, i), full.K.topRightCorner(i, 12)), MatrixXd::Identity(12, 12);
   const VectorXd f = frequencies(T.transpose() * full.K * T, T.transpose() * full.M * T);
   ASSERT_EQ(body.modal.modes(), 6);
   for (int k = 0; k < 6; k++) EXPECT_NEAR(body.mode[k].frequency, f[6 + k], 1e-8 * f[6 + k]);
