@@ -197,7 +197,7 @@ private:
       b(2) += s[i] * (1 + s[1 - i]) * y[2 + i] * y[2 + i];
     }
     b(2) -= 2 * co[0] * co[1] * y[2] * y[3];
-    const V x = A.partialPivLu().solve(b);
+    const V x = A.inverse() * b;
     f[0] = y[2], f[1] = y[3], f[2] = x(0), f[3] = x(1);
   }
 };

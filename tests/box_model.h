@@ -4,7 +4,7 @@
 #define HHTDAE_TESTS_BOX_MODEL_H
 
 #include "hhtdae/flexible.h"
-#include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
@@ -33,17 +33,16 @@ inline void boxMust(PetscErrorCode code)
 constexpr int brick_corner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                     {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* K (24 x 24) and m_ij (8 x 8) of one brick, 2 x 2 x 2 points */
-inline void brickMatrices(const Eigen::Matrix<double, 8, 3> &X, const Material &m, Eigen::Matrix<double, 24, 24> *K,
-                          Eigen::Matrix<double, 8, 8> *M)
+/* K (24 x 24) and m_ij (8 x 8) of one brick, 2 x 2 x 2 points; in loops, because 16 sources compile it */
+inline void brickMatrices(const double X[8][3], const Material &m, double K[24][24], double M[8][8])
 {
   const double lame  = m.young * m.poisson / ((1 + m.poisson) * (1 - 2 * m.poisson)),
                shear = m.young / (2 * (1 + m.poisson));
-  K->setZero();
-  M->setZero();
+  std::fill(&K[0][0], &K[0][0] + 24 * 24, 0);
+  std::fill(&M[0][0], &M[0][0] + 8 * 8, 0);
   for (int q = 0; q < 8; q++) {
-    Eigen::Matrix<double, 8, 1> N;
-    Eigen::Matrix<double, 8, 3> dN;
+    double  N[8], dN[8][3], G[8][3];
+    Matrix3 J = Matrix3::Zero();
     for (int a = 0; a < 8; a++) {
       double f[3], d[3];
       for (int c = 0; c < 3; c++) {
@@ -51,18 +50,24 @@ inline void brickMatrices(const Eigen::Matrix<double, 8, 3> &X, const Material &
         f[c] = (1 + s * xi) / 2;
         d[c] = s / 2;
       }
-      N[a] = f[0] * f[1] * f[2];
-      dN.row(a) << d[0] * f[1] * f[2], f[0] * d[1] * f[2], f[0] * f[1] * d[2];
+      N[a]     = f[0] * f[1] * f[2];
+      dN[a][0] = d[0] * f[1] * f[2];
+      dN[a][1] = f[0] * d[1] * f[2];
+      dN[a][2] = f[0] * f[1] * d[2];
+      for (int c = 0; c < 3; c++)
+        for (int e = 0; e < 3; e++) J(c, e) += dN[a][c] * X[a][e];
     }
-    const Matrix3                     J = dN.transpose() * X;
-    const double                      w = J.determinant();
-    const Eigen::Matrix<double, 8, 3> G = dN * J.inverse().transpose();
-    *M += m.density * w * N * N.transpose();
+    const double  w       = J.determinant();
+    const Matrix3 inverse = J.inverse();
+    for (int a = 0; a < 8; a++)
+      for (int c = 0; c < 3; c++) G[a][c] = inverse(c, 0) * dN[a][0] + inverse(c, 1) * dN[a][1] + inverse(c, 2) * dN[a][2];
     for (int a = 0; a < 8; a++)
       for (int b = 0; b < 8; b++) {
-        const Vector3 ga = G.row(a), gb = G.row(b);
-        K->block<3, 3>(3 * a, 3 * b) +=
-            w * (lame * ga * gb.transpose() + shear * (gb * ga.transpose() + ga.dot(gb) * Matrix3::Identity()));
+        M[a][b] += m.density * w * N[a] * N[b];
+        const double both = G[a][0] * G[b][0] + G[a][1] * G[b][1] + G[a][2] * G[b][2];
+        for (int c = 0; c < 3; c++)
+          for (int d = 0; d < 3; d++)
+            K[3 * a + c][3 * b + d] += w * (lame * G[a][c] * G[b][d] + shear * (G[b][c] * G[a][d] + (c == d ? both : 0)));
       }
   }
 }
@@ -171,21 +176,21 @@ private:
   }
   void addElement(const hhtdae::FeElement &e)
   {
-    Eigen::Matrix<double, 8, 3>   X;
-    Eigen::Matrix<double, 24, 24> K;
-    Eigen::Matrix<double, 8, 8>   M;
-    PetscInt                      rows[24];
+    double   X[8][3], K[24][24], M[8][8];
+    PetscInt rows[24];
     for (int a = 0; a < 8; a++) {
-      X.row(a) = position(e.node[a]).transpose();
-      for (int c = 0; c < 3; c++) rows[3 * a + c] = 3 * e.node[a] + c;
+      const Vector3 x = position(e.node[a]);
+      for (int c = 0; c < 3; c++) {
+        X[a][c]         = x[c];
+        rows[3 * a + c] = 3 * e.node[a] + c;
+      }
     }
-    brickMatrices(X, box_.material, &K, &M);
-    boxMust(MatSetValues(model_.K, 24, rows, 24, rows, K.data(),
-                         ADD_VALUES)); /* symmetric: the order of storage does not matter */
+    brickMatrices(X, box_.material, K, M);
+    boxMust(MatSetValues(model_.K, 24, rows, 24, rows, &K[0][0], ADD_VALUES));
     for (int c = 0; c < 3; c++) {
       PetscInt component[8];
       for (int a = 0; a < 8; a++) component[a] = rows[3 * a + c];
-      boxMust(MatSetValues(model_.M, 8, component, 8, component, M.data(), ADD_VALUES));
+      boxMust(MatSetValues(model_.M, 8, component, 8, component, &M[0][0], ADD_VALUES));
     }
   }
 };

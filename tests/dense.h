@@ -1,7 +1,4 @@
-/*
-  Dense linear algebra that results are compared with, by Eigen and not by LAPACK, which the libraries call. It is compiled once:
-  each of these solvers takes seconds in every source that names it.
-*/
+/* Dense linear algebra that results are compared with, by LAPACK and compiled once: each of Eigen's solvers takes seconds in every source that names it. */
 #pragma once
 #include <Eigen/Core>
 
@@ -17,12 +14,12 @@ DenseModes      ModesOf(const Eigen::MatrixXd &K, const Eigen::MatrixXd &M);
 Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd &K, const Eigen::MatrixXd &M);
 Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd &symmetric);
 
-/* A x = b; LeastSquares() where A has more rows than columns */
+/* A x = b for each column of b; LeastSquares() where A has more rows than columns */
 Eigen::MatrixXd  SolveDense(const Eigen::MatrixXd &A, const Eigen::MatrixXd &b);
 Eigen::MatrixXcd SolveComplex(const Eigen::MatrixXcd &A, const Eigen::MatrixXcd &b);
 Eigen::MatrixXd  LeastSquares(const Eigen::MatrixXd &A, const Eigen::MatrixXd &b);
 
-/* Pivots above threshold times the largest */
-Eigen::Index RankOf(const Eigen::MatrixXcd &A, double threshold);
+/* Singular values above threshold times the largest */
+int RankOf(const Eigen::MatrixXcd &A, double threshold);
 
 } // namespace hhtest

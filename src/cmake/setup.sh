@@ -59,13 +59,19 @@ trap 'rm -f "$log"' EXIT
 echo "setup: package lists"
 # A third party's broken list must not stop us: what counts is whether the packages can be installed.
 apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
-for package in $optional; do
-  if apt install -s "$package" >/dev/null 2>&1; then # "apt-cache show" also knows packages that nobody offers any more
-    required="$required $package"
-  else
-    echo "setup: $package is not to be had here, the tests that need it will be skipped"
-  fi
-done
+available() { apt install -s "$@" >/dev/null 2>&1; } # "apt-cache show" also knows packages that nobody offers any more
+# shellcheck disable=SC2086
+if [ -z "$optional" ] || available $optional; then # one question takes seconds
+  required="$required$optional"
+else
+  for package in $optional; do
+    if available "$package"; then
+      required="$required $package"
+    else
+      echo "setup: $package is not to be had here, the tests that need it will be skipped"
+    fi
+  done
+fi
 [ -n "$required" ] || exit 0
 echo "setup: installing$required"
 {

@@ -18,11 +18,20 @@ def check(condition, message):
         sys.exit("FAILED: " + message)
 
 
+def surroundings(command, **environment):
+    """The environment for a command: a process that ctest starts by itself is told to be alone, which ranks are not."""
+    own = {**os.environ, **environment}
+    if os.path.basename(command[0]).startswith("mpi"):
+        own.pop("OMPI_MCA_ess_singleton_isolated", None)
+        own.pop("OMPI_MCA_orte_create_session_dirs", None)
+    return own
+
+
 def run(command, fails=False, cwd=None, seconds=300, **environment):
     """Standard output of a program; fails=True asks for a failure, and returns standard error instead."""
     command = [str(word) for word in command]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=seconds, cwd=cwd,
-                          env={**os.environ, **environment})
+                          env=surroundings(command, **environment))
     if (done.returncode != 0) != fails:
         print(done.stdout[-4000:])
         print(done.stderr[-4000:])

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-from common import check, run
+from common import check, run, surroundings
 from resuming import command, content, states, summary
 
 bin, directory, count = sys.argv[1], sys.argv[2], int(sys.argv[3])
@@ -95,7 +95,7 @@ def disturbed(case):
         if os.path.exists(checkpoint):
             line += ["-ts_hhtdae_resume", checkpoint]
             resumes += 1
-        process = subprocess.Popen(line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=surroundings(line))
         try:
             out, err = process.communicate(timeout=chance.random() * 1.1 * case.seconds if kills < 3 else 300)
         except subprocess.TimeoutExpired:

@@ -65,7 +65,7 @@ struct LieGroup {
         const double d = 1e-5 * (1 + x.norm());
         D.col(k)       = (residual(x + d * Vector3::Unit(k), next, rate, acceleration) - r) / d;
       }
-      const Vector3 dx = D.partialPivLu().solve(r);
+      const Vector3 dx = D.inverse() * r;
       x -= dx;
       if (dx.norm() < 1e-12 * (1 + x.norm())) break;
     }
