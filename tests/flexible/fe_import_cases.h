@@ -29,17 +29,19 @@ inline Eigen::MatrixXd Dense(Mat A)
   return result;
 }
 
-/* Frequencies in cycles, ascending; of an unsupported model without the six rigid ones, or with the nodes of a set held
- */
+/* Frequencies in cycles, ascending; of an unsupported model without the six rigid ones, or with the nodes of a set held. M x = (K + s M) x / (l + s):
+   M is singular where it is integrated with few points. */
 inline std::vector<double> Frequencies(const FeModel &model, const std::vector<PetscInt> &held = {})
 {
   std::vector<Eigen::Index> rows;
   for (PetscInt n = 0; n < model.nodes; n++)
     for (int c = 0; c < 3 && !std::count(held.begin(), held.end(), n); c++) rows.push_back(3 * n + c);
   const Eigen::MatrixXd K = Dense(model.K)(rows, rows), M = Dense(model.M)(rows, rows);
-  const Eigen::VectorXd     squares = hhtest::EigenvaluesOf(K, M);
-  std::vector<double>       f;
-  for (Eigen::Index k = held.empty() ? 6 : 0; k < squares.size(); k++) f.push_back(std::sqrt(squares[k]) / (2 * PETSC_PI));
+  const double          s    = 1e-6 * K.trace() / M.trace();
+  const Eigen::VectorXd flexibilities = hhtest::EigenvaluesOf(M, K + s * M);
+  std::vector<double>   f;
+  for (Eigen::Index k = flexibilities.size() - (held.empty() ? 7 : 1); k >= 0; k--)
+    f.push_back(std::sqrt(1 / std::max(flexibilities[k], 1e-300) - s) / (2 * PETSC_PI));
   return f;
 }
 
