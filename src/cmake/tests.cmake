@@ -229,3 +229,11 @@ foreach(test IN ITEMS python.install integration.docs integration.install integr
     set_tests_properties(${test} PROPERTIES RESOURCE_LOCK documentation)
   endif()
 endforeach()
+
+# What takes longest is begun first, also where no run before has told how long it takes: what is left to the end keeps one processor only.
+foreach(test IN ITEMS integration.instructions integration.install soak.models integration.page integration.resume.1 integration.kill9 integration.hhtreduce
+                      fuzz.readers integration.resume.2)
+  if(TEST ${test})
+    set_tests_properties(${test} PROPERTIES COST 100)
+  endif()
+endforeach()

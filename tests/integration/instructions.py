@@ -17,11 +17,7 @@ build, cmake, configuration = sys.argv[1:4]
 packages = sys.argv[4:]
 here = os.path.join(os.path.dirname(os.path.abspath(__file__)), "outside")
 
-with open("/proc/cpuinfo") as file:
-    processor = set(file.read().split())
 flavours = {"-fsanitize=address -O1": {"ASAN_OPTIONS": "detect_leaks=0"}, "-march=native -O1": {}}
-if {"avx2", "fma"} <= processor:
-    flavours["-mavx2 -mfma -O1"] = {}
 
 with tempfile.TemporaryDirectory(prefix="instructions-", dir=build) as work:
     prefix = os.path.join(work, "prefix")

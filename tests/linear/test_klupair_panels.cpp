@@ -214,7 +214,9 @@ TEST_F(KluPairPanels, AtOnceForManySolves)
   const PetscInt n = 90;
   for (bool often : {false, true}) {
     factor(coupled_blocks(random, n));
-    if (often) OK(LinearSolveOften(A));
+    if (often) {
+      OK(LinearSolveOften(A));
+    }
     leave(1e-14, n);
     again();
     EXPECT_EQ(counts().given_up, 1);

@@ -55,6 +55,8 @@ TEST(SceneCounts, DroppedRows)
     SceneRun  run(scene, 1, "");
     ErrorTrap trap;
     EXPECT_EQ(run.solve() != 0, part);
-    if (part) EXPECT_TRUE(trap.says("rotational motion second: row 1 of 1 (driven angle) was dropped as redundant")) << trap.message;
+    if (part) {
+      EXPECT_TRUE(trap.says("rotational motion second: row 1 of 1 (driven angle) was dropped as redundant")) << trap.message;
+    }
   }
 }

@@ -126,8 +126,9 @@ TEST(NodesAndLoads, MarkersFollowTheirParticles)
   const Eigen::Vector4d eta(&u[6]);
   for (PetscInt i = 0; i < (PetscInt)s.R.bodies.body.size(); i++) {
     const LocalBody &k = s.R.bodies.body[i];
-    if (k.kind == BodyKind::Attached)
+    if (k.kind == BodyKind::Attached) {
       EXPECT_LT((s.R.bodies.now[i].r - c.place((std::size_t)DataOf(scene).bodies[k.id].attachment - 2, frame.r, frame.A, eta)).norm(), 1e-13);
+    }
   }
 }
 

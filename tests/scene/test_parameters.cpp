@@ -145,7 +145,7 @@ TEST(Parameters, AnElementThatMayBeMissing)
   const Body      body = scene.add("block", PointMass());
   const Marker    on = scene.marker(body), at = scene.marker(scene.ground());
   const Element   pin = scene.add("pin", [=] { return held > 0 ? std::optional<Spherical>(Spherical{on, at}) : std::nullopt; });
-  const Element   wind = scene.add("wind", UserForce{on, {}, {}, {Expression{{}, [](const Real *) -> Real { return 0.0; }}, Measure::time(), Measure::time()}});
+  const Element   wind = scene.add("wind", UserForce{on, {}, {}, {Expression{{}, [](const Real *) -> Real { return 0.0; }}, Measure::time(), Measure::time()}, {}});
   scene.gravity({0, 0, -2});
   scene.channel("z", Measure::displacement(on, 2));
   scene.channel("reaction", Measure::jointForce(pin, 2));
@@ -191,7 +191,7 @@ TEST(Parameters, AFunctionReadsThePresentValue)
   const Body      body = scene.add("block", PointMass());
   const Marker    on   = scene.marker(body);
   const auto      none = Expression{{}, [](const Real *) -> Real { return 0.0; }};
-  scene.add("push", UserForce{on, {}, {}, {none, none, Expression{{}, [=](const Real *) -> Real { return push.value(); }}}});
+  scene.add("push", UserForce{on, {}, {}, {none, none, Expression{{}, [=](const Real *) -> Real { return push.value(); }}}, {}});
   scene.channel("v", Measure::velocity(on, 2));
   SceneRun            run(scene, 1, tolerance(1e-8));
   std::vector<double> x;
