@@ -186,8 +186,9 @@ PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided
-   difference of the predictor (at a double node). Not if the rates are too wild to be believed. */
+/* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided difference of the predictor (at a double
+   node). Rates that are too wild to be believed are left out, but for those of states: without them the error of the first step would not know these
+   (FirstStep.StatesAfterARestart). */
 PetscErrorCode MakeHistory(TS ts, Vec rate)
 {
   Integrator        &I = Get(ts);
@@ -206,23 +207,23 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   const PetscReal e = errors.at(h);
   I.corrector.wlte  = e;
   PetscCall(TimeScaleOfAccelerations(ts, rate, &T));
-  if (I.fixed_h ? h * h * h > T * T : e > 100) { /* fixed steps know no tolerance: of the coordinates */
-    PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar j, PetscScalar &x, PetscScalar &d) {
-      const TSHHT3Role r = RoleOf(I, i);
-      if (IsDifferential(r)) x += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j;
-      if (r == TSHHT3_COORDINATE) d = x;
-    },
-    Read(rate), Write(I.X0), Write(p.D[0])));
-  if (e > 0) PetscCall(StartMisfit(ts, rate));
-  if (e > 0 && (p.degree_max > 0 || I.count[TSHHT3_STATE])) {
+  const bool believed = I.fixed_h ? h * h * h <= T * T : e <= 100; /* fixed steps know no tolerance: of the coordinates */
+  if (believed) {
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar j, PetscScalar &x, PetscScalar &d) {
+        const TSHHT3Role r = RoleOf(I, i);
+        if (IsDifferential(r)) x += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j;
+        if (r == TSHHT3_COORDINATE) d = x;
+      },
+      Read(rate), Write(I.X0), Write(p.D[0])));
+    if (e > 0) PetscCall(StartMisfit(ts, rate));
+  } else PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
+  const bool follows = believed && e > 0 && p.degree_max > 0;
+  if (follows || I.count[TSHHT3_STATE]) {
     if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
     PetscCall(VecCopy(rate, p.D[1]));
     p.available = 1;
-    p.degree    = PetscMin(1, p.degree_max);
+    p.degree    = follows ? 1 : 0;
     p.t[1]      = p.t[0];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
