@@ -90,15 +90,20 @@ TEST(Formulas, ErrorConstantOfThePosition)
   }
 }
 
-/* The same for s''' = 1, s = t^3/6 */
+/* s = t^3/6 in steps of 1, of which w is a polynomial of second degree, too; the backward differentiation of second order has 1/3 */
 TEST(Formulas, ErrorConstantOfAState)
 {
-  for (double rho : {0., .5, .9, 1.}) {
+  for (double rho : {0., .1, .3, .5, .9, 1.}) {
     const Parameters p = RadiusParameters(rho);
-    const double     l = p.lagState(), w0 = l * l / 2, w1 = (1 + l) * (1 + l) / 2;
-    const double     s1 = (1 - p.gamma_s) * w0 + p.gamma_s * w1;
-    EXPECT_NEAR(s1 - 1. / 6., p.k_s, 1e-15);
+    const double     l = p.lagState();
+    const auto       w = [&](double t) { return t * t / 2. + l * t + l * (p.am_s - .5); };
+    for (double t : {0., 1., 7.}) {
+      const double average = (1. - p.am_s) * w(t + 1.) + p.am_s * w(t), rates = (1. - p.af_s) * (t + 1.) * (t + 1.) / 2. + p.af_s * t * t / 2.;
+      EXPECT_NEAR(average, rates, 1e-13);
+      EXPECT_NEAR(t * t * t / 6. + (1. - p.gamma_s) * w(t) + p.gamma_s * w(t + 1.) - std::pow(t + 1., 3) / 6., p.k_s, 1e-13) << rho;
+    }
   }
+  EXPECT_NEAR(RadiusParameters(0.).k_s, 1. / 3., 1e-15);
 }
 
 /* The scalings turn shifts into the derivatives of (2): sigma_v D_c = gamma h, sigma_a D_c = ca */
