@@ -60,31 +60,33 @@ static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *par
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What Taylor's series of first order leaves out of states, h^2/2 s'', in units of the tolerance */
-static PetscErrorCode TaylorErrorOfStates(TS ts, PetscReal h, PetscReal *e)
+/* What Taylor's series leaves out of coordinates, h^3/6 q''', and of states, h^2/2 s'', in units of the tolerance; 0 where no rates are known */
+static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
 {
   const Integrator &I     = Get(ts);
   PetscReal         local = 0, sum;
 
   PetscFunctionBegin;
   *e = 0;
-  if (!I.count[TSHHT3_STATE] || I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar rate, PetscScalar w) { local += PetscSqr(PetscRealPart(rate * w)); }, Read(I.predictor.D[1]), Read(I.weight)));
+  if (I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar rate, PetscScalar w) { local += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
+    Read(I.predictor.D[1]), Read(I.weight)));
   PetscCallMPI(MPI_Allreduce(&local, &sum, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  *e = h * h / 2 * PetscSqrtReal(sum / PetscMax(I.norm_size, 1));
+  *e = PetscSqrtReal(sum / PetscMax(I.norm_size, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
   A step so short that rounding of Phi would drown the accelerations: TSEvent may ask for one, or the
   final time. q and q' advance by Taylor series, whose error is far below rounding of the corrector's, and accelerations
-  and multipliers are made consistent anew. States must not miss more than the corrector leaves of them: beside a mechanism at rest, whose accelerations
-  all are rounding, they may need many such steps (FirstStep.StatesBesideAMechanismAtRest).
+  and multipliers are made consistent anew. They must not miss more than the corrector leaves: where accelerations are rounding, as at rest, ordinary steps
+  look so short (FirstStep.StatesBesideAMechanismAtRest, FirstStep.DrivenFromNoAcceleration).
 */
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 {
   const Integrator &I = Get(ts);
-  PetscReal         part, states;
+  PetscReal         part, missed;
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
@@ -92,8 +94,8 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
   if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > 1e-4 * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
   if (part <= 0.01) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TaylorErrorOfStates(ts, h, &states));
-  *tiny = (PetscBool)(states <= CorrectorTolerance(I));
+  PetscCall(TaylorError(ts, h, &missed));
+  *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -473,6 +473,55 @@ TEST(FirstStep, StatesBesideAMechanismAtRest)
   }
 }
 
+/* x = sin 3 t is prescribed to a mass: without acceleration at first, which makes no ordinary step a tiny one */
+TEST(FirstStep, DrivenFromNoAcceleration)
+{
+  struct Driven : Problem {
+    Driven()
+    {
+      name = "driven";
+      n    = 2;
+      t1   = 0.5;
+      role = {TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+    }
+    void initial(double *u, double *v) const override { u[0] = u[1] = v[1] = 0., v[0] = 3.; }
+    void residual(double t, const double *u, const double *, const double *a, double *f) const override
+    {
+      f[0] = a[0] + u[1];
+      f[1] = u[0] - std::sin(3. * t);
+    }
+    void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+    {
+      J.add(0, 0, sa);
+      J.add(0, 1, 1.);
+      J.add(1, 0, 1.);
+    }
+  };
+  const Driven p;
+  for (double eps : {1e-8, 1e-9, 1e-10}) {
+    double     error = 0.;
+    Simulation run(p, tolerance(eps));
+    run.watch = [&](Simulation &r, PetscInt, double t) { widen(error, std::abs(r.u()[1] - 9. * std::sin(3. * t))); };
+    must(run.solve());
+    MEASURED("%g: multiplier off by %.1e of 9", eps, error);
+    EXPECT_LT(error, 2e-3) << eps;
+  }
+}
+
+/* Their error follows the tolerance at every spectral radius */
+TEST(FirstStep, StatesOfEveryRadius)
+{
+  PetscInt steps;
+  double   first, least = 1., most = 0.;
+  for (const char *radius : {"0", "0.10102", "0.3", "0.54", "0.8", "1"}) {
+    const double error = errorOfFollower(Follower(1.), tolerance(1e-6) + "-ts_hhtdae_radius " + radius, 0, &steps, &first);
+    MEASURED("radius %s: error %.1e in %d steps", radius, error, (int)steps);
+    least = std::min(least, error);
+    most  = std::max(most, error);
+  }
+  EXPECT_LT(most, 4. * least);
+}
+
 /* Steps from a restart are of second order, though s changes by far more than the tolerance within one */
 TEST(BetweenRuns, RestartsOfStates)
 {
