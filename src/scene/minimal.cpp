@@ -341,8 +341,10 @@ PetscErrorCode Linearization::stateSpace(const std::vector<Excitation> &in, cons
   Dense             CD(no, n + nf);
   for (Eigen::Index k = 0; k < n + nf; k++) {
     SmallMotion x;
+    double      largest;
     Unknowns<double>(w, m, Eigen::VectorXd::Unit(n + nf, k), x);
-    for (Eigen::Index o = 0; o < no; o++) PetscCall(w.derivative(out[o], x, &CD(o, k)));
+    PetscCall(w.displacement({x[0].begin(), x[0].end()}, &largest));
+    for (Eigen::Index o = 0; o < no; o++) PetscCall(w.derivative(out[o], x, largest, &CD(o, k)));
   }
   auto rows = [](const Dense &X) {
     std::vector<double> y;

@@ -2,6 +2,7 @@
 #include "linearization.h"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hhtdae
 {
@@ -33,12 +34,14 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
 }
 
 /* Differences of fourth order at one reach after the other: along most of a small motion measures are polynomials, or nearly so, and two agree at once.
-   Where a force is steep, as those of contacts are, the first ones are outside of where it is linear; too near, they are rounding. */
-PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double *x) const
+   Where a force is steep, as those of contacts are, the first ones are outside of where it is linear; too near, they are rounding of the measure, which is
+   no derivative of 0: where it is large, as a pressure or a reaction under preload, those that reach further are tried as well
+   (Linearize.MeasuresFarFromZero). `largest`: displacement of the motion that this is a part of. */
+PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double largest, double *x) const
 {
   constexpr double weight[2] = {8. / 12, -1. / 12}, agree = 1e-9;
   Vec              d[3], at[3];
-  double           largest = 0, here, before = 0, best = INFINITY;
+  double           here, before = NAN, best = INFINITY;
   PetscFunctionBegin;
   for (int c = 0; c < 3; c++) at[c] = state[c];
   PetscCall(moved.take(*R, t, at));
@@ -48,13 +51,13 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
     PetscCall(VecDuplicate(state[0], &at[c]));
   }
   PetscCall(toState(along, d));
-  for (PetscInt i = 0; i < R->n; i++)
-    if (coordinate(i)) largest = std::max(largest, std::abs(along[0][i]));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
   *x = 0;
-  for (double reach : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
-    const double e   = reach * std::min(1., size) / (largest > 0 ? largest : 1);
-    double       now = 0;
+  double     now = 0, rounding = 0;
+  const auto attempt = [&](double reach) -> PetscErrorCode {
+    const double e = reach * std::min(1., size) / (largest > 0 ? largest : 1);
+    PetscFunctionBegin;
+    now      = 0;
+    rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(here) / e;
     for (int k = 1; k <= 2; k++)
       for (int side : {1, -1}) {
         double y;
@@ -65,18 +68,37 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
         if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* half a turn is both pi and -pi */
         now += side * weight[k - 1] * y / e;
       }
-    const double change = reach < 1e-3 ? std::abs(now - before) : INFINITY;
+    const double change = std::abs(now - before) + rounding;
     if (change < best) {
       best = change;
       *x   = now;
     }
     before = now;
-    if (best <= agree * std::abs(now)) break;
+    PetscFunctionReturn(0);
+  };
+  for (double reach : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
+    PetscCall(attempt(reach));
+    if (best <= agree * std::abs(now) || 10 * rounding > best) break;
+  }
+  if (rounding > 0 && !(best <= 1e3 * agree * std::abs(*x))) {
+    before = NAN;
+    for (double reach : {1e-3, 1e-2, 1e-1, 1.}) PetscCall(attempt(reach));
   }
   for (int c = 0; c < 3; c++) {
     PetscCall(VecDestroy(&d[c]));
     PetscCall(VecDestroy(&at[c]));
   }
+  PetscFunctionReturn(0);
+}
+
+/* The largest displacement on all ranks */
+PetscErrorCode Linearization::Work::displacement(const std::vector<std::complex<double>> &x, double *largest) const
+{
+  PetscFunctionBegin;
+  *largest = 0;
+  for (PetscInt i = 0; i < R->n; i++)
+    if (coordinate(i)) *largest = std::max(*largest, std::abs(x[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
   PetscFunctionReturn(0);
 }
 
@@ -135,8 +157,9 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
 
 PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const std::vector<std::complex<double>> &x, std::complex<double> s, std::complex<double> *y)
 {
-  double part[2];
+  double part[2], largest;
   PetscFunctionBegin;
+  PetscCall(w.displacement(x, &largest)); /* of both parts: one of them may be next to nothing in coordinates, and not in states */
   for (int imaginary = 0; imaginary < 2; imaginary++) {
     SmallMotion          along;
     std::complex<double> power = 1;
@@ -144,7 +167,7 @@ PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const
       along[k].resize(x.size());
       for (std::size_t i = 0; i < x.size(); i++) along[k][i] = imaginary ? (power * x[i]).imag() : (power * x[i]).real();
     }
-    PetscCall(w.derivative(m, along, &part[imaginary]));
+    PetscCall(w.derivative(m, along, largest, &part[imaginary]));
   }
   *y = {part[0], part[1]};
   PetscFunctionReturn(0);

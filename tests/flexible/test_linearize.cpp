@@ -105,6 +105,45 @@ TEST(Linearize, ResponseOfAnOscillator)
   }
 }
 
+/* A state p of the size of pressures follows the slider, p' = 2 (x - 2): differences of it are not rounding of p0 */
+TEST(Linearize, MeasuresFarFromZero)
+{
+  for (double p0 : {0., 1e5, 1e7, 2e8, 1e9}) {
+    Slider         s;
+    const Measure  x = Measure::displacement(s.at, 2, s.ground, s.ground);
+    const State    p = s.scene.state("pressure", Expression{{x}, [](const Real *a) -> Real { return 2. * (a[0] - 2.); }}, p0);
+    const Started        start(s.scene);
+    std::vector<Complex> h, of_x;
+    must(start.small.response(s.push, Measure::value(p), {1.}, &h));
+    must(start.small.response(s.push, x, {1.}, &of_x));
+    const Complex expected = 2. * of_x[0] / Complex(0, 1);
+    MEASURED("p0 = %g: %.1e", p0, std::abs(h[0] / expected - 1.));
+    EXPECT_LT(std::abs(h[0] / expected - 1.), 1e-6) << p0;
+    StateSpace z;
+    must(start.small.stateSpace({s.push}, {Measure::value(p)}, &z));
+    double most = 0;
+    for (double entry : z.C) most = std::max(most, std::abs(entry));
+    EXPECT_GT(most, 1e-3) << p0;
+  }
+}
+
+/* A force that is steep in a state: where the displacement is in phase, the other part of the state is not differentiated at an endless reach */
+TEST(Linearize, BothPartsOfASteepFunction)
+{
+  for (double damping : {0., 1e-12, 1e-3}) {
+    Slider        s(damping);
+    const Measure v = Measure::velocity(s.at, 2, s.ground, s.ground);
+    const State   q = s.scene.state("sensor", Expression{{v}, [](const Real *a) -> Real { return a[0]; }}, 0);
+    const auto    zero = Expression{{}, [](const Real *) -> Real { return 0.; }}, steep = Expression{{Measure::value(q)}, [](const Real *a) -> Real { return 1e-9 * tanh(50. * a[0]); }};
+    const Element f = s.scene.add("reading", UserForce{s.at, {}, s.ground, {zero, zero, steep}, {}});
+    const Started start(s.scene);
+    std::vector<Complex> h, of_q;
+    must(start.small.response(s.push, Measure::elementForce(f, s.at, 2, s.ground), {3., 30.}, &h));
+    must(start.small.response(s.push, Measure::value(q), {3., 30.}, &of_q));
+    for (int k = 0; k < 2; k++) EXPECT_LT(std::abs(h[k] / (50e-9 * of_q[k]) - 1.), 1e-5) << damping << " " << h[k] << " " << of_q[k];
+  }
+}
+
 /* Two rods that hang from one another: M and K of the angles */
 TEST(Linearize, DoublePendulum)
 {
