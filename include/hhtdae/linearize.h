@@ -13,7 +13,7 @@
     M x'' + C x' + K x = b f,
 
   x: displacements and small rotations of bodies, and all other unknowns as they are. M, C and K are those of this moment: modes are motions where
-  the state is at rest, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
+  the state is in equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
 
     the body that take() is given         a driven hub for its blades, the rotor for a shaft that is not round; modes in axes of a round rotor are
                                           those in space, faster or slower by its speed

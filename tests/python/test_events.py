@@ -54,6 +54,27 @@ class Zeros(unittest.TestCase):
             np.testing.assert_allclose(q[:, 0], x, rtol=0, atol=1e-13)
 
 
+class Conditions(unittest.TestCase):
+    def test_begin_and_end(self):
+        """A ball that is thrown is above 1.2 for a while"""
+        times = [(3 - s * math.sqrt(9 - 2 * G * 0.2)) / G for s in (1, -1)]
+        for formula, direction, wanted in ((lambda z: z > 1.2, 0, times), (lambda z: z > 1.2, 1, times[:1]), (lambda z: z > 1.2, -1, times[1:]),
+                                           (lambda z: z < 1.2, 1, times[1:]), (lambda z: (z > 1.2) & (z < 5), 0, times)):
+            scene = h.Scene(gravity=(0, 0, -G))
+            b = scene.add("ball", h.PointMass(position=(0, 0, 1), velocity=(0, 0, 3)))
+            run, seen = scene.run(tolerance=1e-8), []
+            run.event(formula(h.displacement(b.marker(), 2)), lambda r: seen.append(r.time), direction=direction)
+            run.solve(1.)
+            np.testing.assert_allclose(seen, wanted, rtol=0, atol=1e-6)
+
+    def test_no_number(self):
+        scene, z, v = ball()
+        run = scene.run(tolerance=1e-6)
+        run.event(h.sqrt(z - 0.5))
+        with self.assertRaisesRegex(ValueError, "event 0: its formula is not a number"):
+            run.solve(1.)
+
+
 class Bounces(unittest.TestCase):
     def test_at_the_floor(self):
         """All bounces at height zero, also those of which the next step would hold thousands"""

@@ -22,6 +22,8 @@ __all__ = ["Expression", "Parameter", "TimeFunction", "abs_", "arccos", "arcsin"
            "sqrt", "step", "step5", "tan", "tanh", "time_values", "where"]
 
 
+CONDITIONS = ("less", "less_equal", "equal", "logical_not", "logical_and", "logical_or")
+
 _describing = []  # not empty while a function describes, which is called again when parameters have changed
 
 

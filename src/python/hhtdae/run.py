@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from .events import Signs
-from .expressions import _expression
+from .expressions import CONDITIONS, _expression
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
 from .spec import check_parameters, number
@@ -195,7 +195,7 @@ class Run(Channels):
         Parameters
         ----------
         formula : Expression
-            A measure, or a formula of measures. Full turns of an `angle` that no element and no channel reads are counted from this call's time on or later:
+            A measure, or a formula of measures; a condition, as ``x < 0.3``, passes upwards where it becomes true. Full turns of an `angle` that no element and no channel reads are counted from this call's time on or later:
             make a channel of it.
         action : callable, optional
             action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes what a callback
@@ -210,6 +210,8 @@ class Run(Channels):
         if action is not None and not callable(action):
             raise TypeError("event(): action is %r, must be a function of the run" % (action,))
         formula = _expression(formula)
+        if formula.op in CONDITIONS:
+            formula = formula - 0.5
         check_parameters(ordered([formula]), self.scene, "event()")
         self._events.append((formula, action, terminal))
         self._signs.add(direction)
@@ -221,7 +223,10 @@ class Run(Channels):
 
     def _event_value(self, k, time):
         self._now.take(time)
-        return self._now.value(self._events[k][0])
+        value = self._now.value(self._events[k][0])
+        if value != value:
+            raise ValueError("event %d: its formula is not a number (NaN) at t = %.9g" % (k, time))
+        return value
 
     def _look(self, ts):
         """After a step, before monitors see it: where something passes zero the step is taken back to the first passage, which ends TSSolve(). So outputs
@@ -384,8 +389,8 @@ class Run(Channels):
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None, axes: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step, which has to be at rest, or steady as seen from the body `axes`, from flexible bodies or from
-        space: see `Linearization`. Collective."""
+        """Small motions about the state at a time of the last step, which has to be in equilibrium, at rest without accelerations, or steady as seen from the
+        body `axes`, from flexible bodies or from space: see `Linearization`. Collective."""
         return Linearization(self, time, axes)
 
     # ---- the rest ----

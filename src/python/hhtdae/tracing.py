@@ -1,7 +1,7 @@
 """What is done with formulas: tracing Python functions, tapes for the C++ part, derivatives."""
 
 from . import _core
-from .expressions import Expression, TimeFunction, _constant, _expression, _node, _power, _unary, cos, cosh, sin, sinh, sqrt, where
+from .expressions import CONDITIONS, Expression, TimeFunction, _constant, _expression, _node, _power, _unary, cos, cosh, sin, sinh, sqrt, where
 
 
 def trace(function, count, what):
@@ -131,11 +131,10 @@ def differentiate(roots, arguments):
     for n in order:
         depends[id(n)] = {n.value} if n.op == "argument" else set().union(*[depends[id(x)] for x in n.operands]) if n.operands else set()
     factors, result = {}, {}
-    constant = ("less", "less_equal", "equal", "logical_and", "logical_or", "logical_not")
     for k in arguments:
         d = {}
         for n in order:
-            if k not in depends[id(n)] or n.op in constant:
+            if k not in depends[id(n)] or n.op in CONDITIONS:
                 continue
             if n.op == "argument":
                 d[id(n)] = _expression(1.)
