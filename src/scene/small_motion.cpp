@@ -41,7 +41,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
 {
   constexpr double weight[2] = {8. / 12, -1. / 12}, agree = 1e-9;
   Vec              d[3], at[3];
-  double           here, before = NAN, best = INFINITY;
+  double           here, before = INFINITY, best = INFINITY;
   PetscFunctionBegin;
   for (int c = 0; c < 3; c++) at[c] = state[c];
   PetscCall(moved.take(*R, t, at));
@@ -68,7 +68,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
         if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* half a turn is both pi and -pi */
         now += side * weight[k - 1] * y / e;
       }
-    const double change = std::abs(now - before) + rounding;
+    const double change = std::abs(now - before) + rounding; /* infinite for the first one */
     if (change < best) {
       best = change;
       *x   = now;
@@ -81,7 +81,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
     if (best <= agree * std::abs(now) || 10 * rounding > best) break;
   }
   if (rounding > 0 && !(best <= 1e3 * agree * std::abs(*x))) {
-    before = NAN;
+    before = INFINITY;
     for (double reach : {1e-3, 1e-2, 1e-1, 1.}) PetscCall(attempt(reach));
   }
   for (int c = 0; c < 3; c++) {
