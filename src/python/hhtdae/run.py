@@ -289,7 +289,7 @@ class Run(Channels):
         self._open().restartStep()
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
-        """Calls function(run) after every step."""
+        """Calls function(run) after every step. Where it sets parameters that make a formula jump, it has to call `restart`."""
         begun = 0
 
         def monitor(ts, step, t, u):

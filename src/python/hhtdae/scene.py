@@ -172,6 +172,8 @@ class Scene:
 
         What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
         which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
+        Between parts of a run, in `Run.on_step` and in actions of events where a value makes a formula jump call `Run.restart`: steps across a jump lose accuracy.
+        `Run.step_by` does so by itself.
         """
         values = {name: number(value, "parameter " + name) for name, value in values.items()}
         for name in sorted(values, key=lambda name: name in self._parameters):  # all or none: one that there is not is an error before others are set
