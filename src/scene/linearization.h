@@ -35,7 +35,7 @@ struct Linearization::Work {
   PetscErrorCode differentiate();
   PetscErrorCode chooseUnits();
   PetscErrorCode derivative(const Measure &m, const SmallMotion &along, double largest, double *x) const; /* how a measure changes */
-  PetscErrorCode displacement(const std::vector<std::complex<double>> &x, double *largest) const;
+  PetscErrorCode displacement(const std::vector<std::complex<double>> &x, double *largest) const; /* the largest one */
   PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
   PetscErrorCode drive(Element e, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;

@@ -82,7 +82,10 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
   }
   if (rounding > 0 && !(best <= 1e3 * agree * std::abs(*x))) {
     before = INFINITY;
-    for (double reach : {1e-3, 1e-2, 1e-1, 1.}) PetscCall(attempt(reach));
+    for (double reach : {1e-3, 1e-2, 1e-1, 1.}) {
+      PetscCall(attempt(reach));
+      if (best <= agree * std::abs(now)) break;
+    }
   }
   for (int c = 0; c < 3; c++) {
     PetscCall(VecDestroy(&d[c]));

@@ -179,8 +179,8 @@ class Excitation:
 class Linearization:
     """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
 
-    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: modes are motions where the state is in equilibrium,
-    or steady as seen from the axes that x is in. These are at this moment those of space and turn with the body `axes` (a driven hub for its blades); without one,
+    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: modes are motions where the state is in
+    equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space and turn with the body `axes` (a driven hub for its blades); without one,
     with the flexible bodies where all of them turn alike; else, or where `axes` is `scene.ground`, they stand still: an axisymmetric rotor of rigid discs at
     speed is steady as seen from space. A swinging rod is steady from nowhere. Modes in axes of a round rotor are those in space, faster or slower by its speed.
     """
