@@ -56,9 +56,12 @@ progress() {
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-echo "setup: package lists"
-# A third party's broken list must not stop us: what counts is whether the packages can be installed.
-apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
+# Lists of the last minutes are those of this target's first call.
+if [ -z "$(find /var/lib/apt/lists/partial -maxdepth 0 -mmin -20 2>/dev/null)" ]; then
+  echo "setup: package lists"
+  # A third party's broken list must not stop us: what counts is whether the packages can be installed.
+  apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
+fi
 available() { apt install -s "$@" >/dev/null 2>&1; } # "apt-cache show" also knows packages that nobody offers any more
 # shellcheck disable=SC2086
 if [ -z "$optional" ] || available $optional; then # one question takes seconds
