@@ -12,8 +12,8 @@
 
     M x'' + C x' + K x = b f,
 
-  x: displacements and small rotations of bodies, and all other unknowns as they are. M, C and K are those of this moment: modes are motions where
-  the state is in equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
+  x: displacements and small rotations of bodies, and all other unknowns as they are. M, C and K are those of this moment: small motions go on with
+  them where the state is in equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
 
     the body that take() is given         a driven hub for its blades, the rotor for a shaft that is not round; modes in axes of a round rotor are
                                           those in space, faster or slower by its speed
@@ -21,8 +21,12 @@
     nothing                               else, and where take() is given the ground: an axisymmetric rotor of rigid discs at speed is steady as
                                           seen from space
 
-  A swinging rod is steady from nowhere. Of flexible bodies that do not turn alike a notice says so. Loads and
-  measures of space axes turn with the axes.
+  Of flexible bodies that do not turn alike a notice says so. Loads and measures of space axes turn with the axes.
+
+  A swinging rod is steady from nowhere. There modes() and stateSpace() are of the rates that small motions have at this moment, how constraints change
+  along the motion included: A is the derivative of (z', z'') by (z, z'), where z are lengths along what constraints leave, in units of masses. Of a single freedom
+  they are those of its path whatever the speed: the rod has value^2 = -m g l cos(angle)/J. What is sparse, response() and SlowestModes(), takes constraints as they
+  are at this moment: it is of equilibria and steady motions.
   All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
 */
 #ifndef HHTDAE_LINEARIZE_H

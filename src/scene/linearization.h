@@ -1,4 +1,4 @@
-/* What the parts of a linearization share: linearize.cpp makes it, minimal.cpp and response.cpp solve it, small_motion.cpp reads what they find. */
+/* What the parts of a linearization share: linearize.cpp makes it, minimal.cpp, with row_rates.cpp, and response.cpp solve it, small_motion.cpp reads what they find. */
 #ifndef HHTDAE_SCENE_LINEARIZATION_H
 #define HHTDAE_SCENE_LINEARIZATION_H
 
@@ -12,11 +12,17 @@ namespace hhtdae
 /* x, x', x'' of own unknowns */
 using SmallMotion = std::array<std::vector<double>, 3>;
 
+/* Rates of rows of C and K along the motion that is linearized, by all unknowns; second: of the rates */
+struct RowRates {
+  Eigen::MatrixXd C, K, second_K;
+};
+
 struct Linearization::Work {
   TS                         start = nullptr;   /* of a run that has not begun: one that has made the first step in its place */
   Runtime                   *R = nullptr;
   double                     t = 0, size = 1; /* of the scene */
   Vector3                    spin = Vector3::Zero(), spin_rate = Vector3::Zero(); /* of the axes of displacements and rotations */
+  Matrix3                    axes = Matrix3::Identity(); /* these axes in space */
   Vec                        state[3] = {};   /* u, u', u'' */
   Mat                        M = nullptr, C = nullptr, K = nullptr;
   Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
@@ -38,8 +44,15 @@ struct Linearization::Work {
   PetscErrorCode displacement(const std::vector<std::complex<double>> &x, double *largest) const; /* the largest one */
   PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
   PetscErrorCode drive(Element e, std::vector<double> *b) const;
+  PetscErrorCode push(const Excitation &in, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
+  PetscErrorCode rates(const std::vector<PetscInt> &rows, RowRates *out) const;
+  PetscErrorCode fastest(double *rate) const;
+  PetscErrorCode nearby(double later, double time, Work *w) const;
 };
+
+/* All of a distributed matrix on every rank */
+PetscErrorCode Whole(Mat A, Eigen::MatrixXd &out);
 
 /* The amplitude of a measure in the motion Re(x exp(s t)) */
 PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const std::vector<std::complex<double>> &x, std::complex<double> s, std::complex<double> *y);

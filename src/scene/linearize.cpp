@@ -75,7 +75,7 @@ void LocalRates(const double *x, const double *w, const double *alpha, Matrix3 T
 struct Turning {
   Matrix3 S[3][3];
 
-  Turning(const Vector3 &spin, const Vector3 &rate)
+  Turning(const Vector3 &spin, const Vector3 &rate, const Matrix3 &axes)
   {
     const Matrix3 W = Cross<double>(spin);
     for (auto &row : S)
@@ -84,6 +84,8 @@ struct Turning {
     S[1][0] = W;
     S[2][1] = 2 * W;
     S[2][0] = Cross<double>(rate) + W * W;
+    for (auto &row : S)
+      for (Matrix3 &x : row) x = x * axes;
   }
 
   void before(Matrix3 T[3][3]) const
@@ -115,7 +117,7 @@ PetscErrorCode PutTurn(Linearization::Work &w, PetscInt first, int n, const Matr
 PetscErrorCode MakeTurns(Linearization::Work &w)
 {
   Runtime      &R = *w.R;
-  const Turning by(w.spin, w.spin_rate);
+  const Turning by(w.spin, w.spin_rate, w.axes);
   const double *s[3];
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(w.state[k], &s[k]));

@@ -2,14 +2,16 @@
   Small motions in minimal coordinates, by dense algebra, the same on every rank.
 
   From positions q, velocities v, first-order states s and inputs f, accelerations and whatever is algebraic follow by the differentiated
-  constraints:
+  constraints, rates of whose rows along the motion have a dot:
 
-    W (q'', s', lambda, V, F) = b f - K_q q - C_q v - K_s s,    rows of constraints: Phi_q q'' = 0,  Psi_v q'' = -Psi_q v - Psi_s s'
+    W (q'', s', lambda, V, F) = b f - K_q q - C_q v - K_s s,    rows of constraints: Phi_q q'' = -2 Phi_q. v - Phi_q.. q,
+                                                                Psi_v q'' = -(Psi_v. + Psi_q) v - Psi_q. q - Psi_s s' - Psi_s. s
 
   Positions are q = N z, N an orthonormal basis of what Phi_q leaves; velocities v = L y + P q + S s, L of what Phi_q and Psi_v leave, P and S the least
-  ones for which Psi_v v = -Psi_q q - Psi_s s. So
+  ones for which Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q - Psi_s s. Where the rows change, N and L go with them by the least rates, so that their columns are moved
+  parallel to themselves: coordinates of a single freedom are lengths along its path, in units of masses, whatever the speed. So
 
-    z' = N^T v,    y' = L^T q'',    s' from above.
+    z' = N^T v,    y' = L^T q'' + L.^T (P q + S s),    s' from above.
 
   All of this is in coordinates for which masses are 1 (Work::unit) and with rows of constraints of length 1: metres, radians and modal coordinates are not
   of one size, the less so the smaller the bodies are, and what is orthonormal in them loses digits (SmallBodies.StateSpace).
@@ -32,29 +34,6 @@ using Dense   = Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr PetscInt most = 1000; /* unknowns: a minute for all modes */
-
-/* All of a distributed matrix on every rank */
-PetscErrorCode Whole(Mat A, Dense &out)
-{
-  Mat         one;
-  PetscMPIInt size;
-  PetscInt    n;
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)A), &size));
-  PetscCall(MatGetSize(A, &n, nullptr));
-  PetscCall(MatCreateRedundantMatrix(A, size, MPI_COMM_NULL, MAT_INITIAL_MATRIX, &one));
-  out = Dense::Zero(n, n);
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt           count;
-    const PetscInt    *column;
-    const PetscScalar *value;
-    PetscCall(MatGetRow(one, i, &count, &column, &value));
-    for (PetscInt k = 0; k < count; k++) out(i, column[k]) = value[k];
-    PetscCall(MatRestoreRow(one, i, &count, &column, &value));
-  }
-  PetscCall(MatDestroy(&one));
-  PetscFunctionReturn(0);
-}
 
 /* Own entries of every rank, on every rank */
 template <class T> PetscErrorCode Gather(const Linearization::Work &w, MPI_Datatype type, const std::vector<T> &own, std::vector<T> &all)
@@ -153,8 +132,8 @@ Dense Scaled(Dense W, Dense right)
   return column.asDiagonal() * right;
 }
 
-/* Matrices to units in which masses are 1 and rows of constraints have length 1, with the multipliers that belong to them */
-void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K)
+/* Matrices to units in which masses are 1 and rows of constraints have length 1, with the multipliers that belong to them; and the rates of these rows */
+void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscInt> &constraints, RowRates &rates)
 {
   for (Dense *X : {&M, &C, &K}) *X = m.unit.asDiagonal() * *X * m.unit.asDiagonal();
   Eigen::VectorXd row = Eigen::VectorXd::Ones(m.unit.size());
@@ -165,6 +144,8 @@ void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K)
     }
   for (Dense *X : {&M, &C, &K}) *X = row.asDiagonal() * *X * row.asDiagonal();
   m.unit.array() *= row.array();
+  for (Dense *X : {&rates.C, &rates.K, &rates.second_K})
+    for (Eigen::Index i = 0; i < X->rows(); i++) X->row(i) = m.unit(constraints[i]) * X->row(i) * m.unit.asDiagonal();
 }
 
 PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation> &in, Minimal &m)
@@ -188,22 +169,30 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   m.rest.insert(m.rest.end(), m.velocity.begin(), m.velocity.end());
   m.rest.insert(m.rest.end(), definitions.begin(), definitions.end());
   m.unit = Eigen::Map<const Eigen::VectorXd>(unit.data(), n);
-  ToUnits(m, M, C, K);
-
-  const Subspace position(Block(K, m.holonomic, m.q));
   std::vector<PetscInt> both = m.holonomic;
   both.insert(both.end(), m.velocity.begin(), m.velocity.end());
-  Dense rates(both.size(), m.q.size()), rest_q = Dense::Zero(rates.rows(), rates.cols()), rest_s = Dense::Zero(rates.rows(), m.ds());
-  const Eigen::Index h = (Eigen::Index)m.holonomic.size();
-  rates << Block(K, m.holonomic, m.q), Block(C, m.velocity, m.q);
-  rest_q.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.q);
-  rest_s.bottomRows(rates.rows() - h) = -Block(K, m.velocity, m.s);
-  const Subspace motion(rates);
+  RowRates rates;
+  PetscCall(w.rates(both, &rates));
+  ToUnits(m, M, C, K, both, rates);
+
+  const Subspace     position(Block(K, m.holonomic, m.q));
+  const Eigen::Index h = (Eigen::Index)m.holonomic.size(), nr = (Eigen::Index)both.size();
+  const auto         rate = [&](const Dense &X, const std::vector<PetscInt> &columns) {
+    std::vector<PetscInt> all(nr);
+    std::iota(all.begin(), all.end(), 0);
+    return Block(X, all, columns);
+  };
+  Dense of_v(nr, m.q.size()), of_q(nr, m.q.size()), of_s = Dense::Zero(nr, m.ds()), of_v_rate = rate(rates.C, m.q);
+  of_v << Block(K, m.holonomic, m.q), Block(C, m.velocity, m.q);
+  of_v_rate.topRows(h) = rate(rates.K, m.q).topRows(h);
+  of_q << of_v_rate.topRows(h), Block(K, m.velocity, m.q);
+  of_s.bottomRows(nr - h) = Block(K, m.velocity, m.s);
+  const Subspace motion(of_v);
   PetscCheck(position.independent() && motion.independent(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: the constraints depend on one another in this position, where the number of degrees of freedom is not defined");
   m.N = position.free;
   m.L = motion.free;
-  m.P = motion.least(rest_q);
-  m.S = motion.least(rest_s);
+  m.P = motion.least(-of_q);
+  m.S = motion.least(-of_s);
 
   /* W, and the right-hand side for (q, v, s, f) */
   std::vector<PetscInt> rows(n);
@@ -222,19 +211,11 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
                  "Linearization::stateSpace(): input %d is a motion of a displacement or velocity, whose derivatives would be inputs, too: make it one of an acceleration, "
                  "or ask response()", (int)f);
   }
-  for (PetscInt i : m.holonomic) {
-    W.row(i).setZero();
-    right.row(i).setZero();
-    for (Eigen::Index k = 0; k < nq; k++) W(i, k) = K(i, m.q[k]);
-  }
-  for (PetscInt i : m.velocity) {
-    W.row(i).setZero();
-    right.row(i).setZero();
-    for (Eigen::Index k = 0; k < nq; k++) {
-      W(i, k)          = C(i, m.q[k]);
-      right(i, nq + k) = -K(i, m.q[k]);
-    }
-    for (Eigen::Index k = 0; k < ns; k++) W(i, nq + k) = K(i, m.s[k]);
+  const Dense of_v_second = of_v_rate + of_q, of_q_second = rate(rates.K, m.q), of_s_second = rate(rates.K, m.s), second = rate(rates.second_K, m.q);
+  for (Eigen::Index k = 0; k < nr; k++) {
+    const PetscInt i = both[k];
+    W.row(i) << of_v.row(k), of_s.row(k), Dense::Zero(1, n - nq - ns);
+    right.row(i) << -(k < h ? second : of_q_second).row(k), -of_v_second.row(k), -(double)(k >= h) * of_s_second.row(k), Dense::Zero(1, nf);
   }
   Dense expand = Dense::Zero(2 * nq + ns + nf, m.states() + nf);
   expand.block(0, 0, nq, m.dz())                       = m.N;
@@ -245,10 +226,12 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   m.y = Scaled(W, right * expand);
   PetscCheck(m.y.allFinite(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: accelerations and multipliers do not follow from the state: the constraints are singular there");
 
-  Dense rate(m.states(), m.states() + nf);
-  rate << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq), m.y.middleRows(nq, ns);
-  m.A = rate.leftCols(m.states());
-  m.B = rate.rightCols(nf);
+  Dense       result(m.states(), m.states() + nf), aside = expand.middleRows(nq, nq);
+  const Dense turn = motion.least(-of_v_rate * m.L);
+  aside.middleCols(m.dz(), m.dy()).setZero();
+  result << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq) + turn.transpose() * aside, m.y.middleRows(nq, ns);
+  m.A = result.leftCols(m.states());
+  m.B = result.rightCols(nf);
   PetscFunctionReturn(0);
 }
 

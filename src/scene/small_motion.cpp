@@ -122,14 +122,27 @@ PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) con
 
 PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<double> *b) const
 {
-  const SceneData &s = R->scene;
-  Motion           m, centre;
+  double largest = 0;
   PetscFunctionBegin;
   b->assign(R->n, 0);
   if (in.driven.id >= 0) {
     PetscCall(drive(in.driven, b));
     PetscFunctionReturn(0);
   }
+  PetscCall(push(in, b));
+  for (double x : *b) largest = std::max(largest, std::abs(x));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
+  PetscCheck(largest > 0 || (in.load.isZero(0) && in.moment.isZero(0)), comm(), PETSC_ERR_ARG_WRONG,
+             "Linearization: the load of an excitation, force (%g, %g, %g) and moment (%g, %g, %g), moves nothing: the body %s %s", in.load(0), in.load(1), in.load(2), in.moment(0), in.moment(1), in.moment(2),
+             R->scene.bodies[R->scene.markers[in.at.id].body].name.c_str(), R->scene.planar ? "stays in the plane" : "does not turn");
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::Work::push(const Excitation &in, std::vector<double> *b) const
+{
+  const SceneData &s = R->scene;
+  Motion           m, centre;
+  PetscFunctionBegin;
   PetscCheck(s.valid(in.at), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is not one of this scene");
   const PetscInt body = s.markers[in.at.id].body;
   PetscCheck(in.load.allFinite() && in.moment.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: force or moment of an excitation is not a number");

@@ -241,6 +241,163 @@ TEST(Linearize, DifferenceOfTwoTumblingRuns)
   }
 }
 
+/* Coordinates of a single freedom are lengths along its path in units of masses, s'' = -dV/ds - c s', whatever the speed: a rod at a height, a swing and a
+   spin where no state is steady */
+TEST(Linearize, APendulumThatSwings)
+{
+  constexpr double mass = 2, half = 0.7, J = 0.4 + mass * half * half, g = 9.81, damping = 0.8;
+  for (Space kind : {Space::Planar, Space::Spatial})
+    for (Rotations rotations : {Rotations::Local, Rotations::Euler313})
+      for (double speed : {0., 3., -20.}) {
+        const double angle = 1.1;
+        Scene        scene(PETSC_COMM_SELF, kind);
+        RigidBody    b     = body(mass, {0.4, 0.1, 0.4}, half * Vector3(std::sin(angle), -std::cos(angle), 0));
+        b.rotation         = Eigen::AngleAxisd(angle, Vector3::UnitZ()).toRotationMatrix();
+        b.angular_velocity = {0, 0, speed};
+        b.velocity         = b.angular_velocity.cross(b.position);
+        scene.start().rotations = rotations;
+        scene.gravity({0, -g, 0});
+        const Body   rod = scene.add("rod", b);
+        const Marker pin = scene.marker(rod, {0, half, 0}), ground = scene.marker(scene.ground());
+        scene.add("pin", Revolute{pin, ground});
+        scene.add("damper", TorsionalSpringDamper{pin, ground, 0, damping, 0});
+        const Started start(scene);
+        for (const Mode &mode : start.modes()) {
+          const Complex s = mode.value;
+          EXPECT_LT(std::abs(J * s * s + damping * s + mass * g * half * std::cos(angle)), 1e-6) << speed << " " << s;
+        }
+      }
+}
+
+/* The same of a slider-crank by what its energies are of the crank's angle */
+TEST(Linearize, ASliderCrankAtSpeed)
+{
+  constexpr double r = 0.3, l = 0.8, m1 = 1, m2 = 2, m3 = 1.5, J1 = 0.02, J2 = 0.15, stiffness = 300, g = 9.81;
+  const auto       at = [&](double a, double *inertia) { /* potential energy, and kinetic energy at a speed of 1 */
+    const double b = std::asin(r * std::sin(a) / l), db = r * std::cos(a) / (l * std::cos(b)), x = r * std::cos(a) + l * std::cos(b);
+    const double dx = -r * std::sin(a) - l * std::sin(b) * db, dx2 = -r * std::sin(a) - l / 2 * std::sin(b) * db, dy2 = l / 2 * std::cos(b) * db;
+    *inertia = m1 * r * r / 4 + J1 + m2 * (dx2 * dx2 + dy2 * dy2) + J2 * db * db + m3 * dx * dx;
+    return m1 * g * r / 2 * std::sin(a) + m2 * g * l / 2 * std::sin(b) + stiffness / 2 * (x - 0.5) * (x - 0.5);
+  };
+  for (double speed : {0., 4., 25.}) {
+    constexpr double angle = 0.9, e = 1e-3;
+    double           J[3], V[3];
+    for (int k = -1; k <= 1; k++) V[k + 1] = at(angle + k * e, &J[k + 1]);
+    const double expected = -((V[2] - 2 * V[1] + V[0]) / (e * e) - (V[2] - V[0]) * (J[2] - J[0]) / (8 * e * e * J[1])) / J[1];
+    const double b = std::asin(r * std::sin(angle) / l), db = r * std::cos(angle) / (l * std::cos(b));
+    Scene        scene(PETSC_COMM_SELF);
+    scene.gravity({0, -g, 0});
+    const auto turned = [](double a) { return Eigen::AngleAxisd(a, Vector3::UnitZ()).toRotationMatrix(); };
+    RigidBody  crank  = body(m1, {1, 1, J1}, r / 2 * Vector3(std::cos(angle), std::sin(angle), 0)), rod = body(m2, {1, 1, J2}), slider = body(m3, {1, 1, 1});
+    crank.rotation         = turned(angle);
+    crank.angular_velocity = {0, 0, speed};
+    crank.velocity         = crank.angular_velocity.cross(crank.position);
+    rod.rotation           = turned(-b);
+    rod.angular_velocity   = {0, 0, -db * speed};
+    rod.position           = 2 * crank.position + l / 2 * Vector3(std::cos(b), -std::sin(b), 0);
+    rod.velocity           = 2 * crank.velocity + rod.angular_velocity.cross(rod.position - 2 * crank.position);
+    slider.position        = {r * std::cos(angle) + l * std::cos(b), 0, 0};
+    slider.velocity        = {-speed * (r * std::sin(angle) + l * std::sin(b) * db), 0, 0};
+    const Body   one = scene.add("crank", crank), two = scene.add("rod", rod), three = scene.add("slider", slider);
+    const Marker ground = scene.marker(scene.ground()), piston = scene.marker(three);
+    scene.add("main", Revolute{scene.marker(one, {-r / 2, 0, 0}), ground});
+    scene.add("big end", Revolute{scene.marker(two, {-l / 2, 0, 0}), scene.marker(one, {r / 2, 0, 0})});
+    scene.add("small end", Revolute{scene.marker(two, {l / 2, 0, 0}), piston});
+    scene.add("slide", Translational{scene.marker(three, {0, 0, 0}, axesAlong({1, 0, 0})), scene.marker(scene.ground(), {0, 0, 0}, axesAlong({1, 0, 0}))});
+    scene.add("spring", SpringDamper{piston, scene.marker(scene.ground(), {-1, 0, 0}), stiffness, 0, 1.5});
+    const Started start(scene);
+    for (const Mode &mode : start.modes()) EXPECT_LT(std::abs(mode.value * mode.value - expected), 1e-4 * std::abs(expected)) << speed << " " << mode.value << " " << expected;
+  }
+}
+
+namespace
+{
+
+/* Measures of a run at a time, and of its linearization */
+struct Constrained {
+  std::vector<Measure> state, second;
+  void                 add(Marker at)
+  {
+    for (int c = 0; c < 3; c++) {
+      state.push_back(Measure::displacement(at, c));
+      state.push_back(Measure::velocity(at, c));
+      second.push_back(Measure::acceleration(at, c));
+    }
+  }
+};
+
+/* Two rods in space, from a ball joint and a hinge between them, or a disc that rolls; k: which of the initial values is different by `apart` */
+Constrained constrained(Scene &scene, bool rolls, int k, double apart)
+{
+  const auto  by = [&](int i) { return i == k ? apart : 0.; };
+  Constrained measures;
+  if (rolls) {
+    constexpr double r = 0.3;
+    RigidBody        b = body(1.5, {0.03, 0.03, 0.06});
+    b.rotation         = (Eigen::AngleAxisd(0.4 + by(0), Vector3::UnitZ()) * Eigen::AngleAxisd(-M_PI / 2 + 0.3 + by(1), Vector3::UnitX())).toRotationMatrix();
+    b.angular_velocity = b.rotation * Vector3(0.4 + by(2), 1.5 + by(3), 6 + by(4));
+    const Vector3 axis = b.rotation.col(2), down = (axis * axis(2) - Vector3::UnitZ()).normalized();
+    b.position         = {0.1 + by(5), 0.2, -r * down(2)};
+    b.velocity         = b.angular_velocity.cross(-r * down);
+    scene.gravity({0, 0, -9.81});
+    const Body disc = scene.add("disc", b);
+    scene.add("rolls", hhtdae::RollingDisc{scene.marker(disc), scene.marker(scene.ground()), r});
+    for (const Vector3 &p : {Vector3(0, 0, 0), Vector3(0.2, 0, 0), Vector3(0, 0.1, 0.2)}) measures.add(scene.marker(disc, p));
+    return measures;
+  }
+  const Matrix3 A = Eigen::AngleAxisd(0.5 + by(0), Vector3(1 + by(1), 2, -1).normalized()).toRotationMatrix(), B = A * Eigen::AngleAxisd(0.8 + by(2), Vector3::UnitZ()).toRotationMatrix();
+  RigidBody     one = body(1, {0.1, 0.2, 0.25}, A * Vector3(0.5, 0, 0)), two = body(2, {0.05, 0.3, 0.3});
+  one.rotation         = A;
+  one.angular_velocity = A * Vector3(1 + by(3), -2, 3 + by(4));
+  one.velocity         = one.angular_velocity.cross(one.position);
+  two.rotation         = B;
+  two.position         = A * Vector3(1, 0, 0) + B * Vector3(0.4, 0, 0);
+  two.angular_velocity = one.angular_velocity + A * Vector3(0, 0, -4 + by(5));
+  two.velocity         = 2 * one.velocity + two.angular_velocity.cross(B * Vector3(0.4, 0, 0));
+  scene.gravity({0, -9.81, 0});
+  const Body first = scene.add("first", one), second = scene.add("second", two);
+  scene.add("ball", Spherical{scene.marker(first, {-0.5, 0, 0}), scene.marker(scene.ground())});
+  scene.add("hinge", Revolute{scene.marker(second, {-0.4, 0, 0}), scene.marker(first, {0.5, 0, 0})});
+  for (Body b : {first, second})
+    for (const Vector3 &p : {Vector3(0, 0, 0), Vector3(0.2, 0, 0), Vector3(0, 0.1, 0.2)}) measures.add(scene.marker(b, p));
+  return measures;
+}
+
+} // namespace
+
+/* What the reduction makes of constraints that change along the motion: from differences of positions and velocities between two runs follow those of
+   accelerations */
+TEST(Linearize, DifferenceOfTwoConstrainedRuns)
+{
+  constexpr double apart = 1e-4;
+  for (bool rolls : {false, true})
+    for (int k = 0; k < 6; k++) {
+      Eigen::VectorXd value[3], second[3];
+      StateSpace      space, of_second;
+      for (int run : {0, 1, 2}) {
+        Scene             scene(PETSC_COMM_SELF);
+        const Constrained m = constrained(scene, rolls, k, (run - 1) * apart);
+        const Started     start(scene);
+        Snapshot          now;
+        must(now.take(start.run.ts, 0));
+        value[run].resize((Eigen::Index)m.state.size());
+        second[run].resize((Eigen::Index)m.second.size());
+        for (std::size_t i = 0; i < m.state.size(); i++) must(now.value(m.state[i], &value[run]((Eigen::Index)i)));
+        for (std::size_t i = 0; i < m.second.size(); i++) must(now.value(m.second[i], &second[run]((Eigen::Index)i)));
+        if (run != 1) continue;
+        must(start.small.stateSpace({}, m.state, &space));
+        must(start.small.stateSpace({}, m.second, &of_second));
+      }
+      using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      const Eigen::Map<const Rows> C(space.C.data(), space.outputs, space.states), C2(of_second.C.data(), of_second.outputs, of_second.states);
+      const Eigen::VectorXd        y = value[2] - value[0], x = (C.transpose() * C).inverse() * (C.transpose() * y), y2 = second[2] - second[0];
+      EXPECT_EQ(space.states, 8);
+      EXPECT_GT(y.norm(), apart / 10);
+      EXPECT_LT((C * x - y).norm(), 1e-6 * y.norm()) << rolls << " " << k;
+      EXPECT_LT((C2 * x - y2).norm(), 1e-5 * y2.norm() + 1e-3 * apart) << rolls << " " << k << ": of " << y2.norm();
+    }
+}
+
 /* A force that is linear only within a hundredth of a millimetre */
 TEST(Linearize, SteepForces)
 {
@@ -515,6 +672,21 @@ TEST(Linearize, ErrorsThatSayWhatToDo)
   EXPECT_TRUE(trap.says("must be finite")) << trap.message;
   EXPECT_NE(SlowestModes(small, 0, &modes), 0);
   EXPECT_TRUE(trap.says("must be positive")) << trap.message;
+}
+
+/* Inputs that a body cannot follow */
+TEST(Linearize, LoadsThatMoveNothing)
+{
+  StateSpace space;
+  ErrorTrap  trap;
+  for (bool planar : {false, true}) {
+    Scene        scene(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
+    const Marker at = scene.marker(planar ? scene.add("plate", body(1, {1, 1, 1})) : scene.add("ball", PointMass{1}));
+    const Started start(scene);
+    EXPECT_NE(start.small.stateSpace({Excitation::torque(at, {1, 0, 0})}, {Measure::velocity(at, 0)}, &space), 0);
+    EXPECT_TRUE(trap.says(planar ? "the body plate stays in the plane" : "the body ball does not turn")) << trap.message;
+    must(start.small.stateSpace({Excitation::force(at, {1, 0, 0})}, {Measure::velocity(at, 0)}, &space));
+  }
 }
 
 /* A table that is shaken along x, with a mass on spring and damper: x/y = (k + i w c)/(k - m w^2 + i w c), by motions of displacement, velocity and

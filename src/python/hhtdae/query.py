@@ -179,10 +179,13 @@ class Excitation:
 class Linearization:
     """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
 
-    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: modes are motions where the state is in
+    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: small motions go on with them where the state is in
     equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space and turn with the body `axes` (a driven hub for its blades); without one,
     with the flexible bodies where all of them turn alike; else, or where `axes` is `scene.ground`, they stand still: an axisymmetric rotor of rigid discs at
-    speed is steady as seen from space. A swinging rod is steady from nowhere. Modes in axes of a round rotor are those in space, faster or slower by its speed.
+    speed is steady as seen from space. Modes in axes of a round rotor are those in space, faster or slower by its speed.
+
+    A swinging rod is steady from nowhere. There `modes()` without a count and `state_space()` are of the rates that small motions have at this moment, how
+    constraints change along the motion included; `response()` and `modes(count)`, which are sparse, are of equilibria and steady motions.
     """
 
     def __init__(self, run, time=None, axes=None):

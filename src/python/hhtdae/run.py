@@ -389,8 +389,8 @@ class Run(Channels):
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None, axes: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step, which has to be in equilibrium, at rest without accelerations, or steady as seen from the
-        body `axes`, from flexible bodies or from space: see `Linearization`. Collective."""
+        """Small motions about the state at a time of the last step: in equilibrium, at rest without accelerations, or steady as seen from the body `axes`, from
+        flexible bodies or from space; in any other state `modes()` and `state_space()` alone: see `Linearization`. Collective."""
         return Linearization(self, time, axes)
 
     # ---- the rest ----
