@@ -93,7 +93,6 @@ PETSC_EXTERN PetscErrorCode TSHHT3SetIS(TS, TSHHT3Role, IS);
 PETSC_EXTERN PetscErrorCode TSHHT3GetIS(TS, TSHHT3Role, IS *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStart(TS, TSHHT3Start);
 PETSC_EXTERN PetscErrorCode TSHHT3SetNodes(TS, IS, Vec);
-PETSC_EXTERN PetscErrorCode TSHHT3SetLengths(TS, IS);
 
 /* New generalized coordinates in the course of a run: whether, the map of (U, U', U''), and the word that it is done */
 typedef PetscErrorCode (*TSHHT3ChangeTest)(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx);

@@ -2,6 +2,8 @@
   Time derivatives of the constraints, where the application gives none: one-sided differences of its residual along q + tau q'. They are exact in
   q'' by construction, blind to what happened before t (a motion may start there), and each row takes the step tau at which it is most accurate:
   where its derivative changes least from one tau to the next. A row that depends on time itself begins with a tau that resolves this (excitation.cpp).
+  Where the longest tau is the best one of a row, rounding decides, as where coordinates are large numbers and one of them happens to be near 0: longer
+  ones are tried, as far as they move nothing by more than the largest coordinate.
 */
 #include "consistent.h"
 #include "entries.h"
@@ -18,6 +20,8 @@ namespace
 
 constexpr int       levels = 9, points = 6; /* of a row: tau = T/10, T/40, ...; of fourth order in tau */
 constexpr int       max_levels = 32;        /* of all rows */
+constexpr int       longer = 16;            /* levels -1, -2, ...: tau = 4 T/10, 16 T/10, ... (Units.ForcesOfTheStart) */
+constexpr signed char none = -longer - 1;
 
 PetscReal Tau(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
 
@@ -40,20 +44,23 @@ struct Best {
   Best(std::vector<signed char> &at, const std::vector<signed char> &begin, PetscInt n, bool again)
     : last(n, 0), value(n, 0), change(n, PETSC_MAX_REAL), level(at), from(begin), known(again)
   {
-    if (!known) level.assign((size_t)n, -1);
+    if (!known) level.assign((size_t)n, none);
   }
-  /* noise: what rounding of the coordinates makes of x. Over a tau that is too short for anything to change the differences vanish, and agree (Units.DifferencesThatVanish). */
+  /* noise: what rounding of the coordinates makes of x. Over a tau that is too short for anything to change the differences vanish, and agree (Units.ForcesOfTheStart).
+     Of longer tau only those that go on from the longest so far, if that was the best. */
   void take(PetscInt i, int l, PetscReal x, PetscReal noise)
   {
-    const PetscReal d  = PetscMax(PetscAbsReal(x - last[i]), noise);
-    const int       nth = from.empty() ? l : l - from[i];
-    if (known ? l == level[i] : nth > 0 && nth < levels && d < change[i]) { /* false for NaN */
+    const PetscReal d    = PetscMax(PetscAbsReal(x - last[i]), noise);
+    const int       nth  = from.empty() ? l : l - from[i];
+    const bool      next = l < 0 ? asksFor(i, l) : nth > 0 && nth < levels;
+    if (known ? l == level[i] : next && d < change[i]) { /* false for NaN */
       change[i] = d;
       value[i]  = x;
       level[i]  = (signed char)l;
     }
     last[i] = x;
   }
+  bool asksFor(PetscInt i, int l) const { return l == -1 ? level[i] == 1 : level[i] == l + 1; }
 };
 
 template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
@@ -63,43 +70,42 @@ template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
   return sum;
 }
 
-/* Rounding of the largest coordinate */
-PetscErrorCode RoundingOf(const Integrator &I, Vec U, PetscReal *rounding)
+/* The largest of a vector's coordinates */
+PetscErrorCode LargestCoordinate(const Integrator &I, Vec U, PetscReal *largest)
 {
   PetscReal most = 0;
 
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar u) { if (IsCoordinate(I, i)) most = PetscMax(most, PetscAbsScalar(u)); }, Read(U)));
-  PetscCallMPI(MPI_Allreduce(&most, rounding, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)U)));
-  *rounding *= PETSC_MACHINE_EPSILON;
+  PetscCallMPI(MPI_Allreduce(&most, largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)U)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
-PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[max_levels])
+PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[longer + max_levels])
 {
-  PetscBool any[max_levels] = {};
+  PetscBool any[longer + max_levels] = {};
 
   PetscFunctionBegin;
   for (size_t i = 0; i < I.role.size(); i++) {
     if (!IsConstraint(I, (PetscInt)i)) continue;
     const bool holonomic = I.role[i] == TSHHT3_HOLONOMIC;
-    const int  one = first && holonomic ? I.levels[0][i] : -1, two = second ? I.levels[holonomic ? 1 : 0][i] : -1;
-    if (one >= 0) any[one] = PETSC_TRUE;
-    if (two >= 0) any[two] = PETSC_TRUE;
+    const int  one = first && holonomic ? I.levels[0][i] : none, two = second ? I.levels[holonomic ? 1 : 0][i] : none;
+    for (int level : {one, two})
+      if (level != none) any[longer + level] = PETSC_TRUE;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, max_levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
-  for (int l = 0; l < max_levels; l++) used[l] = any[l];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, longer + max_levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+  for (int l = 0; l < longer + max_levels; l++) used[l] = any[l];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* First levels of rows that follow time, and which levels are to be looked at */
-PetscErrorCode LevelsToTry(const Integrator &I, PetscReal T, std::vector<signed char> &from, bool (&used)[max_levels])
+PetscErrorCode LevelsToTry(const Integrator &I, PetscReal T, std::vector<signed char> &from, bool (&used)[longer + max_levels])
 {
   const int last = I.excitation ? FirstLevel(T, I.fastest) : 0;
 
   PetscFunctionBegin;
-  for (int l = 0; l < max_levels; l++) used[l] = l < last + levels;
+  for (int l = -longer; l < max_levels; l++) used[longer + l] = l >= 0 && l < last + levels;
   if (last == 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ForEntries([&](PetscInt, PetscScalar x) { from.push_back((signed char)FirstLevel(T, PetscRealPart(x))); }, Read(I.excitation)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -120,6 +126,49 @@ PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Ve
   PetscCall(F.like(U));
   PetscCall(EvaluateResidual(ts, t, U, V, first, F)); /* `first` is zero yet */
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &x) { if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) x = f; }, Read(F), Write(first)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums of differences over tau, per row: first and second derivatives */
+PetscErrorCode DifferencesOver(TS ts, PetscReal t, Vec U, Vec V, PetscReal tau, const std::vector<PetscReal> &f0, std::vector<PetscReal> &s1, std::vector<PetscReal> &s2)
+{
+  WorkVec Ut, F, zero;
+
+  PetscFunctionBegin;
+  PetscCall(Ut.like(U));
+  PetscCall(F.like(U));
+  PetscCall(zero.like(U));
+  PetscCall(VecZeroEntries(zero));
+  s1 = s2 = f0;
+  for (size_t i = 0; i < f0.size(); i++) {
+    s1[i] *= first_weights[0];
+    s2[i] *= second_weights[0];
+  }
+  for (int j = 1; j < points; j++) {
+    PetscCall(VecWAXPY(Ut, j * tau, V, U));
+    PetscCall(ResidualAlong(ts, t + j * tau, Ut, V, zero, F));
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar f) {
+        s1[i] += first_weights[j] * PetscRealPart(f);
+        s2[i] += second_weights[j] * PetscRealPart(f);
+      },
+      Read(F)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether any row of any rank asks for a tau as long as that of level l < 0, and none of what moves is moved further than the largest coordinate */
+PetscErrorCode IsLongerOf(TS ts, const Best &d1, const Best &d2, int l, PetscReal tau, PetscReal speed, PetscReal largest, PetscBool *yes)
+{
+  const Integrator &I    = Get(ts);
+  PetscBool         asks = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (!d1.from.empty() || (I.excitation && tau > I.fastest) || (points - 1) * tau * speed > largest) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < (PetscInt)I.role.size() && !asks; i++)
+    if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = PETSC_TRUE;
+  PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,11 +193,11 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second)
 {
   Integrator            &I = Get(ts);
-  WorkVec                Ut, F, zero;
+  WorkVec                at, F, zero;
   PetscInt               n;
-  PetscBool              rest;
-  bool                   used[max_levels];
-  PetscReal              rounding;
+  PetscBool              rest, more;
+  bool                   used[longer + max_levels];
+  PetscReal              largest, speed;
   std::vector<PetscReal> f0, s1, s2;
   std::vector<signed char> from;
 
@@ -158,43 +207,40 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
     PetscCall(DerivativesAtRest(ts, t, U, V, first, second));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(RoundingOf(I, U, &rounding));
+  PetscCall(LargestCoordinate(I, U, &largest));
+  PetscCall(LargestCoordinate(I, V, &speed));
   PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(Ut.like(U));
+  PetscCall(at.like(U));
   PetscCall(F.like(U));
   PetscCall(zero.like(U));
+  PetscCall(VecCopy(U, at));
   PetscCall(VecZeroEntries(zero));
   again = again && I.levels_known;
   if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
   else PetscCall(LevelsToTry(I, T, from, used));
   f0.resize(n);
   Best d1(I.levels[0], from, n, again), d2(I.levels[1], from, n, again);
-  PetscCall(VecCopy(U, Ut));
-  PetscCall(ResidualAlong(ts, t, Ut, V, zero, F));
+  PetscCall(ResidualAlong(ts, t, at, V, zero, F));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
-  for (int level = 0; level < max_levels; level++) {
-    if (!used[level]) continue;
-    const PetscReal tau = Tau(T, level);
-    s1 = s2 = f0;
-    for (PetscInt i = 0; i < n; i++) {
-      s1[i] *= first_weights[0];
-      s2[i] *= second_weights[0];
-    }
-    for (int j = 1; j < points; j++) {
-      PetscCall(VecWAXPY(Ut, j * tau, V, U));
-      PetscCall(ResidualAlong(ts, t + j * tau, Ut, V, zero, F));
-      PetscCall(ForEntries(
-        [&](PetscInt i, PetscScalar f) {
-          s1[i] += first_weights[j] * PetscRealPart(f);
-          s2[i] += second_weights[j] * PetscRealPart(f);
-        },
-        Read(F)));
-    }
+  const auto attempt = [&](int level) -> PetscErrorCode {
+    const PetscReal tau = t + Tau(T, level) - t, rounding = PETSC_MACHINE_EPSILON * largest; /* t + j tau without rounding (Units.LateInTime) */
+    PetscFunctionBegin;
+    if (!(tau > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(DifferencesOver(ts, t, U, V, tau, f0, s1, s2));
     for (PetscInt i = 0; i < n; i++) {
       if (!IsConstraint(I, i)) continue;
       d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding / tau);
       d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding / (tau * tau));
     }
+    PetscFunctionReturn(PETSC_SUCCESS);
+  };
+  for (int level = -longer; level < max_levels; level++)
+    if (used[longer + level]) PetscCall(attempt(level));
+  for (int level = -1; level >= -longer && !again; level--) {
+    PetscCall(IsLongerOf(ts, d1, d2, level, Tau(T, level), speed, largest, &more));
+    if (!more) break;
+    if (level == -1) PetscCall(attempt(0)); /* the one before it */
+    PetscCall(attempt(level));
   }
   I.levels_known = PETSC_TRUE;
   for (int order = 1; order <= 2; order++) {

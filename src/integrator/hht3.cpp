@@ -207,7 +207,6 @@ PetscErrorCode Destroy(TS ts)
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
   PetscCall(VecDestroy(&Get(ts).checkpoint_vec));
   PetscCall(ISDestroy(&Get(ts).rotations.is));
-  PetscCall(ISDestroy(&Get(ts).lengths));
   delete static_cast<Integrator *>(ts->data);
   ts->data = NULL;
   PetscCall(ComposeSetters(ts, false));

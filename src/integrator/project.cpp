@@ -159,28 +159,6 @@ Prepared PreparedBy(const Integrator &I, bool moved)
   return {!I.count[TSHHT3_NONHOLONOMIC] || !moved, moved ? Gamma::Near : Gamma::Made};
 }
 
-/* Sizes of the coordinates, with the largest of those that were named as lengths in place of each of them */
-PetscErrorCode SizesByLengths(TS ts, Vec size)
-{
-  Integrator &I = Get(ts);
-  PetscInt    n, first, end, least, most;
-  PetscReal   largest;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(size, &first, &end));
-  PetscCall(ISGetLocalSize(I.lengths, &n));
-  PetscCall(ISGetMinMax(I.lengths, &least, &most));
-  PetscCheck(n == 0 || (least >= first && most < end), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "TSHHT3SetLengths(): unknown %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT,
-             least < first ? least : most, first, end - 1);
-  PetscCall(VecZeroEntries(size));
-  PetscCall(VecISSet(size, I.lengths, 1));
-  PetscCall(VecPointwiseMult(size, size, I.ymax));
-  PetscCall(VecMax(size, NULL, &largest));
-  PetscCall(VecCopy(I.ymax, size));
-  PetscCall(VecISSet(size, I.lengths, largest));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
 constexpr PetscReal many = 1e3;
 
@@ -257,22 +235,33 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with the largest length in place of each: one near 0 in millimetres moves by much more than 1 in a short time (Units.ForcesOfTheStart) */
+/* Of rows of constraints, by themselves where nothing moves within the run */
 PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 {
-  Integrator &I    = Get(ts);
-  Vec         size = I.ymax;
-  PetscReal   rate;
-  WorkVec     by_lengths;
+  PetscReal rate;
 
   PetscFunctionBegin;
-  if (I.lengths) {
-    PetscCall(by_lengths.like(I.ymax));
-    PetscCall(SizesByLengths(ts, by_lengths));
-    size = by_lengths;
-  }
-  PetscCall(MostOfItsSize(ts, I.V0, size, &rate));
+  PetscCall(MostOfItsSize(ts, Get(ts).V0, Get(ts).ymax, &rate));
   *T = TimeOf(ts, rate, runs);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the solution is what a step has left in t, U, V, but for less than the tolerance: after a roll-back, or where a post-step function has brought attitudes
+   to length 1. What it misses of the constraints is not the application's (BetweenRuns.WhatAStepHasLeft). */
+PetscErrorCode IsOwnState(TS ts, PetscReal t, Vec U, Vec V, PetscBool *own)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T, u, v;
+
+  PetscFunctionBegin;
+  *own = PETSC_FALSE;
+  if (!I.constraints() || !IsEndOf(ts, t)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecWAXPY(I.work, -1, U, ts->vec_sol));
+  PetscCall(Distance(ts, I.work, 1, &u));
+  PetscCall(TimeScale(ts, &T));
+  PetscCall(VecWAXPY(I.work, -1, V, ts->vec_dot));
+  PetscCall(Distance(ts, I.work, T, &v));
+  *own = (PetscBool)(u <= 1 && v <= 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,45 +303,4 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SetLengths(TS ts, IS lengths)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  if (lengths) PetscCall(PetscObjectReference((PetscObject)lengths));
-  PetscCall(ISDestroy(&I.lengths));
-  I.lengths = lengths;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace hht3
-
-/*@
-  TSHHT3SetLengths - Tells which coordinates are lengths of one unit
-
-  Logically Collective
-
-  Input Parameters:
-+ ts      - the `TS` context
-- lengths - global indices of coordinates, each on the rank that owns it; or `NULL`
-
-  Level: advanced
-
-  Notes:
-  A consistent start differentiates the constraints along the velocities, over a time that moves no coordinate by much more than its size.
-  Without this function each coordinate is judged by itself and counts as 1 where it is less (as the quotient of the tolerances, absolute by relative, where there are
-  both). A position that is near 0 in millimetres is then taken for a small one, which costs digits of the first accelerations and multipliers. Of
-  coordinates that are named here the largest one is the size of all.
-
-  Scenes of libhhtscene say so themselves.
-
-.seealso: `TSHHT3`, `TSHHT3SetIS()`, `TSHHT3SetStart()`
-@*/
-PetscErrorCode TSHHT3SetLengths(TS ts, IS lengths)
-{
-  PetscFunctionBegin;
-  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
-  if (lengths) PetscValidHeaderSpecific(lengths, IS_CLASSID, 2);
-  PetscTryMethod(ts, "TSHHT3SetLengths_C", (TS, IS), (ts, lengths));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -192,7 +192,6 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(ReadCheckpoint);
   HHT3_COMPOSE(SetCheckpointVec);
   HHT3_COMPOSE(SetCoordinateChange);
-  HHT3_COMPOSE(SetLengths);
   HHT3_COMPOSE(SetRotations);
   HHT3_COMPOSE(GetRotationFactor);
   HHT3_COMPOSE(SetStepLimit);

@@ -19,7 +19,6 @@ PetscErrorCode ComposeSetters(TS ts, bool attach);
 
 /* An error in a setter that comes too late */
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
-PetscErrorCode SetLengths(TS ts, IS lengths); /* project.cpp */
 
 } // namespace hht3
 

@@ -49,6 +49,12 @@ PetscErrorCode NameRedundant(TS ts);
 /* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
 
+/* Whether the solution is what a step has left in t, U, V, but for less than the tolerance */
+PetscErrorCode IsOwnState(TS ts, PetscReal t, Vec U, Vec V, PetscBool *own);
+
+/* Whether a step that ended at t has left the time as it is; Accept() may have moved it a little */
+inline bool IsEndOf(TS ts, PetscReal t) { return PetscAbsReal(ts->ptime - t) <= PetscMax(1e-9 * Get(ts).h, 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)); }
+
 /* U0 and V0 to the nearest ones that the constraints allow */
 PetscErrorCode ProjectState(TS ts, Prepared *prepared);
 

@@ -127,7 +127,6 @@ struct Integrator : StepState {
 
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
   IS                         is[TSHHT3_NUM_ROLES] = {};
-  IS                         lengths              = nullptr; /* coordinates that are lengths, where the application says so */
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
   std::vector<unsigned char> role;
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */

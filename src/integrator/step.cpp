@@ -54,7 +54,7 @@ PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)
 }
 
 /* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
-   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. Accept() may have moved the time a little. */
+   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. */
 PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *changed)
 {
   Integrator      &I = Get(ts);
@@ -63,7 +63,7 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   PetscBool        same_u, same_v;
 
   PetscFunctionBegin;
-  *changed = (PetscBool)(PetscAbsReal(ts->ptime - t) > PetscMax(1e-9 * I.h, 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)));
+  *changed = (PetscBool)!IsEndOf(ts, t);
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &s));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &d));
@@ -131,11 +131,9 @@ PetscErrorCode Begin(TS ts)
     if (changed) PetscCall(PetscInfo(ts, "the solution or the time was changed from outside: restart\n"));
   }
   I.own_start = PETSC_FALSE;
-  if (ts->steprestart && I.have_step) {
-    PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &I.own_start));
-    I.own_start = (PetscBool)!I.own_start;
-  }
   if (ts->steprestart || changed) {
+    if (ts->steps && I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));
+    else if (ts->steps && I.at_begin) PetscCall(IsOwnState(ts, I.t0, I.U0, I.V0, &I.own_start));
     I.have_step = I.at_begin = PETSC_FALSE;
     PetscCall(Start(ts));
     I.at_begin = PETSC_TRUE;

@@ -96,7 +96,6 @@ void BindIntegrator(py::module_ &m)
   m.def("set_nodes", [](py::object ts, py::object nodes, py::object reference) {
     Check(TSHHT3SetNodes(ToTS(ts), nodes.is_none() ? nullptr : ToIS(nodes), reference.is_none() ? nullptr : ToVec(reference)));
   });
-  m.def("set_lengths", [](py::object ts, py::object lengths) { Check(TSHHT3SetLengths(ToTS(ts), lengths.is_none() ? nullptr : ToIS(lengths))); });
   m.def("set_start", [](py::object ts, const std::string &start) {
     Check(TSHHT3SetStart(ToTS(ts), (TSHHT3Start)Choice(TSHHT3Starts, 3, start, "start")));
   });

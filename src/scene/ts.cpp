@@ -126,22 +126,6 @@ PetscErrorCode DestroyRun(void **run)
 }
 #endif
 
-/* Positions of bodies and of nodes */
-PetscErrorCode TellLengths(const Runtime &R, TS ts)
-{
-  std::vector<PetscInt> rows;
-  IS                    lengths;
-  PetscFunctionBegin;
-  for (const LocalBody &b : R.bodies.body)
-    for (int i = 0; b.owned && b.kind != BodyKind::Attached && i < GroupSize(b.kind, 0); i++) rows.push_back(R.start + b.first + i);
-  for (const auto &x : R.scene.extensions)
-    for (PetscInt i = 0; i < x->coordinates(); i++) rows.push_back(x->start[R.rank] + i);
-  PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)rows.size(), rows.data(), PETSC_COPY_VALUES, &lengths));
-  PetscCall(TSHHT3SetLengths(ts, lengths));
-  PetscCall(ISDestroy(&lengths));
-  PetscFunctionReturn(0);
-}
-
 /* The TS owns the run */
 PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
 {
@@ -225,7 +209,6 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
   PetscCall(TSSetI2Jacobian(*ts, R.J, R.J, I2Jacobian, &R));
   PetscCall(TellNodes(R, *ts));
-  PetscCall(TellLengths(R, *ts));
   PetscCall(TSSetTime(*ts, R.scene.start.time));
   PetscCall(TS2SetSolution(*ts, U, V));
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));

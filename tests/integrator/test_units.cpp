@@ -40,14 +40,10 @@ struct AtItsLowest : Problem {
   double ratio(double lambda) const { return lambda / (2. * (g + speed * speed / L)); }
 };
 
-double startRatio(const AtItsLowest &p, bool lengths)
+double startRatio(const AtItsLowest &p)
 {
   Simulation run(p, tolerance(1e-5));
   Vec        U;
-  IS         positions;
-  must(ISCreateStride(PETSC_COMM_SELF, 2, 0, 1, &positions));
-  if (lengths) must(TSHHT3SetLengths(run.ts, positions));
-  must(ISDestroy(&positions));
   must(run.step());
   must(VecDuplicate(run.U, &U));
   must(TSHHT3Interpolate(run.ts, 0., U, nullptr, nullptr));
@@ -58,29 +54,69 @@ double startRatio(const AtItsLowest &p, bool lengths)
 
 } // namespace
 
+/* Its horizontal coordinate is 0, which says nothing of lengths. A time too short for anything to change gives no differences, which is no derivative of zero. */
 TEST(Units, ForcesOfTheStart)
 {
   for (double length : {.5, 5., 20.})
     for (double unit : {1., 1e3, 1e6}) {
       const AtItsLowest p(unit, length, 20.);
-      EXPECT_NEAR(startRatio(p, true), 1., 1e-6) << length << " m in units of 1/" << unit;
+      EXPECT_NEAR(startRatio(p), 1., 1e-6) << length << " m in units of 1/" << unit;
     }
 }
 
-/* Where nobody says what is a length, differences over a time that is too short for anything to change are no zero */
-TEST(Units, DifferencesThatVanish) { EXPECT_NEAR(startRatio(AtItsLowest(1e3, 5., 20.), false), 1., 1e-2); }
-
-TEST(Units, LengthsOfAnotherRankAreRefused)
+namespace
 {
-  const AtItsLowest p(1., 1., 1.);
-  Simulation        run(p, tolerance(1e-5));
-  IS                foreign;
-  ErrorTrap         trap;
-  must(ISCreateStride(PETSC_COMM_SELF, 1, 7, 1, &foreign));
-  must(TSHHT3SetLengths(run.ts, foreign));
-  must(ISDestroy(&foreign));
-  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_OUTOFRANGE);
-  EXPECT_NE(trap.message.find("unknown 7"), std::string::npos) << trap.message;
+
+/* A mass of 3 that follows sin(2 (t - begin) + 0.7) */
+struct Late : Problem {
+  const double begin;
+  explicit Late(double t) : begin(t)
+  {
+    name = "late in time";
+    n    = 2;
+    t1   = begin + 1.;
+    role = {TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  double given(double t) const { return std::sin(2. * (t - begin) + 0.7); }
+  void   initial(double *u, double *v) const override
+  {
+    u[0] = given(begin);
+    v[0] = 2. * std::cos(0.7);
+    u[1] = v[1] = 0.;
+  }
+  void residual(double t, const double *u, const double *, const double *a, double *f) const override
+  {
+    f[0] = 3. * a[0] + u[1];
+    f[1] = u[0] - given(t);
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    J.add(0, 0, 3. * sa);
+    J.add(0, 1, 1.);
+    J.add(1, 0, 1.);
+  }
+};
+
+} // namespace
+
+/* Seconds since 1970, of which rounding leaves a quarter of a microsecond */
+TEST(Units, LateInTime)
+{
+  for (double begin : {0., 1e6, 1.7e9}) {
+    const Late p(begin);
+    Simulation run(p, tolerance(1e-6));
+    Printed    out;
+    Vec        U;
+    must(TSSetTime(run.ts, begin));
+    must(run.step());
+    must(VecDuplicate(run.U, &U));
+    must(TSHHT3Interpolate(run.ts, begin, U, nullptr, nullptr));
+    EXPECT_NEAR(whole(U)[1], 12. * std::sin(0.7), 1e-5) << begin;
+    must(VecDestroy(&U));
+    EXPECT_FALSE(out.says("violate")) << out.text();
+    must(run.solve());
+    EXPECT_NEAR(run.u()[0], std::sin(2.7), 1e-5) << begin;
+  }
 }
 
 /* From rest the run's length is the only time that is known at first. Runs that something else is to end are as those that end. */

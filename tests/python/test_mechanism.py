@@ -297,41 +297,15 @@ class OnTS(unittest.TestCase):
         with self.assertRaises(h.Error):
             integrator.set_nodes(ts, [[0, 1]], X)
 
-    def test_lengths(self):
-        """A mass of 2 on a rod of 5 m that passes its lowest point at 20 m/s, in millimetres: the rod's force at the start"""
-        m, L, speed, g = 2., 5e3, 2e4, 9810.
-
-        def f(ts, t, u, v, a, out):
-            x, y, force = u.array_r
-            r = math.hypot(x, y)
-            out.array = [m * a[0] + force * x / r, m * (a[1] + g) + force * y / r, r - L]
-
-        def J(ts, t, u, v, a, sv, sa, J, P):
-            n, force = u.array_r[:2] / np.linalg.norm(u.array_r[:2]), u[2]
-            P.setValues(range(3), range(3), np.block([[m * sa * np.eye(2) + force / L * (np.eye(2) - np.outer(n, n)), n[:, None]], [n, 0.]]))
-            P.assemble()
-            return True
-
-        def first_force(lengths):
-            A = PETSc.Mat().createDense([3, 3], comm=PETSc.COMM_SELF).setUp()
-            u, v = A.createVecRight(), A.createVecRight()
-            u.array, v.array = [0., -L, 0.], [speed, 0., 0.]
-            ts = PETSc.TS().create(comm=PETSc.COMM_SELF)
-            ts.setType("hhtdae")
-            ts.setI2Function(f, u.duplicate())
-            ts.setI2Jacobian(J, A)
-            ts.setSolution2(u, v)
-            ts.setMaxTime(1.)
-            ts.setTolerances(rtol=1e-5, atol=1e-5)
-            integrator.set_lengths(ts, lengths)
-            ts.step()
-            return integrator.interpolate(ts, 0.)[0][2] / (m * (g + speed**2 / L))
-
-        self.assertAlmostEqual(first_force([0, 1]), 1., delta=1e-6)
-        self.assertAlmostEqual(first_force(PETSc.IS().createStride(2, step=1, comm=PETSc.COMM_SELF)), 1., delta=1e-6)
-        self.assertGreater(abs(first_force(None) - 1.), 1e-6)
-        with self.assertRaises(PETSc.Error):
-            first_force([7])
+    def test_units_of_length(self):
+        """Multipliers of the first steps of a swing through the lowest point, in metres, millimetres and micrometres"""
+        for unit in 1., 1e3, 1e6:
+            solution = h.solve_mechanism(lambda t, q, v, a: [a[0], a[1] + 9.81 * unit], (0, 0.05), [0, -unit], [5 * unit, 0],
+                                         constraints=lambda t, q: [q[0]**2 + q[1]**2 - unit**2], trace=True)
+            height = 1 + solution.q[1] / unit
+            expected = (25 - 2 * 9.81 * height + 9.81 * (1 - height)) / 2  # (v^2 - g y)/(2 L^2), v by the energy
+            np.testing.assert_allclose(solution.multipliers[0], expected, rtol=1e-2)
+            self.assertAlmostEqual(solution.multipliers[0][0], expected[0], delta=1e-6)
 
     def test_rotations(self):
         """A sphere that turns freely: its attitude after two turns and a bit, gathered by the functions that take references"""

@@ -11,7 +11,7 @@ from . import _core
 
 __all__ = ["Statistics", "checkpoint_load", "checkpoint_save", "evaluate_at", "get_acceleration", "get_alpha", "get_form", "get_order",
            "get_role", "get_rotation_factor", "interpolate", "move_back", "set_alpha", "set_checkpoint_vec", "set_coordinate_change",
-           "set_corrector_tolerance", "set_form", "set_lengths", "set_nodes", "set_order", "set_predictor_degree", "set_radius", "set_reuse", "set_role",
+           "set_corrector_tolerance", "set_form", "set_nodes", "set_order", "set_predictor_degree", "set_radius", "set_reuse", "set_role",
            "set_rotations", "set_row_name", "set_start", "set_step_limit", "statistics"]
 
 
@@ -130,21 +130,6 @@ def set_nodes(ts, nodes, reference=None):
         own.setBlockSize(nodes.shape[1])
         nodes = own
     _core.set_nodes(ts, nodes, reference)
-
-
-def set_lengths(ts, lengths):
-    """Says which coordinates are lengths of one unit, for starts in any unit; scenes do it themselves. Collective.
-
-    Parameters
-    ----------
-    lengths : petsc4py.PETSc.IS, array of int or None
-        Own unknowns by global number; the largest of them is the size of all. None takes back what was said: then a coordinate below 1 counts as 1.
-    """
-    from petsc4py import PETSc
-
-    if lengths is not None and not isinstance(lengths, PETSc.IS):
-        lengths = PETSc.IS().createGeneral(list(lengths), comm=ts.getComm())
-    _core.set_lengths(ts, lengths)
 
 
 def set_start(ts, start):
