@@ -8,6 +8,7 @@
 #include "consistent.h"
 #include "entries.h"
 #include "equations.h"
+#include "random.h"
 #include "roles.h"
 #include "work_vec.h"
 #include <vector>
@@ -129,6 +130,28 @@ PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What rounding of the coordinates makes of each row: the larger one of two samples, since in one of them it may cancel */
+PetscErrorCode RoundingOfRows(TS ts, PetscReal t, Vec U, Vec V, const std::vector<PetscReal> &f0, std::vector<PetscReal> &rounding)
+{
+  constexpr int seen = 8; /* times rounding */
+  PetscInt      start;
+  WorkVec       at, F, zero;
+
+  PetscFunctionBegin;
+  PetscCall(at.like(U));
+  PetscCall(F.like(U));
+  PetscCall(zero.like(U));
+  PetscCall(VecZeroEntries(zero));
+  PetscCall(VecGetOwnershipRange(U, &start, NULL));
+  rounding.assign(f0.size(), 0);
+  for (unsigned salt = 0; salt < 2; salt++) {
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + seen * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
+    PetscCall(ResidualAlong(ts, t, at, V, zero, F));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { rounding[i] = PetscMax(rounding[i], PetscAbsReal(PetscRealPart(f) - f0[i]) / seen); }, Read(F)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Sums of differences over tau, per row: first and second derivatives */
 PetscErrorCode DifferencesOver(TS ts, PetscReal t, Vec U, Vec V, PetscReal tau, const std::vector<PetscReal> &f0, std::vector<PetscReal> &s1, std::vector<PetscReal> &s2)
 {
@@ -198,7 +221,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   PetscBool              rest, more;
   bool                   used[longer + max_levels];
   PetscReal              largest, speed;
-  std::vector<PetscReal> f0, s1, s2;
+  std::vector<PetscReal> f0, s1, s2, rounding;
   std::vector<signed char> from;
 
   PetscFunctionBegin;
@@ -222,15 +245,16 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   Best d1(I.levels[0], from, n, again), d2(I.levels[1], from, n, again);
   PetscCall(ResidualAlong(ts, t, at, V, zero, F));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
+  PetscCall(RoundingOfRows(ts, t, U, V, f0, rounding));
   const auto attempt = [&](int level) -> PetscErrorCode {
-    const PetscReal tau = t + Tau(T, level) - t, rounding = PETSC_MACHINE_EPSILON * largest; /* t + j tau without rounding (Units.LateInTime) */
+    const PetscReal tau = t + Tau(T, level) - t; /* t + j tau without rounding (Units.LateInTime) */
     PetscFunctionBegin;
     if (!(tau > 0)) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(DifferencesOver(ts, t, U, V, tau, f0, s1, s2));
     for (PetscInt i = 0; i < n; i++) {
       if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding / tau);
-      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding / (tau * tau));
+      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding[i] / tau);
+      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding[i] / (tau * tau));
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   };

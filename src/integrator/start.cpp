@@ -315,6 +315,9 @@ PetscErrorCode NameRedundant(TS ts)
     PetscCall(PetscStrlen(names, &used));
     PetscCall(PetscSNPrintf(names + used, sizeof(names) - used, "%s %s", i ? "," : " Rows", label.text));
   }
+  if (n == 1) PetscCall(LabelRow(ts, rows[0], &label));
+  PetscCheck(n != 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text,
              names, I.names.name && n > named ? ", ..." : "");

@@ -456,6 +456,21 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(finals[0][0], finals[1][0], delta=1e-8)
         self.assertEqual(finals[0][1], finals[1][1])
 
+    def test_states_of_one_another(self):
+        """An observer of a mass on a spring, which sees its displacement alone and knows nothing of where it began"""
+        scene = h.Scene()
+        m = scene.add("b", h.PointMass(position=(0.5, 0, 0))).marker()
+        scene.add("spring", h.UserForce(m, force=[-4 * h.displacement(m, 0), 0, 0]))
+        x, v = scene.states(["x", "v"], lambda z: [z[1] + 6 * (h.displacement(m, 0) - z[0]), -4 * z[0] + 5 * (h.displacement(m, 0) - z[0])], [0, 0])
+        for name, value in (("x", x), ("v", v)):
+            scene.channel(name, h.value(value))
+        run = scene.solve(3., tolerance=1e-8)
+        # errors e' = (A - L C) e with eigenvalues -3, -3: e = (0.5 - 1.5 t, ...) exp(-3 t), as e(0) = (0.5, 0) and e_x' = e_v - 6 e_x
+        self.assertAlmostEqual(0.5 * math.cos(6) - run["x"][-1], (0.5 - 1.5 * 3) * math.exp(-9), delta=1e-5)
+        self.assertAlmostEqual(-math.sin(6) - run["v"][-1], -4.5 * 3 * math.exp(-9), delta=1e-4)
+        with self.assertRaisesRegex(ValueError, "2 names, 1 rates, 2 initial values"):
+            h.Scene().states(["a", "b"], lambda z: [z[0]], [0, 0])
+
     def test_states_beside_motions_of_accelerations(self):
         """Their speeds are states, too: what a rate is given is its own state, and none is described twice"""
         for parameters in (False, True):

@@ -176,6 +176,12 @@ class Excitation:
         return self.at, self.load, self.moment, self.driven
 
 
+def _excitation(x):
+    if not isinstance(x, Excitation):
+        raise TypeError("%r is no Excitation: Excitation.force(marker, vector), .torque(marker, vector) or .motion(element)" % (x,))
+    return x._tuple()
+
+
 class Linearization:
     """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
 
@@ -211,11 +217,11 @@ class Linearization:
 
     def response(self, excitation, measure, omega):
         """Complex amplitudes of a measure where the input is cos(omega t), for each circular frequency of `omega` (rad per unit of time)."""
-        return self._core.response(excitation._tuple(), _measure(measure), np.atleast_1d(np.asarray(omega, dtype=float)))
+        return self._core.response(_excitation(excitation), _measure(measure), np.atleast_1d(np.asarray(omega, dtype=float)))
 
     def state_space(self, inputs, outputs):
         """`StateSpace` in minimal coordinates between lists of excitations and measures."""
-        return StateSpace(*self._core.state_space([e._tuple() for e in inputs], [_measure(m) for m in outputs]))
+        return StateSpace(*self._core.state_space([_excitation(e) for e in inputs], [_measure(m) for m in outputs]))
 
     def operators(self):
         """M, C, K as petsc4py matrices, a row and column for each unknown of the scene."""

@@ -313,6 +313,19 @@ class Scene:
         self._states += 1
         return state
 
+    def states(self, names: Sequence[str], rates: Callable[[Sequence[Expression]], Sequence[Formula]], initial: Sequence[float]) -> List[State]:
+        """States that refer to one another, as those of an observer: x' = rates(x), of as many values as there are names:
+        ``scene.states(["x", "v"], lambda x: [x[1], -4 * x[0]], [1., 0.])``."""
+        names, initial = list(names), list(initial)
+        values = [Measure("state", target=State(self, (self._states + k, self.ground._number), name)) for k, name in enumerate(names)]
+        formulas = list(rates(values))
+        if not len(names) == len(formulas) == len(initial):
+            raise ValueError("states: %d names, %d rates, %d initial values, must be as many" % (len(names), len(formulas), len(initial)))
+        initial = [number(x, "state %s: its initial value" % name) for name, x in zip(names, initial)]
+        for name, formula in zip(names, formulas):
+            self._formula(formula, "state " + name)
+        return [self.state(*each) for each in zip(names, formulas, initial)]
+
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
         self._describe()
