@@ -247,9 +247,8 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
   PetscCall(RoundingOfRows(ts, t, U, V, f0, rounding));
   const auto attempt = [&](int level) -> PetscErrorCode {
-    const PetscReal tau = t + Tau(T, level) - t; /* t + j tau without rounding (Units.LateInTime) */
+    const PetscReal tau = SpanFrom(t, Tau(T, level));
     PetscFunctionBegin;
-    if (!(tau > 0)) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(DifferencesOver(ts, t, U, V, tau, f0, s1, s2));
     for (PetscInt i = 0; i < n; i++) {
       if (!IsConstraint(I, i)) continue;

@@ -115,7 +115,7 @@ PetscErrorCode ComputeBend(TS ts)
 PetscErrorCode MeasureMisfit(TS ts)
 {
   Integrator     &I   = Get(ts);
-  const PetscReal tau = 0.1 * I.h_last;
+  const PetscReal tau = SpanFrom(ts->ptime, 0.1 * I.h_last);
 
   PetscFunctionBegin;
   if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));

@@ -86,7 +86,7 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(TimeScaleOfAccelerations(ts, I.X, &Ta));
   PetscCall(TimeScaleOfVelocities(ts, I.V0, &Tv));
   if (!rest && Ta < PETSC_MAX_REAL) T = PetscMax(T, Tv); /* what has just begun to move has no time scale of a short run: its rates would be rounding (BetweenRuns.ShortRunsHaveTheirMultipliers) */
-  const PetscReal d = PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest); /* of what is at rest T may be a run without end: Units.LongRuns */
+  const PetscReal d = SpanFrom(ts->ptime, PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest)); /* of what is at rest T may be a run without end: Units.LongRuns */
   PetscCall(X0.like(I.X));
   PetscCall(U.like(I.X));
   PetscCall(V.like(I.X));

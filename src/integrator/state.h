@@ -202,6 +202,9 @@ struct Integrator : StepState {
 };
 
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
+
+/* About tau > 0, as the difference of two times that are numbers: to what t + tau is rounded a motion that follows time is elsewhere than after tau (Units.LateInTime) */
+inline PetscReal SpanFrom(PetscReal t, PetscReal tau) { return t + PetscMax(tau, 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)) - t; }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }
 inline bool IsConstraint(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_HOLONOMIC || RoleOf(I, i) == TSHHT3_NONHOLONOMIC; }

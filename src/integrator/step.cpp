@@ -212,8 +212,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
   I.h  = ts->time_step;
   I.t0 = ts->ptime;
   I.t1 = ts->ptime + I.h;
-  /* what time is rounded to is the step: motions that depend on it are elsewhere after h (Units.LateInTime) */
-  if (I.t1 > I.t0 && PetscAbsReal(I.t1 - I.t0 - I.h) > 1e-9 * I.h) I.h = I.t1 - I.t0;
+  if (I.t1 > I.t0 && PetscAbsReal(I.t1 - I.t0 - I.h) > 1e-9 * I.h) I.h = SpanFrom(I.t0, I.h);
   PetscCall(TSPreStage(ts, I.t1));
   if (*tiny) PetscCall(TinyStep(ts, ok));
   else {
