@@ -141,8 +141,8 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
   const bool      wide   = I.h < shortest * T;
-  const PetscReal length = wide ? shortest * T : I.h, begin = wide ? -length / 2 : I.t0 - c.t;
-  for (int k = 0; k < points; k++) z[k] = begin + length * k / (points - 1);
+  const PetscReal length = wide ? shortest * T : I.h, begin = wide ? c.t - length / 2 : I.t0, apart = SpanFrom(begin, length / (points - 1));
+  for (int k = 0; k < points; k++) z[k] = begin - c.t + k * apart;
   DerivativeWeights(z, weight);
   PetscCall(VecZeroEntries(c.gamma));
   for (int k = 0; k < points; k++) {

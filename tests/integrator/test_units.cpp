@@ -109,14 +109,22 @@ TEST(Units, LateInTime)
       Simulation run(p, tolerance(1e-6) + "-ts_hhtdae_order " + order);
       Printed    out;
       double     off = 0.;
+      Vec        sampled;
+      must(VecDuplicate(run.U, &sampled));
       run.watch = [&](Simulation &r, PetscInt step, double t) {
-        if (step > 0) widen(off, std::abs(r.u()[1] - 12. * p.given(t)));
+        PetscReal last;
+        if (step == 0) return;
+        widen(off, std::abs(r.u()[1] - 12. * p.given(t)));
+        must(TSGetPrevTime(r.ts, &last));
+        must(TSHHT3EvaluateAt(r.ts, last + 0.4 * (t - last), sampled, nullptr, nullptr));
+        EXPECT_NEAR(whole(sampled)[1], 12. * p.given(last + 0.4 * (t - last)), 1e-4) << begin;
       };
       must(TSSetTime(run.ts, begin));
       must(TSSetMaxTime(run.ts, begin + 1.));
       must(run.solve());
       EXPECT_FALSE(out.says("violate")) << out.text();
       EXPECT_NEAR(run.u()[0], std::sin(2.7), 1e-5) << begin;
+      must(VecDestroy(&sampled));
       if (begin == 0.) expected = off;
       EXPECT_LT(off, 1.1 * expected) << order << " " << begin;
       MEASURED("order %s from %g: %.2e", order, begin, off);
