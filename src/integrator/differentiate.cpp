@@ -23,6 +23,7 @@ constexpr int       levels = 9, points = 6; /* of a row: tau = T/10, T/40, ...; 
 constexpr int       max_levels = 32;        /* of all rows */
 constexpr int       longer = 16;            /* levels -1, -2, ...: tau = 4 T/10, 16 T/10, ... (Units.ForcesOfTheStart) */
 constexpr signed char none = -longer - 1;
+constexpr PetscReal enough = 1e-8;          /* a change by less asks for none of these */
 
 PetscReal Tau(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
 
@@ -61,7 +62,7 @@ struct Best {
     }
     last[i] = x;
   }
-  bool asksFor(PetscInt i, int l) const { return l == -1 ? level[i] == 1 : level[i] == l + 1; }
+  bool asksFor(PetscInt i, int l) const { return change[i] > enough * PetscAbsReal(value[i]) && (l == -1 ? level[i] == 1 : level[i] == l + 1); }
 };
 
 template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
@@ -130,8 +131,9 @@ PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rounding of the coordinates makes of each row: the larger one of two samples, since in one of them it may cancel */
-PetscErrorCode RoundingOfRows(TS ts, PetscReal t, Vec U, Vec V, const std::vector<PetscReal> &f0, std::vector<PetscReal> &rounding)
+/* What rounding makes of each row: of the coordinates, the larger one of two samples, since in one of them it may cancel; at least that of the largest coordinate: what is
+   0, as a rotation within the step, turns lengths that are rounded */
+PetscErrorCode RoundingOfRows(TS ts, PetscReal t, Vec U, Vec V, PetscReal largest, const std::vector<PetscReal> &f0, std::vector<PetscReal> &rounding)
 {
   constexpr int seen = 8; /* times rounding */
   PetscInt      start;
@@ -143,7 +145,7 @@ PetscErrorCode RoundingOfRows(TS ts, PetscReal t, Vec U, Vec V, const std::vecto
   PetscCall(zero.like(U));
   PetscCall(VecZeroEntries(zero));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
-  rounding.assign(f0.size(), 0);
+  rounding.assign(f0.size(), PETSC_MACHINE_EPSILON * largest);
   for (unsigned salt = 0; salt < 2; salt++) {
     PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + seen * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
     PetscCall(ResidualAlong(ts, t, at, V, zero, F));
@@ -188,7 +190,7 @@ PetscErrorCode IsLongerOf(TS ts, const Best &d1, const Best &d2, int l, PetscRea
 
   PetscFunctionBegin;
   *yes = PETSC_FALSE;
-  if (!d1.from.empty() || (I.excitation && tau > I.fastest) || (points - 1) * tau * speed > largest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!d1.from.empty() || !(speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * speed > largest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < (PetscInt)I.role.size() && !asks; i++)
     if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = PETSC_TRUE;
   PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
@@ -245,7 +247,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   Best d1(I.levels[0], from, n, again), d2(I.levels[1], from, n, again);
   PetscCall(ResidualAlong(ts, t, at, V, zero, F));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
-  PetscCall(RoundingOfRows(ts, t, U, V, f0, rounding));
+  PetscCall(RoundingOfRows(ts, t, U, V, largest, f0, rounding));
   const auto attempt = [&](int level) -> PetscErrorCode {
     const PetscReal tau = SpanFrom(t, Tau(T, level));
     PetscFunctionBegin;
