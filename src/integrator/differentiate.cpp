@@ -23,7 +23,6 @@ constexpr int       levels = 9, points = 6; /* of a row: tau = T/10, T/40, ...; 
 constexpr int       max_levels = 32;        /* of all rows */
 constexpr int       longer = 16;            /* levels -1, -2, ...: tau = 4 T/10, 16 T/10, ... (Units.ForcesOfTheStart) */
 constexpr signed char none = -longer - 1;
-constexpr PetscReal enough = 1e-8;          /* a change by less asks for none of these */
 
 PetscReal Tau(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
 
@@ -62,7 +61,7 @@ struct Best {
     }
     last[i] = x;
   }
-  bool asksFor(PetscInt i, int l) const { return change[i] > enough * PetscAbsReal(value[i]) && (l == -1 ? level[i] == 1 : level[i] == l + 1); }
+  bool asksFor(PetscInt i, int l) const { return l == -1 ? level[i] == 1 : level[i] == l + 1; }
 };
 
 template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
