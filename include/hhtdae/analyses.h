@@ -21,7 +21,7 @@ namespace hhtdae
 {
 
 /* To static equilibrium at time t, at rest: the one downhill from where the run is, or nearest to it. Motions hold where they are at t;
-   rates of first-order states are zero. Motions of velocities and accelerations that are not zero then have none. */
+   rates of first-order states are zero, and states that nothing reads keep their values. Motions of velocities and accelerations that are not zero then have none. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 
 /* To the nearest positions, and velocities, that meet all constraints and motions at time t, in the metric of the masses. fixed_start

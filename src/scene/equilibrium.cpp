@@ -14,6 +14,7 @@
 #include "start.h"
 #include "still.h"
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace hhtdae
@@ -267,6 +268,41 @@ PetscErrorCode Balanced(Equilibrium &E, const Unbalanced &at, bool *found)
   PetscFunctionReturn(0);
 }
 
+/* States without a column in the equations at rest: integrals for later use, of power or of a deviation */
+PetscErrorCode FindUnread(Equilibrium &E)
+{
+  const IS        states = E.R.roles[TSHHT3_STATE];
+  const PetscInt *i;
+  PetscInt        n, all;
+  PetscFunctionBegin;
+  PetscCall(ISGetSize(states, &all));
+  if (!all) PetscFunctionReturn(0);
+  PetscCall(MatGetSize(E.J, nullptr, &n));
+  std::vector<PetscReal> column(n);
+  PetscCall(Jacobian(E.R, E.t, E.U, E.zero, E.zero, 0, 0, E.J));
+  PetscCall(MatGetColumnNorms(E.J, NORM_INFINITY, column.data()));
+  PetscCall(ISGetLocalSize(states, &n));
+  PetscCall(ISGetIndices(states, &i));
+  std::copy_if(i, i + n, std::back_inserter(E.unread), [&](PetscInt s) { return column[s] == 0; });
+  PetscCall(ISRestoreIndices(states, &i));
+  std::sort(E.unread.begin(), E.unread.end());
+  PetscFunctionReturn(0);
+}
+
+/* These as they were in `begin` */
+PetscErrorCode KeepUnread(Equilibrium &E, Vec begin)
+{
+  const double *before;
+  double       *now;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(begin, &before));
+  PetscCall(VecGetArray(E.U, &now));
+  for (PetscInt i : E.unread) now[i - E.R.start] = before[i - E.R.start];
+  PetscCall(VecRestoreArray(E.U, &now));
+  PetscCall(VecRestoreArrayRead(begin, &before));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
   double  h = 0, first, before;
@@ -307,7 +343,9 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   PetscCall(E.create(U, "scene_equilibrium_"));
   PetscCall(VecDuplicate(U, &E.start));
   PetscCall(VecDuplicate(U, &E.undamped));
+  PetscCall(FindUnread(E));
   PetscCall(Relax(E, &found, at));
+  PetscCall(KeepUnread(E, U));
   PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
              "constraints are violated by %g, motions of velocities, rates of states and definitions by %g.\n"

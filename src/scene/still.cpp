@@ -80,7 +80,8 @@ PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
     PetscCall(ISGetLocalSize(R.roles[r], &n));
     PetscCall(ISGetIndices(R.roles[r], &i));
     double &largest = rest[r == TSHHT3_HOLONOMIC ? 0 : 1];
-    for (PetscInt k = 0; k < n; k++) largest = std::max(largest, std::abs(f[i[k] - R.start]));
+    for (PetscInt k = 0; k < n; k++)
+      if (!std::binary_search(unread.begin(), unread.end(), i[k])) largest = std::max(largest, std::abs(f[i[k] - R.start]));
     PetscCall(ISRestoreIndices(R.roles[r], &i));
   }
   PetscCall(VecRestoreArrayRead(x, &f));

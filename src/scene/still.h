@@ -7,6 +7,7 @@
 #include "runtime.h"
 #include <cmath>
 #include <petscksp.h>
+#include <vector>
 
 namespace hhtdae
 {
@@ -26,6 +27,7 @@ struct StillSystem {
   Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;
+  std::vector<PetscInt> unread; /* own rows of states that nothing reads: they rest at any value, whatever their rates, and are not measured */
 
   StillSystem(Runtime &r, double time);
   ~StillSystem();

@@ -456,6 +456,22 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(finals[0][0], finals[1][0], delta=1e-8)
         self.assertEqual(finals[0][1], finals[1][1])
 
+    def test_equilibrium_beside_integrals(self):
+        """A state that nothing reads keeps its value; an integral in a feedback loop takes the one that brings the deviation to zero; a clock in one never rests"""
+        def hung(rate, reads):
+            scene = h.Scene(gravity=(0, 0, -9.81))
+            m = scene.add("b", h.PointMass(mass=2, position=(0, 0, 0.5))).marker()
+            z = h.displacement(m, "z")
+            x = scene.state("x", rate(z), 0.25)
+            scene.add("spring", h.UserForce(m, force=[-400 * h.displacement(m, "x"), -400 * h.displacement(m, "y"), -400 * z + (h.value(x) if reads else 0)]))
+            now = scene.run().equilibrium().snapshot()
+            return now.value(z), now.value(h.value(x))
+        np.testing.assert_allclose(hung(lambda z: z * z, False), [-2 * 9.81 / 400, 0.25], atol=1e-8)
+        np.testing.assert_allclose(hung(lambda z: 0 * z + 1, False), [-2 * 9.81 / 400, 0.25], atol=1e-8)
+        np.testing.assert_allclose(hung(lambda z: 10 * (0.1 - z), True), [0.1, 40 + 2 * 9.81], rtol=1e-6)
+        with self.assertRaisesRegex(h.Error, "stop what never rests"):
+            hung(lambda z: 0 * z + 1, True)
+
     def test_states_of_one_another(self):
         """An observer of a mass on a spring, which sees its displacement alone and knows nothing of where it began"""
         scene = h.Scene()

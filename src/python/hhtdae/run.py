@@ -305,8 +305,8 @@ class Run(Channels):
     # ---- analyses of a run that has not begun ----
 
     def equilibrium(self, time: Any = None) -> "Run":
-        """Moves the run to static equilibrium at a time, at rest; returns the run. Initial values that violate constraints need
-        ``scene.start(assembly="project")`` before the run is made. Collective."""
+        """Moves the run to static equilibrium at a time, at rest; returns the run. States whose values nothing reads, integrals for later use, keep them.
+        Initial values that violate constraints need ``scene.start(assembly="project")`` before the run is made. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 
