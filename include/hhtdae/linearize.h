@@ -57,14 +57,17 @@ struct BodyPart {
 };
 
 /* What an input of 1 is: a force and a moment in space axes on the body of a marker, at its origin; or what is added to the function of a
-   motion, displacement, velocity or acceleration as the motion is of: a shaken base */
+   motion, displacement, velocity or acceleration as the motion is of: a shaken base; or the acceleration of the ground, relative to which all
+   coordinates are */
 struct Excitation {
   Marker  at;
   Vector3 load = Vector3::Zero(), moment = Vector3::Zero();
   Element driven = {};
-  static Excitation force(Marker m, const Vector3 &f) { return {m, f, Vector3::Zero()}; }
-  static Excitation torque(Marker m, const Vector3 &f) { return {m, Vector3::Zero(), f}; }
-  static Excitation motion(Element e) { return {{}, Vector3::Zero(), Vector3::Zero(), e}; }
+  Vector3 ground = Vector3::Zero();
+  static Excitation force(Marker m, const Vector3 &f) { return {m, f, Vector3::Zero(), {}, Vector3::Zero()}; }
+  static Excitation torque(Marker m, const Vector3 &f) { return {m, Vector3::Zero(), f, {}, Vector3::Zero()}; }
+  static Excitation motion(Element e) { return {{}, Vector3::Zero(), Vector3::Zero(), e, Vector3::Zero()}; }
+  static Excitation groundAcceleration(const Vector3 &a) { return {{}, Vector3::Zero(), Vector3::Zero(), {}, a}; }
 };
 
 /* z' = A z + B f, y = C z + D f; z: as many as there are degrees of freedom of positions and of velocities, and first-order states. Rows

@@ -31,7 +31,7 @@ py::tuple Part(Linearized &l, const Mode &mode, py::object body)
   return py::make_tuple(Out(p.displacement.data(), 3), Out(p.rotation.data(), 3), p.share);
 }
 
-/* (marker, force, moment, element): what an input of 1 is */
+/* (marker, force, moment, element, acceleration of the ground): what an input of 1 is */
 Excitation ToExcitation(py::handle x)
 {
   const py::tuple t = py::reinterpret_borrow<py::tuple>(x);
@@ -40,6 +40,7 @@ Excitation ToExcitation(py::handle x)
   e.load   = ToVector(t[1], "an excitation's force");
   e.moment = ToVector(t[2], "an excitation's moment");
   e.driven = ToHandle<Element>(t[3], "an excitation's motion");
+  e.ground = ToVector(t[4], "an excitation's acceleration of the ground");
   return e;
 }
 

@@ -45,6 +45,7 @@ struct Linearization::Work {
   PetscErrorCode load(const Excitation &in, std::vector<double> *b) const;                /* the right-hand side, own rows */
   PetscErrorCode drive(Element e, std::vector<double> *b) const;
   PetscErrorCode push(const Excitation &in, std::vector<double> *b) const;
+  PetscErrorCode shake(const Vector3 &ground, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
   PetscErrorCode rates(const std::vector<PetscInt> &rows, RowRates *out) const;
   PetscErrorCode fastest(double *rate) const;

@@ -1,4 +1,5 @@
 /* Small motions about the state of a linearization: what a measure makes of one, and a mode's parts. */
+#include "extension.h"
 #include "linearization.h"
 #include <algorithm>
 #include <cmath>
@@ -120,11 +121,40 @@ PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) con
   PetscFunctionReturn(0);
 }
 
+/* b = -M x'' of x'' that takes all masses along with the ground */
+PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<double> *b) const
+{
+  Vec           along, force;
+  double       *x;
+  const double *f;
+  PetscFunctionBegin;
+  PetscCheck(ground.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: the acceleration of the ground is not a number");
+  PetscCall(MatCreateVecs(M, &along, &force));
+  PetscCall(VecSet(along, 0));
+  PetscCall(VecGetArray(along, &x));
+  for (PetscInt k = 0; k < R->bodies.own; k++)
+    for (int c = 0; Coordinates(R->bodies.body[k].kind) && c < GroupSize(R->bodies.body[k].kind, 0); c++) x[R->bodies.body[k].first + c] = ground(c);
+  for (const auto &e : R->scene.extensions)
+    for (PetscInt i = 0; e->vectors() && i < e->coordinates(); i++) x[e->start[R->rank] - R->start + i] = ground((int)(i % 3));
+  PetscCall(VecRestoreArray(along, &x));
+  PetscCall(MatMult(M, along, force));
+  PetscCall(VecGetArrayRead(force, &f));
+  for (PetscInt i = 0; i < R->n; i++) (*b)[i] = -f[i];
+  PetscCall(VecRestoreArrayRead(force, &f));
+  PetscCall(VecDestroy(&along));
+  PetscCall(VecDestroy(&force));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<double> *b) const
 {
   double largest = 0;
   PetscFunctionBegin;
   b->assign(R->n, 0);
+  if (!in.ground.isZero(0)) {
+    PetscCall(shake(in.ground, b));
+    PetscFunctionReturn(0);
+  }
   if (in.driven.id >= 0) {
     PetscCall(drive(in.driven, b));
     PetscFunctionReturn(0);

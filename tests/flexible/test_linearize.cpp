@@ -689,6 +689,37 @@ TEST(Linearize, LoadsThatMoveNothing)
   }
 }
 
+/* All masses are taken along by the ground: a mass on a spring, and a rod that hangs, J s^2 + m g l = -m l a for its angle */
+TEST(Linearize, AShakenGround)
+{
+  const std::vector<double> w = {0, 3, 12, 40};
+  std::vector<Complex>      h;
+  Slider                    s;
+  const Started             slider(s.scene);
+  const Vector3             along = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix().col(0);
+  must(slider.small.response(Excitation::groundAcceleration(along), Measure::distance(s.at, s.ground), w, &h));
+  for (std::size_t i = 0; i < w.size(); i++) {
+    const Complex expected = -m / (k - m * w[i] * w[i] + c * Complex(0, w[i]));
+    EXPECT_LT(std::abs(h[i] - expected), 1e-8 * std::abs(expected)) << w[i];
+  }
+  for (Space kind : {Space::Planar, Space::Spatial}) {
+    Scene scene(PETSC_COMM_SELF, kind);
+    scene.gravity({0, -9.81, 0});
+    const Body   rod = scene.add("rod", body(1.5, {0.1, 0.1, 0.1}, {0, -0.5, 0}));
+    const Marker pin = scene.marker(rod, {0, 0.5, 0}), ground = scene.marker(scene.ground());
+    scene.add("pin", Revolute{pin, ground});
+    const Started start(scene);
+    StateSpace    z;
+    must(start.small.response(Excitation::groundAcceleration({1, 0, 0}), Measure::angle(pin, ground), w, &h));
+    for (std::size_t i = 0; i < w.size(); i++) {
+      const double expected = -1.5 * 0.5 / (1.5 * 9.81 * 0.5 - (0.1 + 1.5 * 0.25) * w[i] * w[i]);
+      EXPECT_LT(std::abs(h[i] - expected), 1e-8 * std::abs(expected)) << w[i] << " " << h[i];
+    }
+    must(start.small.stateSpace({Excitation::groundAcceleration({1, 0, 0})}, {Measure::angularAcceleration(pin, 2)}, &z));
+    EXPECT_NEAR(z.D[0], -1.5 * 0.5 / (0.1 + 1.5 * 0.25), 1e-9);
+  }
+}
+
 /* A table that is shaken along x, with a mass on spring and damper: x/y = (k + i w c)/(k - m w^2 + i w c), by motions of displacement, velocity and
    acceleration; the force of the drive is what the masses need */
 TEST(Linearize, AShakenBase)

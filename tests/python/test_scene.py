@@ -648,6 +648,9 @@ class Questions(unittest.TestCase):
         self.assertAlmostEqual(abs(small.value(modes[0], h.displacement(m, 2))), 1., delta=1e-9)
         w = np.array([1., 5., 20.])
         push = h.Excitation.force(m, (0, 0, 1))
+        with self.assertRaisesRegex(TypeError, "is no Excitation"):
+            small.response([push], h.displacement(m, 2), w)
+        np.testing.assert_allclose(small.response(h.Excitation.ground_acceleration((0, 0, 1)), h.displacement(m, 2), w), -2 / (k - 2 * w**2 + 1j * w * c), rtol=1e-8)
         np.testing.assert_allclose(small.response(push, h.displacement(m, 2), w), 1 / (k - 2 * w**2 + 1j * w * c), rtol=1e-9)
         A, B, C, D = small.state_space([push], [h.displacement(m, 2)])
         self.assertEqual((A.shape, B.shape, C.shape, D.shape), ((2, 2), (2, 1), (1, 2), (1, 1)))

@@ -151,11 +151,12 @@ class StateSpace:
 
 @dataclass(eq=False)
 class Excitation:
-    """What an input of 1 is: made by `force`, `torque` or `motion`."""
+    """What an input of 1 is: made by `force`, `torque`, `motion` or `ground_acceleration`."""
     at: object = None
     load: Tuple[float, float, float] = (0., 0., 0.)
     moment: Tuple[float, float, float] = (0., 0., 0.)
     driven: object = None
+    ground: Tuple[float, float, float] = (0., 0., 0.)
 
     @classmethod
     def force(cls, marker, vector):
@@ -172,13 +173,18 @@ class Excitation:
         """What is added to the function of a motion: a shaken base."""
         return cls(driven=element)
 
+    @classmethod
+    def ground_acceleration(cls, vector):
+        """An acceleration (3,) of the ground, relative to which all coordinates are."""
+        return cls(ground=vector)
+
     def _tuple(self):
-        return self.at, self.load, self.moment, self.driven
+        return self.at, self.load, self.moment, self.driven, self.ground
 
 
 def _excitation(x):
     if not isinstance(x, Excitation):
-        raise TypeError("%r is no Excitation: Excitation.force(marker, vector), .torque(marker, vector) or .motion(element)" % (x,))
+        raise TypeError("%r is no Excitation: Excitation.force(marker, vector), .torque(marker, vector), .motion(element) or .ground_acceleration(vector)" % (x,))
     return x._tuple()
 
 
