@@ -130,69 +130,120 @@ PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rounding makes of each row: of the coordinates, the larger one of two samples, since in one of them it may cancel; at least that of the largest coordinate: what is
-   0, as a rotation within the step, turns lengths that are rounded */
-PetscErrorCode RoundingOfRows(TS ts, PetscReal t, Vec U, Vec V, PetscReal largest, const std::vector<PetscReal> &f0, std::vector<PetscReal> &rounding)
-{
-  constexpr int seen = 8; /* times rounding */
-  PetscInt      start;
-  WorkVec       at, F, zero;
+/* The rows along U + tau V, t + tau */
+struct Path {
+  TS                     ts;
+  PetscReal              t, speed = 0, largest = 0; /* of the coordinates */
+  Vec                    U, V;
+  WorkVec                at, F, zero;
+  std::vector<PetscReal> now; /* rows at t */
 
-  PetscFunctionBegin;
-  PetscCall(at.like(U));
-  PetscCall(F.like(U));
-  PetscCall(zero.like(U));
-  PetscCall(VecZeroEntries(zero));
-  PetscCall(VecGetOwnershipRange(U, &start, NULL));
-  rounding.assign(f0.size(), PETSC_MACHINE_EPSILON * largest);
-  for (unsigned salt = 0; salt < 2; salt++) {
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + seen * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
-    PetscCall(ResidualAlong(ts, t, at, V, zero, F));
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { rounding[i] = PetscMax(rounding[i], PetscAbsReal(PetscRealPart(f) - f0[i]) / seen); }, Read(F)));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  Path(TS s, PetscReal time, Vec u, Vec v) : ts(s), t(time), U(u), V(v) {}
 
-/* Sums of differences over tau, per row: first and second derivatives */
-PetscErrorCode DifferencesOver(TS ts, PetscReal t, Vec U, Vec V, PetscReal tau, const std::vector<PetscReal> &f0, std::vector<PetscReal> &s1, std::vector<PetscReal> &s2)
-{
-  WorkVec Ut, F, zero;
+  PetscErrorCode create()
+  {
+    PetscFunctionBegin;
+    for (WorkVec *x : {&at, &F, &zero}) PetscCall(x->like(U));
+    PetscCall(VecZeroEntries(zero));
+    PetscCall(LargestCoordinate(Get(ts), U, &largest));
+    PetscCall(LargestCoordinate(Get(ts), V, &speed));
+    PetscCall(VecCopy(U, at));
+    PetscCall(rows(t, now));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
 
-  PetscFunctionBegin;
-  PetscCall(Ut.like(U));
-  PetscCall(F.like(U));
-  PetscCall(zero.like(U));
-  PetscCall(VecZeroEntries(zero));
-  s1 = s2 = f0;
-  for (size_t i = 0; i < f0.size(); i++) {
-    s1[i] *= first_weights[0];
-    s2[i] *= second_weights[0];
+  /* of what stands in `at` */
+  PetscErrorCode rows(PetscReal time, std::vector<PetscReal> &f)
+  {
+    PetscFunctionBegin;
+    f.clear();
+    PetscCall(ResidualAlong(ts, time, at, V, zero, F));
+    PetscCall(ForEntries([&](PetscInt, PetscScalar x) { f.push_back(PetscRealPart(x)); }, Read(F)));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (int j = 1; j < points; j++) {
-    PetscCall(VecWAXPY(Ut, j * tau, V, U));
-    PetscCall(ResidualAlong(ts, t + j * tau, Ut, V, zero, F));
-    PetscCall(ForEntries(
-      [&](PetscInt i, PetscScalar f) {
-        s1[i] += first_weights[j] * PetscRealPart(f);
-        s2[i] += second_weights[j] * PetscRealPart(f);
-      },
-      Read(F)));
+
+  /* Sums of differences over tau: times 1/tau and 1/tau^2 first and second derivatives */
+  PetscErrorCode differences(PetscReal tau, std::vector<PetscReal> &first, std::vector<PetscReal> &second)
+  {
+    std::vector<PetscReal> f = now;
+    PetscFunctionBegin;
+    first.assign(now.size(), 0);
+    second.assign(now.size(), 0);
+    for (int j = 0; j < points; j++) {
+      if (j > 0) {
+        PetscCall(VecWAXPY(at, j * tau, V, U));
+        PetscCall(rows(t + j * tau, f));
+      }
+      for (size_t i = 0; i < f.size(); i++) {
+        first[i] += first_weights[j] * f[i];
+        second[i] += second_weights[j] * f[i];
+      }
+    }
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+
+  /* What rounding makes of each row: of the coordinates, the larger one of two samples, since in one of them it may cancel; at least that of the largest
+     coordinate: what is 0, as a rotation within the step, turns lengths that are rounded */
+  PetscErrorCode roundingOfRows(std::vector<PetscReal> &rounding)
+  {
+    constexpr int          seen = 8; /* times rounding */
+    PetscInt               start;
+    std::vector<PetscReal> f;
+    PetscFunctionBegin;
+    PetscCall(VecGetOwnershipRange(U, &start, NULL));
+    rounding.assign(now.size(), PETSC_MACHINE_EPSILON * largest);
+    for (unsigned salt = 0; salt < 2; salt++) {
+      PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + seen * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
+      PetscCall(rows(t, f));
+      for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / seen);
+    }
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
 
 /* Whether any row of any rank asks for a tau as long as that of level l < 0, and none of what moves is moved further than the largest coordinate */
-PetscErrorCode IsLongerOf(TS ts, const Best &d1, const Best &d2, int l, PetscReal tau, PetscReal speed, PetscReal largest, PetscBool *yes)
+PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int l, PetscReal tau, PetscBool *yes)
 {
-  const Integrator &I    = Get(ts);
+  const Integrator &I    = Get(along.ts);
   PetscBool         asks = PETSC_FALSE;
 
   PetscFunctionBegin;
   *yes = PETSC_FALSE;
-  if (!d1.from.empty() || !(speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * speed > largest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!d1.from.empty() || !(along.speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * along.speed > along.largest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < (PetscInt)I.role.size() && !asks; i++)
     if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = PETSC_TRUE;
-  PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)along.ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivatives of each row: of those over `used` levels, or of longer ones where these are asked for */
+PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer + max_levels], Best &d1, Best &d2)
+{
+  const Integrator      &I = Get(along.ts);
+  PetscBool              more;
+  std::vector<PetscReal> s1, s2, rounding(along.now.size(), 0);
+
+  PetscFunctionBegin;
+  if (!d1.known) PetscCall(along.roundingOfRows(rounding));
+  const auto attempt = [&](int level) -> PetscErrorCode {
+    const PetscReal tau = SpanFrom(along.t, Tau(T, level));
+    PetscFunctionBegin;
+    PetscCall(along.differences(tau, s1, s2));
+    for (PetscInt i = 0; i < (PetscInt)s1.size(); i++) {
+      if (!IsConstraint(I, i)) continue;
+      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding[i] / tau);
+      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding[i] / (tau * tau));
+    }
+    PetscFunctionReturn(PETSC_SUCCESS);
+  };
+  for (int level = -longer; level < max_levels; level++)
+    if (used[longer + level]) PetscCall(attempt(level));
+  for (int level = -1; level >= -longer && !d1.known; level--) {
+    PetscCall(IsLongerOf(along, d1, d2, level, Tau(T, level), &more));
+    if (!more) break;
+    if (level == -1) PetscCall(attempt(0)); /* the one before it */
+    PetscCall(attempt(level));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,13 +267,10 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
    again: with the differences that were the best ones at the last call, near by. */
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second)
 {
-  Integrator            &I = Get(ts);
-  WorkVec                at, F, zero;
-  PetscInt               n;
-  PetscBool              rest, more;
-  bool                   used[longer + max_levels];
-  PetscReal              largest, speed;
-  std::vector<PetscReal> f0, s1, s2, rounding;
+  Integrator              &I = Get(ts);
+  Path                     along(ts, t, U, V);
+  PetscBool                rest;
+  bool                     used[longer + max_levels];
   std::vector<signed char> from;
 
   PetscFunctionBegin;
@@ -231,41 +279,12 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
     PetscCall(DerivativesAtRest(ts, t, U, V, first, second));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(LargestCoordinate(I, U, &largest));
-  PetscCall(LargestCoordinate(I, V, &speed));
-  PetscCall(VecGetLocalSize(U, &n));
-  PetscCall(at.like(U));
-  PetscCall(F.like(U));
-  PetscCall(zero.like(U));
-  PetscCall(VecCopy(U, at));
-  PetscCall(VecZeroEntries(zero));
   again = again && I.levels_known;
   if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
   else PetscCall(LevelsToTry(I, T, from, used));
-  f0.resize(n);
-  Best d1(I.levels[0], from, n, again), d2(I.levels[1], from, n, again);
-  PetscCall(ResidualAlong(ts, t, at, V, zero, F));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f) { f0[i] = PetscRealPart(f); }, Read(F)));
-  PetscCall(RoundingOfRows(ts, t, U, V, largest, f0, rounding));
-  const auto attempt = [&](int level) -> PetscErrorCode {
-    const PetscReal tau = SpanFrom(t, Tau(T, level));
-    PetscFunctionBegin;
-    PetscCall(DifferencesOver(ts, t, U, V, tau, f0, s1, s2));
-    for (PetscInt i = 0; i < n; i++) {
-      if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding[i] / tau);
-      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding[i] / (tau * tau));
-    }
-    PetscFunctionReturn(PETSC_SUCCESS);
-  };
-  for (int level = -longer; level < max_levels; level++)
-    if (used[longer + level]) PetscCall(attempt(level));
-  for (int level = -1; level >= -longer && !again; level--) {
-    PetscCall(IsLongerOf(ts, d1, d2, level, Tau(T, level), speed, largest, &more));
-    if (!more) break;
-    if (level == -1) PetscCall(attempt(0)); /* the one before it */
-    PetscCall(attempt(level));
-  }
+  PetscCall(along.create());
+  Best d1(I.levels[0], from, (PetscInt)along.now.size(), again), d2(I.levels[1], from, (PetscInt)along.now.size(), again);
+  PetscCall(FindBest(along, T, used, d1, d2));
   I.levels_known = PETSC_TRUE;
   for (int order = 1; order <= 2; order++) {
     Vec out = order == 1 ? first : second;
@@ -275,7 +294,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
         g = 0;
         if (!IsConstraint(I, i)) return;
         if (I.role[i] == TSHHT3_HOLONOMIC) g = order == 1 ? d1.value[i] : d2.value[i];
-        else g = order == 1 ? f0[i] : d1.value[i];
+        else g = order == 1 ? along.now[i] : d1.value[i];
       },
       Write(out)));
   }
