@@ -110,7 +110,7 @@ if(GTest_FOUND)
     target_include_directories(fuzz SYSTEM PRIVATE ${HHTDAE_HDF5_INCLUDE_DIR})
     target_link_libraries(fuzz PRIVATE ${HHTDAE_HDF5_LIBRARY})
   endif()
-  add_test(NAME fuzz.readers COMMAND fuzz -count 700 -seed 2 -output ${PROJECT_BINARY_DIR}/fuzz)
+  add_test(NAME fuzz.readers COMMAND fuzz -count 400 -seed 2 -output ${PROJECT_BINARY_DIR}/fuzz)
   set_tests_properties(fuzz.readers PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS fuzz)
 endif()
 
