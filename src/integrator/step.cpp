@@ -132,7 +132,7 @@ PetscErrorCode Begin(TS ts)
   }
   I.own_start = PETSC_FALSE;
   if (ts->steprestart || changed) {
-    if (ts->steps && I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));
+    if (I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));
     else if (ts->steps && I.at_begin) PetscCall(IsOwnState(ts, I.t0, I.U0, I.V0, &I.own_start));
     I.have_step = I.at_begin = PETSC_FALSE;
     PetscCall(Start(ts));

@@ -621,4 +621,12 @@ TEST(BetweenRuns, WhatAStepHasLeft)
     angle[(int)x] = std::atan2(run.u()[1], run.u()[0]);
     EXPECT_NEAR(angle[(int)x], angle[0], 2e-3) << (int)x;
   }
+  Simulation run(p, tolerance(1e-7)); /* and who begins to count anew */
+  Printed    out;
+  for (double end : {1., 2.}) {
+    must(TSSetMaxTime(run.ts, end));
+    must(TSSetStepNumber(run.ts, 0));
+    must(run.solve());
+  }
+  EXPECT_EQ(out.text().find("violate"), std::string::npos) << out.text();
 }
