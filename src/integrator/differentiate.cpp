@@ -201,7 +201,8 @@ struct Path {
   }
 };
 
-/* Whether any row of any rank asks for a tau as long as that of level l < 0, and none of what moves is moved further than the largest coordinate */
+/* Whether any row of any rank asks for a tau as long as that of level l < 0, what follows time is resolved by it, and none of what moves is moved further than the
+   largest coordinate; the same on all ranks, those without unknowns too */
 PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int l, PetscReal tau, PetscBool *yes)
 {
   const Integrator &I    = Get(along.ts);
@@ -209,7 +210,7 @@ PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int
 
   PetscFunctionBegin;
   *yes = PETSC_FALSE;
-  if (!d1.from.empty() || !(along.speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * along.speed > along.largest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(along.speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * along.speed > along.largest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < (PetscInt)I.role.size() && !asks; i++)
     if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = PETSC_TRUE;
   PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)along.ts)));

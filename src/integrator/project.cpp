@@ -235,7 +235,7 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of rows of constraints, by themselves where nothing moves within the run */
+/* For differences of constraints: what the motion takes, though the run be `runs` times shorter */
 PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 {
   PetscReal rate;

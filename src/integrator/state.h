@@ -203,7 +203,8 @@ struct Integrator : StepState {
 
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 
-/* About tau > 0, as the difference of two times that are numbers: to what t + tau is rounded a motion that follows time is elsewhere than after tau (Units.LateInTime) */
+/* About tau > 0, as what lies between t and t + tau once that is rounded: whatever follows time is where the rounded one puts it, and differences are over this span
+   (Units.LateInTime) */
 inline PetscReal SpanFrom(PetscReal t, PetscReal tau) { return t + PetscMax(tau, 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)) - t; }
 inline TSHHT3Role RoleOf(const Integrator &I, PetscInt i) { return I.role.empty() ? TSHHT3_COORDINATE : (TSHHT3Role)I.role[i]; }
 inline bool IsCoordinate(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_COORDINATE; }

@@ -126,6 +126,12 @@ PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, Row
   Eigen::MatrixXd  X, at_a_time[2];
   double           rate, e;
   PetscFunctionBegin;
+  if (rows.empty()) { /* of any rank */
+    PetscInt n;
+    PetscCall(MatGetSize(K, &n, nullptr));
+    for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) x->resize(0, n);
+    PetscFunctionReturn(0);
+  }
   for (int k = 0; k < 2; k++) {
     Work w;
     PetscCall(nearby(0, t + k * reach, &w));
