@@ -153,6 +153,7 @@ PetscErrorCode TakeSNES(TS ts)
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SetUpJacobian(ts));
   PetscCall(CheckMatrices(ts));
+  PetscCall(CheckTriangle(ts));
   PetscCall(SetUpSolvers(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -113,3 +113,25 @@ TEST(Triangle, RolesThatBreakTheSymmetryAreNamed)
     says(vars, setRoles, "is a");
   }
 }
+
+/* Where the TS gets another SNES in the course of a run the matrix of that one holds one triangle */
+TEST(Triangle, AnotherSNESBetweenSteps)
+{
+  const Sleigh p(1.);
+  Simulation   run(p, tolerance(1e-5) + "-ts_exact_final_time stepover ");
+  SNES         snes;
+  Mat          S;
+  must(run.step());
+  must(MatCreateSeqSBAIJ(PETSC_COMM_SELF, 1, p.n, p.n, p.n, nullptr, &S));
+  must(MatSetOption(S, MAT_IGNORE_LOWER_TRIANGULAR, PETSC_TRUE));
+  must(SNESCreate(PETSC_COMM_SELF, &snes));
+  must(SNESSetJacobian(snes, S, S, SNESTSFormJacobian, run.ts));
+  must(TSSetSNES(run.ts, snes));
+  {
+    ErrorTrap trap;
+    EXPECT_NE(run.step(), 0);
+    EXPECT_TRUE(trap.says("is a velocity-level constraint (of 1)")) << trap.message;
+  }
+  must(SNESDestroy(&snes));
+  must(MatDestroy(&S));
+}
