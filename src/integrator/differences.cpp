@@ -155,7 +155,7 @@ PetscErrorCode RowBeside(TS ts, Mat ones, IS color, int half, const WorkVec (&x)
 {
   WorkVec         moved[3], mark, F, places;
   const PetscInt *index;
-  PetscInt        n, first;
+  PetscInt        n;
 
   PetscFunctionBegin;
   for (WorkVec *v : {&mark, &F, &places}) PetscCall(v->like(F0));
@@ -173,15 +173,11 @@ PetscErrorCode RowBeside(TS ts, Mat ones, IS color, int half, const WorkVec (&x)
   }
   PetscCall(EvaluateResidual(ts, ts->ptime, moved[0], moved[1], moved[2], F));
   PetscCall(MatMult(ones, mark, places));
-  PetscCall(VecGetOwnershipRange(F, &first, NULL));
-  PetscInt found = PETSC_MAX_INT;
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar place, PetscScalar f, PetscScalar f0) {
-      if (place == 0. && PetscAbsScalar(f - f0) > 1e-12 * (PetscAbsScalar(f) + PetscAbsScalar(f0))) found = PetscMin(found, first + i); /* sums over all may round otherwise */
+  PetscCall(FirstWhere(
+    [](PetscInt, PetscScalar place, PetscScalar f, PetscScalar f0) {
+      return place == 0. && PetscAbsScalar(f - f0) > 1e-12 * (PetscAbsScalar(f) + PetscAbsScalar(f0)); /* sums over all may round otherwise */
     },
-    Read(places), Read(F), Read(F0)));
-  PetscCallMPI(MPI_Allreduce(&found, row, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  if (*row == PETSC_MAX_INT) *row = -1;
+    row, Read(places), Read(F), Read(F0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
