@@ -116,6 +116,7 @@ PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
   a.plain(there);
   a.good = a.good && IsFlag(there);
   if (a.good && there) PetscCall(TransferVec(ts, a, x));
+  else if (a.good && a.reading) PetscCall(VecDestroy(x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -283,10 +284,9 @@ PetscErrorCode CheckCheckpointFile(TS ts)
    written here alone. */
 PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
-  const Integrator &I = Get(ts);
-
   PetscFunctionBegin;
-  if (ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->ops->step != Step || ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  const Integrator &I = Get(ts);
   if (I.checkpoint_every > 0) PetscCall(CheckpointIfDue(ts));
   else if (I.checkpoint_file[0] && I.have_step) PetscCall(CheckpointSave(ts, I.checkpoint_file));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -238,6 +238,33 @@ TEST(Checkpoint, SaveAndLoad)
   EXPECT_EQ(second.v(), first.v());
 }
 
+/* A TS that has run takes all of the file's state and keeps nothing of its own: the coordinates that its start has found to be driven are not driven in the run of the
+   file, whose pendulum has turned since, Driven.FreeAfterAll */
+TEST(Checkpoint, LoadedIntoATSThatHasRun)
+{
+  const Pendulum p(-90., 2., 2.);
+  const File     file("run");
+  Simulation     first(p, tolerance(1e-6)), second(p, tolerance(1e-6));
+  Printed        out;
+  const auto     driven = [&](Simulation &run) {
+    const std::string before = out.text();
+    must(TSView(run.ts, PETSC_VIEWER_STDOUT_SELF));
+    return out.text().find("whose motion is given", before.size()) != std::string::npos;
+  };
+  for (int k = 0; k < 40; k++) must(first.step());
+  must(TSHHT3CheckpointSave(first.ts, file.name.c_str()));
+  must(TSSetTimeStep(second.ts, 1e-9));
+  must(second.step());
+  EXPECT_TRUE(driven(second));
+  must(TSHHT3CheckpointLoad(second.ts, file.name.c_str()));
+  EXPECT_FALSE(driven(first));
+  EXPECT_FALSE(driven(second));
+  must(first.solve());
+  must(second.solve());
+  EXPECT_EQ(second.u(), first.u());
+  sameCounters(second.statistics(), first.statistics());
+}
+
 /* Points of a time span that the run has behind it are not gone back for. */
 TEST(Checkpoint, ResumesInATimeSpan)
 {

@@ -1,6 +1,8 @@
 /* What the integrator puts into a SNES goes with TSReset(), TSDestroy() and another type, and the user's comes back */
 #include "integrator/corrector.h"
 #include "support.h"
+#include <cstdio>
+#include <unistd.h>
 
 using namespace hhtest;
 
@@ -75,6 +77,24 @@ TEST(Hooks, AnotherTypeAfterSteps)
   must(run.solve());
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
   EXPECT_GT(run.statistics().steps, 0);
+}
+
+/* The monitors of the first look into nothing that is not theirs, even if it looks like a run with a checkpoint to write */
+TEST(Hooks, MonitorsOfAnotherType)
+{
+  const std::string checkpoint = testing::TempDir() + "hhtdae-hooks-" + std::to_string((long)getpid());
+  Simulation        run(springs(), tolerance(1e-4) + "-ts_hhtdae_checkpoint " + checkpoint);
+  must(run.solve());
+  EXPECT_EQ(std::remove(checkpoint.c_str()), 0);
+  must(TSSetType(run.ts, TSALPHA2));
+  hht3::Integrator looks_alike;
+  looks_alike.have_step = PETSC_TRUE;
+  checkpoint.copy(looks_alike.checkpoint_file, checkpoint.size());
+  void *data   = run.ts->data;
+  run.ts->data = &looks_alike;
+  EXPECT_EQ(TSMonitor(run.ts, 1, run.t(), run.U), 0);
+  run.ts->data = data;
+  EXPECT_NE(std::remove(checkpoint.c_str()), 0);
 }
 
 TEST(Hooks, AnotherTypeBeforeSetUp)
