@@ -2,7 +2,6 @@
   The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
   than it says. It is replaced by any other type, as by -ts_adapt_type basic.
 */
-#include "compat.h"
 #include "estimate.h"
 #include "order.h"
 #include "start.h"

@@ -8,7 +8,6 @@
 
   A step far shorter than the one before, as to an event or the end of a run, does not lengthen the history: its beginning is left out.
 */
-#include "bdf.h"
 #include "entries.h"
 #include "order.h"
 #include "stage.h"

@@ -16,7 +16,6 @@
   dV        of misfit.cpp belongs to a step, and is measured in the new coordinates if h changes
 */
 #include "change.h"
-#include "compat.h"
 #include "equations.h"
 #include "estimate.h"
 #include "order.h"

@@ -8,18 +8,11 @@
 
   Whether a file belongs to the run: checkpoint_identity.cpp.
 */
-#include "bdf.h"
 #include "change.h"
 #include "checkpoint.h"
-#include "checkpoint_file.h"
-#include "checkpoint_identity.h"
-#include "checkpoint_matrix.h"
-#include "compat.h"
-#include "linear/archive.h"
+#include "checkpoint_parts.h"
 #include "step.h"
 #include "work_vec.h"
-#include <string>
-#include <vector>
 
 namespace hht3
 {

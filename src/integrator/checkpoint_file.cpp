@@ -1,4 +1,4 @@
-#include "checkpoint_file.h"
+#include "checkpoint_parts.h"
 #include "linear/hash.h"
 #include <cerrno>
 #include <cstdint>

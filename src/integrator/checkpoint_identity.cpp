@@ -2,13 +2,11 @@
   To tell whether a file belongs to the run: sizes, roles and method, and the residual at the state in the file, with other accelerations than
   its own, at which it would be zero.
 */
-#include "checkpoint_identity.h"
-#include "compat.h"
+#include "checkpoint_parts.h"
 #include "corrector.h"
 #include "entries.h"
 #include "equations.h"
 #include "linear/hash.h"
-#include "linear/linear.h"
 #include "rows.h"
 #include "work_vec.h"
 

@@ -2,16 +2,11 @@
   The Newton matrix in a checkpoint: the values of its rows, and what the solver keeps. It is not evaluated again, because the application
   may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
 */
-#include "checkpoint_identity.h"
-#include "checkpoint_matrix.h"
+#include "checkpoint_parts.h"
 #include "equations.h"
-#include "formulas.h"
 #include "jacobian.h"
-#include "linear/archive.h"
 #include "linear/hash.h"
-#include "linear/linear.h"
 #include <cstdint>
-#include <vector>
 
 namespace hht3
 {

@@ -14,8 +14,6 @@
 #include "corrector.h"
 #include "entries.h"
 #include "equations.h"
-#include "formulas.h"
-#include "linear/linear.h"
 #include "random.h"
 #include "solver.h"
 #include "work_vec.h"

@@ -3,7 +3,6 @@
 #ifndef HHTDAE_CONSISTENT_H
 #define HHTDAE_CONSISTENT_H
 
-#include "linear/linear.h"
 #include "state.h"
 
 namespace hht3

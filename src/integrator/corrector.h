@@ -3,7 +3,6 @@
 #ifndef HHTDAE_CORRECTOR_H
 #define HHTDAE_CORRECTOR_H
 
-#include "formulas.h"
 #include "state.h"
 #include <initializer_list>
 

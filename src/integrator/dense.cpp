@@ -8,7 +8,6 @@
 
   Both ends give back the step's own values.
 */
-#include "bdf.h"
 #include "dense.h"
 #include "entries.h"
 #include "rotations.h"

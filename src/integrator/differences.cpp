@@ -3,15 +3,12 @@
   own scale and by MatFDColoring, then combined with the shifts. The pattern is the DM's matrix or is found by moving one
   unknown at a time, which takes as many evaluations as there are unknowns; both are said with -info.
 */
-#include "compat.h"
 #include "entries.h"
 #include "equations.h"
 #include "jacobian.h"
-#include "linear/linear.h"
 #include "rows.h"
 #include "work_vec.h"
 #include <cstdint>
-#include <vector>
 
 namespace hht3
 {

@@ -11,7 +11,6 @@
 #include "random.h"
 #include "roles.h"
 #include "work_vec.h"
-#include <vector>
 
 namespace hht3
 {

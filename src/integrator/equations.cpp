@@ -18,10 +18,7 @@
 */
 #include "entries.h"
 #include "equations.h"
-#include "events.h"
-#include "formulas.h"
 #include "jacobian.h"
-#include "linear/linear.h"
 #include "proofs.h"
 #include "rotations.h"
 #include "solver.h"

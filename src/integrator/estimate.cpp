@@ -9,7 +9,6 @@
 #include "corrector.h"
 #include "entries.h"
 #include "estimate.h"
-#include "events.h"
 #include "order.h"
 #include "rotations.h"
 

@@ -14,8 +14,6 @@
 #include "consistent.h"
 #include "dense.h"
 #include "entries.h"
-#include "events.h"
-#include "linear/linear.h"
 #include "roles.h"
 #include "rotations.h"
 #include "solver.h"

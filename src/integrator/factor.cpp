@@ -3,7 +3,6 @@
   through its preconditioner (PCGetFailedReason()), on one rank alone if every rank has a block of its own: the ranks agree on it here,
   and the correction fails. Errors of PETSc's (a package that is not there, a defect) go up.
 */
-#include "linear/linear.h"
 #include "rows.h"
 #include "solver.h"
 

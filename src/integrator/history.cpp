@@ -18,7 +18,6 @@
 #include "entries.h"
 #include "work_vec.h"
 #include <petscblaslapack.h>
-#include <vector>
 
 namespace hht3
 {

@@ -4,7 +4,6 @@
   this TS. It goes with TSReset(), TSDestroy() and a change of type, and what the user had set there before comes back.
 */
 #include "corrector.h"
-#include "hooks.h"
 #include "settings.h"
 
 namespace hht3

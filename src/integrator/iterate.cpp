@@ -2,12 +2,9 @@
   One run of SNES: the full step as a line search, the judgement of corrections (judge.cpp) as its convergence test, and the explanation
   of what went wrong. A user's line search, convergence test, lag or type stands.
 */
-#include "compat.h"
 #include "corrector.h"
 #include "entries.h"
 #include "estimate.h"
-#include "hooks.h"
-#include "linear/linear.h"
 #include "rows.h"
 #include "settings.h"
 #include "solver.h"

@@ -3,10 +3,9 @@
   asked for them. PETSc's own differences (-snes_fd, -snes_fd_color, -ts_fd_color) would difference the step's residual by the step's
   unknowns, rounding of q divided by beta h^2 included, and not at all in the start: ours take their place.
 */
-#include "compat.h"
 #include "corrector.h"
-#include "hooks.h"
 #include "jacobian.h"
+#include "settings.h"
 #include "solver.h"
 #include <petscdm.h>
 #include <petscdmshell.h>

@@ -22,8 +22,6 @@
 */
 #include "corrector.h"
 #include "estimate.h"
-#include "formulas.h"
-#include "policy.h"
 #include "proofs.h"
 
 namespace hht3

@@ -1,6 +1,5 @@
 /* The longest step that the application allows: what the estimate cannot see, because nothing of it shows at the ends
  * of the step. */
-#include "compat.h"
 #include "estimate.h"
 
 namespace hht3

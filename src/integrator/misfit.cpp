@@ -18,11 +18,9 @@
   derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
   spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
-#include "compat.h"
 #include "entries.h"
 #include "equations.h"
 #include "estimate.h"
-#include "formulas.h"
 #include "solver.h"
 #include "stage.h"
 #include "start.h"

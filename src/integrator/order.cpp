@@ -13,7 +13,6 @@
   since high differences magnify it. So this ratio limits the step of orders 3 to 5, and HHT, which has no such limit and takes the oscillation away, is chosen where its
   step is longer. Orders 3 and 4, whose limits are lower, are mostly ways to 5.
 */
-#include "bdf.h"
 #include "order.h"
 #include "rotations.h"
 #include "sweeps.h"

@@ -9,8 +9,6 @@
   served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
 #include "entries.h"
-#include "events.h"
-#include "formulas.h"
 #include "predictor.h"
 #include "sweeps.h"
 

@@ -4,8 +4,6 @@
 #include "entries.h"
 #include "equations.h"
 #include "estimate.h"
-#include "events.h"
-#include "formulas.h"
 #include "order.h"
 #include "start.h"
 #include "work_vec.h"

@@ -1,5 +1,4 @@
 /* What a run says about itself: the summary line and the progress line. Both are TS monitors. */
-#include "report.h"
 #include "step.h"
 #include <ctime>
 

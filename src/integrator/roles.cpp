@@ -12,13 +12,11 @@
 #include "entries.h"
 #include "equations.h"
 #include "jacobian.h"
-#include "linear/linear.h"
 #include "random.h"
 #include "roles.h"
 #include "rows.h"
 #include "work_vec.h"
 #include <algorithm>
-#include <vector>
 
 namespace hht3
 {

@@ -18,8 +18,6 @@
   within half a turn of the reference. (About a reference that turns on with w_n, where no such limit is, a precessing top of prescribed w was off by 10 to 100 times
   as much.) A rotation vector depends on w by gamma h (1 - (h - gamma h)/2 [w] + O(h^2)).
 */
-#include "bdf.h"
-#include "compat.h"
 #include "entries.h"
 #include "order.h"
 #include "rotation_vector.h"
@@ -27,7 +25,6 @@
 #include "settings.h"
 #include "step.h"
 #include "work_vec.h"
-#include <vector>
 
 namespace hht3
 {

@@ -5,7 +5,6 @@
 #include "corrector.h"
 #include "entries.h"
 #include "estimate.h"
-#include "linear/linear.h"
 #include "proofs.h"
 #include "random.h"
 #include "work_vec.h"

@@ -1,7 +1,6 @@
 /*
   What the setters and getters of api.cpp do to a TS of our type, and the list of functions by which they find it.
 */
-#include "bdf.h"
 #include "change.h"
 #include "checkpoint.h"
 #include "dense.h"

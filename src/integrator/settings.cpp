@@ -3,7 +3,6 @@
   otherwise.
 */
 #include "entries.h"
-#include "hooks.h"
 #include "settings.h"
 
 namespace hht3

@@ -1,4 +1,5 @@
-/* What the user has set: tolerances and options that have a meaning here or none (settings.cpp), and the public setters and getters (setters.cpp). */
+/* What the user has set: tolerances and options that have a meaning here or none (settings.cpp), and the public setters and getters (setters.cpp); what the
+   integrator puts into the SNES, and takes out again with what stood there before (hooks.cpp). */
 #ifndef HHTDAE_SETTINGS_H
 #define HHTDAE_SETTINGS_H
 
@@ -19,6 +20,19 @@ PetscErrorCode ComposeSetters(TS ts, bool attach);
 
 /* An error in a setter that comes too late */
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
+
+/* Our line search, where the user chose none: a correction then costs no residual after the last one */
+PetscErrorCode HooksLineSearch(TS ts);
+
+/* Our differences fill the matrix */
+PetscErrorCode HooksJacobian(TS ts);
+
+/* At set-up: the convergence test, and that SNES asks for a matrix and reports a singular one as the corrector wants it */
+PetscErrorCode HooksInstall(TS ts);
+PetscErrorCode HooksRemove(TS ts);
+
+/* Whether the test of the SNES is the user's, who may have set it at any time */
+PetscBool HooksUserTest(TS ts);
 
 } // namespace hht3
 

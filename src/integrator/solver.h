@@ -2,7 +2,6 @@
 #ifndef HHTDAE_SOLVER_H
 #define HHTDAE_SOLVER_H
 
-#include "linear/linear.h"
 #include "state.h"
 
 namespace hht3

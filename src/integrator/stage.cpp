@@ -6,7 +6,6 @@
 */
 #include "entries.h"
 #include "estimate.h"
-#include "formulas.h"
 #include "order.h"
 #include "rotations.h"
 #include "stage.h"

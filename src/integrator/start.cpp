@@ -6,13 +6,10 @@
   the multipliers and an error of second order in q' (Arnold, Bruels 2007).
 */
 #include "change.h"
-#include "compat.h"
 #include "consistent.h"
 #include "entries.h"
 #include "equations.h"
 #include "estimate.h"
-#include "events.h"
-#include "linear/linear.h"
 #include "order.h"
 #include "predictor.h"
 #include "proofs.h"
@@ -23,7 +20,6 @@
 #include "stage.h"
 #include "start.h"
 #include "work_vec.h"
-#include <vector>
 
 namespace hht3
 {

@@ -1,23 +1,129 @@
 /*
   The state of a run, which every part of the integrator reads and writes: struct Integrator, and what it is made of.
 
-  What a run is at any time is kept in plain structs, ...State, here and in corrector_state.h and history_state.h: checkpoint.cpp writes them as
-  they are, so that a field added to one of them is saved and restored without another line. What the user has set is kept apart,
-  ...Options: it belongs to the run that resumes.
+  What a run is at any time is kept in plain structs, ...State: checkpoint.cpp writes them as they are, so that a field added to one of them is saved and
+  restored without another line. What the user has set is kept apart, ...Options: it belongs to the run that resumes.
 */
 #ifndef HHTDAE_STATE_H
 #define HHTDAE_STATE_H
 
+#include "bdf.h"
 #include "compat.h"
-#include "corrector_state.h"
-#include "formulas.h"
 #include "hhtdae/hhtdae.h"
-#include "history_state.h"
 #include "linear/linear.h"
+#include "policy.h"
 #include <vector>
 
 namespace hht3
 {
+
+/* Events of -log_view, registered in hht3.cpp */
+struct Events {
+  PetscLogEvent start, predict, matrix, estimate, sample;
+};
+extern Events events;
+
+/* The stopping test and the reuse ladder, section 5 of the paper */
+struct CorrectorOptions : ReuseOptions {
+  PetscReal c         = 1e-3; /* error left by the iteration, relative to the tolerance; see CorrectorTolerance() */
+  PetscBool c_given   = PETSC_FALSE; /* by the user: taken as it is */
+  PetscInt  max_it    = 10;
+  PetscBool user_lag  = PETSC_FALSE; /* -snes_lag_jacobian: the user rules */
+  PetscBool user_test = PETSC_FALSE; /* the user's test of SNES decides; corrections are only measured */
+};
+
+/* What the corrector remembers of its matrix and of its corrections */
+struct CorrectorState {
+  MatrixPolicy matrix;
+  PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
+  PetscBool from_rest   = PETSC_FALSE; /* the last step went from where it began: at fixed steps a prediction may lead astray */
+  PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
+  PetscBool rounding    = PETSC_FALSE; /* what is left of it is rounding */
+  PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
+  PetscReal floor       = 0;           /* corrections below this are rounding of q */
+  PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
+
+  PetscInt            it     = 0; /* of the present correction */
+  PetscInt            base   = 0; /* iteration after which the present matrix came into use */
+  PetscInt            renewals = 0; /* matrices made in the course of it */
+  PetscInt            met    = 0; /* times that corrections have turned back and met */
+  PetscReal           e      = 0; /* last correction, in units of the tolerance */
+  PetscReal           xi_max = 0; /* worst rate of this correction */
+  PetscReal           forces = 0; /* residual in the rows of driven coordinates, in units of the tolerance */
+  SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
+};
+
+struct Corrector : CorrectorOptions, CorrectorState {
+  PetscInt limit() const { return max_it + 2 * met; } /* of iterations; -snes_max_it ends them before */
+};
+
+/* What is known of the forces that small corrections may hide */
+struct VerificationState {
+  PetscReal largest = 0;            /* claim of the present matrix; 0: not known */
+  PetscBool measured = PETSC_FALSE; /* inertia has been measured since the matrix was made */
+  PetscBool looked   = PETSC_FALSE; /* the residual after the last correction was needed for its proof */
+  unsigned  sample = 3;              /* of rounding, the next one of its own random numbers */
+  PetscReal since = 0;              /* time since the residual was looked at last: forces may have been missing for so long */
+};
+
+/* Whether small corrections prove anything, verify.cpp */
+struct Verification : VerificationState {
+  Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
+  Vec unproved = nullptr; /* time before `since` in which a row's residual has stayed as it was, whenever it was looked at */
+  Vec defined = nullptr, product = nullptr, passed = nullptr; /* work of PassDefinitionsOn(), none where nothing is defined */
+  Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
+};
+
+constexpr PetscInt max_degree = max_order; /* of the predictor */
+constexpr PetscInt hht_degree = 3; /* that pays in steps of order two */
+
+struct PredictorOptions {
+  PetscInt  degree_max = hht_degree; /* what the user allows */
+  PetscBool fixed      = PETSC_FALSE;
+};
+
+struct PredictorState {
+  PetscInt  degree    = 0; /* in use */
+  PetscInt  available = 0; /* differences that exist */
+  PetscReal t[max_degree + 2] = {}; /* t_n, t_{n-1}, ... */
+};
+
+/* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
+   time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
+struct Predictor : PredictorOptions, PredictorState {
+  Vec D[max_degree + 2] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used. One beyond them is work space. */
+};
+
+/* What the choice of the order knows of the steps before */
+struct OrderMemory {
+  PetscReal S[max_order + 2] = {};     /* amplitudes of the scaled differences of orders 2 to 6; 0: none yet */
+  PetscReal ratio[max_order + 1] = {10, 10, 10, 10, 10, 10}; /* of one to the one before it, as stability sees it; more than any where nothing is known */
+};
+
+/* Orders above two, bdf.cpp and order.cpp. Nothing of it is used where the largest order is two. */
+struct OrderState {
+  PetscInt  now = 2, next = 2;          /* of the step from t_n, and of the one after it when it is accepted */
+  PetscInt  made = 0, accepted = 0;     /* of the step that led to t_n, and of the accepted one that leads away from it; 0: neither */
+  PetscInt  ready = 2;                  /* for which X0, D_0 and the misfit of velocities stand */
+  PetscInt  past = 0;                   /* states before t_n that are kept */
+  PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
+  OrderMemory memory, after;            /* at t_n, and when the step is accepted */
+  PetscInt  wait = 0, penalty = 0;      /* steps of order two after a higher one has failed: still to be made, and the last time */
+  PetscBool chosen = PETSC_FALSE;       /* next is */
+  PetscReal spin = 0;                   /* fastest rotation of a body in the step that led to t_n, rad per time; 0 where there is no history or no rotation vector */
+  PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
+  PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
+  PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */
+};
+
+struct Order : OrderState {
+  PetscInt wanted = 2;        /* by the user; may be TSHHT3_ORDER_AUTO */
+  PetscInt max    = 2;        /* that is possible */
+  PetscBool measured = PETSC_FALSE; /* S are the scaled differences of the attempt, order.cpp */
+  PetscReal S[max_order + 2] = {};
+  Vec      U[max_order] = {}; /* U, U' at t_{n-1}, t_{n-2}, ... */
+  Vec      V[max_order] = {};
+};
 
 struct ChangeState {
   PetscBool stale = PETSC_FALSE; /* the matrix is still to be made in the new coordinates */

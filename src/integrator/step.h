@@ -1,4 +1,4 @@
-/* One step, step.cpp. */
+/* One step, step.cpp; and what a run says of itself, report.cpp: clocks, and the monitors of -ts_hhtdae_summary and -ts_hhtdae_progress. */
 #ifndef HHTDAE_STEP_H
 #define HHTDAE_STEP_H
 
@@ -12,6 +12,14 @@ PetscErrorCode RollBack(TS ts);
 
 /* vec_sol and vec_dot are as the integrator left them: the next step need not start anew */
 PetscErrorCode NoteState(TS ts);
+
+void ReadClocks(PetscReal *wall, PetscReal *cpu);
+
+/* The time since the set-up into the statistics */
+void StopClocks(Integrator &I);
+
+PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 
 } // namespace hht3
 

@@ -65,7 +65,12 @@ __attribute__((target("avx2"))) Body SweepNewer(PetscInt n, Body body)
   SweepAll(n, body);
   return body;
 }
-bool NewerProcessor();
+
+inline bool NewerProcessor()
+{
+  static const bool newer = __builtin_cpu_supports("avx2");
+  return newer;
+}
 #endif
 
 template <class Body>

@@ -10,7 +10,6 @@
 */
 #include "entries.h"
 #include "jacobian.h"
-#include "linear/linear.h"
 #include "work_vec.h"
 
 namespace hht3

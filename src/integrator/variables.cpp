@@ -15,7 +15,6 @@
 #include "roles.h"
 #include "rows.h"
 #include "work_vec.h"
-#include <vector>
 
 namespace hht3
 {

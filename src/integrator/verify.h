@@ -3,7 +3,6 @@
 #define HHTDAE_VERIFY_H
 
 #include "entries.h"
-#include "formulas.h"
 #include "state.h"
 
 namespace hht3

@@ -1,12 +1,11 @@
-/* Whether a checkpoint belongs to the run that reads it. */
-#ifndef HHTDAE_CHECKPOINT_IDENTITY_H
-#define HHTDAE_CHECKPOINT_IDENTITY_H
+/* What a checkpoint is made of: whether it belongs to the run that reads it (checkpoint_identity.cpp), the Newton matrix and what its solver keeps
+   (checkpoint_matrix.cpp), and the file (checkpoint_file.cpp). */
+#ifndef HHTDAE_CHECKPOINT_PARTS_H
+#define HHTDAE_CHECKPOINT_PARTS_H
 
-#include "formulas.h"
+#include "linear/archive.h"
 #include "state.h"
-#include <cstdint>
 #include <string>
-#include <vector>
 
 namespace hht3
 {
@@ -36,6 +35,21 @@ PetscErrorCode CheckFinite(TS ts, const char file[]);
 
 /* An answer for all ranks */
 PetscErrorCode Everywhere(TS ts, bool mine, bool *all);
+
+PetscErrorCode SaveMatrix(TS ts, Archive &a);
+
+/* Where it cannot be restored the run makes a new one */
+PetscErrorCode LoadMatrix(TS ts, Archive &a);
+
+/* A file with one sequence of bytes of every rank: written beside and renamed when it is whole and on the disk, with a checksum. Collective.
+   A run that dies while writing keeps the file that was there before. */
+PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const std::vector<char> &mine);
+
+/* Collective; an error where no such file could be written: for before a run, lest it tells at its end */
+PetscErrorCode CheckpointFileCheck(MPI_Comm comm, const std::string &file);
+
+/* Collective; an error on all ranks where the file is damaged, not one of these, or of another number of ranks */
+PetscErrorCode CheckpointFileRead(MPI_Comm comm, const std::string &file, std::vector<char> &mine);
 
 } // namespace hht3
 
