@@ -166,6 +166,7 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   Integrator       &I    = Get(ts);
   MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
   Identity          id;
+  std::string       options;
   std::vector<char> words;
   WorkVec           was, is;
   bool              good;
@@ -189,7 +190,10 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCall(CheckFinite(ts, file));
   I.stage_id = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
-  PetscCall(CompareOptions(ts, file, words));
+  PetscCall(OptionsInWords(ts, &options));
+  const std::string theirs(words.begin(), words.end());
+  if (theirs != options) /* the user's right, but then the run is another one */
+    PetscCall(PetscPrintf(comm, "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
   PetscCall(TellingResidual(ts, is));
   PetscCall(CheckTellingResidual(ts, file, was, is));
   PetscCall(LoadMatrix(ts, a));

@@ -76,18 +76,6 @@ void SyncDirectory(const std::string &file)
   close(d);
 }
 
-PetscErrorCode Sizes(MPI_Comm comm, size_t mine, std::vector<std::uint64_t> &sizes)
-{
-  const std::uint64_t size = mine;
-  PetscMPIInt         ranks;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  sizes.resize(ranks);
-  PetscCallMPI(MPI_Gather(&size, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, 0, comm));
-  PetscFunctionReturn(0);
-}
-
 /* All ranks' bytes, one rank after the other, through a buffer on rank 0 */
 PetscErrorCode WriteAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, const std::vector<char> &mine, Stream &out)
 {
@@ -179,14 +167,17 @@ Verdict Examine(const char *name, PetscMPIInt ranks, Header &h, std::vector<std:
 PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const std::vector<char> &mine)
 {
   const std::string          part = file + ".part";
+  const std::uint64_t        size = mine.size();
   std::vector<std::uint64_t> sizes;
-  PetscMPIInt                rank;
+  PetscMPIInt                rank, ranks;
   Stream                     out;
   struct stat                info;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(Sizes(comm, mine.size(), sizes));
+  PetscCallMPI(MPI_Comm_size(comm, &ranks));
+  sizes.resize(ranks);
+  PetscCallMPI(MPI_Gather(&size, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, 0, comm));
   if (rank == 0) {
     Header h = {};
     std::memcpy(h.magic, magic, sizeof magic);

@@ -165,18 +165,4 @@ PetscErrorCode CheckFinite(TS ts, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Other options are the user's right, but then the run is another one */
-PetscErrorCode CompareOptions(TS ts, const char file[], const std::vector<char> &words)
-{
-  std::string       is;
-  const std::string was(words.begin(), words.end());
-
-  PetscFunctionBegin;
-  PetscCall(OptionsInWords(ts, &is));
-  if (was != is)
-    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
-                          "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, was.c_str(), is.c_str()));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace hht3

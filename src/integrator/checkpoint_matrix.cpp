@@ -93,18 +93,6 @@ PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In the state at hand, for the pattern alone */
-PetscErrorCode MakePattern(TS ts, Mat J, Mat P)
-{
-  Integrator            &I     = Get(ts);
-  const TSHHT3Statistics saved = I.stat;
-
-  PetscFunctionBegin;
-  PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, ShiftV(I.p, I.h), ShiftA(I.p, I.h), J, P));
-  I.stat = saved;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The solver of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
 PetscErrorCode LoadSolver(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
 {
@@ -164,7 +152,9 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   PetscCall(GivesRows(J, &rows));
   if (m.there) {
     PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
-    PetscCall(MakePattern(ts, mffd ? P : J, P));
+    const TSHHT3Statistics saved = I.stat;
+    PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, ShiftV(I.p, I.h), ShiftA(I.p, I.h), mffd ? P : J, P)); /* for the pattern alone */
+    I.stat = saved;
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
     good = good && (rows || mffd); /* the application's product has no values to restore */

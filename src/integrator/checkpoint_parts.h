@@ -24,7 +24,6 @@ PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was);
 
 /* Options that the run may change, at the cost of repeating the uninterrupted one no more: for comparison and for the message */
 PetscErrorCode OptionsInWords(TS ts, std::string *text);
-PetscErrorCode CompareOptions(TS ts, const char file[], const std::vector<char> &words);
 
 /* The residual by which a problem is told: at the last state, with accelerations that leave the inertia forces in it */
 PetscErrorCode TellingResidual(TS ts, Vec F);

@@ -143,27 +143,18 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = 1/weight with random signs: accelerations of the size that the tolerances mean; zero where there is no coordinate */
-static PetscErrorCode ProbingAccelerations(TS ts, Vec Z)
-{
-  Integrator &I = Get(ts);
-  PetscInt    first;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(Z, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i, 1) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel */
+/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel: 1/weight with random signs, accelerations of the
+   size that the tolerances mean, zero where there is no coordinate */
 static PetscErrorCode MeasureInertia(TS ts)
 {
   Integrator &I = Get(ts);
   WorkVec     Z, A, F, change;
+  PetscInt    first;
 
   PetscFunctionBegin;
   for (WorkVec *v : {&Z, &A, &F, &change}) PetscCall(v->like(I.X, I.spare));
-  PetscCall(ProbingAccelerations(ts, Z));
+  PetscCall(VecGetOwnershipRange(Z, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i, 1) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
   PetscCall(VecWAXPY(A, 1, Z, I.A1));
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, change));

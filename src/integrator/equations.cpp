@@ -38,16 +38,6 @@ Scales StepScales(const Integrator &I)
           1 / ScaleVelocity(p, h)};
 }
 
-/* (9a): what the average takes from t_n. f_n is evaluated once per step, at the end of the last one */
-PetscErrorCode AddOldForces(const Integrator &I, Vec F)
-{
-  const PetscReal w = -I.alpha / (1 + I.alpha);
-
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar &f) { if (IsCoordinate(I, i)) f += w * f0; }, Read(I.F0), Write(F)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Definitions of V and F that use q'' need the true one, where (9a) evaluates at q''/(1+alpha): a second evaluation, made
    only for problems that have such definitions */
 PetscErrorCode TrueAccelerationRows(TS ts, Vec X, Vec F)
@@ -177,7 +167,8 @@ PetscErrorCode FormFunction(SNES, Vec X, Vec F, TS ts)
   PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
   if (I.F0) {
     if (I.definitions_use_acceleration) PetscCall(TrueAccelerationRows(ts, X, F));
-    PetscCall(AddOldForces(I, F));
+    const PetscReal w = -I.alpha / (1 + I.alpha); /* (9a): what the average takes from t_n. f_n is evaluated once per step, at the end of the last one */
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar &f) { if (IsCoordinate(I, i)) f += w * f0; }, Read(I.F0), Write(F)));
   }
   if (I.constraints()) PetscCall(ScaleResidual(I, F));
   PetscFunctionReturn(PETSC_SUCCESS);

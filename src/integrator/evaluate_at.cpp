@@ -155,26 +155,8 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X from U, V, A as they were interpolated: the first guess */
-PetscErrorCode GuessUnknowns(const Integrator &I, Consistent &c)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
-    Read(c.U), Read(c.V), Read(c.A), Write(c.X)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Packages keep pivots from one matrix to the next. In a new step the factors are made from nothing, so that samples do not depend
-   on those of earlier steps: a resumed run gives the same to the last bit. */
-PetscErrorCode ForgetEarlierSteps(const Integrator &I, Sampler &S)
-{
-  PetscFunctionBegin;
-  if (S.t1 != I.t1) PetscCall(KSPReset(S.at.ksp));
-  S.t1 = I.t1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* From U, V, A as they were interpolated, which are the first guess. Packages keep pivots from one matrix to the next: in a new step the factors are made from
+   nothing, so that samples do not depend on those of earlier steps and a resumed run gives the same to the last bit. */
 PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
 {
   Integrator            &I     = Get(ts);
@@ -184,9 +166,13 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
+  if (S.t1 != I.t1) PetscCall(KSPReset(S.at.ksp));
+  S.t1      = I.t1;
   S.at.t    = t;
   S.at.tiny = 1e-28 * I.h; /* as in the start */
-  PetscCall(GuessUnknowns(I, S.at));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
+    Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
   PetscCall(ReferTo(ts, S.at.U, before));
   if (S.at.gamma) PetscCall(ConstraintTerms(ts, S.at));
   PetscCall(SolveConsistent(ts, S.at, false, ok, &why));
@@ -208,11 +194,9 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   Sampler    *S  = NULL;
 
   PetscFunctionBegin;
-  PetscCheck(I.have_step || IsBeginOfStep(ts, t), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
   const PetscReal x = StepFraction(I, t);
   if (I.have_step && x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
   if (S) {
-    PetscCall(ForgetEarlierSteps(I, *S));
     PetscCall(Interpolate(ts, t, S->at.U, S->at.V, S->at.A));
     PetscCall(SampleInside(ts, *S, t, &ok));
   }

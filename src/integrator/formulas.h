@@ -80,18 +80,9 @@ inline PetscReal ScalePosition(const Parameters &p, PetscReal h) { return p.beta
 inline PetscReal ScaleVelocity(const Parameters &p, PetscReal h) { return p.gamma * h; }
 inline PetscReal ScaleState(const Parameters &p, PetscReal h) { return p.gamma_s * h; }
 
-/* (2a) and (2b): position and velocity from the accelerations at both ends. What a_n is multiplied with, and the whole; a_{n+1} goes
-   with ScalePosition() and ScaleVelocity(). The sweeps of stage.cpp take these factors. */
+/* (2a) and (2b): position and velocity from the accelerations at both ends. What a_n is multiplied with; a_{n+1} goes with ScalePosition() and ScaleVelocity(). */
 inline PetscReal OldPosition(const Parameters &p, PetscReal h) { return h * h * ((PetscReal)0.5 - p.beta); }
 inline PetscReal OldVelocity(const Parameters &p, PetscReal h) { return h * (1 - p.gamma); }
-inline PetscReal NewmarkPosition(const Parameters &p, PetscReal h, PetscReal q, PetscReal v, PetscReal a0, PetscReal a1)
-{
-  return q + (h * v + OldPosition(p, h) * a0 + ScalePosition(p, h) * a1);
-}
-inline PetscReal NewmarkVelocity(const Parameters &p, PetscReal h, PetscReal v, PetscReal a0, PetscReal a1)
-{
-  return v + (OldVelocity(p, h) * a0 + ScaleVelocity(p, h) * a1);
-}
 
 /* How much less the multipliers' oscillation is damped than at alpha = -0.05 (or its spectral radius), 1 down to 0. Phi = 0
    leaves normal accelerations with the double eigenvalue -rho: what one step leaves in q or q' grows by 1/(1-rho) before it

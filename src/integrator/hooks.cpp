@@ -15,24 +15,16 @@ namespace
 /* The test stands in the SNES of ts, put there by HooksInstall(): neither by the user since nor for another TS */
 bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == ConvergenceTest && snes->cnvP == (void *)ts; }
 
-/* A test chosen by the user: by the option, also where it names the default, or by the program */
-PetscErrorCode UserHasTest(SNES snes, PetscBool *has)
-{
-  PetscFunctionBegin;
-  PetscCall(OptionGiven((PetscObject)snes, "-snes_convergence_test", has));
-  if (snes->ops->converged != SNESConvergedDefault) *has = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* By exchange of the fields: SNESSetConvergenceTest() would destroy the context of the user's test */
+/* Unless the user has chosen one, by the option, also where it names the default, or by the program. By exchange of the fields: SNESSetConvergenceTest() would destroy the
+   context of the user's test */
 PetscErrorCode InstallTest(TS ts, SNES snes)
 {
   Hooks    &H = Get(ts).hooks;
   PetscBool users;
 
   PetscFunctionBegin;
-  PetscCall(UserHasTest(snes, &users));
-  if (users) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(OptionGiven((PetscObject)snes, "-snes_convergence_test", &users));
+  if (users || snes->ops->converged != SNESConvergedDefault) PetscFunctionReturn(PETSC_SUCCESS);
   H.test                      = PETSC_TRUE;
   H.cnvP                      = snes->cnvP;
   H.convergeddestroy          = snes->ops->convergeddestroy;
@@ -152,14 +144,6 @@ PetscErrorCode RemoveJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES that the user has given to several TS serves the one that steps */
-PetscErrorCode TakeFromOther(TS ts, SNES snes)
-{
-  PetscFunctionBegin;
-  if (snes->ops->converged == ConvergenceTest && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A SNES that has served another TS evaluates that one's functions */
 PetscErrorCode PointToUs(TS ts, SNES snes)
 {
@@ -231,7 +215,7 @@ PetscErrorCode HooksInstall(TS ts)
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
-  PetscCall(TakeFromOther(ts, snes));
+  if (snes->ops->converged == ConvergenceTest && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP)); /* of several TS it serves the one that steps */
   if (H.snes != snes) {
     PetscCall(PointToUs(ts, snes));
     PetscCall(PetscObjectReference((PetscObject)snes));

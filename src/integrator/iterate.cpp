@@ -106,33 +106,25 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
 }
 
 /* A SNES type that asks for no convergence test of ours (ksponly) has counted by itself. How well the matrix served is not known:
-   where the problem is not linear, the next step gets a new one. */
-PetscErrorCode CountForeign(TS ts)
+   where the problem is not linear, the next step gets a new one. If it has never asked for any test, it is open whether the equations of the step hold: one linear
+   solve is the user's word that they do. */
+PetscErrorCode CountForeign(TS ts, PetscBool solved)
 {
   Integrator &I = Get(ts);
+  SNESType    type;
   PetscInt    its;
+  PetscBool   linear;
 
   PetscFunctionBegin;
+  PetscCall(SNESGetType(ts->snes, &type));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &linear));
+  PetscCheck(!solved || linear || I.corrector.user_test, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "-snes_type %s ended without asking for a test of convergence, so that nothing is known of its result: use %s or, for linear problems, %s", type, SNESNEWTONLS, SNESKSPONLY);
   PetscCall(SNESGetIterationNumber(ts->snes, &its));
   I.corrector.it = its;
   I.stat.newton += its;
   I.stat.solves += its;
   if (ts->problem_type != TS_LINEAR) I.corrector.xi_max = 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A type that never asks for the convergence test leaves it open whether the equations of the step hold. One linear solve is
-   the user's word that they do. */
-PetscErrorCode CheckJudged(TS ts)
-{
-  SNESType  type;
-  PetscBool linear;
-
-  PetscFunctionBegin;
-  PetscCall(SNESGetType(ts->snes, &type));
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &linear));
-  PetscCheck(linear || Get(ts).corrector.user_test, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "-snes_type %s ended without asking for a test of convergence, so that nothing is known of its result: use %s or, for linear problems, %s", type, SNESNEWTONLS, SNESKSPONLY);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,8 +261,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   }
   const bool foreign = !c.it;
   *ok                = (PetscBool)(reason > 0);
-  if (foreign && *ok) PetscCall(CheckJudged(ts));
-  if (foreign) PetscCall(CountForeign(ts));
+  if (foreign) PetscCall(CountForeign(ts, *ok));
   ts->snes_its += c.it;
   if (!*ok) PetscCall(ExplainSNES(ts, reason));
   if (*ok) PetscCall(StageVectors(ts, I.X));

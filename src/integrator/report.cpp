@@ -1,26 +1,15 @@
 /* What a run says about itself: the summary line and the progress line. Both are TS monitors. */
 #include "step.h"
+#include <chrono>
 #include <ctime>
 
 namespace hht3
 {
 
-namespace
-{
-
-PetscReal Seconds(clockid_t clock)
-{
-  timespec t = {};
-  (void)clock_gettime(clock, &t);
-  return (PetscReal)t.tv_sec + 1e-9 * (PetscReal)t.tv_nsec;
-}
-
-} // namespace
-
 void ReadClocks(PetscReal *wall, PetscReal *cpu)
 {
-  *wall = Seconds(CLOCK_MONOTONIC);
-  *cpu  = Seconds(CLOCK_PROCESS_CPUTIME_ID);
+  *wall = std::chrono::duration<PetscReal>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  *cpu  = (PetscReal)std::clock() / CLOCKS_PER_SEC;
 }
 
 void StopClocks(Integrator &I)

@@ -32,27 +32,6 @@ namespace hht3
 namespace
 {
 
-PetscErrorCode LocalIndices(TS ts, IS is, std::vector<PetscInt> &local)
-{
-  const PetscInt *index;
-  PetscInt        n, first, end;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &first, &end));
-  PetscCall(ISGetLocalSize(is, &n));
-  PetscCall(ISGetIndices(is, &index));
-  local.resize((std::size_t)n);
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCheck(index[k] >= first && index[k] + 3 <= end, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-               "TSHHT3SetRotations(): rotation vector at %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT, index[k], first, end - 1);
-    for (PetscInt i = index[k]; i < index[k] + 3; i++)
-      PetscCheck(IsCoordinate(Get(ts), i - first), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "TSHHT3SetRotations(): unknown %" PetscInt_FMT " is no coordinate", i);
-    local[(std::size_t)k] = index[k] - first;
-  }
-  PetscCall(ISRestoreIndices(is, &index));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* of a step of length h */
 void Commutator(PetscReal h, const PetscScalar *w0, const PetscScalar *w1, PetscScalar *c) { Cross(h * h / 12, w1, w0, c); }
 
@@ -60,11 +39,24 @@ void Commutator(PetscReal h, const PetscScalar *w0, const PetscScalar *w1, Petsc
 
 PetscErrorCode SetUpRotations(TS ts)
 {
-  Integrator &I = Get(ts);
+  Integrator     &I = Get(ts);
+  const PetscInt *index;
+  PetscInt        n, first, end;
 
   PetscFunctionBegin;
   I.rotations.at.clear();
-  if (I.rotations.is) PetscCall(LocalIndices(ts, I.rotations.is, I.rotations.at));
+  if (!I.rotations.is) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &first, &end));
+  PetscCall(ISGetLocalSize(I.rotations.is, &n));
+  PetscCall(ISGetIndices(I.rotations.is, &index));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCheck(index[k] >= first && index[k] + 3 <= end, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+               "TSHHT3SetRotations(): rotation vector at %" PetscInt_FMT ", but this rank's unknowns are %" PetscInt_FMT " to %" PetscInt_FMT, index[k], first, end - 1);
+    for (PetscInt i = index[k]; i < index[k] + 3; i++)
+      PetscCheck(IsCoordinate(I, i - first), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "TSHHT3SetRotations(): unknown %" PetscInt_FMT " is no coordinate", i);
+    I.rotations.at.push_back(index[k] - first);
+  }
+  PetscCall(ISRestoreIndices(I.rotations.is, &index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

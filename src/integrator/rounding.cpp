@@ -12,23 +12,6 @@
 namespace hht3
 {
 
-namespace
-{
-
-/* r = noise with random factors, row by row: rounding of one row knows nothing of that of another. (A residual of unknowns that have been
-   moved a little is taken back to them by the matrix, however near to singular it is.) */
-PetscErrorCode Scatter(Vec noise, unsigned salt, Vec r)
-{
-  PetscInt first;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(r, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * RandomRounding(first + i, salt); }, Read(noise), Write(r)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-} // namespace
-
 /* The correction that the matrix at hand makes of a residual r, to rounding: no other one follows */
 PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
 {
@@ -64,11 +47,13 @@ PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
 }
 
 /* e of rounding at the iterate X, in units of the tolerance: the larger of two samples, since in one of them the rows may cancel
-   (Stiff.FastModeBesideASlowOne) */
+   (Stiff.FastModeBesideASlowOne). The noise of the residual is taken with random factors, row by row: rounding of one row knows nothing of that of another. (A residual of
+   unknowns that have been moved a little is taken back to them by the matrix, however near to singular it is.) */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
 {
   WorkVec   F, noise, r;
   PetscReal sample;
+  PetscInt  first;
 
   PetscFunctionBegin;
   *e = 0;
@@ -76,8 +61,9 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
   for (WorkVec *v : {&F, &noise, &r}) PetscCall(v->like(X, Get(ts).spare));
   PetscCall(SNESComputeFunction(ts->snes, X, F));
   PetscCall(MeasureRounding(ts, X, F, noise));
+  PetscCall(VecGetOwnershipRange(X, &first, NULL));
   for (unsigned salt = 0; salt < 2; salt++) {
-    PetscCall(Scatter(noise, salt, r));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * RandomRounding(first + i, salt); }, Read(noise), Write(r)));
     PetscCall(SizeOfAnswer(ts, r, F, &sample));
     *e = PetscMax(*e, sample);
   }

@@ -50,21 +50,22 @@ PetscErrorCode CheckAdapt(TS ts)
 /* Types of SNES that solve something else than F(X) = 0 with the matrix of X */
 PetscErrorCode CheckSNESType(TS ts)
 {
-  SNESType  type;
-  PetscBool vi, transposed, rows, stages;
+  static constexpr char bounds[] = "solves variational inequalities: the unknowns of a step are accelerations, on which there are no bounds";
+  static const struct {
+    SNESType    type;
+    const char *why;
+  } unfit[] = {{SNESVINEWTONRSLS, bounds},
+               {SNESVINEWTONSSLS, bounds},
+               {SNESKSPTRANSPOSEONLY, "solves with the transposed matrix, which is for adjoints"},
+               {SNESNGS, "solves row by row for the row's own unknown, which a constraint does not contain"},
+               {SNESMS, "takes a few explicit stages, which smooth, and ends without asking for a test of convergence or asks it without a matrix"}};
+  PetscBool is;
 
   PetscFunctionBegin;
-  PetscCall(SNESGetType(ts->snes, &type));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)ts->snes, &vi, SNESVINEWTONRSLS, SNESVINEWTONSSLS, ""));
-  PetscCheck(!vi, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "-snes_type %s solves variational inequalities: the unknowns of a step are accelerations, on which there are no bounds; use %s", type, SNESNEWTONLS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPTRANSPOSEONLY, &transposed));
-  PetscCheck(!transposed, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_type %s solves with the transposed matrix, which is for adjoints; use %s or %s", type, SNESKSPONLY, SNESNEWTONLS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESNGS, &rows));
-  PetscCheck(!rows, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_type %s solves row by row for the row's own unknown, which a constraint does not contain; use %s", type, SNESNEWTONLS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESMS, &stages));
-  PetscCheck(!stages, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "-snes_type %s takes a few explicit stages, which smooth, and ends without asking for a test of convergence or asks it without a matrix; use %s", type, SNESNEWTONLS);
+  for (const auto &u : unfit) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, u.type, &is));
+    PetscCheck(!is, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_type %s %s; use %s, or %s for linear problems", u.type, u.why, SNESNEWTONLS, SNESKSPONLY);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

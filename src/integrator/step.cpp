@@ -25,6 +25,18 @@
 namespace hht3
 {
 
+/* vec_sol and vec_dot are as the integrator left them, see StateWasChanged() */
+PetscErrorCode NoteState(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
+  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 namespace
 {
 
@@ -79,19 +91,6 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An application that failed when f_n was evaluated would spoil every attempt from t_n: it is asked again */
-PetscErrorCode RenewHistoryForces(TS ts)
-{
-  Integrator &I = Get(ts);
-  PetscReal   norm;
-
-  PetscFunctionBegin;
-  if (!I.F0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecNorm(I.F0, NORM_2, &norm));
-  if (PetscIsInfOrNanReal(norm)) PetscCall(HistoryForces(ts, ts->ptime));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The accepted step becomes the history */
 PetscErrorCode Commit(TS ts)
 {
@@ -143,14 +142,6 @@ PetscErrorCode Begin(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
-PetscErrorCode TrueAcceleration(Integrator &I)
-{
-  PetscFunctionBegin;
-  if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
 {
   Integrator     &I    = Get(ts);
@@ -158,7 +149,8 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   const PetscReal stop = HHT3StopAfter(ts, ts->ptime);
 
   PetscFunctionBegin;
-  PetscCall(TrueAcceleration(I));
+  /* the acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
+  if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
   PetscCall(UpdateWeights(ts, I.U1));
   ts->ptime = I.t1;
   /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
@@ -303,23 +295,6 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-} // namespace
-
-/* vec_sol and vec_dot are as the integrator left them, see StateWasChanged() */
-PetscErrorCode NoteState(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-namespace
-{
-
 /* TSSolve() cuts the step to what is left until the next stop. Nothing is left where it is called at the end of a run, less than nothing where points of a time span, or ends of earlier runs,
    are behind the time at which a run begins or is resumed: then the step is the one before. */
 PetscErrorCode PassStops(TS ts)
@@ -373,7 +348,7 @@ PetscErrorCode Step(TS ts)
     }
     if (!ok || !accept) {
       accept = PETSC_FALSE;
-      PetscCall(RenewHistoryForces(ts));
+      PetscCall(HistoryForces(ts, ts->ptime)); /* an application that failed when f_n was evaluated would spoil every attempt from t_n */
       PetscCall(CheckRejections(ts, ++rejections));
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }

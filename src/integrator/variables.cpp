@@ -80,6 +80,19 @@ PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An error if there is one, in a text with its name */
+PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code, const char before[], const char after[])
+{
+  PetscInt row;
+  RowLabel label;
+
+  PetscFunctionBegin;
+  PetscCall(FirstRow(ts, mark, &row));
+  if (row >= 0) PetscCall(LabelRow(ts, row, &label));
+  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), code, "%s %s %s", before, label.text, after);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rows of constraints must not depend on accelerations, holonomic ones not on velocities. Which they are said to be, which they are by what they depend on. */
 PetscErrorCode RefuseRates(TS ts, Dependence &d)
 {

@@ -65,6 +65,10 @@ TEST(Formulas, BothFamiliesMeetAtOneHalf)
   EXPECT_NEAR(a.k, b.k, 1e-15);
 }
 
+/* (2a) and (2b) */
+static double NewmarkPosition(const Parameters &p, double h, double q, double v, double a0, double a1) { return q + (h * v + OldPosition(p, h) * a0 + ScalePosition(p, h) * a1); }
+static double NewmarkVelocity(const Parameters &p, double h, double v, double a0, double a1) { return v + (OldVelocity(p, h) * a0 + ScaleVelocity(p, h) * a1); }
+
 TEST(Formulas, NewmarkIsExactForConstantAcceleration)
 {
   const Parameters p = HHTParameters(-.3, false);
