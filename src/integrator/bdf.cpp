@@ -12,6 +12,7 @@
 #include "order.h"
 #include "stage.h"
 #include "work_vec.h"
+#include <algorithm>
 #include <utility>
 
 namespace hht3
@@ -66,13 +67,12 @@ PetscErrorCode LeaveBDF(TS ts)
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "order 2 from t = %g\n", (double)ts->ptime));
-  I.p = I.hht;
   if (I.order.made > 2 && p.available > 0) {
     PetscCall(ForEntries(
       [&](PetscInt i, PetscScalar a, PetscScalar v, PetscScalar slope, PetscScalar &x) {
         const TSHHT3Role r = RoleOf(I, i);
-        if (r == TSHHT3_COORDINATE) x = a + I.p.lag() * I.h_last * slope;
-        if (r == TSHHT3_STATE) x = v + I.p.lagState() * I.h_last * slope;
+        if (r == TSHHT3_COORDINATE) x = a + I.hht.lag() * I.h_last * slope;
+        if (r == TSHHT3_STATE) x = v + I.hht.lagState() * I.h_last * slope;
       },
       Read(I.A0), Read(I.V0), Read(p.D[1]), Write(I.X0)));
     I.bent = Bend::None;
@@ -143,21 +143,13 @@ void CommitOrder(Integrator &I)
 
   if (o.max == 2) return;
   if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * I.h_last)) {
-    const PetscInt last = o.max - 1;
-    Vec            u = o.U[last], v = o.V[last];
-    for (PetscInt j = last; j > 0; j--) {
-      o.U[j] = o.U[j - 1];
-      o.V[j] = o.V[j - 1];
-    }
-    for (PetscInt j = o.max; j > 0; j--) {
-      o.t[j]   = o.t[j - 1];
-      o.hht[j] = o.hht[j - 1];
-    }
     /* U1, V1 take the place of what goes, and U0, V0 are the first of the past when they have been exchanged */
-    o.U[0] = I.U0;
-    o.V[0] = I.V0;
-    I.U0   = u;
-    I.V0   = v;
+    std::rotate(o.U, o.U + o.max - 1, o.U + o.max);
+    std::rotate(o.V, o.V + o.max - 1, o.V + o.max);
+    std::swap(o.U[0], I.U0);
+    std::swap(o.V[0], I.V0);
+    std::copy_backward(o.t, o.t + o.max, o.t + o.max + 1);
+    std::copy_backward(o.hht, o.hht + o.max, o.hht + o.max + 1);
     o.past = PetscMin(o.past + 1, o.max);
   }
   o.t[0]   = I.t1;
@@ -167,8 +159,7 @@ void CommitOrder(Integrator &I)
   o.since  = o.next == o.now ? o.since + 1 : 0;
   if (o.wait > 0) o.wait--;
   o.above  = o.now > 2 ? o.above + 1 : 0;
-  o.now = PetscMin(o.next, PetscMax(2, o.past));
-  if (o.now < 3) o.now = 2;
+  o.now    = PetscMin(o.next, PetscMax(2, o.past));
 }
 
 /* Keeps n states of the past */

@@ -21,35 +21,15 @@ namespace
 {
 
 /* Numbers of TS and SNES */
-struct SolverState {
-  PetscInt  steps, reject, snes_its, ksp_its, failures, just_decreased, lag_jacobian, lag_preconditioner, jac_iter, pre_iter;
-  PetscReal t, t_prev, t_prev_rollback, h;
-  PetscBool restart;
-};
-
 void Transfer(TS ts, Archive &a)
 {
-  SNES        snes = ts->snes;
-  SolverState s    = {ts->steps, ts->reject, ts->snes_its, ts->ksp_its, ts->num_snes_failures, ts->adapt->timestepjustdecreased, snes->lagjacobian, snes->lagpreconditioner,
-                      snes->jac_iter, snes->pre_iter, ts->ptime, ts->ptime_prev, ts->ptime_prev_rollback, ts->time_step, ts->steprestart};
-  a.plain(s);
-  a.good = a.good && IsFlag(s.restart);
-  if (!a.reading || !a.good) return;
-  ts->steps                        = s.steps;
-  ts->reject                       = s.reject;
-  ts->snes_its                     = s.snes_its;
-  ts->ksp_its                      = s.ksp_its;
-  ts->num_snes_failures            = s.failures;
-  ts->adapt->timestepjustdecreased = s.just_decreased;
-  snes->lagjacobian                = s.lag_jacobian;
-  snes->lagpreconditioner          = s.lag_preconditioner;
-  snes->jac_iter                   = s.jac_iter;
-  snes->pre_iter                   = s.pre_iter;
-  ts->ptime                        = s.t;
-  ts->ptime_prev                   = s.t_prev;
-  ts->ptime_prev_rollback          = s.t_prev_rollback;
-  ts->time_step                    = s.h;
-  ts->steprestart                  = s.restart;
+  SNES snes = ts->snes;
+
+  for (PetscInt *x : {&ts->steps, &ts->reject, &ts->snes_its, &ts->ksp_its, &ts->num_snes_failures, &ts->adapt->timestepjustdecreased, &snes->lagjacobian, &snes->lagpreconditioner, &snes->jac_iter, &snes->pre_iter})
+    a.plain(*x);
+  for (PetscReal *x : {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step}) a.plain(*x);
+  a.plain(ts->steprestart);
+  a.good = a.good && IsFlag(ts->steprestart);
 }
 
 bool FlagsAreFlags(const Integrator &I)
@@ -88,16 +68,9 @@ PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
   PetscFunctionBegin;
   if (!*x) PetscCall(VecDuplicate(ts->vec_sol, x));
   PetscCall(VecGetLocalSize(*x, &n));
-  if (a.reading) {
-    PetscCall(VecGetArray(*x, &array));
-    a.array(array, (size_t)n);
-    PetscCall(VecRestoreArray(*x, &array));
-  } else { /* nobody is to believe that it has changed */
-    const PetscScalar *values;
-    PetscCall(VecGetArrayRead(*x, &values));
-    a.array(const_cast<PetscScalar *>(values), (size_t)n);
-    PetscCall(VecRestoreArrayRead(*x, &values));
-  }
+  PetscCall(a.reading ? VecGetArray(*x, &array) : VecGetArrayRead(*x, (const PetscScalar **)&array)); /* nobody is to believe that a vector has changed which goes to a file */
+  a.array(array, (size_t)n);
+  PetscCall(a.reading ? VecRestoreArray(*x, &array) : VecRestoreArrayRead(*x, (const PetscScalar **)&array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

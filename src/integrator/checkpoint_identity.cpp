@@ -34,11 +34,10 @@ PetscErrorCode Identify(TS ts, Identity *id)
     PetscCall(VecGetSize(I.checkpoint_vec, &id->extra));
     PetscCall(VecGetLocalSize(I.checkpoint_vec, &id->extra_n));
   }
-  id->form   = I.form;
-  id->forces = I.F0 != nullptr;
-  id->p      = I.hht;
-  id->order  = I.order.max;
-  id->roles  = Hash().add(I.role.data(), I.role.size()).sum;
+  id->form  = I.form;
+  id->p     = I.hht;
+  id->order = I.order.max;
+  id->roles = Hash().add(I.role.data(), I.role.size()).sum;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -62,7 +61,7 @@ PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
   PetscFunctionBegin;
   PetscCall(Identify(ts, &is));
   PetscCheck(was.N == is.N, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, was.N, is.N);
-  PetscCheck(was.form == is.form && was.forces == is.forces && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
+  PetscCheck(was.form == is.form && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
              form(is.form), (double)is.p.af);
   PetscCheck(was.order == is.order, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written with order up to %" PetscInt_FMT ", the run has %" PetscInt_FMT ": give the same -ts_hhtdae_order", file, was.order, is.order);
@@ -123,31 +122,25 @@ PetscErrorCode TellingResidual(TS ts, Vec F)
 
 PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
 {
-  PetscReal scale = 0, rows[2] = {0, 0}, pair[2] = {0, 0};
-  PetscInt  start, bad = HHT3_INT_MAX, first;
-  RowLabel  label;
+  PetscReal   scale = 0;
+  PetscScalar there, here;
+  PetscInt    row;
+  RowLabel    label;
 
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(was, &start, NULL));
   PetscCall(ForEntries([&](PetscInt, PetscScalar x) { if (!PetscIsInfOrNanScalar(x)) scale = PetscMax(scale, PetscAbsScalar(x)); }, Read(was)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  PetscCall(ForEntries(
-      [&](PetscInt i, PetscScalar x, PetscScalar y) {
-        if (bad < HHT3_INT_MAX || (PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) || PetscAbsScalar(x - y) <= other_problem * scale) return;
-        bad     = start + i;
-        pair[0] = PetscRealPart(x);
-        pair[1] = PetscRealPart(y);
-      },
-      Read(was), Read(is)));
-  PetscCallMPI(MPI_Allreduce(&bad, &first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  if (first == bad) rows[0] = pair[0], rows[1] = pair[1];
-  if (first == HHT3_INT_MAX) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  PetscCall(LabelRow(ts, first, &label));
+  PetscCall(FirstWhere(
+    [=](PetscInt, PetscScalar x, PetscScalar y) { return !(PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) && !(PetscAbsScalar(x - y) <= other_problem * scale); }, &row,
+    Read(was), Read(is)));
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(EntryOf(was, row, &there));
+  PetscCall(EntryOf(is, row, &here));
+  PetscCall(LabelRow(ts, row, &label));
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED,
           "Checkpoint %s belongs to another problem: in its state the residual of row %s was %g, in this run it is %g. Resume the problem that wrote it; "
           "what its residual depends on besides the state has to be in the vector of TSHHT3SetCheckpointVec()",
-          file, label.text, (double)rows[0], (double)rows[1]);
+          file, label.text, (double)PetscRealPart(there), (double)PetscRealPart(here));
 }
 
 PetscErrorCode CheckFinite(TS ts, const char file[])

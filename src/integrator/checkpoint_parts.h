@@ -13,8 +13,7 @@ namespace hht3
 /* What must be the same in both runs, rank by rank */
 struct Identity {
   PetscInt      N, n, extra, extra_n; /* unknowns of all ranks and of this one; entries of the application's own likewise */
-  PetscInt      form, forces;         /* forces: whether there is F0 */
-  PetscInt      order;                /* the largest one */
+  PetscInt      form, order;          /* order: the largest one */
   Parameters    p;
   std::uint64_t roles;
 };

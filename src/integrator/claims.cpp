@@ -186,14 +186,4 @@ PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode ViewClaims(TS ts, PetscViewer viewer)
-{
-  const Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  if (Claims(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
-                                                  HasDefinitions(I) ? ", and definitions may hide more" : ""));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace hht3

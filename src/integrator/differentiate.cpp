@@ -34,6 +34,7 @@ int FirstLevel(PetscReal T, PetscReal excitation)
 }
 constexpr PetscReal first_weights[points]  = {-25. / 12, 4, -3, 4. / 3, -1. / 4, 0};
 constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -13, 61. / 12, -10. / 12};
+constexpr PetscReal first_sum = 32. / 3, second_sum = 160. / 3; /* of their sizes */
 
 /* A derivative of each row: the best one so far, and the level that it is of */
 struct Best {
@@ -62,13 +63,6 @@ struct Best {
   }
   bool asksFor(PetscInt i, int l) const { return l == -1 ? level[i] == 1 : level[i] == l + 1; }
 };
-
-template <size_t n> constexpr PetscReal SumOfSizes(const PetscReal (&weight)[n])
-{
-  PetscReal sum = 0;
-  for (const PetscReal w : weight) sum += w < 0 ? -w : w;
-  return sum;
-}
 
 /* The largest of a vector's coordinates */
 PetscErrorCode LargestCoordinate(const Integrator &I, Vec U, PetscReal *largest)
@@ -231,8 +225,8 @@ PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer + ma
     PetscCall(along.differences(tau, s1, s2));
     for (PetscInt i = 0; i < (PetscInt)s1.size(); i++) {
       if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau, SumOfSizes(first_weights) * rounding[i] / tau);
-      d2.take(i, level, s2[i] / (tau * tau), SumOfSizes(second_weights) * rounding[i] / (tau * tau));
+      d1.take(i, level, s1[i] / tau, first_sum * rounding[i] / tau);
+      d2.take(i, level, s2[i] / (tau * tau), second_sum * rounding[i] / (tau * tau));
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   };

@@ -67,6 +67,8 @@ PetscErrorCode Unmoved(TS ts, Vec unmoved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+} // namespace
+
 PetscErrorCode CountDriven(const Integrator &I, PetscInt *all)
 {
   PetscScalar sum = 0;
@@ -76,8 +78,6 @@ PetscErrorCode CountDriven(const Integrator &I, PetscInt *all)
   *all = (PetscInt)(PetscRealPart(sum) + 0.5);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-} // namespace
 
 /* Which coordinates may be driven, by the factored matrix of the start */
 PetscErrorCode NoteDriven(TS ts)
@@ -93,16 +93,6 @@ PetscErrorCode NoteDriven(TS ts)
   PetscCall(CountDriven(I, &all));
   if (all) PetscCall(PetscInfo(ts, "start: %" PetscInt_FMT " coordinates may be driven, their forces are judged by the residual\n", all));
   else PetscCall(VecDestroy(&I.verify.driven));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode ViewDriven(TS ts, PetscViewer viewer)
-{
-  PetscInt all = 0;
-
-  PetscFunctionBegin;
-  PetscCall(CountDriven(Get(ts), &all));
-  if (all) PetscCall(PetscViewerASCIIPrintf(viewer, "forces of %" PetscInt_FMT " coordinates whose motion is given are judged by the residual\n", all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

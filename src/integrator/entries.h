@@ -104,7 +104,20 @@ PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same for the local entries that are listed */
+/* The entry of a vector with this global index, for all ranks */
+inline PetscErrorCode EntryOf(Vec x, PetscInt index, PetscScalar *entry)
+{
+  PetscInt first, end;
+
+  PetscFunctionBegin;
+  *entry = 0;
+  PetscCall(VecGetOwnershipRange(x, &first, &end));
+  if (index >= first && index < end) PetscCall(VecGetValues(x, 1, &index, entry));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, entry, 1, MPIU_SCALAR, MPIU_SUM, PetscObjectComm((PetscObject)x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f(i, x_i, ...) for the local entries that are listed */
 template <class F, class... Arrays>
 PetscErrorCode ForSome(const std::vector<PetscInt> &list, F f, Arrays... arrays)
 {

@@ -76,7 +76,7 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
 }
 
 /* Y_i and the weights after U has been accepted; all: of every entry */
-static PetscErrorCode Weigh(TS ts, Vec U, bool all)
+PetscErrorCode UpdateWeights(TS ts, Vec U, bool all)
 {
   Integrator &I   = Get(ts);
   Tolerances  tol = {ts->atol, ts->rtol};
@@ -98,13 +98,6 @@ static PetscErrorCode Weigh(TS ts, Vec U, bool all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode UpdateWeights(TS ts, Vec U)
-{
-  PetscFunctionBegin;
-  PetscCall(Weigh(ts, U, false));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Before a step from U: where the user has set other tolerances since the last one, all weights are made anew */
 PetscErrorCode FollowTolerances(TS ts, Vec U)
 {
@@ -122,7 +115,7 @@ PetscErrorCode FollowTolerances(TS ts, Vec U)
     I.of_id[k]    = id;
     I.of_state[k] = state;
   }
-  if (other && I.norm_size) PetscCall(Weigh(ts, U, true));
+  if (other && I.norm_size) PetscCall(UpdateWeights(ts, U, true));
   I.of_vectors = PETSC_TRUE;
   I.of_atol    = ts->atol;
   I.of_rtol    = ts->rtol;

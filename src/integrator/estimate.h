@@ -8,8 +8,8 @@
 namespace hht3
 {
 
-/* Y_i and the weights after U has been accepted */
-PetscErrorCode UpdateWeights(TS ts, Vec U);
+/* Y_i and the weights after U has been accepted; all: of every entry */
+PetscErrorCode UpdateWeights(TS ts, Vec U, bool all = false);
 PetscErrorCode FollowTolerances(TS ts, Vec U);
 
 /* A correction in units of the tolerance: the change of the error estimate that it makes in a step of length h, (40); for h = 1 |k| times the weighted norm */

@@ -161,7 +161,7 @@ PetscErrorCode Reset(TS ts)
 
   PetscFunctionBegin;
   PetscCall(HooksRemove(ts));
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.defined, &I.verify.product, &I.verify.passed, &I.verify.driven}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.row, &I.col, &I.accepted[0], &I.accepted[1], &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
   for (Vec &v : I.spare) PetscCall(VecDestroy(&v));
   I.spare.clear();
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
@@ -296,6 +296,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   Integrator      &I = Get(ts);
   const Corrector &c = I.corrector;
   const Parameters &p = I.hht;
+  PetscInt         n;
   PetscBool        ascii;
 
   PetscFunctionBegin;
@@ -313,11 +314,16 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   if (I.constraints() && p.rho == 1) PetscCall(PetscViewerASCIIPrintf(viewer, "the multipliers' oscillation is not damped at all\n"));
   if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.of(I.linear.constraint).slow_rate, (double)c.hold));
-  PetscCall(ViewClaims(ts, viewer));
-  PetscCall(ViewDriven(ts, viewer));
+  if (Claims(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
+                                                  I.count[TSHHT3_VARIABLE] || I.count[TSHHT3_FORCE] ? ", and definitions may hide more" : ""));
+  PetscCall(CountDriven(I, &n));
+  if (n) PetscCall(PetscViewerASCIIPrintf(viewer, "forces of %" PetscInt_FMT " coordinates whose motion is given are judged by the residual\n", n));
   PetscCall(PetscViewerASCIIPrintf(viewer, "initial values against constraints: %s\n", TSHHT3Starts[I.start_policy]));
   if (ts->setupcalled) PetscCall(ViewRoles(ts, viewer));
-  PetscCall(ViewRotations(ts, viewer));
+  if (I.rotations.is) {
+    PetscCall(ISGetSize(I.rotations.is, &n));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "local rotation vectors: %" PetscInt_FMT "\n", n));
+  }
   if (I.linear_chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));
   const TSHHT3Statistics &s = I.stat;
   if (s.steps) {

@@ -181,14 +181,8 @@ PetscErrorCode CorrectorSetUp(TS ts)
 
 static void BeginIteration(Integrator &I)
 {
-  Corrector &c = I.corrector;
-  c.it = c.base = c.renewals = c.met = 0;
-  c.e = c.xi_max = 0;
-  c.forces = 0;
-  c.reason = SNES_CONVERGED_ITERATING;
-  c.matrix.fresh  = PETSC_FALSE;
-  c.wrong_jacobian = PETSC_FALSE;
-  c.rounding       = PETSC_FALSE;
+  static_cast<Correction &>(I.corrector) = {};
+  I.corrector.matrix.fresh               = PETSC_FALSE;
 }
 
 /* Trust regions and line searches compare norms of residuals. They end in failure, or shorten corrections to nothing, where these are rounding or where

@@ -108,8 +108,8 @@ PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal
 PetscErrorCode CheckPositions(TS ts, PetscBool *current)
 {
   Integrator     &I = Get(ts);
-  PetscReal       e = PETSC_MAX_REAL, last, value = 0, e0 = 0, worst = 0;
-  PetscInt        row = 0, worst_row = 0;
+  PetscReal       e = PETSC_MAX_REAL, last, value = 0;
+  PetscInt        row = 0;
   RowLabel        label;
   const PetscBool project = (PetscBool)(I.start_policy == TSHHT3_START_PROJECT);
 
@@ -118,17 +118,12 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     last = e;
     PetscCall(MissOfPositions(ts, &e));
     PetscCall(WorstRow(ts, I.work, &row, &value));
-    if (it == 0) {
-      e0        = e;
-      worst     = value;
-      worst_row = row;
-    }
+    if (it == 0) PetscCall(ReportMisfit(ts, "positions", "", e, row, value, project));
     *current = PETSC_TRUE;
     if (!project || e == 0 || e >= 0.5 * last) break;
     PetscCall(Move(I, I.U0, I.X));
     *current = PETSC_FALSE;
   }
-  PetscCall(ReportMisfit(ts, "positions", "", e0, worst_row, worst, project));
   if (!project || e <= 1e-3) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LabelRow(ts, row, &label));
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,

@@ -27,8 +27,11 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
 /* After a correction that has failed with a matrix of its own: sets wrong_jacobian if the residual has not answered it at all */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 
-PetscErrorCode ViewClaims(TS ts, PetscViewer viewer);
-PetscErrorCode ViewDriven(TS ts, PetscViewer viewer);
+/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+bool Claims(const Integrator &I);
+
+/* How many coordinates may be driven */
+PetscErrorCode CountDriven(const Integrator &I, PetscInt *all);
 
 } // namespace hht3
 

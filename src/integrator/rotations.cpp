@@ -60,17 +60,6 @@ PetscErrorCode SetUpRotations(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode ViewRotations(TS ts, PetscViewer viewer)
-{
-  PetscInt n;
-
-  PetscFunctionBegin;
-  if (!Get(ts).rotations.is) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ISGetSize(Get(ts).rotations.is, &n));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "local rotation vectors: %" PetscInt_FMT "\n", n));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Rotation vectors in U1, V1 being that of the stage: at order two what (2a) has left there and the commutator, above it from their base */
 PetscErrorCode StageOfRotations(const Integrator &I)
 {

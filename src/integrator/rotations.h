@@ -13,7 +13,6 @@ constexpr PetscReal longest_turn = 3;
 
 PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferBack back, void *ctx);
 PetscErrorCode SetUpRotations(TS ts);
-PetscErrorCode ViewRotations(TS ts, PetscViewer viewer);
 
 /* U0 becomes the reference, and vec_sol follows */
 PetscErrorCode ReferToState(TS ts);

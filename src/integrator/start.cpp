@@ -20,6 +20,7 @@
 #include "stage.h"
 #include "start.h"
 #include "work_vec.h"
+#include <string>
 
 namespace hht3
 {
@@ -278,13 +279,12 @@ PetscErrorCode NameRedundant(TS ts)
 {
   Integrator           &I = Get(ts);
   IS                    multipliers;
-  std::vector<PetscInt> list;
+  std::vector<PetscInt> list(I.constrained);
   PetscInt              start, n = 0, rows[20];
   Mat                   P;
   RowLabel              label;
-  constexpr PetscInt    named     = 4;
-  char                  text[256] = "", names[named * sizeof(label.text)] = "";
-  size_t                used;
+  constexpr PetscInt    named = 4;
+  std::string           text, names;
   PetscBool             is_singular;
   MatSolverType         package;
 
@@ -296,27 +296,24 @@ PetscErrorCode NameRedundant(TS ts)
   PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
   PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
-  for (size_t i = 0; i < I.role.size(); i++)
-    if (I.role[i] == TSHHT3_HOLONOMIC || I.role[i] == TSHHT3_NONHOLONOMIC) list.push_back(start + (PetscInt)i);
+  for (PetscInt &i : list) i += start;
   if (I.constraints()) {
     PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)list.size(), list.data(), PETSC_COPY_VALUES, &multipliers));
     PetscCall(LinearNameDependent(P, multipliers, 20, &n, rows));
     PetscCall(ISDestroy(&multipliers));
   }
   for (PetscInt i = 0; i < n; i++) {
-    PetscCall(PetscStrlen(text, &used));
-    if (used < sizeof(text) - 16) PetscCall(PetscSNPrintf(text + used, sizeof(text) - used, "%s%" PetscInt_FMT, i ? ", " : "", rows[i]));
+    text += (i ? ", " : "") + std::to_string(rows[i]);
     if (!I.names.name || i >= named) continue;
     PetscCall(LabelRow(ts, rows[i], &label));
-    PetscCall(PetscStrlen(names, &used));
-    PetscCall(PetscSNPrintf(names + used, sizeof(names) - used, "%s %s", i ? "," : " Rows", label.text));
+    names += std::string(i ? ", " : " Rows ") + label.text;
   }
   if (n == 1) PetscCall(LabelRow(ts, rows[0], &label));
   PetscCheck(n != 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text,
-             names, I.names.name && n > named ? ", ..." : "");
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text.c_str(),
+             names.c_str(), I.names.name && n > named ? ", ..." : "");
   PetscCall(PackageInDoubt(ts, &package));
   PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
@@ -387,7 +384,7 @@ PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
   PetscCall(GuessUnknowns(I, I.U0));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
-    if (I.unfactored || I.corrector.no_solve) PetscCall(NameRedundant(ts));
+    if (I.unfactored) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
   PetscCall(NoteDriven(ts));
@@ -457,19 +454,17 @@ PetscErrorCode StartFromState(TS ts, Prepared have)
 /* Initial values that are no numbers end up in a matrix, where nobody can tell where they came from */
 static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
 {
-  PetscReal value = 0, found;
-  PetscInt  row, first;
-  RowLabel  label;
+  PetscScalar value;
+  PetscInt    row;
+  RowLabel    label;
 
   PetscFunctionBegin;
   PetscCall(FirstWhere([](PetscInt, PetscScalar v) { return PetscIsInfOrNanScalar(v); }, &row, Read(x)));
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetOwnershipRange(x, &first, NULL));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar v) { if (first + i == row) value = PetscIsNanScalar(v) ? 2 : PetscRealPart(v) > 0 ? 1 : -1; }, Read(x)));
-  PetscCallMPI(MPI_Allreduce(&value, &found, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscCall(EntryOf(x, row, &value));
   PetscCall(LabelRow(ts, row, &label));
   SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %s is %s at t = %g: set it (TS2SetSolution())", what, label.text,
-          found > 1 ? "not a number (NaN)" : found > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
+          PetscIsNanScalar(value) ? "not a number (NaN)" : PetscRealPart(value) > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
 }
 
 /* From vec_sol and vec_dot at ptime; history is forgotten */

@@ -32,25 +32,28 @@ struct CorrectorOptions : ReuseOptions {
   PetscBool user_test = PETSC_FALSE; /* the user's test of SNES decides; corrections are only measured */
 };
 
+/* What is known of the present correction of a step */
+struct Correction {
+  PetscInt            it       = 0;
+  PetscInt            base     = 0; /* iteration after which the present matrix came into use */
+  PetscInt            renewals = 0; /* matrices made in the course of it */
+  PetscInt            met      = 0; /* times that corrections have turned back and met */
+  PetscReal           e        = 0; /* last correction, in units of the tolerance */
+  PetscReal           xi_max   = 0; /* worst rate */
+  PetscReal           forces   = 0; /* residual in the rows of driven coordinates, in units of the tolerance */
+  SNESConvergedReason reason   = SNES_CONVERGED_ITERATING;
+  PetscBool           wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen */
+  PetscBool           rounding       = PETSC_FALSE; /* what is left is rounding */
+};
+
 /* What the corrector remembers of its matrix and of its corrections */
-struct CorrectorState {
+struct CorrectorState : Correction {
   MatrixPolicy matrix;
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool from_rest   = PETSC_FALSE; /* the last step went from where it began: at fixed steps a prediction may lead astray */
-  PetscBool wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen in this correction */
-  PetscBool rounding    = PETSC_FALSE; /* what is left of it is rounding */
   PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
-
-  PetscInt            it     = 0; /* of the present correction */
-  PetscInt            base   = 0; /* iteration after which the present matrix came into use */
-  PetscInt            renewals = 0; /* matrices made in the course of it */
-  PetscInt            met    = 0; /* times that corrections have turned back and met */
-  PetscReal           e      = 0; /* last correction, in units of the tolerance */
-  PetscReal           xi_max = 0; /* worst rate of this correction */
-  PetscReal           forces = 0; /* residual in the rows of driven coordinates, in units of the tolerance */
-  SNESConvergedReason reason = SNES_CONVERGED_ITERATING;
 };
 
 struct Corrector : CorrectorOptions, CorrectorState {
@@ -70,7 +73,6 @@ struct VerificationState {
 struct Verification : VerificationState {
   Vec inertia = nullptr, claim = nullptr, noise = nullptr, model = nullptr, work = nullptr, where = nullptr; /* where: X of the matrix */
   Vec unproved = nullptr; /* time before `since` in which a row's residual has stayed as it was, whenever it was looked at */
-  Vec defined = nullptr, product = nullptr, passed = nullptr; /* work of PassDefinitionsOn(), none where nothing is defined */
   Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
 };
 

@@ -80,7 +80,7 @@ PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An error if there is one, in a text with its name */
+/* An error if there is one */
 PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code, const char before[], const char after[])
 {
   PetscInt row;
@@ -88,7 +88,7 @@ PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code,
 
   PetscFunctionBegin;
   PetscCall(FirstRow(ts, mark, &row));
-  if (row >= 0) PetscCall(LabelRow(ts, row, &label));
+  PetscCall(LabelRow(ts, row, &label));
   PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), code, "%s %s %s", before, label.text, after);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -96,13 +96,14 @@ PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code,
 /* Rows of constraints must not depend on accelerations, holonomic ones not on velocities. Which they are said to be, which they are by what they depend on. */
 PetscErrorCode RefuseRates(TS ts, Dependence &d)
 {
-  Integrator &I           = Get(ts);
-  PetscInt    of_velocity = -1, of_acceleration = -1;
-  RowLabel    label;
+  Integrator       &I           = Get(ts);
+  PetscInt          of_velocity = -1, of_acceleration = -1;
+  std::vector<char> velocity, acceleration;
 
   PetscFunctionBegin;
   for (int time = 0; time < 2; time++) {
-    std::vector<char> velocity(I.role.size(), 0), acceleration(I.role.size(), 0);
+    velocity.assign(I.role.size(), 0);
+    acceleration.assign(I.role.size(), 0);
     PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { velocity[i] = RoleOf(I, i) == TSHHT3_HOLONOMIC; }));
     PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
     PetscCall(FirstRow(ts, velocity, &of_velocity));
@@ -111,13 +112,9 @@ PetscErrorCode RefuseRates(TS ts, Dependence &d)
     PetscCall(d.measureNoise());
     if (d.noise == 0) break;
   }
-  PetscCall(LabelRow(ts, of_acceleration >= 0 ? of_acceleration : of_velocity, &label));
-  PetscCheck(of_acceleration < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "Row %s is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown "
-             "TSHHT3_VARIABLE if the row defines it",
-             label.text);
-  PetscCheck(of_velocity < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "Row %s is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC", label.text);
+  PetscCall(Refuse(ts, acceleration, PETSC_ERR_ARG_WRONG, "Row",
+                   "is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown TSHHT3_VARIABLE if the row defines it"));
+  PetscCall(Refuse(ts, velocity, PETSC_ERR_ARG_WRONG, "Row", "is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,18 +122,13 @@ PetscErrorCode RefuseHolonomic(TS ts, Dependence &d)
 {
   Integrator       &I = Get(ts);
   std::vector<char> bad(I.role.size(), 0);
-  PetscInt          row;
-  RowLabel          label;
 
   PetscFunctionBegin;
   if (!I.count[TSHHT3_HOLONOMIC]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i) || RoleOf(I, i) == TSHHT3_STATE; }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_HOLONOMIC) bad[i] = 1; }));
-  PetscCall(FirstRow(ts, bad, &row));
-  PetscCall(LabelRow(ts, row, &label));
-  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "The holonomic constraint of row %s depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
-             "Make it a coordinate without mass, with its equation as one more constraint",
-             label.text);
+  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "The holonomic constraint of row",
+                   "depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
+                   "Make it a coordinate without mass, with its equation as one more constraint"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,8 +138,7 @@ PetscErrorCode RefuseFast(TS ts, Dependence &d)
   Integrator       &I = Get(ts);
   std::vector<char> fast(I.role.size(), 0), bad(I.role.size(), 0);
   const auto        defined = [&](PetscInt i) { if (IsDefined(I, i)) fast[i] = 1; };
-  PetscInt          row, before = -1, now = 0;
-  RowLabel          label;
+  PetscInt          before = -1, now = 0;
 
   PetscFunctionBegin;
   PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, defined));
@@ -165,12 +156,8 @@ PetscErrorCode RefuseFast(TS ts, Dependence &d)
     for (char f : fast) now += f;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
   }
-  PetscCall(FirstRow(ts, bad, &row));
-  PetscCall(LabelRow(ts, row, &label));
-  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "The velocity-level constraint of row %s depends on a variable or force state that itself depends on velocities, accelerations or multipliers. "
-             "Write these velocities into the row instead",
-             label.text);
+  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "The velocity-level constraint of row",
+                   "depends on a variable or force state that itself depends on velocities, accelerations or multipliers. Write these velocities into the row instead"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -179,19 +166,13 @@ PetscErrorCode CheckSweeps(TS ts, Dependence &d)
 {
   Integrator       &I = Get(ts);
   std::vector<char> bad(I.role.size(), 0);
-  PetscInt          row;
-  RowLabel          label;
 
   PetscFunctionBegin;
   PetscCall(VecCopy(d.U, d.moved));
   PetscCall(ResidualAlong(ts, ts->ptime, d.moved, d.V, d.A, d.other));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar f) { if (IsDefined(I, i) && PetscAbsScalar(f) > 1e-8 * (1 + PetscAbsScalar(u))) bad[i] = 1; }, Read(d.moved), Read(d.other)));
-  PetscCall(FirstRow(ts, bad, &row));
-  PetscCall(LabelRow(ts, row, &label));
-  PetscCheck(row < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "Row %s defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide "
-             "the row by the factor of V",
-             label.text);
+  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "Row",
+                   "defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide the row by the factor of V"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

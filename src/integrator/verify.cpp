@@ -20,6 +20,7 @@
 #include "entries.h"
 #include "proofs.h"
 #include "verify.h"
+#include "work_vec.h"
 
 namespace hht3
 {
@@ -73,15 +74,13 @@ struct Row {
 /* The iteration has been seen to converge: what is left of constraint forces is a part of what they were */
 bool RateIsKnown(const Integrator &I) { return I.corrector.matrix.rate >= 0; }
 
-/* R: the residual F, with definitions what they make of it in the equations of motion */
-PetscErrorCode OfMotion(TS ts, Vec F, Vec *R)
+/* R: the residual F, with definitions what they make of it in the equations of motion, which then stands in `passed` */
+PetscErrorCode OfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
 {
-  Vec &passed = Get(ts).verify.passed;
-
   PetscFunctionBegin;
   *R = F;
   if (!HasDefinitions(Get(ts))) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!passed) PetscCall(VecDuplicate(F, &passed));
+  PetscCall(passed.like(F, Get(ts).spare));
   PetscCall(VecCopy(F, passed));
   PetscCall(PassDefinitionsOn(ts, passed));
   *R = passed;
@@ -95,10 +94,11 @@ PetscErrorCode NoteProof(TS ts, Vec F)
   Verification   &v     = I.verify;
   const bool      known = RateIsKnown(I);
   const RowScales scale(I);
+  WorkVec         passed;
   Vec             R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, &R));
+  PetscCall(OfMotion(ts, F, passed, &R));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar m, PetscScalar w, PetscScalar noise, PetscScalar f, PetscScalar model, PetscScalar force, PetscScalar &unproved) {
       if (!(PetscRealPart(m) > 0)) return;
@@ -115,18 +115,18 @@ PetscErrorCode NoteProof(TS ts, Vec F)
 /* Imbalances of variables and force states act on the equations of motion: R -= P R_B for B = V, F */
 PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
 {
-  Integrator   &I = Get(ts);
-  Verification &v = I.verify;
-  Mat           P;
+  Integrator &I = Get(ts);
+  WorkVec     defined, product;
+  Mat         P;
 
   PetscFunctionBegin;
   if (!HasDefinitions(I)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  if (!v.defined) PetscCall(VecDuplicate(R, &v.defined));
-  if (!v.product) PetscCall(VecDuplicate(R, &v.product));
-  PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, v.defined));
-  PetscCall(MatMult(P, v.defined, v.product));
-  PetscCall(VecAXPY(R, -1, v.product));
+  PetscCall(defined.like(R, I.spare));
+  PetscCall(product.like(R, I.spare));
+  PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, defined));
+  PetscCall(MatMult(P, defined, product));
+  PetscCall(VecAXPY(R, -1, product));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,10 +161,11 @@ PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
   Integrator &I     = Get(ts);
   const bool  known = RateIsKnown(I);
   PetscReal   sum[4];
+  WorkVec     passed;
   Vec         R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, &R));
+  PetscCall(OfMotion(ts, F, passed, &R));
   PetscCall(SumRows(
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal model, PetscReal force) {

@@ -64,7 +64,6 @@ struct Imbalance {
 };
 
 /* claims.cpp */
-bool           Claims(const Integrator &I);
 PetscErrorCode MeasureRows(TS ts, Vec X, Vec F);
 PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise);
 /* verify.cpp */
