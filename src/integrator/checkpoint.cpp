@@ -39,7 +39,7 @@ bool FlagsAreFlags(const Integrator &I)
                              &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
     if (!IsFlag(*x)) return false;
   return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) &&
-         IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) && IsBetween(I.unfactored, PC_SETUP_ERROR, PC_SUBPC_ERROR) &&
+         IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) &&
          IsBetween(c.reason, SNES_DIVERGED_TR_DELTA, SNES_BREAKOUT_INNER_ITER);
 }
 

@@ -104,7 +104,7 @@ PetscErrorCode LoadSolver(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Ar
   if (!m.chosen) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(ksp, J, P));
   PetscCall(LinearLoadState(ksp, P, &I.linear, &a, same, &usable));
-  I.linear_chosen = PETSC_TRUE;
+  I.linear.chosen = PETSC_TRUE;
   *good           = usable;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -123,7 +123,7 @@ PetscErrorCode SaveMatrix(TS ts, Archive &a)
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(P, &m.there));
-  m.chosen = I.linear_chosen;
+  m.chosen = I.linear.chosen;
   a.plain(m);
   if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SaveRows(P, a));
@@ -158,7 +158,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
     good = good && (rows || mffd); /* the application's product has no values to restore */
-    if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
+    if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.linear.scaled));
     if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();

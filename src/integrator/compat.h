@@ -15,17 +15,6 @@
 
 #if PETSC_VERSION_LT(3, 21, 0)
   #define SNESLineSearchShellSetApply SNESLineSearchShellSetUserFunc
-typedef TSI2Function HHT3I2Function;
-typedef TSRHSFunction HHT3RHSFunction;
-typedef TSI2Jacobian HHT3I2Jacobian;
-typedef TSIFunction  HHT3IFunction;
-typedef TSIJacobian  HHT3IJacobian;
-#else
-typedef TSI2FunctionFn *HHT3I2Function;
-typedef TSRHSFunctionFn *HHT3RHSFunction;
-typedef TSI2JacobianFn *HHT3I2Jacobian;
-typedef TSIFunctionFn *HHT3IFunction;
-typedef TSIJacobianFn *HHT3IJacobian;
 #endif
 
 /* setfromoptions() takes the options object by pointer until 3.22, by value since */

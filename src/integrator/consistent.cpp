@@ -183,16 +183,16 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
   for (int attempt = 0; attempt < 2 && !numbers; attempt++) { /* there is no h to cut: an application whose Jacobian is not a number is asked once more */
     PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.J ? c.J : c.P, c.P));
     PetscCall(PetscObjectStateGet((PetscObject)c.P, &state));
-    if (state != *c.scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
-    PetscCall(PetscObjectStateGet((PetscObject)c.P, c.scaled));
+    if (state != c.linear->scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
+    PetscCall(PetscObjectStateGet((PetscObject)c.P, &c.linear->scaled));
     PetscCall(MatrixHasNumbers(c.P, &numbers));
   }
   if (c.near && numbers) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ChooseSolver(c.ksp, c.P, c.linear, c.chosen));
-  PetscCall(Factor(ts, c.ksp, c.P, c.P, c.linear, c.failed));
+  PetscCall(ChooseSolver(c.ksp, c.P, c.linear));
+  PetscCall(Factor(ts, c.ksp, c.P, c.P, c.linear));
   I.stat.factorizations++;
-  if (!numbers && !*c.failed) *c.failed = PC_FACTOR_OTHER;
-  *ok  = (PetscBool)!*c.failed;
+  if (!numbers && !c.linear->failed) c.linear->failed = PC_FACTOR_OTHER;
+  *ok  = (PetscBool)!c.linear->failed;
   *why = !numbers ? "the application's Jacobian is not a number" : "the matrix is singular there, or the solver failed";
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,7 +206,7 @@ static PetscErrorCode WithOwnFactors(Consistent &c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.failed, where that was the linear solver. */
+/* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.linear->failed, where that was the linear solver. */
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
   PetscReal e = 0, last, first = 0, forces = 0;
@@ -235,7 +235,7 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
       continue;
     }
     *why = "the matrix is singular there, or the solver failed";
-    if (!*ok) *c.failed = PC_SUBPC_ERROR;
+    if (!*ok) c.linear->failed = PC_SUBPC_ERROR;
     if (c.its == 1) first = e;
     else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
     const bool known = c.its > 1 && !fresh, falls = e <= slow * last;

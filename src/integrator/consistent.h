@@ -17,18 +17,15 @@ struct Consistent {
   Vec X = nullptr;
   Vec gamma = nullptr;               /* of the differentiated constraints (6b), (6c); null: there are none */
   Vec F = nullptr, d = nullptr;      /* residual, correction */
-  PetscReal         t      = 0;
-  PetscReal         tiny   = 0;      /* the step that stands in the matrix for h -> 0 */
-  PetscReal         h      = 0;      /* of the implicit Euler method: q' = begin[1] + h q'', q = begin[0] + h^2 q''. 0: they are given */
-  Vec               begin[2] = {};
-  LinearChoice     *linear = nullptr;
-  PetscBool        *chosen = nullptr; /* linear has been chosen */
-  PetscObjectState *scaled = nullptr; /* of P when it was scaled last */
-  PCFailedReason   *failed = nullptr; /* of the last factorization */
-  PetscReal         T      = 0;       /* gamma is to be made again, for this time scale, once s' is known; 0: it need not */
-  PetscReal         enough = 0;       /* part of the first correction below which no other one is needed; 0: to rounding */
-  bool              near   = false;   /* the factors at hand, of a matrix near by, serve as well */
-  PetscInt          its = 0, ksp_its = 0;
+  PetscReal t    = 0;
+  PetscReal tiny = 0; /* the step that stands in the matrix for h -> 0 */
+  PetscReal h    = 0; /* of the implicit Euler method: q' = begin[1] + h q'', q = begin[0] + h^2 q''. 0: they are given */
+  Vec begin[2] = {};
+  LinearState *linear = nullptr; /* of P and ksp */
+  PetscReal    T      = 0;       /* gamma is to be made again, for this time scale, once s' is known; 0: it need not */
+  PetscReal    enough = 0;       /* part of the first correction below which no other one is needed; 0: to rounding */
+  bool         near   = false;   /* the factors at hand, of a matrix near by, serve as well */
+  PetscInt     its = 0, ksp_its = 0;
 };
 
 /* Where the unknown of a role stands in U, U', U'' */

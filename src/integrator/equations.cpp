@@ -188,10 +188,10 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   I.rotations.factor = RotationFactor(I);
   PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P));
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
-  if (state != I.scaled_state) { /* an application whose matrix never changes may have left our scaled one in place */
+  if (state != I.linear.scaled) { /* an application whose matrix never changes may have left our scaled one in place */
     if (I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));
     PetscCall(ScaleMatrix(I, s, P));
-    PetscCall(PetscObjectStateGet((PetscObject)P, &I.scaled_state));
+    PetscCall(PetscObjectStateGet((PetscObject)P, &I.linear.scaled));
   }
   if (J != P) PetscCall(ScaleOperator(I, s, J));
   I.rotations.factor = 0;
@@ -200,9 +200,9 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   I.stat.factorizations++;
 
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(ChooseSolver(ksp, P, &I.linear, &I.linear_chosen));
-  PetscCall(Factor(ts, ksp, J, P, &I.linear, &I.unfactored));
-  if (I.unfactored) PetscCall(SNESSetJacobianDomainError(snes));
+  PetscCall(ChooseSolver(ksp, P, &I.linear));
+  PetscCall(Factor(ts, ksp, J, P, &I.linear));
+  if (I.linear.failed) PetscCall(SNESSetJacobianDomainError(snes));
   PetscCall(PetscLogEventEnd(events.matrix, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -23,12 +23,9 @@ namespace hht3
 {
 
 struct Sampler {
-  Consistent       at;
-  LinearChoice     linear;
-  PetscBool        chosen = PETSC_FALSE;
-  PetscObjectState scaled = 0;
-  PCFailedReason   failed = PC_NOERROR;
-  PetscReal        t1     = PETSC_NINFINITY; /* end of the step of the last sample */
+  Consistent  at;
+  LinearState linear;
+  PetscReal   t1 = PETSC_NINFINITY; /* end of the step of the last sample */
 };
 
 namespace
@@ -101,9 +98,6 @@ PetscErrorCode GetSampler(TS ts, Sampler **S)
   for (Vec *v : {&c.U, &c.V, &c.A, &c.X, &c.F, &c.d}) PetscCall(VecDuplicate(I.U0, v));
   if (I.constraints()) PetscCall(VecDuplicate(I.U0, &c.gamma));
   c.linear = &I.sampler->linear;
-  c.chosen = &I.sampler->chosen;
-  c.scaled = &I.sampler->scaled;
-  c.failed = &I.sampler->failed;
   PetscCall(CreateSolver(ts, *I.sampler));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

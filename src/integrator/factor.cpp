@@ -56,16 +56,16 @@ PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
 }
 
 /* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
-PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen)
+PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearState *linear)
 {
   PetscBool symmetric, numbers = PETSC_TRUE; /* NaN is not symmetric, but no reason to choose another solver */
 
   PetscFunctionBegin;
-  if (*chosen && !linear->cholesky) PetscFunctionReturn(PETSC_SUCCESS);
+  if (linear->chosen && !linear->cholesky) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LinearIsSymmetric(P, &symmetric));
-  if (*chosen && !symmetric) PetscCall(MatrixHasNumbers(P, &numbers));
-  if (!*chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, linear));
-  *chosen = PETSC_TRUE;
+  if (linear->chosen && !symmetric) PetscCall(MatrixHasNumbers(P, &numbers));
+  if (!linear->chosen || (!symmetric && numbers)) PetscCall(LinearChoose(ksp, P, symmetric, linear));
+  linear->chosen = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -98,8 +98,8 @@ static PetscErrorCode TakeTolerance(TS ts, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* failed: of the last factorization on entry, of this one on return, the same on all ranks */
-PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed)
+/* linear->failed: of the last factorization on entry, of this one on return */
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearState *linear)
 {
   PC        pc;
   PetscBool other = PETSC_FALSE, numbers;
@@ -107,23 +107,23 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFail
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
   /* a factor that failed may keep its error: PCSetUp_LU() forgives zero pivots alone, and MUMPS under PETSc forgives nothing */
-  if (*failed) PetscCall(PCReset(pc));
-  *failed = PC_NOERROR;
+  if (linear->failed) PetscCall(PCReset(pc));
+  linear->failed = PC_NOERROR;
   PetscCall(TakeTolerance(ts, ksp));
   PetscCall(KSPSetOperators(ksp, J, P));
   if (ts->snes->lagpreconditioner != 1) PetscFunctionReturn(PETSC_SUCCESS); /* the user's: SNES says whether, the solve sets up */
   PetscCall(KSPSetUp(ksp));
-  PetscCall(FailedReason(pc, failed));
-  for (int attempt = 0; *failed && attempt < 2; attempt++) { /* no Krylov method, then no room */
+  PetscCall(FailedReason(pc, &linear->failed));
+  for (int attempt = 0; linear->failed && attempt < 2; attempt++) { /* no Krylov method, then no room */
     PetscCall(MatrixHasNumbers(P, &numbers));
-    if (numbers && *failed == PC_FACTOR_OUTMEMORY) PetscCall(LinearChooseSmaller(ksp, P, linear, &other));
+    if (numbers && linear->failed == PC_FACTOR_OUTMEMORY) PetscCall(LinearChooseSmaller(ksp, P, linear, &other));
     else if (numbers) PetscCall(LinearGiveUpKrylov(ksp, P, linear, &other));
     if (!numbers || !other) break;
     PetscCall(KSPSetOperators(ksp, J, P));
     PetscCall(KSPSetUp(ksp));
-    PetscCall(FailedReason(pc, failed));
+    PetscCall(FailedReason(pc, &linear->failed));
   }
-  PetscCall(CheckMemory(ts, pc, P, *failed));
+  PetscCall(CheckMemory(ts, pc, P, linear->failed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

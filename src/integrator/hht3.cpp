@@ -73,22 +73,18 @@ PetscErrorCode AllocateForRoles(TS ts)
 
 PetscErrorCode CheckProblem(TS ts)
 {
-  HHT3I2Function f;
-  HHT3IFunction  f1;
-  HHT3RHSFunction rhs;
-  DM             dm;
+  DM   dm;
+  DMTS tdm;
 
   PetscFunctionBegin;
   PetscCall(TSGetDM(ts, &dm));
-  PetscCall(DMTSGetRHSFunction(dm, &rhs, NULL));
-  PetscCall(DMTSGetI2Function(dm, &f, NULL));
-  PetscCall(DMTSGetIFunction(dm, &f1, NULL)); /* PETSc's convention for second-order types: then it is F(t,U,U'') */
-  PetscCheck(f || f1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+  PetscCall(DMGetDMTS(dm, &tdm));
+  PetscCheck(tdm->ops->i2function || tdm->ops->ifunction /* PETSc's convention for second-order types: then it is F(t,U,U'') */, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none%s",
-             rhs ? ", but a first-order one U' = G(t,U) of TSSetRHSFunction(): give it as U' - G(t,U) = 0 of first-order states, or take another -ts_type" : "");
+             tdm->ops->rhsfunction ? ", but a first-order one U' = G(t,U) of TSSetRHSFunction(): give it as U' - G(t,U) = 0 of first-order states, or take another -ts_type" : "");
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors%s",
-             f ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
+             tdm->ops->i2function ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
   for (Vec x : {ts->vec_sol, ts->vec_dot}) { /* its entries are not in one array */
     PetscBool nest;
     PetscCall(PetscObjectTypeCompare((PetscObject)x, VECNEST, &nest));
@@ -184,11 +180,12 @@ PetscErrorCode Reset(TS ts)
   static_cast<ChangeState &>(I.change)       = ChangeState();
   static_cast<OrderState &>(I.order)         = OrderState();
   I.p                                        = I.hht;
-  I.linear_chosen = PETSC_FALSE;
-  I.scaled_state  = 0;
+  I.linear.chosen   = PETSC_FALSE;
+  I.linear.scaled   = 0;
+  I.linear.failed   = PC_NOERROR;
   I.scaled_operator = 0;
-  I.stage_id      = 0;
-  I.wall0         = 0;
+  I.stage_id        = 0;
+  I.wall0           = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -324,7 +321,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
     PetscCall(ISGetSize(I.rotations.is, &n));
     PetscCall(PetscViewerASCIIPrintf(viewer, "local rotation vectors: %" PetscInt_FMT "\n", n));
   }
-  if (I.linear_chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));
+  if (I.linear.chosen) PetscCall(PetscViewerASCIIPrintf(viewer, "linear solver: %s\n", I.linear.text));
   const TSHHT3Statistics &s = I.stat;
   if (s.steps) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "steps=%" PetscInt_FMT ", rejected=%" PetscInt_FMT ", failed corrections=%" PetscInt_FMT " (+%" PetscInt_FMT " repeated with a new matrix), restarts=%" PetscInt_FMT "\n",
@@ -461,7 +458,6 @@ PetscErrorCode TSHHT3Initialize(void)
   PetscCall(HHT3CheckPetscVersion());
   hht3::registered = PETSC_TRUE;
   PetscCall(PetscRegisterFinalize(hht3::Finalize));
-  PetscCall(hht3::DeclareOwnOptions());
   PetscCall(TSRegister(TSHHT3, hht3::Create));
   PetscCall(TSAdaptRegister(TSHHT3, hht3::CreateAdapt));
   PetscCall(LinearRegister());

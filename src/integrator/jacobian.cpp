@@ -16,29 +16,18 @@ namespace hht3
 namespace
 {
 
-/* The user's wish for differences, and whether their pattern is to be found, too */
-PetscErrorCode DifferencesWanted(DM dm, PetscBool *wanted, PetscBool *pattern)
+/* Whether the application has a Jacobian, the user's wish for differences, and whether their pattern is to be found, too */
+PetscErrorCode WhoFillsMatrix(DM dm, bool *has, bool *wanted, bool *pattern)
 {
-  HHT3IJacobian ijacobian;
-  DMSNES        sdm;
+  DMTS   tdm;
+  DMSNES sdm;
 
   PetscFunctionBegin;
-  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
+  PetscCall(DMGetDMTS(dm, &tdm));
   PetscCall(DMGetDMSNES(dm, &sdm));
-  *pattern = (PetscBool)(sdm->ops->computejacobian == SNESComputeJacobianDefault);
-  *wanted  = (PetscBool)(*pattern || sdm->ops->computejacobian == SNESComputeJacobianDefaultColor || ijacobian == TSComputeIJacobianDefaultColor);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HasJacobian(DM dm, PetscBool *has)
-{
-  HHT3I2Jacobian i2jacobian;
-  HHT3IJacobian  ijacobian;
-
-  PetscFunctionBegin;
-  PetscCall(DMTSGetI2Jacobian(dm, &i2jacobian, NULL));
-  PetscCall(DMTSGetIJacobian(dm, &ijacobian, NULL));
-  *has = (PetscBool)(i2jacobian || ijacobian);
+  *has     = tdm->ops->i2jacobian || tdm->ops->ijacobian;
+  *pattern = sdm->ops->computejacobian == SNESComputeJacobianDefault;
+  *wanted  = *pattern || sdm->ops->computejacobian == SNESComputeJacobianDefaultColor || tdm->ops->ijacobian == TSComputeIJacobianDefaultColor;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,13 +54,13 @@ PetscErrorCode SetUpJacobian(TS ts)
   DM        dm;
   SNES      snes;
   Mat       J, P;
-  PetscBool shell, has = PETSC_FALSE, wanted = PETSC_FALSE, pattern = PETSC_FALSE;
+  PetscBool shell;
+  bool      has = false, wanted = false, pattern = false;
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(TSGetDM(ts, &dm));
-  PetscCall(HasJacobian(dm, &has));
-  PetscCall(DifferencesWanted(dm, &wanted, &pattern));
+  PetscCall(WhoFillsMatrix(dm, &has, &wanted, &pattern));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
   if (has && !wanted) {
@@ -145,8 +134,8 @@ PetscErrorCode TakeSNES(TS ts)
   PetscFunctionBegin;
   PetscCall(HooksRemove(ts));
   PetscCall(SNESSetDM(ts->snes, ts->dm));
-  I.linear_chosen         = PETSC_FALSE;
-  I.scaled_state          = 0;
+  I.linear.chosen         = PETSC_FALSE;
+  I.linear.scaled         = 0;
   I.scaled_operator       = 0;
   I.corrector.matrix.have = PETSC_FALSE;
   PetscCall(DifferencesDestroy(ts));

@@ -52,7 +52,7 @@ PetscErrorCode SolveStart(TS ts, Vec rhs, Vec d)
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  if (Get(ts).unfactored) PetscCall(NameRedundant(ts));
+  if (Get(ts).linear.failed) PetscCall(NameRedundant(ts));
   PetscCall(KSPSetOperators(ksp, P, P));
   PetscCall(SolveOfTheRun(ts, rhs, d, &ok));
   if (!ok) PetscCall(NameRedundant(ts));

@@ -11,10 +11,10 @@ namespace hht3
 PetscErrorCode SolverDefaults(TS ts, KSP ksp);
 
 /* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
-PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearChoice *linear, PetscBool *chosen);
+PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearState *linear);
 
-/* failed: of the last factorization on entry, of this one on return, the same on all ranks */
-PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearChoice *linear, PCFailedReason *failed);
+/* linear->failed: of the last factorization on entry, of this one on return */
+PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearState *linear);
 
 /* After a solve by the run's solver. *other: another one takes its place, which has no factor yet */
 PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other);

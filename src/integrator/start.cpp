@@ -50,9 +50,6 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   c->A      = I.A1;
   c->X      = I.X;
   c->linear = &I.linear;
-  c->chosen = &I.linear_chosen;
-  c->scaled = &I.scaled_state;
-  c->failed = &I.unfactored;
   I.stage_id = 0; /* U1, V1, A1 belong to no stage from now on */
   PetscCall(VecCopy(U, I.U1));
   PetscCall(VecCopy(V, I.V1));
@@ -362,8 +359,8 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
   ts->ksp_its += c.ksp_its;
-  I.corrector.no_solve = (PetscBool)(I.unfactored != PC_NOERROR);
-  if (I.unfactored) PetscCall(ExplainLinearFailure(ts, t, 0));
+  I.corrector.no_solve = (PetscBool)(I.linear.failed != PC_NOERROR);
+  if (I.linear.failed) PetscCall(ExplainLinearFailure(ts, t, 0));
   else if (!*ok && why != I.failure) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "%s in the search for accelerations and multipliers at t = %g", why, (double)t));
   PetscCall(SNESSetConvergedReason(ts->snes, *ok ? SNES_CONVERGED_SNORM_RELATIVE : SNES_DIVERGED_INNER)); /* for TSAdapt */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -384,7 +381,7 @@ PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
   PetscCall(GuessUnknowns(I, I.U0));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
-    if (I.unfactored) PetscCall(NameRedundant(ts));
+    if (I.linear.failed) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
   PetscCall(NoteDriven(ts));

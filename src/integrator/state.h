@@ -163,6 +163,13 @@ struct RowNames {
   void         *ctx  = nullptr;
 };
 
+/* A linear solver and its matrix */
+struct LinearState : LinearChoice {
+  PetscBool        chosen = PETSC_FALSE;
+  PetscObjectState scaled = 0;          /* of the matrix after we scaled it, to see whether the application refilled it */
+  PCFailedReason   failed = PC_NOERROR; /* why the last matrix could not be factored, the same on all ranks */
+};
+
 /* hooks.cpp: what stands in the SNES, and what stood there before */
 struct Hooks {
   SNES      snes        = nullptr;     /* that has them */
@@ -216,7 +223,6 @@ struct StepState {
   PetscReal        ahead_to    = 0;              /* end of the run that it was looked for in */
   PetscBool        told        = PETSC_FALSE;    /* that steps do not follow them */
   PetscBool        fixed_h     = PETSC_FALSE; /* TSADAPTNONE */
-  PCFailedReason   unfactored  = PC_NOERROR;  /* why the last matrix could not be factored, the same on all ranks */
   TSHHT3Statistics stat        = {};
 };
 
@@ -282,9 +288,7 @@ struct Integrator : StepState {
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */
-  LinearChoice  linear;
-  PetscBool     linear_chosen = PETSC_FALSE;
-  PetscObjectState scaled_state = 0; /* of the matrix after we scaled it, to see whether the application refilled it */
+  LinearState   linear;
   PetscObjectState scaled_operator = 0; /* the same of an operator beside the matrix */
 
   Change    change;

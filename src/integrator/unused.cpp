@@ -13,9 +13,6 @@ namespace hht3
 namespace
 {
 
-constexpr int      max_families = 8;
-const char *const *families[max_families]; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
-
 const char *const names[] = {"ts_hhtdae_",
                              "ts_hhtdae_form",
                              "ts_hhtdae_alpha",
@@ -31,6 +28,9 @@ const char *const names[] = {"ts_hhtdae_",
                              "ts_hhtdae_checkpoint_every",
                              "ts_hhtdae_resume",
                              nullptr};
+
+constexpr int      max_families           = 8;
+const char *const *families[max_families] = {names}; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
 
 /* Where the name of an option begins behind the prefix of its object; npos if it is of another family */
 size_t StemBegin(const std::string &option, const std::string &stem)
@@ -134,14 +134,7 @@ PetscErrorCode ReportUnusedOptions(void)
 PetscErrorCode ForgetOptions(void)
 {
   PetscFunctionBegin;
-  for (const char *const *&family : families) family = nullptr;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode DeclareOwnOptions(void)
-{
-  PetscFunctionBegin;
-  PetscCall(TSHHT3DeclareOptions(names));
+  std::fill(families + 1, families + max_families, nullptr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

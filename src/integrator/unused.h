@@ -9,10 +9,9 @@
 namespace hht3
 {
 
-PetscErrorCode DeclareOwnOptions(void);
 /* Prints them; collective on PETSC_COMM_WORLD, called when PETSc ends */
 PetscErrorCode ReportUnusedOptions(void);
-PetscErrorCode ForgetOptions(void);
+PetscErrorCode ForgetOptions(void); /* but our own */
 
 } // namespace hht3
 
