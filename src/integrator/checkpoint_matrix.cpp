@@ -19,57 +19,19 @@ struct MatrixState {
   PetscBool chosen = PETSC_FALSE; /* a linear solver was */
 };
 
-PetscErrorCode Rows(Mat A, std::vector<PetscScalar> &values, std::vector<PetscInt> &columns)
+std::uint64_t PatternHash(const std::vector<PetscInt> &col, const std::vector<PetscInt> &offset)
 {
-  PetscInt           begin, end, n;
-  const PetscInt    *col;
-  const PetscScalar *val;
-
-  PetscFunctionBegin;
-  values.clear();
-  columns.clear();
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  PetscCall(MatGetRowUpperTriangular(A));
-  for (PetscInt i = begin; i < end; i++) {
-    PetscCall(MatGetRow(A, i, &n, &col, &val));
-    values.insert(values.end(), val, val + n);
-    columns.push_back(n);
-    columns.insert(columns.end(), col, col + n);
-    PetscCall(MatRestoreRow(A, i, &n, &col, &val));
-  }
-  PetscCall(MatRestoreRowUpperTriangular(A));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-std::uint64_t PatternHash(const std::vector<PetscInt> &x) { return Hash().add(x.data(), x.size() * sizeof(PetscInt)).sum; }
-
-PetscErrorCode SetRows(Mat A, const std::vector<PetscScalar> &values, const std::vector<PetscInt> &columns)
-{
-  PetscInt           begin, end;
-  const PetscInt    *col = columns.data();
-  const PetscScalar *val = values.data();
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  for (PetscInt i = begin; i < end; i++) {
-    const PetscInt n = *col++;
-    PetscCall(MatSetValues(A, 1, &i, n, col, val, INSERT_VALUES));
-    col += n;
-    val += n;
-  }
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return Hash().add(col.data(), col.size() * sizeof(PetscInt)).add(offset.data(), offset.size() * sizeof(PetscInt)).sum;
 }
 
 PetscErrorCode SaveRows(Mat A, Archive &a)
 {
   std::vector<PetscScalar> values;
-  std::vector<PetscInt>    columns;
+  std::vector<PetscInt>    col, offset;
 
   PetscFunctionBegin;
-  PetscCall(Rows(A, values, columns));
-  std::uint64_t pattern = PatternHash(columns);
+  PetscCall(LocalValues(A, false, values, col, offset));
+  std::uint64_t pattern = PatternHash(col, offset);
   a.plain(pattern);
   a.list(values);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,17 +41,17 @@ PetscErrorCode SaveRows(Mat A, Archive &a)
 PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
 {
   std::vector<PetscScalar> values, now;
-  std::vector<PetscInt>    columns;
+  std::vector<PetscInt>    col, offset;
   std::uint64_t            pattern = 0;
 
   PetscFunctionBegin;
-  PetscCall(Rows(A, now, columns));
+  PetscCall(LocalValues(A, false, now, col, offset));
   a.plain(pattern);
   a.list(values);
-  int same = a.good && values.size() == now.size() && pattern == PatternHash(columns);
+  int same = a.good && values.size() == now.size() && pattern == PatternHash(col, offset);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
   *good = same;
-  if (same) PetscCall(SetRows(A, values, columns));
+  if (same) PetscCall(SetLocalValues(A, values, col, offset));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,6 +6,7 @@
 #include "entries.h"
 #include "equations.h"
 #include "jacobian.h"
+#include "random.h"
 #include "rows.h"
 #include "work_vec.h"
 #include <cstdint>
@@ -40,40 +41,26 @@ PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A state off the initial one, where entries may happen to vanish */
-PetscErrorCode OffTheStart(TS ts, WorkVec (&x)[3])
+/* A state off the initial one */
+PetscErrorCode Elsewhere(TS ts, WorkVec (&x)[3])
 {
-  PetscInt start, end;
-
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
   for (WorkVec &v : x) PetscCall(v.like(ts->vec_sol));
-  PetscCall(VecCopy(ts->vec_sol, x[0]));
-  PetscCall(VecCopy(ts->vec_dot, x[1]));
-  PetscCall(VecSet(x[2], 0.1));
-  for (PetscInt i = start; i < end; i++) {
-    PetscCall(VecSetValue(x[0], i, 1e-4 * (1 + i % 1000 * 7919 % 13), ADD_VALUES));
-    PetscCall(VecSetValue(x[1], i, 1e-3 * (1 + i % 1000 * 104729 % 17), ADD_VALUES));
-  }
-  for (int k = 0; k < 2; k++) {
-    PetscCall(VecAssemblyBegin(x[k]));
-    PetscCall(VecAssemblyEnd(x[k]));
-  }
+  PetscCall(OffTheStart(ts, 21, 0.1, x[0], x[1], x[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
 PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
 {
-  WorkVec            x[3], F0, F;
-  PetscInt           N, n, start, end;
-  const PetscScalar *a, *b;
+  WorkVec  x[3], F0, F;
+  PetscInt N, n, start, end;
 
   PetscFunctionBegin;
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetLocalSize(ts->vec_sol, &n));
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
-  PetscCall(OffTheStart(ts, x));
+  PetscCall(Elsewhere(ts, x));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(F.like(ts->vec_sol));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
@@ -87,12 +74,7 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
       }
       if (sign < 0) break;
       PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
-      PetscCall(VecGetArrayRead(F0, &a));
-      PetscCall(VecGetArrayRead(F, &b));
-      for (PetscInt i = 0; i < n; i++)
-        if (a[i] != b[i] || start + i == j) rows[i].push_back(j);
-      PetscCall(VecRestoreArrayRead(F, &b));
-      PetscCall(VecRestoreArrayRead(F0, &a));
+      PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar f) { if (f0 != f || start + i == j) rows[i].push_back(j); }, Read(F0), Read(F)));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -120,25 +102,6 @@ PetscErrorCode CreateMatrix(TS ts, Mat *P)
   PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
   PetscCall(PetscInfo(ts, "no I2Jacobian: pattern of the matrix found by %" PetscInt_FMT " evaluations of the residual\n", N + 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Entry by entry 1 */
-PetscErrorCode SetOnes(Mat pattern, Mat ones)
-{
-  PetscInt        start, end, n;
-  const PetscInt *col;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetOwnershipRange(pattern, &start, &end));
-  for (PetscInt i = start; i < end; i++) {
-    PetscCall(MatGetRow(pattern, i, &n, &col, NULL));
-    const std::vector<PetscScalar> values((size_t)n, 1);
-    PetscCall(MatSetValues(ones, 1, &i, n, col, values.data(), INSERT_VALUES));
-    PetscCall(MatRestoreRow(pattern, i, &n, &col, NULL));
-  }
-  PetscCall(MatAssemblyBegin(ones, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(ones, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,7 +150,7 @@ PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
   WorkVec  x[3], F0;
 
   PetscFunctionBegin;
-  PetscCall(OffTheStart(ts, x));
+  PetscCall(Elsewhere(ts, x));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   PetscCall(ISColoringGetIS(colors, PETSC_USE_POINTER, &n, &color));
@@ -238,7 +201,11 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
   if (!found) {
-    PetscCall(SetOnes(*P, d->part));
+    std::vector<PetscScalar> ones;
+    std::vector<PetscInt>    col, offset;
+    PetscCall(LocalValues(*P, false, ones, col, offset));
+    ones.assign(ones.size(), 1);
+    PetscCall(SetLocalValues(d->part, ones, col, offset));
     PetscCall(CheckPattern(ts, d->part, colors));
   }
   PetscInt n;

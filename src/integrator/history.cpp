@@ -242,51 +242,25 @@ PetscErrorCode CheckRoles(TS ts, const Mapping &map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D_0, D_1, ... of entry i from the values at the nodes, by forward substitution */
-void NewDifferences(const Motion &m, PetscInt i, const PetscScalar *const value[], PetscScalar *const D[])
-{
-  for (PetscInt k = 0; k < m.nodes; k++) {
-    PetscScalar v = value[k][i];
-    for (PetscInt j = 0; j < k; j++) v -= m.to_values[k][j] * D[j][i];
-    D[k][i] = v / m.to_values[k][k];
-  }
-}
-
-/* Takes over what has changed; in the paper's form q''_n is a_n but for a start */
+/* Takes over what has changed: D_0, D_1, ... from the values at the nodes by forward substitution, and the state; in the paper's form q''_n is a_n but for a start */
 PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const WorkVec value[])
 {
-  const PetscScalar *w[max_basis], *now[3];
-  PetscScalar       *D[max_basis], *x, *to[3];
-  Vec                state[3] = {I.U0, I.V0, I.A0};
-
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m.nodes; k++) {
-    PetscCall(VecGetArrayRead(value[k], &w[k]));
-    PetscCall(VecGetArray(I.predictor.D[k], &D[k]));
+    for (PetscInt j = 0; j < k; j++) PetscCall(VecAXPY(value[k], -m.to_values[k][j], value[j]));
+    PetscCall(VecScale(value[k], 1 / m.to_values[k][k]));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &d) { if (map.changed[i] & Mapping::Acceleration) d = x; }, Read(value[k]), Write(I.predictor.D[k])));
   }
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecGetArrayRead(map.now[k], &now[k]));
-    PetscCall(VecGetArray(state[k], &to[k]));
-  }
-  PetscCall(VecGetArray(I.X0, &x));
-  for (size_t i = 0; i < map.changed.size(); i++) {
-    if (!map.changed[i]) continue;
-    const bool same = I.form == TSHHT3_FORM_PAPER && to[2][i] == x[i];
-    for (int k = 0; k < 3; k++) to[k][i] = now[k][i];
-    if (!(map.changed[i] & Mapping::Acceleration)) continue;
-    NewDifferences(m, (PetscInt)i, w, D);
-    x[i] = D[0][i];
-    if (same) to[2][i] = x[i];
-  }
-  PetscCall(VecRestoreArray(I.X0, &x));
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecRestoreArray(state[k], &to[k]));
-    PetscCall(VecRestoreArrayRead(map.now[k], &now[k]));
-  }
-  for (PetscInt k = 0; k < m.nodes; k++) {
-    PetscCall(VecRestoreArray(I.predictor.D[k], &D[k]));
-    PetscCall(VecRestoreArrayRead(value[k], &w[k]));
-  }
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar d0, PetscScalar &u0, PetscScalar &v0, PetscScalar &a0, PetscScalar &x0) {
+      if (!map.changed[i]) return;
+      const bool same = I.form == TSHHT3_FORM_PAPER && a0 == x0, accelerates = map.changed[i] & Mapping::Acceleration;
+      u0 = u;
+      v0 = v;
+      if (accelerates) x0 = d0;
+      a0 = same && accelerates ? d0 : a;
+    },
+    Read(map.now[0]), Read(map.now[1]), Read(map.now[2]), Read(value[0]), Write(I.U0), Write(I.V0), Write(I.A0), Write(I.X0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

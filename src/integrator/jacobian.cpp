@@ -7,6 +7,7 @@
 #include "jacobian.h"
 #include "settings.h"
 #include "solver.h"
+#include <algorithm>
 #include <petscdm.h>
 #include <petscdmshell.h>
 
@@ -85,6 +86,46 @@ PetscErrorCode GivesRows(Mat A, PetscBool *yes)
   PetscCall(MatHasOperation(A, MATOP_GET_ROW, yes));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &foreign, MATMFFD, MATSHELL, MATNEST, MATMPIDENSE, ""));
   if (foreign) *yes = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values of the local rows, one after another, and for each its global column; of one triangle from the diagonal on */
+PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
+{
+  PetscInt           start, end, nc;
+  const PetscInt    *c;
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  val.clear();
+  col.clear();
+  offset.assign(1, 0);
+  PetscCall(MatGetOwnershipRange(P, &start, &end));
+  PetscCall(MatGetRowUpperTriangular(P)); /* nothing but with MATSBAIJ, whose blocks on the diagonal are whole */
+  for (PetscInt i = start; i < end; i++) {
+    PetscCall(MatGetRow(P, i, &nc, &c, &v));
+    const PetscInt from = triangle ? (PetscInt)(std::lower_bound(c, c + nc, i) - c) : 0;
+    col.insert(col.end(), c + from, c + nc);
+    val.insert(val.end(), v + from, v + nc);
+    offset.push_back((PetscInt)val.size());
+    PetscCall(MatRestoreRow(P, i, &nc, &c, &v));
+  }
+  PetscCall(MatRestoreRowUpperTriangular(P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetLocalValues(Mat P, const std::vector<PetscScalar> &val, const std::vector<PetscInt> &col, const std::vector<PetscInt> &offset)
+{
+  PetscInt start;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetOwnershipRange(P, &start, NULL));
+  for (PetscInt i = 0; i + 1 < (PetscInt)offset.size(); i++) {
+    const PetscInt row = start + i;
+    PetscCall(MatSetValues(P, 1, &row, offset[i + 1] - offset[i], col.data() + offset[i], val.data() + offset[i], INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

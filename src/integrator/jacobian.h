@@ -16,6 +16,10 @@ PetscErrorCode TakeSNES(TS ts);
 PetscErrorCode CheckMatrices(TS ts);
 PetscErrorCode GivesRows(Mat A, PetscBool *yes);
 
+/* Values of the local rows, one after another, and for each its global column; of one triangle from the diagonal on. And back: of a matrix with these places */
+PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset);
+PetscErrorCode SetLocalValues(Mat P, const std::vector<PetscScalar> &val, const std::vector<PetscInt> &col, const std::vector<PetscInt> &offset);
+
 /* triangle.cpp: refuses a matrix of one triangle where the Newton matrix is not symmetric; D A D with the scalings of the present h */
 PetscErrorCode CheckTriangle(TS ts);
 PetscErrorCode ScaleTriangle(Integrator &I, Mat A);

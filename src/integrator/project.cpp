@@ -157,32 +157,28 @@ Prepared PreparedBy(const Integrator &I, bool moved)
 /* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
 constexpr PetscReal many = 1e3;
 
-/* What rounding leaves of velocities is no time scale (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be
-   a millionth of what things take (Query.Units) */
-PetscReal WithoutEnd(PetscReal t) { return t != 0 ? many * PetscAbsReal(t) : many * many; }
-
 /* Constraints of what moves are differentiated over what it takes, though the run were so many times shorter: differences over parts of a run of next to nothing are
    rounding (BetweenRuns.ShortRunsHaveTheirMultipliers). What would take more does not move. */
 constexpr PetscReal runs = 1e6;
 
-/* 1/rate, in place of one beyond so many runs the whole run where it has an end */
+/* 1/rate, in place of one beyond so many runs the whole run where it has an end. Where it has none: what rounding leaves of velocities is no time scale
+   (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be a millionth of what things take (Query.Units) */
 PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 {
   const Integrator &I    = Get(ts);
   const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
-  PetscReal         span = ends ? ts->max_time - I.t_begin : rate > 0 ? WithoutEnd(ts->ptime) : 1;
+  PetscReal         span = ends ? ts->max_time - I.t_begin : !(rate > 0) ? 1 : ts->ptime != 0 ? many * PetscAbsReal(ts->ptime) : many * many;
   if (I.excitation && I.fastest < span / many) span = many * I.fastest;
   return rate > 0 && 1 / rate < (ends ? within : 1) * span ? 1 / rate : span;
 }
 
-/* Coordinates whose size is less count as of this size */
-PetscReal LeastSize(TS ts) { return PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); }
+} // namespace
 
 /* The largest of coordinates' rates or accelerations, each by the coordinate's size */
-PetscErrorCode MostOfItsSize(TS ts, Vec x, Vec size, PetscReal *most)
+PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most)
 {
   Integrator     &I     = Get(ts);
-  const PetscReal least = LeastSize(ts);
+  const PetscReal least = PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); /* coordinates whose size is less count as of this size */
   PetscReal       local = 0;
 
   PetscFunctionBegin;
@@ -190,12 +186,10 @@ PetscErrorCode MostOfItsSize(TS ts, Vec x, Vec size, PetscReal *most)
     [&](PetscInt i, PetscScalar v, PetscScalar y) {
       if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
     },
-    Read(x), Read(size)));
+    Read(x), Read(I.ymax)));
   PetscCallMPI(MPI_Allreduce(&local, most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-} // namespace
 
 /* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i| */
 PetscErrorCode TimeScale(TS ts, PetscReal *T)
@@ -203,19 +197,8 @@ PetscErrorCode TimeScale(TS ts, PetscReal *T)
   PetscReal rate;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, Get(ts).V0, Get(ts).ymax, &rate));
+  PetscCall(RelativeRate(ts, Get(ts).V0, &rate));
   *T = TimeOf(ts, rate, 1);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The same however short the run is; PETSC_MAX_REAL: nothing moves */
-PetscErrorCode TimeScaleOfVelocities(TS ts, Vec V, PetscReal *T)
-{
-  PetscReal rate;
-
-  PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, V, Get(ts).ymax, &rate));
-  *T = rate > 0 ? 1 / rate : PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +208,7 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
   PetscReal most;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, A, Get(ts).ymax, &most));
+  PetscCall(RelativeRate(ts, A, &most));
   *T = most > 0 ? 1 / PetscSqrtReal(most) : PETSC_MAX_REAL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -236,7 +219,7 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
   PetscReal rate;
 
   PetscFunctionBegin;
-  PetscCall(MostOfItsSize(ts, Get(ts).V0, Get(ts).ymax, &rate));
+  PetscCall(RelativeRate(ts, Get(ts).V0, &rate));
   *T = TimeOf(ts, rate, runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

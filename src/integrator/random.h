@@ -30,6 +30,19 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt, const Which &which)
 
 inline PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt) { return Shake(x, r, salt, [](PetscInt) { return true; }); }
 
+/* A state off the initial one, with accelerations about a: there entries may vanish that do not elsewhere, at rest or in a symmetric position */
+inline PetscErrorCode OffTheStart(TS ts, unsigned salt, PetscReal a, Vec U, Vec V, Vec A)
+{
+  PetscFunctionBegin;
+  PetscCall(VecCopy(ts->vec_sol, U));
+  PetscCall(VecCopy(ts->vec_dot, V));
+  PetscCall(VecSet(A, a));
+  PetscCall(Shake(U, 1e-4, salt));
+  PetscCall(Shake(V, 1e-3, salt + 1));
+  PetscCall(Shake(A, 1e-3, salt + 2));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 inline PetscReal RandomSign(PetscInt i, unsigned salt) { return RandomNumber(i, salt) < 0 ? -1 : 1; }
 
 /* Of either sign, between a half and one: rounding that neither vanishes by chance nor is the same for all */

@@ -16,7 +16,6 @@
 #include "roles.h"
 #include "rows.h"
 #include "work_vec.h"
-#include <algorithm>
 
 namespace hht3
 {
@@ -31,31 +30,6 @@ struct Probe {
   PetscBool                  triangle = PETSC_FALSE; /* the matrix is MATSBAIJ: an entry (i, j) stands for (j, i) too */
   explicit Probe(PetscInt n) : col_a(n), col_v(n), row_a(n), row_v(n), row_u(n), self(n) {}
 };
-
-/* Values of the local rows, one after another, and for each its global column; of one triangle from the diagonal on */
-PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
-{
-  PetscInt           start, end, nc;
-  const PetscInt    *c;
-  const PetscScalar *v;
-
-  PetscFunctionBegin;
-  val.clear();
-  col.clear();
-  offset.assign(1, 0);
-  PetscCall(MatGetOwnershipRange(P, &start, &end));
-  PetscCall(MatGetRowUpperTriangular(P)); /* nothing but with MATSBAIJ, whose blocks on the diagonal are whole */
-  for (PetscInt i = start; i < end; i++) {
-    PetscCall(MatGetRow(P, i, &nc, &c, &v));
-    const PetscInt from = triangle ? (PetscInt)(std::lower_bound(c, c + nc, i) - c) : 0;
-    col.insert(col.end(), c + from, c + nc);
-    val.insert(val.end(), v + from, v + nc);
-    offset.push_back((PetscInt)val.size());
-    PetscCall(MatRestoreRow(P, i, &nc, &c, &v));
-  }
-  PetscCall(MatRestoreRowUpperTriangular(P));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* least: what counts as nothing in this row, for matrices made of differences */
 bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
@@ -164,9 +138,7 @@ PetscErrorCode RunProbes(TS ts, Probe &probe)
   PetscCall(VecZeroEntries(I.A1));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
   PetscCall(RefuseBadMatrix(ts, P)); /* roles read from it would be wrong ones */
-  PetscCall(Shake(I.U1, 1e-4, 1));
-  PetscCall(Shake(I.V1, 1e-3, 2));
-  PetscCall(Shake(I.A1, 1e-3, 3));
+  PetscCall(OffTheStart(ts, 1, 0, I.U1, I.V1, I.A1));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
   if (probe.triangle) PetscCall(ProbeRates(ts, I.U1, I.V1, I.A1, probe));
   I.stat = saved; /* the probes are not part of the run */

@@ -70,7 +70,7 @@ PetscErrorCode GuessUnknowns(Integrator &I, Vec U)
 PetscErrorCode Rates(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
-  PetscReal   T, Ta, Tv;
+  PetscReal   T, Ta, rate_of_motion;
   PetscBool   ok, rest;
   WorkVec     X0, U, V;
 
@@ -78,8 +78,8 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(TimeScale(ts, &T));
   PetscCall(IsAtRest(I, I.V0, &rest));
   PetscCall(TimeScaleOfAccelerations(ts, I.X, &Ta));
-  PetscCall(TimeScaleOfVelocities(ts, I.V0, &Tv));
-  if (!rest && Ta < PETSC_MAX_REAL) T = PetscMax(T, Tv); /* what has just begun to move has no time scale of a short run: its rates would be rounding (BetweenRuns.ShortRunsHaveTheirMultipliers) */
+  PetscCall(RelativeRate(ts, I.V0, &rate_of_motion));
+  if (!rest && Ta < PETSC_MAX_REAL) T = rate_of_motion > 0 ? PetscMax(T, 1 / rate_of_motion) : PETSC_MAX_REAL; /* what has just begun to move has no time scale of a short run: its rates would be rounding (BetweenRuns.ShortRunsHaveTheirMultipliers) */
   const PetscReal d = SpanFrom(ts->ptime, PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest)); /* of what is at rest T may be a run without end: Units.LongRuns */
   PetscCall(X0.like(I.X));
   PetscCall(U.like(I.X));

@@ -38,12 +38,7 @@ struct Dependence {
   {
     PetscFunctionBegin;
     for (WorkVec *v : {&U, &V, &A, &F, &other, &moved}) PetscCall(v->like(ts->vec_sol));
-    PetscCall(VecCopy(ts->vec_sol, U));
-    PetscCall(VecCopy(ts->vec_dot, V));
-    PetscCall(VecZeroEntries(A));
-    PetscCall(Shake(U, 1e-4, 11));
-    PetscCall(Shake(V, 1e-3, 12));
-    PetscCall(Shake(A, 1e-3, 13));
+    PetscCall(OffTheStart(ts, 11, 0, U, V, A));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
