@@ -33,7 +33,7 @@ constexpr PetscInt  max_it    = 30;  /* at a rate of `slow` 13 digits take 25 */
 PetscErrorCode ConstraintRows(const Integrator &I, Consistent &c)
 {
   PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &d) { d = IsCoordinate(I, i) ? x : 0; }, Read(c.X), Write(c.d)));
+  PetscCall(TakeRoles(I, c.X, {TSHHT3_COORDINATE}, c.d));
   PetscCall(MatMult(c.P, c.d, I.work));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar p, PetscScalar g, PetscScalar &f) { if (IsConstraint(I, i)) f = p + g; }, Read(I.work), Read(c.gamma), Write(c.F)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,7 +100,7 @@ PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
 
   PetscFunctionBegin;
   for (WorkVec *v : {&U, &F, &held}) PetscCall(v->like(c.X));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &l) { l = IsConstraint(I, i) ? x : 0; }, Read(c.X), Write(U)));
+  PetscCall(TakeRoles(I, c.X, {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC}, U));
   PetscCall(MatMult(c.P, U, held));
   PetscCall(VecCopy(c.U, U));
   PetscCall(Shake(U, PETSC_MACHINE_EPSILON, 0, [&](PetscInt i) { return IsCoordinate(I, i); }));

@@ -21,8 +21,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal held         = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
-constexpr PetscReal least_forces = 1e-4; /* of the corrector's tolerance, where fixed steps make it smaller: forces have rounding, StiffStart.StrongDampingStopsAtOnce */
+constexpr PetscReal held = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
 
 /* The residual in the rows of driven coordinates, in units of the tolerance, above what is known of its rounding */
 PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
@@ -124,7 +123,7 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
 {
   Integrator     &I      = Get(ts);
   Corrector      &c      = I.corrector;
-  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_forces * CorrectorTolerance(I));
+  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_error * CorrectorTolerance(I));
 
   PetscFunctionBegin;
   *good = (PetscBool)(!I.verify.driven || (!*evaluated && before <= tol));

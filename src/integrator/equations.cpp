@@ -88,6 +88,16 @@ PetscErrorCode TrueAccelerationMatrix(TS ts, Vec X, Mat P)
 
 } // namespace
 
+PetscErrorCode TakeRoles(const Integrator &I, Vec x, std::initializer_list<TSHHT3Role> roles, Vec to)
+{
+  bool taken[TSHHT3_NUM_ROLES] = {};
+
+  PetscFunctionBegin;
+  for (TSHHT3Role r : roles) taken[r] = true;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar from, PetscScalar &y) { y = taken[RoleOf(I, i)] ? from : 0; }, Read(x), Write(to)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* D_r A D_c, in place; matrix-free operators that PETSc makes from our own residual are in these units already (MATMFFD). Products of the
    application's (MATSHELL) are not. */
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)

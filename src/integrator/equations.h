@@ -3,6 +3,7 @@
 #define HHTDAE_EQUATIONS_H
 
 #include "state.h"
+#include <initializer_list>
 
 namespace hht3
 {
@@ -24,6 +25,9 @@ struct Scales {
   PetscReal coordinate, state;   /* columns */
   PetscReal holonomic, velocity; /* rows */
 };
+
+/* to = the entries of x whose role is one of these, zeros elsewhere; also in place */
+PetscErrorCode TakeRoles(const Integrator &I, Vec x, std::initializer_list<TSHHT3Role> roles, Vec to);
 
 /* D_r A D_c, in place */
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A);

@@ -163,7 +163,7 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   if (S.t1 != I.t1) PetscCall(KSPReset(S.at.ksp));
   S.t1      = I.t1;
   S.at.t    = t;
-  S.at.tiny = 1e-28 * I.h; /* as in the start */
+  S.at.tiny = vanishing * I.h;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));

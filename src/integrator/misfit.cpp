@@ -42,13 +42,6 @@ PetscReal Least(TS ts)
   return I.count[TSHHT3_STATE] || last ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
 }
 
-PetscErrorCode KeepCoordinates(const Integrator &I, Vec d)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (!IsCoordinate(I, i)) x = 0; }, Write(d)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had. The factors at hand serve, though those of a start have met
    the matrix of its rates since (Statistics.FactorizationsOfAStart); they may be those with which the last correction failed, as the matrix was singular: then others. */
 PetscErrorCode SolveNormal(TS ts, Vec dV)
@@ -68,7 +61,7 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
     PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));
   }
   if (!ok) PetscCall(VecZeroEntries(dV));
-  else PetscCall(KeepCoordinates(I, dV));
+  else PetscCall(TakeRoles(I, dV, {TSHHT3_COORDINATE}, dV));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -132,8 +125,7 @@ PetscErrorCode StartMisfit(TS ts, Vec rate)
   PetscFunctionBegin;
   if (!I.count[TSHHT3_HOLONOMIC] || ts->snes->mf_operator) PetscFunctionReturn(PETSC_SUCCESS);
   if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
-  PetscCall(VecCopy(rate, I.bend));
-  PetscCall(KeepCoordinates(I, I.bend));
+  PetscCall(TakeRoles(I, rate, {TSHHT3_COORDINATE}, I.bend));
   PetscCall(ComputeBend(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -67,7 +67,7 @@ PetscErrorCode MissOfPositions(TS ts, PetscReal *e)
   PetscFunctionBegin;
   PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0)); /* leaves no accelerations */
   PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar &r) { r = RoleOf(I, i) == TSHHT3_HOLONOMIC ? f : 0; }, Read(I.gamma), Write(I.work)));
+  PetscCall(TakeRoles(I, I.gamma, {TSHHT3_HOLONOMIC}, I.work));
   PetscCall(SolveStart(ts, I.work, I.X));
   PetscCall(Distance(ts, I.X, 1, e));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -10,7 +10,7 @@
   and place without these, if the way that they would have gone is less than the tolerance: a transient that moves bodies farther is
   resolved. That it was one shows in its accelerations, which are gone; those of an oscillation would be as before.
 */
-#include "entries.h"
+#include "equations.h"
 #include "estimate.h"
 #include "start.h"
 #include "work_vec.h"
@@ -58,7 +58,7 @@ PetscErrorCode ImplicitAccelerations(TS ts, PetscReal h, PetscBool *ok)
 
   PetscFunctionBegin;
   /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { if (RoleOf(I, i) != TSHHT3_STATE && RoleOf(I, i) != TSHHT3_VARIABLE) x = 0; }, Write(I.X)));
+  PetscCall(TakeRoles(I, I.X, {TSHHT3_STATE, TSHHT3_VARIABLE}, I.X));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, h, I.U0, I.V0, {false, Gamma::Near}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,7 +43,7 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   if (mffd) c->J = NULL;
   PetscCall(SNESGetKSP(ts->snes, &c->ksp));
   PetscCall(TimeScale(ts, &c->tiny));
-  c->tiny = 1e-28 * PetscMin(c->tiny, 1); /* h C/M and h^2 K/M must be nothing: with 1e-12 dampers of 1e12 M/T stood as inertia in the matrix, Start.StrongDampingIsNoInertia */
+  c->tiny = vanishing * PetscMin(c->tiny, 1);
   c->t      = t;
   c->U      = I.U1;
   c->V      = I.V1;
@@ -57,13 +57,8 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X of a state before its accelerations are known: what is algebraic stands in U */
-PetscErrorCode GuessUnknowns(Integrator &I, Vec U)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = IsDifferential(RoleOf(I, i)) ? 0 : u; }, Read(U), Write(I.X)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* Whose unknown stands in U, so that X knows of it before the accelerations are known */
+constexpr std::initializer_list<TSHHT3Role> algebraic = {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE};
 
 /* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
    Leaves X as it was. */
@@ -262,7 +257,7 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(GuessUnknowns(I, U));
+  PetscCall(TakeRoles(I, U, algebraic, I.X));
   PetscCall(OfTheRun(ts, t, U, V, &c));
   PetscCall(TakeUnknowns(I, c));
   PetscCall(ConsistentMatrix(ts, c, &ok, &why));
@@ -378,7 +373,7 @@ PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(GuessUnknowns(I, I.U0));
+  PetscCall(TakeRoles(I, I.U0, algebraic, I.X));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
     if (I.linear.failed) PetscCall(NameRedundant(ts));
@@ -479,8 +474,7 @@ PetscErrorCode Start(TS ts)
   I.repaired = PETSC_FALSE;
   I.tiny_row = 0;
   PetscCall(VecCopy(ts->vec_sol, I.U0));
-  PetscCall(VecCopy(ts->vec_dot, I.V0));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &v) { if (!IsDifferential(RoleOf(I, i))) v = 0; }, Write(I.V0)));
+  PetscCall(TakeRoles(I, ts->vec_dot, {TSHHT3_COORDINATE, TSHHT3_STATE}, I.V0));
   PetscCall(CheckInitialNumbers(ts, I.U0, "value"));
   PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));

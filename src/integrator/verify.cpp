@@ -18,6 +18,7 @@
   Otherwise the iteration goes on; the rate that it then measures, or a new matrix, settles the matter.
 */
 #include "entries.h"
+#include "equations.h"
 #include "proofs.h"
 #include "verify.h"
 #include "work_vec.h"
@@ -30,15 +31,6 @@ namespace
 
 constexpr PetscReal allowed     = 0.1; /* unproved change of positions, in units of the tolerance */
 constexpr PetscReal taken_away  = 0.9; /* of an imbalance that a sample of rounding has explained in part */
-constexpr PetscReal least_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, too */
-
-/* to = the entries of R whose role is among the two, zeros elsewhere */
-PetscErrorCode Keep(const Integrator &I, Vec R, TSHHT3Role one, TSHHT3Role other, Vec to)
-{
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar r, PetscScalar &t) { t = RoleOf(I, i) == one || RoleOf(I, i) == other ? r : 0; }, Read(R), Write(to)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Largest change of the positions, in units of the tolerance, by accelerations that would have made a correction of E = |k| h^2 a, over one step */
 PetscReal Drift(const Integrator &I, PetscReal E) { return E / (2 * PetscAbsReal(I.p.k)); }
@@ -124,7 +116,7 @@ PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   PetscCall(defined.like(R, I.spare));
   PetscCall(product.like(R, I.spare));
-  PetscCall(Keep(I, R, TSHHT3_VARIABLE, TSHHT3_FORCE, defined));
+  PetscCall(TakeRoles(I, R, {TSHHT3_VARIABLE, TSHHT3_FORCE}, defined));
   PetscCall(MatMult(P, defined, product));
   PetscCall(VecAXPY(R, -1, product));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,7 +135,7 @@ PetscErrorCode Model(TS ts, Vec dX)
   if (!v.work) PetscCall(VecDuplicate(dX, &v.work));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
   if (I.constraints()) {
-    PetscCall(Keep(I, dX, TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, v.model));
+    PetscCall(TakeRoles(I, dX, {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC}, v.model));
     PetscCall(MatMult(P, v.model, v.work));
     PetscCall(MatMult(P, dX, v.model));
     PetscCall(VecAXPY(v.model, -1, v.work));
