@@ -28,31 +28,35 @@ PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 }
 
 /* U1, V1, A1 = base + X times their derivatives by X; of what is no coordinate U1 is X itself */
-template <bool all>
 struct Stage {
   PetscReal          kq, kv, ka;
-  const PetscScalar *x, *base[3];
-  const float       *moves;
+  const float       *moves; /* null: all are coordinates */
+  const PetscScalar *base[3];
   PetscScalar       *to[3];
 
   template <class At>
-  HHT3_INLINE void set(const At &at, const Four &given) const
+  HHT3_INLINE void operator()(const At &at, const Four &given) const
   {
-    const Four c = all ? given : given * at.get(moves);
+    const Four c = moves ? given * at.get(moves) : given;
     Four       u = at.get(base[0]) + kq * c;
-    if (!all) u += given - c;
+    if (moves) u += given - c;
     at.put(to[0], u);
     at.put(to[1], at.get(base[1]) + kv * c);
     at.put(to[2], at.get(base[2]) + ka * c);
   }
+};
+
+struct GivenStage {
+  Stage              stage;
+  const PetscScalar *x;
+
   template <class At>
-  HHT3_INLINE void operator()(const At &at) const { set(at, at.get(x)); }
+  HHT3_INLINE void operator()(const At &at) const { stage(at, at.get(x)); }
 };
 
 /* The same after X = X - d, and the squares of d by the weights */
-template <bool all>
 struct CorrectedStage {
-  Stage<all>         stage;
+  Stage              stage;
   const PetscScalar *d, *w;
   PetscScalar       *x;
   Four               sum = {0, 0, 0, 0};
@@ -63,42 +67,24 @@ struct CorrectedStage {
     const Four correction = at.get(d), weighted = correction * at.get(w), now = at.get(x) - correction;
     sum += weighted * weighted;
     at.put(x, now);
-    stage.set(at, now);
+    stage(at, now);
   }
 };
 
-/* The arrays of a stage but X */
-struct StageArrays {
-  PetscScalar       *base[3];
-  PetscScalar       *to[3];
-  PetscInt           n;
-};
-
-PetscErrorCode GetStage(const Integrator &I, StageArrays *s)
+/* sweep(n, stage), which has the arrays of the stage and those of `more` */
+template <class F, class... More>
+PetscErrorCode ForStage(const Integrator &I, F sweep, More &...more)
 {
-  Vec to[3] = {I.U1, I.V1, I.A1};
+  Read     b0(I.base[0]), b1(I.base[1]), b2(I.base[2]);
+  Write    u(I.U1), v(I.V1), a(I.A1);
+  PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(VecGetLocalSize(I.U1, &s->n));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(I.base[k], &s->base[k]));
-  for (int k = 0; k < 3; k++) PetscCall(VecGetArray(to[k], &s->to[k]));
+  PetscCall(VecGetLocalSize(I.U1, &n));
+  PetscCall(WithArrays(
+    [&] { sweep(n, Stage{ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), I.moves.empty() ? nullptr : I.moves.data(), {b0.x, b1.x, b2.x}, {u.x, v.x, a.x}}); },
+    b0, b1, b2, u, v, a, more...));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode RestoreStage(const Integrator &I, StageArrays *s)
-{
-  Vec to[3] = {I.U1, I.V1, I.A1};
-
-  PetscFunctionBegin;
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(to[k], &s->to[k]));
-  for (int k = 0; k < 3; k++) PetscCall(VecRestoreArray(I.base[k], &s->base[k]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-template <bool all>
-Stage<all> MakeStage(const Integrator &I, const StageArrays &s, const PetscScalar *x)
-{
-  return {ScalePosition(I.p, I.h), ScaleVelocity(I.p, I.h), I.p.ca(), x, {s.base[0], s.base[1], s.base[2]}, I.moves.data(), {s.to[0], s.to[1], s.to[2]}};
 }
 
 PetscErrorCode StageOfStates(const Integrator &I, Vec X)
@@ -128,37 +114,21 @@ PetscErrorCode FinishStage(Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HasStage(const Integrator &I, Vec X, bool *has)
+} // namespace
+
+/* U1, V1, A1 from X; to be called after PrepareStage() */
+PetscErrorCode StageVectors(TS ts, Vec X)
 {
+  Integrator      &I = Get(ts);
+  Read             x(X);
   PetscObjectId    id;
   PetscObjectState state;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectGetId((PetscObject)X, &id));
   PetscCall(PetscObjectStateGet((PetscObject)X, &state));
-  *has = id == I.stage_id && state == I.stage_state;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-} // namespace
-
-/* U1, V1, A1 from X; to be called after PrepareStage() */
-PetscErrorCode StageVectors(TS ts, Vec X)
-{
-  Integrator        &I = Get(ts);
-  StageArrays        s;
-  const PetscScalar *x;
-  bool               has;
-
-  PetscFunctionBegin;
-  PetscCall(HasStage(I, X, &has));
-  if (has) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(X, &x));
-  PetscCall(GetStage(I, &s));
-  if (I.moves.empty()) Sweep(s.n, MakeStage<true>(I, s, x));
-  else Sweep(s.n, MakeStage<false>(I, s, x));
-  PetscCall(RestoreStage(I, &s));
-  PetscCall(VecRestoreArrayRead(X, &x));
+  if (id == I.stage_id && state == I.stage_state) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForStage(I, [&](PetscInt n, const Stage &stage) { Sweep(n, GivenStage{stage, x.x}); }, x));
   PetscCall(FinishStage(I, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -166,23 +136,13 @@ PetscErrorCode StageVectors(TS ts, Vec X)
 /* X = X - dX, the norm of dX by which the corrector judges it, and U1, V1, A1 that belong to the new X, in one sweep */
 PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
 {
-  Integrator        &I = Get(ts);
-  StageArrays        s;
-  const PetscScalar *d, *w;
-  PetscScalar       *x;
-  Four               sum;
+  Integrator &I = Get(ts);
+  Write       x(X);
+  Read        d(dX), w(I.weight);
+  Four        sum = {0, 0, 0, 0};
 
   PetscFunctionBegin;
-  PetscCall(VecGetArray(X, &x));
-  PetscCall(VecGetArrayRead(dX, &d));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  PetscCall(GetStage(I, &s));
-  if (I.moves.empty()) sum = Sweep(s.n, CorrectedStage<true>{MakeStage<true>(I, s, x), d, w, x}).sum;
-  else sum = Sweep(s.n, CorrectedStage<false>{MakeStage<false>(I, s, x), d, w, x}).sum;
-  PetscCall(RestoreStage(I, &s));
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
-  PetscCall(VecRestoreArrayRead(dX, &d));
-  PetscCall(VecRestoreArray(X, &x));
+  PetscCall(ForStage(I, [&](PetscInt n, const Stage &stage) { sum = Sweep(n, CorrectedStage{stage, d.x, w.x, x.x}).sum; }, x, d, w));
   PetscCall(FinishStage(I, X));
   PetscCall(ReduceCorrection(ts, dX, Total(sum), I.h, e));
   PetscFunctionReturn(PETSC_SUCCESS);
