@@ -201,37 +201,43 @@ PetscErrorCode UseOrder(TS ts)
 /* As PrepareStage() does it for order two: psi_q + gamma h psi_v of coordinates, psi_q of states and of rotation vectors, see StageOfRotations() */
 PetscErrorCode PrepareBDF(TS ts)
 {
-  Integrator &I = Get(ts);
-  Order      &o = I.order;
-  PetscReal   tau[max_order + 1];
-  ReadEach    u, v;
+  Integrator        &I = Get(ts);
+  Order             &o = I.order;
+  PetscReal          tau[max_order + 1];
+  Vec                U[max_order] = {I.U0}, V[max_order] = {I.V0};
+  const PetscScalar *u[max_order], *v[max_order];
 
   PetscFunctionBegin;
   Spans(o, I.t1, tau);
   const BDF       b      = BDFOf(o.now, tau);
   const PetscReal misfit = MisfitOfHistory(o, b);
+  std::copy(o.U, o.U + o.now - 1, U + 1);
+  std::copy(o.V, o.V + o.now - 1, V + 1);
   for (PetscInt j = 0; j < o.now; j++) {
-    u.add(j ? o.U[j - 1] : I.U0);
-    v.add(j ? o.V[j - 1] : I.V0);
+    PetscCall(VecGetArrayRead(U[j], &u[j]));
+    PetscCall(VecGetArrayRead(V[j], &v[j]));
   }
-  const auto psi = [&](const ReadEach::Entries &x, PetscScalar sum) {
-    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j];
+  const auto psi = [&](const PetscScalar *const x[], PetscInt i, PetscScalar sum) {
+    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j][i]; /* not by VecMAXPY(), which rounds otherwise: HigherOrderRotations.ObservedOrders */
     return sum;
   };
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar &bu, PetscScalar &bv, PetscScalar &ba, PetscScalar dV, ReadEach::Entries ui, ReadEach::Entries vi) {
-      bv = IsCoordinate(I, i) ? psi(vi, -misfit * dV) : 0;
-      bu = IsDifferential(RoleOf(I, i)) ? psi(ui, 0) + b.gh * bv : 0;
+    [&](PetscInt i, PetscScalar &bu, PetscScalar &bv, PetscScalar &ba, PetscScalar dV) {
+      bv = IsCoordinate(I, i) ? psi(v, i, -misfit * dV) : 0;
+      bu = IsDifferential(RoleOf(I, i)) ? psi(u, i, 0) + b.gh * bv : 0;
       ba = 0;
     },
-    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */), u, v));
-  if (I.rotations.is)
-    PetscCall(ForSome(
-      I.rotations.at,
-      [&](PetscInt, PetscScalar &bu, ReadEach::Entries ui) {
-        for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi({ui.x, ui.i + k}, 0);
-      },
-      Write(I.base[0]), u));
+    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */)));
+  PetscCall(ForSome(
+    I.rotations.at,
+    [&](PetscInt i, PetscScalar &bu) {
+      for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi(u, i + k, 0);
+    },
+    Write(I.base[0])));
+  for (PetscInt j = 0; j < o.now; j++) {
+    PetscCall(VecRestoreArrayRead(U[j], &u[j]));
+    PetscCall(VecRestoreArrayRead(V[j], &v[j]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

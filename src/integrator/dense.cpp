@@ -10,6 +10,7 @@
 */
 #include "dense.h"
 #include "entries.h"
+#include "equations.h"
 #include "rotations.h"
 
 namespace hht3
@@ -20,32 +21,21 @@ namespace
 
 /* The value of a polynomial, as a sum of vectors */
 struct WeightedSum {
-  PetscInt           n = 0;
-  PetscReal          weight[max_order + 2];
-  Vec                vec[max_order + 2];
-  const PetscScalar *x[max_order + 2];
+  PetscInt    n = 0;
+  PetscScalar weight[max_order + 2];
+  Vec         vec[max_order + 2];
 
   void add(PetscReal w, Vec v)
   {
     weight[n] = w;
     vec[n++]  = v;
   }
-  PetscScalar operator[](PetscInt i) const
-  {
-    PetscScalar sum = 0;
-    for (PetscInt j = 0; j < n; j++) sum += weight[j] * x[j][i];
-    return sum;
-  }
-  PetscErrorCode get()
+  PetscErrorCode value(std::vector<Vec> &spare, WorkVec &x)
   {
     PetscFunctionBegin;
-    for (PetscInt j = 0; j < n; j++) PetscCall(VecGetArrayRead(vec[j], &x[j]));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscErrorCode restore()
-  {
-    PetscFunctionBegin;
-    for (PetscInt j = n - 1; j >= 0; j--) PetscCall(VecRestoreArrayRead(vec[j], &x[j]));
+    PetscCall(x.like(vec[0], spare));
+    PetscCall(VecZeroEntries(x));
+    PetscCall(VecMAXPY(x, n, weight, vec));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };
@@ -124,20 +114,15 @@ Polynomials OfStep(const Integrator &I, PetscReal t)
 }
 
 /* The rotation vectors among U, of order two, after all coordinates */
-PetscErrorCode AtRotations(const Integrator &I, PetscReal x, WeightedSum velocity, Vec U)
+PetscErrorCode AtRotations(Integrator &I, PetscReal x, WeightedSum velocity, Vec U)
 {
-  Read  v0(I.V0), v1(I.V1);
-  Write u(U);
+  WorkVec V;
 
   PetscFunctionBegin;
-  PetscCall(WithArrays(
-    [&] {
-      for (PetscInt i : I.rotations.at) {
-        const PetscScalar v[3] = {velocity[i], velocity[i + 1], velocity[i + 2]};
-        InterpolateCommutator(I, x, HermiteEnd(x), &v0[i], &v1[i], v, &u[i]);
-      }
-    },
-    velocity, v0, v1, u));
+  PetscCall(velocity.value(I.spare, V));
+  PetscCall(ForSome(
+    I.rotations.at, [&](PetscInt, const PetscScalar &v0, const PetscScalar &v1, const PetscScalar &v, PetscScalar &u) { InterpolateCommutator(I, x, HermiteEnd(x), &v0, &v1, &v, &u); }, Read(I.V0),
+    Read(I.V1), Read(V), Write(U)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,11 +156,23 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
     PetscCall(VecGetLocalSize(x, &size));
     PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
   }
-  const Polynomials p = OfStep(I, t);
-  if (U) PetscCall(ForEntries([&](PetscInt i, PetscScalar &u, PetscScalar differential, PetscScalar algebraic) { u = IsDifferential(RoleOf(I, i)) ? differential : algebraic; }, Write(U), p.differential, p.algebraic));
-  if (V) PetscCall(ForEntries([&](PetscInt i, PetscScalar &v, PetscScalar velocity, PetscScalar rate) { v = IsCoordinate(I, i) ? velocity : RoleOf(I, i) == TSHHT3_STATE ? rate : 0; }, Write(V), p.velocity, p.rate));
-  if (A) PetscCall(ForEntries([&](PetscInt i, PetscScalar &a, PetscScalar acceleration) { a = IsCoordinate(I, i) ? acceleration : 0; }, Write(A), p.acceleration));
-  if (U && I.order.accepted <= 2) PetscCall(AtRotations(I, StepFraction(I, t), p.velocity, U));
+  Polynomials p = OfStep(I, t);
+  WorkVec     differential, velocity, acceleration, rate, algebraic;
+  if (U) {
+    PetscCall(p.differential.value(I.spare, differential));
+    PetscCall(p.algebraic.value(I.spare, algebraic));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar q, PetscScalar l, PetscScalar &u) { u = IsDifferential(RoleOf(I, i)) ? q : l; }, Read(differential), Read(algebraic), Write(U)));
+    if (I.rotations.is && I.order.accepted <= 2) PetscCall(AtRotations(I, StepFraction(I, t), p.velocity, U));
+  }
+  if (V) {
+    PetscCall(p.velocity.value(I.spare, velocity));
+    PetscCall(p.rate.value(I.spare, rate));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar q, PetscScalar s, PetscScalar &v) { v = IsCoordinate(I, i) ? q : RoleOf(I, i) == TSHHT3_STATE ? s : 0; }, Read(velocity), Read(rate), Write(V)));
+  }
+  if (A) {
+    PetscCall(p.acceleration.value(I.spare, acceleration));
+    PetscCall(TakeRoles(I, acceleration, {TSHHT3_COORDINATE}, A));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,34 +27,6 @@ struct Write {
   PetscScalar   &operator[](PetscInt i) const { return x[i]; }
 };
 
-/* Several vectors that are read: x[j] is the entry of the j-th one */
-struct ReadEach {
-  static constexpr int most = 8;
-  int                  n    = 0;
-  Vec                  vec[most];
-  const PetscScalar   *x[most];
-
-  struct Entries {
-    const PetscScalar *const *x;
-    PetscInt                  i;
-    const PetscScalar        &operator[](int j) const { return x[j][i]; }
-  };
-  void           add(Vec v) { vec[n++] = v; }
-  Entries        operator[](PetscInt i) const { return {x, i}; }
-  PetscErrorCode get()
-  {
-    PetscFunctionBegin;
-    for (int j = 0; j < n; j++) PetscCall(VecGetArrayRead(vec[j], &x[j]));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscErrorCode restore()
-  {
-    PetscFunctionBegin;
-    for (int j = 0; j < n; j++) PetscCall(VecRestoreArrayRead(vec[j], &x[j]));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-};
-
 /* get() or restore() of all arrays */
 template <class Call, class... Arrays>
 PetscErrorCode ForArrays(Call call, Arrays &...arrays)

@@ -17,6 +17,7 @@
 #include "change.h"
 #include "entries.h"
 #include "work_vec.h"
+#include <algorithm>
 #include <petscblaslapack.h>
 
 namespace hht3
@@ -144,22 +145,23 @@ PetscErrorCode Apply(TS ts, Mapping &map, PetscReal x)
 PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkVec (&to)[3])
 {
   PetscReal w[3][max_basis];
-  ReadEach  stored;
+  Vec       stored[max_basis];
 
   PetscFunctionBegin;
   PetscCall(Weights(m, x, w));
-  for (PetscInt j = 0; j < m.n; j++) stored.add(m.stored[j]);
+  std::copy(m.stored, m.stored + m.n, stored);
+  for (int s = 0; s < 3; s++) {
+    PetscCall(VecZeroEntries(to[2 - s]));
+    PetscCall(VecMAXPY(to[2 - s], m.n, w[s], stored));
+  }
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar u0, PetscScalar v0, ReadEach::Entries y, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
-      const bool  moves  = IsCoordinate(I, i);
-      PetscScalar sum[3] = {0, 0, 0};
-      for (int j = 0; moves && j < m.n; j++)
-        for (int s = 0; s < 3; s++) sum[s] += w[s][j] * y[j];
-      u = moves ? u0 + x * v0 + sum[2] : u0;
-      v = v0 + sum[1];
-      a = sum[0];
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const bool moves = IsCoordinate(I, i);
+      u = moves ? u0 + x * v0 + u : u0;
+      v = moves ? v0 + v : v0;
+      if (!moves) a = 0;
     },
-    Read(I.U0), Read(I.V0), stored, Write(to[0]), Write(to[1]), Write(to[2])));
+    Read(I.U0), Read(I.V0), Write(to[0]), Write(to[1]), Write(to[2])));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
