@@ -41,11 +41,13 @@ constexpr PetscReal longest_growth = 2;
 
 constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
 
+constexpr int most_points = max_order + 2; /* of the highest one; those that the history does not have yet weigh nothing */
+
 /* Scaled differences as sums of squares or largest entries */
-template <int points, bool largest>
+template <bool largest>
 struct Differences {
-  PetscReal          weight[kinds][points];
-  const PetscScalar *u[points], *w;
+  PetscReal          weight[kinds][most_points] = {};
+  const PetscScalar *u[most_points], *w;
   Four               result[kinds] = {};
 
   template <class At>
@@ -53,7 +55,7 @@ struct Differences {
   {
     const Four scale = at.get(w);
     Four       d[kinds] = {};
-    for (int j = 0; j < points; j++) {
+    for (int j = 0; j < most_points; j++) {
       const Four x = at.get(u[j]);
       for (int s = 0; s < kinds; s++) d[s] += weight[s][j] * x;
     }
@@ -63,60 +65,48 @@ struct Differences {
       else result[s] += x * x;
     }
   }
+  PetscReal total(int s) const { return largest ? PetscMax(PetscMax(result[s][0], result[s][1]), PetscMax(result[s][2], result[s][3])) : Total(result[s]); }
 };
 
-template <int points>
-void SweepDifferences(PetscInt n, NormType type, const PetscReal weight[kinds][max_order + 2], const PetscScalar *const u[], const PetscScalar *w, PetscReal result[kinds])
+/* Of U1, U0 and the past up to S_top, on this rank */
+template <bool largest>
+PetscErrorCode SweepDifferences(const Integrator &I, PetscInt top, PetscReal result[kinds])
 {
-  const auto fill = [&](auto &d) {
-    d.w = w;
-    for (int j = 0; j < points; j++) {
-      d.u[j] = u[j];
-      for (int s = 0; s < kinds; s++) d.weight[s][j] = weight[s][j];
-    }
-  };
-  if (type == NORM_2) {
-    Differences<points, false> d;
-    fill(d);
-    d = Sweep(n, d);
-    for (int s = 0; s < kinds; s++) result[s] = Total(d.result[s]);
-  } else {
-    Differences<points, true> d;
-    fill(d);
-    d = Sweep(n, d);
-    for (int s = 0; s < kinds; s++) result[s] = PetscMax(PetscMax(d.result[s][0], d.result[s][1]), PetscMax(d.result[s][2], d.result[s][3]));
-  }
+  Differences<largest> d;
+  Vec                  vec[most_points] = {I.U1, I.U0};
+  PetscReal            tau[most_points];
+  PetscInt             n;
+
+  PetscFunctionBegin;
+  Spans(I.order, I.t1, tau);
+  for (PetscInt m = lowest; m <= top; m++) DifferenceWeights(m, tau, d.weight[m - lowest]);
+  for (PetscInt j = 2; j < most_points; j++) vec[j] = j <= top ? I.order.U[j - 2] : I.U1;
+  PetscCall(VecGetLocalSize(I.U1, &n));
+  PetscCall(VecGetArrayRead(I.weight, &d.w));
+  for (int j = 0; j < most_points; j++) PetscCall(VecGetArrayRead(vec[j], &d.u[j]));
+  d = Sweep(n, d);
+  for (int s = 0; s < kinds; s++) result[s] = d.total(s);
+  for (int j = 0; j < most_points; j++) PetscCall(VecRestoreArrayRead(vec[j], &d.u[j]));
+  PetscCall(VecRestoreArrayRead(I.weight, &d.w));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* S_m as far as the history goes, S[m]; those beyond are -1 */
 PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
 {
-  Integrator        &I      = Get(ts);
-  Order             &o      = I.order;
-  const PetscInt     points = PetscMin(o.past, max_order) + 2;
-  PetscReal          tau[max_order + 2], weight[kinds][max_order + 2] = {}, local[kinds] = {}, all[kinds];
-  const PetscScalar *u[max_order + 2], *w;
-  PetscInt           n;
+  Integrator    &I   = Get(ts);
+  Order         &o   = I.order;
+  const PetscInt top = o.past + 1;
+  PetscReal      local[kinds], all[kinds];
 
   PetscFunctionBegin;
   if (o.measured && type == NORM_2) { /* by the estimate */
     std::copy_n(o.S, max_order + 2, S);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  Spans(I.order, I.t1, tau);
-  for (PetscInt s = 0; s < kinds && lowest + s < points; s++) DifferenceWeights(lowest + s, tau, weight[s]);
-  const auto vec = [&](PetscInt j) { return j == 0 ? I.U1 : j == 1 ? I.U0 : o.U[j - 2]; };
-  PetscCall(VecGetLocalSize(I.U1, &n));
-  PetscCall(VecGetArrayRead(I.weight, &w));
-  for (PetscInt j = 0; j < points; j++) PetscCall(VecGetArrayRead(vec(j), &u[j]));
-  if (points == 4) SweepDifferences<4>(n, type, weight, u, w, local);
-  else if (points == 5) SweepDifferences<5>(n, type, weight, u, w, local);
-  else if (points == 6) SweepDifferences<6>(n, type, weight, u, w, local);
-  else SweepDifferences<7>(n, type, weight, u, w, local);
-  for (PetscInt j = 0; j < points; j++) PetscCall(VecRestoreArrayRead(vec(j), &u[j]));
-  PetscCall(VecRestoreArrayRead(I.weight, &w));
+  PetscCall(type == NORM_2 ? SweepDifferences<false>(I, top, local) : SweepDifferences<true>(I, top, local));
   PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt s = 0; s < kinds; s++) S[lowest + s] = lowest + s >= points ? -1 : type == NORM_2 ? PetscSqrtReal(all[s] / PetscMax(I.norm_size, 1)) : all[s];
+  for (PetscInt m = lowest; m < lowest + kinds; m++) S[m] = m > top ? -1 : type == NORM_2 ? PetscSqrtReal(all[m - lowest] / PetscMax(I.norm_size, 1)) : all[m - lowest];
   if (type == NORM_2) {
     o.measured = PETSC_TRUE;
     std::copy_n(S, max_order + 2, o.S);
