@@ -218,10 +218,6 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCall(Agree(model.comm, fault.empty() ? "" : "finite-element body " + name + ": " + fault, PETSC_ERR_ARG_WRONG));
   PetscCall(CheckAttachments(model, body.attachments));
-  SceneAccess::record(scene, [=, &model](Scene &s) {
-    if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
-  });
-  DataOf(scene).refuseLate("finite-element body " + name);
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
   x->name  = name;
@@ -246,16 +242,22 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
     PetscCall(ExtractBlocks(*x));
   }
   PetscCall(MassAndBox(model, &mass, corner));
+  std::vector<Vector3> point(body.attachments.size());
+  for (std::size_t i = 0; i < point.size(); i++) PetscCall(MakeTie(*x, body.attachments[i], &point[i]));
+  /* nothing fails from here on: what is described anew with other parameters was right, and what was wrong has left nothing in the scene */
+  SceneAccess::record(scene, [=, &model](Scene &s) {
+    if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
+  });
+  DataOf(scene).refuseLate("finite-element body " + name);
   const double extent = (corner[1] - corner[0]).norm();
   /* a scene takes its size from bodies and markers, and has none of this body else but its attachments */
   for (const Vector3 &c : corner) DataOf(scene).markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
-  for (const Attachment &a : body.attachments) {
-    Vector3 point;
-    PetscCall(MakeTie(*x, a, &point));
-    const Body frame = AddFrame(scene, *x, name + "." + a.name, point, mass, extent);
+  for (std::size_t i = 0; i < point.size(); i++) {
+    const std::string &attachment = body.attachments[i].name;
+    const Body         frame      = AddFrame(scene, *x, name + "." + attachment, point[i], mass, extent);
     DataOf(scene).markers.push_back({frame.id, Vector3::Zero(), Matrix3::Identity()});
-    x->ties.back().frame = Marker{(PetscInt)DataOf(scene).markers.size() - 1};
-    frames_[a.name]      = frame;
+    x->ties[i].frame    = Marker{(PetscInt)DataOf(scene).markers.size() - 1};
+    frames_[attachment] = frame;
   }
   name_      = name;
   scene_     = DataOf(scene).number;

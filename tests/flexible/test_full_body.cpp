@@ -257,6 +257,31 @@ TEST(FullBody, UnknownAttachment)
   EXPECT_TRUE(trap.says("finite-element body beam: it has no attachment middle, but left, right")) << trap.message;
 }
 
+/* What was refused is not described again with other parameters, and leaves nothing in the scene */
+TEST(FullBody, ARefusedBodyIsForgotten)
+{
+  Beam8      beam;
+  Scene      scene(PETSC_COMM_WORLD);
+  FullFeBody fe;
+  FullBody   b  = placed(FeLaw::Large);
+  b.attachments = {{"left"}};
+  beam.model.elements.clear();
+  scene.parameter("p", 1);
+  {
+    ErrorTrap trap;
+    EXPECT_NE(fe.add(scene, "beam", beam.model, b), 0);
+    EXPECT_TRUE(trap.says("need elements")) << trap.message;
+  }
+  b.law = FeLaw::Small;
+  must(fe.add(scene, "beam", beam.model, b));
+  scene.marker(fe.attachment("left"));
+  const std::size_t markers = DataOf(scene).markers.size();
+  must(scene.set("p", 2));
+  must(scene.setUp());
+  EXPECT_EQ(DataOf(scene).extensions.size(), 1u);
+  EXPECT_EQ(DataOf(scene).markers.size(), markers);
+}
+
 TEST(FullBody, RefusesByName)
 {
   const auto refused = [](const std::function<void(FeModel &, FullBody &)> &spoil, const char *why) {
