@@ -64,7 +64,8 @@ struct FeModel {
   FeModel &operator=(const FeModel &) = delete;
 
   /* A Gmsh mesh (.msh) of tetrahedra with 4 or 10 nodes or bricks with 8 or 20; materials by the name of physical volumes, "" for
-     all others; physical groups of any dimension become node sets by their names. METIS divides the mesh among the ranks. */
+     all others; physical groups of any dimension become node sets by their names, or numbers; groups of several
+     dimensions that share one are "point rod", "curve rod", "surface rod", "volume rod". METIS divides the mesh among the ranks. */
   PetscErrorCode readMesh(const std::string &file, const std::map<std::string, Material> &materials);
   /* Stored matrices of CalculiX: stem.sti, stem.mas, stem.dof, nodes and sets of the input deck stem.inp */
   PetscErrorCode readCalculix(const std::string &stem);

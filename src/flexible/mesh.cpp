@@ -356,12 +356,27 @@ PetscErrorCode TakeElements(DM dm, const std::vector<PointData> &data, const std
   PetscFunctionReturn(0);
 }
 
+/* Names of the sets of groups. Gmsh numbers and names the groups of each dimension by themselves, so that a surface and a volume may share a name: one set of
+   both would tie an attachment to the whole body where its end was meant */
+std::vector<std::string> SetNames(const MeshFile &mesh)
+{
+  static const char *const kind[] = {"point ", "curve ", "surface ", "volume "};
+  std::vector<std::string> names;
+  for (const MeshGroup &g : mesh.groups) {
+    bool shared = false;
+    for (const MeshGroup &other : mesh.groups) shared = shared || (other.name == g.name && other.dim != g.dim);
+    names.push_back((shared ? kind[g.dim] : "") + g.name);
+  }
+  return names;
+}
+
 PetscErrorCode TakeNodes(const MeshFile &mesh, const MeshNodes &nodes, const std::vector<PointData> &data,
                          const std::vector<PetscInt> &number, const std::vector<bool> &own, FeModel *model)
 {
-  std::vector<PetscInt>   index(model->own);
-  std::vector<MeshPoint>  points;
-  std::vector<MeshMember> regions;
+  std::vector<PetscInt>          index(model->own);
+  std::vector<MeshPoint>         points;
+  std::vector<MeshMember>        regions;
+  const std::vector<std::string> names = SetNames(mesh);
   PetscFunctionBegin;
   for (std::size_t p = 0; p < own.size(); p++)
     if (own[p]) index[number[p] - model->first] = data[p].a;
@@ -373,9 +388,9 @@ PetscErrorCode TakeNodes(const MeshFile &mesh, const MeshNodes &nodes, const std
     model->label.push_back(p.tag);
   }
   model->sets.clear();
-  for (const MeshGroup &g : mesh.groups) model->sets[g.name];
+  for (const std::string &name : names) model->sets[name];
   for (const MeshMember &m : regions)
-    for (int g : mesh.regions[m.region].groups) model->sets[mesh.groups[g].name].push_back(model->first + m.node);
+    for (int g : mesh.regions[m.region].groups) model->sets[names[g]].push_back(model->first + m.node);
   for (auto &s : model->sets) {
     std::sort(s.second.begin(), s.second.end());
     s.second.erase(std::unique(s.second.begin(), s.second.end()), s.second.end());

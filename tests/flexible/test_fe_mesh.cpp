@@ -171,6 +171,28 @@ TEST_P(FeMesh, SetsAndLabels)
   }
 }
 
+/* Gmsh counts groups of each dimension from one: those of one number or name are not one set */
+TEST(FeMeshFiles, GroupsOfOneName)
+{
+  const MeshBox box{ElementType::Brick8, 3, 2, 2, 1.5};
+  for (bool four : {true, false})
+    for (bool named : {true, false}) {
+      std::string       text = MeshWriter(box).text(four);
+      const std::size_t from = text.find("$PhysicalNames"), to = text.find("$EndPhysicalNames");
+      FeModel           model(PETSC_COMM_SELF);
+      if (named) text.replace(text.find("\"left\""), 6, "\"solid\"");
+      else text.erase(from, to + 18 - from);
+      must(readText(model, text, {{named ? "solid" : "1", softSteel()}}));
+      const std::string name = named ? "solid" : "1";
+      EXPECT_EQ(model.sets.size(), 4u);
+      EXPECT_EQ(model.sets.count(name), 0u) << "which of them?";
+      EXPECT_EQ((PetscInt)model.sets["volume " + name].size(), model.nodes);
+      EXPECT_EQ(model.sets["surface " + name].size(), 9u);
+      EXPECT_EQ(model.sets[named ? "right" : "2"].size(), 9u);
+      EXPECT_EQ(model.sets[named ? "corner" : "point 1"].size(), 1u);
+    }
+}
+
 /* Nodes on the surface follow a linear field; those inside, in a mesh of no regularity, find it */
 TEST_P(FeMesh, PatchTest)
 {
