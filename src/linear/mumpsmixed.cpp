@@ -27,7 +27,7 @@ struct Mixed {
   PetscObjectState state;
   Mat              F      = nullptr;
   bool             fallen = false; /* F is of double precision */
-  PetscInt         wait = 0, left = 0; /* factorizations from then until single precision is tried again, and those to come; doubled with every fall back */
+  PetscInt         wait = 0, left = 0; /* factorizations from then until single precision is tried again, and those to come; doubled with every fall back. wait < 0: double precision has no room */
   char             why[128] = "";
   bool             no_analysis = false; /* it failed: structurally singular, or no room for the factor */
   PetscReal        rate   = 0; /* of refinement, measured */
@@ -199,6 +199,25 @@ PetscErrorCode MatSolveTranspose_MumpsMixed(Mat F, Vec b, Vec x) { return Solve(
 
 /* ---- factorization ---- */
 
+/* Where double precision has no room, what single precision says stands: the matrix may be that of one wild iterate, after which the integrator takes a smaller
+   step if it is singular, and measures what rough solves leave. The factor in single precision is made again, as both together would take three times its memory. */
+PetscErrorCode TryDouble(Mat F, Mat A, const char why[])
+{
+  Mixed &m = Of(F);
+
+  PetscFunctionBegin;
+  if (m.wait < 0) PetscFunctionReturn(0);
+  PetscCall(FallBack(F, A, why));
+  if (F->factorerrortype != MAT_FACTOR_OUTMEMORY) PetscFunctionReturn(0);
+  PetscCall(PetscInfo(F, "There is no room for double precision: single precision stays\n"));
+  m.fallen = false;
+  m.wait   = -1;
+  PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
+  PetscCall(Symbolic(F, A));
+  if (!F->factorerrortype) PetscCall(Numeric(F, A));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode FactorSingle(Mat F, Mat A)
 {
   Mixed          &m     = Of(F);
@@ -206,21 +225,25 @@ PetscErrorCode FactorSingle(Mat F, Mat A)
   char            why[128];
 
   PetscFunctionBegin;
-  A->erroriffailure = PETSC_FALSE; /* double precision may do */
+  A->erroriffailure = (PetscBool)(error && m.wait < 0); /* else double precision may do */
   PetscCall(Numeric(F, A));
   A->erroriffailure = error;
   if (F->factorerrortype == MAT_FACTOR_OUTMEMORY) { /* of which double precision needs twice as much */
     PetscCheck(!error, PetscObjectComm((PetscObject)F), PETSC_ERR_MEM, "There is not enough memory to factor the matrix of %" PetscInt_FMT " rows in single precision", A->rmap->N);
     PetscFunctionReturn(0);
   }
+  if (F->factorerrortype == MAT_FACTOR_OTHER) {
+    PetscCall(FallBack(F, A, "the matrix is not one of single precision"));
+    PetscFunctionReturn(0);
+  }
   if (F->factorerrortype) {
-    PetscCall(FallBack(F, A, F->factorerrortype == MAT_FACTOR_OTHER ? "the matrix is not one of single precision" : "the matrix is singular to single precision"));
+    PetscCall(TryDouble(F, A, "the matrix is singular to single precision"));
     PetscFunctionReturn(0);
   }
   PetscCall(MeasureRate(m));
   if (m.rate <= slow) PetscFunctionReturn(0);
   PetscCall(PetscSNPrintf(why, sizeof(why), "of the error of a solve %.2g is left by the next one, %g is allowed", (double)m.rate, (double)slow));
-  PetscCall(FallBack(F, A, why));
+  PetscCall(TryDouble(F, A, why));
   PetscFunctionReturn(0);
 }
 

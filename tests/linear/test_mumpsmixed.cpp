@@ -88,9 +88,9 @@ Triplets rod(PetscInt n)
 }
 
 /* The first node of a block held twice */
-Triplets redundant()
+Triplets redundant(PetscInt side)
 {
-  Triplets e = block(4, 4, 4, true);
+  Triplets e = block(side, side, side, true);
   for (PetscInt d = 0; d < 3; ++d) {
     const PetscInt row = e.n++;
     e.add_symmetric(row, d, 2.0);
@@ -246,7 +246,7 @@ TEST_F(MumpsMixed, EntriesBeyondTheRange)
 
 TEST_F(MumpsMixed, SingularMatrixIsReported)
 {
-  create(redundant());
+  create(redundant(4));
   for (const char *type : {PCLU, PCCHOLESKY})
     for (const char *package : {"smumpsnd", "mumpsmixed"}) {
       Solver s(A, package, type);
@@ -355,6 +355,51 @@ TEST_F(MumpsMixed, NoRoom)
   EXPECT_FALSE(solved("mumpsnd", "30"));
   OK(MatScale(A, 1e60));
   EXPECT_FALSE(solved("mumpsmixed", "30"));
+}
+
+/* Where double precision has no room, what single precision says of a matrix counts: one that is singular is no want of room, one that is
+   solved roughly is solved, and the next one is factored as ever */
+TEST_F(MumpsMixed, NoRoomToFallBack)
+{
+  Triplets       singular = redundant(8), loose = block(8, 8, 8, true);
+  const PetscInt first    = loose.n;
+  for (PetscInt i = first; i < first + 100; i++) { /* a chain of springs that next to nothing holds */
+    const double k = 1 + 0.1 * std::sin(i);
+    loose.add(i, i, i > first ? k : 1e-5);
+    if (i == first) continue;
+    loose.add(i - 1, i - 1, k);
+    loose.add_symmetric(i - 1, i, -k);
+  }
+  loose.n += 100;
+  OK(PetscOptionsSetValue(NULL, "-mat_mumps_memory", "8")); /* 6 MB in single precision, 10 in double */
+  create(singular);
+  {
+    Solver s(A, "mumpsmixed");
+    s.solve();
+    EXPECT_EQ(s.failed(), PC_FACTOR_NUMERIC_ZEROPIVOT) << PCFailedReasons[s.failed()];
+    for (PetscInt row = singular.n - 3; row < singular.n; row++) { OK(MatSetValue(A, row, row, 1.0, INSERT_VALUES)); }
+    OK(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+    OK(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    s.solve();
+    EXPECT_GT(s.reason(), 0) << PCFailedReasons[s.failed()];
+    EXPECT_LT(s.error, 1e-11);
+  }
+  create(loose);
+  {
+    Solver s(A, "mumpsmixed");
+    OK(LinearSolveRoughly(A, PETSC_TRUE));
+    for (double unit : {1., 2.}) {
+      OK(MatScale(A, unit));
+      s.solve();
+      EXPECT_GT(s.reason(), 0) << PCFailedReasons[s.failed()];
+      EXPECT_LT(s.error, 0.5);
+      EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
+    }
+    OK(LinearSolveRoughly(A, PETSC_FALSE));
+    s.solve();
+    EXPECT_LT(s.error, 1e-8);
+  }
+  OK(PetscOptionsClearValue(NULL, "-mat_mumps_memory"));
 }
 
 /* In place of a factor without room, if nobody asked for one */
