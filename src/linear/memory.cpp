@@ -1,4 +1,4 @@
-/* Free memory as Linux tells it: /proc/meminfo, and the limit of version 2 of control groups */
+/* Free memory as Linux tells it: /proc/meminfo, and the limits of version 2 of control groups */
 #include "memory.h"
 #include <fstream>
 #include <limits>
@@ -28,23 +28,27 @@ static double NumberOf(const std::string &file)
   return in >> value ? value : -1;
 }
 
-static double FreeInGroup()
+/* A limit holds for the groups below the one that has it: SLURM's is that of the job, systemd's that of a slice */
+static double FreeInGroups(const std::string &root)
 {
-  std::ifstream in("/proc/self/cgroup");
+  std::ifstream in(root + "/proc/self/cgroup");
   std::string   line, path;
   while (std::getline(in, line))
     if (line.compare(0, 3, "0::") == 0) path = line.substr(3);
-  const std::string group = "/sys/fs/cgroup" + path + "/memory.";
-  const double      most = NumberOf(group + "max"), used = NumberOf(group + "current"), files = NumberIn(group + "stat", "file");
-  if (most < 0 || used < 0) return INFINITE;
-  return (most - used + (files > 0 ? files : 0)) / 1e6; /* what is cached of files gives way */
+  double least = INFINITE;
+  for (;; path.resize(path.rfind('/'))) {
+    const std::string group = root + "/sys/fs/cgroup" + path + "/memory.";
+    const double      most = NumberOf(group + "max"), used = NumberOf(group + "current"), files = NumberIn(group + "stat", "file");
+    if (most >= 0 && used >= 0) least = PetscMin(least, (most - used + (files > 0 ? files : 0)) / 1e6); /* what is cached of files gives way */
+    if (path.find('/') == std::string::npos) return least;
+  }
 }
 
-double LinearFreeMemory()
+double LinearFreeMemory(const std::string &root)
 {
-  const double available = NumberIn("/proc/meminfo", "MemAvailable:"), swap = NumberIn("/proc/meminfo", "SwapFree:");
+  const double available = NumberIn(root + "/proc/meminfo", "MemAvailable:"), swap = NumberIn(root + "/proc/meminfo", "SwapFree:");
   const double machine = available < 0 ? INFINITE : (available + (swap > 0 ? swap : 0)) * 1024 / 1e6;
-  return PetscMin(machine, FreeInGroup());
+  return PetscMin(machine, FreeInGroups(root));
 }
 
 PetscErrorCode LinearMemoryOf(MPI_Comm comm, double mine, double limit, LinearMemory *fullest)

@@ -3,6 +3,9 @@
 #include "linear/linear.h"
 #include "linear/memory.h"
 #include "view_text.h"
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
 #include <petsc/private/matimpl.h>
@@ -446,6 +449,32 @@ TEST(Memory, OfTheMachine)
   EXPECT_EQ(m.free, 5);
   OK(LinearMemoryOf(PETSC_COMM_SELF, 7, -1, &m));
   EXPECT_GT(m.free, 0.5 * free);
+}
+
+/* As the kernel writes it: a limit holds for all groups below the one that has it (SLURM's jobs, systemd's slices) */
+TEST(Memory, OfControlGroups)
+{
+  char root[] = "/tmp/hhtdae_memory_XXXXXX";
+  ASSERT_NE(mkdtemp(root), nullptr);
+  const std::string at    = root;
+  const auto        write = [&](const std::string &file, const std::string &text) {
+    std::filesystem::create_directories(std::filesystem::path(at + file).parent_path());
+    std::ofstream(at + file) << text;
+  };
+  const std::string job = "/sys/fs/cgroup/job_7", leaf = job + "/step_0/user/task_0";
+  write("/proc/meminfo", "MemTotal: 99000000 kB\nMemAvailable: 50000000 kB\nSwapFree: 1000000 kB\n");
+  EXPECT_NEAR(LinearFreeMemory(at), 51000000 * 1.024e-3, 1e-6);
+  write("/proc/self/cgroup", "1:name=systemd:/\n0::/job_7/step_0/user/task_0\n");
+  write(leaf + "/memory.max", "max\n");
+  write(leaf + "/memory.current", "1000000\n");
+  EXPECT_NEAR(LinearFreeMemory(at), 51000000 * 1.024e-3, 1e-6);
+  write(job + "/memory.max", "8000000000\n");
+  write(job + "/memory.current", "3000000000\n");
+  write(job + "/memory.stat", "anon 2000000000\nfile 500000000\n");
+  EXPECT_NEAR(LinearFreeMemory(at), 5500, 1e-6);
+  write(leaf + "/memory.max", "2000000000\n");
+  EXPECT_NEAR(LinearFreeMemory(at), 1999, 1e-6);
+  std::filesystem::remove_all(at);
 }
 
 TEST_F(MumpsMixed, ManyRightHandSides)
