@@ -92,7 +92,8 @@ def nodes_and_loads(folder, base):
     lines = [[line for line in run([PROGRAM, "-info", file]).splitlines() if "load case push" in line or "nodes for" in line] for file in (body, again)]
     check(lines[0] == lines[1], "nodes and loads on two ranks are others: %s" % lines)
     for more, message in (
-            (["-keep_nodes", "tip,999"], "the model has no node 999"), (["-pressure", "wind:nowhere"], "no node set 'nowhere'"),
+            (["-keep_nodes", "tip,999"], "the model has no node 999"), (["-keep_nodes", "2345678"], "the model has no node 2345678"),
+            (["-keep_nodes", "3-2000000"], '"3-2000000" is a range of more than a million'), (["-pressure", "wind:nowhere"], "no node set 'nowhere'"),
             (["-pressure", "wind:tip:along"], "is not name:set"), (["-load", "push:" + os.path.join(folder, "bar.msh")], "line 1 is not")):
         error = run([PROGRAM, *base, *more, "-o", os.path.join(folder, "no.h5")], fails=True)
         check(message in error and error.startswith("hhtreduce: error:"), "%s\nhas no %r in\n%s" % (more, message, error))

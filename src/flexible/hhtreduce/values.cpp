@@ -82,8 +82,9 @@ std::string ParseNumbers(const std::string &text, std::vector<PetscInt> *numbers
     char      *end, *last;
     const long from = std::strtol(part.c_str(), &end, 10);
     const long to   = *end == '-' ? std::strtol(end + 1, &last, 10) : from;
-    if (end == part.c_str() || from < 0 || to < from || to > 1000000 || (*end == '-' ? last == end + 1 || *last : *end))
+    if (end == part.c_str() || from < 0 || to < from || to > 2147483647 || (*end == '-' ? last == end + 1 || *last : *end))
       return "\"" + part + "\" is not a number from 0 up or a range as 5-9";
+    if (to - from > 1000000) return "\"" + part + "\" is a range of more than a million numbers";
     for (long k = from; k <= to; k++) numbers->push_back((PetscInt)k);
   }
   return "";
