@@ -187,6 +187,7 @@ PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice)
   PetscCall(PetscObjectCompose((PetscObject)ksp, OURS, NULL));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
+  PetscCall(PCSetFromOptions(pc)); /* of a factor the preconditioner has read none */
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(ForgetGuess(ksp));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, &end));

@@ -1,5 +1,5 @@
 /* Which solver KSP gets: by the matrix, by options, by the program */
-#include "linear/linear.h"
+#include "linear/choose.h"
 #include "bench/linear_matrices.h"
 #include <gtest/gtest.h>
 #include <hhtdae/hhtdae.h>
@@ -207,6 +207,39 @@ TEST_F(LinearChoiceTest, OrderingOptionReachesTheFactor)
   OK(VecDestroy(&b));
   OK(KSPDestroy(&ksp));
   OK(PetscOptionsDestroy(&database));
+}
+
+/* A factor that takes the place of conjugate gradients reads the options which their preconditioner has not */
+TEST_F(LinearChoiceTest, OrderingOptionReachesALaterFactor)
+{
+  KSP          ksp;
+  PC           pc;
+  LinearChoice choice;
+  PetscBool    changed, same;
+  static int   called;
+  called = 0;
+  OK(MatOrderingRegister("hhtdae_later", [](Mat A, MatOrderingType, IS *r, IS *c) -> PetscErrorCode {
+    ++called;
+    return MatGetOrdering(A, MATORDERINGMETISND, r, c);
+  }));
+  OK(PetscOptionsSetValue(NULL, "-pc_factor_mat_ordering_type", "hhtdae_later"));
+  OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+  OK(LinearDefaults(ksp, &choice));
+  OK(KSPSetOperators(ksp, small, small));
+  OK(KSPSetFromOptions(ksp));
+  OK(LinearChoose(ksp, small, PETSC_FALSE, &choice));
+  OK(LinearChooseSmaller(ksp, small, &choice, &changed));
+  ASSERT_TRUE(changed) << choice.text;
+  choice.no_room = PETSC_FALSE;
+  OK(LinearTakeFactor(ksp, &choice));
+  OK(LinearChoose(ksp, small, PETSC_FALSE, &choice));
+  OK(KSPGetPC(ksp, &pc));
+  OK(PetscObjectTypeCompare((PetscObject)pc, PCLU, &same));
+  EXPECT_TRUE(same) << choice.text;
+  OK(KSPSetUp(ksp));
+  EXPECT_EQ(called, 1);
+  OK(PetscOptionsClearValue(NULL, "-pc_factor_mat_ordering_type"));
+  OK(KSPDestroy(&ksp));
 }
 
 TEST_F(LinearChoiceTest, ProgramWins)
