@@ -21,6 +21,9 @@ using Eigen::VectorXd;
 
 #define REDUCE_PREFIX "reduce_" /* of all options of solvers */
 
+/* SLEPc, for programs that started PETSc alone */
+PetscErrorCode StartSlepc();
+
 /* ---- blocks ---- */
 
 constexpr PetscInt block_columns = 32; /* multiplied or solved at a time */

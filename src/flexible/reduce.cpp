@@ -211,8 +211,7 @@ static void CopyNodes(const FeModel &model, bool keep, MatrixXd *x, ReducedBody 
   body->shape.swap(*x);
 }
 
-/* Programs that started PETSc alone */
-static PetscErrorCode StartSlepc()
+PetscErrorCode StartSlepc()
 {
   PetscBool started;
 

@@ -6,6 +6,7 @@
   Time is taken in a unit in which stiffness and masses are of one size, and the shift has to be of the size of the values: next to a shift far below them
   slow modes and infinite ones look alike. So the search is repeated about what it has found, and the modes are held against the equations.
 */
+#include "flexible/modes.h"
 #include "hhtdae/modes.h"
 #include <Eigen/Core>
 #include <algorithm>
@@ -448,7 +449,6 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   Mat       given[3];
   PetscInt  unknowns;
   PetscReal left, frequency;
-  PetscBool ready;
   PetscFunctionBegin;
   PetscCall(of.operators(&given[2], &given[1], &given[0]));
   const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
@@ -457,8 +457,7 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCall(MatGetSize(given[0], &unknowns, nullptr));
   PetscCheck(2 * count < unknowns, comm, PETSC_ERR_ARG_OUTOFRANGE,
              "SlowestModes(): %" PetscInt_FMT " modes are too many of %" PetscInt_FMT " unknowns for a search; Linearization::modes() has all modes of so small a scene", count, unknowns);
-  PetscCall(SlepcInitialized(&ready));
-  if (!ready) PetscCall(SlepcInitializeNoArguments());
+  PetscCall(StartSlepc());
   PetscCall(Search(of, given, shift, count, modes));
   PetscCall(Worst(of, given, shift, modes, &left, &frequency));
   PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
