@@ -68,16 +68,20 @@ MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
   return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.values.tail(n).replicate(1, f.cols())));
 }
 
-/* T of Sum t (phi x (phi x d))/2 = phi^T T phi/2 for forces t that nodes at d from the point of an attachment get from it */
-PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, const MatrixXd &t, MatrixXd *ties)
+/* T of Sum t (phi x (phi x d))/2 = phi^T T phi/2 for forces that nodes at d from the point of an attachment get from it: of a rigid one, whose nodes are in no
+   other, all that they get, t; of an average, which has no mass, what passes the loads `held` on it on to its nodes */
+PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, const MatrixXd &t, const MatrixXd &held, MatrixXd *ties)
 {
   PetscFunctionBegin;
   ties->setZero(3 * (Eigen::Index)tied.size(), 3 * t.cols());
   for (std::size_t a = 0; a < tied.size(); a++)
-    for (PetscInt i : tied[a].node) {
-      const Vector3 d = NodePosition(model, i) - tied[a].position;
+    for (std::size_t i = 0; i < tied[a].node.size(); i++) {
+      const PetscInt node = tied[a].node[i];
+      const Vector3  d    = NodePosition(model, node) - tied[a].position;
       for (Eigen::Index l = 0; l < t.cols(); l++) {
-        const Vector3 force = t.col(l).segment<3>(3 * i);
+        Vector3 force;
+        if (tied[a].tie == Tie::Rigid) force = t.col(l).segment<3>(3 * node);
+        else force = tied[a].row[i].transpose() * held.col(l).segment<6>(6 * (Eigen::Index)a);
         ties->block<3, 3>(3 * (Eigen::Index)a, 3 * l) += 0.5 * (force * d.transpose() + d * force.transpose()) - force.dot(d) * Matrix3::Identity();
       }
     }
@@ -118,7 +122,7 @@ PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied
   PetscCall(SolveBlock(solver.ksp, InteriorRows(in, f), &x));
   for (std::size_t i = 0; i < in.dof.size(); i++) u->row(in.dof[i]) += x.row((Eigen::Index)i);
   PetscCall(Multiply(model.K, *u, &product));
-  PetscCall(TieForces(model, tied, product - f, ties));
+  PetscCall(TieForces(model, tied, product - f, held, ties));
   PetscFunctionReturn(0);
 }
 

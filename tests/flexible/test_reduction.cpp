@@ -281,6 +281,28 @@ TEST(Reduction, AttachmentAwayFromItsNodes)
   }
 }
 
+/* An average stiffens nothing: what loads on one attachment make of a free body's modes is the same beside another one, which shares its nodes */
+TEST(Reduction, StiffeningOfAveragesThatShareNodes)
+{
+  Made        m(bar());
+  ReducedBody alone, beside;
+  Reduction   r;
+  m.builder.addSet("half", [](const Vector3 &x) { return x[0] < 0.25; });
+  r.method      = Method::FreeFree;
+  r.modes       = 6;
+  r.stiffening  = true;
+  r.attachments = {attach("left", Tie::Average)};
+  must(Reduce(m.model, r, &alone));
+  r.attachments.push_back(attach("half", Tie::Average));
+  must(Reduce(m.model, r, &beside));
+  ASSERT_EQ(alone.modal.modes(), beside.modal.modes());
+  for (int c = 0; c < 6; c++) {
+    const Eigen::MatrixXd &x = alone.modal.attachments[0].stiffening[c], &p = alone.modal.stiffening[c];
+    EXPECT_LT((beside.modal.attachments[0].stiffening[c] - x).cwiseAbs().maxCoeff(), 1e-6 * x.cwiseAbs().maxCoeff()) << c;
+    EXPECT_LT((beside.modal.stiffening[c] - p).cwiseAbs().maxCoeff(), 1e-6 * p.cwiseAbs().maxCoeff()) << c;
+  }
+}
+
 TEST(Reduction, SuspectUnits)
 {
   Box box            = bar();
