@@ -259,7 +259,7 @@ static PetscErrorCode TakeDeflated(EPS eps, PetscInt rows, BlockKrylov *b)
     const PetscScalar *values;
     PetscCall(BVGetColumn(eps->V, i - n, &v));
     PetscCall(VecGetArrayRead(v, &values));
-    std::copy_n(values, rows, b->W.data() + i * rows);
+    std::copy_n(values, rows, b->W.col(i).data());
     PetscCall(VecRestoreArrayRead(v, &values));
     PetscCall(BVRestoreColumn(eps->V, i - n, &v));
   }

@@ -107,7 +107,7 @@ static PetscErrorCode Collect(EPS eps, Mat K, NormalModes *modes)
     const PetscScalar *values;
     PetscCall(EPSGetEigenpair(eps, k, &value, nullptr, x, nullptr));
     PetscCall(VecGetArrayRead(x, &values));
-    std::copy_n(values, rows, modes->x.data() + k * rows);
+    std::copy_n(values, rows, modes->x.col(k).data());
     PetscCall(VecRestoreArrayRead(x, &values));
     modes->lambda[k] = value;
   }

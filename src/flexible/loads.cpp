@@ -140,7 +140,7 @@ template <class Shape> std::vector<FacePoint> PointsOf(int f)
   return points;
 }
 
-void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes, PetscInt m,
+void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes, Eigen::Index m,
              const Vector3 &center, Sums *sum)
 {
   const PetscInt n = (PetscInt)points[0].N.size();
@@ -178,7 +178,7 @@ void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const Ele
 /* Modes at the nodes of the loaded faces' elements, whoever owns them: three numbers for each mode, mode after mode */
 PetscErrorCode AddFaces(const FeModel &model, const ResolvedLoad &load, const BodyScales &scales, const MatrixXd &x, Sums *sum)
 {
-  const PetscInt         m = (PetscInt)x.cols();
+  const Eigen::Index     m = x.cols(); /* whose products with nodes an int need not hold */
   ElementNodes           nodes;
   std::vector<FeElement> elements;
   std::vector<double>    X, own(3 * m * model.own + 1), modes;

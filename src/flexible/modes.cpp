@@ -40,7 +40,7 @@ PetscErrorCode MultiplyColumns(Mat A, const MatrixXd &X, PetscInt from, PetscInt
   PetscCall(MatDenseGetArrayRead(C, &values));
   PetscInt lda;
   PetscCall(MatDenseGetLDA(C, &lda));
-  for (PetscInt k = 0; k < count; k++) std::copy_n(values + k * lda, rows, Y->data() + k * rows);
+  for (PetscInt k = 0; k < count; k++) std::copy_n(values + (std::size_t)k * lda, rows, Y->col(k).data());
   PetscCall(MatDenseRestoreArrayRead(C, &values));
   PetscCall(MatDestroy(&B));
   PetscCall(MatDestroy(&C));

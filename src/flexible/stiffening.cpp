@@ -129,13 +129,13 @@ PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied
 /* Values at the nodes of this rank's elements, whoever owns them: `width` columns of x for each node */
 PetscErrorCode Bring(const FeModel &model, const ElementNodes &nodes, const Eigen::Ref<const MatrixXd> &x, std::vector<double> *here)
 {
-  const PetscInt      width = (PetscInt)x.cols();
+  const Eigen::Index  width = x.cols(); /* whose products with nodes an int need not hold */
   std::vector<double> own(3 * width * model.own + 1);
 
   PetscFunctionBegin;
   here->resize(3 * width * nodes.global.size() + 1);
   for (PetscInt i = 0; i < model.own; i++)
-    for (PetscInt k = 0; k < width; k++)
+    for (Eigen::Index k = 0; k < width; k++)
       for (int c = 0; c < 3; c++) own[3 * (i * width + k) + c] = x(3 * i + c, k);
   PetscCall(nodes.bring((int)(3 * width), own.data(), here->data()));
   PetscFunctionReturn(0);
@@ -163,19 +163,19 @@ struct Sampled {
 };
 
 /* sigma grad phi_k : grad phi_l over the element at the points of its stiffness, for each load */
-void AddElement(const Sampled &s, const fe::Lame &lame, const std::vector<PetscInt> &place, const std::vector<double> &modes, PetscInt m, const std::vector<double> &u,
-                PetscInt loads, std::vector<MatrixXd> *sum)
+void AddElement(const Sampled &s, const fe::Lame &lame, const std::vector<PetscInt> &place, const std::vector<double> &modes, Eigen::Index m, const std::vector<double> &u,
+                Eigen::Index loads, std::vector<MatrixXd> *sum)
 {
   const Eigen::Index n = (Eigen::Index)place.size();
   MatrixXd           shape[3], gradient(9, m), stressed(9, m);
   for (int c = 0; c < 3; c++) {
     shape[c].resize(n, m);
     for (Eigen::Index i = 0; i < n; i++)
-      for (PetscInt k = 0; k < m; k++) shape[c](i, k) = modes[3 * (place[i] * m + k) + c];
+      for (Eigen::Index k = 0; k < m; k++) shape[c](i, k) = modes[3 * (place[i] * m + k) + c];
   }
   for (std::size_t q = 0; q < s.G.size(); q++) {
     for (int c = 0; c < 3; c++) gradient.middleRows<3>(3 * c).noalias() = s.G[q] * shape[c];
-    for (PetscInt l = 0; l < loads; l++) {
+    for (Eigen::Index l = 0; l < loads; l++) {
       Matrix3 D = Matrix3::Zero();
       for (Eigen::Index i = 0; i < n; i++) D += Eigen::Map<const Vector3>(&u[3 * (place[i] * loads + l)]) * s.G[q].col(i).transpose();
       const Matrix3 strain = 0.5 * (D + D.transpose());
