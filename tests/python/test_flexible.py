@@ -194,6 +194,27 @@ class Beam(unittest.TestCase):
         body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6)
         np.testing.assert_allclose(body.frequencies, self.body.frequencies, rtol=1e-7)
 
+    def test_matrices_with_entries_in_parts(self):
+        """As element matrices leave them: scipy adds what stands at one place"""
+        try:
+            import scipy.sparse
+        except ImportError:
+            self.skipTest("no scipy")
+        parts = scipy.sparse.csr_matrix(([1., 2., 3., 4., 5., 6.], [0, 0, 1, 2, 2, 2], [0, 2, 3, 6]), shape=(3, 3))
+        own = flexible.FeModel.from_matrices(parts, parts, np.zeros((1, 3))).K
+        np.testing.assert_array_equal(own.getValues(range(3), range(3)), parts.toarray())
+        self.assertEqual(parts.nnz, 6, "the user's is as it was")
+
+    def test_refused_whole_model(self):
+        """What was refused is not described again with other parameters, and its model may go"""
+        scene = h.Scene()
+        scene.parameter("p", 1.)
+        with self.assertRaisesRegex(h.Error, "need elements"):
+            flexible.FullFeBody(scene, "beam", flexible.FeModel.from_matrices(self.model.K, self.model.M, self.model.coordinates), flexible.FullBody())
+        flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law="small"))
+        scene.set(p=2.)
+        scene.run()
+
     def test_sets_by_condition(self):
         """An array of True and False names the nodes where it is True"""
         model = flexible.FeModel.from_matrices(self.model.K, self.model.M, self.model.coordinates)

@@ -199,8 +199,14 @@ def _matrix(A, name, comm):
     if not hasattr(A, "tocsr"):
         raise TypeError("%s is a %s, must be a sparse matrix of scipy (scipy.sparse.csr_matrix(%s)) or one of petsc4py" % (name, type(A).__name__, name))
     A = A.tocsr()
+    if not A.has_canonical_format:  # PETSc takes the last of several entries at one place, of which scipy means the sum
+        A = A.copy()
+        A.sum_duplicates()
     if np.iscomplexobj(A):
         raise TypeError("%s is complex, must be real; damping of structure goes into the scene's FlexibleBody" % name)
+    most = np.iinfo(PETSc.IntType).max
+    if A.nnz > most:
+        raise ValueError("%s has %d entries, this PETSc counts to %d: take one with 64-bit indices" % (name, A.nnz, most))
     mat = PETSc.Mat().createAIJ(A.shape, csr=(A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data.astype(float)), comm=comm)
     mat.assemble()
     return mat
