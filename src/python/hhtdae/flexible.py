@@ -116,7 +116,8 @@ class FeModel:
 
     @classmethod
     def from_mesh(cls, file, materials, comm=None):
-        """A Gmsh mesh of tetrahedra or bricks; materials, `Material` or triples, by the name of physical volumes, "" for all others."""
+        """A Gmsh mesh of tetrahedra or bricks; materials, `Material` or triples, by the name of physical volumes, "" for all others. Physical
+        groups become sets by their names, or numbers; those of several dimensions that share one are "point rod", "curve rod", "surface rod", "volume rod"."""
         model = cls(comm)
         model._core.read_mesh(str(file), {name: _material(m, name) for name, m in (materials if isinstance(materials, dict) else {"": materials}).items()})
         return model
