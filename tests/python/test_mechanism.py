@@ -171,6 +171,14 @@ class Mistakes(unittest.TestCase):
         with self.assertRaisesRegex(ZeroDivisionError, "half a second"):
             h.solve_mechanism(broken, (0, 1), [1, 0], [0, 0], constraints=rod)
 
+        def half_way(t, q, v, a):
+            if q[0] < 0.5:
+                raise ZeroDivisionError("half way")
+            return [a[0] + q[0]]
+        for options in ({}, {"ts_error_if_step_fails": 0}):  # without an error of PETSc's, too
+            with self.assertRaisesRegex(ZeroDivisionError, "half way"):
+                h.solve_mechanism(half_way, (0, 2), [1.], [0.], max_step=0.1, options=options)
+
     def test_failure_is_a_result(self):
         """Forces that become infinite in finite time: what was reached, and why it went no further"""
         s = h.solve_mechanism(lambda t, q, v, a: [a[0] - 6 * q[0]**2], (0, 2), [1.], [2.], trace=True, options={"ts_max_reject": 20, "ts_max_snes_failures": 20})

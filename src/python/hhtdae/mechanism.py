@@ -386,6 +386,8 @@ def _solve(ts, p, output):
         if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
             raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
         return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
+    if p.error is not None:  # with -ts_error_if_step_fails 0
+        raise p.error
     if output.stopped is not None:
         return 1, "a terminal event came at t = %.6g" % output.stopped
     if ts.getConvergedReason() < 0:
