@@ -1,5 +1,6 @@
 #include "bind.h"
 #include <petsc4py/petsc4py.h>
+#include <utility>
 
 namespace hhtdae
 {
@@ -41,7 +42,10 @@ template <class T> T Get(py::handle x, T (*get)(PyObject *))
 
 void Check(PetscErrorCode code)
 {
-  if (code == 0) return;
+  if (code == 0) { /* an exception that PETSc has got over is the cause of nothing later */
+    Py_CLEAR(pending_);
+    return;
+  }
   if (PyErr_Occurred()) {
     Py_CLEAR(pending_);
     throw py::error_already_set();
@@ -112,6 +116,14 @@ py::object Call(py::handle f, const py::tuple &arguments)
   Py_XDECREF(trace);
   Py_XSETREF(pending_, value);
   throw std::runtime_error(text);
+}
+
+void PassOn()
+{
+  if (!pending_) return;
+  const py::object value = py::reinterpret_steal<py::object>(std::exchange(pending_, nullptr));
+  PyErr_SetObject((PyObject *)Py_TYPE(value.ptr()), value.ptr());
+  throw py::error_already_set();
 }
 
 PetscErrorCode CheckSignals()

@@ -57,7 +57,19 @@ inline py::array FromVector(const Vector3 &x) { return FromDoubles(x.data(), {3}
 /* Calls a Python function from inside of PETSc: an exception is kept for Check(), which makes it the cause of hhtdae.Error, and goes
    on as a std::runtime_error with its text. */
 py::object Call(py::handle f, const py::tuple &arguments);
-/* The same at the border to C: an error of PETSc */
+/* Raises the exception that Call() has kept, if there is one */
+void PassOn();
+/* What Python calls without PETSc between: an exception of a function within goes on as it is */
+template <class F> auto Directly(F f)
+{
+  try {
+    return f();
+  } catch (const std::runtime_error &) {
+    PassOn();
+    throw;
+  }
+}
+/* The same as Call() at the border to C: an error of PETSc */
 template <class F> PetscErrorCode Guarded(F f)
 {
   py::gil_scoped_acquire gil;

@@ -37,7 +37,7 @@ py::array EvaluateTape(const Tape &tape, Array x)
 {
   if (x.size() < tape.arguments) throw py::value_error("the function has " + std::to_string(tape.arguments) + " arguments, not " + std::to_string(x.size()));
   std::vector<double> out(tape.outputs.size());
-  tape.evaluate(x.data(), out.data());
+  Directly([&] { tape.evaluate(x.data(), out.data()); });
   return FromDoubles(out.data(), {(py::ssize_t)out.size()});
 }
 
@@ -48,7 +48,7 @@ py::tuple DifferentiateTape(const Tape &tape, Array x)
   std::vector<Real> u(Real::most);
   if (n > Real::most || x.size() < n) throw py::value_error("a function of at most 16 arguments, all of them given, can be differentiated");
   for (int k = 0; k < n; k++) u[k] = Real(x.data()[k], n, k);
-  const Real          y = tape(u.data());
+  const Real          y = Directly([&] { return tape(u.data()); });
   std::vector<double> g(n, 0.0);
   for (int k = 0; k < y.derivatives().size(); k++) g[k] = y.derivatives()(k);
   return py::make_tuple(y.value(), FromDoubles(g.data(), {(py::ssize_t)n}));
@@ -121,7 +121,7 @@ void BindFunctions(py::module_ &m)
   py::class_<TimeFunction>(m, "TimeFunction")
     .def(py::init([](double c) { return Right(TimeFunction(c)); }))
     .def("__call__", [](const TimeFunction &f, double t) {
-      const TimeFunction::Value v = f(t);
+      const TimeFunction::Value v = Directly([&] { return f(t); });
       return py::make_tuple(v.f, v.f1, v.f2);
     })
     .def_static("polynomial", [](Array c) { return Right(TimeFunction::polynomial({c.data(), c.data() + c.size()})); })

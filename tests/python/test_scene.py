@@ -9,6 +9,8 @@ import numpy as np
 
 import hhtdae as h
 from hhtdae import _core, elements, spec
+from hhtdae.expressions import Expression
+from hhtdae.tracing import compile_tape
 
 
 def pendulum(tip=(1., 0., 0.), **fields):
@@ -797,6 +799,23 @@ class Mistakes(unittest.TestCase):
         with self.assertRaisesRegex(h.Error, "pull.*LookupError: no such table") as caught:
             scene.solve(1.)
         self.assertIsInstance(caught.exception.__cause__, LookupError)
+
+    def test_exceptions_of_functions_between_runs(self):
+        """They come as they are where Python asks for a value, and are the cause of nothing that follows"""
+        scene = h.Scene()
+        m = scene.add("b", h.PointMass()).marker()
+        now = scene.run().snapshot()
+
+        def law(x):
+            raise LookupError("no such table")
+        table = _core.TimeFunction.values(law)
+        tape = compile_tape([h.callback(law, Expression("argument", (), 0))], {}, keep := [], 1)
+        for call in (lambda: now.value(2 * h.callback(law, h.displacement(m, 0))), lambda: table(1.), lambda: tape(np.zeros(1)), lambda: tape.differentiate(np.zeros(1))):
+            with self.assertRaisesRegex(LookupError, "no such table"):
+                call()
+            with self.assertRaises(h.Error) as caught:
+                scene.set(nothing=1)
+            self.assertIsNone(caught.exception.__cause__)
 
     def test_exceptions_of_monitors_and_interrupts(self):
         scene, rod, pin = pendulum()
