@@ -505,6 +505,19 @@ class Runs(unittest.TestCase):
                 run = scene.run(tolerance=1e-7, sample=.5).solve(1)
                 self.assertAlmostEqual(run["x"][-1], math.exp(-1), delta=1e-4)
 
+    def test_states_after_a_motion_that_was_refused(self):
+        """It has no state, so that the next one is the first"""
+        scene = h.Scene()
+        wheel = scene.rigid_body("wheel", mass=1)
+        with self.assertRaises(TypeError):
+            scene.add("drive", h.RotationalMotion(wheel, scene.ground, lambda t: 0 * t + 1, of="acceleration"))
+        x, y = scene.states(["x", "y"], lambda z: [-z[0], 0 * z[1]], [1., 3.])
+        scene.channel("x", h.value(x))
+        scene.channel("z", h.value(scene.state("z", lambda z: -2 * z, 1.)))
+        run = scene.solve(1., tolerance=1e-7)
+        self.assertAlmostEqual(run["x"][-1], math.exp(-1), delta=1e-4)
+        self.assertAlmostEqual(run["z"][-1], math.exp(-2), delta=1e-4)
+
     def test_channel_of_many_measures(self):
         """A channel needs no derivatives, and so may have more measures than there is room for derivatives"""
         scene = h.Scene()

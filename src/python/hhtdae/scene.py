@@ -215,20 +215,14 @@ class Scene:
             described, converted = self._converted(what, name)
             given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
-            self._count_states(what)
-            return self._enter(name, type(what), given)
+            return self._enter(name, what, given)
         if not callable(what):
             raise TypeError("Scene.add(%r): %r is no body, joint, motion or force" % (name, what))
         with describing():
             first = what()
         if first is None:
             raise TypeError("Scene.add(%r): the function must return a body or an element at first, then its kind is known" % name)
-        self._count_states(first)
-        return self._enter(name, type(first), self._later(lambda: self._fields_of(what(), type(first), name)))
-
-    def _count_states(self, what):
-        """A motion that is given by its acceleration has a state, its speed"""
-        self._states += getattr(what, "of", None) == "acceleration"
+        return self._enter(name, first, self._later(lambda: self._fields_of(what(), type(first), name)))
 
     def _fields_of(self, what, kind, name):
         if what is None and not issubclass(kind, (RigidBody, PointMass, FlexibleBody)):
@@ -255,15 +249,18 @@ class Scene:
         self._keeps(keep, who)
         return given
 
-    def _enter(self, name, kind, given):
+    def _enter(self, name, what, given):
         self._describe()
+        kind = type(what)
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
                 return Body(self, enter(name, given), name)
         known = next((c.__name__ for c in kind.__mro__ if c.__name__ in ELEMENTS), None)
         if known is None:
             raise TypeError("Scene.add(%r): a %s is no body, joint, motion or force" % (name, kind.__name__))
-        return Element(self, self._core.element(known, name, given), name)
+        element = Element(self, self._core.element(known, name, given), name)
+        self._states += getattr(what, "of", None) == "acceleration"  # a motion that is given by its acceleration has a state, its speed
+        return element
 
     def _later(self, function):
         def describe(*given):
