@@ -242,10 +242,10 @@ void BindScene(py::module_ &m)
     .def("create_ts", NewRun)
     .def("solve", Solve)
     .def("sample", Sample)
-    .def("view", [](Scene &s, const std::string &file) {
+    .def("view", [](Scene &s, py::object comm, const std::string &file) {
       PetscViewer viewer;
-      if (file.empty()) return Check(s.view(PETSC_VIEWER_STDOUT_WORLD));
-      Check(PetscViewerASCIIOpen(PETSC_COMM_WORLD, file.c_str(), &viewer));
+      if (file.empty()) return Check(s.view(PETSC_VIEWER_STDOUT_(ToComm(comm))));
+      Check(PetscViewerASCIIOpen(ToComm(comm), file.c_str(), &viewer));
       const PetscErrorCode code = s.view(viewer);
       Check(PetscViewerDestroy(&viewer));
       Check(code);

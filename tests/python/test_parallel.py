@@ -10,6 +10,8 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 MPIEXEC = os.environ.get("HHTDAE_MPIEXEC", "mpiexec -n").split()
 
 SCRIPT = """
+import tempfile
+
 import numpy as np
 import hhtdae as h
 from mpi4py import MPI
@@ -51,6 +53,12 @@ try:
 except h.Error:
     pass
 run.close()
+if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:  # a scene of one rank is that rank's affair
+    own = h.Scene(comm=MPI.COMM_SELF)
+    own.add("b", h.PointMass())
+    with tempfile.NamedTemporaryFile("r") as file:
+        own.view(file.name)
+        assert "3 degrees of freedom" in file.read()
 if MPI.COMM_WORLD.rank == 0:
     print("result", MPI.COMM_WORLD.size, run["x"][-1], run["y"][-1], frequency, seen[0])
 """

@@ -444,4 +444,4 @@ class Scene:
     def view(self, file: str = "") -> None:
         """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""
         self._core.set_up()
-        self._core.view(file)
+        self._core.view(self.comm, file)
