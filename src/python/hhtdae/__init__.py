@@ -43,13 +43,13 @@ from .results import *
 from .run import Run
 from .scene import *
 
-__all__ = ["Error", "MechanismResult", "Run", "Statistics", "flexible", "integrator", "solve_mechanism", "statistics"]
+__all__ = ["Error", "MechanismResult", "Run", "Statistics", "integrator", "solve_mechanism", "statistics"]
 for _module in (bodies, elements, expressions, measures, query, recipe, results, scene):
     __all__ += _module.__all__
 
 
 def __getattr__(name):
-    # Flexible bodies bring SLEPc with them: only for those who ask.
+    # Flexible bodies bring SLEPc with them: only for those who ask, by name.
     if name == "flexible":
         import importlib
 
