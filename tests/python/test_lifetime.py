@@ -58,12 +58,14 @@ class Keeping(unittest.TestCase):
 
     def test_run_with_events(self):
         """Its TS looks at it after every step, and must not keep it: closed or dropped it goes, and its scene with it"""
+        steps = []
         for close in (True, False):
             scene = h.Scene(gravity=(0, 0, -1))
             height = h.displacement(scene.add("b", h.PointMass(position=(0, 0, 0.1))).marker(), 2)
             scene.channel("z", height)
             run = scene.run(tolerance=1e-5)
             run.event(height)
+            run.on_step(lambda run: steps.append(run.time))
             run.solve(0.5)
             watch = weakref.ref(run), weakref.ref(scene)
             if close:
@@ -72,6 +74,7 @@ class Keeping(unittest.TestCase):
             gc.collect()
             oscillator().run().close()
             self.assertEqual((watch[0](), watch[1]()), (None, None))
+        self.assertEqual(len(steps), len(set(steps)) * 2)
 
     def test_snapshot_and_operators_outlive(self):
         run = oscillator().solve(0.2)

@@ -290,13 +290,16 @@ class Run(Channels):
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step. Where it sets parameters that make a formula jump, it has to call `restart`."""
-        begun = 0
+        begun, me = 0, weakref.ref(self)  # its TS must not hold the run, see _look_of()
 
         def monitor(ts, step, t, u):
             nonlocal begun
-            first, begun = begun != self._serial, self._serial  # the state that a part of the run begins with
+            run = me()
+            if run is None:
+                return
+            first, begun = begun != run._serial, run._serial  # the state that a part of the run begins with
             if step > 0 and not first:
-                function(self)
+                function(run)
         self._open().setMonitor(monitor)
 
     def _at(self, time):
