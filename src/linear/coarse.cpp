@@ -238,13 +238,11 @@ PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c
 
 PetscErrorCode CoarseFill(PC pc, Vec positions, CoarseLevel *c, PetscBool *failed)
 {
-  const PetscBool first = (PetscBool)!c->A;
-
   PetscFunctionBegin;
   PetscCall(Positions(positions, c));
   PetscCall(FillR(c));
-  PetscCall(MatPtAP(pc->pmat, c->R, first ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, 1, &c->A));
-  PetscCall(InnerSetUp(pc, "coarse_", c->A, first, &c->inner, failed));
+  PetscCall(MatPtAP(pc->pmat, c->R, c->A ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, 1, &c->A));
+  PetscCall(InnerSetUp(pc, "coarse_", c->A, &c->inner, failed));
   PetscFunctionReturn(0);
 }
 

@@ -148,7 +148,7 @@ PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, 
   else if (fresh || !f->apart) PetscCall(CreateApart(pc->pmat, rows, nodes, f));
   if (!f->apart) PetscFunctionReturn(0);
   PetscCall(FillApart(rows, nodes, f));
-  PetscCall(InnerSetUp(pc, "constraint_", f->apart, fresh, &f->inner, &apart_failed));
+  PetscCall(InnerSetUp(pc, "constraint_", f->apart, &f->inner, &apart_failed));
   *failed = (PetscBool)(*failed || apart_failed);
   PetscFunctionReturn(0);
 }

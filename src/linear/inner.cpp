@@ -25,7 +25,7 @@ PetscErrorCode Create(PC pc, const char name[], InnerSolver *s)
 }
 
 /* A on each rank, if it is small and distributed */
-PetscErrorCode GatherMatrix(Mat A, PetscBool again, InnerSolver *s)
+PetscErrorCode GatherMatrix(Mat A, InnerSolver *s)
 {
   PetscInt    rows;
   PetscMPIInt size;
@@ -36,18 +36,14 @@ PetscErrorCode GatherMatrix(Mat A, PetscBool again, InnerSolver *s)
   PetscCall(MatGetSize(A, &rows, NULL));
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)A), &size));
   if (size == 1 || rows > small) PetscFunctionReturn(0);
-  if (!again) {
-    if (s->whole) PetscCall(MatDestroySubMatrices(1, &s->whole));
-    PetscCall(VecDestroy(&s->b));
-    PetscCall(VecDestroy(&s->x));
-    PetscCall(VecScatterDestroy(&s->gather));
+  if (!s->whole) {
     PetscCall(MatCreateVecs(A, NULL, &b));
     PetscCall(VecScatterCreateToAll(b, &s->gather, &s->b));
     PetscCall(VecDuplicate(s->b, &s->x));
     PetscCall(VecDestroy(&b));
   }
   PetscCall(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, &all));
-  PetscCall(MatCreateSubMatrices(A, 1, &all, &all, again ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &s->whole));
+  PetscCall(MatCreateSubMatrices(A, 1, &all, &all, s->whole ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &s->whole));
   PetscCall(ISDestroy(&all));
   PetscCall(PetscObjectStateIncrease((PetscObject)s->whole[0])); /* PETSc 3.18 copies new values without a word */
   PetscFunctionReturn(0);
@@ -75,7 +71,7 @@ PetscErrorCode SolveGathered(InnerSolver *s, Vec b, Vec x)
 
 } // namespace
 
-PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, InnerSolver *s, PetscBool *failed)
+PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, InnerSolver *s, PetscBool *failed)
 {
   const bool     first = !s->ksp;
   PetscBool      symmetric;
@@ -83,14 +79,14 @@ PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, In
   PCFailedReason reason;
 
   PetscFunctionBegin;
-  PetscCall(GatherMatrix(A, (PetscBool)(s->whole && !another), s));
+  PetscCall(GatherMatrix(A, s));
   if (s->whole) A = s->whole[0];
   PetscCall(LinearSolveOften(A));
   if (first) PetscCall(Create(pc, name, s));
   PetscCall(KSPSetOperators(s->ksp, A, A));
-  if (first || another || s->choice.cholesky) {
+  if (first || s->choice.cholesky) {
     PetscCall(LinearIsSymmetric(A, &symmetric));
-    if (first || another || !symmetric) PetscCall(LinearChoose(s->ksp, A, symmetric, &s->choice));
+    if (first || !symmetric) PetscCall(LinearChoose(s->ksp, A, symmetric, &s->choice));
   }
   PetscCall(KSPSetUp(s->ksp));
   PetscCall(KSPGetPC(s->ksp, &inner));
@@ -112,7 +108,7 @@ PetscErrorCode InnerLoadState(PC pc, const char name[], Mat A, InnerSolver *s, A
 
   PetscFunctionBegin;
   if (!s->ksp) {
-    PetscCall(GatherMatrix(A, PETSC_FALSE, s));
+    PetscCall(GatherMatrix(A, s));
     PetscCall(Create(pc, name, s));
   }
   if (s->whole) A = s->whole[0];

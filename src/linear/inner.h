@@ -15,8 +15,8 @@ struct InnerSolver {
   LinearChoice choice;
 };
 
-/* After each change of A's values; another: of its pattern, too. *failed where A is singular. Collective on the preconditioner. */
-PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, PetscBool another, InnerSolver *s, PetscBool *failed);
+/* After each change of A's values; where its pattern changes InnerDestroy() comes before. *failed where A is singular. Collective on the preconditioner. */
+PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, InnerSolver *s, PetscBool *failed);
 PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed);
 /* linear.h; A, whose values are set, is the matrix that the state belongs to. *same: of this rank alone. */
 PetscErrorCode InnerSaveState(const InnerSolver &s, Archive *archive);
