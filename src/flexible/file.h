@@ -74,6 +74,7 @@
 
 #include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
+#include "linear/hash.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -94,23 +95,11 @@ constexpr hsize_t     block_entries  = 1 << 22; /* of one part that is sent to b
 
 using Dims = std::vector<hsize_t>;
 
-inline uint64_t Mix(uint64_t x)
-{
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
-inline uint64_t Fnv(const std::string &text)
-{
-  uint64_t h = 0xcbf29ce484222325ull;
-  for (unsigned char c : text) h = (h ^ c) * 0x100000001b3ull;
-  return h;
-}
+inline uint64_t Fnv(const std::string &text) { return Hash().add(text.data(), text.size()).sum; }
 
 inline uint64_t EntryHash(uint64_t bits, uint64_t key, uint64_t index)
 {
-  return Mix(bits ^ Mix(key + index * 0x9e3779b97f4a7c15ull));
+  return HashMix(bits ^ HashMix(key + index * 0x9e3779b97f4a7c15ull));
 }
 
 inline uint64_t Bits(double v)

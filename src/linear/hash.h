@@ -1,4 +1,4 @@
-/* The 64-bit hash FNV-1a of Fowler, Noll and Vo, by which files are checked and models told apart. */
+/* The 64-bit hash FNV-1a of Fowler, Noll and Vo, by which files are checked and models told apart; and a mixing step. */
 #ifndef HHTDAE_LINEAR_HASH_H
 #define HHTDAE_LINEAR_HASH_H
 
@@ -14,5 +14,13 @@ struct Hash {
     return *this;
   }
 };
+
+/* The mixing step of splitmix64 */
+inline std::uint64_t HashMix(std::uint64_t x)
+{
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
 
 #endif

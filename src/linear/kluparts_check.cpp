@@ -1,6 +1,7 @@
 /* Whether the interiors of "kluparts" are regular enough, and which unknowns should leave them if not */
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
+#include "vectors.h"
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
@@ -9,13 +10,6 @@ static const int SWEEPS = 3;
 
 /* Of every entry, to make a singular matrix regular */
 static const PetscReal DISTURBANCE = 1e-7;
-
-/* Between 1/2 and 1 in size, of either sign, the same in every run */
-static PetscScalar Number(PetscInt i)
-{
-  const double x = (double)((unsigned long long)i * 2654435761ULL % 4294967296ULL) / 4294967296.0;
-  return x < 0.5 ? -0.5 - x : x;
-}
 
 /* Largest entries of the interior's rows, with what couples them to the interface */
 static std::vector<PetscReal> RowSizes(const PartsSplit &s)
@@ -79,7 +73,7 @@ PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual)
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; ++i) {
-    b[s.inner_row[i]] = size[i] * Number(s.begin + s.inner_row[i]);
+    b[s.inner_row[i]] = size[i] * LinearPseudoRandomValue((uint64_t)(s.begin + s.inner_row[i]), 0);
     inner.left.push_back(b[s.inner_row[i]]);
     inner.size[i] = PetscAbsScalar(b[s.inner_row[i]]);
   }
@@ -112,7 +106,7 @@ static PetscErrorCode Iterate(KluPair *k, bool transposed, const std::vector<Pet
   std::vector<PetscScalar> z(n), w(n);
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < n; ++i) w[i] = Number(i);
+  for (PetscInt i = 0; i < n; ++i) w[i] = LinearPseudoRandomValue((uint64_t)i, 0);
   for (int sweep = 0; sweep < SWEEPS; ++sweep) {
     for (PetscInt i = 0; i < n; ++i) z[i] = r[i] * w[i];
     /* KLU holds the transpose */
@@ -185,7 +179,7 @@ static PetscErrorCode Disturb(KluParts *p, std::vector<PetscInt> *move)
   PetscReal      inverse;
 
   PetscFunctionBegin;
-  for (size_t k = 0; k < p->split.val.size(); ++k) p->split.val[k] *= 1 + DISTURBANCE * Number((PetscInt)k);
+  for (size_t k = 0; k < p->split.val.size(); ++k) p->split.val[k] *= 1 + DISTURBANCE * LinearPseudoRandomValue(k, 0);
   PetscCall(PetscObjectStateIncrease((PetscObject)p->inner));
   PetscCall(MatFactorInfoInitialize(&info));
   PetscCall(MatLUFactorNumeric(p->factor, p->inner, &info));

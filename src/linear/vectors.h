@@ -2,16 +2,13 @@
 #ifndef HHTDAE_LINEAR_VECTORS_H
 #define HHTDAE_LINEAR_VECTORS_H
 
-#include <cstdint>
+#include "hash.h"
 #include <petscvec.h>
 
-/* A value of size 1/2 to 1, of either sign: none is small by chance (the mixing step of splitmix64) */
+/* A value of size 1/2 to 1, of either sign: none is small by chance */
 inline PetscReal LinearPseudoRandomValue(uint64_t index, uint64_t stream)
 {
-  uint64_t z = index + (stream << 48) + 0x9e3779b97f4a7c15u;
-  z          = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z          = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
+  const uint64_t  z    = HashMix(index + (stream << 48) + 0x9e3779b97f4a7c15u);
   const PetscReal size = 0.5 + 0.5 * (PetscReal)(z >> 12) / (PetscReal)(1ull << 52);
   return z & 1 ? size : -size;
 }
