@@ -172,8 +172,6 @@ PetscErrorCode CreateMatrix(const FeModel &model, const std::vector<PetscInt> &o
 
 /* ---- entries ---- */
 
-template <class Shape> using RowMajor = Eigen::Matrix<double, Shape::nodes, Shape::nodes, Eigen::RowMajor>;
-
 template <class Shape>
 PetscErrorCode AddElement(const FeModel &model, const FeElement &e, const fe::NodeVectors<Shape> &X,
                           bool mass_as_stiffness, double *least)

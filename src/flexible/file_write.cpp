@@ -114,35 +114,32 @@ void PutModal(Writer *out, const ModalBody &m)
   const hsize_t        n = (hsize_t)m.omega.size(), a = m.attachments.size();
   std::vector<double>  moment, position, translation, rotation;
   std::vector<uint8_t> names;
-  const auto           append = [](std::vector<double> *v, const std::vector<double> &more) {
-    v->insert(v->end(), more.begin(), more.end());
-  };
   out->put<double>("/modal/mass", {1}, {m.mass});
   out->put("/modal/center", {3}, Flat(m.center));
   out->put("/modal/moments", {3, 3}, Flat(m.moments.transpose()));
   out->put("/modal/omega", {n}, Flat(m.omega));
   out->put("/modal/first", {n, 3}, Flat(m.first));
-  for (const auto &c : m.moment) append(&moment, Flat(c));
+  for (const auto &c : m.moment) Append(&moment, Flat(c));
   out->put("/modal/moment", {3, n, 3}, moment);
   if (m.quadratic[0].size()) {
     std::vector<double> quadratic;
-    for (const auto &q : m.quadratic) append(&quadratic, Flat(q.transpose()));
+    for (const auto &q : m.quadratic) Append(&quadratic, Flat(q.transpose()));
     out->put("/modal/quadratic", {6, n, n}, quadratic);
   }
   if (m.stiffening[0].size()) {
     std::vector<double> own, loads;
-    for (const auto &B : m.stiffening) append(&own, Flat(B));
+    for (const auto &B : m.stiffening) Append(&own, Flat(B));
     for (const auto &at : m.attachments)
-      for (const auto &B : at.stiffening) append(&loads, Flat(B));
+      for (const auto &B : at.stiffening) Append(&loads, Flat(B));
     out->put("/modal/stiffening", {6, n, n}, own);
     out->put("/attachments/stiffening", {6 * a, n, n}, loads);
   }
   for (const auto &at : m.attachments) {
     names.insert(names.end(), at.name.begin(), at.name.end());
     names.push_back(0);
-    append(&position, Flat(at.position));
-    append(&translation, Flat(at.translation));
-    append(&rotation, Flat(at.rotation));
+    Append(&position, Flat(at.position));
+    Append(&translation, Flat(at.translation));
+    Append(&rotation, Flat(at.rotation));
   }
   out->put("/attachments/name", {names.size()}, names);
   out->put("/attachments/position", {a, 3}, position);

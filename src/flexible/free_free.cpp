@@ -48,8 +48,8 @@ static PetscErrorCode CreateTies(const FeModel &model, const std::vector<Tied> &
 }
 
 /* The rigid motions in dofs of the tied model */
-static void TiedRigid(const FeModel &model, const std::vector<Tied> &tied, const std::vector<PetscInt> &dof,
-                      const BodyScales &scales, PetscMPIInt rank, MatrixXd *r)
+static void TiedRigid(const std::vector<Tied> &tied, const std::vector<PetscInt> &dof, const BodyScales &scales,
+                      PetscMPIInt rank, MatrixXd *r)
 {
   PetscInt next = (PetscInt)dof.size();
   PetscInt rows = next;
@@ -62,7 +62,6 @@ static void TiedRigid(const FeModel &model, const std::vector<Tied> &tied, const
     r->middleRows(next + 3, 3) = scales.frame.bottomRows<3>();
     next += 6;
   }
-  (void)model;
 }
 
 static bool AnyRigid(const std::vector<Tied> &tied)
@@ -120,7 +119,7 @@ static PetscErrorCode CreateFreePencil(const FeModel &model, const std::vector<T
     PetscCall(MatPtAP(model.K, f->P, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &f->pencil.K));
     PetscCall(MatPtAP(model.M, f->P, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &f->pencil.M));
   }
-  TiedRigid(model, tied, dof, scales, rank, &f->pencil.rigid);
+  TiedRigid(tied, dof, scales, rank, &f->pencil.rigid);
   PetscCall(MatGetSize(f->pencil.K, &f->pencil.modes, nullptr));
   PetscFunctionReturn(0);
 }
