@@ -3,6 +3,7 @@
   first rank has it whole; the others send it their elements and their nodes' rows.
 */
 #include "flexible/surface.h"
+#include "flexible/element_shapes.h"
 #include "flexible/exchange.h"
 #include <algorithm>
 #include <array>
@@ -13,29 +14,25 @@ namespace hhtdae
 namespace
 {
 
-/* Corners counter-clockwise from outside, the first again where there are three */
-constexpr int tetrahedron[4][4] = {{0, 2, 1, 0}, {0, 1, 3, 0}, {0, 3, 2, 0}, {1, 2, 3, 1}};
-constexpr int brick[6][4]       = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
-
 struct Face {
-  std::array<PetscInt, 4> key, corner; /* key: the same for both elements at it */
+  std::array<PetscInt, 4> key, corner; /* key: the same for both elements at it; corners counter-clockwise from outside, the first again where there are three */
   bool                    operator<(const Face &f) const { return key < f.key; }
 };
 
 std::vector<Face> OuterFaces(const std::vector<FeElement> &elements)
 {
   std::vector<Face> all, outer;
-  for (const FeElement &e : elements) {
-    const bool solid_of_six = e.type == ElementType::Brick8 || e.type == ElementType::Brick20;
-    for (int f = 0; f < (solid_of_six ? 6 : 4); f++) {
-      Face face;
-      for (int k = 0; k < 4; k++) face.corner[k] = e.node[solid_of_six ? brick[f][k] : tetrahedron[f][k]];
-      face.key = face.corner;
-      std::sort(face.key.begin(), face.key.begin() + (solid_of_six ? 4 : 3));
-      if (!solid_of_six) face.key[3] = -1;
-      all.push_back(face);
-    }
-  }
+  for (const FeElement &e : elements)
+    fe::WithShape(e.type, [&](auto shape) {
+      for (const auto &of : shape.face) {
+        Face face;
+        for (int k = 0; k < 4; k++) face.corner[k] = e.node[of[k % shape.perface]];
+        face.key = face.corner;
+        std::sort(face.key.begin(), face.key.begin() + shape.perface);
+        if (shape.perface == 3) face.key[3] = -1;
+        all.push_back(face);
+      }
+    });
   std::sort(all.begin(), all.end());
   for (std::size_t k = 0; k < all.size();) {
     std::size_t next = k + 1;
