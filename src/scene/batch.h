@@ -57,6 +57,8 @@ public:
   /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }
+  /* whether its instances begin with what their stores were told to remember, StoreBase::remember() */
+  virtual bool isDescribed() const { return false; }
   /* out of one instance, by its number in the store that described it; false if it is not here */
   virtual bool memoryOf(const StoreBase *, PetscInt, double *) const { return false; }
   /* The angle of a marker about the z axis of another, by their numbers in the scene, if an instance here counts its turns */

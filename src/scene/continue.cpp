@@ -5,7 +5,6 @@
 #include "start.h"
 #include "store.h"
 #include <limits>
-#include <typeinfo>
 
 namespace hhtdae
 {
@@ -23,43 +22,58 @@ bool SameUnknowns(const SceneData &a, const SceneData &b)
   return same;
 }
 
-std::vector<Batch *> ThatRemember(const Runtime &R)
+/* Of variables, states, channels and users' functions; what joints and forces remember is in their description, CarryTurns() */
+std::vector<Batch *> FunctionsThatRemember(const Runtime &R)
 {
   std::vector<Batch *> all;
   for (const auto &b : R.batches)
-    if (b->memory()) all.push_back(b.get());
+    if (b->memory() && !b->isDescribed()) all.push_back(b.get());
   return all;
 }
 
-/* The first element with memories that is in one of the two alone, or has others */
-std::string ComeOrGone(const SceneData &from, const SceneData &to)
+/* Numbers that an element remembers, and angles that its formulas read */
+int Memory(const SceneData &s, std::size_t e)
 {
-  const auto memory = [](const SceneData &s, std::size_t e) {
-    int n = 0;
-    if (e < s.elements.size())
-      for (const Part &p : s.elements[e].parts) n += p.store->memory();
-    return n;
-  };
-  for (std::size_t e = 0; e < std::max(from.elements.size(), to.elements.size()); e++)
-    if (memory(from, e) != memory(to, e)) {
-      const ElementData &of = (e < to.elements.size() ? to : from).elements[e];
-      return std::string(of.type) + " " + of.name + " has";
-    }
-  return "some have";
+  int n = 0;
+  if (e >= s.elements.size()) return 0;
+  for (const Part &p : s.elements[e].parts) {
+    n += p.store->memory();
+    if (const std::vector<Expression> *all = p.store->expressions(p.index))
+      for (const Expression &x : *all)
+        for (const Measure &m : x.arguments) n += m.kind == Measure::Angle;
+  }
+  return n;
 }
 
-/* Angles over full turns and points on curves, which go on from where they are */
+PetscErrorCode RefuseToCarry(const SceneData &s, const std::string &what)
+{
+  SETERRQ(s.comm, PETSC_ERR_SUP,
+          "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: let joints, motions or forces come and go in their place (of "
+          "velocities, to lock a shaft), or change a parameter of an element that stays",
+          what.c_str());
+}
+
+PetscErrorCode CheckMemories(const SceneData &from, const SceneData &to)
+{
+  PetscFunctionBegin;
+  for (std::size_t e = 0; e < std::max(from.elements.size(), to.elements.size()); e++) {
+    const int before = Memory(from, e), after = Memory(to, e);
+    if (before == after) continue;
+    const ElementData &of = (before ? from : to).elements[e]; /* where it is there */
+    PetscCall(RefuseToCarry(to, std::string(of.type) + " " + of.name + " has"));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* Angles over full turns that functions read, which go on from where they are */
 PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
 {
-  const std::vector<Batch *> a = ThatRemember(from), b = ThatRemember(to);
+  const std::vector<Batch *> a = FunctionsThatRemember(from), b = FunctionsThatRemember(to);
   int                        same = a.size() == b.size();
   PetscFunctionBegin;
   for (std::size_t k = 0; same && k < a.size(); k++) same = a[k]->memory() == b[k]->memory();
   if (to.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, to.scene.comm));
-  PetscCheck(same, to.scene.comm, PETSC_ERR_SUP,
-             "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: let joints, motions or forces come and go in their place (of "
-             "velocities, to lock a shaft), or change a parameter of an element that stays",
-             ComeOrGone(from.scene, to.scene).c_str());
+  if (!same) PetscCall(RefuseToCarry(to.scene, "some have that channels, variables or formulas read"));
   for (std::size_t k = 0; k < a.size(); k++) {
     std::vector<double> memory(a[k]->memory());
     a[k]->copyMemory(memory.data(), false);
@@ -69,20 +83,30 @@ PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
   PetscFunctionReturn(0);
 }
 
-/* The same in the description, by which assembly goes before there is a run: of elements whose parts are what they were */
+/* The parts of an element that remember */
+std::vector<Part> Remembering(const ElementData &e)
+{
+  std::vector<Part> all;
+  for (const Part &p : e.parts)
+    if (p.store->memory()) all.push_back(p);
+  return all;
+}
+
+/* Angles over full turns and points on curves, which go on from where they are: in the description, by which assembly goes before there is a run */
 PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
 {
-  const auto                                   &before = from.scene.elements;
   std::vector<double>                           x;
   std::vector<int>                              found;
   std::vector<std::pair<StoreBase *, PetscInt>> into;
   PetscFunctionBegin;
-  for (std::size_t e = 0; e < std::min(before.size(), to.elements.size()); e++) {
-    const std::vector<Part> &a = before[e].parts, &b = to.elements[e].parts;
-    for (std::size_t k = 0; a.size() == b.size() && k < a.size(); k++) {
+  PetscCall(CheckMemories(from.scene, to));
+  for (std::size_t e = 0; e < to.elements.size(); e++) {
+    if (!Memory(to, e)) continue;
+    const std::vector<Part> a = Remembering(from.scene.elements[e]), b = Remembering(to.elements[e]);
+    for (std::size_t k = 0; k < std::min(a.size(), b.size()); k++) {
       const std::size_t at = x.size();
       const int         n  = b[k].store->memory();
-      if (!n || typeid(*a[k].store) != typeid(*b[k].store)) continue;
+      if (n != a[k].store->memory()) continue;
       x.resize(at + n, 0.);
       found.push_back(0);
       for (const auto &batch : from.batches)
@@ -299,8 +323,8 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.begin        = t;
     M.number.owner = old->number.owner;
     M.left         = 1e-2 * (atol + rtol) / std::max(SceneSize(M.scene), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
-    PetscCall(CarryTurns(*old, M.scene));
-    PetscErrorCode failed = WriteState(M, *old, U, V);
+    PetscErrorCode failed = CarryTurns(*old, M.scene);
+    if (!failed) failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);
     journal_->stale = true; /* this model is of this run alone; the next one from the start is described anew */
     PetscCall(failed);

@@ -65,7 +65,8 @@ struct Runtime {
 
   std::map<PetscInt, std::vector<std::unique_ptr<Probe>>> readers; /* of elements that were asked for, ReadersOf() */
   std::vector<CountedAngle>    asked;
-  long                         accepts = 0; /* accepted states that `asked` and the memories have seen */
+  long                         accepts  = 0; /* accepted states that `asked` and the memories have seen */
+  PetscInt                     followed = 0; /* steps of a TS of another type among them */
   long                         moved = -1;  /* which move of the bodies was to the last of them; -1: none, or in other axes */
   std::shared_ptr<DroppedRows> dropped;     /* none unless rows were dropped as redundant, on any rank */
   std::shared_ptr<ChannelWork> channels;

@@ -10,23 +10,35 @@ namespace hhtdae
 namespace
 {
 
-/* Velocities of local rotations are not the derivatives of what TSHHT3 alone counts anew in every step */
-PetscErrorCode CheckType(TS ts, const Runtime &R)
+/* TSHHT3 tells of accepted states itself. Of other types, whose state is the last accepted one while they solve for the next, the number of steps
+   tells. Velocities of local rotations are not the derivatives of what TSHHT3 alone counts anew in every step. */
+PetscErrorCode FollowType(TS ts, Runtime &R)
 {
   PetscBool ours;
   TSType    type;
+  PetscInt  steps;
+  PetscReal t;
+  Vec       U, V;
   PetscFunctionBegin;
-  if (!R.turns || !R.bodies.local) PetscFunctionReturn(0);
   PetscCall(TSGetType(ts, &type));
   PetscCall(PetscStrcmp(type, TSHHT3, &ours));
-  PetscCheck(ours, R.scene.comm, PETSC_ERR_ARG_INCOMP, "The scene has bodies that turn in space, whose local rotation vectors TS type %s cannot follow: use Euler angles, -scene_rotations euler313", type);
+  if (ours) PetscFunctionReturn(0);
+  PetscCheck(!R.turns || !R.bodies.local, R.scene.comm, PETSC_ERR_ARG_INCOMP,
+             "The scene has bodies that turn in space, whose local rotation vectors TS type %s cannot follow: use Euler angles, -scene_rotations euler313", type);
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (steps == R.followed) PetscFunctionReturn(0);
+  R.followed = steps;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(Remember(R, U, V));
+  PetscCall(CheckDropped(R, t, U, V));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode I2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(CheckType(ts, *static_cast<Runtime *>(ctx)));
+  PetscCall(FollowType(ts, *static_cast<Runtime *>(ctx)));
   PetscCall(Guarded([&] { return Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F); }));
   PetscFunctionReturn(0);
 }
@@ -227,7 +239,7 @@ PetscErrorCode Scene::solve(TS ts)
   Runtime *R;
   PetscFunctionBegin;
   PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
-  PetscCall(CheckUnchanged(data(), start_));
+  PetscCall(CheckUnchanged(R->scene, start_));
   PetscCall(AttachOutput(*R, output_, ts));
   const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */

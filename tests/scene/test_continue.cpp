@@ -389,3 +389,81 @@ TEST(Continue, SnapshotsBeforeTheFirstStep)
   must(TSDestroy(&first));
   must(TSDestroy(&next));
 }
+
+/* Of two stops that count full turns one goes and the other one comes, of the same kernel and so of as many numbers */
+TEST(Continue, AStopDoesNotTakeTheTurnsOfAnother)
+{
+  Scene      s(PETSC_COMM_SELF);
+  Parameter  which = s.parameter("which", 0);
+  RigidBody  b;
+  TS         next;
+  ErrorTrap  trap;
+  b.angular_velocity = {0, 0, 9};
+  const Body   first = s.add("first", b), second = s.add("second", RigidBody());
+  const Marker i = s.marker(first), j = s.marker(s.ground()), k = s.marker(second), l = s.marker(s.ground());
+  s.add("first axle", Revolute{i, j});
+  s.add("second axle", Revolute{k, l});
+  s.add("first stop", [=] { return which < 1 ? std::optional<RotationalStop>(RotationalStop{i, j, -INFINITY, 100}) : std::nullopt; });
+  s.add("second stop", [=] { return which > 0 ? std::optional<RotationalStop>(RotationalStop{k, l, -0.1, 0.1}) : std::nullopt; });
+  SceneRun run(s, 1.5, tolerance(1e-6));
+  must(run.solve());
+  must(s.set("which", 1));
+  EXPECT_NE(s.createTS(&next, run.ts), 0);
+  EXPECT_TRUE(trap.says("have come or gone that count angles over full turns or follow a curve, as rotational stop first stop has")) << trap.message;
+}
+
+/* A spring that counts full turns gets a damper, for which its force is another kernel's */
+TEST(Continue, ASpringGetsADamper)
+{
+  Scene     s(PETSC_COMM_SELF);
+  Parameter damping = s.parameter("damping", 0);
+  RigidBody b;
+  b.angular_velocity = {0, 0, 9};
+  const Body   first = s.add("first", b), second = s.add("second", b);
+  Element      spring[2];
+  int          n = 0;
+  for (Body at : {first, second}) {
+    const Marker i = s.marker(at), j = s.marker(s.ground());
+    s.add("", Revolute{i, j});
+    spring[n] = s.add("spring " + std::to_string(n), [=] { return TorsionalSpringDamper{i, j, 0.05, n ? double(damping) : 0.1, 0, 0}; });
+    n++;
+  }
+  SceneRun run(s, 1.5, tolerance(1e-6));
+  Snapshot now;
+  double   before[2], after[2];
+  must(run.solve());
+  must(now.take(run.ts));
+  for (int k = 0; k < 2; k++) must(now.value(Measure::force(spring[k], 0), &before[k]));
+  must(s.set("damping", 1e-9));
+  TS ts;
+  must(s.createTS(&ts, run.ts));
+  must(now.take(ts));
+  for (int k = 0; k < 2; k++) {
+    must(now.value(Measure::force(spring[k], 0), &after[k]));
+    EXPECT_GT(std::abs(before[k]), 0.05 * 2 * M_PI);
+    EXPECT_NEAR(after[k], before[k], 1e-6) << k;
+  }
+  must(TSDestroy(&ts));
+}
+
+/* A description that cannot be built, or is not where the run is, is no fault of the run */
+TEST(Continue, ARunOutlivesAFailedDescription)
+{
+  Swing s;
+  s.scene.channel("x", Measure::displacement(s.centre, 0));
+  SceneRun            run(s.scene, 0.2, tolerance(1e-6));
+  std::vector<double> x;
+  TS                  next;
+  must(run.solve());
+  s.scene.start().assembly = Assembly::Project;
+  {
+    ErrorTrap trap;
+    must(s.scene.set("caught", 1));
+    must(s.scene.set("line", 50)); /* out of reach */
+    EXPECT_NE(s.scene.createTS(&next, run.ts), 0);
+  }
+  s.scene.start().assembly = Assembly::Report;
+  must(TSSetMaxTime(run.ts, 0.4));
+  must(run.solve());
+  must(s.scene.sample(run.ts, 0.4, x));
+}

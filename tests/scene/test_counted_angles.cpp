@@ -258,3 +258,24 @@ TEST(CountedAngles, StartsThatPassHalfATurn)
       EXPECT_NEAR(angleOf(run.ts, i, j), expected, 1e-6) << equilibrium;
     }
 }
+
+/* A wheel that swings by ten radians to either side on a spring, under a type of PETSc's own; the square of its angular velocity by Euler's angles */
+TEST(CountedAngles, UnderOtherTypes)
+{
+  for (const bool planar : {true, false}) {
+    const double end = 2, swing = 10, rate = 0.5;
+    Wheel        w(swing * rate, planar ? Space::Planar : Space::Spatial);
+    w.scene.add("spring", TorsionalSpringDamper{w.i, w.j, rate * rate});
+    SceneRun run(w.scene, end, "-ts_type alpha2 -ts_alpha_radius 1 -ts_adapt_type none -ts_dt 5e-3 -scene_rotations euler313");
+    must(run.solve());
+    Vec                U, V;
+    const PetscScalar *u, *v;
+    must(TS2GetSolution(run.ts, &U, &V));
+    must(VecGetArrayRead(U, &u));
+    must(VecGetArrayRead(V, &v));
+    const double square = planar ? v[2] * v[2] : v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + 2 * v[3] * v[5] * std::cos(u[4]);
+    must(VecRestoreArrayRead(U, &u));
+    must(VecRestoreArrayRead(V, &v));
+    EXPECT_NEAR(std::sqrt(square), swing * rate * std::cos(rate * end), 1e-3) << (planar ? "planar" : "spatial");
+  }
+}

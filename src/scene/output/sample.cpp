@@ -35,7 +35,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   PetscInt steps;
   TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
-  PetscCall(CheckUnchanged(data(), start_));
+  PetscCall(CheckUnchanged(run->scene, start_));
   for (Vec &x : W) {
     PetscCall(VecCreate(run->scene.comm, &x));
     PetscCall(VecSetSizes(x, run->n, PETSC_DETERMINE));
