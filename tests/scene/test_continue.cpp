@@ -451,18 +451,17 @@ TEST(Continue, ARunOutlivesAFailedDescription)
 {
   Swing s;
   s.scene.channel("x", Measure::displacement(s.centre, 0));
+  s.scene.start().assembly = Assembly::Project;
   SceneRun            run(s.scene, 0.2, tolerance(1e-6));
   std::vector<double> x;
   TS                  next;
   must(run.solve());
-  s.scene.start().assembly = Assembly::Project;
   {
     ErrorTrap trap;
     must(s.scene.set("caught", 1));
     must(s.scene.set("line", 50)); /* out of reach */
     EXPECT_NE(s.scene.createTS(&next, run.ts), 0);
   }
-  s.scene.start().assembly = Assembly::Report;
   must(TSSetMaxTime(run.ts, 0.4));
   must(run.solve());
   must(s.scene.sample(run.ts, 0.4, x));

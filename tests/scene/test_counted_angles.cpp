@@ -266,7 +266,7 @@ TEST(CountedAngles, UnderOtherTypes)
     const double end = 2, swing = 10, rate = 0.5;
     Wheel        w(swing * rate, planar ? Space::Planar : Space::Spatial);
     w.scene.add("spring", TorsionalSpringDamper{w.i, w.j, rate * rate});
-    SceneRun run(w.scene, end, "-ts_type alpha2 -ts_alpha_radius 1 -ts_adapt_type none -ts_dt 5e-3 -scene_rotations euler313");
+    SceneRun run(w.scene, end, "-ts_type alpha2 -ts_alpha_radius 1 -ts_adapt_type none -ts_dt 5e-3 -scene_rotations euler313 -pc_type lu -pc_factor_mat_solver_type klu");
     must(run.solve());
     Vec                U, V;
     const PetscScalar *u, *v;
