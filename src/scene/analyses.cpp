@@ -48,7 +48,7 @@ struct Assembling : StillSystem {
     PetscCall(residual(u));
     PetscCall(keep(TSHHT3_HOLONOMIC, F));
     PetscCall(measure(F, at));
-    misfit = std::isfinite(at.misfit) ? at.misfit : INFINITY;
+    misfit = at.misfit;
     PetscFunctionReturn(0);
   }
   /* the move x that meets the rows in F as the matrix has them; part: how far that is, infinite if there is none */

@@ -5,6 +5,7 @@
 #include "bodies.h"
 #include "pattern.h"
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -152,19 +153,17 @@ struct InstancesOf {
     const auto at = std::lower_bound(number.begin(), number.end(), e);
     return s == store && at != number.end() && *at == e ? (PetscInt)(at - number.begin()) : -1;
   }
-  bool joins(std::size_t n, int k, PetscInt i, PetscInt j) const; /* whether instance n has these as its markers 2k and 2k+1; counted_angles.cpp */
+  bool joins(std::size_t n, std::array<int, 2> pair, PetscInt i, PetscInt j) const; /* whether these are a pair of markers of instance n; counted_angles.cpp */
 };
 
 /* Batch::countedAngle() of a kernel's instances */
 template <class K, class Instances> bool AngleOf(const Instances &all, const InstancesOf &of, PetscInt i, PetscInt j, double *x)
 {
   for (std::size_t n = 0; n < of.number.size(); n++)
-    if constexpr (K::angles > 0) {
-      for (int k = 0; k < K::angles; k++) {
-        if (!of.joins(n, k, i, j)) continue;
-        *x = all[n].data.memory[k];
-        return true;
-      }
+    for (int k = 0; k < K::angles; k++) {
+      if (!of.joins(n, K::markersOfAngle(all[n].data, k), i, j)) continue;
+      if constexpr (K::angles > 0) *x = all[n].data.memory[k];
+      return true;
     }
   (void)all, (void)i, (void)j, (void)x;
   return false;

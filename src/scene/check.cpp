@@ -26,7 +26,7 @@ std::string Text(const Vector3 &x) { return Text(x(0)) + ", " + Text(x(1)) + ", 
 bool SameStart(const StartPolicy &a, const StartPolicy &b)
 {
   return a.assembly == b.assembly && a.tolerance == b.tolerance && a.redundant == b.redundant && a.equilibrium == b.equilibrium && a.view == b.view &&
-         a.time == b.time;
+         a.time == b.time && a.rotations == b.rotations && a.angle_tol == b.angle_tol;
 }
 
 class Check

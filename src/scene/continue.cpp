@@ -1,5 +1,6 @@
 /* A run that goes on where another one is, with a description that may have changed. */
 #include "extension.h"
+#include "guard.h"
 #include "journal.h"
 #include "runtime.h"
 #include "start.h"
@@ -315,7 +316,10 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
   PetscCall(TS2GetSolution(from, &U, &V));
   if (journal_) {
     journal_->stale = true;
-    describeAnew();
+    PetscCall(Guarded([&] {
+      describeAnew();
+      return PetscErrorCode(0);
+    }));
     Model &M = *model_;
     PetscCheck(SameUnknowns(old->scene, M.scene), old->scene.comm, PETSC_ERR_ARG_WRONG,
                "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene are not those that it was made with");

@@ -86,7 +86,10 @@ double StartAngle(const Model &M, Marker i, Marker j)
   return Unwind<double>(PrincipalAngle<double>(M.scene.frame(i), M.scene.frame(j)), PrincipalAngle<double>(AsDescribed(M, i), AsDescribed(M, j)));
 }
 
-bool InstancesOf::joins(std::size_t n, int k, PetscInt i, PetscInt j) const { return store->marker(number[n], 2 * k) == i && store->marker(number[n], 2 * k + 1) == j; }
+bool InstancesOf::joins(std::size_t n, std::array<int, 2> pair, PetscInt i, PetscInt j) const
+{
+  return pair[0] >= 0 && store->marker(number[n], pair[0]) == i && store->marker(number[n], pair[1]) == j;
+}
 
 PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all)
 {

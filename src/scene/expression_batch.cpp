@@ -87,41 +87,10 @@ void ExpressionBatch::jacobian(Evaluation &e)
   }
 }
 
-void ExpressionBatch::accept(Bodies &B)
+void ExpressionBatch::each(const Visit &visit)
 {
-  for (Row &r : all_) r.f.arguments.accept(B);
-}
-
-bool ExpressionBatch::countedAngle(PetscInt i, PetscInt j, double *x) const
-{
-  return std::any_of(all_.begin(), all_.end(), [&](const Row &r) { return r.f.arguments.countedAngle(i, j, x); });
-}
-
-bool ExpressionBatch::limitsSteps() const
-{
-  return std::any_of(all_.begin(), all_.end(), [](const Row &r) { return r.f.arguments.limitsSteps(); });
-}
-
-double ExpressionBatch::longestStep(const Evaluation &e) const
-{
-  double least = std::numeric_limits<double>::infinity();
-  for (const Row &r : all_) least = std::min(least, r.f.arguments.longestStep(e));
-  return least;
-}
-
-PetscInt ExpressionBatch::memory() const
-{
-  PetscInt n = 0;
-  for (const Row &r : all_) n += r.f.arguments.memory();
-  return n;
-}
-
-void ExpressionBatch::copyMemory(double *x, bool in)
-{
-  for (Row &r : all_) {
-    r.f.arguments.copyMemory(x, in);
-    x += r.f.arguments.memory();
-  }
+  for (Row &r : all_)
+    for (LocalMeasure &m : r.f.arguments.all()) visit(m);
 }
 
 } // namespace hhtdae

@@ -36,7 +36,7 @@ private:
   void report(const Evaluation &e, const Piece &p, const double *m, double f) const;
 };
 
-class ExpressionBatch : public Batch
+class ExpressionBatch : public ReadingBatch<Batch>
 {
 public:
   enum Kind { Definition, RateOfState };
@@ -49,15 +49,12 @@ public:
   }
   bool empty() const { return all_.empty(); }
 
-  void     pattern(Pattern &p) override;
-  void     residual(Evaluation &e) override;
-  void     jacobian(Evaluation &e) override;
-  void     accept(Bodies &B) override;
-  bool     countedAngle(PetscInt i, PetscInt j, double *x) const override;
-  bool     limitsSteps() const override;
-  double   longestStep(const Evaluation &e) const override;
-  PetscInt memory() const override;
-  void     copyMemory(double *x, bool in) override;
+  void pattern(Pattern &p) override;
+  void residual(Evaluation &e) override;
+  void jacobian(Evaluation &e) override;
+
+protected:
+  void each(const Visit &visit) override;
 
 private:
   struct Row {

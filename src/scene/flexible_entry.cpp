@@ -86,6 +86,7 @@ std::string Fault(const FlexibleBody &b, bool planar)
   if (planar) return "flexible bodies need a scene in space";
   if (!SameColumns(m)) return "its ModalBody has " + std::to_string(n) + " frequencies, and invariants, attachments, nodes or loads with another number of modes";
   if (!Finite(m)) return "its ModalBody has values that are not finite";
+  if (!(m.mass > 0 && m.moments.trace() > 0)) return "its ModalBody has a mass of " + Number(m.mass) + " and second moments of mass of " + Number(m.moments.trace()) + " in all; both are positive";
   if (n && m.omega.minCoeff() <= 0) return "mode " + std::to_string(n) + " or another has no positive frequency; rigid-body modes do not belong to a ModalBody";
   for (const auto &x : m.quadratic)
     if (n && !x.size() && b.mass == ModalMass::Full) return "its ModalBody has no invariants quadratic in the modes; use ModalMass::Partial or Constant";
@@ -138,6 +139,8 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
   f->deformation      = Sized(b.deformation, n);
   f->deformation_rate = Sized(b.deformation_rate, n);
   for (PetscInt k = 0; k < n; k++) f->damping.push_back(b.ratios.size() ? b.ratios(k) : RatioOf(b, b.model->omega(k) / (2 * M_PI)));
+  f->frame = (PetscInt)data().markers.size();
+  data().markers.push_back({body.id, Vector3::Zero(), Matrix3::Identity()});
   data().bodies[body.id].flexible = f;
   return body;
 }

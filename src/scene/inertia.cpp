@@ -62,12 +62,12 @@ void FillLight(SceneData &s)
   for (const BodyData &b : s.bodies) {
     if (b.mass > 0) lightest = std::min(lightest, b.mass);
     heaviest = std::max(heaviest, b.mass);
-    moment   = std::max(moment, b.inertia.norm());
+    if (!b.point) moment = std::max(moment, s.planar ? b.inertia(2, 2) : b.inertia.norm());
   }
   for (BodyData &b : s.bodies) {
     if (HasAll(s, b)) {
       if (b.mass < least * heaviest) b.light_mass = std::max(b.light_mass, least * heaviest);
-      if (LeastMoment(s, b) < least * moment) b.light_inertia = std::max(b.light_inertia, least * moment);
+      if (!b.point && LeastMoment(s, b) < least * moment) b.light_inertia = std::max(b.light_inertia, least * moment);
       continue;
     }
     const double size = SceneSize(s);

@@ -142,14 +142,13 @@ PetscErrorCode WriteKept(Runtime &R)
 
 PetscErrorCode ReadKept(Runtime &R, const double *x)
 {
-  const double *parameters = x;
-  double        digest[2];
+  double digest[2];
   PetscFunctionBegin;
+  PetscCall(CheckParameters(R.scene, x)); /* whose values masses and places may depend on */
   x += Kept(R) - kept;
   MakeDigest(R.scene).put(digest);
   PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
-  PetscCall(CheckParameters(R.scene, parameters));
   PetscCall(ResumeOutput(R, x + 2));
   PetscFunctionReturn(0);
 }

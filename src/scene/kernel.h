@@ -44,6 +44,7 @@
 #define HHTDAE_SCENE_KERNEL_H
 
 #include "frames.h"
+#include <array>
 
 namespace hhtdae
 {
@@ -84,6 +85,7 @@ template <class K, int M, int R> struct ConstraintBase {
   using Gradient                           = Matrix<R, size>;
   using Hessian                            = Matrix<size, size>;
   static constexpr bool curved(int a, int b) { return Depends(K::depends, a) && Depends(K::depends, b); }
+  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* of those that are counted over full turns */
 };
 
 template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
@@ -161,12 +163,6 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
       for (int i = 0; i < Z && zj; i++) zj[r * Z + i] = psi[r].derivatives()(2 * N + i);
     }
   }
-  template <class Data>
-  static void gradient(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, Gradient &J, Gradient &P)
-  {
-    const double none = 0;
-    gradient(d, f, w, t, &none, J, P, nullptr);
-  }
 
   /* d(J^T lambda)/d frames */
   template <class Data>
@@ -195,12 +191,6 @@ template <class K, int M, int R> struct VelocityConstraint : ConstraintBase<K, M
     for (int r = 0; r < R; r++)
       for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(psi[r].derivatives()(a));
   }
-  template <class Data>
-  static void curvature(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *lambda, Hessian &H)
-  {
-    const double none = 0;
-    curvature(d, f, w, t, &none, lambda, H);
-  }
 
 private:
   template <class T, class Data> static void evaluate(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *psi)
@@ -224,6 +214,7 @@ template <class K, int M, int C> struct Force {
   static constexpr bool     damped = true, needs_rotation = true, says_angle = false;
   static constexpr bool     carriable = true; /* its description lets the user carry the components as force states */
   using Data = Empty;
+  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* of those that are counted over full turns */
 
   template <class Data>
   static void wrench(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on)

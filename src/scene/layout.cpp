@@ -356,23 +356,19 @@ PetscErrorCode Layout(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* What reads the parts of an element, made when it is first asked for; memories as they are now */
-const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element)
+/* What reads a part of an element, made when it is first asked for; memories as they are now */
+Probe &ReaderOf(Runtime &R, const Part &p)
 {
-  const std::vector<Part>             &parts   = R.scene.elements[element].parts;
-  std::vector<std::unique_ptr<Probe>> &readers = R.readers[element];
-  if (readers.empty()) {
+  std::unique_ptr<Probe> &reader = R.readers[{p.store, p.index}];
+  if (!reader) {
     LocalizerOf read(R, LocalizerOf::Read);
-    for (const Part &p : parts) readers.push_back(p.store->probe(read, p.index));
+    reader = p.store->probe(read, p.index);
   }
-  std::vector<double> memory;
-  for (std::size_t k = 0; k < parts.size(); k++) {
-    RecallMemories(*readers[k], R.batches);
-    memory.resize(readers[k]->memory());
-    for (const auto &b : R.batches)
-      if (!memory.empty() && b->memoryOf(parts[k].store, parts[k].index, memory.data())) readers[k]->copyMemory(memory.data(), true);
-  }
-  return readers;
+  std::vector<double> memory(reader->memory());
+  RecallMemories(*reader, R.batches);
+  for (const auto &b : R.batches)
+    if (!memory.empty() && b->memoryOf(p.store, p.index, memory.data())) reader->copyMemory(memory.data(), true);
+  return *reader;
 }
 
 PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role)

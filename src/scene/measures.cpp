@@ -369,23 +369,6 @@ void MeasureSet::accept(const Bodies &B)
   for (LocalMeasure &m : all_) m.accept(B);
 }
 
-bool MeasureSet::countedAngle(PetscInt i, PetscInt j, double *x) const
-{
-  return std::any_of(all_.begin(), all_.end(), [&](const LocalMeasure &m) { return m.countedAngle(i, j, x); });
-}
-
-bool MeasureSet::limitsSteps() const
-{
-  return std::any_of(all_.begin(), all_.end(), [](const LocalMeasure &m) { return m.kind == Measure::Angle; });
-}
-
-double MeasureSet::longestStep(const Evaluation &e) const
-{
-  double least = std::numeric_limits<double>::infinity();
-  for (const LocalMeasure &m : all_) least = std::min(least, m.longestStep(e));
-  return least;
-}
-
 PetscInt MeasureSet::memory() const
 {
   PetscInt n = 0;

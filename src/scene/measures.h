@@ -9,6 +9,8 @@
 #define HHTDAE_SCENE_MEASURES_H
 
 #include "scene_data.h"
+#include <functional>
+#include <limits>
 #include <string>
 
 namespace hhtdae
@@ -90,18 +92,64 @@ public:
   /* adds factor times dm/du + sv dm/du' + sa dm/du'' to a row of the width of the columns */
   void addGradient(int k, const Evaluation &e, double factor, double *row) const;
 
-  void     accept(const Bodies &B);
-  bool     countedAngle(PetscInt i, PetscInt j, double *x) const;
-  bool     limitsSteps() const;
-  double   longestStep(const Evaluation &e) const;
-  PetscInt memory() const;
-  void     copyMemory(double *x, bool in);
+  std::vector<LocalMeasure>       &all() { return all_; }
+  void                             accept(const Bodies &B);
+  PetscInt                         memory() const;
+  void                             copyMemory(double *x, bool in);
 
 private:
   std::vector<LocalMeasure> all_;
   std::vector<std::vector<int>>
           at_; /* columns of each: bodies of i, j, frame; or a scalar; then, of probes, bodies and multipliers */
   Columns columns_;
+};
+
+/* A batch that reads measures: what these remember of accepted steps, count, and allow as a step */
+template <class Base> class ReadingBatch : public Base
+{
+public:
+  void accept(Bodies &B) override
+  {
+    each([&](LocalMeasure &m) { m.accept(B); });
+  }
+  bool countedAngle(PetscInt i, PetscInt j, double *x) const override
+  {
+    bool found = false;
+    read([&](const LocalMeasure &m) { found = found || m.countedAngle(i, j, x); });
+    return found;
+  }
+  bool limitsSteps() const override
+  {
+    bool any = false;
+    read([&](const LocalMeasure &m) { any = any || m.kind == Measure::Angle; });
+    return any;
+  }
+  double longestStep(const Evaluation &e) const override
+  {
+    double least = std::numeric_limits<double>::infinity();
+    read([&](const LocalMeasure &m) { least = std::min(least, m.longestStep(e)); });
+    return least;
+  }
+  PetscInt memory() const override
+  {
+    PetscInt n = 0;
+    read([&](const LocalMeasure &m) { n += m.memory(); });
+    return n;
+  }
+  void copyMemory(double *x, bool in) override
+  {
+    each([&](LocalMeasure &m) {
+      m.copyMemory(x, in);
+      x += m.memory();
+    });
+  }
+
+protected:
+  using Visit = std::function<void(LocalMeasure &)>;
+  virtual void each(const Visit &f) = 0; /* in the same order every time */
+
+private:
+  void read(const Visit &f) const { const_cast<ReadingBatch *>(this)->each(f); }
 };
 
 } // namespace hhtdae

@@ -270,13 +270,14 @@ PetscErrorCode Snapshot::modes(Body b, std::vector<double> *coordinates)
 PetscErrorCode Snapshot::Work::checkMemory(PetscInt element)
 {
   const ElementData &e = scene().elements[element];
-  double             n;
+  double             n = 0, all = 0;
   PetscFunctionBegin;
   if (accepts == R->accepts) PetscFunctionReturn(0);
-  PetscCall(FromOwner(*R, ownerOfElement(e), &n, 1, [&](double *y) {
-    for (const auto &p : ReadersOf(*R, element)) *y += (double)p->memory();
-  }));
-  PetscCheck(n == 0, scene().comm, PETSC_ERR_ARG_WRONGSTATE,
+  for (const Part &p : e.parts) {
+    PetscCall(FromOwner(*R, OwnerOf(*R->model, *p.store, p.index), &n, 1, [&](double *y) { *y = (double)ReaderOf(*R, p).memory(); }));
+    all += n;
+  }
+  PetscCheck(all == 0, scene().comm, PETSC_ERR_ARG_WRONGSTATE,
              "Snapshot: the run has gone on since its state at t = %g was taken, and %s %s counts full turns or follows a curve, which it does for the "
              "present state alone; ask earlier, or take() again",
              t, e.type, e.name.c_str());
@@ -285,8 +286,9 @@ PetscErrorCode Snapshot::Work::checkMemory(PetscInt element)
 
 PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
 {
+  using Six = Eigen::Matrix<double, 6, 1>;
   const ElementData &e = scene().elements[element];
-  double             numbers[6];
+  Six                part, whole = Six::Zero(); /* force and moment */
   Motion             at_marker;
   PetscFunctionBegin;
   PetscCall(hasElement(element));
@@ -296,24 +298,24 @@ PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
              scene().bodyName(elsewhere).c_str(), scene().bodyName(scene().markers[on].body).c_str());
   PetscCall(checkMemory(element));
   PetscCall(motion(on, &at_marker));
-  PetscCall(FromOwner(*R, ownerOfElement(e), numbers, 6, [&](double *y) {
-    Vector3 f = Vector3::Zero(), m = f;
-    move();
-    const Evaluation ev = at();
-    for (const auto &p : ReadersOf(*R, element)) {
-      std::vector<Wrench<double>> wrench(p->markers());
-      p->loads(ev, wrench.data());
-      for (int k = 0; k < p->markers(); k++) {
-        if (R->bodies.body[R->bodies.marker[p->marker(k)].body].id != loaded) continue;
-        f += wrench[k].f;
-        m += wrench[k].m + (R->bodies.frame(p->marker(k)).x - at_marker.position).cross(wrench[k].f);
+  for (const Part &p : e.parts) {
+    PetscCall(FromOwner(*R, OwnerOf(*R->model, *p.store, p.index), part.data(), 6, [&](double *y) {
+      Eigen::Map<Six> sum(y);
+      move();
+      const Evaluation            ev     = at();
+      Probe                      &reader = ReaderOf(*R, p);
+      std::vector<Wrench<double>> wrench(reader.markers());
+      reader.loads(ev, wrench.data());
+      for (int k = 0; k < reader.markers(); k++) {
+        if (R->bodies.body[R->bodies.marker[reader.marker(k)].body].id != loaded) continue;
+        sum.head<3>() += wrench[k].f;
+        sum.tail<3>() += wrench[k].m + (R->bodies.frame(reader.marker(k)).x - at_marker.position).cross(wrench[k].f);
       }
-    }
-    std::copy(f.data(), f.data() + 3, y);
-    std::copy(m.data(), m.data() + 3, y + 3);
-  }));
-  x->force  = Eigen::Map<const Vector3>(numbers);
-  x->moment = Eigen::Map<const Vector3>(numbers + 3);
+    }));
+    whole += part;
+  }
+  x->force  = whole.head<3>();
+  x->moment = whole.tail<3>();
   PetscFunctionReturn(0);
 }
 

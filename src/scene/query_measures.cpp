@@ -39,9 +39,7 @@ PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, boo
       PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) {
         std::vector<double> c(p.store->rows());
         move();
-        const PetscInt element = p.store->element(p.index);
-        const auto     part    = &p - scene().elements[element].parts.data();
-        ReadersOf(*R, element)[part]->components(at(), c.data());
+        ReaderOf(*R, p).components(at(), c.data());
         *y = c[row];
       }));
     }

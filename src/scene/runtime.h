@@ -63,7 +63,7 @@ struct Runtime {
   std::vector<PetscInt> next_body;
   PetscInt              reframed = 0; /* changes of axes so far, own bodies */
 
-  std::map<PetscInt, std::vector<std::unique_ptr<Probe>>> readers; /* of elements that were asked for, ReadersOf() */
+  std::map<std::pair<const StoreBase *, PetscInt>, std::unique_ptr<Probe>> readers; /* of parts of elements that were asked for, ReaderOf() */
   std::vector<CountedAngle>    asked;
   long                         accepts  = 0; /* accepted states that `asked` and the memories have seen */
   PetscInt                     followed = 0; /* steps of a TS of another type among them */
@@ -92,7 +92,7 @@ inline Runtime       *RunOf(TS ts)
 }
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
-const std::vector<std::unique_ptr<Probe>> &ReadersOf(Runtime &R, PetscInt element);
+Probe         &ReaderOf(Runtime &R, const Part &p); /* on the rank that has it */
 PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* of own unknowns */
 /* initial.cpp: state of the description, with what rotations count from chosen by it */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);

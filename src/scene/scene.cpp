@@ -121,6 +121,7 @@ void Scene::gravity(const Vector3 &acceleration)
 {
   if (recording()) record([=](Scene &s) { s.gravity(acceleration); });
   data().refuseLate("gravity");
+  if (data().fixed) return;
   if (!acceleration.allFinite()) data().errors.push_back("gravity must be finite");
   data().gravity = acceleration;
 }
@@ -129,6 +130,7 @@ void Scene::groundAcceleration(const TimeFunction &x, const TimeFunction &y, con
 {
   if (recording()) record([=](Scene &s) { s.groundAcceleration(x, y, z); });
   data().refuseLate("the ground's acceleration");
+  if (data().fixed) return;
   for (const TimeFunction *f : {&x, &y, &z})
     if (!f->error().empty()) data().errors.push_back("the ground's acceleration: " + f->error());
   data().ground_acceleration = {x, y, z};
@@ -220,6 +222,16 @@ Element ElementBuilder::done()
 
 /* ---- from description to work ---- */
 
+/* What an earlier set-up has found before it failed */
+static void BeginAnew(SceneData &s)
+{
+  for (StoreBase *store : s.order)
+    for (PetscInt e = 0; e < store->size(); e++) store->setActive(e, 0xff);
+  for (BodyData &b : s.bodies)
+    if (!b.massless) b.light_mass = b.light_inertia = 0;
+  s.started = StartResult();
+}
+
 /* Constraints of the user's own are evaluated here, and may throw */
 PetscErrorCode Scene::setUp()
 {
@@ -230,6 +242,7 @@ PetscErrorCode Scene::setUp()
     Model     &M = *model_;
     SceneData &s = M.scene;
     if (M.compiled) PetscFunctionReturn(0);
+    BeginAnew(s);
     s.start = start_;
     PetscCall(TSHHT3Initialize());
     PetscCall(DeclareSceneOptions());

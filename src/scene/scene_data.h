@@ -18,6 +18,7 @@ struct FlexibleData {
   std::shared_ptr<const ModalBody> model;
   ModalMass                        mass;
   std::vector<double>              damping, deformation, deformation_rate; /* ratios, modal coordinates at the start */
+  PetscInt                         frame = -1; /* marker of the floating frame, on which loads of the modes and contacts of nodes act */
 
   /* Places that markers take hold of: attachments, and behind them the kept nodes */
   const ModalAttachment &place(PetscInt k) const

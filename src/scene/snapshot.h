@@ -36,7 +36,6 @@ struct Snapshot::Work {
   }
   const SceneData &scene() const { return R->scene; }
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
-  PetscMPIInt      ownerOfElement(const ElementData &e) const { return e.parts.empty() ? 0 : OwnerOf(*R->model, *e.parts[0].store, e.parts[0].index); }
 
   /* What was described after the run was made has no place in it */
   PetscErrorCode hasBody(PetscInt body) const;

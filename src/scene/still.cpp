@@ -50,6 +50,9 @@ PetscErrorCode StillSystem::create(Vec begin, const char *prefix)
   PetscFunctionReturn(0);
 }
 
+/* For the largest of all, which is not defined where one is no number */
+static double Size(double x) { return std::isnan(x) ? INFINITY : std::abs(x); }
+
 PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
 {
   const PetscScalar *f;
@@ -65,14 +68,14 @@ PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
     const int        directions = PlanarScene(k.kind) ? 2 : 3, whole = Coordinates(k.kind);
     const double     modal      = std::sqrt(R.scene.bodies[k.id].mass); /* of modal forces, as if the modes moved all mass (SmallBodies.Equilibrium) */
     for (int c = 0; c < R.bodies.coordinates(b); c++) {
-      const double y = std::abs(f[k.first + c]) * (c < directions ? 1 : c < whole ? 1 / size : modal);
-      if (y > mine.value || std::isnan(y)) mine = {y, (int)k.id};
+      const double y = Size(f[k.first + c]) * (c < directions ? 1 : c < whole ? 1 / size : modal);
+      if (y > mine.value) mine = {y, (int)k.id};
     }
   }
   for (const auto &e : R.scene.extensions) {
     const PetscScalar *g = f + e->start[R.rank] - R.start;
     for (PetscInt i = 0; i < e->coordinates(); i++)
-      if (!(std::abs(g[i]) <= mine.value)) mine = {std::abs(g[i]), -1};
+      if (Size(g[i]) > mine.value) mine = {Size(g[i]), -1};
   }
   for (TSHHT3Role r : {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE, TSHHT3_STATE}) {
     const PetscInt *i;
@@ -81,7 +84,7 @@ PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
     PetscCall(ISGetIndices(R.roles[r], &i));
     double &largest = rest[r == TSHHT3_HOLONOMIC ? 0 : 1];
     for (PetscInt k = 0; k < n; k++)
-      if (!std::binary_search(unread.begin(), unread.end(), i[k])) largest = std::max(largest, std::abs(f[i[k] - R.start]));
+      if (!std::binary_search(unread.begin(), unread.end(), i[k])) largest = std::max(largest, Size(f[i[k] - R.start]));
     PetscCall(ISRestoreIndices(R.roles[r], &i));
   }
   PetscCall(VecRestoreArrayRead(x, &f));
@@ -103,17 +106,11 @@ PetscErrorCode StillSystem::reach(Vec v, double *part) const
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k          = R.bodies.body[b];
     const int        directions = PlanarScene(k.kind) ? 2 : 3;
-    for (int c = 0; c < Coordinates(k.kind); c++) {
-      const double y = std::abs(x[k.first + c]) / (c < directions ? size : 1) / largest_turn;
-      mine           = std::isnan(y) ? INFINITY : std::max(mine, y);
-    }
+    for (int c = 0; c < Coordinates(k.kind); c++) mine = std::max(mine, Size(x[k.first + c]) / (c < directions ? size : 1) / largest_turn);
   }
   for (const auto &e : R.scene.extensions) {
     const PetscScalar *g = x + e->start[R.rank] - R.start;
-    for (PetscInt i = 0; i < e->coordinates(); i++) {
-      const double y = std::abs(g[i]) / size / largest_turn;
-      mine           = std::isnan(y) ? INFINITY : std::max(mine, y);
-    }
+    for (PetscInt i = 0; i < e->coordinates(); i++) mine = std::max(mine, Size(g[i]) / size / largest_turn);
   }
   PetscCall(VecRestoreArrayRead(v, &x));
   PetscCallMPI(MPI_Allreduce(&mine, part, 1, MPI_DOUBLE, MPI_MAX, R.scene.comm));

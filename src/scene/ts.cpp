@@ -187,7 +187,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(setUp());
   PetscCall(CheckUnchanged(data(), start_));
   PetscCall(CreateRun(model_, ts));
-  if (data().start.equilibrium && !model_->continues) PetscCall(StartWithMotions(*ts));
+  if (data().start.equilibrium && !model_->continues) PetscCall(Guarded([&] { return StartWithMotions(*ts); }));
   PetscFunctionReturn(0);
 }
 

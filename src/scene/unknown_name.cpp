@@ -38,7 +38,7 @@ std::string NameOfElement(const SceneData &s, PetscInt row)
   for (std::size_t e = 0; e < s.elements.size(); e++) {
     int before[2] = {0, 0}; /* rows of earlier parts, of forces and constraints */
     for (const Part &p : s.elements[e].parts) {
-      const PetscInt k = p.store->start.empty() ? -1 : row - p.store->start[p.index];
+      const PetscInt k = p.index < (PetscInt)p.store->start.size() ? row - p.store->start[p.index] : -1; /* what came too late has no unknowns */
       int           &n = before[p.store->isConstraint()];
       if (k >= 0 && k < p.store->unknowns(p.index)) return NameOfPart(s, (PetscInt)e, p, k, n);
       n += p.store->rows();
@@ -63,13 +63,13 @@ std::string NameOfExtension(const Model &M, PetscInt row)
 std::string UnknownName(const Model &M, PetscInt row)
 {
   const SceneData &s = M.scene;
-  for (std::size_t b = 0; b < s.bodies.size(); b++) {
+  for (std::size_t b = 0; b < M.number.body.size(); b++) {
     const PetscInt k = row - M.number.body[b];
     if (M.number.body[b] >= 0 && k >= 0 && k < CoordinatesOf(s, s.bodies[b])) return NameOfCoordinate(s, s.bodies[b], k);
   }
-  for (std::size_t i = 0; i < s.variables.size(); i++)
+  for (std::size_t i = 0; i < M.number.variable.size(); i++)
     if (M.number.variable[i] == row) return "variable " + s.variables[i].name;
-  for (std::size_t i = 0; i < s.states.size(); i++)
+  for (std::size_t i = 0; i < M.number.state.size(); i++)
     if (M.number.state[i] == row) return "state " + s.states[i].name;
   const std::string element = NameOfElement(s, row);
   return element.empty() ? NameOfExtension(M, row) : element;

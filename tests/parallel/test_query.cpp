@@ -82,3 +82,29 @@ TEST(QueryRanks, RunsSideBySide)
   EXPECT_EQ(x[1].position, x[2].position);
   EXPECT_GT((x[0].position - x[1].position).norm(), 1e-3);
 }
+
+/* Rows of one constraint that hold bodies of different ranks against a weight of 3 m/s^2 */
+TEST(QueryRanks, LoadsOfRowsOnDifferentBodies)
+{
+  Scene               scene(PETSC_COMM_WORLD, Space::Planar);
+  std::vector<Marker> at;
+  UserConstraint      rows;
+  for (int k = 0; k < 6; k++) {
+    RigidBody b;
+    b.mass     = k + 1;
+    b.position = {0, k + 1., 0};
+    at.push_back(scene.marker(scene.add("", b)));
+    rows.rows.push_back({{Measure::displacement(at[k], 0)}, [](const Real *m) { return m[0]; }});
+  }
+  const Element hold = scene.add("hold", rows);
+  scene.gravity({3, 0, 0});
+  SceneRun run(scene, 0.1, tolerance(1e-6));
+  Snapshot now;
+  must(run.solve());
+  must(now.take(run.ts));
+  for (int k = 0; k < 6; k++) {
+    Load l;
+    must(now.load(hold, at[k], &l));
+    EXPECT_NEAR(l.force(0), -3 * (k + 1), 1e-8) << k;
+  }
+}

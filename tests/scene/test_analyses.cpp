@@ -489,3 +489,18 @@ TEST(Analyses, AssemblyAtATime)
   EXPECT_LT((m.position - Linkage(1.3).C).norm(), 1e-10);
   EXPECT_LT((m.velocity - (after - before) / 2e-4).norm(), 1e-7);
 }
+
+/* A row that is no number is none that is met */
+TEST(Analyses, AssemblyOfWhatIsNoNumber)
+{
+  Scene        s(PETSC_COMM_SELF);
+  const Body   ball = s.add("ball", PointMass());
+  const Marker i    = s.marker(ball);
+  s.add("circle", UserConstraint{{Expression{{Measure::displacement(i, 0), Measure::time()}, [](const Real *m) { return m[0] - sqrt(1 - m[1] * m[1]); }}}});
+  s.start().assembly = Assembly::Project;
+  OwnTS run(s);
+  must(AssembleAt(run.ts, 0.6));
+  ErrorTrap error;
+  EXPECT_NE(AssembleAt(run.ts, 2), 0);
+  EXPECT_TRUE(error.says("the scene cannot be assembled at t = 2")) << error.message;
+}

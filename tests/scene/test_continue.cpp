@@ -466,3 +466,43 @@ TEST(Continue, ARunOutlivesAFailedDescription)
   must(run.solve());
   must(s.scene.sample(run.ts, 0.4, x));
 }
+
+/* An exception of the user's function is an error, and the run is where it was */
+TEST(Continue, ADescriptionThatThrows)
+{
+  Scene      s(PETSC_COMM_SELF);
+  Parameter  bad = s.parameter("bad", 0);
+  const Body b   = s.add("body", RigidBody());
+  s.add("spring", [=, i = s.marker(b), j = s.marker(s.ground(), {1, 0, 0})] {
+    if (bad > 0) throw std::runtime_error("no such spring");
+    return SpringDamper{i, j, 1};
+  });
+  SceneRun run(s, 0.1, tolerance(1e-6));
+  must(run.solve());
+  must(s.set("bad", 1));
+  TS next;
+  {
+    ErrorTrap trap;
+    EXPECT_NE(s.createTS(&next, run.ts), 0);
+    EXPECT_TRUE(trap.says("no such spring")) << trap.message;
+  }
+  must(TSSetMaxTime(run.ts, 0.2));
+  must(run.solve());
+}
+
+/* What comes while the scene runs is refused and changes nothing of the run */
+TEST(Continue, GravityThatComesTooLate)
+{
+  Scene        s(PETSC_COMM_SELF);
+  const Marker i = s.marker(s.add("ball", PointMass()));
+  s.gravity({0, 0, -1});
+  for (int k = 0; k < 3; k++) s.channel("", Measure::displacement(i, 2));
+  SceneRun run(s, 1, tolerance(1e-6));
+  must(TSMonitorSet(run.ts, [](TS, PetscInt step, PetscReal, Vec, void *scene) -> PetscErrorCode {
+    if (step == 1) static_cast<Scene *>(scene)->gravity({0, 0, 5});
+    for (int k = 0; k < 20; k++) static_cast<Scene *>(scene)->channel("", Measure::time());
+    return 0;
+  }, &s, nullptr));
+  must(run.solve());
+  EXPECT_NEAR(of(run.ts, i).position(2), -0.5, 1e-8);
+}

@@ -279,3 +279,22 @@ TEST(CountedAngles, UnderOtherTypes)
     EXPECT_NEAR(std::sqrt(square), swing * rate * std::cos(rate * end), 1e-3) << (planar ? "planar" : "spatial");
   }
 }
+
+/* By a row of the user's own, whose cam tells how far the wheel has turned */
+TEST(CountedAngles, InUserConstraints)
+{
+  Wheel        w(9);
+  const Body   follower = w.scene.add("follower", RigidBody());
+  const Marker at       = w.scene.marker(follower);
+  w.scene.add("slide", Translational{at, w.scene.marker(w.scene.ground())});
+  w.scene.add("cam", UserConstraint{{Expression{{Measure::displacement(at, 2), Measure::angle(w.i, w.j)}, [](const Real *m) { return m[0] - 0.01 * m[1]; }}}});
+  w.scene.start().assembly = Assembly::Project;
+  SceneRun run(w.scene, 3, tolerance(1e-6));
+  Snapshot now;
+  Motion   m;
+  must(run.solve());
+  must(now.take(run.ts));
+  must(now.motion(at, &m));
+  EXPECT_GT(m.position(2), 0.01 * 3 * turn);
+  EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 100 * m.position(2), 1e-5);
+}

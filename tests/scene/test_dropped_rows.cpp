@@ -163,3 +163,25 @@ TEST(DroppedRows, FrictionThatReadsThem)
     EXPECT_EQ(out.says("joint friction rub takes the forces of dropped rows for zero"), k == 1) << out.text();
   }
 }
+
+/* A set-up that fails for want of an equilibrium, and the next one without it */
+TEST(DroppedRows, AfterASetUpThatFailed)
+{
+  Scene     s(PETSC_COMM_SELF);
+  RigidBody b;
+  b.position = {5, 0, 0};
+  twoMotions(s, MotionOf::Displacement);
+  s.add("free", b); /* falls */
+  s.gravity({0, 0, -9.81});
+  s.start().equilibrium = true;
+  {
+    Printed   quiet;
+    ErrorTrap trap;
+    EXPECT_NE(s.setUp(), 0);
+  }
+  s.start().equilibrium = false;
+  Printed quiet;
+  must(s.setUp());
+  EXPECT_EQ(ModelOf(s).scene.started.dropped.size(), 1u);
+  EXPECT_NE(failure(s, 1).find("was dropped as redundant at the start, and is violated by"), std::string::npos);
+}

@@ -184,6 +184,50 @@ TEST(NodesAndLoads, QueriesAndParameters)
   }
 }
 
+/* Loads and contacts of a flexible body that a parameter takes away, beside a marker that was made after them */
+TEST(NodesAndLoads, ThatMayBeMissing)
+{
+  Scene           scene(PETSC_COMM_SELF);
+  const Parameter on    = scene.parameter("on", 1);
+  const Body      body  = scene.add("body", flexible(withNodes(4, 3)));
+  const Marker    floor = scene.marker(scene.ground(), {0, 0, -50});
+  scene.add("load", [=] { return on > 0 ? std::optional<ModalLoad>(ModalLoad{body, "dead", TimeFunction(2)}) : std::nullopt; });
+  scene.add("contact", [=] {
+    NodeContact c;
+    c.body = body;
+    c.j    = floor;
+    c.law  = {1e3};
+    return on > 0 ? std::optional<NodeContact>(c) : std::nullopt;
+  });
+  const Body    weight = scene.add("weight", RigidBody());
+  const Channel z      = scene.channel("z", Measure::displacement(scene.marker(weight, {0, 0, 0.5}), 2));
+  for (double x : {1., 0., 1.}) {
+    TS    ts;
+    Array y;
+    must(scene.set("on", x));
+    must(scene.createTS(&ts));
+    must(TSSetMaxTime(ts, 1e-3));
+    must(scene.solve(ts));
+    must(scene.sample(ts, 1e-3, y));
+    EXPECT_DOUBLE_EQ(y[z.id], 0.5);
+    must(TSDestroy(&ts));
+  }
+}
+
+TEST(NodesAndLoads, ABodyWithoutMass)
+{
+  for (const bool mass : {true, false}) {
+    Scene      scene(PETSC_COMM_SELF);
+    ModalCloud c = withNodes(3, 5);
+    if (mass) c.body.mass = 0;
+    else c.body.moments.setZero();
+    scene.add("cloud", flexible(c));
+    ErrorTrap trap;
+    EXPECT_NE(scene.setUp(), 0);
+    EXPECT_TRUE(trap.says("flexible body cloud: its ModalBody has a mass of")) << trap.message;
+  }
+}
+
 namespace
 {
 

@@ -258,3 +258,27 @@ TEST(Parameters, OfCheckpoints)
       EXPECT_TRUE(trap.says(word)) << trap.message;
     });
 }
+
+/* A mass tells scenes of checkpoints apart; as a parameter it is named */
+TEST(Parameters, OfCheckpointsInMasses)
+{
+  const TemporaryFile file("masses.checkpoint");
+  Scene               s(PETSC_COMM_SELF);
+  const Parameter     m = s.parameter("mass", 1);
+  s.add("ball", [=] {
+    PointMass b;
+    b.mass = m;
+    return b;
+  });
+  {
+    SceneRun run(s, 0.2, tolerance(1e-6));
+    must(s.solve(run.ts));
+    must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+  }
+  must(s.set("mass", 2));
+  SceneRun  run(s, 0.2, tolerance(1e-6));
+  ErrorTrap trap;
+  must(TSSetUp(run.ts));
+  EXPECT_NE(TSHHT3CheckpointLoad(run.ts, file.name.c_str()), 0);
+  EXPECT_TRUE(trap.says("is of a run with parameter mass = 1, this one was made with 2")) << trap.message;
+}

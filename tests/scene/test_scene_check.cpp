@@ -1,5 +1,6 @@
 /* What is wrong with the description of a scene is said by name, all of it at once. */
 #include "hhtdae/scene.h"
+#include "scene/model.h"
 #include "scene_start.h"
 
 using namespace hhtest;
@@ -179,4 +180,47 @@ TEST(SceneCheck, OptionsOfTheStart)
   }
   Options bad("-scene_angle_tol -1");
   SAYS(complaint(other), "-scene_angle_tol is -1");
+}
+
+TEST(SceneCheck, AStartThatChangesTooLate)
+{
+  for (const bool rotations : {true, false}) {
+    Scene s(PETSC_COMM_SELF);
+    TS    ts;
+    s.add("body", RigidBody());
+    must(s.setUp());
+    if (rotations) s.start().rotations = Rotations::Euler313;
+    else s.start().angle_tol = 1e-3;
+    ErrorTrap trap;
+    EXPECT_NE(s.createTS(&ts), 0);
+    SAYS(trap.message, "Scene::start() was changed after the scene was set up");
+  }
+}
+
+/* which then is no inertia that assembly takes for real */
+TEST(SceneCheck, InertiaThatIsNotThere)
+{
+  for (const bool planar : {true, false}) {
+    Scene     s(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
+    RigidBody gear;
+    gear.mass    = 1e-3;
+    gear.inertia = planar ? Matrix3(Vector3(1, 1, 1e-9).asDiagonal()) : Matrix3(1e-9 * Matrix3::Identity());
+    s.add("gear", gear);
+    s.add("point", PointMass());
+    must(s.setUp());
+    EXPECT_EQ(ModelOf(s).scene.bodies[0].light_inertia, 0);
+  }
+}
+
+TEST(SceneCheck, ShearOfAPlanarBeam)
+{
+  Scene        s(PETSC_COMM_SELF, Space::Planar);
+  RigidBody    b;
+  b.position = {1, 0, 0};
+  Beam beam;
+  beam.i    = s.marker(s.add("body", b));
+  beam.j    = s.marker(s.ground());
+  beam.E    = beam.area = beam.Izz = beam.Iyy = beam.shear_z = 1;
+  s.add("beam", beam);
+  SAYS(complaint(s), "beam beam: G is 0");
 }

@@ -189,11 +189,14 @@ TEST(SceneOutput, SaysWhatIsWrong)
   rods.scene.channel("a", Measure::time());
   rods.scene.channel("/b/", Measure::time());
   rods.scene.channel("time", Measure::time());
+  rods.scene.channel("time/step", Measure::time());
+  rods.scene.channel("arm", Measure::time());
+  rods.scene.channel("arm/x", Measure::time());
   rods.scene.channel("c", Measure::jointForce(Element{7}, 0));
   rods.scene.shape(Body{5}, Shape::sphere(1));
   ErrorTrap trap;
   EXPECT_NE(rods.scene.setUp(), 0);
-  for (const char *part : {"channel a: marker i", "there is one of this name", "begins nor ends with /", "taken by the times", "channel c:", "shape: its body"})
+  for (const char *part : {"channel a: marker i", "there is one of this name", "begins nor ends with /", "taken by the times", "channel time/step: this name is taken", "channel arm/x: there is channel arm", "channel c:", "shape: its body"})
     EXPECT_TRUE(trap.says(part)) << part << "\n" << trap.message;
 }
 

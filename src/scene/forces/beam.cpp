@@ -21,7 +21,7 @@ void CheckSection(ElementBuilder &e, const Beam &s)
   } else {
     RequireNotNegative(e, "Iyy", s.Iyy);
     RequireNotNegative(e, "J", s.J);
-    if (s.shear_y > 0)
+    if (s.shear_y > 0 || s.shear_z > 0)
       RequirePositive(e, "G", s.G);
     else
       RequireNotNegative(e, "G", s.G);

@@ -35,7 +35,7 @@ struct CaseOnBody {
   }
 };
 
-class ModalLoadBatch : public Batch
+class ModalLoadBatch : public ReadingBatch<Batch>
 {
 public:
   struct Instance {
@@ -86,38 +86,18 @@ public:
     }
   }
 
-  void accept(Bodies &B) override
-  {
-    for (Instance &e : all) e.scale.arguments.accept(B);
-  }
-  bool limitsSteps() const override
-  {
-    return std::any_of(all.begin(), all.end(), [](const Instance &e) { return e.scale.arguments.limitsSteps(); });
-  }
-  double longestStep(const Evaluation &ev) const override
-  {
-    double least = std::numeric_limits<double>::infinity();
-    for (const Instance &e : all) least = std::min(least, e.scale.arguments.longestStep(ev));
-    return least;
-  }
-  PetscInt memory() const override
-  {
-    PetscInt n = 0;
-    for (const Instance &e : all) n += e.scale.arguments.memory();
-    return n;
-  }
-  void copyMemory(double *x, bool in) override
-  {
-    for (Instance &e : all) {
-      e.scale.arguments.copyMemory(x, in);
-      x += e.scale.arguments.memory();
-    }
-  }
   bool memoryOf(const StoreBase *s, PetscInt number, double *x) const override
   {
     const PetscInt i = of.find(s, number);
     if (i >= 0) const_cast<LocalFunction &>(all[i].scale).arguments.copyMemory(x, false);
     return i >= 0;
+  }
+
+protected:
+  void each(const Visit &visit) override
+  {
+    for (Instance &e : all)
+      for (LocalMeasure &m : e.scale.arguments.all()) visit(m);
   }
 
 private:
@@ -263,11 +243,7 @@ template <> Element Scene::enter(const std::string &name, const ModalLoad &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  Marker     at;
-  if (flexible) { /* on the floating frame */
-    at = Marker{(PetscInt)s.markers.size(), number_};
-    s.markers.push_back({x.body.id, Vector3::Zero(), Matrix3::Identity()});
-  }
+  const Marker at{flexible ? s.bodies[x.body.id].flexible->frame : -1, number_};
   ElementBuilder e(*this, name, "modal load", ElementData::Force, at, Marker{}, false);
   e.require(flexible, "its body is not a flexible one of this scene");
   if (!e.good()) return e.done();

@@ -124,11 +124,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  Marker     at;
-  if (flexible) { /* on the floating frame */
-    at = Marker{(PetscInt)s.markers.size(), number_};
-    s.markers.push_back({x.body.id, Vector3::Zero(), Matrix3::Identity()});
-  }
+  const Marker at{flexible ? s.bodies[x.body.id].flexible->frame : -1, number_};
   ElementBuilder e(*this, name, "node contact", ElementData::Force, at, x.j);
   e.require(flexible, "its body is not a flexible one of this scene");
   if (!e.good()) return e.done();

@@ -23,7 +23,7 @@ template <class K> struct UserItem {
 };
 
 /* Components eliminated: the kernel's inputs are functions of the unknowns */
-template <class K> class UserBatch : public ForceBatchBase<K>
+template <class K> class UserBatch : public ReadingBatch<ForceBatchBase<K>>
 {
   using Base = ForceBatchBase<K>;
   using Base::M, Base::Z, Base::request_, Base::slot_;
@@ -78,42 +78,18 @@ public:
     }
   }
 
-  void accept(Bodies &B) override
-  {
-    for (LocalFunction &f : functions) f.arguments.accept(B);
-  }
-  bool countedAngle(PetscInt i, PetscInt j, double *x) const override
-  {
-    return std::any_of(functions.begin(), functions.end(), [&](const LocalFunction &f) { return f.arguments.countedAngle(i, j, x); });
-  }
-  bool limitsSteps() const override
-  {
-    return std::any_of(functions.begin(), functions.end(), [](const LocalFunction &f) { return f.arguments.limitsSteps(); });
-  }
-  double longestStep(const Evaluation &ev) const override
-  {
-    double least = std::numeric_limits<double>::infinity();
-    for (const LocalFunction &f : functions) least = std::min(least, f.arguments.longestStep(ev));
-    return least;
-  }
-  PetscInt memory() const override
-  {
-    PetscInt n = 0;
-    for (const LocalFunction &f : functions) n += f.arguments.memory();
-    return n;
-  }
-  void copyMemory(double *x, bool in) override
-  {
-    for (LocalFunction &f : functions) {
-      f.arguments.copyMemory(x, in);
-      x += f.arguments.memory();
-    }
-  }
   bool memoryOf(const StoreBase *s, PetscInt number, double *x) const override
   {
     const PetscInt i = this->of.find(s, number);
     if (i >= 0) const_cast<LocalFunction &>(functions[i]).arguments.copyMemory(x, false);
     return i >= 0;
+  }
+
+protected:
+  void each(const typename ReadingBatch<Base>::Visit &visit) override
+  {
+    for (LocalFunction &f : functions)
+      for (LocalMeasure &m : f.arguments.all()) visit(m);
   }
 
 private:

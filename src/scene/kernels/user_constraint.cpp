@@ -182,6 +182,13 @@ bool UserRow::linear(const At &at) const
   return true;
 }
 
+std::array<int, 2> UserRow::markersOfAngle(int k) const
+{
+  for (const Argument &a : arguments)
+    if (a.kind == Measure::Angle && a.number == k) return {a.marker[0], a.marker[1]};
+  return {-1, -1};
+}
+
 void UserRow::accept(const Frame<double> *f, double *remembered) const
 {
   for (const Argument &a : arguments)

@@ -11,6 +11,7 @@
 #include "marker_measure.h"
 #include "scene/user_function.h"
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -50,6 +51,7 @@ public:
   /* whether f is linear in velocities, with factors that no input changes, where positions and time are those of `at` */
   bool linear(const At &at) const;
 
+  std::array<int, 2> markersOfAngle(int k) const; /* -1: it has no k-th one */
   void   accept(const Frame<double> *f, double *remembered) const;
   double longestStep(const Frame<double> *f, const Twist<double> *w, double angular) const;
 
@@ -70,7 +72,7 @@ template <int M, int Angles> struct UserPosition : Constraint<UserPosition<M, An
   using Base                             = Constraint<UserPosition<M, Angles>, M, 1>;
   using Data                             = UserRowData;
   static constexpr const char *name      = "user constraint";
-  static constexpr int         memory    = Angles;
+  static constexpr int         memory = Angles, angles = Angles;
   static constexpr bool        own_units = true, driven = true;
 
   template <class T> static void value(const Data &d, const Frame<T> *f, const T &t, T *phi)
@@ -91,6 +93,7 @@ template <int M, int Angles> struct UserPosition : Constraint<UserPosition<M, An
   }
   static void time(const Data &d, const Frame<double> *f, double t, double *rate) { rate[0] = -d.row->rate(at(d, f, t)); }
 
+  static std::array<int, 2> markersOfAngle(const Data &d, int k) { return d.row->markersOfAngle(k); }
   static void   accept(Data &d, const Frame<double> *f) { d.row->accept(f, d.memory); }
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double, double angular)
   {
@@ -105,7 +108,7 @@ template <int M, int Angles> struct UserVelocity : VelocityConstraint<UserVeloci
   using Base                             = VelocityConstraint<UserVelocity<M, Angles>, M, 1>;
   using Data                             = UserRowData;
   static constexpr const char *name      = "user constraint of velocities";
-  static constexpr int         memory    = Angles, inputs = UserRow::inputs;
+  static constexpr int         memory = Angles, angles = Angles, inputs = UserRow::inputs;
   static constexpr bool        own_units = true;
 
   template <class T> static void value(const Data &d, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *psi)
@@ -133,6 +136,7 @@ template <int M, int Angles> struct UserVelocity : VelocityConstraint<UserVeloci
     d.row->curvature({f, w, t, z, d.memory}, -lambda[0], H);
   }
 
+  static std::array<int, 2> markersOfAngle(const Data &d, int k) { return d.row->markersOfAngle(k); }
   static void   accept(Data &d, const Frame<double> *f) { d.row->accept(f, d.memory); }
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double, double angular)
   {

@@ -8,7 +8,7 @@ namespace hhtdae
 struct ChannelWork {
   std::vector<PetscMPIInt>        owner;
   std::vector<LocalMeasure>       own;   /* arguments of own channels, one after the other */
-  std::vector<const ChannelData *> what; /* own channels */
+  std::vector<std::size_t> what; /* own channels */
   bool                            energies = false; /* any rank reads one */
 };
 
@@ -17,7 +17,7 @@ namespace
 
 /* Angles and motions that channels read are counted over full turns like those of elements: the batch takes part in accepted steps
    and checkpoints, and adds nothing to the equations. */
-class ChannelBatch : public Batch
+class ChannelBatch : public ReadingBatch<Batch>
 {
 public:
   explicit ChannelBatch(std::shared_ptr<ChannelWork> work) : work_(std::move(work)) {}
@@ -25,36 +25,11 @@ public:
   void pattern(Pattern &) override {}
   void residual(Evaluation &) override {}
   void jacobian(Evaluation &) override {}
-  void accept(Bodies &B) override
+
+protected:
+  void each(const Visit &visit) override
   {
-    for (LocalMeasure &m : work_->own) m.accept(B);
-  }
-  bool countedAngle(PetscInt i, PetscInt j, double *x) const override
-  {
-    return std::any_of(work_->own.begin(), work_->own.end(), [&](const LocalMeasure &m) { return m.countedAngle(i, j, x); });
-  }
-  bool limitsSteps() const override
-  {
-    return std::any_of(work_->own.begin(), work_->own.end(), [](const LocalMeasure &m) { return m.kind == Measure::Angle; });
-  }
-  double longestStep(const Evaluation &e) const override
-  {
-    double least = std::numeric_limits<double>::infinity();
-    for (const LocalMeasure &m : work_->own) least = std::min(least, m.longestStep(e));
-    return least;
-  }
-  PetscInt memory() const override
-  {
-    PetscInt n = 0;
-    for (const LocalMeasure &m : work_->own) n += m.memory();
-    return n;
-  }
-  void copyMemory(double *x, bool in) override
-  {
-    for (LocalMeasure &m : work_->own) {
-      m.copyMemory(x, in);
-      x += m.memory();
-    }
+    for (LocalMeasure &m : work_->own) visit(m);
   }
 
 private:
@@ -73,7 +48,7 @@ PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l)
       work->energies = work->energies || m.kind == Measure::KineticEnergy || m.kind == Measure::PotentialEnergy;
       if (work->owner.back() == R.rank) work->own.push_back(PlaceMeasure(l, m));
     }
-    if (work->owner.back() == R.rank) work->what.push_back(&c);
+    if (work->owner.back() == R.rank) work->what.push_back((std::size_t)(&c - R.scene.channels.data()));
   }
   R.channels = work;
   if (!work->own.empty()) R.batches.push_back(std::make_unique<ChannelBatch>(work));
@@ -96,14 +71,15 @@ PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<
   PetscFunctionBegin;
   if (R.channels->energies) PetscCall(MakeBalance(R, e, b));
   const LocalMeasure *m = R.channels->own.data();
-  for (const ChannelData *c : R.channels->what) {
+  for (std::size_t channel : R.channels->what) {
+    const Expression &value = R.scene.channels[channel].value;
     std::vector<Real> x;
-    for (std::size_t k = 0; k < c->value.arguments.size(); k++, m++) {
+    for (std::size_t k = 0; k < value.arguments.size(); k++, m++) {
       if (m->kind == Measure::KineticEnergy) x.push_back(Real(b.kinetic));
       else if (m->kind == Measure::PotentialEnergy) x.push_back(Real(b.potential()));
       else x.push_back(Real(MeasureValue(*m, e)));
     }
-    values.push_back(c->value.f(x.data()).value());
+    values.push_back(value.f(x.data()).value());
   }
   PetscFunctionReturn(0);
 }

@@ -4,6 +4,9 @@
 namespace hhtdae
 {
 
+/* whether a channel's name has another one for a group */
+static bool Within(const std::string &group, const std::string &name) { return name.size() > group.size() && name.compare(0, group.size(), group) == 0 && name[group.size()] == '/'; }
+
 Channel Scene::channel(const std::string &given, const Expression &value, const std::string &unit)
 {
   if (recording()) record([=](Scene &s) { s.channel(given, value, unit); });
@@ -13,9 +16,12 @@ Channel Scene::channel(const std::string &given, const Expression &value, const 
   s.refuseLate("channel " + name);
   if (name.front() == '/' || name.back() == '/' || name.find("//") != std::string::npos)
     s.errors.push_back(who + "a name neither begins nor ends with /, which separates groups in the file");
-  if (name == "time") s.errors.push_back(who + "this name is taken by the times of the samples");
-  for (const ChannelData &c : s.channels)
-    if (!given.empty() && c.name == name) s.errors.push_back(who + "there is one of this name");
+  if (name == "time" || Within("time", name)) s.errors.push_back(who + "this name is taken by the times of the samples");
+  for (const ChannelData &c : s.channels) {
+    if (c.name == name) s.errors.push_back(who + "there is one of this name");
+    if (Within(c.name, name) || Within(name, c.name))
+      s.errors.push_back(who + "there is channel " + c.name + ", and what stands before a / is a group of channels in the file, which is not a channel itself");
+  }
   if (!value.f) s.errors.push_back(who + "its function is empty");
   for (const Measure &m : value.arguments) {
     const std::string error = CheckMeasure(s, m, false);

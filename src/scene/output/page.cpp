@@ -203,13 +203,13 @@ private:
   PetscErrorCode pack(const Runtime &R, const Evaluation &e, std::vector<double> &mine) const
   {
     PetscFunctionBegin;
-    for (std::size_t b = 0; b < R.scene.bodies.size(); b++) {
+    for (std::size_t b = 0; b < R.local_body.size(); b++) {
       if (ownerOf(R, b) != R.rank) continue;
       const BodyMotion        &m = R.bodies.now[R.local_body[b]];
       const Eigen::Quaterniond q(m.A);
       for (double x : {m.r(0), m.r(1), m.r(2), q.x(), q.y(), q.z(), q.w()}) mine.push_back(x);
     }
-    for (std::size_t b = 0; b < R.scene.bodies.size(); b++) {
+    for (std::size_t b = 0; b < R.local_body.size(); b++) {
       const BodyData &d = R.scene.bodies[b];
       if (ownerOf(R, b) != R.rank || !d.flexible) continue;
       const double *eta = e.u + R.bodies.body[R.local_body[b]].first + 6;
