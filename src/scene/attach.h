@@ -32,10 +32,7 @@ public:
   bool          isExplicit() const override { return true; }
   bool          everIndependent() const override { return true; } /* each has a frame of its own */
   bool          curves() const override { return false; }
-  bool          carried(PetscInt) const override { return false; }
   bool          usesVelocities() const override { return false; }
-  int           inputs() const override { return 0; }
-  ScalarRef     input(PetscInt, int) const override { return {}; }
   void          localize(Localizer &, std::vector<std::unique_ptr<Batch>> &) const override {}
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override;
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override;

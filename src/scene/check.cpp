@@ -4,7 +4,6 @@
 #include "symmetric.h"
 #include <cmath>
 #include <set>
-#include <sstream>
 
 namespace hhtdae
 {
@@ -14,14 +13,7 @@ namespace
 
 constexpr double angle_tolerance = 1e-8; /* of directions that have to be exact */
 
-std::string Text(double x)
-{
-  std::ostringstream o;
-  o.precision(6);
-  o << x;
-  return o.str();
-}
-std::string Text(const Vector3 &x) { return Text(x(0)) + ", " + Text(x(1)) + ", " + Text(x(2)); }
+std::string Text(const Vector3 &x) { return Show(x(0)) + ", " + Show(x(1)) + ", " + Show(x(2)); }
 
 bool SameStart(const StartPolicy &a, const StartPolicy &b)
 {
@@ -57,7 +49,7 @@ private:
   {
     if (b.massless) return; /* the frame of an attachment follows its body */
     const std::string who = "body " + b.name;
-    require(std::isfinite(b.mass) && b.mass >= 0, who, "mass is " + Text(b.mass) + ", must be positive, or 0 where joints determine what it does");
+    require(std::isfinite(b.mass) && b.mass >= 0, who, "mass is " + Show(b.mass) + ", must be positive, or 0 where joints determine what it does");
     require(b.r.allFinite() && b.v.allFinite() && b.w.allFinite(), who,
             "position, velocity and angular velocity must be finite");
     if (b.point) {
@@ -66,12 +58,12 @@ private:
     }
     const double off = b.A.allFinite() ? (b.A.transpose() * b.A - Matrix3::Identity()).norm() : INFINITY;
     require(off < angle_tolerance, who,
-            "rotation is not orthonormal (R^T R misses the identity by " + Text(off) + "); give body axes as columns");
+            "rotation is not orthonormal (R^T R misses the identity by " + Show(off) + "); give body axes as columns");
     if (off < angle_tolerance)
       require(b.A.determinant() > 0, who, "rotation is left-handed; its third column must be the first x the second");
     if (s_.planar)
       require(std::isfinite(b.inertia(2, 2)) && b.inertia(2, 2) >= 0, who,
-              "inertia(2,2) is " + Text(b.inertia(2, 2)) + ", must be positive, or 0 where joints determine the angle");
+              "inertia(2,2) is " + Show(b.inertia(2, 2)) + ", must be positive, or 0 where joints determine the angle");
     else
       inertia(b, who);
     inPlane(b, who);
@@ -85,7 +77,7 @@ private:
     }
     const double scale = b.inertia.norm(), skew = (b.inertia - b.inertia.transpose()).norm();
     require(skew <= 1e-10 * scale, who,
-            "inertia is not symmetric (off by " + Text(skew) +
+            "inertia is not symmetric (off by " + Show(skew) +
                 "); products of inertia have the same sign on both sides");
     if (skew > 1e-10 * scale) return;
     const Vector3     I      = SymmetricEigen(b.inertia).values;
@@ -104,7 +96,7 @@ private:
   {
     if (!s_.planar) return;
     require(std::abs(b.r(2)) < angle_tolerance && std::abs(b.v(2)) < angle_tolerance, who,
-            "z is " + Text(b.r(2)) + " and its velocity " + Text(b.v(2)) + "; in a planar scene both are 0");
+            "z is " + Show(b.r(2)) + " and its velocity " + Show(b.v(2)) + "; in a planar scene both are 0");
     require(b.w(0) == 0 && b.w(1) == 0, who, "angular velocity is " + Text(b.w) + "; in a planar scene it is along z");
     require(b.point || std::abs(b.A(2, 2) - 1) < angle_tolerance, who,
             "its z axis is not along z, as in a planar scene it must be");
@@ -119,7 +111,7 @@ private:
     const std::string who =
         "marker " + (name == s_.marker_names.end() ? std::to_string(id) + " on " + s_.bodyName(m.body) : name->second);
     require(std::abs(m.s(2)) < angle_tolerance, who,
-            "z is " + Text(m.s(2)) + "; markers of a planar scene lie in its plane, z = 0");
+            "z is " + Show(m.s(2)) + "; markers of a planar scene lie in its plane, z = 0");
     require(std::abs(m.R(2, 2) - 1) < angle_tolerance, who,
             "its z axis is " + Text(Vector3(m.R.col(2))) + "; in a planar scene it is along z");
   }

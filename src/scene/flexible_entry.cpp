@@ -1,7 +1,6 @@
 /* Flexible bodies of a scene's description, and the frames of their attachments. */
 #include "attach.h"
 #include <cmath>
-#include <sstream>
 
 namespace hhtdae
 {
@@ -14,13 +13,6 @@ double RatioOf(const FlexibleBody &b, double frequency)
   for (const DampingBand &band : b.damping)
     if (!(frequency > band.below)) return band.ratio;
   return b.damping.empty() ? 0 : b.damping.back().ratio;
-}
-
-std::string Number(double x)
-{
-  std::ostringstream o;
-  o << x;
-  return o.str();
 }
 
 std::vector<double> Sized(const Eigen::VectorXd &x, PetscInt n)
@@ -86,7 +78,7 @@ std::string Fault(const FlexibleBody &b, bool planar)
   if (planar) return "flexible bodies need a scene in space";
   if (!SameColumns(m)) return "its ModalBody has " + std::to_string(n) + " frequencies, and invariants, attachments, nodes or loads with another number of modes";
   if (!Finite(m)) return "its ModalBody has values that are not finite";
-  if (!(m.mass > 0 && m.moments.trace() > 0)) return "its ModalBody has a mass of " + Number(m.mass) + " and second moments of mass of " + Number(m.moments.trace()) + " in all; both are positive";
+  if (!(m.mass > 0 && m.moments.trace() > 0)) return "its ModalBody has a mass of " + Show(m.mass) + " and second moments of mass of " + Show(m.moments.trace()) + " in all; both are positive";
   if (n && m.omega.minCoeff() <= 0) return "mode " + std::to_string(n) + " or another has no positive frequency; rigid-body modes do not belong to a ModalBody";
   for (const auto &x : m.quadratic)
     if (n && !x.size() && b.mass == ModalMass::Full) return "its ModalBody has no invariants quadratic in the modes; use ModalMass::Partial or Constant";
@@ -99,7 +91,7 @@ std::string Fault(const FlexibleBody &b, bool planar)
     const DampingBand &d = b.damping[k];
     if (!(d.ratio >= 0) || !std::isfinite(d.ratio)) return "a damping ratio is negative or not finite";
     if (!(k ? d.below > b.damping[k - 1].below : d.below >= 0))
-      return "its bands of damping end at " + (k ? Number(b.damping[k - 1].below) + " and then at " : std::string()) + Number(d.below) + "; they have to be given by increasing frequency";
+      return "its bands of damping end at " + (k ? Show(b.damping[k - 1].below) + " and then at " : std::string()) + Show(d.below) + "; they have to be given by increasing frequency";
   }
   if (b.ratios.size() && !(b.ratios.minCoeff() >= 0 && b.ratios.allFinite())) return "a damping ratio is negative or not finite";
   return "";

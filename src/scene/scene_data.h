@@ -5,6 +5,7 @@
 #include "frames.h"
 #include "hhtdae/scene.h"
 #include "kernel.h"
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <string>
@@ -60,6 +61,14 @@ struct ScalarRef {
 
 class StoreBase; /* all instances of one kernel, store.h */
 class Extension; /* unknowns of other kinds, extension.h */
+
+/* A number in messages */
+inline std::string Show(double x)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", x);
+  return text;
+}
 
 /* One kernel instance of an element */
 struct Part {

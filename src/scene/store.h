@@ -35,12 +35,12 @@ public:
   virtual int           markers() const                   = 0;
   virtual PetscInt      marker(PetscInt e, int k) const   = 0;
   virtual PetscInt      element(PetscInt e) const         = 0;
-  virtual bool          isConstraint() const              = 0;
-  virtual bool          isHolonomic() const               = 0; /* of constraints */
+  virtual bool          isConstraint() const { return false; }
+  virtual bool          isHolonomic() const { return false; } /* of constraints */
   virtual int           rows() const                      = 0; /* of a constraint, components of a force */
-  virtual unsigned char active(PetscInt e) const          = 0; /* bits of the rows that stay */
+  virtual unsigned char active(PetscInt) const { return 0; } /* bits of the rows of a constraint that stay */
   virtual void          setActive(PetscInt, unsigned char) {}
-  virtual bool          carried(PetscInt) const           = 0; /* as force states */
+  virtual bool          carried(PetscInt) const { return false; } /* as force states */
   virtual bool          usesVelocities() const { return true; }
   virtual bool          isExplicit() const { return false; } /* a constraint of the description alone, which a run meets without unknowns */
   virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
@@ -48,8 +48,8 @@ public:
   virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
   virtual int           memory() const { return 0; } /* numbers that an instance remembers of accepted steps */
   virtual void          remember(PetscInt, double *) {} /* these in place of what the description tells */
-  virtual int           inputs() const                    = 0;
-  virtual ScalarRef     input(PetscInt e, int i) const    = 0;
+  virtual int           inputs() const { return 0; }
+  virtual ScalarRef     input(PetscInt, int) const { return {}; }
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
   virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint, before any numbering */
   /* one instance to be read where it is not assembled: loads of a constraint, components of a force that is not carried */
@@ -155,11 +155,8 @@ public:
 template <class K> class ForceStore : public StoreOf<K>
 {
 public:
-  bool          isConstraint() const override { return false; }
-  bool          isHolonomic() const override { return false; }
-  bool          usesVelocities() const override { return K::damped; }
-  int           rows() const override { return K::count; }
-  unsigned char active(PetscInt) const override { return 0; }
+  bool usesVelocities() const override { return K::damped; }
+  int  rows() const override { return K::count; }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {

@@ -189,13 +189,8 @@ public:
   int           markers() const override { return 1; }
   PetscInt      marker(PetscInt e, int) const override { return all[e].marker; }
   PetscInt      element(PetscInt e) const override { return all[e].element; }
-  bool          isConstraint() const override { return false; }
-  bool          isHolonomic() const override { return false; }
   int           rows() const override { return 1; }
-  unsigned char active(PetscInt) const override { return 0; }
   bool          carried(PetscInt e) const override { return all[e].carried; }
-  int           inputs() const override { return 0; }
-  ScalarRef     input(PetscInt, int) const override { return {}; }
 
   const std::vector<Expression> *expressions(PetscInt e) const override { return &all[e].scale; }
 

@@ -55,13 +55,7 @@ public:
   int           markers() const override { return 2; }
   PetscInt      marker(PetscInt e, int k) const override { return all[e].marker[k]; }
   PetscInt      element(PetscInt e) const override { return all[e].element; }
-  bool          isConstraint() const override { return false; }
-  bool          isHolonomic() const override { return false; }
   int           rows() const override { return 3; }
-  unsigned char active(PetscInt) const override { return 0; }
-  bool          carried(PetscInt) const override { return false; }
-  int           inputs() const override { return 0; }
-  ScalarRef     input(PetscInt, int) const override { return {}; }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {

@@ -4,18 +4,10 @@
 
 #include "scene/scene_data.h"
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 namespace hhtdae
 {
-
-inline std::string Show(double x)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", x);
-  return text;
-}
 
 inline void RequireFinite(ElementBuilder &e, const std::string &what, double x)
 {

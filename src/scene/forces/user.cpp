@@ -158,13 +158,8 @@ public:
   int           markers() const override { return K::markers; }
   PetscInt      marker(PetscInt e, int k) const override { return all[e].marker[k]; }
   PetscInt      element(PetscInt e) const override { return all[e].element; }
-  bool          isConstraint() const override { return false; }
-  bool          isHolonomic() const override { return false; }
   int           rows() const override { return K::count; }
-  unsigned char active(PetscInt) const override { return 0; }
   bool          carried(PetscInt e) const override { return all[e].carried; }
-  int           inputs() const override { return 0; }
-  ScalarRef     input(PetscInt, int) const override { return {}; }
 
   const std::vector<Expression> *expressions(PetscInt e) const override { return &all[e].expressions; }
 

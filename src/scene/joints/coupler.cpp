@@ -18,7 +18,7 @@ void CheckTerm(ElementBuilder &e, const Term &t, std::size_t k)
   e.require(t.i, (term + ": marker i").c_str());
   e.require(t.j, (term + ": marker j").c_str());
   e.require(std::isfinite(t.factor) && t.factor != 0,
-            term + ": factor is " + Text(t.factor) + ", must be finite and not zero");
+            term + ": factor is " + Show(t.factor) + ", must be finite and not zero");
   if (e.good()) RequirePair(e, t.i, t.j, t.rotation, term + ": ");
 }
 
@@ -69,7 +69,7 @@ Element Couple(ElementBuilder &e, Terms terms)
 template <> Element Scene::enter(const std::string &name, const Gear &s)
 {
   ElementBuilder e(*this, name, "gear", ElementData::Joint, s.i1, s.j1);
-  e.require(std::isfinite(s.ratio) && s.ratio != 0, "ratio is " + Text(s.ratio) + ", must be finite and not zero");
+  e.require(std::isfinite(s.ratio) && s.ratio != 0, "ratio is " + Show(s.ratio) + ", must be finite and not zero");
   if (!e.good()) return e.done();
   return Couple(e, {{s.i1, s.j1, true, 1}, {s.i2, s.j2, true, s.ratio}});
 }
@@ -78,7 +78,7 @@ template <> Element Scene::enter(const std::string &name, const Gear &s)
 template <> Element Scene::enter(const std::string &name, const RackAndPinion &s)
 {
   ElementBuilder e(*this, name, "rack and pinion", ElementData::Joint, s.i1, s.j1);
-  e.require(std::isfinite(s.radius) && s.radius != 0, "radius is " + Text(s.radius) + ", must be finite and not zero");
+  e.require(std::isfinite(s.radius) && s.radius != 0, "radius is " + Show(s.radius) + ", must be finite and not zero");
   if (!e.good()) return e.done();
   return Couple(e, {{s.i1, s.j1, true, -s.radius}, {s.i2, s.j2, false, 1}});
 }

@@ -33,7 +33,7 @@ public:
   void positive(const char *what, double value)
   {
     require(std::isfinite(value) && value > 0,
-            std::string(what) + " is " + text(value) + ", must be positive and finite");
+            std::string(what) + " is " + Show(value) + ", must be positive and finite");
   }
 
   /* Rows of kernel K. What it takes from the axes of a marker could not react on a body without rotation. */
@@ -45,13 +45,6 @@ public:
         require(false, std::string("marker ") + (k == 0 ? "i" : "j") + " is on " + scene().turnlessName(body(k)) + ", must be on a rigid body or the ground");
     }
     if (good()) constrain<K>({marker_[0], marker_[1]}, data);
-  }
-
-  static std::string text(double x)
-  {
-    char s[32];
-    snprintf(s, sizeof s, "%g", x);
-    return s;
   }
 
 private:

@@ -12,7 +12,7 @@ template <> Element Scene::enter(const std::string &name, const Screw &s)
 {
   ElementBuilder e(*this, name, "screw", ElementData::Joint, s.i, s.j);
   e.require(!e.planar(), "a planar scene has no screws");
-  e.require(std::isfinite(s.pitch), "pitch is " + Text(s.pitch) + ", must be finite");
+  e.require(std::isfinite(s.pitch), "pitch is " + Show(s.pitch) + ", must be finite");
   if (e.good()) RequirePair(e, s.i, s.j, true);
   if (e.good()) {
     const Frame<double> f[2] = {e.frame(s.i), e.frame(s.j)};

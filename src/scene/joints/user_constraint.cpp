@@ -149,7 +149,7 @@ private:
     } catch (const std::exception &error) {
       e_.require(false, where_ + " has failed at the start: " + error.what());
     }
-    require(std::isfinite(value), " is " + Text(value) + " at the start, must be finite");
+    require(std::isfinite(value), " is " + Show(value) + " at the start, must be finite");
     require(std::isfinite(sum), " has no finite derivatives at the start; the distance of markers that coincide has none");
   }
   template <int M> void put()

@@ -13,11 +13,11 @@ void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of, double
 {
   e.require(f.error().empty(), "its function: " + f.error());
   if (!e.good()) return;
-  const std::string         when = " at the start, t = " + Text(t) + (t == 0 ? " (another time is set before by Scene::start())" : "");
+  const std::string         when = " at the start, t = " + Show(t) + (t == 0 ? " (another time is set before by Scene::start())" : "");
   const TimeFunction::Value v    = f(t);
-  e.require(std::isfinite(v.f), "its function is " + Text(v.f) + when + ", must be finite");
+  e.require(std::isfinite(v.f), "its function is " + Show(v.f) + when + ", must be finite");
   if (of == MotionOf::Displacement)
-    e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Text(v.f1) + " and " + Text(v.f2) + when + ", a displacement needs them finite");
+    e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Show(v.f1) + " and " + Show(v.f2) + when + ", a displacement needs them finite");
 }
 
 /* f as the rate of a state */

@@ -4,18 +4,10 @@
 
 #include "scene/kernels/angle.h"
 #include "scene/scene_data.h"
-#include <cstdio>
 #include <string>
 
 namespace hhtdae
 {
-
-inline std::string Text(double x)
-{
-  char s[32];
-  snprintf(s, sizeof s, "%g", x);
-  return s;
-}
 
 /* Markers i and j are known to be markers of the scene. where: "term 2: " */
 inline void RequirePair(ElementBuilder &e, Marker i, Marker j, bool rotation, const std::string &where = "")
