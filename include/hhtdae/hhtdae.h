@@ -62,8 +62,8 @@ typedef struct {
   PetscInt  jacobians;       /* evaluations of the application's Jacobian */
   PetscInt  factorizations;  /* set-ups of the preconditioner with a new matrix */
   PetscInt  solves;          /* linear solves */
-  PetscReal time;            /* wall-clock seconds from the first step of TSSolve() to its end */
-  PetscReal cpu;             /* CPU seconds of this process over the same span */
+  PetscReal time;            /* wall-clock seconds from the first step of a TSSolve() to its end, of all of them; in between up to now */
+  PetscReal cpu;             /* CPU seconds of this process over the same spans */
   PetscInt  corrector_fails; /* corrections that did not converge */
   PetscInt  retries;         /* of these, repeated at the same h with a new matrix */
   PetscInt  restarts;        /* consistent starts: the first one, events, TSRestartStep() */

@@ -183,6 +183,7 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   PetscFunctionBegin;
   PetscCheck(I.have_step || I.at_begin, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
   PetscTryMethod(ts, "TSHHT3CheckpointPrepare_C", (TS), (ts));
+  StopClocks(I, false);
   PetscCall(Gather(ts, a));
   PetscCall(CheckpointFileWrite(PetscObjectComm((PetscObject)ts), file, a.data));
   PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
@@ -206,6 +207,7 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscCall(NoteState(ts));
   I.sol_id           = 0; /* compare the solution with the step's end: it may have been changed after it */
   I.checkpoint_steps = I.stat.steps;
+  I.timed            = PETSC_FALSE;
   if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));
   PetscCall(PetscInfo(ts, "resumed at t = %g, step %" PetscInt_FMT ", from %s\n", (double)ts->ptime, ts->steps, file));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -119,10 +119,7 @@ PetscErrorCode SetUp(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (I.wall0 <= 0) {
-    ReadClocks(&I.wall0, &I.cpu0);
-    I.progress_t0 = I.t_begin = ts->ptime;
-  }
+  if (!I.U0) I.t_begin = ts->ptime;
   PetscCall(PetscCitationsRegister(citation, &cited));
   PetscCall(CheckProblem(ts));
   PetscCall(TSGetAdapt(ts, &ts->adapt));
@@ -166,8 +163,9 @@ PetscErrorCode Reset(TS ts)
   PetscCall(MatDestroy(&I.second));
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SamplerDestroy(I));
-  if (!I.is_set)
-    for (IS &is : I.is) PetscCall(ISDestroy(&is));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
+    if (!I.is_set || (r == TSHHT3_COORDINATE && I.made_coordinates)) PetscCall(ISDestroy(&I.is[r]));
+  I.made_coordinates = PETSC_FALSE;
   I.role.clear();
   I.moves.clear();
   I.states.clear();
@@ -185,7 +183,7 @@ PetscErrorCode Reset(TS ts)
   I.linear.failed   = PC_NOERROR;
   I.scaled_operator = 0;
   I.stage_id        = 0;
-  I.wall0           = 0;
+  I.timed           = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

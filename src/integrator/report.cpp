@@ -6,18 +6,29 @@
 namespace hht3
 {
 
-void ReadClocks(PetscReal *wall, PetscReal *cpu)
+namespace
 {
-  *wall = std::chrono::duration<PetscReal>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  *cpu  = (PetscReal)std::clock() / CLOCKS_PER_SEC;
+
+PetscReal Wall() { return std::chrono::duration<PetscReal>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+PetscReal Processor() { return (PetscReal)std::clock() / CLOCKS_PER_SEC; }
+
+} // namespace
+
+/* Of what the run has taken before, in an earlier TSSolve() or in the process that wrote its checkpoint, the statistics know */
+void StartClocks(Integrator &I)
+{
+  if (I.timed) return;
+  I.wall0 = Wall() - I.stat.time;
+  I.cpu0  = Processor() - I.stat.cpu;
+  I.timed = PETSC_TRUE;
 }
 
-void StopClocks(Integrator &I)
+void StopClocks(Integrator &I, bool stop)
 {
-  PetscReal wall, cpu;
-  ReadClocks(&wall, &cpu);
-  I.stat.time = wall - I.wall0;
-  I.stat.cpu  = cpu - I.cpu0;
+  if (!I.timed) return;
+  I.stat.time = Wall() - I.wall0;
+  I.stat.cpu  = Processor() - I.cpu0;
+  I.timed     = (PetscBool)!stop;
 }
 
 /* TSSolve() calls its monitors a last time with the reason set, and that is when the line is due */
@@ -27,7 +38,7 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
   if (ts->ops->step != Step || !ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
   Integrator             &I = Get(ts);
   const TSHHT3Statistics &s = I.stat;
-  StopClocks(I);
+  StopClocks(I, true);
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                         "summary: steps=%" PetscInt_FMT " rejected=%" PetscInt_FMT " newton=%" PetscInt_FMT " residuals=%" PetscInt_FMT
                         " jacobians=%" PetscInt_FMT " factorizations=%" PetscInt_FMT " solves=%" PetscInt_FMT " time=%.6g cpu=%.6g fails=%" PetscInt_FMT
@@ -43,18 +54,17 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 /* One line, rewritten four times a second, with what is left of the run at its average rate */
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
 {
-  PetscReal      now, cpu;
-  FILE          *out = PETSC_STDERR;
+  FILE *out = PETSC_STDERR;
 
   PetscFunctionBegin;
   if (ts->ops->step != Step || step < 0) PetscFunctionReturn(PETSC_SUCCESS); /* the TS may be of another type by now */
   Integrator &I = Get(ts);
-  ReadClocks(&now, &cpu);
-  if (I.wall0 <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal now = Wall();
+  if (!ts->steps) PetscFunctionReturn(PETSC_SUCCESS);
   if (!ts->reason && now - I.progress_last < 0.25) PetscFunctionReturn(PETSC_SUCCESS);
   I.progress_last          = now;
-  const PetscReal      spent = now - I.wall0;
-  const PetscReal      done  = t - I.progress_t0;
+  const PetscReal      spent = I.timed ? now - I.wall0 : I.stat.time;
+  const PetscReal      done  = t - I.t_begin;
   const PetscReal      rate  = spent > 0 ? done / spent : 0;
   const PetscReal      left  = rate > 0 && ts->max_time < PETSC_MAX_REAL / 2 ? (ts->max_time - t) / rate : 0;
   PetscCall(PetscFPrintf(PetscObjectComm((PetscObject)ts), out, "\rt = %-12.6g h = %-10.3e step %-9" PetscInt_FMT " %.3e of time per second, %.0f s left   %s", (double)t, (double)I.h, step, (double)rate,

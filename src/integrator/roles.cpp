@@ -194,6 +194,7 @@ PetscErrorCode TakeSets(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Those that were detected, and coordinates that nobody has named among roles that were */
 PetscErrorCode MakeSets(TS ts)
 {
   Integrator &I = Get(ts);
@@ -202,7 +203,8 @@ PetscErrorCode MakeSets(TS ts)
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) {
-    if (!I.count[r]) continue;
+    if (!I.count[r] || (I.is_set && (r != TSHHT3_COORDINATE || I.is[r]))) continue;
+    I.made_coordinates = I.is_set;
     std::vector<PetscInt> index;
     for (size_t i = 0; i < I.role.size(); i++)
       if (I.role[i] == r) index.push_back(start + (PetscInt)i);
@@ -237,7 +239,7 @@ PetscErrorCode SetUpRoles(TS ts)
   PetscCallMPI(MPI_Allreduce(local, global, TSHHT3_NUM_ROLES + 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++) I.count[r] = global[r];
   I.definitions_use_acceleration = (PetscBool)(global[TSHHT3_NUM_ROLES] > 0);
-  if (!I.is_set) PetscCall(MakeSets(ts));
+  PetscCall(MakeSets(ts));
   PetscCall(CheckTriangle(ts));
   PetscCall(VecGetSize(ts->vec_sol, &n));
   if (I.count[TSHHT3_COORDINATE] == n) I.role = std::vector<unsigned char>(); /* an ODE: no roles to look up */

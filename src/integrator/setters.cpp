@@ -42,7 +42,7 @@ PetscErrorCode SetAlpha(TS ts, PetscReal alpha)
 {
   PetscFunctionBegin;
   PetscCheck(alpha >= (PetscReal)-1 / 3 - 1e-12 && alpha <= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "alpha = %g is not in [-1/3, 0]", (double)alpha);
-  PetscCall(NotAfterSetUp(ts, "alpha"));
+  if (alpha != Get(ts).alpha || Get(ts).radius >= 0) PetscCall(NotAfterSetUp(ts, "alpha"));
   Get(ts).alpha  = alpha;
   Get(ts).radius = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -51,7 +51,7 @@ PetscErrorCode SetAlpha(TS ts, PetscReal alpha)
 PetscErrorCode GetAlpha(TS ts, PetscReal *alpha)
 {
   PetscFunctionBegin;
-  *alpha = Get(ts).radius < 0 ? Get(ts).alpha : -Get(ts).hht.af;
+  *alpha = Get(ts).radius < 0 ? Get(ts).alpha : -RadiusParameters(Get(ts).radius).af;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,7 +59,7 @@ PetscErrorCode SetRadius(TS ts, PetscReal rho)
 {
   PetscFunctionBegin;
   PetscCheck(rho >= 0 && rho <= 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Spectral radius %g is not in [0, 1]", (double)rho);
-  PetscCall(NotAfterSetUp(ts, "The spectral radius"));
+  if (rho != Get(ts).radius) PetscCall(NotAfterSetUp(ts, "The spectral radius"));
   Get(ts).radius = rho;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,13 +92,15 @@ PetscErrorCode SetCorrectorTolerance(TS ts, PetscReal c)
 
 PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
 {
-  Predictor &p = Get(ts).predictor;
+  Predictor      &p     = Get(ts).predictor;
+  const PetscBool fixed = (PetscBool)(degree >= 0);
+  const PetscInt  most  = fixed ? degree : hht_degree;
 
   PetscFunctionBegin;
   PetscCheck(degree >= -1 && degree <= hht_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, hht_degree);
-  PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
-  p.fixed      = (PetscBool)(degree >= 0);
-  p.degree_max = degree >= 0 ? degree : hht_degree;
+  if (fixed != p.fixed || most != p.degree_max) PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
+  p.fixed      = fixed;
+  p.degree_max = most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -158,8 +160,11 @@ PetscErrorCode GetAcceleration(TS ts, Vec *A)
 
 PetscErrorCode GetStatistics(TS ts, TSHHT3Statistics *s)
 {
+  Integrator &I = Get(ts);
+
   PetscFunctionBegin;
-  *s = Get(ts).stat;
+  StopClocks(I, ts->reason != TS_CONVERGED_ITERATING);
+  *s = I.stat;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

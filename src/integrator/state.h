@@ -242,6 +242,7 @@ struct Integrator : StepState {
   /* the problem: roles of local unknowns and rows; empty where every unknown is a coordinate */
   IS                         is[TSHHT3_NUM_ROLES] = {};
   PetscBool                  is_set               = PETSC_FALSE; /* by the application, not detected */
+  PetscBool              made_coordinates = PETSC_FALSE; /* their set, beside those that were named */
   std::vector<unsigned char> role;
   std::vector<float>         moves;  /* 1 for coordinates, 0 for others: for loops without branches. Empty where roles are. */
   std::vector<PetscInt>      states, constrained; /* local unknowns that are first-order states, multipliers of constraints */
@@ -308,8 +309,8 @@ struct Integrator : StepState {
   PetscInt         checkpoint_every = 0;
   PetscInt         checkpoint_steps = 0; /* accepted steps when the last one was written or read */
   Vec              checkpoint_vec = nullptr; /* the application's, saved and restored with the state */
+  PetscBool        timed = PETSC_FALSE; /* the clocks run, since then: */
   PetscReal        wall0 = 0, cpu0 = 0;
-  PetscReal        progress_t0 = 0;
   PetscReal        progress_last = 0;
 };
 

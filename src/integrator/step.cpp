@@ -326,6 +326,7 @@ PetscErrorCode Step(TS ts)
   PetscReal   next;
 
   PetscFunctionBegin;
+  StartClocks(I);
   PetscCall(PassStops(ts));
   next = ts->time_step;
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
@@ -353,7 +354,7 @@ PetscErrorCode Step(TS ts)
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
   }
-  if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I);
+  if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,10 +13,9 @@ PetscErrorCode RollBack(TS ts);
 /* vec_sol and vec_dot are as the integrator left them: the next step need not start anew */
 PetscErrorCode NoteState(TS ts);
 
-void ReadClocks(PetscReal *wall, PetscReal *cpu);
-
-/* The time since the set-up into the statistics */
-void StopClocks(Integrator &I);
+/* The clocks of the statistics run from the first step of a solve on; their time into the statistics, and whether they stop with that */
+void StartClocks(Integrator &I);
+void StopClocks(Integrator &I, bool stop);
 
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);

@@ -443,3 +443,33 @@ TEST(Options, OneLinearSolvePerStep)
   EXPECT_GE(s.newton, s.steps);
   EXPECT_LT(run.errors().q, 1e-3);
 }
+
+TEST(Options, AlphaOfARadius)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  PetscReal      before, after;
+  must(TSHHT3SetRadius(run.ts, .8));
+  must(TSHHT3GetAlpha(run.ts, &before));
+  must(TSSetUp(run.ts));
+  must(TSHHT3GetAlpha(run.ts, &after));
+  EXPECT_DOUBLE_EQ(before, -.8 / 1.8);
+  EXPECT_DOUBLE_EQ(after, before);
+}
+
+/* as TSSetFromOptions() between two TSSolve() does */
+TEST(Options, TheSameValuesAfterTheSetUp)
+{
+  const Pendulum p;
+  for (const bool radius : {false, true}) {
+    Simulation run(p, std::string("-ts_hhtdae_predictor_degree 2 ") + (radius ? "-ts_hhtdae_radius 0.8" : "-ts_hhtdae_alpha -0.1"));
+    must(TSSetUp(run.ts));
+    EXPECT_EQ(TSHHT3SetPredictorDegree(run.ts, 2), 0);
+    EXPECT_EQ(radius ? TSHHT3SetRadius(run.ts, .8) : TSHHT3SetAlpha(run.ts, -.1), 0);
+    ErrorTrap trap;
+    EXPECT_NE(TSHHT3SetPredictorDegree(run.ts, 3), 0);
+    EXPECT_NE(TSHHT3SetPredictorDegree(run.ts, -1), 0);
+    EXPECT_NE(TSHHT3SetRadius(run.ts, .7), 0);
+    EXPECT_NE(TSHHT3SetAlpha(run.ts, radius ? -.1 : -.2), 0);
+  }
+}

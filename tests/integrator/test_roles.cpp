@@ -242,3 +242,24 @@ TEST(Roles, EmptyRowIsNamed)
   EXPECT_EQ(TSSetUp(run.ts), PETSC_ERR_ARG_WRONG);
   EXPECT_TRUE(trap.says("Row 2 of the residual depends on no unknown")) << trap.message;
 }
+
+/* Who names constraints alone may ask for the coordinates, after TSReset() as well */
+TEST(Roles, CoordinatesAreThoseThatNobodyNames)
+{
+  const Pendulum p;
+  Simulation     run(p, "");
+  IS             is;
+  PetscInt       n;
+  setIS(run.ts, TSHHT3_HOLONOMIC, {2});
+  for (int k = 0; k < 2; k++) {
+    must(TSHHT3GetIS(run.ts, TSHHT3_COORDINATE, &is));
+    EXPECT_EQ(is, nullptr);
+    must(TSSetUp(run.ts));
+    must(TSHHT3GetIS(run.ts, TSHHT3_COORDINATE, &is));
+    ASSERT_NE(is, nullptr);
+    must(ISGetSize(is, &n));
+    EXPECT_EQ(n, 2);
+    must(TSReset(run.ts));
+    must(TS2SetSolution(run.ts, run.U, run.V));
+  }
+}

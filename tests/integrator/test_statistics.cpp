@@ -1,5 +1,7 @@
 /* The counters, and by them the reuse of the matrix */
 #include "support.h"
+#include <chrono>
+#include <thread>
 
 using namespace hhtest;
 
@@ -95,6 +97,26 @@ TEST(Statistics, Times)
   EXPECT_GT(run.statistics().time, 0.);
   EXPECT_GT(run.statistics().cpu, 0.);
   EXPECT_LT(run.statistics().cpu, 60.);
+}
+
+/* After each step, and without what lies between two solves */
+TEST(Statistics, TimesOfStepsAlone)
+{
+  const Pendulum p(-90., 0., .1);
+  Simulation     run(p, tolerance(1e-6));
+  const auto     pause = std::chrono::milliseconds(250);
+  must(TSSetUp(run.ts));
+  std::this_thread::sleep_for(pause);
+  must(run.step());
+  const PetscReal first = run.statistics().time;
+  EXPECT_GT(first, 0.);
+  EXPECT_GE(run.statistics().time, first);
+  must(run.solve());
+  std::this_thread::sleep_for(pause);
+  must(TSSetMaxTime(run.ts, .2));
+  must(run.solve());
+  EXPECT_GT(run.statistics().time, first);
+  EXPECT_LT(run.statistics().time, 1e-3 * (double)pause.count());
 }
 
 /* A linear problem at one h needs one matrix, beside those of the start */
