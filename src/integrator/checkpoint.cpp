@@ -23,10 +23,12 @@ namespace
 /* Numbers of TS and SNES */
 void Transfer(TS ts, Archive &a)
 {
-  SNES snes = ts->snes;
+  SNES           snes = ts->snes;
+  const PetscInt lag  = snes->lagjacobian;
 
-  for (PetscInt *x : {&ts->steps, &ts->reject, &ts->snes_its, &ts->ksp_its, &ts->num_snes_failures, &ts->adapt->timestepjustdecreased, &snes->lagjacobian, &snes->lagpreconditioner, &snes->jac_iter, &snes->pre_iter})
+  for (PetscInt *x : {&ts->steps, &ts->reject, &ts->snes_its, &ts->ksp_its, &ts->num_snes_failures, &ts->adapt->timestepjustdecreased, &snes->lagjacobian, &snes->jac_iter, &snes->pre_iter})
     a.plain(*x);
+  if (a.reading && (Get(ts).corrector.user_lag || snes->lagjacobian > 0)) snes->lagjacobian = lag; /* the user's, of this run or of the other one */
   for (PetscReal *x : {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step}) a.plain(*x);
   a.plain(ts->steprestart);
   a.good = a.good && IsFlag(ts->steprestart);

@@ -2,6 +2,8 @@
 #ifndef HHTDAE_COMPAT_H
 #define HHTDAE_COMPAT_H
 
+#include <algorithm>
+#include <initializer_list>
 #include <petsc/private/snesimpl.h>
 #include <petsc/private/tsimpl.h>
 
@@ -103,6 +105,18 @@ static inline PetscBool HHT3EventActive(TS ts)
   return (PetscBool)(ts->event && ts->event->status != TSEVENT_NONE);
 #else
   return (PetscBool)(ts->event && ts->event->processing);
+#endif
+}
+
+/* After the steps to an event TSEvent goes on with the step that it was begun with, unless the user sets another one: with h, where it is one of those that nobody has set */
+static inline void HHT3StepAfterEvent(TS ts, std::initializer_list<PetscReal> unset, PetscReal h)
+{
+#if PETSC_VERSION_LT(3, 21, 0)
+  if (!ts->event || ts->event->status != TSEVENT_NONE) return;
+  PetscReal &after = ts->event->timestep_posteventinterval;
+  if (std::find(unset.begin(), unset.end(), after) != unset.end()) after = h;
+#else
+  (void)ts, (void)unset, (void)h;
 #endif
 }
 

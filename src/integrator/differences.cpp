@@ -50,6 +50,18 @@ PetscErrorCode Elsewhere(TS ts, WorkVec (&x)[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An entry for another one, which comes back: residuals are compared to the last bit, so that a state has to be the same again to the last bit */
+PetscErrorCode Exchange(Vec v, PetscInt i, PetscScalar *other)
+{
+  PetscScalar *x;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(v, &x));
+  std::swap(x[i], *other);
+  PetscCall(VecRestoreArray(v, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
 PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
 {
@@ -66,16 +78,16 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   rows.assign(n, {});
   for (PetscInt j = 0; j < N; j++) {
-    for (int sign = 1; sign >= -1; sign -= 2) {
-      for (Vec v : x) {
-        if (j >= start && j < end) PetscCall(VecSetValue(v, j, sign * 1e-3, ADD_VALUES));
-        PetscCall(VecAssemblyBegin(v));
-        PetscCall(VecAssemblyEnd(v));
-      }
-      if (sign < 0) break;
-      PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
-      PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar f) { if (f0 != f || start + i == j) rows[i].push_back(j); }, Read(F0), Read(F)));
+    const bool  here     = j >= start && j < end;
+    PetscScalar other[3] = {};
+    for (int k = 0; here && k < 3; k++) {
+      PetscCall(VecGetValues(x[k], 1, &j, &other[k]));
+      other[k] += 1e-3;
+      PetscCall(Exchange(x[k], j - start, &other[k]));
     }
+    PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
+    for (int k = 0; here && k < 3; k++) PetscCall(Exchange(x[k], j - start, &other[k]));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar f) { if (f0 != f || start + i == j) rows[i].push_back(j); }, Read(F0), Read(F)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -196,7 +196,9 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   PetscCall(PetscLogEventBegin(events.matrix, ts, 0, 0, 0));
   PetscCall(StageVectors(ts, X));
   I.rotations.factor = RotationFactor(I);
-  PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P));
+  const PetscErrorCode failed = EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, s.sv, s.sa, J, P);
+  if (failed) I.rotations.factor = 0;
+  PetscCall(failed);
   PetscCall(PetscObjectStateGet((PetscObject)P, &state));
   if (state != I.linear.scaled) { /* an application whose matrix never changes may have left our scaled one in place */
     if (I.F0 && I.definitions_use_acceleration) PetscCall(TrueAccelerationMatrix(ts, X, P));

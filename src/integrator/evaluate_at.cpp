@@ -168,9 +168,10 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
   PetscCall(ReferTo(ts, S.at.U, before));
-  if (S.at.gamma) PetscCall(ConstraintTerms(ts, S.at));
-  PetscCall(SolveConsistent(ts, S.at, false, ok, &why));
-  PetscCall(ReferBack(ts, S.at.U, before));
+  PetscErrorCode failed = S.at.gamma ? ConstraintTerms(ts, S.at) : PETSC_SUCCESS;
+  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, &why);
+  PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
+  PetscCall(failed);
   I.stat = saved;
   if (!*ok) S.t1 = PETSC_NINFINITY; /* a factor that failed may keep its error */
   if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));

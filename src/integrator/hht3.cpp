@@ -426,6 +426,7 @@ PetscErrorCode Create(TS ts)
   ts->ops->snesjacobian   = FormJacobian;
   ts->default_adapt_type  = TSHHT3;
   ts->usessnes            = PETSC_TRUE;
+  NoteRanks(PetscObjectComm((PetscObject)ts));
   if (ts->time_step == petsc_step) ts->time_step = unset_step;
   Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, which ends the run at the first failure */
   if (Get(ts).failures_unlimited) ts->max_snes_failures = HHT3_UNLIMITED;
@@ -473,5 +474,6 @@ PETSC_EXTERN PetscErrorCode PetscDLLibraryRegister_hhtdae(void)
 {
   PetscFunctionBegin;
   PetscCall(TSHHT3Initialize());
+  hht3::NoteRanks(PETSC_COMM_WORLD);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -242,6 +242,7 @@ PetscErrorCode Iterate(TS ts, PetscBool *ok)
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   const PetscErrorCode failed = SNESSolve(ts->snes, NULL, I.X);
   if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
+  if (failed && !c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1));
   PetscCall(failed);
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(FinishWithFullSteps(ts, &reason));

@@ -54,8 +54,9 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetReusePreconditioner(ksp, &reuse));
   PetscCall(KSPSetReusePreconditioner(ksp, PETSC_TRUE));
-  PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));
+  const PetscErrorCode failed = SolveOfTheRun(ts, I.gamma, dV, &ok);
   PetscCall(KSPSetReusePreconditioner(ksp, reuse));
+  PetscCall(failed);
   if (!ok) {
     PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
     PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));

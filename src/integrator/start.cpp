@@ -316,22 +316,15 @@ PetscErrorCode NameRedundant(TS ts)
           "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);
 }
 
-/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok)
+namespace
+{
+
+PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, Consistent &c, PetscBool *ok, const char **why)
 {
   Integrator &I = Get(ts);
-  Consistent  c;
-  const char *why;
-  PetscBool   reuse; /* the user's */
-  WorkVec     before, F, d;
+  WorkVec     F, d;
 
   PetscFunctionBegin;
-  PetscCall(OfTheRun(ts, t, U, V, &c));
-  PetscCall(KSPGetReusePreconditioner(c.ksp, &reuse));
-  c.near   = have.near && !reuse;
-  c.enough = have.near ? four_digits : 0;
-  if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_TRUE));
-  if (h == 0) PetscCall(ReferTo(ts, c.U, before));
   c.h        = h;
   c.begin[0] = I.base[0];
   c.begin[1] = I.base[1];
@@ -347,10 +340,34 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   PetscCall(d.like(I.X));
   c.F = F;
   c.d = d;
-  PetscCall(SolveConsistent(ts, c, have.matrix, ok, &why));
+  PetscCall(SolveConsistent(ts, c, have.matrix, ok, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V. Reference and factors are
+   left as they were after an error of the application too, which may go on. */
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  Consistent  c;
+  const char *why;
+  PetscBool   reuse; /* the user's */
+  WorkVec     before;
+
+  PetscFunctionBegin;
+  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(KSPGetReusePreconditioner(c.ksp, &reuse));
+  c.near   = have.near && !reuse;
+  c.enough = have.near ? four_digits : 0;
+  if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_TRUE));
+  if (h == 0) PetscCall(ReferTo(ts, c.U, before));
+  const PetscErrorCode failed = SolveAt(ts, t, h, U, V, have, c, ok, &why);
   PetscCall(KSPSetReusePreconditioner(c.ksp, reuse));
-  if (!have.matrix && !have.near && h == 0) PetscCall(NoteInertia(ts, c.P));
+  if (!failed && !have.matrix && !have.near && h == 0) PetscCall(NoteInertia(ts, c.P));
   PetscCall(ReferBack(ts, c.U, before));
+  PetscCall(failed);
   I.corrector.matrix.forget();
   ts->snes_its += c.its;
   ts->ksp_its += c.ksp_its;

@@ -214,6 +214,7 @@ struct StepState {
   PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
   PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
+  PetscReal        h_after_event = -1;        /* that TSEvent was told, where the step size is chosen */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
   PetscReal        h_given     = 0;           /* of steps of fixed length, by the user */
   PetscReal        h_first     = 0;           /* by the user, at the set-up */
@@ -302,7 +303,7 @@ struct Integrator : StepState {
 
   /* bookkeeping: vec_sol and vec_dot as the integrator left them */
   PetscObjectState sol_state = 0, dot_state = 0;
-  PetscObjectId    sol_id = 0;
+  PetscObjectId    sol_id = 0, dot_id = 0;
   char             failure[512] = "";
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";

@@ -34,6 +34,7 @@ PetscErrorCode NoteState(TS ts)
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
   PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_dot, &I.dot_id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,7 +69,7 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
 {
   Integrator      &I = Get(ts);
   PetscObjectState s, d;
-  PetscObjectId    id;
+  PetscObjectId    id[2];
   PetscBool        same_u, same_v;
 
   PetscFunctionBegin;
@@ -76,8 +77,9 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &s));
   PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &d));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &id));
-  const PetscInt touched = s != I.sol_state || d != I.dot_state || id != I.sol_id;
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &id[0]));
+  PetscCall(PetscObjectGetId((PetscObject)ts->vec_dot, &id[1]));
+  const PetscInt touched = s != I.sol_state || d != I.dot_state || id[0] != I.sol_id || id[1] != I.dot_id;
   PetscInt       any;
   PetscCallMPI(MPI_Allreduce(&touched, &any, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
@@ -157,6 +159,8 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
   ts->time_step = I.h_next = next;
+  if (I.h_chosen) HHT3StepAfterEvent(ts, {unset_step, petsc_step, I.h_after_event}, next);
+  if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
   /* the step to the stop was what was left, and would be taken for what the user wants */
   if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
     const PetscReal rest = HHT3StopAfter(ts, stop) - stop;
@@ -177,12 +181,13 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSSolve() cuts a step that is longer than the run */
+/* TSSolve() cuts a step that is longer than the run; TSEvent makes its own steps on the way to a zero */
 void NoteGivenStep(TS ts)
 {
   Integrator     &I    = Get(ts);
   const PetscReal rest = HHT3StopAfter(ts, ts->ptime) - ts->ptime;
 
+  if (HHT3EventActive(ts)) return;
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
   else if (I.h_next == 0) I.h_given = I.h_first; /* the first run is shorter than a step */
 }

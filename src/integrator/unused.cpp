@@ -112,6 +112,15 @@ PetscErrorCode UsedAnywhere(const std::string &option, PetscBool *used)
 
 } // namespace
 
+static bool on_all_ranks = false;
+
+void NoteRanks(MPI_Comm comm)
+{
+  PetscMPIInt here, all;
+  if (!MPI_Comm_size(comm, &here) && !MPI_Comm_size(PETSC_COMM_WORLD, &all)) on_all_ranks = on_all_ranks || here == all;
+}
+
+/* Collective, and so only where every rank has loaded the library, as is known by a TS of theirs or by the plugin: others would be waited for for ever */
 PetscErrorCode ReportUnusedOptions(void)
 {
   std::vector<std::string> unused;
@@ -119,6 +128,10 @@ PetscErrorCode ReportUnusedOptions(void)
   PetscBool                used;
 
   PetscFunctionBegin;
+  NoteRanks(PETSC_COMM_SELF);
+  const bool report = on_all_ranks;
+  on_all_ranks      = false; /* PETSc may be initialized again */
+  if (!report) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(UnusedOnFirstRank(rank, unused));
   n = (PetscMPIInt)unused.size();

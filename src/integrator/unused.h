@@ -11,6 +11,7 @@ namespace hht3
 
 /* Prints them; collective on PETSC_COMM_WORLD, called when PETSc ends */
 PetscErrorCode ReportUnusedOptions(void);
+void           NoteRanks(MPI_Comm comm); /* the library is at work on all ranks of this one */
 PetscErrorCode ForgetOptions(void); /* but our own */
 
 } // namespace hht3

@@ -325,6 +325,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
                "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene are not those that it was made with");
     M.continues    = true;
     M.begin        = t;
+    M.first        = old->model->continues ? old->model->first : old->scene.start.time;
     M.number.owner = old->number.owner;
     M.left         = 1e-2 * (atol + rtol) / std::max(SceneSize(M.scene), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
     PetscErrorCode failed = CarryTurns(*old, M.scene);

@@ -64,15 +64,15 @@ double StartOf(const SceneData &s, PetscInt marker)
   return b < 0 || s.bodies[b].point ? 0 : std::atan2(s.bodies[b].A(1, 0), s.bodies[b].A(0, 0));
 }
 
-/* By what a motion has turned the angle since the start, if there is one that drives it */
-bool TurnOfMotion(const SceneData &s, double t, PetscInt i, PetscInt j, double *turn)
+/* What a motion has made of the angle since the first run's start, where there is one that drives it */
+bool AngleOfMotion(const Model &M, double t, PetscInt i, PetscInt j, double *angle)
 {
   double from, to;
-  for (const StoreBase *store : s.order)
+  for (const StoreBase *store : M.scene.order)
     for (PetscInt e = 0; e < store->size(); e++) {
-      if (!store->drivenAngle(e, s.start.time, &from) || store->marker(e, 0) != i || store->marker(e, 1) != j) continue;
+      if (!store->drivenAngle(e, M.continues ? M.first : M.scene.start.time, &from) || store->marker(e, 0) != i || store->marker(e, 1) != j) continue;
       store->drivenAngle(e, t, &to);
-      *turn = to - from;
+      *angle = (M.continues ? std::remainder(from, 2 * M_PI) : StartAngle(M, Marker{i}, Marker{j})) + to - from;
       return true;
     }
   return false;
@@ -107,7 +107,7 @@ PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<Counte
 PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first)
 {
   const SceneData          &s    = R.scene;
-  double                    most = PETSC_NINFINITY, x, turn;
+  double                    most = PETSC_NINFINITY, x;
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
   if (s.planar) {
@@ -118,7 +118,7 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
       if (b->countedAngle(i, j, &x)) most = std::max(most, x);
     if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
     if (most > PETSC_NINFINITY) now[0].angle = most;
-    else if (TurnOfMotion(s, t, i, j, &turn)) now[0].angle = StartAngle(*R.model, Marker{i}, Marker{j}) + turn;
+    else if (AngleOfMotion(*R.model, t, i, j, &x)) now[0].angle = x;
   }
   PetscCall(CountAngles(R, u, now));
   *first = now[0];

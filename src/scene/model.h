@@ -22,7 +22,7 @@ struct Model {
   bool        compiled = false;
   bool        continues = false; /* from where another run was, at this time, with its owners of bodies */
   double      left      = 0;     /* by that run's tolerance, of misfits of positions: parts of the scene's size */
-  double      begin     = 0;
+  double      begin     = 0, first = 0; /* first: where the first of these runs began */
   PetscMPIInt rank = 0, size = 1;
   Numbering   number;
   std::vector<Matrix3> described; /* attitudes of the bodies, before assembly and equilibrium moved them */

@@ -1,4 +1,5 @@
 /* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
+#include "integrator/start.h"
 #include "support.h"
 #include <array>
 
@@ -629,4 +630,71 @@ TEST(BetweenRuns, WhatAStepHasLeft)
     must(run.solve());
   }
   EXPECT_EQ(out.text().find("violate"), std::string::npos) << out.text();
+}
+
+/* Steps by which TSEvent brackets a zero, in the last step of a part, are none that the user has given for the next part */
+TEST(Events, InTheLastStepOfAPart)
+{
+  Simulation run(oscillator(), fixedSteps(1e-2));
+  PetscInt   direction = 0;
+  PetscBool  terminate = PETSC_FALSE;
+  const auto near      = [](TS, PetscReal t, Vec, PetscScalar *f, void *) -> PetscErrorCode {
+    f[0] = (t - .9953) * (1. + t * t);
+    return 0;
+  };
+  must(TSSetEventHandler(run.ts, 1, &direction, &terminate, near, leave, nullptr));
+  must(TSSetMaxTime(run.ts, 1.));
+  must(run.solve());
+  const PetscInt before = run.statistics().steps;
+  must(TSSetMaxTime(run.ts, 2.));
+  must(run.solve());
+  EXPECT_EQ(run.statistics().steps - before, 100);
+}
+
+/* A mechanism of a microsecond whose first step is chosen: the step behind an event's own ones is that before it, not PETSc's 0.1 */
+TEST(Events, StepsBehindThemAreThoseBefore)
+{
+  const Oscillators p({2e6}, {0.}, false, 4e-6);
+  Simulation        run(p, tolerance(1e-6));
+  must(TSSetTimeStep(run.ts, hht3::unset_step));
+  std::vector<double> steps;
+  double              last = 0.;
+  PetscInt            direction = 0, found = 0;
+  PetscBool           terminate = PETSC_FALSE;
+  const auto          zero      = [](TS, PetscReal, Vec U, PetscScalar *f, void *) { return VecGetValues(U, 1, std::array<PetscInt, 1>{0}.data(), f); };
+  const auto          count     = [](TS, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *n) -> PetscErrorCode { return ++*static_cast<PetscInt *>(n), 0; };
+  run.watch = [&](Simulation &, PetscInt step, double t) {
+    if (step) steps.push_back(t - last);
+    last = t;
+  };
+  must(TSSetEventHandler(run.ts, 1, &direction, &terminate, zero, count, &found));
+  must(TSSetEventTolerances(run.ts, 1e-10, nullptr));
+  must(run.solve());
+  EXPECT_EQ(found, 3);
+  EXPECT_LT(*std::max_element(steps.begin(), steps.end()), 1e-7);
+  Simulation plain(p, tolerance(1e-6));
+  must(TSSetTimeStep(plain.ts, hht3::unset_step));
+  must(plain.solve());
+  EXPECT_LE(run.statistics().rejected + run.statistics().corrector_fails, plain.statistics().rejected + plain.statistics().corrector_fails);
+}
+
+/* Velocities in another vector, whose count of changes happens to be that of the old one */
+TEST(BetweenRuns, VelocitiesInAnotherVector)
+{
+  Simulation       run(oscillator(), fixedSteps(1e-2));
+  Vec              other;
+  PetscObjectState old, now;
+  must(TSSetMaxTime(run.ts, .1));
+  must(run.solve());
+  must(VecDuplicate(run.V, &other));
+  must(VecSet(other, 7.));
+  must(PetscObjectStateGet((PetscObject)run.V, &old));
+  must(PetscObjectStateGet((PetscObject)other, &now));
+  ASSERT_LE(now, old);
+  must(PetscObjectStateSet((PetscObject)other, old));
+  must(TS2SetSolution(run.ts, run.U, other));
+  must(TSSetMaxTime(run.ts, .1 + 1e-2));
+  must(run.solve());
+  EXPECT_NEAR(whole(other)[0], 7., 0.5);
+  must(VecDestroy(&other));
 }

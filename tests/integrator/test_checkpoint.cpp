@@ -265,6 +265,30 @@ TEST(Checkpoint, LoadedIntoATSThatHasRun)
   sameCounters(second.statistics(), first.statistics());
 }
 
+/* Whoever of the two gives the option, the run that goes on makes matrices as its own options say */
+TEST(Checkpoint, LagOfTheRunThatGoesOn)
+{
+  const Pendulum p(-90., 0., 1.);
+  const File     file("lag");
+  for (const bool first : {true, false}) { /* whose option it is */
+    Simulation run(p, tolerance(1e-6) + (first ? "-snes_lag_jacobian 3" : "")), next(p, tolerance(1e-6) + (first ? "" : "-snes_lag_jacobian 1"));
+    SNES       snes;
+    PetscInt   before, after;
+    must(TSSetMaxTime(run.ts, .5));
+    must(run.solve());
+    must(TSHHT3CheckpointSave(run.ts, file.name.c_str()));
+    must(TSSetUp(next.ts));
+    must(TSGetSNES(next.ts, &snes));
+    must(SNESGetLagJacobian(snes, &before));
+    must(TSHHT3CheckpointLoad(next.ts, file.name.c_str()));
+    must(SNESGetLagJacobian(snes, &after));
+    EXPECT_EQ(after > 0, before > 0);
+    EXPECT_TRUE(before < 0 || after == before) << after;
+    must(next.solve());
+    EXPECT_LT(next.errors().q, 1e-3);
+  }
+}
+
 /* Points of a time span that the run has behind it are not gone back for. */
 TEST(Checkpoint, ResumesInATimeSpan)
 {

@@ -188,3 +188,51 @@ TEST(Differences, SnesTestJacobian)
     }
   }
 }
+
+/* From U = 0, where x + d - d is not x: places of the matrix are those of the springs, three a row */
+TEST(Differences, NoPlaceThatNobodyFollows)
+{
+  struct Springs : Problem {
+    Springs()
+    {
+      name = "springs";
+      n    = 60;
+      t1   = 1e-3;
+      role.assign(n, TSHHT3_COORDINATE);
+    }
+    void initial(double *u, double *v) const override
+    {
+      std::fill(u, u + n, 0.);
+      std::fill(v, v + n, 0.);
+      v[0] = 1.;
+    }
+    void residual(double, const double *u, const double *, const double *a, double *f) const override
+    {
+      for (PetscInt i = 0; i < n; i++) f[i] = a[i] + 2. * u[i] - (i ? u[i - 1] : 0.) - (i + 1 < n ? u[i + 1] : 0.);
+    }
+    void jacobian(double, const double *, const double *, const double *, double, double, Entries &) const override {}
+  } springs;
+  TS           source, ts;
+  Vec          U, V, F;
+  TSI2Function function;
+  void        *ctx;
+  SNES         snes;
+  Mat          P;
+  MatInfo      info;
+  must(ProblemCreateTS(PETSC_COMM_SELF, springs, &source, &U, &V));
+  must(TSGetI2Function(source, nullptr, &function, &ctx));
+  must(VecDuplicate(U, &F));
+  must(TSCreate(PETSC_COMM_SELF, &ts));
+  must(TSSetType(ts, TSHHT3));
+  must(TSSetI2Function(ts, F, function, ctx));
+  must(TS2SetSolution(ts, U, V));
+  must(TSSetMaxTime(ts, springs.t1));
+  must(TSSetUp(ts));
+  must(TSGetSNES(ts, &snes));
+  must(SNESGetJacobian(snes, nullptr, &P, nullptr, nullptr));
+  must(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
+  EXPECT_EQ(info.nz_used, 3. * springs.n - 2.);
+  must(TSDestroy(&ts));
+  must(TSDestroy(&source));
+  for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
+}

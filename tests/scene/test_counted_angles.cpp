@@ -19,8 +19,9 @@ struct Wheel {
   Marker  i, j;
   Element axle;
 
-  explicit Wheel(double speed = 0, Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
+  explicit Wheel(double speed = 0, Space space = Space::Spatial, bool parameters = false) : scene(PETSC_COMM_SELF, space)
   {
+    if (parameters) scene.parameter("unused", 0);
     const Vector3 z = space == Space::Planar ? Vector3(0, 0, 1) : Vector3(Vector3(1, 2, 2) / 3);
     const Matrix3 R = hhtdae::axesAlong(z);
     RigidBody     b;
@@ -297,4 +298,23 @@ TEST(CountedAngles, InUserConstraints)
   must(now.motion(at, &m));
   EXPECT_GT(m.position(2), 0.01 * 3 * turn);
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 100 * m.position(2), 1e-5);
+}
+
+/* Driven, and asked for first in a run that goes on from one that goes on */
+TEST(CountedAngles, OfMotionsAfterRunsThatWentOn)
+{
+  Wheel w(0, Space::Spatial, true);
+  w.scene.add("drive", RotationalMotion{w.i, w.j, TimeFunction::polynomial({0, 0, turn})});
+  SceneRun run(w.scene, 1.3, tolerance(1e-6));
+  must(run.solve());
+  TS ts = run.ts, next;
+  for (double end : {2.1, 2.7}) {
+    must(w.scene.createTS(&next, ts));
+    must(TSSetMaxTime(next, end));
+    must(w.scene.solve(next));
+    if (ts != run.ts) must(TSDestroy(&ts));
+    ts = next;
+  }
+  EXPECT_NEAR(angleOf(ts, w.i, w.j), turn * 2.7 * 2.7, 1e-4);
+  must(TSDestroy(&ts));
 }
