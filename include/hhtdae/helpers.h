@@ -17,14 +17,19 @@ namespace hhtdae
 {
 
 /* Orthonormal right-handed axes (columns) whose z axis is along a direction, which need not be of length one; x as near to `x` as can
-   be, any if that is along z or not given */
+   be. If `x` is along z or not given, x is as near as can be to the axis of space along which z has its least component, the first one
+   of several: z along (0, 0, 1) has the axes of space themselves. */
 inline Matrix3 axesAlong(const Vector3 &z, const Vector3 &x = Vector3::Zero())
 {
   Matrix3 A;
   A.col(2)        = z.normalized();
-  const Vector3 p = x - A.col(2).dot(x) * A.col(2);
-  if (p.norm() > 1e-8 * x.norm()) A.col(0) = p.normalized();
-  else A.col(0) = Vector3(A.col(2)).unitOrthogonal();
+  Vector3 p       = x - A.col(2).dot(x) * A.col(2);
+  if (!(p.norm() > 1e-8 * x.norm())) {
+    const Vector3 a     = A.col(2).cwiseAbs();
+    const int     least = a(0) <= a(1) && a(0) <= a(2) ? 0 : a(1) <= a(2) ? 1 : 2;
+    p                   = Vector3::Unit(least) - A(least, 2) * A.col(2);
+  }
+  A.col(0) = p.normalized();
   A.col(1) = A.col(2).cross(A.col(0));
   return A;
 }
@@ -79,8 +84,9 @@ inline RigidBody composed(const std::vector<RigidBody> &parts)
   return all;
 }
 
-/* A joint of two bodies from a point and an axis of space at the start: markers on both, z along the axis. For all joints that two
-   markers alike describe: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw, InLine, InPlane, ParallelAxes, Orientation */
+/* A joint of two bodies from a point and an axis of space at the start: markers on both, with the axes axesAlong(axis). For all joints that two
+   markers alike describe: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw, InLine, InPlane, ParallelAxes, Orientation.
+   In planar scenes the axis is z, and Translational slides along x of space; for another direction there make the markers. */
 template <class Joint> Element connect(Scene &scene, const std::string &name, Body i, Body j, const Vector3 &point, const Vector3 &axis = Vector3::UnitZ())
 {
   const Matrix3 A = axesAlong(axis);

@@ -71,6 +71,46 @@ TEST(Helpers, AxesAlong)
   EXPECT_LT((axesAlong({0, 0, 1}, {1, 0, 5}) - Matrix3::Identity()).norm(), 1e-14);
 }
 
+/* Without x: the axis of space along which z has its least component, the first one of several, less its part along z, as in Python's axes_along() */
+TEST(Helpers, AxesAlongOneDirection)
+{
+  const Vector3 ex(1, 0, 0), ey(0, 1, 0), ez(0, 0, 1);
+  EXPECT_EQ((axesAlong(ez) - Matrix3::Identity()).norm(), 0);
+  const struct {
+    Vector3 z, x;
+  } cases[] = {{ex, ey}, {ey, ex}, {ez, ex}, {-ex, ey}, {-ey, ex}, {-ez, ex}, {5 * ez, ex}, {{3, 4, 0}, ez}, {{0, 0.6, -0.8}, ex}, {{0.6, 0, 0.8}, ey},
+               {{1, 1, 1}, {2, -1, -1}}, {{1, -2, 3}, {13, 2, -3}}, {{-3, 2, 1}, {3, -2, 13}}, {{2, -1, 2}, {2, 8, 2}}};
+  for (const auto &c : cases)
+    for (const Vector3 &x : {Vector3(0, 0, 0), c.z, Vector3(-2 * c.z)}) {
+      const Matrix3 A = axesAlong(c.z, x);
+      EXPECT_LT((A.col(2) - c.z.normalized()).norm(), 1e-14) << c.z.transpose();
+      EXPECT_LT((A.col(0) - c.x.normalized()).norm(), 1e-14) << c.z.transpose() << " has x along " << A.col(0).transpose();
+      EXPECT_LT((A.col(1) - c.z.cross(c.x).normalized()).norm(), 1e-14) << c.z.transpose();
+    }
+}
+
+/* In a planar scene connect() lets a body slide along x of space */
+TEST(Helpers, ASlideInThePlane)
+{
+  Scene     scene(PETSC_COMM_SELF, Space::Planar);
+  RigidBody b;
+  b.position       = {0.5, 0.2, 0};
+  b.velocity       = {3, 0, 0};
+  const Body body  = scene.add("slider", b);
+  const Element  e = connect<Translational>(scene, "slide", body, scene.ground(), b.position);
+  scene.gravity({0, -10, 0});
+  scene.channel("x", Measure::displacement(scene.marker(body), 0));
+  scene.channel("y", Measure::displacement(scene.marker(body), 1));
+  scene.channel("guide", Measure::jointForce(e, 1)); /* along y_j */
+  SceneRun            run(scene, 2, tolerance(1e-8));
+  std::vector<double> now;
+  must(run.solve());
+  must(scene.sample(run.ts, 2, now));
+  EXPECT_NEAR(now[0], 6.5, 1e-6);
+  EXPECT_NEAR(now[1], 0.2, 1e-9);
+  EXPECT_NEAR(now[2], 10, 1e-5);
+}
+
 /* A rod on a pin through its end, about a slanted axis, swings like a pendulum of its moment about the pin */
 TEST(Helpers, AJointFromAPointAndAnAxis)
 {
