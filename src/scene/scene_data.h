@@ -203,6 +203,7 @@ public:
   ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j, bool pair = true);
 
   bool planar() const { return data_.planar; }
+  int  slidingAxis(int axis) const { return planar() && axis == 2 ? 0 : axis; } /* of j: z, the default, is x in a planar scene, along which Translational slides */
   bool good() const { return good_; } /* no error so far: i and j are markers */
   void require(bool condition, const std::string &message); /* "stiffness is -3, must not be negative" */
   void require(Marker m, const char *what);                 /* m is a marker of this scene */

@@ -190,9 +190,10 @@ void ElementLoads::add(PetscInt element, const Reading &r, std::vector<Load> &lo
     along(e, -r.component[0], loads);
   else if (Is(e, "distance stop"))
     along(e, r.component[0], loads);
-  else if (Is(e, "translational stop"))
-    pair(e, at(e.i).x, r.component[0] * at(e.j).R.col(specs_.of<TranslationalStop>(element)->axis), Vector3::Zero(), loads);
-  else if (Ends(e, "spring-damper") || Ends(e, "spring"))
+  else if (Is(e, "translational stop")) {
+    const int axis = specs_.of<TranslationalStop>(element)->axis;
+    pair(e, at(e.i).x, r.component[0] * at(e.j).R.col(scene_.planar && axis == 2 ? 0 : axis), Vector3::Zero(), loads);
+  } else if (Ends(e, "spring-damper") || Ends(e, "spring"))
     if (std::string(e.type).find("torsional") == std::string::npos)
       along(e, r.component[0], loads);
     else

@@ -133,7 +133,7 @@ TEST(MotionEntries, BadPairsAreNamed)
              "axis is 3, must be 0, 1 or 2");
   ExpectSays(p.errors(TranslationalMotion{p.i, p.ground, kWave, MotionOf::Displacement, -1}), "axis is -1");
   Parts planar(Space::Planar);
-  ExpectSays(planar.errors(TranslationalMotion{planar.i, planar.ground, kWave}), "must be 0 or 1 in a planar scene");
+  ExpectSays(planar.errors(TranslationalMotion{planar.i, planar.ground, kWave, MotionOf::Displacement, 3}), "axis is 3, must be 0, 1 or 2");
 }
 
 TEST(MotionEntries, BadCouplersAreNamed)
@@ -241,6 +241,28 @@ TEST(MotionEntries, AGearOverManyTurns)
   EXPECT_LT(d1, 1e-8);
   EXPECT_LT(d2, 1e-8);
   MEASURED("gear: wheels at 40 and -16 rad to %.1e and %.1e", d1, d2);
+}
+
+/* Without an axis a motion drives what Translational guides: along z_j in space, along x_j in the plane. s = t^2 by the displacement,
+   by the velocity or by the acceleration of the same; the multiplier is the force on the block, 2 times its mass. */
+TEST(MotionEntries, ATranslationWithoutAnAxisIsAlongItsGuide)
+{
+  const TimeFunction function[] = {TimeFunction::polynomial({0, 0, 1}), TimeFunction::polynomial({0, 2}), 2.};
+  for (Space space : {Space::Spatial, Space::Planar})
+    for (int of = 0; of < 3; of++) {
+      const Matrix3 turned = AboutZ(.4);
+      const Vector3 way = turned.col(0), from(.3, -.2, 0);
+      const Matrix3 axes = space == Space::Planar ? turned : (Matrix3() << turned.col(1), turned.col(2), way).finished();
+      Scene         scene(PETSC_COMM_SELF, space);
+      const Body    block = scene.add("block", Block(from));
+      const Marker  i = scene.markerAt(block, from, axes), j = scene.marker(scene.ground(), from, axes);
+      scene.add("guide", Translational{i, j});
+      const Element drive = scene.add("drive", TranslationalMotion{i, j, function[of], (MotionOf)of});
+      SceneRun      run(scene, 1, tight);
+      must(run.solve());
+      EXPECT_LT((Pose(run, block).x - from - way).norm(), 1e-6) << of;
+      EXPECT_NEAR(Multiplier(scene, run, drive), 4, 4e-3) << of;
+    }
 }
 
 namespace

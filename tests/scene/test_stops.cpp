@@ -171,6 +171,41 @@ TEST(Stops, ALoadOnAStopAnywhere)
   }
 }
 
+/* In the plane a stop without an axis ends the travel along x_j, that of Translational; x_j is up here, and the block rests on the stop */
+TEST(Stops, WithoutAnAxisItIsAlongTheGuideInThePlane)
+{
+  const double g = 9.81, k = 1e5, height = 0.4;
+  double       rests[3];
+  for (int axis : {0, 2}) {
+    Scene         scene(PETSC_COMM_SELF, Space::Planar);
+    const Matrix3 up = Eigen::AngleAxisd(M_PI / 2, Vector3::UnitZ()).toRotationMatrix();
+    RigidBody     b;
+    b.mass            = 2;
+    b.position        = {0.1, height, 0};
+    const Body   body = scene.add("body", b);
+    const Marker i = scene.markerAt(body, b.position, up), j = scene.marker(scene.ground(), {0.1, 0, 0}, up);
+    scene.gravity({0, -g, 0});
+    scene.add("guide", Translational{i, j});
+    TranslationalStop s{i, j};
+    s.lower = height;
+    s.law   = {k, 1};
+    if (axis == 0) s.axis = 0; /* else the default */
+    const Element stop = scene.add("stop", s);
+    scene.start().equilibrium = true;
+    TS       ts;
+    Snapshot now;
+    Load     load;
+    must(scene.createTS(&ts));
+    must(now.take(ts));
+    must(now.load(stop, i, &load));
+    must(TSDestroy(&ts));
+    rests[axis] = DataOf(scene).bodies[body.id].r(1);
+    EXPECT_NEAR(rests[axis], height - 2 * g / k, 1e-6 * g / k) << axis;
+    EXPECT_NEAR(load.force(1), 2 * g, 1e-4 * g) << axis;
+  }
+  EXPECT_EQ(rests[0], rests[2]);
+}
+
 /* Past the middle of a stop of 0.5 at a distance of 0.3, from far away: without other forces steps would grow over the whole passage */
 TEST(Stops, NothingFliesThroughALeastDistance)
 {

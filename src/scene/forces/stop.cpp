@@ -42,9 +42,8 @@ template <> Element Scene::enter(const std::string &name, const TranslationalSto
   RequireTwoBodies(e, s.i, s.j);
   RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
   e.require(s.axis >= 0 && s.axis < 3, "axis is " + std::to_string(s.axis) + ", must be 0, 1 or 2");
-  e.require(!e.planar() || s.axis < 2, "axis is 2, which is normal to the plane of a planar scene");
   StopData d = CheckedStop(e, s.lower, s.upper, s.law);
-  d.axis     = s.axis;
+  d.axis     = e.slidingAxis(s.axis);
   e.load<AdvanceStop>({s.i, s.j}, d, {}, s.state);
   return e.done();
 }

@@ -28,7 +28,7 @@ public:
   {
     require(!planar(),
             "not for planar scenes; these have revolute, translational and fixed joints, point distances, points on "
-            "curves and rolling discs");
+            "curves, rolling discs, gears, racks, couplers and user constraints");
   }
   void positive(const char *what, double value)
   {

@@ -1,5 +1,6 @@
 /* Motions: displacement, velocity or acceleration of marker i relative to j as a function of time. */
 #include "scene/kernels/motion.h"
+#include "scene/model.h"
 #include "scene/motions/moving_pair.h"
 
 namespace hhtdae
@@ -60,15 +61,13 @@ template <> Element Scene::enter(const std::string &name, const RotationalMotion
 template <> Element Scene::enter(const std::string &name, const TranslationalMotion &s)
 {
   ElementBuilder e(*this, name, "translational motion", ElementData::Motion, s.i, s.j);
-  const int      axes = e.planar() ? 2 : 3;
+  const int      axis = e.slidingAxis(s.axis);
   CheckFunction(e, s.function, s.of, start().time);
-  e.require(s.axis >= 0 && s.axis < axes,
-            "axis is " + std::to_string(s.axis) +
-                (e.planar() ? ", must be 0 or 1 in a planar scene" : ", must be 0, 1 or 2"));
+  e.require(s.axis >= 0 && s.axis < 3, "axis is " + std::to_string(s.axis) + ", must be 0, 1 or 2");
   if (e.good()) RequirePair(e, s.i, s.j, false);
   if (e.good()) {
-    const double speed = AdvanceRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j), s.axis);
-    Drive<DrivenAdvance, DrivenVelocity, StateVelocity>(*this, e, name, s, {s.function, s.axis}, speed);
+    const double speed = AdvanceRate<double>(e.frame(s.i), e.frame(s.j), data().twist(s.i), data().twist(s.j), axis);
+    Drive<DrivenAdvance, DrivenVelocity, StateVelocity>(*this, e, name, s, {s.function, axis}, speed);
   }
   return e.done();
 }
