@@ -1,6 +1,14 @@
 /*
   Forces. Marker i is on the body that is acted on, marker j on the one that takes the reaction.
   `state = true` carries a force's components as force states F of the equations (7b) instead of eliminating them.
+
+  "Components" at an element are what Measure::force() has of it, in that order, from 0 on. The same loads in the axes of any marker, about
+  any point and on either body are Measure::elementForce(), elementMoment() and Snapshot::load().
+
+  Planar scenes have all of them but TorusPlane, NodeContact and ModalLoad; the latter two are of flexible bodies. The z axes of all markers
+  are normal to the plane there: what turns about z_j in space does so in the plane, translations are along x_j, the plane of a contact is the line
+  along x_j, outside y > 0, and spheres, ellipsoids and boxes are discs, ellipses and rectangles. Components are as many as in space; those out of
+  the plane act on nothing.
 */
 #ifndef HHTDAE_FORCES_H
 #define HHTDAE_FORCES_H
@@ -26,7 +34,7 @@ struct SpringDamper {
   bool   state     = false;
 };
 
-/* Tension f(l, l') given by the user's function, differentiated automatically:
+/* Tension f(l, l'), the component, given by the user's function, differentiated automatically:
      [](const Real &l, const Real &v) { return 100 * pow(l - 1, 3) + 2 * v; } */
 struct NonlinearSpring {
   Marker   i, j;
@@ -50,6 +58,7 @@ struct TorsionalSpringDamper {
   bool   state     = false;
 };
 
+/* As above with a moment given by the user's function. Component: the moment. */
 struct NonlinearTorsionalSpring {
   Marker   i, j;
   ForceLaw moment; /* of angle and rate, on i's body, about z_j; a restoring one is negative */
@@ -64,7 +73,7 @@ struct NonlinearTorsionalSpring {
 
   for rotations small or about one axis; in general the elastic moment is the one that makes the bushing conservative.
   Rotations stay below half a turn. The reaction on j's body balances both. Components: force and moment on i in j's
-  axes.
+  axes (planar scenes: x and y of forces, z of moments count).
 */
 struct Bushing {
   Marker  i, j;
@@ -93,13 +102,14 @@ struct Beam {
   bool   state   = false;
 };
 
-/* The user's own: components as functions of the state, in the axes of `frame` (default: space axes) */
+/* The user's own: components as functions of the state, in the axes of `frame` (default: space axes); force and moment on i's body, at and about i's
+   origin. Components: the three of the force, then the three of the moment, as far as they are given. */
 struct UserForce {
   Marker                  i, j, frame;   /* j may be none: no reaction */
   std::vector<Expression> force, moment; /* none or three each */
   bool                    state = false;
 };
-/* a force along the line from j to i (repulsive when positive), or a moment about z_j on i's body */
+/* a force along the line from j to i (repulsive when positive), or a moment about z_j on i's body. Component: its value */
 struct UserScalarForce {
   Marker     i, j;
   Expression value;
@@ -120,40 +130,43 @@ struct ModalLoad {
   ---- contact: smooth penalty k d^exponent (1 + damping d'), never tensile, regularized Coulomb friction ----
 
   The factor s = 1 + damping d' ends smoothly: it is s for s >= 1/4, 0 for s <= -1/4, and in between u^3 (1 - u/2)/2 with u = 2 s + 1/2.
+
+  Components: the force on i's body, normal force and friction together, in j's axes; of SphereSphere in space axes. It acts where the bodies touch.
 */
 struct ContactLaw {
   double stiffness = 1e5, exponent = 1.5;
   double damping  = 0;                       /* s/m, of the rate of penetration; force never pulls */
   double friction = 0, slip_velocity = 1e-3; /* Coulomb coefficient, velocity of the regularization mu tanh(v/v_s) */
 };
-/* sphere about i, plane: xy of j, outside z > 0 */
+/* sphere about i, plane: xy of j, outside z > 0 (planar scenes: a disc on the line along x_j, outside y > 0) */
 struct SpherePlane {
   Marker     i, j;
   double     radius = 1;
   ContactLaw law    = {};
   bool       state  = false;
 };
-/* ellipsoid about i in its axes, plane as above */
+/* ellipsoid about i in its axes, plane as above (planar scenes: an ellipse) */
 struct EllipsoidPlane {
   Marker     i, j;
   Vector3    semiaxes = Vector3::Ones();
   ContactLaw law      = {};
   bool       state    = false;
 };
-/* tire: torus about z_i, plane as above */
+/* tire: torus about z_i, plane as above (planar scenes: none; a wheel is a SpherePlane of the outer radius) */
 struct TorusPlane {
   Marker     i, j;
   double     radius = 1, tube = 0.1;
   ContactLaw law   = {};
   bool       state = false;
 };
+/* spheres about i and j; components in space axes (planar scenes: discs) */
 struct SphereSphere {
   Marker     i, j;
   double     radius_i = 1, radius_j = 1;
   ContactLaw law   = {};
   bool       state = false;
 };
-/* sphere about i, box about j in its axes */
+/* sphere about i, box about j in its axes (planar scenes: disc and rectangle, half's z does not count) */
 struct SphereBox {
   Marker     i, j;
   double     radius = 1;
@@ -191,7 +204,7 @@ struct TranslationalStop { /* of the displacement of i from j along an axis of j
   Marker     i, j;
   double     lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
   ContactLaw law   = {};
-  int        axis  = 2;
+  int        axis  = 2; /* 0, 1, 2 for x, y, z; 2 is that of Translational (planar scenes: 2 is x_j as well) */
   bool       state = false;
 };
 struct DistanceStop { /* of the distance of the origins; with upper alone a rope */
@@ -202,8 +215,9 @@ struct DistanceStop { /* of the distance of the origins; with upper alone a rope
 };
 
 /* friction in a revolute, translational, cylindrical or spherical joint, from its reaction: moment mu r N or force mu N
-   against the relative motion, regularized. Where redundant constraints are dropped, anywhere in the mechanism, reactions are one choice of many, which
-   depends on how the mechanism is turned in space, and so does the friction: use joints that leave more freedom. */
+   against the relative motion, regularized. Components, on i's body: revolute, the moment about z_j; translational, the force along z_j (planar scenes: x_j);
+   cylindrical, both, the force first; spherical, the moment in space axes. Where redundant constraints are dropped, anywhere in the mechanism,
+   reactions are one choice of many, which depends on how the mechanism is turned in space, and so does the friction: use joints that leave more freedom. */
 struct JointFriction {
   Element joint;
   double  coefficient   = 0;
