@@ -45,7 +45,8 @@ struct FeElement {
 
 /*
   Three translations per node; rank r has nodes [first, first + own). K and M have the rows 3 n .. 3 n + 2 of node n; both are
-  symmetric AIJ matrices with both triangles, K free of supports. Elements are needed for stress and pictures alone.
+  symmetric AIJ matrices with both triangles, K free of supports. Elements are needed for stress, pictures, pressure (LoadCase::surface), stiffening
+  (Reduction::stiffening) and FeLaw::Large, which reads nothing but them; all else comes from K and M.
 */
 struct FeModel {
   MPI_Comm    comm;
@@ -96,7 +97,7 @@ struct Attachment {
 };
 
 enum class Method {
-  CraigBampton, /* constraint modes and fixed-interface normal modes */
+  CraigBampton, /* constraint modes and fixed-interface normal modes; without attachments FreeFree, as ReducedBody::method then says */
   FreeFree,     /* normal modes of the unsupported body; attachments follow them */
   Static        /* constraint modes alone (Guyan) */
 };

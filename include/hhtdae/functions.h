@@ -68,14 +68,15 @@ struct Measure {
     Angle,               /* of i's x axis about j's z axis, from j's x axis; in (-pi, pi] at the start, counted over full turns from there */
     AngularVelocity,     /* of i relative to j, component in frame */
     AngularAcceleration, /* likewise */
-    Multiplier,          /* of row `component` of a joint or motion */
+    Multiplier,          /* of row `component` of a joint or motion; which row is what: joints.h */
     JointForce,          /* of a joint or motion on its marker i's body, component in frame (default: marker j) */
     JointMoment,         /* likewise, about marker i's origin */
-    Component,           /* component of a force element: force state where it is carried as one, else its value */
+    Component,           /* component of a force element, forces.h: force state where it is carried as one, else its value */
     Value,               /* of a variable V */
     StateValue,          /* of a first-order state */
     Modal,               /* modal coordinate `component` of a flexible body */
-    ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output alone */
+    ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output alone. A body that the
+                            element does not act on is an error here, so that no channel is zero by mistake; it is zero in Snapshot::load() */
     ElementMoment,       /* likewise, about marker i's origin */
     KineticEnergy,       /* of the whole scene; for output alone */
     PotentialEnergy      /* likewise: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing, Beam, contacts and stops. What the user's own

@@ -70,14 +70,15 @@ public:
   PetscErrorCode modes(Body flexible, std::vector<double> *coordinates);
 
   /* What an element, joint, motion or force, does to the body of a marker: its force and its moment about the marker's origin, in the
-     axes of another marker (default: space axes). Zero if it does not touch that body. Of a flexible body: to the attachment that the marker is on, or
-     by loads and contacts of its modes, which have no attachment, to all of it; an error if it touches another attachment alone. */
+     axes of another marker (default: space axes). Zero if it does not touch that body, which Measure::elementForce() takes for an error. Of a flexible
+     body: to the attachment that the marker is on, or by loads and contacts of its modes, which have no attachment, to all of it; an error if it touches
+     another attachment alone. */
   PetscErrorCode load(Element e, Marker on, Load *x, Marker axes = {});
 
   /* An angle counts full turns: from the start in planar scenes and where an element, a channel or an expression reads it, else from the first
      question for it on */
   PetscErrorCode value(const Measure &m, double *x);
-  /* kinetic, potential energy of the scene, of what Measure::PotentialEnergy names; the momenta are those about the space origin */
+  /* kinetic, potential energy of the scene, of what Measure::PotentialEnergy names */
   PetscErrorCode energy(double *kinetic, double *potential);
 
 private:
