@@ -9,8 +9,17 @@
       ...
 
   With other parameters, or from where a run has got to, the next one is made first: scene.createTS(&next, ts). All calls are collective.
-  After an error the run is where it was. Options of the linear solvers have the prefixes -scene_assembly_ and, for the way downhill,
-  -scene_equilibrium_.
+  After an error the run is where it was.
+
+  Options of solvers have these prefixes, whatever that of the TS is:
+
+    -scene_assemble_        the linear solver that moves bodies at the start, in the metric of the masses: -scene_assemble_ksp_view
+    -scene_assembly_        the linear solver of all analyses for positions that meet the constraints
+    -scene_equilibrium_     the linear solver of the way downhill to equilibrium, StartPolicy::equilibrium as well
+    -scene_response_        the linear solver of Linearization::response(), linearize.h
+    -scene_modes_           SLEPc's solver of SlowestModes(), modes.h; -scene_modes_st_ that of its shifted matrix
+
+  They are read where such a solver is made; an option that nobody has read is named when PETSc ends.
 */
 #ifndef HHTDAE_ANALYSES_H
 #define HHTDAE_ANALYSES_H

@@ -14,6 +14,14 @@
   by name, all of it at once, as a PETSc error from setUp(), createTS() or solve(), whichever comes first. Exceptions of the user's own
   functions that are tried as they are added, laws of springs and motions in time, come from add(). Every rank describes the
   same scene in the same order; METIS gives each rank its part of the bodies.
+
+  Names are what messages and results call things by: bodies, elements (joints, motions and forces together), variables, states and channels must not have
+  the same name as another one of their kind, which is an error. An empty name becomes the kind's, of an element its type's, with the number among all of
+  the kind from 0 on: "body 7", "revolute 3", "spring-damper 4", "variable 0", "state 0", "channel 2". A motion of accelerations called "drive" makes
+  a state "drive speed". Names of markers are for messages alone and may repeat.
+
+  Options of the start, StartPolicy, and of the linear solvers of start and analyses, analyses.h, have no prefix of a TS. Those of results, output.h,
+  have the prefix of the run's TS, as its -ts_ options do: after TSSetOptionsPrefix(ts, "a_") -scene_csv is -a_scene_csv.
 */
 #ifndef HHTDAE_SCENE_H
 #define HHTDAE_SCENE_H
@@ -143,7 +151,7 @@ public:
   Scene(const Scene &)            = delete;
   Scene &operator=(const Scene &) = delete;
 
-  /* bodies; an empty name becomes "body 7" */
+  /* bodies */
   Body ground() const { return Body{-1, number_}; }
   Body add(const std::string &name, const RigidBody &body);
   Body add(const std::string &name, const PointMass &body);
@@ -250,7 +258,7 @@ public:
 
   /* A run from the start: a TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it.
      Set final time, step and options on it as on any TS. It owns all that changes in the run, so that any number of runs may go on
-     side by side, and outlive the scene. */
+     side by side, and outlive the scene. Where several write results, each TS gets a prefix of its own, or output() other names before its solve(). */
   PetscErrorCode createTS(TS *ts);
 
   /* A run that goes on where another one of this scene is: its time, positions, velocities and states, angles over full turns; with
@@ -258,7 +266,7 @@ public:
      the mass matrix, as in a plastic impact, unless start().assembly is Off; positions that they forbid are an error as at any start.
      Elements that count angles over full turns or follow a curve may not come or go, which is an error: torsional springs, RotationalStop, Screw, Coupler,
      gears, racks, PointOnCurve, constraints and forces of the user's that read angles. RotationalMotion may, but not one of accelerations.
-     Files are begun anew: give the run other names. */
+     Files are begun anew: give the run other names, or its TS a prefix. */
   PetscErrorCode createTS(TS *ts, TS from);
 
   /* TSSolve(), output. */
