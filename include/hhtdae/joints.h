@@ -38,8 +38,9 @@ struct Screw { Marker i, j; double pitch = 1; };
   Couplers of joint motions, each given by its two markers: angle about z_j (revolute, cylindrical) or advance along z_j (planar
   scenes: x_j). They load the joints' own freedoms, a moment about z_j and a force along the advance, and nothing else: no bearing carries
   the force of teeth. The gears and racks after them act at the pitch point.
+
+  Gear: angle_1 + ratio angle_2 = its value at the start. Row: moment on i1's body about z_j1; that on i2's body about z_j2 is ratio times it.
 */
-/* angle_1 + ratio angle_2 = its value at the start. Row: moment on i1's body about z_j1; that on i2's body about z_j2 is ratio times it. */
 struct Gear { Marker i1, j1, i2, j2; double ratio = 1; };
 /* advance_2 - radius angle_1 = its value at the start. Row: force on i2's body along its advance; the moment on i1's body about z_j1 is -radius times it. */
 struct RackAndPinion { Marker i1, j1, i2, j2; double radius = 1; };
