@@ -53,7 +53,8 @@ PETSC_EXTERN const char *const TSHHT3Starts[];
 /* For TSHHT3SetOrder(): HHT of order two, and orders three to five where the motion is smooth */
 #define TSHHT3_ORDER_AUTO (-1)
 
-/* Cumulative counters of a run from its first start on, without the set-up, in the order of the summary line */
+/* Cumulative counters of a run from its first start on, without the set-up. The summary line has them in this order, but for `changes`, which come last if there
+   were any, and `of_order`, which it leaves out. */
 typedef struct {
   PetscInt  steps;           /* accepted steps */
   PetscInt  rejected;        /* steps rejected by the error test */

@@ -10,7 +10,7 @@
 
   Input Parameters:
 + ts   - the `TS` context
-- form - `TSHHT3_FORM_SECOND_ORDER` or `TSHHT3_FORM_PAPER`
+- form - `TSHHT3_FORM_SECOND_ORDER` (default) or `TSHHT3_FORM_PAPER`
 
   Options Database Key:
 . -ts_hhtdae_form <paper,second_order> - the form
@@ -268,9 +268,9 @@ PetscErrorCode TSHHT3SetPredictorDegree(TS ts, PetscInt degree)
 
   Input Parameters:
 + ts    - the `TS` context
-. ratio - factor by which h may differ from the h of the matrix, at least 1
-. rate  - rate of convergence beyond which the next step gets a new matrix; 0 renews it in every step
-- hold  - growth of h that is not taken, so that the factorization lives on, at least 1
+. ratio - factor by which h may differ from the h of the matrix, at least 1, default 1.4
+. rate  - rate of convergence beyond which the next step gets a new matrix; 0 renews it in every step; default 0.25, with the preconditioner hhtconstraint 0.1
+- hold  - growth of h that is not taken, so that the factorization lives on, at least 1, default 1.2
 
   Options Database Key:
 . -ts_hhtdae_reuse <ratio,rate,hold> - the three numbers
@@ -364,8 +364,9 @@ PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
   Level: intermediate
 
   Note:
-  The misfit is the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance;
-  it is printed if it exceeds 1 and always shown by -info. Accelerations and multipliers are made consistent in any case.
+  The misfit is the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance.
+  `TSHHT3_START_REPORT` prints it if it exceeds 1 at the start of a run, and 100 at a restart within it, where velocities are consistent to the order of the method only;
+  `TSHHT3_START_PROJECT` prints nothing. -info shows it always. Accelerations and multipliers are made consistent in any case.
 
   A restart from values that the integrator itself has left (`TSRestartStep()`, events) projects the velocities, unless the choice is
   `TSHHT3_START_OFF`: those of a step meet the constraints to second order, which multipliers would answer with oscillations of first order. Where an
@@ -419,16 +420,20 @@ PetscErrorCode TSHHT3GetAcceleration(TS ts, Vec *A)
 - t  - a time between the ends of the last step
 
   Output Parameters:
-+ U - coordinates, states (cubic Hermite), multipliers, variables and force states (linear), or `NULL`
-. V - velocities (cubic Hermite) and derivatives of states (linear), or `NULL`
-- A - accelerations (linear), or `NULL`
++ U - coordinates, states, multipliers, variables and force states, or `NULL`
+. V - velocities and derivatives of states, or `NULL`
+- A - accelerations, or `NULL`
 
   Level: intermediate
 
   Notes:
   At both ends the values of the step itself are returned, to the last bit.
 
+  Within a step of order two coordinates, velocities and states are cubic Hermite polynomials; accelerations, derivatives of states, multipliers, variables and force states are linear.
   What is linear is only as good as the step is short; `TSHHT3EvaluateAt()` solves for it.
+
+  Within a step of order k above two (`TSHHT3SetOrder()`) all of them are polynomials of degree k through values at the ends of the last steps, accelerations, derivatives of states, multipliers,
+  variables and force states of a lower degree where the history reaches back less far.
 
 .seealso: `TSHHT3`, `TSHHT3EvaluateAt()`, `TSInterpolate()`, `TSHHT3GetAcceleration()`
 @*/

@@ -247,7 +247,7 @@ PetscErrorCode SamplerDestroy(Integrator &I)
   state that it began with is known, at the present time.
 
   Where the equations cannot be solved (a singular position, a Jacobian without an assembled matrix), accelerations and multipliers
-  are interpolated linearly, and -info says so.
+  are those of `TSHHT3Interpolate()`, linear in a step of order two, and -info says so.
 
 .seealso: `TSHHT3`, `TSHHT3Interpolate()`, `TSHHT3GetAcceleration()`
 @*/

@@ -208,7 +208,7 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   TSHHT3Form  form = I.form;
   TSHHT3Start start = I.start_policy;
   PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[3] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold};
-  PetscInt    degree = -1, three = 3, order = I.order.wanted;
+  PetscInt    degree = I.predictor.fixed ? I.predictor.degree_max : -1, three = 3, order = I.order.wanted;
   const char *const orders[] = {"2", "3", "4", "5", "auto"};
   PetscBool   flg;
 
@@ -351,14 +351,14 @@ static PetscErrorCode Finalize(void)
   variables and force states, given by TSSetI2Function() and TSSetI2Jacobian().
 
   Options Database Keys:
-+ -ts_hhtdae_form <paper,second_order>   - how inertia forces are averaged, `TSHHT3SetForm()`
++ -ts_hhtdae_form <paper,second_order>   - how inertia forces are averaged, default second_order, `TSHHT3SetForm()`
 . -ts_hhtdae_alpha <alpha>               - numerical damping in [-1/3, 0], default -0.3, `TSHHT3SetAlpha()`
 . -ts_hhtdae_radius <rho>                - spectral radius at infinity in place of alpha, `TSHHT3SetRadius()`
 . -ts_hhtdae_order <2,3,4,5,auto>        - the order, default 2, `TSHHT3SetOrder()`
-. -ts_hhtdae_corrector_tolerance <c>     - where the Newton iteration stops, `TSHHT3SetCorrectorTolerance()`
-. -ts_hhtdae_predictor_degree <d>        - degree of the predictor, -1 to choose, `TSHHT3SetPredictorDegree()`
-. -ts_hhtdae_reuse <ratio,rate,hold>     - when the matrix is renewed, `TSHHT3SetReuse()`
-. -ts_hhtdae_start <off,report,project>  - inconsistent initial values, `TSHHT3SetStart()`
+. -ts_hhtdae_corrector_tolerance <c>     - where the Newton iteration stops, default 0.001 or less, `TSHHT3SetCorrectorTolerance()`
+. -ts_hhtdae_predictor_degree <d>        - degree of the predictor, default -1, to choose it, `TSHHT3SetPredictorDegree()`
+. -ts_hhtdae_reuse <ratio,rate,hold>     - when the matrix is renewed, default 1.4,0.25,1.2, `TSHHT3SetReuse()`
+. -ts_hhtdae_start <off,report,project>  - inconsistent initial values, default report, `TSHHT3SetStart()`
 . -ts_hhtdae_summary                     - print the counters at the end of the run
 . -ts_hhtdae_progress                    - show the progress of the run on the terminal
 . -ts_hhtdae_checkpoint <file>           - write checkpoints, `TSHHT3CheckpointSave()`
@@ -369,14 +369,17 @@ static PetscErrorCode Finalize(void)
 
   Notes:
   The error test, `TSSetTolerances()`, judges positions (and first-order states) only: weight_i = max(atol_i, rtol_i Y_i) with
-  Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it takes; all options of
-  `SNES`, `KSP` and `PC` override the defaults. A correction that fails cuts the step; it does not end the run.
+  Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it takes. Where half of the unknowns or more are
+  those of nodes of finite elements (`TSHHT3SetNodes()`) and the factor would have more than 1e7 entries, a Krylov method with the preconditioner hhtconstraint
+  takes its place, as it does where there is no room for a factor. All options of `SNES`, `KSP` and `PC` override the defaults. A correction that fails cuts the
+  step; it does not end the run.
 
   The corrector stops by its measured rate of convergence, so that -snes_rtol, -snes_atol, -snes_stol, -snes_max_funcs and
   -snes_divergence_tolerance (`SNESSetTolerances()`) have no meaning, which is printed if they are set; -snes_convergence_test
   <default,skip> or `SNESSetConvergenceTest()` puts the user's test in its place, and then they do. It makes full steps without a
-  line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it counts always; the program's
-  number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told from PETSc's defaults and want the option.
+  line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it, the most iterations of a correction, counts always, and is 10
+  without it (two more each time that corrections have turned back and met); the program's number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told
+  from PETSc's defaults and want the option.
   A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, which is printed, and zero, or less than can be the solution, for a residual that is not zero is a failed solve.
   -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. The default type of `TSAdapt`, also called hhtdae,
   is basic but for small gains of h, which it does not take since they cost a matrix, growth after failures, which it slows, and growth where nothing moves, where it

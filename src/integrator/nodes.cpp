@@ -44,7 +44,14 @@ PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
 .vb
   -ksp_type cg -pc_type hhtconstraint         (fgmres where so much is not symmetric that these do not serve)
 .ve
-  where a factorization of the whole matrix has no room. Its own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
+  where a factorization of the whole matrix has no room.
+
+  Where `reference` is given, at least half of the unknowns are those of nodes, and the factor would have more than 1e7 entries (some 20,000 unknowns), this call makes that the
+  default: conjugate gradients with hhtconstraint in place of a factorization, which `-pc_type lu` or `cholesky` bring back. Where a solve fails or takes more than 100 iterations
+  a factor takes over for good. Each correction of a step is solved to a relative tolerance of 1e-2, unless `-ksp_rtol` says otherwise, and the matrix is renewed at a rate of
+  convergence above 0.1 (`TSHHT3SetReuse()`). -ts_view and -info show the choice.
+
+  The preconditioner's own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
   but for multipliers, are taken for a node. Scenes make the call themselves.
 
   Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, 400 where there are more than 200,000, move together as a rigid body on a coarse level, whose solver has the prefix
