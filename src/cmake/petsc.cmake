@@ -25,6 +25,9 @@ pkg_check_modules(PETSC REQUIRED IMPORTED_TARGET PETSc>=3.18)
 pkg_get_variable(PETSC_PCFILEDIR PETSc pcfiledir)
 find_package(MPI REQUIRED COMPONENTS C CXX)
 string(REGEX MATCH "^[0-9]+\\.[0-9]+" PETSC_MINOR_VERSION "${PETSC_VERSION}")
+string(REGEX MATCH "^([0-9]+)\\.([0-9]+)" PETSC_NEXT_MINOR_VERSION "${PETSC_VERSION}")
+math(EXPR PETSC_NEXT_MINOR_VERSION "${CMAKE_MATCH_2} + 1")
+string(PREPEND PETSC_NEXT_MINOR_VERSION "${CMAKE_MATCH_1}.")
 message(STATUS "PETSc ${PETSC_VERSION} from ${PETSC_PCFILEDIR}")
 
 # PETSC_HAS_<package>: what PETSc was built with, and so may be used by us, too

@@ -49,6 +49,12 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     with_pkg_config = os.path.join(work, "with-pkg-config")
     run([os.environ.get("CC", "cc"), os.path.join(outside, "outside.c"), "-o", with_pkg_config, *flags, "-lm"])
     works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
+    other = os.path.join(work, "later")
+    os.mkdir(other)
+    with open(os.path.join(other, "PETSc.pc"), "w") as file:
+        file.write("Name: PETSc\nDescription: a later one\nVersion: 99.0\n")
+    refusal = run(["pkg-config", "--print-errors", "--libs", "hhtdae"], fails=True, PKG_CONFIG_PATH=os.pathsep.join([os.path.join(libdirs[0], "pkgconfig"), other]))
+    check("PETSc <" in refusal, "pkg-config takes another PETSc: " + refusal)
 
     # A scene, as a component of the same package and through its own pkg-config file
     scene = os.path.join(work, "scene-with-cmake")
