@@ -14,6 +14,7 @@ PLAIN = {
     "doublependulum_angles": [],
     "fourbar": [],
     "heavytop_quaternion": [],
+    "masschain": ["-ts_hhtdae_summary"],
     "oscillators": [],
     "pendulum": [],
     "rolling": [],
