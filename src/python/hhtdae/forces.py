@@ -1,4 +1,8 @@
-"""Forces: springs, bushings, beams, the user's own, contact, stops, friction."""
+"""Forces: springs, bushings, beams, the user's own, contact, stops, friction.
+
+In planar scenes the plane of a contact is the line along x_j, outside y_j > 0; spheres, ellipsoids and boxes are discs, ellipses and rectangles there, and there is no
+`TorusPlane`.
+"""
 
 from __future__ import annotations
 
@@ -178,7 +182,8 @@ def _contact_law():
 
 @_spec
 class SpherePlane(_Joint):
-    """Contact of a sphere about i with the xy plane of j, outside z > 0. Components: the force on i's body, in j's axes.
+    """Contact of a sphere about i with the xy plane of j, outside z_j > 0; planar scenes: with the line along x_j, outside y_j > 0. Components: the force on i's body at
+    the point of contact, in j's axes.
 
     radius : length"""
     radius: Number = 1.
@@ -188,7 +193,7 @@ class SpherePlane(_Joint):
 
 @_spec
 class NodeContact(Spec):
-    """Kept nodes of a flexible body as balls against the xy plane of j, outside z > 0, or a sphere about j. Components: the resultant on the body, in space axes.
+    """Kept nodes of a flexible body as balls against the xy plane of j, outside z_j > 0, or a sphere about j. Components: the resultant on the body, in space axes.
 
     body : flexible Body
     nodes : labels; default: all that are kept
@@ -204,7 +209,8 @@ class NodeContact(Spec):
 
 @_spec
 class EllipsoidPlane(_Joint):
-    """Contact of an ellipsoid about i in its axes with the xy plane of j.
+    """Contact of an ellipsoid about i in its axes with the xy plane of j, outside z_j > 0; planar scenes: with the line along x_j, outside y_j > 0. Components: the force on
+    i's body at the point of contact, in j's axes.
 
     semiaxes : (3,), lengths"""
     semiaxes: Vector = (1., 1., 1.)
@@ -214,7 +220,7 @@ class EllipsoidPlane(_Joint):
 
 @_spec
 class TorusPlane(_Joint):
-    """Contact of a torus about z_i, a tire, with the xy plane of j.
+    """Contact of a torus about z_i, a tire, with the xy plane of j, outside z_j > 0. Components: the force on i's body at the point of contact, in j's axes.
 
     radius : of the circle of centres
     tube : radius of the tube"""
@@ -226,7 +232,7 @@ class TorusPlane(_Joint):
 
 @_spec
 class SphereSphere(_Joint):
-    """Contact of two spheres.
+    """Contact of two spheres. Components: the force on i's body at the point of contact, in space axes.
 
     radius_i, radius_j : lengths"""
     radius_i: Number = 1.
@@ -237,7 +243,7 @@ class SphereSphere(_Joint):
 
 @_spec
 class SphereBox(_Joint):
-    """Contact of a sphere about i with a box about j in its axes.
+    """Contact of a sphere about i with a box about j in its axes. Components: the force on i's body at the point of contact, in j's axes.
 
     radius : of the sphere
     half : (3,), half of the box's edges"""
@@ -264,7 +270,7 @@ class TranslationalStop(_Joint):
     """Ends of the travel of i along an axis of j. Component: the force on i's body.
 
     lower, upper : lengths
-    axis : 0, 1 or 2
+    axis : 0, 1 or 2: x_j, y_j or z_j; in planar scenes the default is x_j, along which `Translational` is there
     law : without friction"""
     lower: Number = -inf
     upper: Number = inf
@@ -288,7 +294,8 @@ class DistanceStop(_Joint):
 @_spec
 class JointFriction(Spec):
     """Friction in a joint (Revolute, Translational, Cylindrical, Spherical) from its reaction force N: moment mu r N or force mu N, regularized.
-    Reaction moments add nothing.
+    Reaction moments add nothing. Components, on the body of the joint's marker i: Revolute, the moment about z_j; Translational, the force along z_j (planar scenes: x_j);
+    Cylindrical, the force along and the moment about z_j; Spherical, the moment in space axes.
 
     joint : Element
     coefficient : mu

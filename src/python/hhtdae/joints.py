@@ -1,4 +1,11 @@
-"""Joints, motions and primitive constraints between marker i and marker j. Multipliers are forces and moments."""
+"""Joints, motions and primitive constraints between marker i and marker j.
+
+Multipliers are forces and moments on the body of marker i, row by row as each class tells: forces at i's origin unless it says otherwise, the opposite on j's
+body at the same point. x_j, y_j, z_j are the axes of marker j.
+
+Planar scenes have Revolute, Translational, Fixed, Gear, RackAndPinion, Coupler, GearMesh, RackMesh, PointDistance, PointOnCurve, RollingDisc, UserConstraint and the
+motions. z is normal to the plane there: what advances along z_j in space advances along x_j, and rows out of the plane are left out.
+"""
 
 from __future__ import annotations
 
@@ -12,51 +19,53 @@ __all__ = ["Spherical", "Revolute", "Universal", "ConstantVelocity", "Translatio
            "Term", "Coupler", "GearMesh", "RackMesh", "InLine", "InPlane", "ParallelAxes", "Perpendicular", "Orientation", "PointDistance",
            "PointOnCurve", "RollingDisc", "RollingSphere", "KnifeEdge", "UserConstraint", "RotationalMotion", "TranslationalMotion"]
 
-# ---- joints; planar scenes: Revolute, Translational, Fixed ----
+# ---- joints ----
 
 @_spec
 class Spherical(_Joint):
-    """Origins coincide."""
+    """Origins coincide. Multipliers: force in space axes."""
 
 
 @_spec
 class Revolute(_Joint):
-    """Origins coincide, z axes are parallel."""
+    """Origins coincide, z axes are parallel. Multipliers: force in space axes, then moment about x_j and y_j; planar scenes: force along x and y."""
 
 
 @_spec
 class Universal(_Joint):
-    """Origins coincide, z_i is perpendicular to z_j."""
+    """Origins coincide, z_i is perpendicular to z_j. Multipliers: force in space axes, then moment about z_j x z_i."""
 
 
 @_spec
 class ConstantVelocity(_Joint):
-    """Origins coincide, rotations about z_i and z_j are equal; opposite if they are described more than 90 degrees apart, which stays so in the run."""
+    """Origins coincide, rotations about z_i and z_j are equal; opposite if they are described more than 90 degrees apart, which stays so in the run. Multipliers: force
+    in space axes, then m, of which the moment is m cos(b / 2) about the axis halfway between z_i and z_j, b their angle: m about z_j where the shafts are in line."""
 
 
 @_spec
 class Translational(_Joint):
-    """Motion along z_j, no rotation."""
+    """Motion along z_j (planar scenes: x_j), no rotation. Multipliers: force along x_j and y_j, then moment about x_j, y_j and z_j; planar scenes: force along y_j,
+    moment about z."""
 
 
 @_spec
 class Cylindrical(_Joint):
-    """Motion along and about z_j."""
+    """Motion along and about z_j. Multipliers: force along x_j and y_j, then moment about them."""
 
 
 @_spec
 class Planar(_Joint):
-    """xy planes coincide."""
+    """xy planes coincide. Multipliers: force along z_j, then moment about x_j and y_j."""
 
 
 @_spec
 class Fixed(_Joint):
-    """No relative motion."""
+    """No relative motion. Multipliers: force in space axes, then moment about x_j, y_j and z_j; planar scenes: force along x and y, moment about z."""
 
 
 @_spec
 class Screw(_Joint):
-    """Motion along and about z_j, coupled.
+    """Motion along and about z_j, coupled. Multipliers: force along x_j and y_j, moment about them, force along z_j.
 
     pitch : advance per turn, length"""
     pitch: Number = 1.
@@ -73,20 +82,21 @@ class _Two(Spec):
 @_spec
 class Gear(_Two):
     """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its value at the start. Its torques are about the joints' axes; the forces of teeth, which
-    bearings feel, are those of `GearMesh`."""
+    bearings feel, are those of `GearMesh`. Multiplier: the moment on the body of i1 about z_j1; that on the body of i2 is ratio times as large."""
     ratio: Number = 1.
 
 
 @_spec
 class RackAndPinion(_Two):
-    """Couples an advance with an angle: advance_2 - radius angle_1 keeps its value at the start. The force of the teeth acts along the axis of the advance, the torque about
-    that of the angle; bearings feel those of `RackMesh`."""
+    """Couples an advance along z_j2 (planar scenes: x_j2) with an angle about z_j1: advance_2 - radius angle_1 keeps its value at the start. The force of the teeth acts
+    along the axis of the advance, the torque about that of the angle; bearings feel those of `RackMesh`. Multiplier: the force on the rack, the body of i2; the moment
+    on the pinion, the body of i1, is -radius times it."""
     radius: Number = 1.
 
 
 @_spec
 class Term(Spec):
-    """A joint's motion in a `Coupler`: angle about z_j, or advance along it, times a factor."""
+    """A joint's motion in a `Coupler`: angle about z_j, or advance along it (planar scenes: along x_j), times a factor."""
     i: Any
     j: Any
     rotation: bool = True
@@ -95,7 +105,8 @@ class Term(Spec):
 
 @_spec
 class Coupler(Spec):
-    """The sum of two or three terms keeps its value at the start."""
+    """The sum of two or three terms keeps its value at the start. Multiplier: the load on the body of a term's marker i, a moment about z_j or a force along the advance,
+    over the term's factor."""
     terms: Sequence[Term]
 
     def _described(self, scene, who):
@@ -109,44 +120,44 @@ class Coupler(Spec):
 @_spec
 class GearMesh(_Two):
     """Teeth between two wheels on one carrier; the marker `mesh` on the carrier is at the pitch point, its z axis (planar scenes: x axis) along the
-    force of the teeth. Multiplier: the force on body 1 along it."""
+    force of the teeth. Multiplier: the force on the body of i1 along it."""
     mesh: Any
 
 
 @_spec
 class RackMesh(_Two):
-    """Teeth between wheel 1 and rack 2, which is on a translational joint along z_j2 (planar scenes: x_j2)."""
+    """Teeth between wheel 1 and rack 2, which is on a translational joint along z_j2 (planar scenes: x_j2); `mesh` and multiplier as of `GearMesh`."""
     mesh: Any
 
 
 @_spec
 class InLine(_Joint):
-    """Origin of i on the z axis of j."""
+    """Origin of i on the z axis of j. Multipliers: force along x_j and y_j."""
 
 
 @_spec
 class InPlane(_Joint):
-    """Origin of i in the xy plane of j."""
+    """Origin of i in the xy plane of j. Multiplier: force along z_j."""
 
 
 @_spec
 class ParallelAxes(_Joint):
-    """z axes are parallel."""
+    """z axes are parallel. Multipliers: moment about x_j and y_j."""
 
 
 @_spec
 class Perpendicular(_Joint):
-    """z axes are perpendicular."""
+    """z axes are perpendicular. Multiplier: moment about z_j x z_i."""
 
 
 @_spec
 class Orientation(_Joint):
-    """All axes are parallel."""
+    """All axes are parallel. Multipliers: moment about x_j, y_j and z_j."""
 
 
 @_spec
 class PointDistance(_Joint):
-    """Origins at a constant distance.
+    """Origins at a constant distance. Multiplier: the tension.
 
     length : negative: the distance at the start"""
     length: Number = -1.
@@ -154,7 +165,8 @@ class PointDistance(_Joint):
 
 @_spec
 class PointOnCurve(_Joint):
-    """Origin of i on a curve in j's axes, a twice continuously differentiable spline through points.
+    """Origin of i on a curve in j's axes, a twice continuously differentiable spline through points. Multipliers: force along the two normals of the curve;
+    planar scenes: along z x tangent, the tangent in the direction of the points.
 
     points : (n, 3)
     closed : bool; an open curve goes on as a straight line beyond its ends"""
@@ -167,7 +179,8 @@ class PointOnCurve(_Joint):
 
 @_spec
 class RollingDisc(_Joint):
-    """A disc about z_i rolls on the xy plane of j without slip.
+    """A disc about z_i rolls on the xy plane of j without slip, on the side where it is at the start; planar scenes: on the line along x_j. Multipliers: force at the point of
+    contact, along the normal away from the plane, then friction along x_j and y_j; planar scenes: along y_j, then friction along x_j.
 
     radius : length"""
     radius: Number = 1.
@@ -175,7 +188,8 @@ class RollingDisc(_Joint):
 
 @_spec
 class RollingSphere(_Joint):
-    """A sphere about i's origin rolls on the xy plane of j without slip.
+    """A sphere about i's origin rolls on the xy plane of j without slip, on the side where it is at the start. Multipliers: force at the point of contact, along z_j, then
+    friction along x_j and y_j.
 
     radius : length"""
     radius: Number = 1.
@@ -183,12 +197,13 @@ class RollingSphere(_Joint):
 
 @_spec
 class KnifeEdge(_Joint):
-    """No velocity of i's origin along y_i."""
+    """Origin of i in the xy plane of j, without velocity along y_i. Multipliers: force along z_j, force along y_i."""
 
 
 @_spec
 class UserConstraint(Spec):
-    """Formulas that stay zero: of displacements, distances, angles and time, or of velocities too, in which they have to be linear."""
+    """Formulas that stay zero: of displacements, distances, angles and time, or of velocities too, in which they have to be linear. Multipliers: one a row; the load on the
+    bodies is that times the derivatives of the formula by positions, at velocity level by velocities. A row reads six markers, four angles, two variables and states at most."""
     rows: Sequence[Formula]
     _functions = {"rows": _expressions}
 
@@ -197,7 +212,7 @@ class UserConstraint(Spec):
 
 @_spec
 class RotationalMotion(Spec):
-    """Prescribes the angle of i about z_j.
+    """Prescribes the angle of i about z_j. Multiplier: moment about z_j.
 
     function : of time: a number, a `TimeFunction`, a formula of time(), or a Python function of t, which is traced; radians
     of : "displacement", "velocity" or "acceleration": what the function is
@@ -212,11 +227,11 @@ class RotationalMotion(Spec):
 
 @_spec
 class TranslationalMotion(Spec):
-    """Prescribes the displacement of i along an axis of j.
+    """Prescribes the displacement of i along an axis of j. Multiplier: force along it.
 
     function : of time: a number, a `TimeFunction`, a formula of time(), or a Python function of t, which is traced; length
     of : "displacement", "velocity" or "acceleration": what the function is
-    axis : 0, 1 or 2"""
+    axis : 0, 1 or 2: x_j, y_j or z_j; in planar scenes the default is x_j, along which `Translational` is there"""
     i: Any
     j: Any
     function: Union[float, TimeFunction, Expression, Callable]

@@ -101,7 +101,7 @@ def angular_acceleration(i, component, j=None, frame=None):
 
 
 def multiplier(joint, row):
-    """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment."""
+    """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment on the body of its marker i, along which axes its class says, row by row."""
     return Measure("multiplier", component=_row(row, "row"), target=_target(joint, "element"))
 
 
@@ -121,12 +121,13 @@ def force(element, component=0):
 
 
 def element_force(element, on, component, frame=None):
-    """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone."""
+    """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone. An `Error` where the element does not act on
+    that body; `Snapshot.load` is zero there."""
     return Measure("element_force", on, None, frame, _component(component), _target(element, "element"))
 
 
 def element_moment(element, on, component, frame=None):
-    """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone."""
+    """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone. An `Error` where the element does not act on that body."""
     return Measure("element_moment", on, None, frame, _component(component), _target(element, "element"))
 
 

@@ -90,8 +90,8 @@ class Snapshot:
         return Motion(**self._core.relative(marker, to))
 
     def load(self, element, on, axes=None):
-        """`Load`: what a joint, motion or force does to the body of the marker `on`, its moment about that marker's origin, in the axes of another marker
-        (default: space). Of a flexible body: to the attachment that the marker is on, or by ``ModalLoad`` and ``NodeContact``, which have no attachment, to all
+        """`Load`: what a joint, motion or force does to the body of the marker `on`, zero where it does not act on it; the moment about that marker's origin, in the axes of
+        another marker (default: space). Of a flexible body: to the attachment that the marker is on, or by ``ModalLoad`` and ``NodeContact``, which have no attachment, to all
         of it; `Error` if the element touches another attachment alone."""
         return Load(*self._core.load(element, on, axes))
 
