@@ -38,7 +38,7 @@ class Statistics:
 
 
 def set_form(ts, form):
-    """How the inertia forces are averaged over a step: "paper", equation (9a) of Negrut et al., or "second_order", second order always."""
+    """How the inertia forces are averaged over a step: "second_order" (the default), second order always, or "paper", equation (9a) of Negrut et al."""
     _core.set_form(ts, form)
 
 
@@ -48,7 +48,7 @@ def get_form(ts):
 
 
 def set_alpha(ts, alpha):
-    """Numerical damping of the HHT method, -1/3 (most) to 0 (none)."""
+    """Numerical damping of the HHT method, -1/3 (most) to 0 (none), default -0.3."""
     _core.set_alpha(ts, alpha)
 
 
@@ -76,17 +76,18 @@ def get_order(ts):
 
 
 def set_corrector_tolerance(ts, factor):
-    """The corrector's error as a part of the tolerance of a step."""
+    """The corrector's error as a part of the tolerance of a step, default 0.001 and less for constrained systems with little damping."""
     _core.set_corrector_tolerance(ts, factor)
 
 
 def set_predictor_degree(ts, degree):
-    """Degree of the predictor's polynomial."""
+    """Degree of the predictor's polynomial, 0 to 3, or -1 (the default) to choose it in each step."""
     _core.set_predictor_degree(ts, degree)
 
 
 def set_reuse(ts, ratio, rate, hold):
-    """When the Newton matrix is made anew: factor by which h may differ, rate of convergence, growth of h that is not taken."""
+    """When the Newton matrix is made anew: factor by which h may differ (default 1.4), rate of convergence (0.25; 0.1 with the preconditioner hhtconstraint), growth of h
+    that is not taken (1.2)."""
     _core.set_reuse(ts, ratio, rate, hold)
 
 
@@ -133,7 +134,7 @@ def set_nodes(ts, nodes, reference=None):
 
 
 def set_start(ts, start):
-    """About initial values that violate the constraints: "off", "report", or "project" to the nearest consistent ones."""
+    """About initial values that violate the constraints: "off", "report" (the default), or "project" to the nearest consistent ones."""
     _core.set_start(ts, start)
 
 
@@ -184,7 +185,7 @@ def get_acceleration(ts):
 
 
 def interpolate(ts, t):
-    """(u, v, a) at a time of the last step, by the method's own polynomial: new vectors."""
+    """(u, v, a) at a time of the last step, by polynomials through the ends of steps: new vectors."""
     return _core.interpolate(ts, t)
 
 
