@@ -5,6 +5,7 @@ import inspect
 import os
 import pickle
 import pydoc
+import re
 import unittest
 
 import numpy as np
@@ -56,6 +57,26 @@ class Documentation(unittest.TestCase):
             told |= {n.target.id for n in tree.body if isinstance(n, ast.AnnAssign)}
             there = {name for name in dir(module) if not name.startswith("__")}
             self.assertEqual(told, there)
+
+
+    def test_arguments_of_stubs(self):
+        """As many as pybind11's documentation has, and of their names those that it knows"""
+        with open(os.path.join(PACKAGE, "_core.pyi")) as text:
+            tree = ast.parse(text.read())
+        functions = [(_core, f) for f in tree.body if isinstance(f, ast.FunctionDef)]
+        for c in tree.body:
+            if isinstance(c, ast.ClassDef):
+                functions += [(getattr(_core, c.name), f) for f in c.body if isinstance(f, ast.FunctionDef) and f.name != "__getattr__"
+                              and not any(getattr(d, "id", "") == "property" for d in f.decorator_list)]
+        self.assertGreater(len(functions), 50)
+        for of, f in functions:
+            head = (getattr(of, f.name).__doc__ or "").split("\n")[0]
+            there = re.findall(r"(?:^|[(,] ?)(\w+): ", head[len(f.name):])
+            told = [a.arg for a in f.args.args]
+            self.assertEqual(len(told), len(there), "%s is declared with %s" % (head, told))
+            for a, b in zip(told, there):
+                if not b.startswith("arg"):
+                    self.assertEqual(a, b, head)
 
 
 class Pickles(unittest.TestCase):
