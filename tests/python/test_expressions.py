@@ -81,6 +81,23 @@ class Operations(unittest.TestCase):
                 self.assertAlmostEqual(y[1], (g(t + d)[0] - g(t - d)[0]) / (2 * d), delta=2e-6)
                 self.assertAlmostEqual(y[2], (g(t + d)[1] - g(t - d)[1]) / (2 * d), delta=2e-6)
 
+    def test_time_values(self):
+        """A function that gives its own derivatives, in a motion; one that gives two numbers is told"""
+        f = h.time_values(lambda t: (t**3, 3 * t**2, 6 * t))
+        self.assertEqual(time_function(f, [])(2.), (8., 12., 12.))
+        scene = h.Scene()
+        b = scene.add("b", h.PointMass(mass=2.))
+        rail = scene.ground.marker()
+        drive = scene.add("drive", h.TranslationalMotion(b.marker(), rail, f, axis=0))
+        scene.channel("x", h.displacement(b.marker(), 0))
+        scene.channel("force", h.joint_force(drive, 0))
+        run = scene.solve(1., tolerance=1e-8)
+        self.assertAlmostEqual(run["x"][-1], 1., delta=1e-9)
+        self.assertAlmostEqual(run.sample()["force"], 12., delta=1e-2)
+        short = h.time_values(lambda t: (t, 1.))
+        with self.assertRaisesRegex(RuntimeError, "must return its value and its first and second derivative"):
+            time_function(short, [])(0.5)
+
     def test_numpy(self):
         """numpy's functions, mixed arrays, matrix products"""
         def f(x, y):

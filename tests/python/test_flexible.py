@@ -7,6 +7,7 @@ import tempfile
 import unittest
 
 import numpy as np
+from petsc4py import PETSc
 
 import hhtdae as h
 
@@ -193,6 +194,33 @@ class Beam(unittest.TestCase):
         model.add_set("root", self.model.sets["root"]).add_set("tip", self.model.sets["tip"])
         body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6)
         np.testing.assert_allclose(body.frequencies, self.body.frequencies, rtol=1e-7)
+
+    def test_matrices_in_files(self):
+        """K and M in Matrix Market's format, nodes and sets as lines of text: the same body; and as PETSc writes them"""
+        names = {name: os.path.join(self.folder.name, "own." + name) for name in ("K", "M", "nodes", "sets")}
+        for name, A in (("K", self.model.K), ("M", self.model.M)):
+            rows, columns, values = A.getValuesCSR()
+            with open(names[name], "w") as text:
+                print("%%%%MatrixMarket matrix coordinate real general\n%d %d %d" % (*A.getSize(), len(values)), file=text)
+                for i in range(A.getSize()[0]):
+                    for k in range(rows[i], rows[i + 1]):
+                        print(i + 1, columns[k] + 1, "%.17g" % values[k], file=text)
+        with open(names["nodes"], "w") as text:
+            for label, x in zip(self.model.label, self.model.coordinates):
+                print(label, *("%.17g" % c for c in x), file=text)
+        with open(names["sets"], "w") as text:
+            for name in ("root", "tip"):
+                print(name, *self.model.label[self.model.sets[name]], file=text)
+        model = flexible.FeModel.from_files(names["K"], names["M"], names["nodes"], names["sets"])
+        np.testing.assert_array_equal(model.label[model.sets["tip"]], self.model.label[self.model.sets["tip"]])
+        body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=6)
+        np.testing.assert_allclose(body.frequencies, self.body.frequencies, rtol=1e-7)
+        for name, A in (("K", self.model.K), ("M", self.model.M)):
+            viewer = PETSc.Viewer().createBinary(names[name] + ".petsc", "w", comm=self.model.comm)
+            A.view(viewer)
+            viewer.destroy()
+        model = flexible.FeModel.from_files(names["K"] + ".petsc", names["M"] + ".petsc", names["nodes"], names["sets"])
+        self.assertLess((model.K - self.model.K).norm(), 1e-12 * self.model.K.norm())
 
     def test_matrices_with_entries_in_parts(self):
         """As element matrices leave them: scipy adds what stands at one place"""

@@ -1,7 +1,9 @@
 """The integrator on petsc4py's TS, and solve_mechanism: order, agreement of traced and called equations, output, events, messages."""
 
 import math
+import os
 import pickle
+import tempfile
 import unittest
 
 import numpy as np
@@ -246,6 +248,29 @@ class OnTS(unittest.TestCase):
         q, v, a = integrator.evaluate_at(ts, t)
         self.assertAlmostEqual(q[2], 2 * a[1], delta=1e-9)
         self.assertAlmostEqual(v[1], -0.1 * w * math.sin(w * t), delta=1e-4)
+
+    def test_checkpoint_vec(self):
+        """It comes back with the state; None takes it out of checkpoints"""
+        own = PETSc.Vec().createSeq(2, comm=PETSc.COMM_SELF)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "checkpoint")
+            ts, u = self.make()
+            own.array = [3, 4]
+            integrator.set_checkpoint_vec(ts, own)
+            ts.setMaxTime(0.5)
+            ts.solve(u)
+            integrator.checkpoint_save(ts, file)
+            own.array = [0, 0]
+            again, x = self.make()
+            integrator.set_checkpoint_vec(again, own)
+            again.setUp()
+            integrator.checkpoint_load(again, file)
+            np.testing.assert_array_equal(own.array, [3, 4])
+            np.testing.assert_array_equal(x.array, u.array)
+            self.assertEqual(again.getTime(), ts.getTime())
+            integrator.set_checkpoint_vec(again, None)
+            with self.assertRaises(PETSc.Error):
+                integrator.checkpoint_load(again, file)
 
     def test_radius(self):
         ts, u = self.make()
