@@ -71,6 +71,30 @@ class Elements(unittest.TestCase):
         last = scene.solve(0.5, tolerance=1e-8).sample()
         np.testing.assert_allclose([last[name] for name in "xyz"], [-0.25, 0, -0.5], atol=1e-6)
 
+    def test_parameters_after_ground_acceleration(self):
+        """It stays when they change"""
+        scene = h.Scene()
+        scene.ground_acceleration(2.)
+        mass = scene.parameter("mass", 1.)
+        body = scene.add("body", h.PointMass(mass=mass))
+        scene.channel("x", h.displacement(body.marker(), 0))
+        for value in (1., 3.):
+            scene.set(mass=value)
+            self.assertAlmostEqual(scene.solve(1.)["x"][-1], -1., delta=1e-9)
+
+    def test_names(self):
+        """A part without a name has the one by which messages call it; no two parts have the same"""
+        scene = h.Scene()
+        a, b = scene.rigid_body(""), scene.add("", lambda: h.PointMass(position=(1, 0, 0)))
+        pin = scene.connect("", h.Spherical, a, scene.ground, (0, 0, 0))
+        spring = scene.add("", h.SpringDamper(a.marker(), b.marker(), stiffness=1.))
+        time, decay = scene.variable("", h.time()), scene.state("", lambda x: -x, 1.)
+        self.assertEqual([x.name for x in (a, b, pin, spring, time, decay)], ["body 0", "body 1", "spherical 0", "spring damper 1", "variable 0", "state 0"])
+        scene.add("body 1", h.PointMass(position=(2, 0, 0)))
+        scene.add("spherical 0", h.SpringDamper(a.marker(), b.marker(), stiffness=1.))
+        with self.assertRaisesRegex(h.Error, "(?s)body body 1: the name is given more than once.*element spherical 0: the name"):
+            scene.set_up()
+
     def test_view(self):
         scene, rod, pin = pendulum()
         with tempfile.TemporaryDirectory() as folder:
@@ -587,6 +611,22 @@ class Runs(unittest.TestCase):
 
 
 class Questions(unittest.TestCase):
+    def test_element_moment(self):
+        """A rod held fast bears its weight: channel, snapshot, and the moment that a lever makes of it; on a body that the element does not act on it is an error"""
+        scene = h.Scene(gravity=(0, -10., 0))
+        rod, other = scene.add("rod", h.RigidBody(mass=2., position=(0.5, 0, 0))), scene.add("other", h.RigidBody())
+        root, far = rod.marker((-0.5, 0, 0)), other.marker()
+        clamp = scene.add("clamp", h.Fixed(root, scene.ground.marker()))
+        scene.channel("moment", h.element_moment(clamp, root, "z"))
+        run = scene.solve(0.1)
+        np.testing.assert_allclose(run["moment"], 10., rtol=1e-9)
+        now = run.snapshot()
+        self.assertAlmostEqual(now.load(clamp, root).moment[2], 10., delta=1e-9)
+        self.assertAlmostEqual(now.value(h.element_moment(clamp, root, 2)), 10., delta=1e-9)
+        np.testing.assert_array_equal(now.load(clamp, far).moment, 0)
+        with self.assertRaisesRegex(h.Error, "clamp does not act on other"):
+            now.value(h.element_moment(clamp, far, 2))
+
     def test_snapshot(self):
         """A rod that swings: accelerations, reactions by Newton's law, energies, formulas, angles"""
         scene, rod, pin = pendulum()
@@ -654,6 +694,12 @@ class Questions(unittest.TestCase):
         small = scene.run().linearize()
         modes = small.modes()
         self.assertEqual(len(modes), 1)
+        with tempfile.TemporaryDirectory() as folder:
+            small.animate(modes[0], os.path.join(folder, "mode"), 0.1, frames=5)
+            with open(os.path.join(folder, "mode.pvd")) as text:
+                frames = [line.split('file="')[1].split('"')[0] for line in text if "file=" in line]
+            self.assertEqual(len(frames), 5)
+            self.assertTrue(all(os.path.exists(os.path.join(folder, name)) for name in frames))
         self.assertAlmostEqual(modes[0].frequency, math.sqrt(k / 2) / (2 * math.pi), delta=1e-9)
         self.assertAlmostEqual(modes[0].damping_ratio, c / (2 * math.sqrt(2 * k)), delta=1e-9)
         self.assertIn("Hz", repr(modes[0]))

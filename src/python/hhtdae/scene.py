@@ -1,5 +1,6 @@
 """Multibody scenes: the description, of which runs are made."""
 
+import re
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type, Union
 
 import numpy as np
@@ -19,7 +20,7 @@ __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
 
 
 class _Handle:
-    """Refers to a part of a scene"""
+    """Refers to a part of a scene; its name is what results and messages call it"""
 
     __slots__ = ("_id", "_number", "_scene", "name")
 
@@ -40,7 +41,7 @@ class _Handle:
 
 
 class Body(_Handle):
-    """A body of a scene, the ground, or the frame of an attachment."""
+    """A body of a scene, the ground, or the frame of an attachment. `name` is what results and messages call it."""
 
     __slots__ = ()
     _kind = "body"
@@ -86,19 +87,19 @@ class Marker(_Handle):
 
 
 class Element(_Handle):
-    """A joint, motion or force."""
+    """A joint, motion or force. `name` is what results and messages call it."""
     __slots__ = ()
     _kind = "element"
 
 
 class Variable(_Handle):
-    """A user-defined variable."""
+    """A user-defined variable. `name` is what results and messages call it."""
     __slots__ = ()
     _kind = "variable"
 
 
 class State(_Handle):
-    """A first-order state."""
+    """A first-order state. `name` is what results and messages call it."""
     __slots__ = ()
     _kind = "state"
 
@@ -136,7 +137,7 @@ class Scene:
         self._keep = [self.comm]  # what the C++ part refers to and does not own: callbacks and functions that describe
         self._channels = []
         self._parameters = {}
-        self._states = 0
+        self._states = self._bodies = self._elements = self._variables = 0
         self._begun = False  # whether there is more than parameters
         self._edits = 0  # calls that have described something
         self._recipe: Optional[Recipe] = None
@@ -159,10 +160,10 @@ class Scene:
     # ---- description ----
 
     def parameter(self, name: str, value: float) -> Parameter:
-        """A number that may be another one in the next run. Parameters come before everything else. Returns a `Parameter`, which stands for a
-        number anywhere in the description."""
+        """A number that may be another one in the next run. Parameters come before everything else but gravity and `ground_acceleration`. Returns a `Parameter`, which
+        stands for a number anywhere in the description. Its name is one that no other parameter has."""
         if self._begun:
-            raise ValueError("parameter %s came too late: parameters are made before everything else but gravity" % name)
+            raise ValueError("parameter %s came too late: parameters are made before everything else but gravity and the ground's acceleration" % name)
         self._edits += 1
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, number(value, "parameter " + name)))
         return p
@@ -190,7 +191,7 @@ class Scene:
         keep = []
         functions = [time_function(f, keep) for f in (x, y, z)]
         self._keeps(keep, "ground_acceleration()")
-        self._describe()
+        self._edits += 1
         self._core.ground_acceleration(*functions)
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
@@ -199,7 +200,8 @@ class Scene:
         Parameters
         ----------
         name : str
-            For messages and results; an empty one becomes "body 7", "Revolute 3".
+            For messages and results. It is one that no other body, or no other element, has; an empty one becomes "body 7", "spring damper 3", which is the `name` of
+            what is returned.
         what : RigidBody, PointMass, FlexibleBody, one of the elements, or a function without arguments that returns one
             A function is called again whenever parameters have changed. One of an element may return None: the element has its place, and nothing
             acts; its markers are made outside of it, as others are an error. Within a run, `run(after=)`, elements that count angles over full turns or follow curves
@@ -212,6 +214,7 @@ class Scene:
         if not isinstance(name, str):
             raise TypeError("Scene.add(): the name is %r, must be a text" % (name,))
         if isinstance(what, Spec):
+            name = name or self._unnamed(type(what))
             described, converted = self._converted(what, name)
             given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
@@ -222,7 +225,14 @@ class Scene:
             first = what()
         if first is None:
             raise TypeError("Scene.add(%r): the function must return a body or an element at first, then its kind is known" % name)
+        name = name or self._unnamed(type(first))
         return self._enter(name, first, self._later(lambda: self._fields_of(what(), type(first), name)))
+
+    def _unnamed(self, kind):
+        """What a part without a name is called"""
+        if issubclass(kind, (RigidBody, PointMass, FlexibleBody)):
+            return "body %d" % self._bodies
+        return "%s %d" % (re.sub("(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower(), self._elements)
 
     def _fields_of(self, what, kind, name):
         if what is None and not issubclass(kind, (RigidBody, PointMass, FlexibleBody)):
@@ -254,11 +264,13 @@ class Scene:
         kind = type(what)
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
+                self._bodies += 1
                 return Body(self, enter(name, given), name)
         known = next((c.__name__ for c in kind.__mro__ if c.__name__ in ELEMENTS), None)
         if known is None:
             raise TypeError("Scene.add(%r): a %s is no body, joint, motion or force" % (name, kind.__name__))
         element = Element(self, self._core.element(known, name, given), name)
+        self._elements += 1
         self._states += getattr(what, "of", None) == "acceleration"  # a motion that is given by its acceleration has a state, its speed
         return element
 
@@ -294,13 +306,17 @@ class Scene:
         return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
 
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
-        """A user-defined variable: an unknown V = formula."""
+        """A user-defined variable: an unknown V = formula. Names are as of `add`."""
+        name = name or "variable %d" % self._variables
         initial = number(initial, "variable %s: its initial value" % name)
         self._describe()
-        return Variable(self, self._core.variable(name, self._formula(definition, "variable " + name), initial), name)
+        variable = Variable(self, self._core.variable(name, self._formula(definition, "variable " + name), initial), name)
+        self._variables += 1
+        return variable
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
-        """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``."""
+        """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``. Names are as of `add`."""
+        name = name or "state %d" % self._states
         initial = number(initial, "state %s: its initial value" % name)
         self._describe()
         if callable(rate) and not isinstance(rate, Expression):
