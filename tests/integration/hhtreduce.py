@@ -74,6 +74,11 @@ def reduction(folder):
     check("0 nodes without shapes" in info, "-no_shapes kept the nodes\n" + info)
     free = run([PROGRAM, *base[:4], "-method", "freefree", "-max_frequency", 2000, "-o", os.path.join(folder, "free.h5")])
     check(max(table(free)) < 2000, "-max_frequency 2000\n" + free)
+    given = ["-o", os.path.join(folder, "given.h5"), "-reduce_eps_tol", "1e-10", "-reduce_eps_krylov_block", 2, "-reduce_slices_from", 1000, "-reduce_verify", 0,
+             "-reduce_pc_type", "cholesky", "-fe_mass_points", "stiffness"]  # of these bricks the points for the mass are the same
+    check(near(table(run([PROGRAM, *base, *given])), frequencies, 1e-6), "options of the solvers make other frequencies")
+    error = run([PROGRAM, *base, *given, "-fe_mass_points", "some"], fails=True)
+    check("exact or stiffness" in error, error)
     return body, bare, base
 
 
@@ -106,6 +111,8 @@ def pictures(folder, body):
     run([MPIEXEC, RANKS, 3, PROGRAM, "-vtu", again, "-mode", 3, body])
     data = open(vtu, "rb").read()
     check(b'Name="von_mises"' in data and data == open(again, "rb").read(), "pictures on three ranks are others")
+    run([PROGRAM, "-vtu", again, "-mode", 3, "-body", body])
+    check(open(again, "rb").read() == data, "-body names another file")
     run([PROGRAM, "-vtu", again, "-mode", 3, "-scale", "-1e-3", body])
     check(open(again, "rb").read() != data, "-scale has no effect")
 
