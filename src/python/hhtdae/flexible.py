@@ -324,7 +324,7 @@ def _unpickled(whole):
 def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] = 20, max_frequency=0., keep_below=0., keep: Sequence[int] = (),
            stiffening=False, stress=False, all_nodes=True, progress=False, node_sets: Sequence[str] = (), nodes: Sequence[int] = (), pressures=None,
            nodal_loads=None):
-    """Reduces an FE model to a body in modal coordinates.
+    """Reduces an FE model to a body in modal coordinates. Options of PETSc and SLEPc for its solvers have the prefix ``reduce_``: ``-reduce_eps_tol``, ``-reduce_pc_type``.
 
     Parameters
     ----------
