@@ -402,6 +402,9 @@ static PetscErrorCode Finalize(void)
   With -ts_exact_final_time interpolate `TSSolve()` gives positions at the final time, but leaves velocities where the last step ended, as for all types of
   second order; `TSHHT3Interpolate()` gives both.
 
+  A start looks ahead for loads and motions that set in later: it evaluates the I2Function at times up to `TSGetMaxTime()`, in the state of the start. A function that
+  is defined for shorter, as a table, is to be given a value there, or NaN, but is not to return an error.
+
   Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
   this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.
 
@@ -447,7 +450,7 @@ PetscErrorCode Create(TS ts)
   Level: beginner
 
   Note:
-  Programs that link the library call it once after `PetscInitialize()`. With -dll_append libhhtdae.so PETSc calls it itself.
+  Programs that link the library call it once after `PetscInitialize()`, on all ranks or on some. With -dll_append libhhtdae.so PETSc calls it itself.
 
 .seealso: `TSHHT3`, `TSRegister()`
 @*/

@@ -82,6 +82,20 @@ class Ranks(unittest.TestCase):
             for a, b in zip(results[0], other):
                 self.assertAlmostEqual(a, b, delta=1e-7 * (1 + abs(a)))
 
+    def test_some_ranks(self):
+        """A rank that hands out work has no scene, and the others do not wait for it when PETSc ends."""
+        script = """
+from petsc4py import PETSc
+PETSc.Options()["scene_ratee"] = 1
+if PETSc.COMM_WORLD.rank:
+    import hhtdae
+    scene = hhtdae.Scene(gravity=(0, 0, -9.81), comm=PETSc.COMM_SELF)
+    scene.add("ball", hhtdae.PointMass())
+    scene.solve(0.1)
+PETSc._finalize()
+"""
+        ranks(2, "-c", script)
+
     def test_chain(self):
         text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "30")
         found, exact = re.search(r"2 ranks: the end hangs (\S+) m .* exact (\S+) m", text).groups()
