@@ -162,7 +162,7 @@ PetscErrorCode SetUpSolvers(TS ts)
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
-  if (!((PetscObject)ksp)->type_name) PetscCall(SolverDefaults(ts, ksp));
+  PetscCall(SolverDefaults(ts, ksp)); /* what the program has set since TSSetFromOptions(), or without it */
   PetscCall(CorrectorSetUp(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,42 +25,64 @@ PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode PackageGiven(PC pc, PetscBool *given)
+/* Marks on a preconditioner, named after the type and the package that were set here. What stands there under another name, or under none, is the program's, whenever it has set it. */
+static const char MARK_TYPE[] = "hhtdae_linear_type", MARK_PACKAGE[] = "hhtdae_linear_package";
+
+static PetscErrorCode SetMark(PC pc, const char mark[], const char name[])
+{
+  PetscContainer ours;
+
+  PetscFunctionBegin;
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)pc), &ours));
+  PetscCall(PetscObjectSetName((PetscObject)ours, name));
+  PetscCall(PetscObjectCompose((PetscObject)pc, mark, (PetscObject)ours));
+  PetscCall(PetscContainerDestroy(&ours));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode BearsMark(PC pc, const char mark[], const char name[], PetscBool *marked)
+{
+  PetscObject ours;
+  const char *was;
+
+  PetscFunctionBegin;
+  *marked = PETSC_FALSE;
+  PetscCall(PetscObjectQuery((PetscObject)pc, mark, &ours));
+  if (!ours) PetscFunctionReturn(0);
+  PetscCall(PetscObjectGetName(ours, &was));
+  PetscCall(PetscStrcmp(was, name, marked));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearSetType(PC pc, PCType type)
+{
+  PetscFunctionBegin;
+  PetscCall(PCSetType(pc, type));
+  PetscCall(SetMark(pc, MARK_TYPE, type));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode PackageByProgram(PC pc, PetscBool *by_program)
 {
   MatSolverType package = NULL;
+  PetscBool     ours    = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PCFactorGetMatSolverType(pc, &package));
-  *given = package ? PETSC_TRUE : PETSC_FALSE;
+  if (package) PetscCall(BearsMark(pc, MARK_PACKAGE, package, &ours));
+  *by_program = package && !ours ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
 
-/* A preconditioner whose type we set bears a mark, so that a second look does not take our choice for the user's */
-static const char MARK[] = "hhtdae_linear_choice";
-
-static PetscErrorCode SetMark(PC pc)
+static PetscErrorCode TypeByProgram(PC pc, PetscBool *by_program)
 {
-  PetscContainer mark;
-
-  PetscFunctionBegin;
-  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)pc), &mark));
-  PetscCall(PetscObjectCompose((PetscObject)pc, MARK, (PetscObject)mark));
-  PetscCall(PetscContainerDestroy(&mark));
-  PetscFunctionReturn(0);
-}
-
-/* The mark counts while the type is one that we choose */
-static PetscErrorCode SetByProgram(PC pc, PetscBool *by_program)
-{
-  PetscObject mark;
-  PetscBool   ours;
-  PCType      type;
+  PetscBool ours = PETSC_FALSE;
+  PCType    type;
 
   PetscFunctionBegin;
   PetscCall(PCGetType(pc, &type));
-  PetscCall(PetscObjectQuery((PetscObject)pc, MARK, &mark));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &ours, PCLU, PCCHOLESKY, ""));
-  *by_program = type && !(mark && ours) ? PETSC_TRUE : PETSC_FALSE;
+  if (type) PetscCall(BearsMark(pc, MARK_TYPE, type, &ours));
+  *by_program = type && !ours ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
 
@@ -104,11 +126,11 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(KSPGetType(ksp, &ksp_type));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetType(pc, &pc_type));
-  PetscCall(SetByProgram(pc, &pc_by_program));
+  PetscCall(TypeByProgram(pc, &pc_by_program));
   PetscCall(IsSolver(ksp, pc, pc_by_program, &solver));
   if (!ksp_type) PetscCall(KSPSetType(ksp, solver ? KSPPREONLY : KSPGMRES)); /* GMRES is PETSc's own choice */
   PetscCall(LinearOptionGiven(ksp, "-pc_type", &pc_by_option));
-  if (pc_by_program) PetscCall(PackageGiven(pc, &package_by_program));
+  PetscCall(PackageByProgram(pc, &package_by_program));
   PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
   choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
   choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
@@ -116,8 +138,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
     PetscCall(KSPGetOperatorsSet(ksp, NULL, &operators));
     if (operators) PetscCall(KSPGetOperators(ksp, NULL, &P));
     if (operators) PetscCall(LinearStoresTriangle(P, &triangle));
-    PetscCall(PCSetType(pc, triangle ? PCCHOLESKY : PCLU));
-    PetscCall(SetMark(pc));
+    PetscCall(LinearSetType(pc, triangle ? PCCHOLESKY : PCLU));
   }
   PetscFunctionReturn(0);
 }
@@ -213,6 +234,7 @@ static PetscErrorCode SetPackage(PC pc, const char package[])
   PetscCall(MatDestroy(&A));
   PetscCall(MatDestroy(&P));
   PetscCall(PCFactorSetMatSolverType(pc, package));
+  PetscCall(SetMark(pc, MARK_PACKAGE, package));
   PetscFunctionReturn(0);
 }
 
@@ -227,7 +249,7 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, type, &same));
-  if (!same) PetscCall(PCSetType(pc, type));
+  if (!same) PetscCall(LinearSetType(pc, type));
   PetscCall(SetPackage(pc, package));
   if (!same) PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_ordering_type", &ordering));
@@ -283,7 +305,7 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
   }
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
   if (!by_option) PetscCall(KSPSetType(ksp, KSPGMRES));
-  PetscCall(PCSetType(pc, PCNONE));
+  PetscCall(LinearSetType(pc, PCNONE));
   PetscCall(PetscStrncpy(choice->text, "GMRES without preconditioner: nothing factors this type of matrix",
                          sizeof choice->text));
   PetscFunctionReturn(0);
@@ -369,6 +391,7 @@ static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   char name[64];
   PetscCall(PetscStrncpy(name, package, sizeof name)); /* a change of type frees the string */
   PetscCall(SetFactorization(ksp, pc, choice->cholesky ? PCCHOLESKY : PCLU, name));
+  PetscCall(PetscObjectCompose((PetscObject)pc, MARK_PACKAGE, NULL)); /* it is still the user's */
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s, with %s as the user chose",
                           choice->cholesky ? "LDL^T" : "LU", name));
   PetscFunctionReturn(0);

@@ -6,6 +6,9 @@
 
 PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given);
 
+/* A type of our choice, which nobody shall take for the user's */
+PetscErrorCode LinearSetType(PC pc, PCType type);
+
 /* What a factorization takes. large: for the packages that work on dense fronts; parts: for KLU on every rank; single: the factor is as large that
    single precision pays. */
 struct LinearSize {

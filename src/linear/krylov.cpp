@@ -80,7 +80,7 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
   PetscCall(PetscObjectCompose((PetscObject)ksp, OURS, (PetscObject)mark));
   PetscCall(PetscContainerDestroy(&mark));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCHHTCONSTRAINT));
+  PetscCall(LinearSetType(pc, PCHHTCONSTRAINT));
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
   PetscCall(KSPSetFromOptions(ksp)); /* of "preonly" it has read none */
@@ -186,7 +186,7 @@ PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice)
   choice->iterative = choice->constraint = PETSC_FALSE;
   PetscCall(PetscObjectCompose((PetscObject)ksp, OURS, NULL));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCLU));
+  PetscCall(LinearSetType(pc, PCLU));
   PetscCall(PCSetFromOptions(pc)); /* of a factor the preconditioner has read none */
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(ForgetGuess(ksp));

@@ -158,3 +158,45 @@ TEST(LinearSolves, AMotionThatDiesAway)
     EXPECT_LT(std::abs(run.u()[0]), 1e-150) << solver;
   }
 }
+
+/* A factorization or a package that the program names is taken after TSSetFromOptions(), and where that is never called, too */
+TEST(LinearSolves, FactorsThatTheProgramNames)
+{
+  for (bool options : {true, false})
+    for (bool cholesky : {false, true}) {
+      TS            ts;
+      Vec           U, V;
+      PC            pc;
+      PCType        type;
+      MatSolverType package;
+      must(ProblemCreateTS(PETSC_COMM_SELF, pendulum(), &ts, &U, &V));
+      must(TSSetType(ts, TSHHT3));
+      if (options) must(TSSetFromOptions(ts));
+      else must(KSPSetType(solverOf(ts), KSPPREONLY));
+      must(KSPGetPC(solverOf(ts), &pc));
+      must(PCSetType(pc, cholesky ? PCCHOLESKY : PCLU));
+      must(PCFactorSetMatSolverType(pc, cholesky ? MATSOLVERMUMPS : MATSOLVERKLU));
+      must(TSSetMaxSteps(ts, 3));
+      must(TSSolve(ts, nullptr));
+      must(PCGetType(pc, &type));
+      must(PCFactorGetMatSolverType(pc, &package));
+      EXPECT_STREQ(type, cholesky ? PCCHOLESKY : PCLU) << options;
+      EXPECT_STREQ(package, cholesky ? MATSOLVERMUMPS : MATSOLVERKLU) << options;
+      must(TSDestroy(&ts));
+      must(VecDestroy(&U));
+      must(VecDestroy(&V));
+    }
+}
+
+/* A type alone leaves the package to the integrator */
+TEST(LinearSolves, CholeskyOfTheProgram)
+{
+  Simulation run(pendulum(), tolerance(1e-5) + "-ts_max_steps 3");
+  PC         pc;
+  PCType     type;
+  must(KSPGetPC(solverOf(run.ts), &pc));
+  must(PCSetType(pc, PCCHOLESKY));
+  must(run.solve());
+  must(PCGetType(pc, &type));
+  EXPECT_STREQ(type, PCCHOLESKY);
+}

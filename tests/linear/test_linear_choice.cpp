@@ -271,6 +271,30 @@ TEST_F(LinearChoiceTest, SecondLookKnowsItsOwnDefaults)
   EXPECT_EQ(c.package, "mumpsnd");
 }
 
+/* Nor is a package that was chosen taken for the program's in another set-up, and the program's is seen whenever it is named */
+TEST_F(LinearChoiceTest, SecondLookAfterAChoice)
+{
+  KSP          ksp;
+  PC           pc;
+  LinearChoice choice;
+  OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+  OK(KSPGetPC(ksp, &pc));
+  OK(LinearDefaults(ksp, &choice));
+  OK(KSPSetOperators(ksp, large, large));
+  OK(LinearChoose(ksp, large, PETSC_TRUE, &choice));
+  OK(LinearDefaults(ksp, &choice));
+  EXPECT_FALSE(choice.user_pc);
+  EXPECT_FALSE(choice.user_package);
+  OK(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  OK(LinearDefaults(ksp, &choice));
+  EXPECT_FALSE(choice.user_pc);
+  EXPECT_TRUE(choice.user_package);
+  OK(PCSetType(pc, PCLU));
+  OK(LinearDefaults(ksp, &choice));
+  EXPECT_TRUE(choice.user_pc);
+  OK(KSPDestroy(&ksp));
+}
+
 /* The factor gets the package's own ordering, not the one that PETSc prefers for its own factorization */
 TEST_F(LinearChoiceTest, PackageOrdersByItself)
 {
