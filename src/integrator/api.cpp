@@ -302,7 +302,7 @@ PetscErrorCode TSHHT3SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal 
   Input Parameters:
 + ts   - the `TS` context
 . role - the role, see `TSHHT3Role`
-- is   - global indices of the unknowns in U that have it, each on the rank that owns it
+- is   - global indices of the unknowns in U that have it, each on the rank that owns it; `NULL` takes an earlier set back
 
   Level: intermediate
 
@@ -318,8 +318,10 @@ PetscErrorCode TSHHT3SetIS(TS ts, TSHHT3Role role, IS is)
 {
   PetscFunctionBegin;
   PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
-  PetscValidHeaderSpecific(is, IS_CLASSID, 3);
-  PetscCheckSameComm(ts, 1, is, 3);
+  if (is) {
+    PetscValidHeaderSpecific(is, IS_CLASSID, 3);
+    PetscCheckSameComm(ts, 1, is, 3);
+  }
   PetscTryMethod(ts, "TSHHT3SetIS_C", (TS, TSHHT3Role, IS), (ts, role, is));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -24,6 +24,15 @@ PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
                "The %s tolerance %g must be a number from 0 on (-ts_%ctol, TSSetTolerances())", name, (double)x, name[0]);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscInt n, entries, N, all;
+  PetscCall(VecGetLocalSize(ts->vec_sol, &n));
+  PetscCall(VecGetLocalSize(v, &entries));
+  PetscCall(VecGetSize(ts->vec_sol, &N));
+  PetscCall(VecGetSize(v, &all));
+  PetscBool same = (PetscBool)(n == entries && N == all);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
+  PetscCheck(same, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ,
+             "The vector of %s tolerances has %" PetscInt_FMT " entries and the solution %" PetscInt_FMT ", or they lie on other ranks: use VecDuplicate() of the solution (TSSetTolerances())", name, all, N);
   PetscCall(FirstWhere([](PetscInt, PetscScalar a) { return !IsTolerance(PetscRealPart(a)); }, &first, Read(v)));
   PetscCheck(first < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
              "The %s tolerance of unknown %" PetscInt_FMT " must be a number from 0 on (TSSetTolerances())", name, first);

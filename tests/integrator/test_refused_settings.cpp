@@ -228,3 +228,20 @@ TEST(RefusedSettings, FinalTimeByInterpolation)
 
 /* Coarse matrices that are not made of the scaled one ended in a segmentation fault */
 TEST(RefusedSettings, MultigridWithMatricesOfTheApplication) { expectRefused({"-ksp_type gmres -pc_type mg -pc_mg_levels 2", "coarse levels"}); }
+
+/* They belong to the unknowns one by one */
+TEST(RefusedSettings, VectorsOfTolerancesOfAnotherLayout)
+{
+  const Pendulum p(-90., 0., .1);
+  for (int which = 0; which < 2; which++) {
+    Simulation run(p, tolerance(1e-5));
+    Vec        tol;
+    must(VecCreateSeq(PETSC_COMM_SELF, p.n - 1, &tol));
+    must(VecSet(tol, 1e-5));
+    must(TSSetTolerances(run.ts, 1e-5, which ? nullptr : tol, 1e-5, which ? tol : nullptr));
+    ErrorTrap trap;
+    EXPECT_NE(run.solve(), 0);
+    EXPECT_TRUE(trap.says("tolerances has 2 entries")) << trap.message;
+    must(VecDestroy(&tol));
+  }
+}

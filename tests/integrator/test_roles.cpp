@@ -263,3 +263,15 @@ TEST(Roles, CoordinatesAreThoseThatNobodyNames)
     must(TS2SetSolution(run.ts, run.U, run.V));
   }
 }
+
+/* A set is taken back: without any the roles are detected */
+TEST(Roles, SetsTakenBack)
+{
+  const Pendulum p(-90., 0., .1);
+  Simulation     run(p, tolerance(1e-5), PETSC_COMM_SELF, true);
+  ErrorTrap      trap;
+  for (int role = 0; role < TSHHT3_NUM_ROLES; role++) EXPECT_EQ(TSHHT3SetIS(run.ts, (TSHHT3Role)role, nullptr), 0) << trap.message;
+  EXPECT_FALSE(hht3::Get(run.ts).is_set);
+  must(TSSetUp(run.ts));
+  EXPECT_EQ(hht3::Get(run.ts).count[TSHHT3_HOLONOMIC], 1);
+}
