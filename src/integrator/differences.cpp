@@ -22,6 +22,8 @@ struct Differences {
   PetscReal t = 0;
   Vec       at[3] = {};
   int       which = 0;
+  /* the user's, in place of ours; 0: none is given */
+  PetscReal relative = 0, least = 0;
 };
 
 namespace
@@ -180,6 +182,17 @@ PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
 
 } // namespace
 
+/* -mat_fd_coloring_err and -mat_fd_coloring_umin, which would be lost with the scales of the three parts */
+static PetscErrorCode TakeSteps(Differences *d)
+{
+  const PetscObject of = (PetscObject)d->coloring;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetReal(of->options, of->prefix, "-mat_fd_coloring_err", &d->relative, NULL));
+  PetscCall(PetscOptionsGetReal(of->options, of->prefix, "-mat_fd_coloring_umin", &d->least, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* *P: the matrix to use, or NULL to have one made */
 PetscErrorCode DifferencesCreate(TS ts, Mat *P)
 {
@@ -211,6 +224,7 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatFDColoringCreate(d->part, colors, &d->coloring));
   PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(Evaluate)), d));
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
+  PetscCall(TakeSteps(d));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
   if (!found) {
     std::vector<PetscScalar> ones;
@@ -254,7 +268,7 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
-    PetscCall(MatFDColoringSetParameters(d->coloring, relative_step[d->which], 1));
+    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which], d->least > 0 ? d->least : 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }

@@ -236,3 +236,13 @@ TEST(Differences, NoPlaceThatNobodyFollows)
   must(TSDestroy(&source));
   for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
 }
+
+/* PETSc's options for the differences hold */
+TEST(Differences, StepsOfTheUser)
+{
+  const Pendulum p(-30., 0., .1);
+  const Array    u = withoutJacobian(p, tolerance(1e-5)).u;
+  EXPECT_EQ(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_umin 2").u, u); /* only of the type ds */
+  EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_err 1e-4").u, u);
+  EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds -mat_fd_coloring_umin 1e-3").u, withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds").u);
+}
