@@ -139,7 +139,8 @@ PetscErrorCode StepAfterChange(TS ts)
 PetscErrorCode MatrixAfterChange(TS ts)
 {
   Integrator &I = Get(ts);
-  Mat         P;
+  Mat         J, P;
+  PetscBool   mffd;
 
   PetscFunctionBegin;
   I.change.stale = PETSC_FALSE;
@@ -147,8 +148,9 @@ PetscErrorCode MatrixAfterChange(TS ts)
   PetscCall(PrepareStage(ts));
   PetscCall(Predict(ts, I.X));
   PetscCall(SNESSetUp(ts->snes));
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL)); /* alone, as in the start */
-  PetscCall(FormJacobian(ts->snes, I.X, P, P, ts));
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
+  PetscCall(FormJacobian(ts->snes, I.X, mffd ? P : J, P, ts));
   I.corrector.matrix.want = (PetscBool)!I.corrector.matrix.have;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -36,7 +36,15 @@ namespace
 constexpr int       points   = 5;
 constexpr PetscReal shortest = 1e-4;
 
-/* The KSP takes what the user has set for the run's, by options or by program. A shell cannot be had twice. */
+/* Preconditioners of functions or parts that the program has given cannot be had twice */
+PetscErrorCode HasParts(PC pc, PetscBool *yes)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, yes, PCSHELL, PCFIELDSPLIT, PCCOMPOSITE, ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The KSP takes what the user has set for the run's, by options or by program. */
 PetscErrorCode CreateSolver(TS ts, Sampler &S)
 {
   const Integrator &I = Get(ts);
@@ -45,7 +53,7 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   KSPType           type;
   PCType            pctype;
   MatSolverType     package;
-  PetscBool         shell;
+  PetscBool         parts;
   const char       *prefix;
   PetscReal         rtol, atol, dtol;
   PetscInt          its;
@@ -64,8 +72,8 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   PetscCall(KSPGetPC(run, &from));
   PetscCall(KSPGetPC(S.at.ksp, &to));
   PetscCall(PCGetType(from, &pctype));
-  PetscCall(PetscObjectTypeCompare((PetscObject)from, PCSHELL, &shell));
-  if (I.linear.user_pc && pctype && !shell) {
+  PetscCall(HasParts(from, &parts));
+  if (I.linear.user_pc && pctype && !parts) {
     PetscCall(PCSetType(to, pctype));
     if (I.linear.user_package) {
       PetscCall(PCFactorGetMatSolverType(from, &package));
@@ -74,23 +82,34 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   }
   PetscCall(LinearDefaults(S.at.ksp, &S.linear));
   PetscCall(KSPSetFromOptions(S.at.ksp));
+  if (!I.linear.user_pc && I.linear.user_package && !S.linear.user_package) { /* a package that the program has named, and no factorization */
+    PetscCall(PCFactorGetMatSolverType(from, &package));
+    PetscCall(PCFactorSetMatSolverType(to, package));
+    S.linear.user_package = PETSC_TRUE;
+  }
+  PetscCall(HasParts(to, &parts));
+  if (parts) { /* by an option */
+    PetscCall(PCSetType(to, PCLU));
+    S.linear.user_pc = S.linear.user_package = PETSC_FALSE;
+  }
   S.linear.may_be_rough = I.linear.iterative; /* where the run has no factor its samples make none */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *S: null where the run's matrix is no assembled one */
+/* *S: null where the run's matrix is no assembled one, or where the application has a product beside it: that one belongs to the run, and whoever looks into it would not find it in another matrix */
 PetscErrorCode GetSampler(TS ts, Sampler **S)
 {
   Integrator &I = Get(ts);
-  Mat         P;
-  PetscBool   shell;
+  Mat         J, P;
+  PetscBool   shell, product;
 
   PetscFunctionBegin;
   *S = I.sampler;
   if (*S) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)P, &shell, MATMFFD, MATSHELL, ""));
-  if (shell) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSHELL, &product));
+  if (shell || product) PetscFunctionReturn(PETSC_SUCCESS);
   *S = I.sampler = new Sampler;
   Consistent &c = I.sampler->at;
   PetscCall(MatDuplicate(P, MAT_DO_NOT_COPY_VALUES, &c.P));
@@ -246,8 +265,8 @@ PetscErrorCode SamplerDestroy(Integrator &I)
   added to its counters; -log_view shows the samples as HHT3Sample. Where a step was rolled back, or ended by an error, only the
   state that it began with is known, at the present time.
 
-  Where the equations cannot be solved (a singular position, a Jacobian without an assembled matrix), accelerations and multipliers
-  are those of `TSHHT3Interpolate()`, linear in a step of order two, and -info says so.
+  Where the equations cannot be solved (a singular position, a Jacobian without an assembled matrix, or with a `MATSHELL` of the application's
+  as its operator), accelerations and multipliers are those of `TSHHT3Interpolate()`, linear in a step of order two, and -info says so.
 
 .seealso: `TSHHT3`, `TSHHT3Interpolate()`, `TSHHT3GetAcceleration()`
 @*/

@@ -1,5 +1,5 @@
 /* Accelerations, multipliers, variables and force states between the ends of a step, TSHHT3EvaluateAt() */
-#include "support.h"
+#include "matrix_types.h"
 
 #include <array>
 
@@ -247,4 +247,77 @@ TEST(EvaluateAt, RefusesOtherTimes)
   must(run.step());
   EXPECT_NE(TSHHT3EvaluateAt(run.ts, 2. * run.t() + 1., x.U, x.V, x.A), 0);
   EXPECT_TRUE(trap.says("not in the last step")) << trap.message;
+}
+
+namespace
+{
+
+/* An application that finds what it knows of its operator in the operator */
+PetscErrorCode byItsContext(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *)
+{
+  OperatorData *d = nullptr;
+  PetscFunctionBegin;
+  PetscCall(MatShellGetContext(J, &d));
+  PetscCall(OperatorData::jacobian(ts, t, U, V, A, sv, sa, J, P, d));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+/* A product cannot be had twice: accelerations by linear interpolation */
+TEST(EvaluateAt, BesideAProductOfTheApplication)
+{
+  const DoublePendulum p(1.);
+  Simulation           run(p, tolerance(1e-6) + "-ksp_type gmres -ksp_rtol 1e-12");
+  Sample               x(run.U), linear(run.U);
+  OperatorData         data;
+  Mat                  J, P;
+  must(TSGetI2Jacobian(run.ts, nullptr, &P, &data.f, &data.ctx));
+  must(MatCreateShell(PETSC_COMM_SELF, p.n, p.n, p.n, p.n, &data, &J));
+  must(MatShellSetOperation(J, MATOP_MULT, (void (*)(void))OperatorData::product));
+  data.J         = J;
+  data.assembles = true;
+  must(TSSetI2Jacobian(run.ts, J, P, byItsContext, nullptr));
+  for (int k = 0; k < 5; k++) must(run.step());
+  ErrorTrap trap;
+  EXPECT_EQ(TSHHT3EvaluateAt(run.ts, run.t() - 1e-4, x.U, x.V, x.A), 0) << trap.message;
+  must(TSHHT3Interpolate(run.ts, run.t() - 1e-4, linear.U, linear.V, linear.A));
+  EXPECT_EQ(x.values(), linear.values());
+  EXPECT_EQ(data.other, 0);
+  must(MatDestroy(&J));
+  must(MatDestroy(&data.values));
+}
+
+/* Nor can a preconditioner whose parts the program has given */
+TEST(EvaluateAt, PreconditionersWithParts)
+{
+  const DoublePendulum p(1.);
+  for (PCType type : {PCCOMPOSITE, PCFIELDSPLIT}) {
+    const auto options = tolerance(1e-6) + "-ksp_type gmres -ksp_rtol 1e-12 -fieldsplit_all_pc_type svd";
+    Simulation run(p, options);
+    Sample     x(run.U);
+    SNES       snes;
+    KSP        ksp;
+    PC         pc;
+    must(TSGetSNES(run.ts, &snes));
+    must(SNESGetKSP(snes, &ksp));
+    must(KSPGetPC(ksp, &pc));
+    must(PCSetType(pc, type));
+    if (std::string(type) == PCCOMPOSITE) must(PCCompositeAddPCType(pc, PCSVD));
+    else {
+      IS all;
+      must(ISCreateStride(PETSC_COMM_SELF, p.n, 0, 1, &all));
+      must(PCFieldSplitSetIS(pc, "all", all));
+      must(ISDestroy(&all));
+    }
+    {
+      Options in(options);
+      must(TSSetFromOptions(run.ts));
+    }
+    for (int k = 0; k < 5; k++) must(run.step());
+    ErrorTrap trap;
+    const double t = run.t() - 1e-4;
+    EXPECT_EQ(TSHHT3EvaluateAt(run.ts, t, x.U, x.V, x.A), 0) << trap.message;
+    EXPECT_LT(imbalance(run, x, t), 1e-9);
+  }
 }
