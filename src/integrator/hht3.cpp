@@ -255,6 +255,25 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Between two runs: options find the SNES as they do before the first one, and the next step takes it as another one. A factor that exists would not let them name another package. */
+PetscErrorCode LetOptionsIn(TS ts)
+{
+  Integrator &I = Get(ts);
+  KSP         ksp;
+  PC          pc;
+  PetscBool   factors;
+
+  PetscFunctionBegin;
+  PetscCall(HooksRemove(ts));
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factors, PCLU, PCCHOLESKY, ""));
+  if (factors) PetscCall(PCReset(pc));
+  I.linear.chosen = PETSC_FALSE;
+  I.corrector.matrix.forget();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
 {
   SNES        snes;
@@ -268,6 +287,7 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   PetscOptionsHeadEnd();
   /* defaults go in before SNESSetFromOptions(), which TSSetFromOptions() calls next, so that options override them */
   PetscCall(TSGetSNES(ts, &snes));
+  if (Get(ts).hooks.snes) PetscCall(LetOptionsIn(ts));
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; of one triangle there is no LU */

@@ -124,8 +124,10 @@ PetscErrorCode RestoreTolerance(TS ts, SNES snes)
 
 PetscErrorCode RemoveJacobian(TS ts)
 {
-  Hooks &H = Get(ts).hooks;
-  DMSNES sdm;
+  Hooks        &H = Get(ts).hooks;
+  DMSNES        sdm;
+  Mat           P  = NULL;
+  PetscObjectId id = 0;
 
   PetscFunctionBegin;
   if (H.jacobian && ts->dm) {
@@ -135,7 +137,9 @@ PetscErrorCode RemoveJacobian(TS ts)
       sdm->jacobianctxcontainer = H.jacobianctx;
       PetscCall(PetscObjectCompose((PetscObject)sdm, "jacobian ctx", (PetscObject)H.jacobianctx));
     }
-    if (ts->snes && H.J) PetscCall(SNESSetJacobian(ts->snes, H.J, H.P, NULL, NULL));
+    if (ts->snes) PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+    if (P) PetscCall(PetscObjectGetId((PetscObject)P, &id));
+    if (ts->snes && H.J && id == H.matrices[1]) PetscCall(SNESSetJacobian(ts->snes, H.J, H.P, NULL, NULL)); /* unless the user has given others since */
   }
   H.jacobian = PETSC_FALSE;
   PetscCall(PetscContainerDestroy(&H.jacobianctx));
@@ -205,6 +209,14 @@ PetscErrorCode HooksJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of several TS a SNES serves the one that steps. Before its matrices and its line search are looked at: those of the other one's choice are nobody's. */
+PetscErrorCode HooksTakeOver(TS ts, SNES snes)
+{
+  PetscFunctionBegin;
+  if (snes->ops->converged == ConvergenceTest && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* At set-up */
 PetscErrorCode HooksInstall(TS ts)
 {
@@ -215,7 +227,6 @@ PetscErrorCode HooksInstall(TS ts)
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
-  if (snes->ops->converged == ConvergenceTest && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP)); /* of several TS it serves the one that steps */
   if (H.snes != snes) {
     PetscCall(PointToUs(ts, snes));
     PetscCall(PetscObjectReference((PetscObject)snes));

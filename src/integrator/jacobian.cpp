@@ -4,6 +4,7 @@
   unknowns, rounding of q divided by beta h^2 included, and not at all in the start: ours take their place.
 */
 #include "corrector.h"
+#include "dense.h"
 #include "jacobian.h"
 #include "settings.h"
 #include "solver.h"
@@ -60,6 +61,7 @@ PetscErrorCode SetUpJacobian(TS ts)
 
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
+  PetscCall(HooksTakeOver(ts, snes));
   PetscCall(TSGetDM(ts, &dm));
   PetscCall(WhoFillsMatrix(dm, &has, &wanted, &pattern));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
@@ -164,10 +166,49 @@ PetscErrorCode SetUpSolvers(TS ts)
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SolverDefaults(ts, ksp)); /* what the program has set since TSSetFromOptions(), or without it */
   PetscCall(CorrectorSetUp(ts));
+  PetscCall(NoteMatrices(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The user has given the TS another SNES since the last step, or lent its SNES to another TS in between */
+namespace
+{
+
+PetscErrorCode IdsOfMatrices(TS ts, PetscObjectId id[2])
+{
+  Mat A[2];
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, &A[0], &A[1], NULL, NULL));
+  for (int k = 0; k < 2; k++) {
+    id[k] = 0;
+    if (A[k]) PetscCall(PetscObjectGetId((PetscObject)A[k], &id[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* At the end of a step, too: -snes_mf_operator has SNES exchange the operator in the first one */
+PetscErrorCode NoteMatrices(TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(IdsOfMatrices(ts, Get(ts).hooks.matrices));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Since the last step the user has given the TS another SNES, another matrix or other options, or lent its SNES to another TS */
+PetscErrorCode IsAnotherSNES(TS ts, bool *yes)
+{
+  const Hooks  &H = Get(ts).hooks;
+  PetscObjectId id[2];
+
+  PetscFunctionBegin;
+  PetscCall(IdsOfMatrices(ts, id));
+  *yes = ts->snes != H.snes || id[0] != H.matrices[0] || id[1] != H.matrices[1] || !id[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where IsAnotherSNES() */
 PetscErrorCode TakeSNES(TS ts)
 {
   Integrator &I = Get(ts);
@@ -180,6 +221,8 @@ PetscErrorCode TakeSNES(TS ts)
   I.scaled_operator       = 0;
   I.corrector.matrix.have = PETSC_FALSE;
   PetscCall(DifferencesDestroy(ts));
+  PetscCall(SamplerDestroy(I));
+  PetscCall(MatDestroy(&I.second));
   PetscCall(SetUpJacobian(ts));
   PetscCall(CheckMatrices(ts));
   PetscCall(CheckTriangle(ts));

@@ -7,9 +7,12 @@
 namespace hht3
 {
 
-/* At set-up: the matrices of the SNES, then its solvers and the corrector in it. TakeSNES() does both again where the TS has another SNES. */
+/* At set-up: the matrices of the SNES, then its solvers and the corrector in it. TakeSNES() does both again where the TS has another SNES, or this one other matrices
+   or options. */
 PetscErrorCode SetUpJacobian(TS ts);
 PetscErrorCode SetUpSolvers(TS ts);
+PetscErrorCode NoteMatrices(TS ts);
+PetscErrorCode IsAnotherSNES(TS ts, bool *yes);
 PetscErrorCode TakeSNES(TS ts);
 
 /* Refuses matrices without rows and operators that cannot be scaled */

@@ -98,9 +98,9 @@ PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
 
   PetscFunctionBegin;
   PetscCheck(degree >= -1 && degree <= hht_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, hht_degree);
-  if (fixed != p.fixed || most != p.degree_max) PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
-  p.fixed      = fixed;
-  p.degree_max = most;
+  if (fixed != p.fixed || (fixed && most != p.degree_max)) PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
+  p.fixed = fixed;
+  if (fixed || !ts->setupcalled) p.degree_max = most; /* SetUpOrder() has raised one that is free */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,7 +128,8 @@ PetscErrorCode SetIS(TS ts, TSHHT3Role role, IS is)
   PetscCall(PetscObjectReference((PetscObject)is));
   PetscCall(ISDestroy(&I.is[role]));
   I.is[role] = is;
-  I.is_set   = PETSC_TRUE;
+  I.is_set   = PETSC_FALSE;
+  for (IS set : I.is) I.is_set = (PetscBool)(I.is_set || set);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

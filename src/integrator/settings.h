@@ -28,6 +28,7 @@ PetscErrorCode HooksLineSearch(TS ts);
 PetscErrorCode HooksJacobian(TS ts);
 
 /* At set-up: the convergence test, and that SNES asks for a matrix and reports a singular one as the corrector wants it */
+PetscErrorCode HooksTakeOver(TS ts, SNES snes);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 

@@ -185,6 +185,7 @@ struct Hooks {
   PetscBool check_domain = PETSC_FALSE;
   PetscReal abstol       = 0;           /* of the KSP; 0: none has been taken out */
   PetscBool abstol_told  = PETSC_FALSE;
+  PetscObjectId matrices[2] = {}; /* J and P of the SNES, as they are between steps */
 };
 
 /* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */

@@ -336,7 +336,9 @@ PetscErrorCode Step(TS ts)
   next = ts->time_step;
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
-  if (ts->snes != I.hooks.snes || !ts->snes->jacobian_pre) PetscCall(TakeSNES(ts));
+  bool another;
+  PetscCall(IsAnotherSNES(ts, &another));
+  if (another) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(CheckpointIfDue(ts));
   PetscCall(Begin(ts));
@@ -359,6 +361,7 @@ PetscErrorCode Step(TS ts)
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
   }
+  PetscCall(NoteMatrices(ts));
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,6 @@
 /* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
 #include "integrator/start.h"
+#include "integrator/state.h"
 #include "support.h"
 #include <array>
 
@@ -697,4 +698,61 @@ TEST(BetweenRuns, VelocitiesInAnotherVector)
   must(run.solve());
   EXPECT_NEAR(whole(other)[0], 7., 0.5);
   must(VecDestroy(&other));
+}
+
+namespace
+{
+
+/* The second half of a run, after these options were read */
+PetscErrorCode secondHalf(Simulation &run, const std::string &options)
+{
+  Options in(options);
+  PetscFunctionBegin;
+  PetscCall(TSSetFromOptions(run.ts));
+  PetscCall(TSSetMaxTime(run.ts, 1.));
+  PetscCall(TSSolve(run.ts, nullptr));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+/* TSSetFromOptions() between two runs: the linear solver is chosen once more, and options of SNES hold as they do before the first run */
+TEST(BetweenRuns, OptionsReadAgain)
+{
+  const Pendulum    p(-90., 0., 1.);
+  const std::string all = tolerance(1e-6);
+  Simulation        plain(p, all);
+  must(plain.solve());
+  for (const std::string more : {"", "-snes_max_it 7", "-snes_type newtontr", "-snes_linesearch_type bt", "-snes_fd", "-snes_lag_jacobian 1", "-pc_type lu -pc_factor_mat_solver_type klu"}) {
+    Simulation run(p, all + "-ts_max_time .5");
+    must(run.solve());
+    const TSHHT3Statistics before = run.statistics();
+    must(secondHalf(run, all + more));
+    const TSHHT3Statistics  after = run.statistics();
+    const hht3::Integrator &I     = hht3::Get(run.ts);
+    EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-3) << more;
+    EXPECT_STRNE(I.linear.text, "") << more;
+    EXPECT_EQ(I.corrector.max_it, more == "-snes_max_it 7" ? 7 : 10);
+    EXPECT_EQ(I.hooks.line_search, (PetscBool)(more != "-snes_type newtontr" && more != "-snes_linesearch_type bt")) << more;
+    EXPECT_EQ(I.differences != nullptr, more == "-snes_fd");
+    EXPECT_EQ(after.factorizations - before.factorizations > after.steps - before.steps, more == "-snes_lag_jacobian 1") << more;
+  }
+  Simulation run(p, all + "-ts_max_time .5");
+  must(run.solve());
+  ErrorTrap trap;
+  EXPECT_EQ(secondHalf(run, all + "-snes_type ngs"), PETSC_ERR_SUP);
+}
+
+/* Degree -1 is what holds already, whatever the order makes of it */
+TEST(BetweenRuns, TheSameOptionsReadAgain)
+{
+  const Pendulum p(-90., 0., 1.);
+  for (const char *method : {"-ts_hhtdae_predictor_degree -1 -ts_hhtdae_order 5", "-ts_hhtdae_predictor_degree 2 -ts_hhtdae_order 5", "-ts_hhtdae_predictor_degree -1"}) {
+    const std::string all = tolerance(1e-6) + method;
+    Simulation        run(p, all + " -ts_max_time .5");
+    must(run.solve());
+    const PetscInt degree = hht3::Get(run.ts).predictor.degree_max;
+    EXPECT_EQ(secondHalf(run, all), 0) << method;
+    EXPECT_EQ(hht3::Get(run.ts).predictor.degree_max, degree) << method;
+  }
 }

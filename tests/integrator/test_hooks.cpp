@@ -216,7 +216,10 @@ TEST(Hooks, OneSNESForTwoTS)
   Simulation     a(p, options), b(q, options), c(p, options), d(q, options);
   must(TSSetSNES(b.ts, snesOf(a.ts)));
   for (int k = 0; k < 20; k++)
-    for (Simulation *run : {&a, &b, &c, &d}) must(run->step());
+    for (Simulation *run : {&a, &b, &c, &d}) {
+      must(run->step());
+      EXPECT_EQ(lineSearchOf(snesOf(run->ts)), SNESLINESEARCHSHELL);
+    }
   EXPECT_LT(relativeDifference(a.u(), c.u()), 1e-7); /* a matrix of its own for every step */
   EXPECT_LT(relativeDifference(b.u(), d.u()), 1e-7);
   must(TSDestroy(&a.ts)); /* resets the SNES, its matrix included: the DM makes one */
@@ -242,6 +245,46 @@ TEST(Hooks, AnotherSNESBetweenSteps)
   for (int k = 0; k < 10; k++) must(run.step());
   for (int k = 0; k < 20; k++) must(plain.step());
   EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-4);
+}
+
+/* Another matrix in the middle of a run, which nobody has assembled yet or whose places are those of the differences from then on */
+TEST(Hooks, AnotherMatrixBetweenSteps)
+{
+  const Pendulum p(-90., 0., .5);
+  for (const char *more : {"", "-snes_fd_color"}) {
+    const auto   options = tolerance(1e-6) + "-ts_dt 1e-3 -ts_exact_final_time stepover " + more;
+    Simulation   run(p, options), plain(p, options);
+    TSI2Jacobian f;
+    void        *ctx;
+    Mat          P, now;
+    Vec          A, B;
+    must(VecDuplicate(run.U, &A));
+    must(VecDuplicate(run.U, &B));
+    for (int k = 0; k < 10; k++) must(run.step());
+    must(TSHHT3EvaluateAt(run.ts, run.t() - 1e-4, nullptr, nullptr, A));
+    must(TSGetI2Jacobian(run.ts, nullptr, nullptr, &f, &ctx));
+    must(MatCreateSeqAIJ(PETSC_COMM_SELF, p.n, p.n, p.n, nullptr, &P));
+    if (*more) {
+      for (PetscInt i = 0; i < p.n; i++)
+        for (PetscInt j = 0; j < p.n; j++) must(MatSetValue(P, i, j, 0., INSERT_VALUES));
+      must(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+      must(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+    }
+    must(TSSetI2Jacobian(run.ts, P, P, f, ctx));
+    for (int k = 0; k < 10; k++) must(run.step());
+    for (int k = 0; k < 20; k++) must(plain.step());
+    must(SNESGetJacobian(snesOf(run.ts), nullptr, &now, nullptr, nullptr));
+    EXPECT_EQ(now, P);
+    EXPECT_EQ(run.statistics().corrector_fails + run.statistics().retries, 0);
+    EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-4);
+    const double t = std::min(run.t(), plain.t()) - 1e-4;
+    must(TSHHT3EvaluateAt(run.ts, t, nullptr, nullptr, A));
+    must(TSHHT3EvaluateAt(plain.ts, t, nullptr, nullptr, B));
+    EXPECT_LT(relativeDifference(whole(A), whole(B)), 1e-3);
+    must(MatDestroy(&P));
+    must(VecDestroy(&A));
+    must(VecDestroy(&B));
+  }
 }
 
 /* The user's test rules, its context is neither lost nor destroyed before its time */
