@@ -81,12 +81,12 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
     }
   }
   PetscCall(LinearDefaults(S.at.ksp, &S.linear));
-  PetscCall(KSPSetFromOptions(S.at.ksp));
   if (!I.linear.user_pc && I.linear.user_package && !S.linear.user_package) { /* a package that the program has named, and no factorization */
     PetscCall(PCFactorGetMatSolverType(from, &package));
     PetscCall(PCFactorSetMatSolverType(to, package));
     S.linear.user_package = PETSC_TRUE;
   }
+  PetscCall(KSPSetFromOptions(S.at.ksp));
   PetscCall(HasParts(to, &parts));
   if (parts) { /* by an option */
     PetscCall(PCSetType(to, PCLU));

@@ -178,6 +178,10 @@ TEST(LinearSolves, FactorsThatTheProgramNames)
       must(PCFactorSetMatSolverType(pc, cholesky ? MATSOLVERMUMPS : MATSOLVERKLU));
       must(TSSetMaxSteps(ts, 3));
       must(TSSolve(ts, nullptr));
+      PetscReal t, h;
+      must(TSGetTime(ts, &t));
+      must(TSGetPrevTime(ts, &h));
+      must(TSHHT3EvaluateAt(ts, (t + h) / 2., nullptr, V, nullptr)); /* by the same package */
       must(PCGetType(pc, &type));
       must(PCFactorGetMatSolverType(pc, &package));
       EXPECT_STREQ(type, cholesky ? PCCHOLESKY : PCLU) << options;
