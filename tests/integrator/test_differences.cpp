@@ -8,37 +8,50 @@ using namespace hhtest;
 namespace
 {
 
-/* The end of a run by the problem's residual alone */
+/* The end of a run */
 struct End {
   Array            u, v;
   TSHHT3Statistics statistics;
 };
 
+/* A TS of the problem's residual alone */
+struct WithoutJacobian {
+  TS  source, ts;
+  Vec U, V, F;
+
+  explicit WithoutJacobian(const Problem &p)
+  {
+    TSI2Function function;
+    void        *ctx;
+    must(ProblemCreateTS(PETSC_COMM_SELF, p, &source, &U, &V));
+    must(TSGetI2Function(source, nullptr, &function, &ctx));
+    must(VecDuplicate(U, &F));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetType(ts, TSHHT3));
+    must(TSSetI2Function(ts, F, function, ctx));
+    must(TS2SetSolution(ts, U, V));
+    must(TSSetMaxTime(ts, p.t1));
+  }
+  ~WithoutJacobian()
+  {
+    must(TSDestroy(&ts));
+    must(TSDestroy(&source));
+    for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
+  }
+};
+
 End withoutJacobian(const Problem &p, const std::string &options)
 {
-  TS            source, ts;
-  Vec           U, V, F;
-  TSI2Function  function;
-  void         *ctx;
-  const Options in(options);
-  must(ProblemCreateTS(PETSC_COMM_SELF, p, &source, &U, &V));
-  must(TSGetI2Function(source, nullptr, &function, &ctx));
-  must(VecDuplicate(U, &F));
-  must(TSCreate(PETSC_COMM_SELF, &ts));
-  must(TSSetType(ts, TSHHT3));
-  must(TSSetI2Function(ts, F, function, ctx));
-  must(TS2SetSolution(ts, U, V));
-  must(TSSetMaxTime(ts, p.t1));
+  const Options         in(options);
+  const WithoutJacobian run(p);
+  TS                    ts = run.ts;
   must(TSSetTimeStep(ts, 1e-3 * (p.t1 - p.t0)));
   must(TSSetMaxSteps(ts, 1000000));
   must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
   must(TSSetFromOptions(ts));
   must(TSSolve(ts, nullptr));
-  End end = {whole(U), whole(V), {}};
+  End end = {whole(run.U), whole(run.V), {}};
   must(TSHHT3GetStatistics(ts, &end.statistics));
-  must(TSDestroy(&ts));
-  must(TSDestroy(&source));
-  for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
   return end;
 }
 
@@ -212,29 +225,15 @@ TEST(Differences, NoPlaceThatNobodyFollows)
     }
     void jacobian(double, const double *, const double *, const double *, double, double, Entries &) const override {}
   } springs;
-  TS           source, ts;
-  Vec          U, V, F;
-  TSI2Function function;
-  void        *ctx;
-  SNES         snes;
-  Mat          P;
-  MatInfo      info;
-  must(ProblemCreateTS(PETSC_COMM_SELF, springs, &source, &U, &V));
-  must(TSGetI2Function(source, nullptr, &function, &ctx));
-  must(VecDuplicate(U, &F));
-  must(TSCreate(PETSC_COMM_SELF, &ts));
-  must(TSSetType(ts, TSHHT3));
-  must(TSSetI2Function(ts, F, function, ctx));
-  must(TS2SetSolution(ts, U, V));
-  must(TSSetMaxTime(ts, springs.t1));
-  must(TSSetUp(ts));
-  must(TSGetSNES(ts, &snes));
+  const WithoutJacobian run(springs);
+  SNES                  snes;
+  Mat                   P;
+  MatInfo               info;
+  must(TSSetUp(run.ts));
+  must(TSGetSNES(run.ts, &snes));
   must(SNESGetJacobian(snes, nullptr, &P, nullptr, nullptr));
   must(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
   EXPECT_EQ(info.nz_used, 3. * springs.n - 2.);
-  must(TSDestroy(&ts));
-  must(TSDestroy(&source));
-  for (Vec *x : {&U, &V, &F}) must(VecDestroy(x));
 }
 
 /* PETSc's options for the differences hold */
