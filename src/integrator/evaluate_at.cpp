@@ -190,8 +190,8 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   PetscErrorCode failed = S.at.gamma ? ConstraintTerms(ts, S.at) : PETSC_SUCCESS;
   if (!failed) failed = SolveConsistent(ts, S.at, false, ok, &why);
   PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
-  PetscCall(failed);
   I.stat = saved;
+  PetscCall(failed);
   if (!*ok) S.t1 = PETSC_NINFINITY; /* a factor that failed may keep its error */
   if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));
   PetscCall(PetscLogEventEnd(events.sample, ts, 0, 0, 0));

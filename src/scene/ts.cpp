@@ -20,6 +20,7 @@ PetscErrorCode FollowType(TS ts, Runtime &R)
   PetscReal t;
   Vec       U, V;
   PetscFunctionBegin;
+  if (!R.turns && !R.remembers && !R.dropped) PetscFunctionReturn(0); /* nothing to follow; questions are for TSHHT3 alone */
   PetscCall(TSGetType(ts, &type));
   PetscCall(PetscStrcmp(type, TSHHT3, &ours));
   if (ours) PetscFunctionReturn(0);
