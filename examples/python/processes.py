@@ -1,4 +1,4 @@
-"""A sweep on all cores: scenes go to the processes of a pool, runs come back as their results.
+"""A sweep on two processes: scenes go to those of a pool, runs come back as their results.
 
 A wagon runs into a buffer, a spring and a damper in its way from x = 0 on; the deepest point by damping, against the closed form.
 """

@@ -67,10 +67,12 @@ function(hhtdae_python_module name library)
   target_include_directories(python_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src/python)
   target_compile_options(python_${name} PRIVATE -O1 ${HHTDAE_LINES} -fno-math-errno)
   target_link_libraries(python_${name} PRIVATE ${library})
-  if(HHTDAE_PRECOMPILE)
+  if(HHTDAE_PRECOMPILE AND TARGET python__core AND NOT name STREQUAL _core)
+    target_precompile_headers(python_${name} REUSE_FROM python__core)
+  elseif(HHTDAE_PRECOMPILE)
     target_precompile_headers(python_${name} PRIVATE ${HHTDAE_PRECOMPILED} <hhtdae/scene.h> <pybind11/pybind11.h> <pybind11/numpy.h>)
   endif()
-  set_target_properties(python_${name} PROPERTIES OUTPUT_NAME ${name} PREFIX "" SUFFIX "${python_suffix}" CXX_VISIBILITY_PRESET hidden
+  set_target_properties(python_${name} PROPERTIES DEFINE_SYMBOL "" OUTPUT_NAME ${name} PREFIX "" SUFFIX "${python_suffix}" CXX_VISIBILITY_PRESET hidden
                         LIBRARY_OUTPUT_DIRECTORY ${package_build} INSTALL_RPATH "$ORIGIN/lib;$ORIGIN/${from_package}") # of a wheel, and of a prefix
   install(TARGETS python_${name} LIBRARY DESTINATION ${HHTDAE_PYTHON_DIR}/hhtdae)
   add_dependencies(python python_${name})
@@ -90,7 +92,6 @@ endif()
 set_source_files_properties(src/python/tape.cpp PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 if(TARGET hhtflexible)
   hhtdae_python_module(_flexible hhtflexible src/python/flexible.cpp src/python/bind.cpp)
-  set_target_properties(python__flexible PROPERTIES DISABLE_PRECOMPILE_HEADERS ON) # more than two sources would gain
 endif()
 
 file(GLOB python_files CONFIGURE_DEPENDS src/python/hhtdae/*.py src/python/hhtdae/*.pyi src/python/hhtdae/py.typed)

@@ -196,7 +196,8 @@ template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBa
     moment = std::max(moment, k.moments);
   }
   const auto hold = [&](double missing, double sum, double least, const char *what, PetscInt body) {
-    const double part = missing <= 0 ? 0 : missing / std::max(sum, 1e-9 * least);
+    const double ratio = missing <= 0 ? 0 : missing / std::max(sum, 1e-9 * least);
+    const double part  = std::isnan(ratio) ? INFINITY : ratio; /* what is no number exceeds all others */
     if (part <= worst.largest) return;
     worst.largest = part;
     worst.where   = std::string(what) + " on " + DataOf(scene_).bodyName(body);
@@ -228,7 +229,7 @@ Imbalance NewtonEuler::judge(const std::vector<double> &values, const std::vecto
   });
   if (kinetic_ >= 0) {
     const double own = kinetic(values), reported = values[(std::size_t)kinetic_], off = std::abs(own - reported);
-    if (off > worst.largest * own) worst = {own > 0 ? off / own : 1, "kinetic energy of the scene"};
+    if (!(off <= worst.largest * own)) worst = {own > 0 ? off / own : 1, "kinetic energy of the scene"};
   }
   return worst;
 }

@@ -1,7 +1,7 @@
 """Installs into an empty prefix, then builds and runs a small C program, and a scene in C++, that know nothing but that prefix.
 
 Once with CMake's find_package(hhtdae), once with pkg-config hhtdae.
-usage: install.py build-tree cmake configuration directory-of-PETSc.pc [directory-of-SLEPc.pc]
+usage: install.py build-tree cmake configuration directory-of-PETSc.pc
 """
 
 import os
@@ -12,8 +12,7 @@ import tempfile
 
 from common import check, run
 
-build, cmake, configuration, petsc_pc = sys.argv[1:5]
-slepc_pc = sys.argv[5] if len(sys.argv) > 5 else ""
+build, cmake, configuration, petsc_pc = sys.argv[1:]
 here = os.path.dirname(os.path.abspath(__file__))
 
 
@@ -56,26 +55,18 @@ with tempfile.TemporaryDirectory(prefix="install-test-", dir=build) as work:
     refusal = run(["pkg-config", "--print-errors", "--libs", "hhtdae"], fails=True, PKG_CONFIG_PATH=os.pathsep.join([os.path.join(libdirs[0], "pkgconfig"), other]))
     check("PETSc <" in refusal, "pkg-config takes another PETSc: " + refusal)
 
-    # A scene, as a component of the same package and through its own pkg-config file
-    scene = os.path.join(work, "scene-with-cmake")
-    run([cmake, "-S", os.path.join(outside, "scene"), "-B", scene, "-DCMAKE_PREFIX_PATH=" + prefix])
-    run([cmake, "--build", scene])
-    works(os.path.join(scene, "outside_scene"))
+    # A scene by its own pkg-config file; as a component of CMake's package: instructions.py
     flags = run(["pkg-config", "--cflags", "--libs", "hhtscene"], PKG_CONFIG_PATH=paths).split()
     with_pkg_config = os.path.join(work, "scene-with-pkg-config")
     run([os.environ.get("CXX", "c++"), "-std=c++17", os.path.join(outside, "scene", "outside_scene.cpp"), "-o", with_pkg_config, *flags])
     works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
 
-    # Flexible bodies, where the build has them
+    # Flexible bodies, where the build has them, as a component; by their pkg-config file: instructions.py
     if not os.path.exists(os.path.join(libdirs[0], "libhhtflexible.so")):
         sys.exit()
     flexible = os.path.join(work, "flexible-with-cmake")
     run([cmake, "-S", os.path.join(outside, "flexible"), "-B", flexible, "-DCMAKE_PREFIX_PATH=" + prefix])
     run([cmake, "--build", flexible])
     works(os.path.join(flexible, "outside_flexible"))
-    flags = run(["pkg-config", "--cflags", "--libs", "hhtflexible"], PKG_CONFIG_PATH=paths + os.pathsep + slepc_pc).split()
-    with_pkg_config = os.path.join(work, "flexible-with-pkg-config")
-    run([os.environ.get("CXX", "c++"), "-std=c++17", os.path.join(outside, "flexible", "outside_flexible.cpp"), "-o", with_pkg_config, *flags])
-    works(with_pkg_config, LD_LIBRARY_PATH=libdirs[0])
     reduced = run([os.path.join(prefix, "bin", "hhtreduce"), "-help"])
     check("-attach" in reduced, "hhtreduce does not explain itself: " + reduced)

@@ -121,4 +121,5 @@ for number in range(count):
     case = cases[number % len(cases)]
     kills, resumes = disturbed(case)
     total = [total[0] + 1, total[1] + (case.ranks > 1), total[2] + kills, total[3] + resumes]
+check(count < 10 or (total[2] and total[3]), "no run was killed, or none went on from a checkpoint")
 print("%d runs, %d of them on two ranks: %d kills, %d resumptions, all with the bits of the undisturbed run (seed %d)" % (*total, seed))

@@ -24,7 +24,7 @@ def errors(*options):
 
 # The plug-in, and nothing else, makes the type known; it can come through the environment as well.
 message = run([program, "-ts_type", "hhtdae"], fails=True)
-check("hhtdae" in message, "without the plug-in ex43 failed for another reason: " + message[-500:])
+check("Unknown TS type: hhtdae" in message, "without the plug-in ex43 failed for another reason: " + message[-500:])
 view = ["-damping", "0.1", "-ts_max_steps", "20", "-ts_view"]
 by_arguments = run([program, *plugin, *view])
 by_environment = run([program, *view], PETSC_OPTIONS=" ".join(plugin))

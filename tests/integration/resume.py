@@ -38,6 +38,7 @@ def try_one(name):
     check(summary(out) == counters, "%s: a run that writes checkpoints has other counters" % name)
     out, rest = record(name, "resumed", *recording[1], "-ts_hhtdae_resume", checkpoint)
     left = len(whole) - middle
+    check(left <= len(rest) <= left + 1, "%s: %d states after the resumption, %d are left" % (name, len(rest), left))
     check(rest[-left:] == whole[-left:], "%s: the resumed run has other bits" % name)
     check(summary(out) == counters, "%s: the resumed run has other counters:\n%s\n%s" % (name, summary(out), counters))
     if name in SCENES:

@@ -143,14 +143,15 @@ private:
     o_.between             = sharp.between;
     o_.unsolved            = sharp.unsolved;
     o_.unjudged            = sharp.unjudged;
-    if (sharp.balance > allowed_imbalance) fail(Wrong, "out of balance: " + sharp.out_of_balance);
+    if (!sharp.arrived() && !sharp.late) fail(Failed, "with a sharp corrector: " + sharp.failure);
+    else if (sharp.balance > allowed_imbalance) fail(Wrong, "out of balance: " + sharp.out_of_balance);
     else if (sharp.unsolved > allowed_residual) fail(Wrong, "equations of motion not solved: " + sharp.where_unsolved);
   }
   void again(const Trajectory &a)
   {
     const int before       = o_.verdict;
     if (laws_) laws();
-    if (o_.verdict == Wrong) return;
+    if (o_.verdict == Wrong || o_.verdict == Failed) return;
     o_.verdict = before;
     if (!again_) return;
     o_.stage = Again;

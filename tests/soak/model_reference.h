@@ -213,6 +213,9 @@ inline Trajectory RunIDA(Model model, double eps, double work, int *legs, double
   r.model = std::move(model);
   if (SolveByIDA(r, eps, newton, work)) r.result.failure = "IDA: " + quiet.message;
   if (r.result.failure.empty() && (int)r.result.x.size() != samples) r.result.failure = "IDA ended early";
+  for (const auto &x : r.result.x)
+    for (double value : x)
+      if (!std::isfinite(value)) r.result.failure = "IDA: a result is not a number";
   *legs = r.legs;
   return r.result;
 }

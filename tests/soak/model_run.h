@@ -27,6 +27,7 @@ struct Trajectory {
   double      unsolved = -1;              /* largest residual of a body at ends of steps, beyond what it may be */
   int         unjudged = 0;               /* bodies */
   std::string out_of_balance, where_unsolved; /* where and when these were found */
+  bool        late = false; /* left at the limit of work */
   bool        arrived() const { return failure.empty() && (int)x.size() == samples; }
 };
 
@@ -86,7 +87,7 @@ struct Watcher {
 /* The largest so far, and of its place a note */
 inline void Keep(const hhtest::Imbalance &now, double t, double *most, std::string *note)
 {
-  if (now.largest > *most && note) *note = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
+  if (!(now.largest <= *most) && note) *note = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
   if (!(now.largest <= *most)) *most = now.largest;
 }
 
@@ -166,6 +167,7 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *c
     late = WorkOf(cost.residuals, unknowns) > w.settings.work;
   }
   if (late) {
+    w.result.late    = true;
     w.result.failure = hhtbench::Text("took longer than the limit, at t = %g of %g", t, w.end);
     PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   }

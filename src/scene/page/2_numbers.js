@@ -28,6 +28,16 @@ function roundStep(range, count) {
   for (const m of [1, 2, 5, 10]) if (m * power >= rough) return m * power;
 }
 
+/* As many digits as tell numbers up to `size` apart by `step` */
+function digitsFor(size, step) {
+  return step > 0 && size > 0 ? Math.min(15, Math.max(4, 1 + Math.floor(Math.log10(size) + 1e-9) - Math.floor(Math.log10(step) + 1e-9))) : 4;
+}
+
+function tickLabels(list, range) {
+  const digits = digitsFor(Math.max(...list.map(Math.abs)), list[1] - list[0]);
+  return list.map(x => formatNumber(Math.abs(x) < 1e-9 * range ? 0 : x, digits));
+}
+
 function ticks(low, high, count) {
   const step = roundStep(high - low, count), list = [];
   if (!(step > 0)) return [low];

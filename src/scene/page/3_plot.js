@@ -51,7 +51,7 @@ class Plot {
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.clearRect(0, 0, width, height);
     g.font = '11px system-ui, "Liberation Sans", sans-serif';
-    const marks = ticks(this.low, this.high, 4), labels = marks.map(x => formatNumber(Math.abs(x) < 1e-9 * (this.high - this.low) ? 0 : x, 4));
+    const marks = ticks(this.low, this.high, 4), labels = tickLabels(marks, this.high - this.low);
     this.left = 8 + Math.max(...labels.map(l => g.measureText(l).width));
     this.right = 8;
     const top = 6, bottom = 18, [t0, t1] = this.timeRange();
@@ -70,11 +70,12 @@ class Plot {
       g.fillText(labels[i], this.left - 4, y(m));
     });
     g.textBaseline = 'alphabetic';
-    for (const m of ticks(t0, t1, Math.max(2, Math.floor(width / 90)))) {
-      const label = formatNumber(Math.abs(m) < 1e-9 * (t1 - t0) ? 0 : m, 4), half = g.measureText(label).width / 2;
-      g.textAlign = 'center';
-      g.fillText(label, Math.min(width - half - 1, Math.max(half, x(m))), height - 4);
-    }
+    const times = ticks(t0, t1, Math.max(2, Math.floor(width / 90)));
+    g.textAlign = 'center';
+    tickLabels(times, t1 - t0).forEach((label, i) => {
+      const half = g.measureText(label).width / 2;
+      g.fillText(label, Math.min(width - half - 1, Math.max(half, x(times[i]))), height - 4);
+    });
     this.series.forEach((s, i) => {
       g.strokeStyle = seriesColours[i % seriesColours.length];
       g.lineWidth = 1.4;
@@ -106,12 +107,13 @@ class Plot {
       g.fill();
     });
     const value = this.element.querySelector('.value'), key = this.element.querySelector('.key');
-    if (this.series.length === 1) value.textContent = formatWithUnit(now[0], this.unit);
+    const digits = digitsFor(Math.max(Math.abs(this.low), Math.abs(this.high)), (this.high - this.low) / 100);
+    if (this.series.length === 1) value.textContent = formatWithUnit(now[0], this.unit, digits);
     else {
       value.textContent = this.unit;
       while (key.children.length < now.length) key.append(document.createElement('span'));
       now.forEach((v, i) => {
-        key.children[i].textContent = this.series[i].name + ' ' + formatNumber(v);
+        key.children[i].textContent = this.series[i].name + ' ' + formatNumber(v, digits);
         key.children[i].style.color = seriesColours[i % seriesColours.length];
       });
     }

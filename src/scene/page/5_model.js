@@ -293,11 +293,15 @@ class Model {
     s.painted = by;
   }
 
-  /* Corners of everything at some times of the run, and the box around them */
+  /* The box around everything at some times of the run, and of all corners those that are outermost in some direction, spread evenly over the sphere:
+     within 2 % of where a camera has to look, for however many bodies */
   findBounds() {
-    const n = this.run.frame.length, some = Math.min(n, 24), corner = new THREE.Vector3();
+    const n = this.run.frame.length, some = Math.min(n, 24), corner = new THREE.Vector3(), outermost = [];
+    for (let k = 0; k < 100; k++) {
+      const z = (2 * k + 1) / 100 - 1, turn = 2.399963 * k, r = Math.sqrt(1 - z * z); // the golden angle
+      outermost.push({direction: new THREE.Vector3(r * Math.cos(turn), r * Math.sin(turn), z), most: -Infinity, point: new THREE.Vector3()});
+    }
     this.bounds = new THREE.Box3();
-    this.points = [];
     for (let k = 0; k < some; k++) {
       this.moveTo(this.run.time[some > 1 ? Math.round(k * (n - 1) / (some - 1)) : 0], 1);
       for (const s of this.run.surfaces) s.mesh.geometry.boundingBox = null;
@@ -310,10 +314,16 @@ class Model {
           corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z).applyMatrix4(o.matrixWorld);
           if (!Number.isFinite(corner.x + corner.y + corner.z)) continue;
           this.bounds.expandByPoint(corner);
-          this.points.push(corner.clone());
+          for (const o of outermost) {
+            const along = corner.dot(o.direction);
+            if (along <= o.most) continue;
+            o.most = along;
+            o.point.copy(corner);
+          }
         }
       });
     }
+    this.points = outermost.filter(o => o.most > -Infinity).map(o => o.point);
     if (!this.points.length)
       for (const x of [-0.5, 0.5]) {
         this.points.push(new THREE.Vector3(x, x, x));

@@ -90,7 +90,7 @@ function draw() {
     view.drawAxes(element('axes'));
     showTag();
   }
-  const digits = Math.min(6, Math.max(0, -Math.floor(Math.log10((end() - begin()) / 500 || 1))));
+  const digits = Math.min(12, Math.max(0, -Math.floor(Math.log10((end() - begin()) / 500 || Math.abs(begin()) / 1000 || 1)))); // of the time of one picture
   element('time').textContent = state.t.toFixed(digits) + ' / ' + end().toFixed(digits);
   element('scrub').value = end() > begin() ? Math.round(1e4 * (state.t - begin()) / (end() - begin())) : 0;
   element('scrub').setAttribute('aria-valuetext', 'time ' + state.t.toFixed(digits));
@@ -321,7 +321,8 @@ function prepareControls() {
   new ResizeObserver(change).observe(element('plots'));
   if (!view) return;
   let down = null;
-  element('canvas').addEventListener('pointerdown', e => { down = [e.clientX, e.clientY]; });
+  element('canvas').addEventListener('pointerdown', e => { down = e.isPrimary ? [e.clientX, e.clientY] : null; }); // a second finger turns the touch into a pinch
+  element('canvas').addEventListener('pointercancel', () => { down = null; });
   element('canvas').addEventListener('pointerup', e => {
     if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 5 || e.button) return;
     const hit = view.pick(e.clientX, e.clientY);
@@ -413,7 +414,7 @@ async function start() {
   addLists();
   if (view) {
     fit();
-    element('grid-note').textContent = 'grid ' + formatNumber(view.gridStep, 2);
+    element('grid-note').textContent = 'grid ' + formatNumber(view.gridStep, 2) + (run.notice ? ' · ' + run.notice : '');
     prepareSurfaces();
   }
   for (let c = 0; c < Math.min(2, run.scene.channels.length); c++) toggleChannel(c);
