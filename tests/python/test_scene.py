@@ -139,6 +139,8 @@ class Elements(unittest.TestCase):
         for call, text in ((lambda: rod.marker((h.displacement(i, 0), 0, 0), name="tip"), "marker tip: position is a formula of the state"),
                            (lambda: scene.set_gravity((0, h.time(), 0)), "gravity is a formula"),
                            (lambda: scene.add(None, h.RigidBody()), "the name is None, must be a text"),
+                           (lambda: scene.channel(3, h.time()), r"Scene.channel\(\): the name is 3"),
+                           (lambda: h.Scene().parameter(None, 1.), r"Scene.parameter\(\): the name is None"),
                            (lambda: scene.variable("V", 1., None), "variable V: its initial value is None"),
                            (lambda: scene.output(dt="1"), r"output\(\): dt is '1', must be a number"),
                            (lambda: scene.set(k="1"), "parameter k is '1'")):
@@ -575,6 +577,26 @@ class Runs(unittest.TestCase):
             scene.output(page_frames=0)
         with self.assertRaisesRegex(ValueError, "must be one of report"):
             scene.start(assembly="maybe")
+
+    def test_what_is_refused_changes_nothing(self):
+        scene, rod, pin = pendulum()
+        for call, error, words in ((lambda: scene.output(page_frames=-3), ValueError, "page_frames"),
+                                   (lambda: scene.output(csv=3), TypeError, r"output\(\): csv is 3, must be a string"),
+                                   (lambda: scene.output(balance=2), TypeError, "balance is 2"),
+                                   (lambda: scene.output(dt=-1.), ValueError, r"output\(\): dt is -1"),
+                                   (lambda: scene.output(page_nodes=1.5), TypeError, "page_nodes is 1.5, must be a whole number"),
+                                   (lambda: scene.start(tolerance="a"), TypeError, r"start\(\): tolerance is 'a'"),
+                                   (lambda: scene.start(tolerance=-1.), ValueError, r"start\(\): tolerance is -1"),
+                                   (lambda: scene.start(time=None), TypeError, "time is None"),
+                                   (lambda: scene.start(view="yes"), TypeError, "view is 'yes', must be True or False"),
+                                   (lambda: scene.start(tolerance=1e-3, assembly="maybe"), ValueError, "assembly is 'maybe'")):
+            before = dict(scene._start), dict(scene._output)
+            with self.assertRaisesRegex(error, words):
+                call()
+            self.assertEqual((scene._start, scene._output), before)
+        scene.output(dt=0.1)
+        scene.start(view=False, time=-1.)
+        self.assertEqual(scene.solve(-0.9).time, -0.9)
 
     def test_two_writers_of_one_file(self):
         """Neither two runs, one of which goes on later, nor two kinds of results"""

@@ -313,6 +313,10 @@ TEST(UserConstraint, Refuses)
   says(one({Measure::time()}, same), "row 1 reads no marker of a body");
   says(one({Measure::displacement(b.origin, 0)}, same), "row 1 reads no marker of a body");
   says(one({Measure::displacement(Marker{99}, 0)}, same), "marker i is not one of this scene");
+  Scene none(PETSC_COMM_SELF);
+  none.add("it", UserConstraint{{Expression{{Measure::time()}, same}}});
+  ASSERT_EQ(DataOf(none).errors.size(), 1u);
+  says(DataOf(none).errors[0], "row 1 reads no marker of a body");
   says(one({Measure::velocity(b.at, 0)}, [](const Real *m) { return m[0] * m[0] - 1; }), "not linear in its velocities");
   says(one({Measure::velocity(b.at, 0), Measure::value(v)}, [](const Real *m) { return m[0] * m[1]; }), "not linear in its velocities");
   says(one({Measure::displacement(b.at, 0)}, [](const Real *m) { return log(m[0] - 2); }), "nan at the start, must be finite");

@@ -325,7 +325,9 @@ for _name in ("sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp log l
 
 
 def where(condition, a, b):
-    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated. Arrays element by element."""
+    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated. Arrays element by element.
+
+    A load that jumps at a time is better a `Parameter` that an action of `Run.event` sets, see `time`."""
     return _by_elements(_where, condition, a, b)
 
 

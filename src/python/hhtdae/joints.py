@@ -203,7 +203,8 @@ class KnifeEdge(_Joint):
 @_spec
 class UserConstraint(Spec):
     """Formulas that stay zero: of displacements, distances, angles and time, or of velocities too, in which they have to be linear. Multipliers: one a row; the load on the
-    bodies is that times the derivatives of the formula by positions, at velocity level by velocities. A row reads six markers, four angles, two variables and states at most."""
+    bodies is that times the derivatives of the formula by positions, at velocity level by velocities. A row reads six markers and four angles at most,
+    and at velocity level, where they take no load, two variables and states."""
     rows: Sequence[Formula]
     _functions = {"rows": _expressions}
 

@@ -51,7 +51,9 @@ def time():
     """Time.
 
     Steps see loads at their ends: a pulse while nothing moves may lie between two of them if it is shorter than a fortieth of the run.
-    ``options={"ts_adapt_dt_max": 0.1}`` holds steps below a part of its duration, see `Scene.run`.
+    ``options={"ts_adapt_dt_max": 0.1}`` holds steps below a part of its duration, see `Scene.run`. A load that jumps at a time, as by `where`, costs velocities
+    the square root of the tolerance, with a step that ends there, too, since both steps beside the jump see the same side of it: a parameter that the action of
+    `Run.event` sets has both sides.
     """
     return Measure("time")
 

@@ -55,7 +55,7 @@ class Snapshot:
     flexible bodies above all, it is the other way round: what the interpolation of positions misses comes out in accelerations and reactions within the
     step times the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance.
 
-    An angle of a scene in space that no element and no channel reads is in (-pi, pi] where it is first asked for, and full turns are
+    An angle of a scene in space that no element and no channel reads between the same two markers (`Body.marker` makes a new one each time) is in (-pi, pi] where it is first asked for, and full turns are
     counted from there: make a channel of it, see `angle`. All calls are collective.
     """
 

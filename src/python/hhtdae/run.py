@@ -196,7 +196,7 @@ class Run(Channels):
         ----------
         formula : Expression
             A measure, or a formula of measures; a condition, as ``x < 0.3``, passes upwards where it becomes true. Full turns of an `angle` that no element and
-            no channel reads are counted from this call's time on or later: make a channel of it.
+            no channel reads between the same two markers are counted from this call's time on or later: make a channel of it.
         action : callable, optional
             action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes what a callback
             does, it has to call `restart`.

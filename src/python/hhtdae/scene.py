@@ -1,5 +1,7 @@
 """Multibody scenes: the description, of which runs are made."""
 
+import operator
+import os
 import re
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Type, Union
 
@@ -13,7 +15,7 @@ from .expressions import Expression, Parameter, describing
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
-from .spec import Formula, Spec, check_parameters, has_formula, number, plain
+from .spec import Formula, Spec, check_parameters, has_formula, number, plain, text
 from .tracing import time_function
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
@@ -164,6 +166,7 @@ class Scene:
         stands for a number anywhere in the description. Its name is one that no other parameter has."""
         if self._begun:
             raise ValueError("parameter %s came too late: parameters are made before everything else but gravity and the ground's acceleration" % name)
+        text(name, "Scene.parameter()")
         self._edits += 1
         self._parameters[name] = p = Parameter(self, name, self._core.parameter(name, number(value, "parameter " + name)))
         return p
@@ -211,8 +214,7 @@ class Scene:
         -------
         Body or Element
         """
-        if not isinstance(name, str):
-            raise TypeError("Scene.add(): the name is %r, must be a text" % (name,))
+        text(name, "Scene.add()")
         if isinstance(what, Spec):
             name = name or self._unnamed(type(what))
             described, converted = self._converted(what, name)
@@ -307,7 +309,7 @@ class Scene:
 
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
         """A user-defined variable: an unknown V = formula. Names are as of `add`."""
-        name = name or "variable %d" % self._variables
+        name = text(name, "Scene.variable()") or "variable %d" % self._variables
         initial = number(initial, "variable %s: its initial value" % name)
         self._describe()
         variable = Variable(self, self._core.variable(name, self._formula(definition, "variable " + name), initial), name)
@@ -316,7 +318,7 @@ class Scene:
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``. Names are as of `add`."""
-        name = name or "state %d" % self._states
+        name = text(name, "Scene.state()") or "state %d" % self._states
         initial = number(initial, "state %s: its initial value" % name)
         self._describe()
         if callable(rate) and not isinstance(rate, Expression):
@@ -341,6 +343,7 @@ class Scene:
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
+        text(name, "Scene.channel()")
         self._describe()
         self._core.channel(name, self._formula(value, "channel " + name), unit)
         self._channels.append((name, unit))
@@ -372,8 +375,9 @@ class Scene:
         angle_tol : float
             Of the error test for rotations, radians; 0: the TS's absolute tolerance.
         """
-        self._choose(self._start, policy, "start", assembly=("report", "off", "project"), redundant=("drop", "refuse", "keep"), rotations=("local", "euler313"))
-        self._core.start(*[self._start[k] for k in ("assembly", "redundant", "rotations", "equilibrium", "view", "tolerance", "time", "angle_tol")])
+        chosen = self._choose(self._start, policy, "start", assembly=("report", "off", "project"), redundant=("drop", "refuse", "keep"), rotations=("local", "euler313"))
+        self._core.start(*[chosen[k] for k in ("assembly", "redundant", "rotations", "equilibrium", "view", "tolerance", "time", "angle_tol")])
+        self._start = chosen
 
     def output(self, **settings):
         """Files of results, beside what runs keep in memory.
@@ -399,23 +403,41 @@ class Scene:
         page_frames, page_nodes : int
             Frames, and nodes that are shown of whole finite-element bodies, at most.
         """
-        for name in {"dt", "animation_dt", "page_dt"} & set(settings):
-            settings[name] = number(settings[name], "output(): " + name)
-        self._choose(self._output, settings, "output")
-        self._core.output(*[self._output[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
-        self._set_page(self._output)
+        chosen = self._choose(self._output, settings, "output")
+        self._set_page(chosen)
+        self._core.output(*[chosen[k] for k in ("file", "csv", "dt", "animation", "animation_dt", "balance")])
+        self._output = chosen
 
     def _set_page(self, output):
         self._core.page(*[output[k] for k in ("page", "page_title", "page_dt", "page_frames", "page_nodes")])
 
     @staticmethod
     def _choose(present, given, what, **choices):
+        """What is present with what is given, of the types that are present; what is refused changes nothing"""
+        chosen = dict(present)
         for name, value in given.items():
+            whole = "%s(): %s" % (what, name)
             if name not in present:
                 raise TypeError("%s(): %r is not known, there are %s" % (what, name, ", ".join(present)))
             if name in choices and value not in choices[name]:
-                raise ValueError("%s(): %s is %r, must be one of %s" % (what, name, value, ", ".join(choices[name])))
-            present[name] = value
+                raise ValueError("%s is %r, must be one of %s" % (whole, value, ", ".join(choices[name])))
+            kind = type(present[name])
+            if name == "balance":
+                kind = (bool, str)
+            elif kind is float:
+                value = number(value, whole)
+                if name != "time" and not 0 <= value < np.inf:
+                    raise ValueError("%s is %g, must not be negative, and finite" % (whole, value))
+            elif kind is str:
+                value = os.fspath(value) if isinstance(value, os.PathLike) else value
+            elif kind is bool:
+                value = bool(value) if isinstance(value, np.bool_) else value
+            elif kind is int:
+                value = operator.index(value) if hasattr(value, "__index__") and not isinstance(value, bool) else value
+            if kind is not float and not isinstance(value, kind):
+                raise TypeError("%s is %r, must be %s" % (whole, value, {str: "a string", int: "a whole number", bool: "True or False"}.get(kind, "True, False or a string")))
+            chosen[name] = value
+        return chosen
 
     @property
     def channels(self) -> List[Tuple[str, str]]:
@@ -439,7 +461,7 @@ class Scene:
             Where everything moves by micrometres, in metres, or where a contact a hundred metres away gives way by millimetres, it has to be as much smaller, or
             what is smaller than the tolerance is not there.
         sample : float or None
-            Time between samples of the channels; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
+            Time between samples of the channels, at its multiples and the start; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
             within steps are more accurate than those at their ends, as a rule, but not with fast modes that hardly anything damps, of flexible bodies
             above all: see `Snapshot`. Those are better sampled at the ends of steps, or with a smaller tolerance.
         after : Run, optional

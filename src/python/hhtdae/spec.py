@@ -32,6 +32,13 @@ def number(x, name):
     return float(x)
 
 
+def text(x, who):
+    """A name"""
+    if not isinstance(x, str):
+        raise TypeError("%s: the name is %r, must be a text" % (who, x))
+    return x
+
+
 def formulas(x):
     """A number, and those of an array, that are formulas"""
     if isinstance(x, Expression):

@@ -181,7 +181,7 @@ template <> Element Scene::enter(const std::string &name, const UserConstraint &
         if (i.id < 0 && body >= 0) i = k;
         else if (i.id >= 0 && j.id < 0 && body != data().markers[i.id].body) j = k;
       }
-  if (i.id < 0 && !data().markers.empty()) i = Marker{0}; /* its rows will say what they lack */
+  if (i.id < 0) i = data().markers.empty() ? marker(ground()) : Marker{0}; /* its rows will say what they lack */
   ElementBuilder e(*this, name, "user constraint", ElementData::Joint, i, j, false);
   e.require(!s.rows.empty(), "it has no rows");
   std::vector<RowBuilder> rows;
