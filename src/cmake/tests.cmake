@@ -216,6 +216,7 @@ if(HHTDAE_PROGRAMS)
                   ${MPIEXEC_EXECUTABLE})
     set_tests_properties(integration.bench_scripts PROPERTIES PROCESSORS 2 ENVIRONMENT "${test_environment}") # scripts that start mpiexec
   endif()
+  hhtdae_script(examples ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
   # A slice of "make kill9", and every example resumed in its middle
   hhtdae_script(kill9 ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/kill9 10)
   foreach(ranks 1 2)
