@@ -26,11 +26,13 @@ constexpr int max_sweeps = 20; /* definitions that refer to one another, one aft
 
 bool IsDefined(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_VARIABLE || RoleOf(I, i) == TSHHT3_FORCE; }
 
+constexpr PetscReal of_two = 1e3; /* noise, of the difference of two residuals: the next ones may differ by more (Roles.ResidualsThatRoundDifferently*) */
+
 /* A state near the initial one, its residual, and others beside it */
 struct Dependence {
   TS        ts;
   WorkVec   U, V, A, F, other, moved;
-  PetscReal noise = 0; /* rows that change by less have not changed */
+  PetscReal noise = 0; /* rows that change by less have not changed: sums in another order, by threads, make a residual that is not the same twice */
 
   explicit Dependence(TS t) : ts(t) {}
 
@@ -40,6 +42,10 @@ struct Dependence {
     for (WorkVec *v : {&U, &V, &A, &F, &other, &moved}) PetscCall(v->like(ts->vec_sol));
     PetscCall(OffTheStart(ts, 11, 0, U, V, A));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F));
+    PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, other));
+    PetscCall(VecAXPY(other, -1, F));
+    PetscCall(VecNorm(other, NORM_INFINITY, &noise));
+    noise = noise < PETSC_MAX_REAL ? of_two * noise : 0; /* rows that are no numbers tell nothing */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
@@ -52,17 +58,6 @@ struct Dependence {
     PetscCall(Shake(moved, 1e-3, 14, which));
     PetscCall(EvaluateResidual(ts, ts->ptime, x == (Vec)U ? moved : U, x == (Vec)V ? moved : V, x == (Vec)A ? moved : A, other));
     PetscCall(ForEntries([&](PetscInt i, PetscScalar f, PetscScalar g) { if (PetscAbsScalar(f - g) > noise && !PetscIsInfOrNanScalar(f) && !PetscIsInfOrNanScalar(g)) changed(i); }, Read(F), Read(other)));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-
-  /* Sums in another order, by threads, make a residual that is not the same twice */
-  PetscErrorCode measureNoise()
-  {
-    PetscFunctionBegin;
-    PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, other));
-    PetscCall(VecAXPY(other, -1, F));
-    PetscCall(VecNorm(other, NORM_INFINITY, &noise));
-    noise *= 1e3;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };
@@ -91,22 +86,12 @@ PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code,
 /* Rows of constraints must not depend on accelerations, holonomic ones not on velocities. Which they are said to be, which they are by what they depend on. */
 PetscErrorCode RefuseRates(TS ts, Dependence &d)
 {
-  Integrator       &I           = Get(ts);
-  PetscInt          of_velocity = -1, of_acceleration = -1;
-  std::vector<char> velocity, acceleration;
+  Integrator       &I = Get(ts);
+  std::vector<char> velocity(I.role.size(), 0), acceleration(I.role.size(), 0);
 
   PetscFunctionBegin;
-  for (int time = 0; time < 2; time++) {
-    velocity.assign(I.role.size(), 0);
-    acceleration.assign(I.role.size(), 0);
-    PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { velocity[i] = RoleOf(I, i) == TSHHT3_HOLONOMIC; }));
-    PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
-    PetscCall(FirstRow(ts, velocity, &of_velocity));
-    PetscCall(FirstRow(ts, acceleration, &of_acceleration));
-    if (of_velocity < 0 && of_acceleration < 0) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(d.measureNoise());
-    if (d.noise == 0) break;
-  }
+  PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { velocity[i] = RoleOf(I, i) == TSHHT3_HOLONOMIC; }));
+  PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
   PetscCall(Refuse(ts, acceleration, PETSC_ERR_ARG_WRONG, "Row",
                    "is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown TSHHT3_VARIABLE if the row defines it"));
   PetscCall(Refuse(ts, velocity, PETSC_ERR_ARG_WRONG, "Row", "is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC"));

@@ -154,6 +154,39 @@ TEST(Roles, ResidualsThatRoundDifferentlyAreNoOtherRoles)
   must(TSSetUp(run.ts));
 }
 
+/* Beside a first-order state, whose part in constraints is looked for with detected roles, too. s' = -s */
+TEST(Roles, ResidualsThatRoundDifferentlyNeedNoNamedRoles)
+{
+  struct Noisy : Pendulum {
+    mutable int calls = 0;
+    Noisy()
+    {
+      n = 4;
+      role.push_back(TSHHT3_STATE);
+    }
+    void initial(double *u, double *v) const override
+    {
+      Pendulum::initial(u, v);
+      u[3] = 1.;
+      v[3] = -1.;
+    }
+    void residual(double t, const double *u, const double *v, const double *a, double *f) const override
+    {
+      Pendulum::residual(t, u, v, a, f);
+      f[2] += 1e-16 * (++calls % 7);
+      f[3] = v[3] + u[3];
+    }
+    void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa, Entries &J) const override
+    {
+      Pendulum::jacobian(t, u, v, a, sv, sa, J);
+      J.add(3, 3, sv + 1.);
+    }
+  } p;
+  Simulation run(p, "");
+  must(TSSetUp(run.ts));
+  EXPECT_EQ(roles(run.ts, 4), (std::vector<int>{TSHHT3_COORDINATE, TSHHT3_COORDINATE, TSHHT3_HOLONOMIC, TSHHT3_STATE}));
+}
+
 TEST(Roles, OverlapIsRefused)
 {
   const Pendulum p;
