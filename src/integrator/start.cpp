@@ -496,9 +496,12 @@ PetscErrorCode Start(TS ts)
   PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
-  if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were */
+  if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were, nor its steps (Excitation.WhatSetsInLaterInANewRun) */
     I.t_begin   = ts->ptime;
     I.norm_size = 0;
+    I.h_regular = I.h_proven = I.h_limit = 0;
+    I.corrector.blames = 0;
+    I.told             = PETSC_FALSE;
     for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));
   }
   PetscCall(FollowTolerances(ts, I.U0));

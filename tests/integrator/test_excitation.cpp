@@ -193,6 +193,26 @@ TEST(Excitation, WhatSetsInLater)
   }
 }
 
+/* Nor by a TS that has made longer steps in a run before */
+TEST(Excitation, WhatSetsInLaterInANewRun)
+{
+  static bool       pushed;
+  const PushedLater p([](double t) { return pushed && t > .003 && t < .008 ? 200. : 0.; }, 100.);
+  Simulation        run(p, tolerance(1e-6));
+  for (pushed = false;; pushed = true) {
+    must(VecZeroEntries(run.U));
+    must(VecZeroEntries(run.V));
+    must(TSSetTime(run.ts, 0.));
+    must(TSSetStepNumber(run.ts, 0));
+    must(TSSetTimeStep(run.ts, 1e-4));
+    must(TSSetMaxTime(run.ts, pushed ? 1. : 100.));
+    must(TS2SetSolution(run.ts, run.U, run.V));
+    must(run.solve());
+    if (pushed) break;
+  }
+  EXPECT_NEAR(run.v()[0], 1., 1e-2);
+}
+
 /* What is a fortieth of the run long is not stepped over, whenever it comes and however long nothing has moved before; nor what comes and goes smoothly, of which the first
    samples of the start have seen a trace */
 TEST(Excitation, InTheMiddleOfTheRun)
