@@ -121,6 +121,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
     good = good && (rows || mffd); /* the application's product has no values to restore */
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.linear.scaled));
+    if (good) PetscCall(PetscObjectStateGet((PetscObject)J, &I.scaled_operator)); /* as they were saved */
     if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();

@@ -211,14 +211,16 @@ PetscErrorCode IsAnotherSNES(TS ts, bool *yes)
 /* Where IsAnotherSNES() */
 PetscErrorCode TakeSNES(TS ts)
 {
-  Integrator &I = Get(ts);
+  Integrator   &I = Get(ts);
+  PetscObjectId id[2];
 
   PetscFunctionBegin;
+  PetscCall(IdsOfMatrices(ts, id));
+  if (id[0] != I.hooks.matrices[0]) I.scaled_operator = 0;
+  if (id[1] != I.hooks.matrices[1]) I.linear.scaled = 0;
   PetscCall(HooksRemove(ts));
   PetscCall(SNESSetDM(ts->snes, ts->dm));
   I.linear.chosen         = PETSC_FALSE;
-  I.linear.scaled         = 0;
-  I.scaled_operator       = 0;
   I.corrector.matrix.have = PETSC_FALSE;
   PetscCall(DifferencesDestroy(ts));
   PetscCall(SamplerDestroy(I));
