@@ -216,14 +216,14 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The estimate of an accepted step, for the corrector's tolerance in the next one: TSAdapt has usually asked for it */
+/* The estimate of an accepted step in TSAdapt's norm, for the corrector's tolerance in the next one: TSAdapt has usually asked for it */
 PetscErrorCode NoteError(TS ts)
 {
   Integrator &I = Get(ts);
   PetscReal   e;
 
   PetscFunctionBegin;
-  if (I.wlte_pending < 0) PetscCall(EvaluateWLTE(ts, NORM_2, NULL, &e));
+  if (I.wlte_pending < 0) PetscCall(EvaluateWLTE(ts, ts->adapt->wnormtype, NULL, &e));
   if (I.wlte_pending >= 0) I.corrector.wlte = I.wlte_pending;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

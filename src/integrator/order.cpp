@@ -100,17 +100,16 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   PetscReal      local[kinds], all[kinds];
 
   PetscFunctionBegin;
-  if (o.measured && type == NORM_2) { /* by the estimate */
+  if (o.measured && type == o.norm) { /* by the estimate */
     std::copy_n(o.S, max_order + 2, S);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(type == NORM_2 ? SweepDifferences<false>(I, top, local) : SweepDifferences<true>(I, top, local));
   PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   for (PetscInt m = lowest; m < lowest + kinds; m++) S[m] = m > top ? -1 : type == NORM_2 ? PetscSqrtReal(all[m - lowest] / PetscMax(I.norm_size, 1)) : all[m - lowest];
-  if (type == NORM_2) {
-    o.measured = PETSC_TRUE;
-    std::copy_n(S, max_order + 2, o.S);
-  }
+  o.measured = PETSC_TRUE;
+  o.norm     = type;
+  std::copy_n(S, max_order + 2, o.S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -132,7 +131,7 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
   Spans(I.order, I.t1, tau);
-  PetscCall(ScaledDifferences(ts, NORM_2, c->S));
+  PetscCall(ScaledDifferences(ts, ts->adapt->wnormtype, c->S));
   for (PetscInt m = lowest; m < lowest + kinds; m++)
     if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], forgets * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
   for (PetscInt m = 3; m <= max_order; m++) {

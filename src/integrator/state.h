@@ -121,7 +121,8 @@ struct OrderState {
 struct Order : OrderState {
   PetscInt wanted = 2;        /* by the user; may be TSHHT3_ORDER_AUTO */
   PetscInt max    = 2;        /* that is possible */
-  PetscBool measured = PETSC_FALSE; /* S are the scaled differences of the attempt, order.cpp */
+  PetscBool measured = PETSC_FALSE; /* S are the scaled differences of the attempt in this norm, order.cpp */
+  NormType norm = NORM_2;
   PetscReal S[max_order + 2] = {};
   Vec      U[max_order] = {}; /* U, U' at t_{n-1}, t_{n-2}, ... */
   Vec      V[max_order] = {};

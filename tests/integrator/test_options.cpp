@@ -186,6 +186,19 @@ TEST(Options, NoToleranceAtAll)
   EXPECT_TRUE(trap.says("No unknown enters the error test")) << trap.message;
 }
 
+/* The next step of orders above two is chosen by the norm that judges it */
+TEST(Options, LargestErrorAboveOrderTwo)
+{
+  const Chain p(30, 0., 1.);
+  for (const char *order : {"5", "auto"}) {
+    Simulation run(p, tolerance(1e-5) + "-ts_adapt_wnormtype infinity -ts_hhtdae_order " + order);
+    must(run.solve());
+    const TSHHT3Statistics s = run.statistics();
+    MEASURED("order %s by the largest error: %d steps, %d rejected", order, (int)s.steps, (int)s.rejected);
+    EXPECT_LT(s.rejected, .2 * (double)s.steps) << order;
+  }
+}
+
 TEST(Options, BackwardInTime)
 {
   const Pendulum p;
