@@ -23,9 +23,11 @@ struct Tolerances {
   PetscReal          a, r;
   const PetscScalar *va = nullptr, *vr = nullptr;
 
+  PetscReal absolute(PetscInt i) const { return va ? PetscRealPart(va[i]) : a; }
+  PetscReal relative(PetscInt i) const { return vr ? PetscRealPart(vr[i]) : r; }
   PetscReal weight(PetscInt i, PetscReal y) const
   {
-    const PetscReal tol = PetscMax(va ? PetscRealPart(va[i]) : a, (vr ? PetscRealPart(vr[i]) : r) * y);
+    const PetscReal tol = PetscMax(absolute(i), relative(i) * y);
     return tol > 0 ? 1 / tol : 0;
   }
 };
@@ -44,11 +46,11 @@ PetscErrorCode Reduce(TS ts, NormType type, PetscInt size, PetscReal local, Pets
 } // namespace
 
 /* The first weights. Also the size below which a correction is rounding of q, and the number of entries that enter the norm
-   (p in (27)). What does not enter has a Y_i that it never exceeds, and so keeps its weight 0. */
+   (p in (27)): what is 0 as yet and has a relative tolerance alone is one of them (Options.RelativeToleranceOfWhatIsZeroAtTheStart). What does not enter has a Y_i that it never exceeds, and so keeps its weight 0. */
 static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
 {
   Integrator &I        = Get(ts);
-  PetscReal   local[2] = {0, 0}, global[2];
+  PetscReal   local[3] = {0, 0, 0}, global[3];
 
   PetscFunctionBegin;
   if (!I.norm_size) PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* a turn is rounded as the attitude is */
@@ -61,12 +63,13 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
       y = PetscMax(y, PetscAbsScalar(u));
       w = tol.weight(i, y);
       local[0] += PetscSqr(y * w);
-      if (w > 0) local[1] += 1;
+      if (tol.absolute(i) > 0 || tol.relative(i) > 0) local[1] += 1;
+      if (w > 0) local[2] += 1;
     },
     Read(U), Write(I.ymax), Write(I.weight)));
-  PetscCallMPI(MPI_Allreduce(local, global, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Allreduce(local, global, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   I.norm_size = (PetscInt)(global[1] + 0.5);
-  PetscCheck(I.norm_size > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+  PetscCheck(global[2] > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
              "No unknown enters the error test: there is neither a coordinate nor a first-order state with a tolerance above 0 (-ts_rtol, -ts_atol)");
   /* rounding of q moves a by eps |q| / (beta h^2), and with it the estimate by this much, at any h */
   I.corrector.floor = 4 * PetscAbsReal(I.p.k) / I.p.beta * PETSC_MACHINE_EPSILON * PetscSqrtReal(global[0] / I.norm_size);

@@ -186,6 +186,22 @@ TEST(Options, NoToleranceAtAll)
   EXPECT_TRUE(trap.says("No unknown enters the error test")) << trap.message;
 }
 
+/* What is 0 at the start enters the relative error test as soon as it is not, and is one of the entries of its mean from the start */
+TEST(Options, RelativeToleranceOfWhatIsZeroAtTheStart)
+{
+  const Oscillators p({1., 2.}, {0., 0.}, false, 1.);
+  Simulation        run(p, "-ts_rtol 1e-6 -ts_atol 0");
+  const PetscInt    first = 0;
+  must(VecSetValue(run.U, first, 0., INSERT_VALUES));
+  must(VecAssemblyBegin(run.U));
+  must(VecAssemblyEnd(run.U));
+  must(VecSetValue(run.V, first, 1., INSERT_VALUES));
+  must(VecAssemblyBegin(run.V));
+  must(VecAssemblyEnd(run.V));
+  must(run.solve());
+  EXPECT_EQ(hht3::Get(run.ts).norm_size, 2);
+}
+
 /* The next step of orders above two is chosen by the norm that judges it */
 TEST(Options, LargestErrorAboveOrderTwo)
 {
