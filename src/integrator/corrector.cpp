@@ -89,10 +89,9 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
-    /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what steps since the last
-       failure have shown to work */
-    if (!c.no_solve || I.h_limit <= 0 || I.h_proven < 0.9 * I.h) I.h_limit = 0.7 * I.h;
-    I.h_proven = 0;
+    /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what the last step has shown to work
+       (Failures.SingularMatrixNowAndThen) */
+    if (!c.no_solve || I.h_limit <= 0 || I.h_last < 0.9 * I.h) I.h_limit = 0.7 * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

@@ -136,7 +136,7 @@ PetscErrorCode SetUp(TS ts)
   PetscCall(AllocateForRoles(ts));
   PetscCall(SetUpSolvers(ts));
   I.auto_h = (PetscBool)(ts->time_step == unset_step);
-  if (!I.auto_h) I.h_first = ts->time_step; /* before TSSolve() cuts it */
+  if (!I.auto_h) I.h_given = ts->time_step; /* before TSSolve() cuts it */
   if (I.constraints() && I.p.rho == 1)
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: alpha = 0 has no numerical damping and is weakly unstable on index-3 systems; "
                                                             "with constraints use alpha < 0 (-ts_hhtdae_alpha -0.05 is enough)\n"));

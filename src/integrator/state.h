@@ -211,15 +211,13 @@ struct StepState {
   PetscReal        of_atol = -1, of_rtol = -1; /* tolerances that the weights were made of */
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
   PetscReal        h_regular   = 0;   /* running maximum of steps that went through the corrector, forgetting a tenth in each */
-  PetscReal        h_proven    = 0;   /* largest step accepted since the last failed correction */
   PetscReal        h_limit     = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
   PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */
   PetscBool        h_chosen    = PETSC_FALSE; /* it was */
   PetscReal        h_after_event = -1;        /* that TSEvent was told, where the step size is chosen */
   PetscReal        h_next      = 0;           /* length foreseen for the next step when the last one was accepted */
-  PetscReal        h_given     = 0;           /* of steps of fixed length, by the user */
-  PetscReal        h_first     = 0;           /* by the user, at the set-up */
+  PetscReal        h_given     = 0;           /* by the user, at the set-up or since, of steps of fixed length */
   PetscReal        fastest     = PETSC_MAX_REAL; /* least entry of excitation */
   PetscReal        swing       = PETSC_MAX_REAL; /* the same of rows that change all along the run */
   Ahead            ahead       = Ahead::Unknown; /* of what the start has not seen */

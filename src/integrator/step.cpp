@@ -41,9 +41,6 @@ PetscErrorCode NoteState(TS ts)
 namespace
 {
 
-/* Failures that cut h below rounding again and again: time hardly moves */
-constexpr PetscInt max_tiny_row = 50;
-
 /* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
    has them again and again */
 constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
@@ -167,7 +164,6 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
     I.h_next = ts->time_step = I.h_given;
     if (rest > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(I.h_given, rest); /* BetweenRuns.FixedStepsInATimeSpan */
   }
-  if (!tiny) I.h_proven = PetscMax(h, I.h_proven);
   if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
   if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
   I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
@@ -189,7 +185,6 @@ void NoteGivenStep(TS ts)
 
   if (HHT3EventActive(ts)) return;
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
-  else if (I.h_next == 0) I.h_given = I.h_first; /* the first run is shorter than a step */
 }
 
 PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
@@ -295,7 +290,7 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
   if (I.corrector.blames >= max_blames) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
   else if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
   else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
-  else if (I.tiny_row >= max_tiny_row) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
+  else if (ts->max_reject >= 0 && I.tiny_row > ts->max_reject) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
   else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -316,7 +311,7 @@ PetscErrorCode PassStops(TS ts)
              (double)ts->time_step, (double)ts->ptime);
   if (ts->time_step != 0 && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.h_next > 0) ts->time_step = I.h_next;
-  else ts->time_step = I.auto_h ? unset_step : I.h_first;
+  else ts->time_step = I.auto_h ? unset_step : I.h_given;
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
