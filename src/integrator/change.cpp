@@ -56,7 +56,6 @@ PetscErrorCode Publish(TS ts)
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(HHT3KeepForRollBack(ts));
-  PetscCall(NoteState(ts));
   PetscCall(CommitChange(ts));
   I.stat.changes++;
   I.change.t    = ts->ptime;

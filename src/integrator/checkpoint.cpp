@@ -206,8 +206,6 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   PetscCall(CheckpointFileRead(PetscObjectComm((PetscObject)ts), file, a.data));
   a.reading = true;
   PetscCall(Spread(ts, file, a));
-  PetscCall(NoteState(ts));
-  I.sol_id           = 0; /* compare the solution with the step's end: it may have been changed after it */
   I.checkpoint_steps = I.stat.steps;
   I.timed            = PETSC_FALSE;
   if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));

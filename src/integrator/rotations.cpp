@@ -166,7 +166,6 @@ PetscErrorCode ReferToState(TS ts)
   PetscCall((*I.rotations.refer)(ts, I.U0, I.rotations.ctx));
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(HHT3KeepForRollBack(ts));
-  PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -301,9 +301,7 @@ struct Integrator : StepState {
   PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
   PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */
 
-  /* bookkeeping: vec_sol and vec_dot as the integrator left them */
-  PetscObjectState sol_state = 0, dot_state = 0;
-  PetscObjectId    sol_id = 0, dot_id = 0;
+  /* bookkeeping */
   char             failure[512] = "";
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";

@@ -25,19 +25,6 @@
 namespace hht3
 {
 
-/* vec_sol and vec_dot are as the integrator left them, see StateWasChanged() */
-PetscErrorCode NoteState(TS ts)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &I.sol_state));
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &I.dot_state));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &I.sol_id));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_dot, &I.dot_id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 namespace
 {
 
@@ -61,32 +48,29 @@ PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)
 }
 
 /* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
-   a second TSSolve() with other values. Compared entry by entry only where PETSc's counters say that it was touched. */
+   a second TSSolve() with other values */
 PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *changed)
 {
-  Integrator      &I = Get(ts);
-  PetscObjectState s, d;
-  PetscObjectId    id[2];
-  PetscBool        same_u, same_v;
+  Integrator &I        = Get(ts);
+  PetscInt    other[2] = {0, 0};
+  PetscBool   same;
 
   PetscFunctionBegin;
   *changed = (PetscBool)!IsEndOf(ts, t);
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_sol, &s));
-  PetscCall(PetscObjectStateGet((PetscObject)ts->vec_dot, &d));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_sol, &id[0]));
-  PetscCall(PetscObjectGetId((PetscObject)ts->vec_dot, &id[1]));
-  const PetscInt touched = s != I.sol_state || d != I.dot_state || id[0] != I.sol_id || id[1] != I.dot_id;
-  PetscInt       any;
-  PetscCallMPI(MPI_Allreduce(&touched, &any, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
-  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecEqual(ts->vec_sol, U, &same_u));
-  PetscCall(VecEqual(ts->vec_dot, V, &same_v));
-  if (!same_u && I.have_step) {
-    PetscCall(IsInterpolatedEnd(ts, &same_u));
-    if (same_u) PetscCall(VecCopy(U, ts->vec_sol));
+  PetscCall(ForEntries(
+    [&](PetscInt, PetscScalar x, PetscScalar u, PetscScalar y, PetscScalar v) {
+      if (x != u) other[0] = 1;
+      if (y != v) other[1] = 1;
+    },
+    Read(ts->vec_sol), Read(U), Read(ts->vec_dot), Read(V)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, other, 2, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  if (other[0] && I.have_step) {
+    PetscCall(IsInterpolatedEnd(ts, &same));
+    if (same) PetscCall(VecCopy(U, ts->vec_sol));
+    if (same) other[0] = 0;
   }
-  *changed = (PetscBool)(!same_u || !same_v);
+  *changed = (PetscBool)(other[0] || other[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,7 +157,6 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   I.stat.h_max = PetscMax(I.stat.h_max, h);
   I.have_step  = PETSC_TRUE;
   PetscCall(TellUnfollowed(ts));
-  PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -372,7 +355,6 @@ PetscErrorCode RollBack(TS ts)
   I.have_step = PETSC_FALSE;
   I.stat.steps--;
   I.stat.of_order[I.order.now]--;
-  PetscCall(NoteState(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

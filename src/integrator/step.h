@@ -10,9 +10,6 @@ namespace hht3
 PetscErrorCode Step(TS ts);
 PetscErrorCode RollBack(TS ts);
 
-/* vec_sol and vec_dot are as the integrator left them: the next step need not start anew */
-PetscErrorCode NoteState(TS ts);
-
 /* The clocks of the statistics run from the first step of a solve on; their time into the statistics, and whether they stop with that */
 void StartClocks(Integrator &I);
 void StopClocks(Integrator &I, bool stop);
