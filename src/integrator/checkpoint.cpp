@@ -37,7 +37,7 @@ void Transfer(TS ts, Archive &a)
 bool FlagsAreFlags(const Integrator &I)
 {
   const CorrectorState &c = I.corrector;
-  for (const PetscBool *x : {&I.have_step, &I.at_begin, &I.have_misfit, &I.repaired, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
+  for (const PetscBool *x : {&I.have_step, &I.at_begin, &I.have_misfit, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
                              &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
     if (!IsFlag(*x)) return false;
   return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) &&
@@ -100,7 +100,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
-  for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.accepted[0], &I.accepted[1], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
+  for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,7 +108,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
 bool HasItsVectors(const Integrator &I)
 {
   const Verification &v = I.verify;
-  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (!I.repaired || (I.accepted[0] && I.accepted[1])) && (I.fastest >= PETSC_MAX_REAL || I.excitation) &&
+  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (I.fastest >= PETSC_MAX_REAL || I.excitation) &&
          (v.largest == 0 || (v.inertia && v.claim && v.noise && v.unproved));
 }
 

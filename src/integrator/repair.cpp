@@ -30,15 +30,9 @@ PetscErrorCode Repair(TS ts)
   PetscCall(PetscInfo(ts, "h changes from %g to %g at t = %g: positions and velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
   I.stat.restarts++;
   ResetOrder(ts);
-  if (!I.repaired) {
-    Vec now[2] = {I.U0, I.V0};
-    for (int k = 0; k < 2; k++) {
-      if (!I.accepted[k]) PetscCall(VecDuplicate(now[k], &I.accepted[k]));
-      PetscCall(VecCopy(now[k], I.accepted[k]));
-    }
-    I.repaired = PETSC_TRUE;
-  }
   PetscCall(ProjectState(ts, &have));
+  PetscCall(VecCopy(I.U0, ts->vec_sol)); /* by less than the tolerance */
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -488,7 +488,6 @@ PetscErrorCode Start(TS ts)
   PetscCall(CheckSettings(ts));
   I.stat.restarts++;
   ResetOrder(ts);
-  I.repaired = PETSC_FALSE;
   I.tiny_row = 0;
   PetscCall(VecCopy(ts->vec_sol, I.U0));
   PetscCall(TakeRoles(I, ts->vec_dot, {TSHHT3_COORDINATE, TSHHT3_STATE}, I.V0));

@@ -206,7 +206,6 @@ struct StepState {
   PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
   PetscBool        have_misfit = PETSC_FALSE; /* dV belongs to t_n */
   Bend             bent        = Bend::None;
-  PetscBool        repaired    = PETSC_FALSE; /* U0, V0 have been changed by Repair() */
   PetscInt         norm_size   = 0;           /* entries that enter the error test, global */
   PetscReal        of_atol = -1, of_rtol = -1; /* tolerances that the weights were made of */
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
@@ -263,7 +262,6 @@ struct Integrator : StepState {
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
   Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp */
   Vec       bend = nullptr; /* change of that misfit over k h^2 by a change of coordinates at t_n */
-  Vec       accepted[2] = {}; /* U, U' as accepted, when Repair() has changed U0, V0 since */
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;

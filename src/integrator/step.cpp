@@ -91,7 +91,6 @@ PetscErrorCode Commit(TS ts)
   I.h_last      = I.h;
   I.have_misfit = PETSC_FALSE;
   I.bent        = Bend::None;
-  I.repaired    = PETSC_FALSE;
   PetscCall(HistoryForces(ts, I.t1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -253,8 +252,8 @@ PetscErrorCode Fail(TS ts, const char *what)
   const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
   ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
-  PetscCall(VecCopy(I.repaired ? I.accepted[0] : I.U0, ts->vec_sol));
-  PetscCall(VecCopy(I.repaired ? I.accepted[1] : I.V0, ts->vec_dot));
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
              "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
