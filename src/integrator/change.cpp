@@ -21,7 +21,6 @@
 #include "order.h"
 #include "predictor.h"
 #include "stage.h"
-#include "step.h"
 
 namespace hht3
 {

@@ -23,6 +23,7 @@
 #include "rotations.h"
 #include "solver.h"
 #include "stage.h"
+#include "work_vec.h"
 
 namespace hht3
 {
@@ -103,6 +104,7 @@ PetscErrorCode TakeRoles(const Integrator &I, Vec x, std::initializer_list<TSHHT
 PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
 {
   PetscBool mffd, triangle;
+  WorkVec   row, col;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMFFD, &mffd));
@@ -110,10 +112,12 @@ PetscErrorCode ScaleMatrix(Integrator &I, const Scales &s, Mat A)
   PetscCall(LinearStoresTriangle(A, &triangle));
   if (I.coordinatesAlone()) PetscCall(MatScale(A, s.coordinate));
   else {
-    PetscCall(FillByRole(I, {1, 1, s.holonomic, s.velocity, 1, 1}, I.row));
-    PetscCall(FillByRole(I, {s.coordinate, s.state, 1, 1, 1, 1}, I.col));
-    if (triangle) PetscCall(ScaleTriangle(I, A));
-    else PetscCall(MatDiagonalScale(A, I.row, I.col));
+    PetscCall(row.like(I.U0, I.spare));
+    PetscCall(col.like(I.U0, I.spare));
+    PetscCall(FillByRole(I, {1, 1, s.holonomic, s.velocity, 1, 1}, row));
+    PetscCall(FillByRole(I, {s.coordinate, s.state, 1, 1, 1, 1}, col));
+    if (triangle) PetscCall(ScaleTriangle(A, row, col));
+    else PetscCall(MatDiagonalScale(A, row, col));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

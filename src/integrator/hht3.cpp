@@ -62,11 +62,7 @@ PetscErrorCode AllocateForRoles(TS ts)
 
   PetscFunctionBegin;
   if (I.constraints() && !I.gamma) PetscCall(VecDuplicate(ts->vec_sol, &I.gamma));
-  if (!I.coordinatesAlone() && !I.row) {
-    PetscCall(VecDuplicate(ts->vec_sol, &I.row));
-    PetscCall(VecDuplicate(ts->vec_sol, &I.col));
-    PetscCall(VecDuplicate(ts->vec_sol, &I.work));
-  }
+  if (!I.coordinatesAlone() && !I.work) PetscCall(VecDuplicate(ts->vec_sol, &I.work));
   if (I.form == TSHHT3_FORM_PAPER && I.alpha != 0 && !I.F0) PetscCall(VecDuplicate(ts->vec_sol, &I.F0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -154,7 +150,7 @@ PetscErrorCode Reset(TS ts)
 
   PetscFunctionBegin;
   PetscCall(HooksRemove(ts));
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.row, &I.col, &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
   for (Vec &v : I.spare) PetscCall(VecDestroy(&v));
   I.spare.clear();
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));

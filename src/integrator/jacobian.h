@@ -23,9 +23,9 @@ PetscErrorCode GivesRows(Mat A, PetscBool *yes);
 PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset);
 PetscErrorCode SetLocalValues(Mat P, const std::vector<PetscScalar> &val, const std::vector<PetscInt> &col, const std::vector<PetscInt> &offset);
 
-/* triangle.cpp: refuses a matrix of one triangle where the Newton matrix is not symmetric; D A D with the scalings of the present h */
+/* triangle.cpp: refuses a matrix of one triangle where the Newton matrix is not symmetric; D A D with the scalings of rows and columns */
 PetscErrorCode CheckTriangle(TS ts);
-PetscErrorCode ScaleTriangle(Integrator &I, Mat A);
+PetscErrorCode ScaleTriangle(Mat A, Vec row, Vec col);
 
 /* differences.cpp: for applications that have no Jacobian. *P: the matrix to use, or NULL to have one made with the pattern that the residual shows */
 PetscErrorCode DifferencesCreate(TS ts, Mat *P);

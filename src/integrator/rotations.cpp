@@ -23,7 +23,6 @@
 #include "rotation_vector.h"
 #include "rotations.h"
 #include "settings.h"
-#include "step.h"
 #include "work_vec.h"
 
 namespace hht3

@@ -284,7 +284,6 @@ struct Integrator : StepState {
   PetscObjectState of_state[2] = {};
 
   /* the matrix */
-  Vec           row = nullptr, col = nullptr; /* scalings; only where roles differ */
   Mat           second = nullptr;             /* definitions that use q'' in the paper's form */
   struct Differences *differences = nullptr;  /* the application has no Jacobian */
   struct Sampler     *sampler = nullptr;      /* once a time between the ends of a step was asked for, evaluate_at.cpp */

@@ -10,7 +10,6 @@
 */
 #include "entries.h"
 #include "jacobian.h"
-#include "work_vec.h"
 
 namespace hht3
 {
@@ -48,16 +47,13 @@ PetscErrorCode CheckTriangle(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* D A D with the scalings of the present h */
-PetscErrorCode ScaleTriangle(Integrator &I, Mat A)
+/* D A D with the scalings of rows and columns; `row` is D on return */
+PetscErrorCode ScaleTriangle(Mat A, Vec row, Vec col)
 {
-  WorkVec D;
-
   PetscFunctionBegin;
-  PetscCall(D.like(I.row));
-  PetscCall(VecPointwiseMult(D, I.row, I.col));
-  PetscCall(VecSqrtAbs(D));
-  PetscCall(MatDiagonalScale(A, D, D));
+  PetscCall(VecPointwiseMult(row, row, col));
+  PetscCall(VecSqrtAbs(row));
+  PetscCall(MatDiagonalScale(A, row, row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -104,8 +104,6 @@ TEST(Roles, AnODECarriesNoRoleMachinery)
   EXPECT_TRUE(I.role.empty());
   EXPECT_TRUE(I.moves.empty());
   EXPECT_TRUE(I.states.empty());
-  EXPECT_EQ(I.row, nullptr);
-  EXPECT_EQ(I.col, nullptr);
   EXPECT_EQ(I.gamma, nullptr);
   EXPECT_EQ(I.work, nullptr);
   EXPECT_EQ(I.constraints(), 0);
