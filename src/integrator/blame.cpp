@@ -10,7 +10,6 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal stayed   = 0.2; /* |1 - <r', r>/<r, r>| below it: the residual has not followed at all */
 constexpr PetscReal hopeless = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
 bool Followed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= followed * PetscAbsReal(was) * s.answer + s.rounding; }
@@ -78,7 +77,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   *evaluated = PETSC_TRUE;
   PetscCall(Model(ts, dX));
   PetscCall(CompareMeasured(ts, X, F, 0, &left));
-  if (left.all > 0 && PetscAbsReal(left.part - 1) <= stayed) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
+  if (left.all > 0) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
