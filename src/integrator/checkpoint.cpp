@@ -31,18 +31,6 @@ void Transfer(TS ts, Archive &a)
   if (a.reading && (Get(ts).corrector.user_lag || snes->lagjacobian > 0)) snes->lagjacobian = lag; /* the user's, of this run or of the other one */
   for (PetscReal *x : {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step}) a.plain(*x);
   a.plain(ts->steprestart);
-  a.good = a.good && IsFlag(ts->steprestart);
-}
-
-bool FlagsAreFlags(const Integrator &I)
-{
-  const CorrectorState &c = I.corrector;
-  for (const PetscBool *x : {&I.have_step, &I.at_begin, &I.have_misfit, &I.auto_h, &I.h_chosen, &I.told, &I.fixed_h, &c.no_solve, &c.from_rest, &c.wrong_jacobian, &c.rounding, &c.matrix.have,
-                             &c.matrix.want, &c.matrix.fresh, &I.order.chosen, &I.change.stale, &I.verify.measured, &I.verify.looked})
-    if (!IsFlag(*x)) return false;
-  return IsBetween(I.bent, Bend::None, Bend::Velocities) && IsBetween(I.ahead, Ahead::Unknown, Ahead::Loads) &&
-         IsBetween(I.status, TS_STEP_INCOMPLETE, TS_STEP_COMPLETE) &&
-         IsBetween(c.reason, SNES_DIVERGED_TR_DELTA, SNES_BREAKOUT_INNER_ITER);
 }
 
 void TransferStructs(TS ts, Archive &a)
@@ -57,9 +45,6 @@ void TransferStructs(TS ts, Archive &a)
   a.plain(I.p);
   a.plain(static_cast<ChangeState &>(I.change));
   a.plain(static_cast<VerificationState &>(I.verify));
-  if (a.reading && !FlagsAreFlags(I)) a.good = false;
-  if (I.order.past < 0 || I.order.past > max_order || I.order.now < 2 || I.order.now > max_order) a.good = false;
-  if (I.predictor.available < 0 || I.predictor.available > max_degree || I.predictor.degree < 0 || I.predictor.degree > I.predictor.available) a.good = false;
 }
 
 PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
@@ -82,7 +67,6 @@ PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
 
   PetscFunctionBegin;
   a.plain(there);
-  a.good = a.good && IsFlag(there);
   if (a.good && there) PetscCall(TransferVec(ts, a, x));
   else if (a.good && a.reading) PetscCall(VecDestroy(x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -102,14 +86,6 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
   for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the vectors are there that the numbers speak of */
-bool HasItsVectors(const Integrator &I)
-{
-  const Verification &v = I.verify;
-  return ((!I.have_misfit && I.order.misfit_h <= 0) || I.dV) && (I.bent == Bend::None || I.bend) && (I.fastest >= PETSC_MAX_REAL || I.excitation) &&
-         (v.largest == 0 || (v.inertia && v.claim && v.noise && v.unproved));
 }
 
 /* What this rank has to say */
@@ -160,9 +136,8 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
   PetscCall(TransferVectors(ts, a));
   Vec of_file = was;
   PetscCall(TransferVec(ts, a, &of_file));
-  PetscCall(Everywhere(ts, a.good && HasItsVectors(I), &good));
+  PetscCall(Everywhere(ts, a.good, &good));
   PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
-  PetscCall(CheckFinite(ts, file));
   I.stage_id = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
   PetscCall(OptionsInWords(ts, &options));

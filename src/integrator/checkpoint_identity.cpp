@@ -143,19 +143,4 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
           file, label.text, (double)PetscRealPart(there), (double)PetscRealPart(here));
 }
 
-PetscErrorCode CheckFinite(TS ts, const char file[])
-{
-  Integrator &I = Get(ts);
-  PetscReal   sum;
-
-  PetscFunctionBegin;
-  for (Vec x : {ts->vec_sol, ts->vec_dot, I.U0, I.V0, I.A0, I.U1, I.V1, I.A1}) {
-    PetscCall(VecNorm(x, NORM_1, &sum)); /* the largest entry may pass over NaN */
-    PetscCheck(!PetscIsInfOrNanReal(sum), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a state that is not finite", file);
-  }
-  for (PetscReal t : {ts->ptime, ts->time_step, I.t0, I.t1, I.h, I.h_last})
-    PetscCheck(!PetscIsInfOrNanReal(t), PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has a time or a step size that is not finite", file);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace hht3

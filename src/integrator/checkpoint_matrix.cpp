@@ -106,7 +106,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
 
   PetscFunctionBegin;
   a.plain(m);
-  PetscCall(Everywhere(ts, a.good && IsFlag(m.there) && IsFlag(m.chosen), &good));
+  PetscCall(Everywhere(ts, a.good, &good));
   if (!good) m = MatrixState{};
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetKSP(ts->snes, &ksp));

@@ -28,9 +28,6 @@ PetscErrorCode OptionsInWords(TS ts, std::string *text);
 PetscErrorCode TellingResidual(TS ts, Vec F);
 PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is);
 
-/* A run writes no state that is not finite, and a residual that is NaN in both runs tells nothing. */
-PetscErrorCode CheckFinite(TS ts, const char file[]);
-
 /* An answer for all ranks */
 PetscErrorCode Everywhere(TS ts, bool mine, bool *all);
 

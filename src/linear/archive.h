@@ -70,20 +70,4 @@ private:
   }
 };
 
-/* Bytes of a damaged file that were read as a flag may be neither of the two */
-template <class Flag> bool IsFlag(const Flag &x)
-{
-  const Flag no = Flag(0), yes = Flag(1);
-  return !std::memcmp(&x, &no, sizeof x) || !std::memcmp(&x, &yes, sizeof x);
-}
-
-/* The same of an enumeration whose values run from `least` to `most` */
-template <class Enum> bool IsBetween(const Enum &x, Enum least, Enum most)
-{
-  int value;
-  static_assert(sizeof x == sizeof value, "as large as an int");
-  std::memcpy(&value, &x, sizeof value);
-  return value >= int(least) && value <= int(most);
-}
-
 #endif

@@ -233,7 +233,7 @@ PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
   archive->plain(was);
   archive->plain(coarse);
   archive->list(node);
-  *same = (PetscBool)(archive->good && IsFlag(options.single) && IsFlag(was.fallen) && IsFlag(was.measured) && IsFlag(coarse) && options.single == c.single && options.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
+  *same = (PetscBool)(archive->good && options.single == c.single && options.aggregate == c.aggregate && coarse == (c.coarse.R != nullptr) && node == c.nodes.node);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
   if (!*same) PetscFunctionReturn(0);
   if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));

@@ -345,8 +345,7 @@ PetscErrorCode KluPairLoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
   archive->list(pivoted);
   PetscCall(KluPairGetRows(A, &rows));
   const size_t entries = rows.start[rows.n];
-  const bool   flags   = IsFlag(panels) && IsFlag(state.panels_looked) && IsFlag(state.panels_used) && IsFlag(state.plan_tried) && IsFlag(state.old_pivots);
-  *same = (PetscBool)(archive->good && flags && analysed.size() == entries && (pivoted.empty() || pivoted.size() == entries));
+  *same = (PetscBool)(archive->good && analysed.size() == entries && (pivoted.empty() || pivoted.size() == entries));
   if (*same) {
     old     = rows;
     old.val = analysed.data();

@@ -315,7 +315,6 @@ PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
   archive->plain(left);
   archive->plain(why);
   why[sizeof(why) - 1] = 0;
-  archive->good        = archive->good && IsFlag(fallen);
   if (!archive->good) fallen = m.fallen;
   PetscMPIInt change = fallen != m.fallen, all;
   PetscCallMPI(MPI_Allreduce(&change, &all, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)F)));

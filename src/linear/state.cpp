@@ -46,8 +46,7 @@ static PetscErrorCode LoadChosen(MPI_Comm comm, Archive *archive, LinearChosen *
 {
   PetscFunctionBegin;
   archive->plain(*was);
-  const bool flags = IsFlag(was->cholesky) && IsFlag(was->iterative) && IsFlag(was->no_room) && IsFlag(was->slow) && IsFlag(was->set_up);
-  *good            = (PetscBool)(archive->good && flags);
+  *good = (PetscBool)archive->good;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, good, 1, MPIU_BOOL, MPI_LAND, comm));
   if (!*good) *was = LinearChosen();
   PetscCallMPI(MPI_Bcast(was, sizeof *was, MPI_BYTE, 0, comm));
