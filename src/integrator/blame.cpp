@@ -10,7 +10,9 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal hopeless = 0.1; /* part of a correction that the residual answers: below it the iteration does not converge in ten */
+constexpr PetscReal part_way   = 0.25; /* of the correction, to either side: near enough for a model without corners there, and far out of rounding */
+constexpr PetscReal stands_out = 10;   /* times rounding: changes that a row shows */
+constexpr PetscReal hopeless   = 0.1;  /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
 bool Followed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= followed * PetscAbsReal(was) * s.answer + s.rounding; }
 
@@ -35,7 +37,7 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
       const PetscReal model = m * s.answer;
-      if (PetscAbsReal(way * model) < 10 * s.rounding || Followed(s, f, m)) return;
+      if (PetscAbsReal(way * model) < stands_out * s.rounding || Followed(s, f, m)) return;
       local[1] += d * s.answer * model;
       local[2] += way * model * model;
     },
@@ -60,7 +62,7 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   PetscCall(VecCopy(v.work, forces));
   PetscCall(PassDefinitionsOn(ts, forces));
   PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));
-  for (int k = 0; k < 2; k++) PetscCall(Answer(ts, k ? -0.25 : 0.25, dX, F, F_where, forces, &answer[k]));
+  for (int k = 0; k < 2; k++) PetscCall(Answer(ts, k ? -part_way : part_way, dX, F, F_where, forces, &answer[k]));
   *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < hopeless && answer[1] >= 0 && answer[1] < hopeless);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -26,6 +26,9 @@ namespace hht3
 namespace
 {
 
+constexpr PetscReal shown   = 0.9; /* of h: so long a step has shown that the solver works at this length */
+constexpr PetscReal fall_to = 0.7; /* of h at which a correction has failed: what h may grow to, for a while */
+
 /* Once more with a matrix of its own, from the prediction or from where the step begins */
 PetscErrorCode Again(TS ts, bool from_rest, PetscBool *converged)
 {
@@ -91,7 +94,7 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   if (!*converged) {
     /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what the last step has shown to work
        (Failures.SingularMatrixNowAndThen) */
-    if (!c.no_solve || I.h_limit <= 0 || I.h_last < 0.9 * I.h) I.h_limit = 0.7 * I.h;
+    if (!c.no_solve || I.h_limit <= 0 || I.h_last < shown * I.h) I.h_limit = fall_to * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

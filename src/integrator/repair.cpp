@@ -15,6 +15,9 @@ constexpr PetscReal shrink = 0.1;  /* h below this times the last one calls for 
 constexpr PetscReal seen   = 1e-6; /* part of the accelerations that growth may make of rounding: ten times as much comes by the velocities
                                       (BetweenRuns.GrowthFromAShortStepKeepsTheMultipliers) */
 
+constexpr PetscReal never_tiny = 1e-4; /* of the longest step of late: the common case, decided without a reduction */
+constexpr PetscReal drowned    = 0.01; /* part of the accelerations that may be rounding in a step that goes through the corrector */
+
 /*
   When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
   starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So positions and
@@ -82,10 +85,9 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
-  /* the common case is decided without a reduction: no step of regular size is tiny */
-  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > 1e-4 * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > never_tiny * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
-  if (part <= 0.01) PetscFunctionReturn(PETSC_SUCCESS);
+  if (part <= drowned) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaylorError(ts, h, &missed));
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);

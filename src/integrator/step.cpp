@@ -28,6 +28,9 @@ namespace hht3
 namespace
 {
 
+/* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten */
+constexpr PetscReal remembers = 0.9, relaxes = 1.02, far_above = 4;
+
 /* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
    has them again and again */
 constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
@@ -147,8 +150,8 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
     I.h_next = ts->time_step = I.h_given;
     if (rest > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(I.h_given, rest); /* BetweenRuns.FixedStepsInATimeSpan */
   }
-  if (!tiny) I.h_regular = PetscMax(h, 0.9 * I.h_regular);
-  if (I.h_limit > 0) I.h_limit = I.h_limit > 4 * h ? 0 : 1.02 * I.h_limit;
+  if (!tiny) I.h_regular = PetscMax(h, remembers * I.h_regular);
+  if (I.h_limit > 0) I.h_limit = I.h_limit > far_above * h ? 0 : relaxes * I.h_limit;
   I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
   I.stat.steps++;
   I.stat.of_order[I.order.now]++;
