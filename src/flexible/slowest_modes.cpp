@@ -223,7 +223,7 @@ bool AtRest(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { re
 
 /* Each mode that is no rigid motion in the equations, balanced as they are where it is: next to a shift far from it rigid motions weigh too much. Shapes
    that do not satisfy them well enough are refined. */
-PetscErrorCode Worst(const Linearization &of, const Mat given[3], PetscReal shift, std::vector<Mode> *modes, PetscReal *worst, PetscReal *frequency)
+PetscErrorCode Worst(const Mat given[3], PetscReal shift, std::vector<Mode> *modes, PetscReal *worst, PetscReal *frequency)
 {
   Balanced  by;
   KSP       factor = nullptr;
@@ -245,7 +245,6 @@ PetscErrorCode Worst(const Linearization &of, const Mat given[3], PetscReal shif
     if (left > balanced) {
       if (!factor) PetscCall(Factor(by, at, &factor));
       PetscCall(Refine(by, factor, sum, &m, &left));
-      PetscCall(of.normalize(&m));
     }
     if (left <= *worst) continue;
     *worst     = left;
@@ -264,7 +263,7 @@ void Sort(PetscInt count, std::vector<Mode> *modes)
 }
 
 /* Of pairs the one with a positive imaginary part; the `count` slowest of all */
-PetscErrorCode Collect(const Linearization &of, PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
+PetscErrorCode Collect(PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
 {
   const Vec D = by.D;
   Vec       re, im;
@@ -290,7 +289,6 @@ PetscErrorCode Collect(const Linearization &of, PEP pep, const Balanced &by, Pet
     for (PetscInt i = 0; i < n; i++) m.shape[i] = {PetscRealPart(x[i]), PetscRealPart(y[i])};
     PetscCall(VecRestoreArrayRead(re, &x));
     PetscCall(VecRestoreArrayRead(im, &y));
-    PetscCall(of.normalize(&m));
     modes->push_back(m);
   }
   PetscCall(VecDestroy(&re));
@@ -370,14 +368,14 @@ PetscErrorCode Solved(PEP pep, bool *solved)
 }
 
 /* Adds what is new among the slowest */
-PetscErrorCode Merge(const Linearization &of, const Mat given[3], PEP pep, const Balanced &b, PetscReal shift, PetscInt count, std::vector<Mode> *modes, int *news)
+PetscErrorCode Merge(const Mat given[3], PEP pep, const Balanced &b, PetscReal shift, PetscInt count, std::vector<Mode> *modes, int *news)
 {
   std::vector<Mode> found;
   Balanced          here;
   PetscReal         at = 0;
   PetscFunctionBegin;
   *news = 0;
-  PetscCall(Collect(of, pep, b, count, &found));
+  PetscCall(Collect(pep, b, count, &found));
   if (modes->empty()) {
     *modes = found;
     *news  = (int)found.size();
@@ -403,7 +401,7 @@ PetscErrorCode Merge(const Linearization &of, const Mat given[3], PEP pep, const
 
 /* A Krylov space from one vector has one vector of each value, and others of a multiple one by rounding alone: so it is searched from other ones until
    there is nothing new among the slowest */
-PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shift, PetscInt count, std::vector<Mode> *modes)
+PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::vector<Mode> *modes)
 {
   Balanced    b;
   PEP         pep = nullptr;
@@ -428,7 +426,7 @@ PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shi
       PetscCall(PEPSolve(pep)); /* the error for the user */
       solved = true;
     } else PetscCall(Solved(pep, &solved));
-    if (solved) PetscCall(Merge(of, given, pep, b, shift, count, modes, &news));
+    if (solved) PetscCall(Merge(given, pep, b, shift, count, modes, &news));
     else {
       PetscCall(PEPDestroy(&pep));
       if (failed++ == failures) break;
@@ -442,13 +440,104 @@ PetscErrorCode Search(const Linearization &of, const Mat given[3], PetscReal shi
   PetscFunctionReturn(0);
 }
 
+/* What a search has found, and its last shift; the largest part of inertia and damping without balance, and the frequency of that mode */
+struct Found {
+  std::vector<Mode> modes; /* not normalized */
+  PetscReal         shift = 0, left = 0, frequency = 0;
+};
+
+PetscErrorCode SearchAbout(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+{
+  PetscFunctionBegin;
+  found->shift = shift;
+  PetscCall(Search(given, shift, count, &found->modes));
+  PetscCall(Worst(given, shift, &found->modes, &found->left, &found->frequency));
+  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift,
+                      found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->left));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Find(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+{
+  PetscFunctionBegin;
+  PetscCall(SearchAbout(given, shift, count, found));
+  const PetscReal slowest = Slowest(found->modes, shift);
+  if (slowest > beside * std::abs(shift) && (found->left > balanced || slowest == std::abs(found->modes.front().value))) /* about rigid motions only where need be */
+    PetscCall(SearchAbout(given, std::copysign(slowest, shift), count, found));
+  PetscFunctionReturn(0);
+}
+
+/* On the ranks that have unknowns, the rows of which are those of their rank as before */
+PetscErrorCode FindOn(MPI_Comm some, const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+{
+  Mat      operators[3];
+  PetscInt n;
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(given[0], &n, nullptr));
+  for (int k = 0; k < 3; k++) {
+    Mat rows;
+    PetscCall(MatMPIAIJGetLocalMat(given[k], MAT_INITIAL_MATRIX, &rows));
+    PetscCall(MatCreateMPIMatConcatenateSeqMat(some, rows, n, MAT_INITIAL_MATRIX, &operators[k]));
+    PetscCall(MatDestroy(&rows));
+  }
+  PetscCall(Find(operators, shift, count, found));
+  for (Mat &A : operators) PetscCall(MatDestroy(&A));
+  PetscFunctionReturn(0);
+}
+
+/* The others are told what was found; their shapes have no unknowns */
+PetscErrorCode Tell(MPI_Comm comm, PetscMPIInt from, Found *found)
+{
+  PetscMPIInt count = (PetscMPIInt)found->modes.size();
+  PetscReal   left[3] = {found->shift, found->left, found->frequency};
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Bcast(&count, 1, MPI_INT, from, comm));
+  PetscCallMPI(MPI_Bcast(left, 3, MPIU_REAL, from, comm));
+  found->shift     = left[0];
+  found->left      = left[1];
+  found->frequency = left[2];
+  found->modes.resize(count);
+  for (Mode &m : found->modes) PetscCallMPI(MPI_Bcast(&m.value, 1, MPI_CXX_DOUBLE_COMPLEX, from, comm));
+  PetscFunctionReturn(0);
+}
+
+/* SLEPc 3.18 waits for ever where ranks without unknowns take part: not all of what its ranks find out each by itself is the same on these
+   (LinearizeRanks.SlowestModesWhereRanksHaveNoUnknowns). A scene of few bodies has such ranks. */
+PetscErrorCode FindWithoutEmptyRanks(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
+  MPI_Comm       some;
+  PetscMPIInt    rank, size, first, failed = 0;
+  PetscInt       n, least;
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(given[0], &n, nullptr));
+  PetscCallMPI(MPI_Allreduce(&n, &least, 1, MPIU_INT, MPI_MIN, comm));
+  if (least > 0) {
+    PetscCall(Find(given, shift, count, found));
+    PetscFunctionReturn(0);
+  }
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  first = n ? rank : size;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, comm));
+  PetscCallMPI(MPI_Comm_split(comm, n ? 0 : MPI_UNDEFINED, rank, &some));
+  const PetscErrorCode own = n ? FindOn(some, given, shift, count, found) : 0;
+  failed                   = own;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm));
+  if (n) PetscCallMPI(MPI_Comm_free(&some));
+  PetscCall(own);
+  PetscCheck(!failed, PETSC_COMM_SELF, (PetscErrorCode)failed, "SlowestModes(): the search has failed on ranks that have unknowns");
+  PetscCall(Tell(comm, first, found));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector<Mode> *modes, PetscReal shift)
 {
-  Mat       given[3];
-  PetscInt  unknowns;
-  PetscReal left, frequency;
+  Mat      given[3];
+  PetscInt unknowns;
+  Found    found;
   PetscFunctionBegin;
   PetscCall(of.operators(&given[2], &given[1], &given[0]));
   const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
@@ -458,22 +547,15 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCheck(2 * count < unknowns, comm, PETSC_ERR_ARG_OUTOFRANGE,
              "SlowestModes(): %" PetscInt_FMT " modes are too many of %" PetscInt_FMT " unknowns for a search; Linearization::modes() has all modes of so small a scene", count, unknowns);
   PetscCall(StartSlepc());
-  PetscCall(Search(of, given, shift, count, modes));
-  PetscCall(Worst(of, given, shift, modes, &left, &frequency));
-  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
-  const PetscReal slowest = Slowest(*modes, shift);
-  if (slowest > beside * std::abs(shift) && (left > balanced || slowest == std::abs(modes->front().value))) { /* about rigid motions only where need be */
-    shift = std::copysign(slowest, shift);
-    PetscCall(Search(of, given, shift, count, modes));
-    PetscCall(Worst(of, given, shift, modes, &left, &frequency));
-    PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift, modes->empty() ? 0. : std::abs(modes->front().value), (double)left));
-  }
-  PetscCheck((PetscInt)modes->size() >= count, comm, PETSC_ERR_NOT_CONVERGED,
+  PetscCall(FindWithoutEmptyRanks(given, shift, count, &found));
+  PetscCheck((PetscInt)found.modes.size() >= count, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): %d of %" PetscInt_FMT " modes about %g 1/s were found; a scene of few unknowns has all of them by Linearization::modes(), else try another shift or -scene_modes_pep_ncv",
-             (int)modes->size(), count, (double)shift);
-  PetscCheck(left <= balanced, comm, PETSC_ERR_NOT_CONVERGED,
+             (int)found.modes.size(), count, (double)found.shift);
+  PetscCheck(found.left <= balanced, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): the mode of %g Hz leaves %g of its inertia and damping without balance: it is none; try another shift than %g 1/s, or Linearization::modes() if there are few unknowns",
-             (double)frequency, (double)left, (double)shift);
+             (double)found.frequency, (double)found.left, (double)found.shift);
+  for (Mode &m : found.modes) PetscCall(of.normalize(&m));
+  *modes = std::move(found.modes);
   PetscFunctionReturn(0);
 }
 

@@ -52,3 +52,23 @@ TEST(LinearizeRanks, TheSameAnswers)
   ASSERT_EQ(one.size(), all.size());
   for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
 }
+
+/* SLEPc's search waited for ever: one body is on one rank, and the others have no unknowns */
+TEST(LinearizeRanks, SlowestModesWhereRanksHaveNoUnknowns)
+{
+  std::vector<Mode> modes[2];
+  for (int k = 0; k < 2; k++) {
+    Rods rods(1, k ? PETSC_COMM_WORLD : PETSC_COMM_SELF);
+    rods.scene.add("", TorsionalSpringDamper{rods.centre[0], rods.scene.marker(rods.scene.ground()), 400., 0.2, 0});
+    SceneRun      run(rods.scene, 0.1, "");
+    Linearization small;
+    must(small.take(run.ts));
+    must(SlowestModes(small, 1, &modes[k], 10));
+    ASSERT_EQ(modes[k].size(), 1u);
+    BodyPart p;
+    must(small.part(modes[k][0], rods.body[0], &p));
+    EXPECT_NEAR(p.share, 1, 1e-6);
+    EXPECT_NEAR(std::abs(p.rotation(2)), 1, 1e-6);
+  }
+  EXPECT_NEAR(modes[1][0].frequency(), modes[0][0].frequency(), 1e-8 * modes[0][0].frequency());
+}
