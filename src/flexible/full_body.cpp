@@ -206,6 +206,19 @@ PetscErrorCode MassAndBox(const FeModel &m, double *mass, Vector3 corner[2])
   PetscFunctionReturn(0);
 }
 
+/* Nodes and unknowns are numbered by the ranks of one communicator for both */
+PetscErrorCode CheckRanks(const Scene &scene, const std::string &name, const FeModel &model)
+{
+  const MPI_Comm comm = DataOf(scene).comm;
+  PetscMPIInt    same;
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_compare(comm, model.comm, &same));
+  PetscCheck(same == MPI_IDENT || same == MPI_CONGRUENT, PETSC_COMM_SELF, PETSC_ERR_ARG_NOTSAMECOMM,
+             "finite-element body %s: its FE model is distributed over other ranks than the scene; make the model on the communicator of the scene, or a scene on that of the model",
+             name.c_str());
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeModel &model, const FullBody &body)
@@ -215,6 +228,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeMo
   double      mass;
   Vector3     corner[2];
   PetscFunctionBegin;
+  PetscCall(CheckRanks(scene, name, model));
   const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCall(Agree(model.comm, fault.empty() ? "" : "finite-element body " + name + ": " + fault, PETSC_ERR_ARG_WRONG));
   PetscCall(CheckAttachments(model, body.attachments));

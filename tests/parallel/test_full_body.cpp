@@ -103,6 +103,24 @@ TEST(FullBodyRanks, SlowestModes)
   for (int i = 0; i < 6; i++) EXPECT_NEAR(modes[1][i].frequency(), modes[0][i].frequency(), 1e-6 * modes[0][i].frequency());
 }
 
+/* Nodes were read at places of other ranks: random positions, or a scene said to be singular */
+TEST(FullBodyRanks, ModelOfOtherRanksThanTheScene)
+{
+  PetscMPIInt size;
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size == 1) GTEST_SKIP() << "the same ranks";
+  for (int k = 0; k < 2; k++) {
+    FeModel model(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF);
+    BoxBuilder({{2, 1, 1}, {1, 1, 1}, {2e6, 0.3, 1000}}, &model);
+    Scene      scene(k ? PETSC_COMM_SELF : PETSC_COMM_WORLD);
+    FullFeBody fe;
+    ErrorTrap  trap;
+    EXPECT_NE(fe.add(scene, "block", model, {}), 0);
+    EXPECT_TRUE(trap.says("finite-element body block: its FE model is distributed over other ranks than the scene")) << trap.message;
+    EXPECT_TRUE(DataOf(scene).bodies.empty());
+  }
+}
+
 TEST(FullBodyRanks, SameAsOnOne)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
