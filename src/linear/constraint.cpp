@@ -34,7 +34,7 @@ struct Constraint : ConstraintOptions, ConstraintState {
   CoarseLevel      coarse;
   NodeProduct      product;
   PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
-  PetscObjectId    matrix    = 0;
+  PetscObjectId    matrix = 0, told = 0; /* the matrix, and the index set of nodes that was composed with it */
   PetscObjectState pattern   = -1;
 };
 
@@ -52,19 +52,23 @@ PetscErrorCode CheckType(PC pc)
   PetscFunctionReturn(0);
 }
 
-/* *fresh: another matrix or another pattern than before */
+/* *fresh: another matrix, another pattern or other nodes than before */
 PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
 {
-  PetscObjectId    id;
+  PetscObjectId    id, told = 0;
   PetscObjectState pattern;
+  PetscObject      is;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
-  *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern);
+  PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_NODES, &is));
+  if (is) PetscCall(PetscObjectGetId(is, &told));
+  *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern || told != c.told);
   if (*fresh) PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
   c.matrix  = id;
   c.pattern = pattern;
+  c.told    = told;
   PetscFunctionReturn(0);
 }
 

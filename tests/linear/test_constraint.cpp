@@ -52,6 +52,24 @@ TEST_F(ConstraintPC, NodesToldAndFound)
   EXPECT_LE(iterations(), 1);
 }
 
+/* Nodes of the same matrix that are told anew, and are no longer told */
+TEST_F(ConstraintPC, FollowsTheNodes)
+{
+  bricks(3);
+  nodes(3);
+  solver(KSPCG, 1e-6);
+  EXPECT_GT(solve(), 0);
+  EXPECT_GT(iterations(), 1);
+  nodes(coordinates); /* one node of all: the factorization of the whole */
+  OK(MatScale(A, 2));
+  EXPECT_GT(solve(), 0);
+  EXPECT_LE(iterations(), 1);
+  OK(PetscObjectCompose((PetscObject)A, LINEAR_NODES, NULL));
+  OK(MatScale(A, 2));
+  EXPECT_GT(solve(), 0);
+  EXPECT_NE(view().find(std::to_string(64 + 2 * 16) + " nodes"), std::string::npos) << view();
+}
+
 /* New values in the old pattern, and another matrix */
 TEST_F(ConstraintPC, FollowsTheMatrix)
 {
