@@ -31,14 +31,14 @@ std::vector<int> TriangleSides(const std::vector<double> &point, const std::vect
   return side;
 }
 
-/* The cluster of each node where cells have edges of this length */
-std::size_t Cluster(const std::vector<double> &point, const std::vector<int> &side, double edge, std::vector<std::size_t> *cluster)
+/* The cluster of each node where cells have edges of this length from a corner */
+std::size_t Cluster(const std::vector<double> &point, const Vector3 &corner, const std::vector<int> &side, double edge, std::vector<std::size_t> *cluster)
 {
   std::map<std::array<long, 4>, std::size_t> known;
   cluster->clear();
   for (std::size_t n = 0; n < side.size(); n++) {
     std::array<long, 4> key{0, 0, 0, side[n]};
-    for (int c = 0; c < 3; c++) key[(std::size_t)c] = std::lround(std::floor(point[3 * n + (std::size_t)c] / edge));
+    for (int c = 0; c < 3; c++) key[(std::size_t)c] = std::lround(std::floor((point[3 * n + (std::size_t)c] - corner(c)) / edge));
     cluster->push_back(known.emplace(key, known.size()).first->second);
   }
   return known.size();
@@ -55,9 +55,11 @@ void ThinSurface(const std::vector<double> &point, std::size_t most, std::vector
   const Eigen::Map<const Eigen::Matrix3Xd> x(point.data(), 3, (Eigen::Index)nodes);
   const std::vector<int>                   side = TriangleSides(point, *triangle);
   std::vector<std::size_t>                 of;
-  double                                   edge = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm() / std::sqrt((double)most);
-  edge /= 8; /* too short, for long bodies as well */
-  while (Cluster(point, side, edge, &of) > most) edge *= 1.1;
+  const Vector3                            corner = x.rowwise().minCoeff();
+  const double                             extent = (x.rowwise().maxCoeff() - corner).norm();
+  double                                   edge   = extent / std::sqrt((double)most) / 8; /* too short, for long bodies as well */
+  /* in one cell there are still up to six clusters, one for each side */
+  while (Cluster(point, corner, side, edge, &of) > most && edge < 2 * extent) edge *= 1.1;
 
   /* of each cluster the node nearest to the mean */
   const std::size_t        clusters = *std::max_element(of.begin(), of.end()) + 1;

@@ -53,6 +53,27 @@ TEST(ThinSurface, KeepsTheShape)
   }
 }
 
+/* However long the edges of cells are, there is a cluster for each side of the body: the search for fewer came to no end */
+TEST(ThinSurface, OfFewNodes)
+{
+  for (const std::size_t most : {1, 3, 6, 20}) {
+    MeshBox                  box;
+    FeModel                  model(PETSC_COMM_SELF);
+    std::vector<PetscInt>    node;
+    std::vector<int>         triangle;
+    std::vector<double>      point;
+    std::vector<std::size_t> kept;
+    box.type = ElementType::Brick8;
+    must(readBox(model, box));
+    OuterTriangles(model.elements, &node, &triangle);
+    for (PetscInt n : node)
+      for (std::size_t k = 0; k < 3; k++) point.push_back(model.coordinates[3 * (std::size_t)n + k] - 0.5); /* on both sides of the origin */
+    ThinSurface(point, most, &kept, &triangle);
+    EXPECT_GE(kept.size(), 1u);
+    EXPECT_LE(kept.size(), std::max(most, (std::size_t)6));
+  }
+}
+
 #if defined(HHTDAE_PAGE)
 
 /* A bar without lateral contraction under tension: the stress is force over area everywhere, Cauchy's at large strains as well */
