@@ -289,12 +289,22 @@ static PetscErrorCode MatGetFactor_KLUParts(Mat A, MatFactorType type, Mat *fact
   PetscFunctionReturn(0);
 }
 
-/* A matrix on one rank is one interior */
+/* A matrix on one rank is one interior, whose factor has the name that was asked for: PCFactorSetMatSolverType() holds the two against one another */
+static PetscErrorCode MatGetFactor_OnePart(Mat A, MatFactorType type, Mat *factor)
+{
+  PetscFunctionBegin;
+  PetscCall(LinearKLUPairFactor(A, type, factor));
+  PetscCall(PetscFree((*factor)->solvertype));
+  PetscCall(PetscStrallocpy(LINEAR_KLUPARTS, &(*factor)->solvertype));
+  PetscCall(PetscObjectComposeFunction((PetscObject)*factor, "MatFactorGetSolverType_C", GetSolverType));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode LinearRegisterKLUParts(void)
 {
   PetscFunctionBegin;
   PetscCall(MatSolverTypeRegister(LINEAR_KLUPARTS, MATMPIAIJ, MAT_FACTOR_LU, MatGetFactor_KLUParts));
-  PetscCall(MatSolverTypeRegister(LINEAR_KLUPARTS, MATSEQAIJ, MAT_FACTOR_LU, LinearKLUPairFactor));
+  PetscCall(MatSolverTypeRegister(LINEAR_KLUPARTS, MATSEQAIJ, MAT_FACTOR_LU, MatGetFactor_OnePart));
   PetscFunctionReturn(0);
 }
 

@@ -242,6 +242,28 @@ TEST_F(LinearChoiceTest, OrderingOptionReachesALaterFactor)
   OK(KSPDestroy(&ksp));
 }
 
+/* The factor has the name that was asked for, or PETSc would take the same choice for another one */
+TEST_F(LinearChoiceTest, APackageIsChosenTwice)
+{
+  for (const char *package : {"klupair", "kluparts", "mumpsnd", "mumpsmixed"}) {
+    SCOPED_TRACE(package);
+    if (!has(small, package, MAT_FACTOR_LU)) continue;
+    KSP           ksp;
+    PC            pc;
+    MatSolverType type;
+    OK(KSPCreate(PETSC_COMM_SELF, &ksp));
+    OK(KSPSetOperators(ksp, small, small));
+    OK(KSPGetPC(ksp, &pc));
+    OK(PCSetType(pc, PCLU));
+    OK(PCFactorSetMatSolverType(pc, package));
+    OK(KSPSetUp(ksp));
+    OK(PCFactorSetMatSolverType(pc, package));
+    OK(PCFactorGetMatSolverType(pc, &type));
+    EXPECT_STREQ(type, package);
+    OK(KSPDestroy(&ksp));
+  }
+}
+
 TEST_F(LinearChoiceTest, ProgramWins)
 {
   EXPECT_EQ(choose(large, true, {}, [](KSP k, PC) { EXPECT_EQ(KSPSetType(k, KSPMINRES), 0); }).ksp, KSPMINRES);
