@@ -80,20 +80,17 @@ static PetscErrorCode FindPartners(Mat A, std::vector<int> *partner)
 template <class P>
 static PetscErrorCode GatherToFirst(const MumpsND<P> *m, const std::vector<int> &local, std::vector<int> *all)
 {
-  PetscMPIInt              count;
+  PetscMPIInt              count = (PetscMPIInt)local.size();
+  PetscInt64               total = (PetscInt64)local.size();
   std::vector<PetscMPIInt> counts(m->size), starts(m->size + 1, 0);
 
   PetscFunctionBegin;
-  PetscCall(PetscMPIIntCast((PetscInt)local.size(), &count));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT64, MPI_SUM, m->comm));
+  PetscCheck(total <= PETSC_MPI_INT_MAX, m->comm, PETSC_ERR_ARG_OUTOFRANGE,
+             "The matrix has more entries than one MPI message can carry; use -pc_factor_mat_solver_type mumps");
   PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, m->comm));
-  PetscInt64 total = 0;
-  for (PetscMPIInt r = 0; r < m->size && m->rank == 0; ++r) {
-    total += counts[r];
-    PetscCheck(total <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-               "The matrix has more entries than one MPI message can carry; use -pc_factor_mat_solver_type mumps");
-    starts[r + 1] = (PetscMPIInt)total;
-  }
-  all->resize(total);
+  for (PetscMPIInt r = 0; r < m->size && m->rank == 0; ++r) starts[r + 1] = starts[r] + counts[r];
+  all->resize(starts[m->size]);
   PetscCallMPI(
       MPI_Gatherv(local.data(), count, MPI_INT, all->data(), counts.data(), starts.data(), MPI_INT, 0, m->comm));
   PetscFunctionReturn(0);
@@ -109,21 +106,33 @@ template <class P> static void SetPositions(const PetscInt order[], PetscInt cou
     for (PetscInt b = 0; b < block; ++b) m->position[block * order[k] + b] = (MUMPS_INT)(block * k + b + 1);
 }
 
-template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
+template <class P>
+static PetscErrorCode OrderOnFirst(const std::vector<int> &row, const std::vector<int> &col, const std::vector<int> &partners, MumpsND<P> *m)
 {
-  std::vector<int>      partner, row, col, partners;
   std::vector<PetscInt> order;
   LinearGraph           graph;
+
+  PetscFunctionBegin;
+  LinearGraphFromEntries<int>(m->id.n, row.size(), row.data(), col.data(), 1, &graph);
+  PetscCall(LinearMetisOrder(graph, std::vector<PetscInt>(partners.begin(), partners.end()), &order));
+  SetPositions(order.data(), (PetscInt)order.size(), m);
+  PetscFunctionReturn(0);
+}
+
+template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
+{
+  std::vector<int> partner, row, col, partners;
+  PetscMPIInt      failed = 0;
 
   PetscFunctionBegin;
   PetscCall(FindPartners(A, &partner));
   PetscCall(GatherToFirst(m, partner, &partners));
   PetscCall(GatherToFirst(m, m->row, &row));
   PetscCall(GatherToFirst(m, m->col, &col));
-  if (m->rank) PetscFunctionReturn(0);
-  LinearGraphFromEntries<int>(m->id.n, row.size(), row.data(), col.data(), 1, &graph);
-  PetscCall(LinearMetisOrder(graph, std::vector<PetscInt>(partners.begin(), partners.end()), &order));
-  SetPositions(order.data(), (PetscInt)order.size(), m);
+  if (!m->rank) failed = OrderOnFirst(row, col, partners, m);
+  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, m->comm)); /* the others would wait in MUMPS for a rank that has returned */
+  if (!m->rank) PetscCall((PetscErrorCode)failed);
+  PetscCheck(!failed, m->comm, (PetscErrorCode)failed, "METIS could not order the matrix on the first rank");
   PetscFunctionReturn(0);
 }
 
