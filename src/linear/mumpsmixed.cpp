@@ -102,6 +102,25 @@ PetscErrorCode FallBack(Mat F, Mat A, const char why[])
   PetscFunctionReturn(0);
 }
 
+/* Where double precision has no room, what single precision says stands: the matrix may be that of one wild iterate, after which the integrator takes a smaller
+   step if it is singular, and measures what rough solves leave. The factor in single precision is made again, as both together would take three times its memory. */
+PetscErrorCode TryDouble(Mat F, Mat A, const char why[])
+{
+  Mixed &m = Of(F);
+
+  PetscFunctionBegin;
+  if (m.wait < 0) PetscFunctionReturn(0);
+  PetscCall(FallBack(F, A, why));
+  if (F->factorerrortype != MAT_FACTOR_OUTMEMORY) PetscFunctionReturn(0);
+  PetscCall(PetscInfo(F, "There is no room for double precision: single precision stays\n"));
+  m.fallen = false;
+  m.wait   = -1;
+  PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
+  PetscCall(Symbolic(F, A));
+  if (!F->factorerrortype) PetscCall(Numeric(F, A));
+  PetscFunctionReturn(0);
+}
+
 /* ---- refinement ---- */
 
 /* d = the factor's answer to A e, less e */
@@ -187,9 +206,9 @@ PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
   if (rough || PetscIsInfOrNanReal(size)) PetscFunctionReturn(0);
   PetscCall(Refine(m, b, x, transposed, &good));
   if (good) PetscFunctionReturn(0);
-  PetscCall(FallBack(F, m.A, "a solve was not refined"));
+  PetscCall(TryDouble(F, m.A, "a solve was not refined"));
   if (F->factorerrortype) PetscCall(VecSet(x, PETSC_INFINITY));
-  else PetscCall(Sweep(m, b, x, transposed));
+  else if (m.fallen) PetscCall(Sweep(m, b, x, transposed)); /* else x is what single precision makes of it */
   PetscFunctionReturn(0);
 }
 
@@ -198,25 +217,6 @@ PetscErrorCode MatSolve_MumpsMixed(Mat F, Vec b, Vec x) { return Solve(F, b, x, 
 PetscErrorCode MatSolveTranspose_MumpsMixed(Mat F, Vec b, Vec x) { return Solve(F, b, x, F->factortype == MAT_FACTOR_LU); }
 
 /* ---- factorization ---- */
-
-/* Where double precision has no room, what single precision says stands: the matrix may be that of one wild iterate, after which the integrator takes a smaller
-   step if it is singular, and measures what rough solves leave. The factor in single precision is made again, as both together would take three times its memory. */
-PetscErrorCode TryDouble(Mat F, Mat A, const char why[])
-{
-  Mixed &m = Of(F);
-
-  PetscFunctionBegin;
-  if (m.wait < 0) PetscFunctionReturn(0);
-  PetscCall(FallBack(F, A, why));
-  if (F->factorerrortype != MAT_FACTOR_OUTMEMORY) PetscFunctionReturn(0);
-  PetscCall(PetscInfo(F, "There is no room for double precision: single precision stays\n"));
-  m.fallen = false;
-  m.wait   = -1;
-  PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
-  PetscCall(Symbolic(F, A));
-  if (!F->factorerrortype) PetscCall(Numeric(F, A));
-  PetscFunctionReturn(0);
-}
 
 PetscErrorCode FactorSingle(Mat F, Mat A)
 {
@@ -252,7 +252,8 @@ PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  if (m.no_analysis) PetscFunctionReturn(0);
+  if (m.no_analysis && !m.fallen) PetscFunctionReturn(0);
+  if (m.no_analysis) m.left = 0; /* double precision had no room for another matrix; single precision may do for this one */
   PetscCall(PetscObjectReference((PetscObject)A));
   PetscCall(MatDestroy(&m.A));
   m.A = A;

@@ -402,6 +402,25 @@ TEST_F(MumpsMixed, NoRoomToFallBack)
     s.solve();
     EXPECT_LT(s.error, 1e-8);
   }
+  /* a hold so loose that a solve cannot be refined does not cost the next ones their factor */
+  loose.add(first, first, 1e-7 - 1e-5);
+  OK(PetscOptionsSetValue(NULL, "-mat_mumps_cntl_3", "1e-9")); /* no null pivot yet */
+  create(loose);
+  {
+    Solver s(A, "mumpsmixed");
+    OK(LinearSolveRoughly(A, PETSC_TRUE));
+    s.solve();
+    OK(LinearSolveRoughly(A, PETSC_FALSE));
+    s.solve();
+    EXPECT_EQ(s.failed(), PC_NOERROR) << PCFailedReasons[s.failed()];
+    EXPECT_LT(s.error, 1);
+    OK(LinearSolveRoughly(A, PETSC_TRUE));
+    OK(MatScale(A, 2));
+    s.solve();
+    EXPECT_GT(s.reason(), 0) << PCFailedReasons[s.failed()];
+    EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
+  }
+  OK(PetscOptionsClearValue(NULL, "-mat_mumps_cntl_3"));
   OK(PetscOptionsClearValue(NULL, "-mat_mumps_memory"));
 }
 
