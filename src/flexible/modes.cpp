@@ -85,8 +85,14 @@ PetscErrorCode Phase::begin(const char name[])
   PetscCall(PetscLogStageGetId(full.c_str(), &stage));
   if (stage < 0) PetscCall(PetscLogStageRegister(full.c_str(), &stage));
   PetscCall(PetscLogStagePush(stage));
+  begun_ = true;
   PetscCall(PetscTime(&start_));
   PetscFunctionReturn(0);
+}
+
+Phase::~Phase()
+{
+  if (begun_) (void)PetscLogStagePop();
 }
 
 PetscErrorCode Phase::end(const std::string &result)
@@ -95,6 +101,7 @@ PetscErrorCode Phase::end(const std::string &result)
   struct rusage  usage;
 
   PetscFunctionBegin;
+  begun_ = false;
   PetscCall(PetscLogStagePop());
   if (!print_) PetscFunctionReturn(0);
   PetscCall(PetscMemoryGetCurrentUsage(&memory));

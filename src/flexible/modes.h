@@ -41,6 +41,8 @@ class Phase
 {
 public:
   Phase(MPI_Comm comm, bool print) : comm_(comm), print_(print) {}
+  Phase(const Phase &) = delete;
+  ~Phase(); /* takes the stage of the log away that an error has left (ReductionErrors.LeaveNoStageOfTheLog) */
   PetscErrorCode begin(const char name[]);
   PetscErrorCode end(const std::string &result); /* what is said of it */
 
@@ -49,6 +51,7 @@ private:
   bool           print_;
   std::string    name_;
   PetscLogDouble start_ = 0;
+  bool           begun_ = false;
 };
 
 /* ---- factorizations and eigenvalues of K x = lambda M x ---- */

@@ -64,6 +64,24 @@ Box hinge()
 
 /* ---- errors of the model ---- */
 
+#if defined(PETSC_USE_LOG) && PETSC_VERSION_LT(3, 20, 0)
+TEST(ReductionErrors, LeaveNoStageOfTheLog)
+{
+  PetscStageLog log;
+  int           before, after;
+  FeModel       model(PETSC_COMM_SELF);
+  Reduction     reduction;
+  BoxBuilder({{2, 1, 1}, {1, 1, 1}}, &model);
+  reduction.attachments = {{"nowhere"}};
+  must(PetscLogGetStageLog(&log));
+  if (!log) GTEST_SKIP() << "nothing is logged";
+  must(PetscStageLogGetCurrent(log, &before));
+  EXPECT_NE(failure(model, reduction), "");
+  must(PetscStageLogGetCurrent(log, &after));
+  EXPECT_EQ(after, before);
+}
+#endif
+
 TEST(ReductionErrors, NoMatrices)
 {
   FeModel empty(PETSC_COMM_SELF);
