@@ -90,8 +90,9 @@ private:
   void expectEnd(Words words, const char *name) const;
   void addRegion(int dim, int tag, const std::vector<int> &physical);
   void entities();
+  void entitiesOf(const char *section, bool partitioned);
   template <class Source, class Int, class Count, class Real>
-  Source         entitiesFrom(Source s, Int integer, Count many, Real real);
+  Source         entitiesFrom(Source s, bool partitioned, Int integer, Count many, Real real);
   int            regionOf(int dim, int tag);
   PetscErrorCode regionsOfGroups();
 

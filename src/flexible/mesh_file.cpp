@@ -116,13 +116,25 @@ void GmshFile::addRegion(int dim, int tag, const std::vector<int> &physical)
 }
 
 template <class Source, class Int, class Count, class Real>
-Source GmshFile::entitiesFrom(Source s, Int integer, Count many, Real real)
+Source GmshFile::entitiesFrom(Source s, bool partitioned, Int integer, Count many, Real real)
 {
   PetscInt count[4];
+  if (partitioned) {
+    many(s); /* partitions */
+    for (Size i = Checked(many(s)); i > 0; i--) { /* entities of ghosts and their partitions */
+      integer(s);
+      integer(s);
+    }
+  }
   for (PetscInt &c : count) Checked(c = many(s));
   for (int dim = 0; dim < 4; dim++)
     for (PetscInt k = 0; k < count[dim]; k++) {
       const int tag = integer(s);
+      if (partitioned) {
+        integer(s); /* dimension and tag of the entity that it is a part of */
+        integer(s);
+        for (Size i = Checked(many(s)); i > 0; i--) integer(s);
+      }
       for (int i = 0; i < (dim ? 6 : 3); i++) real(s);
       std::vector<int> physical;
       for (Size i = Checked(many(s)); i > 0; i--) physical.push_back(integer(s));
@@ -133,20 +145,28 @@ Source GmshFile::entitiesFrom(Source s, Int integer, Count many, Real real)
   return s;
 }
 
+/* Elements of a partitioned mesh are those of entities of the partitions, which have the groups of what they are parts of */
 void GmshFile::entities()
 {
-  const auto at = section_.find("$Entities");
-  if (!four_ || at == section_.end()) return;
+  if (!four_) return;
+  entitiesOf("$Entities", false);
+  entitiesOf("$PartitionedEntities", true);
+}
+
+void GmshFile::entitiesOf(const char *section, bool partitioned)
+{
+  const auto at = section_.find(section);
+  if (at == section_.end()) return;
   const char *p = file_.begin + at->second;
   if (binary_)
     entitiesFrom(
-        Bytes(p, end_), [](Bytes &b) { return b.small(); }, [](Bytes &b) { return b.integer8(); },
+        Bytes(p, end_), partitioned, [](Bytes &b) { return b.small(); }, [](Bytes &b) { return b.integer8(); },
         [](Bytes &b) { b.get<double>(); });
   else
     expectEnd(entitiesFrom(
-                  Words(p, end_), [](Words &w) { return w.small(); }, [](Words &w) { return w.integer(); },
+                  Words(p, end_), partitioned, [](Words &w) { return w.small(); }, [](Words &w) { return w.integer(); },
                   [](Words &w) { w.real(); }),
-              "$EndEntities");
+              ("$End" + std::string(section + 1)).c_str());
 }
 
 int GmshFile::regionOf(int dim, int tag)

@@ -251,9 +251,9 @@ TEST(FeMeshFiles, BinaryIsTheSameAsText)
       "SetFactory(\"OpenCASCADE\");\nCylinder(1) = {0, 0, 0, 0, 0, 2, 0.5};\nPhysical Volume(\"rod\") = {1};\n"
       "Physical Surface(\"end\") = {2};\nMesh.MeshSizeMax = 0.4;\n";
   MeshFile geo(PETSC_COMM_SELF, geometry, ".geo");
-  PetscReal     norm[4];
+  PetscReal     norm[6];
   int           k = 0;
-  for (const char *format : {"msh41", "msh22", "msh41 -bin", "msh22 -bin"}) {
+  for (const char *format : {"msh41", "msh22", "msh41 -bin", "msh22 -bin", "msh41 -part 3", "msh41 -bin -part 3"}) { /* elements of partitions are in entities of their own */
     MeshFile     mesh(PETSC_COMM_SELF, "");
     const std::string command =
         "gmsh -v 0 -3 -order 2 -format " + std::string(format) + " -o " + mesh.name + " " + geo.name;
