@@ -440,6 +440,33 @@ class Runs(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "initial value is .*must be a number"):
             scene.state("x", 1., a)
 
+    def test_what_is_changed_after_it_was_given(self):
+        """Bodies, elements, positions and gravity are what they were when they were given, also where parameters have changed since then"""
+        scene = h.Scene()
+        k = scene.parameter("k", 1.)
+        gravity = [0., 0., -k]
+        scene.set_gravity(gravity)
+        gravity[2] = 7.
+        place = np.array([3. * k, 0., 0.])
+        body = h.RigidBody(position=place)
+        b = scene.add("b", body)
+        place[0], body.mass = k, 5.
+        at = [k * 1., 0., 0.]
+        marker = b.marker(at)
+        at[0] = 5.
+        spring = h.SpringDamper(b.marker(), scene.ground.marker(), stiffness=k, length=1.)
+        element = scene.add("spring", spring)
+        spring.length, spring.i = 2., None
+        scene.channel("f", h.force(element, 0))
+        scene.channel("x", h.displacement(marker, "x"))
+        scene.channel("a", h.acceleration(b.marker(), "z"))
+        before = scene.run().sample()
+        scene.set(k=2.)
+        scene.run().close()
+        scene.set(k=1.)
+        self.assertEqual(scene.run().sample(), before)
+        np.testing.assert_allclose(np.abs(list(before.values()) if isinstance(before, dict) else before), [2., 4., 1.], atol=1e-9)
+
     def test_parameters(self):
         """Formulas of parameters in bodies, markers, elements and gravity; functions that describe; elements that may be missing"""
         scene = h.Scene()

@@ -15,7 +15,7 @@ from .expressions import Expression, Parameter, describing
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
-from .spec import Formula, Spec, check_parameters, has_formula, number, plain, text
+from .spec import Formula, Spec, check_parameters, copied, has_formula, number, plain, text
 from .tracing import time_function
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
@@ -187,6 +187,8 @@ class Scene:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
         described = has_formula(acceleration, self, "gravity")
         self._edits += 1
+        if described:
+            acceleration = copied(acceleration)
         self._core.gravity(self._later(lambda: plain(acceleration)) if described else acceleration)
 
     def ground_acceleration(self, x=0., y=0., z=0.) -> None:
@@ -218,6 +220,8 @@ class Scene:
         if isinstance(what, Spec):
             name = name or self._unnamed(type(what))
             described, converted = self._converted(what, name)
+            if described:
+                what = copied(what)  # the caller's may be another one when parameters change
             given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
             return self._enter(name, what, given)
@@ -288,8 +292,10 @@ class Scene:
         self._describe()
         place = lambda: (plain(position), np.eye(3) if axes is None else plain(axes))
         who = "marker %s" % (name or "on " + body.name)
-        described = [has_formula(position, self, who + ": position"), has_formula(axes, self, who + ": axes")]
-        return Marker(self, self._core.marker(body, self._later(place) if any(described) else place(), name, at), name or "on " + body.name)
+        described = any([has_formula(position, self, who + ": position"), has_formula(axes, self, who + ": axes")])
+        if described:
+            position, axes = copied(position), copied(axes)
+        return Marker(self, self._core.marker(body, self._later(place) if described else place(), name, at), name or "on " + body.name)
 
     def rigid_body(self, name: str, **fields: Any) -> Body:
         """The same as ``add(name, RigidBody(**fields))``."""

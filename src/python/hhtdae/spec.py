@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import numbers
 import sys
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from typing import Any, Callable, Sequence, Union
 
 import numpy as np
@@ -74,6 +75,32 @@ def plain(x):
         return [plain(y) for y in x]
     if isinstance(x, np.ndarray) and x.dtype == object:
         return [plain(y) for y in x]
+    return x
+
+
+def copied(x, known=None):
+    """Lists, dictionaries, arrays and data classes are copied, with what is in them; all else, formulas and parameters above all, stays the object that it is.
+    For what is read again later, as it was when it was given"""
+    known = {} if known is None else known
+    if id(x) in known:
+        return known[id(x)]
+    if type(x) is tuple:
+        return tuple(copied(y, known) for y in x)
+    if isinstance(x, np.ndarray):
+        return x.copy()
+    if type(x) is list:
+        y = known[id(x)] = []
+        y.extend(copied(z, known) for z in x)
+        return y
+    if type(x) is dict:
+        y = known[id(x)] = {}
+        y.update((key, copied(z, known)) for key, z in x.items())
+        return y
+    if is_dataclass(x) and not isinstance(x, type):
+        y = known[id(x)] = copy.copy(x)
+        for f in fields(x):
+            object.__setattr__(y, f.name, copied(getattr(x, f.name), known))
+        return y
     return x
 
 
