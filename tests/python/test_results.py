@@ -29,6 +29,14 @@ def oscillator(mass=1., parts=False):
     return (scene, b, m, k, x) if parts else scene
 
 
+@h.model
+def falling(settings, given=()):
+    """A mass under gravity, with settings that the function itself changes"""
+    scene = h.Scene(gravity=(0, -settings.pop("g"), 0))
+    scene.channel("a", h.acceleration(scene.add("b", h.PointMass()).marker(), "y"))
+    return scene
+
+
 def swing(scene):
     return scene.solve(1., tolerance=1e-7)
 
@@ -63,6 +71,20 @@ class Processes(unittest.TestCase):
                 self.assertEqual((r.time, r.steps, r.units), (1., r.statistics.steps, {"x": "m", "v": "m/s"}))
             x = 0.5 * np.cos(20**0.5)
             np.testing.assert_allclose(np.array(asked[0]) / [1, 1, 40], [x, x, x], atol=5e-4)
+
+    def test_arguments_are_those_of_the_call(self):
+        """One dictionary for many scenes"""
+        scenes = []
+        for g in (1., 2.):
+            settings = {"g": g, "more": [np.ones(2)]}
+            settings["itself"] = settings
+            scenes.append(falling(settings, given=settings["more"]))
+            settings["more"][0][:] = 7.
+            settings["g"] = 3.
+        for scene, g in zip(scenes, (1., 2.)):
+            again = pickle.loads(pickle.dumps(scene))
+            self.assertAlmostEqual(again.solve(0.1)["a"][-1], -g, delta=1e-9)
+            np.testing.assert_array_equal(again._recipe.keywords["given"][0], 1.)
 
     def test_what_cannot(self):
         with self.assertRaisesRegex(TypeError, "@hhtdae.model"):

@@ -3,6 +3,8 @@
 import functools
 from typing import Any, Callable, NamedTuple, Tuple, TypeVar
 
+from .spec import copied
+
 __all__ = ["model"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -11,8 +13,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def model(function: Function) -> Function:
     """Marks a function of a module that describes a scene, so that the scene can be pickled: for processes of `multiprocessing`, for files.
 
-    The function returns the scene, or a tuple with the scene in it. Pickled are its arguments, present values of parameters, and the settings of
-    `Scene.start` and `Scene.output`; the scene is described anew where it is unpickled. Bodies, markers, elements and formulas of it can be pickled along.
+    The function returns the scene, or a tuple with the scene in it. Pickled are its arguments as they were given (lists,
+    dictionaries, arrays and data classes are copied), present values of parameters, and the settings of `Scene.start` and `Scene.output`; the scene is described anew where it is unpickled. Bodies, markers, elements and formulas of it can be pickled along.
 
     >>> @hhtdae.model
     ... def oscillator(mass=1.):
@@ -30,8 +32,9 @@ def model(function: Function) -> Function:
 
     @functools.wraps(function)
     def describe(*args, **keywords):
+        recipe = Recipe(describe, args, keywords)
         result = function(*args, **keywords)
-        Recipe(describe, args, keywords).mark(result)
+        recipe.mark(result)
         return result
 
     return describe
@@ -51,7 +54,7 @@ class Recipe:
     """Kept by the scene that it has made"""
 
     def __init__(self, describe, args, keywords):
-        self.describe, self.args, self.keywords = describe, args, keywords
+        self.describe, self.args, self.keywords = describe, copied(args), copied(keywords)
 
     def mark(self, result):
         scene = _scene_of(result, self.describe)
