@@ -327,6 +327,7 @@ class OnTS(unittest.TestCase):
         ts.getSNES().getKSP().getPC().setType("hhtconstraint")
         ts.solve(u)
         np.testing.assert_allclose(integrator.interpolate(ts, 1.)[0].array, np.cos([1., 2., 3.]), atol=1e-4)
+        integrator.set_nodes(ts, [])
         with self.assertRaises(h.Error):
             integrator.set_nodes(ts, [[0, 1]], X)
 

@@ -96,6 +96,30 @@ PETSc._finalize()
 """
         ranks(2, "-c", script)
 
+    def test_nodes_of_some_ranks(self):
+        """A rank without nodes takes part in what is said of them"""
+        script = """
+from petsc4py import PETSc
+from hhtdae import integrator
+
+J = PETSc.Mat().createAIJ(((6, None), (6, None)), nnz=1)
+J.setUp()
+begin, end = J.getOwnershipRange()
+for i in range(begin, end):
+    J[i, i] = 1
+J.assemble()
+
+def jacobian(ts, t, u, v, a, sv, sa, A, P):
+    return True
+
+ts = PETSc.TS().create()
+ts.setType("hhtdae")
+ts.setI2Function(lambda ts, t, u, v, a, F: a.copy(F), J.createVecLeft())
+ts.setI2Jacobian(jacobian, J, J)
+integrator.set_nodes(ts, [] if PETSc.COMM_WORLD.rank else [[0, 1], [2, 3], [4, 5]])
+"""
+        ranks(2, "-c", script)
+
     def test_chain(self):
         text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "30")
         found, exact = re.search(r"2 ranks: the end hangs (\S+) m .* exact (\S+) m", text).groups()

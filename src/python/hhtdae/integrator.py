@@ -118,7 +118,7 @@ def set_nodes(ts, nodes, reference=None):
     Parameters
     ----------
     nodes : petsc4py.PETSc.IS, (n, 3) array of int or None
-        Own unknowns by global number, those of a node one after the other (the block size of the IS); None takes back what was said.
+        Own unknowns by global number, those of a node one after the other (the block size of the IS); an empty list on a rank without nodes. None takes back what was said.
     reference : petsc4py.PETSc.Vec, optional
         Where the nodes are when these unknowns are zero, in their rows.
     """
@@ -126,9 +126,10 @@ def set_nodes(ts, nodes, reference=None):
     from petsc4py import PETSc
 
     if nodes is not None and not isinstance(nodes, PETSc.IS):
-        nodes = np.atleast_2d(np.asarray(nodes, dtype=PETSc.IntType))
+        nodes = np.asarray(nodes, dtype=PETSc.IntType)
+        size = np.atleast_2d(nodes).shape[1] if nodes.size else 1
         own = PETSc.IS().createGeneral(nodes.ravel(), comm=ts.getComm())
-        own.setBlockSize(nodes.shape[1])
+        own.setBlockSize(int(PETSc.Vec().createWithArray([size], comm=ts.getComm()).max()[1]))  # a rank without nodes cannot tell
         nodes = own
     _core.set_nodes(ts, nodes, reference)
 
