@@ -184,8 +184,13 @@ void BindReduced(py::module_ &m)
     return body;
   });
   m.def("add_stress_modes", [](const FeModel &model, ReducedBody &b) { Check(AddStressModes(model, &b)); });
-  m.def("show", [](Scene &scene, py::object body, const ReducedBody &shown, const std::string &unit) {
-    auto surface = std::make_shared<Surface>();
+  m.def("show", [](Scene &scene, py::object comm, py::object body, const ReducedBody &shown, const std::string &unit) {
+    auto        surface = std::make_shared<Surface>();
+    PetscMPIInt size, same;
+    MPI_Comm_size(shown.comm, &size);
+    MPI_Comm_compare(ToComm(comm), shown.comm, &same);
+    if (size > 1 && same != MPI_IDENT && same != MPI_CONGRUENT)
+      throw py::value_error("the body of the surface is distributed over other ranks than the scene; reduce or load it on the communicator of the scene, or on one rank");
     Check(MakeSurface(shown, surface.get()));
     surface->stress_unit = unit;
     scene.surface(ToHandle<Body>(body, "the body of a surface"), surface);

@@ -120,6 +120,49 @@ integrator.set_nodes(ts, [] if PETSc.COMM_WORLD.rank else [[0, 1], [2, 3], [4, 5
 """
         ranks(2, "-c", script)
 
+    def test_bodies_of_other_ranks(self):
+        """Bodies of one rank beside those of all; what is distributed over other ranks than the scene is refused on all of them"""
+        script = """
+import os, pickle, sys, tempfile
+import hhtdae as h
+from petsc4py import PETSc
+
+try:
+    from hhtdae import flexible
+except ImportError:  # the package was built without SLEPc
+    raise SystemExit(0)
+
+sys.path.insert(0, %r)
+from beam_mesh import beam_mesh
+
+with tempfile.TemporaryDirectory() as folder:
+    file = beam_mesh(os.path.join(folder, "beam.msh"), 1., 0.05, 0.05)
+    one, all = (flexible.FeModel.from_mesh(file, flexible.Material(2e11, 0., 8000.), comm=c) for c in (PETSc.COMM_SELF, PETSc.COMM_WORLD))
+    PETSc.COMM_WORLD.barrier()
+ends = [flexible.Attachment("root"), flexible.Attachment("tip")]
+body, spread = flexible.reduce(one, ends, modes=2), flexible.reduce(all, ends, modes=2)
+again = pickle.loads(pickle.dumps(body))
+assert again.comm.size == 1 and len(again.label) == len(body.label)
+scene = h.Scene(comm=PETSc.COMM_SELF)
+beam = scene.add("beam", h.FlexibleBody(body))
+beam.surface(body)
+try:
+    beam.surface(spread)
+    raise SystemExit(3)
+except ValueError as error:
+    assert "over other ranks than the scene" in str(error)
+try:
+    flexible.FullFeBody(scene, "whole", all)
+    raise SystemExit(4)
+except h.Error as error:
+    assert "over other ranks than the scene" in str(error)
+world = h.Scene()
+beam = world.add("beam", h.FlexibleBody(spread))
+beam.surface(spread)
+beam.surface(body)
+""" % os.path.join(HERE, "..", "..", "examples", "python")
+        ranks(2, "-c", script)
+
     def test_chain(self):
         text = ranks(2, os.path.join(HERE, "..", "..", "examples", "python", "chain.py"), "-links", "30")
         found, exact = re.search(r"2 ranks: the end hangs (\S+) m .* exact (\S+) m", text).groups()

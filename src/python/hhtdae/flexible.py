@@ -25,6 +25,7 @@ try:
 except ImportError as error:
     raise ImportError("flexible bodies are not there, hhtdae was built without SLEPc: %s" % error) from error
 from .scene import Body
+from .spec import copied
 
 __all__ = ["Attachment", "FeModel", "FullBody", "FullFeBody", "HotSpot", "HotSpots", "Material", "ReducedBody", "load_modal_body", "reduce"]
 
@@ -222,6 +223,8 @@ class ReducedBody:
         Of the modes, cycles per unit of time.
     residuals : (modes,)
         A bound of each frequency's error, relative: there is an eigenvalue l of the full model with abs(omega^2 - l) <= residual l; negative: not known.
+    comm
+        Its nodes are distributed over these ranks.
     coordinates : (own nodes, 3); label : (own nodes,); elements : Elements
     shape : (own nodes, 3, modes)
         The modes at the nodes, if they were kept.
@@ -229,14 +232,15 @@ class ReducedBody:
         Stress modes, components xx, yy, zz, xy, yz, zx, if they were asked for.
     """
 
-    def __init__(self, core=None):
+    def __init__(self, core=None, comm=None):
         self._core = core if core is not None else _flexible.ReducedBody()
+        self.comm = PETSc.COMM_SELF if comm is None else comm  # its nodes are distributed over these ranks
 
     @classmethod
     def load(cls, file, comm=None):
         """Reads a file of `save`."""
-        body = cls()
-        body._core.load(_comm(comm), str(file))
+        body = cls(comm=_comm(comm))
+        body._core.load(body.comm, str(file))
         return body
 
     def save(self, file):
@@ -245,7 +249,7 @@ class ReducedBody:
 
     def __reduce__(self):
         """Pickled as the bytes of its file, on one rank"""
-        if PETSc.COMM_WORLD.size > 1:
+        if self.comm.size > 1:
             raise TypeError("a reduced body is distributed over ranks: save() writes it from all of them")
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "body.h5")
@@ -300,7 +304,7 @@ class ReducedBody:
                 for name, values in (("stress", self.stress @ eta), ("von Mises", self.von_mises(eta))):
                     data[name] = np.full((len(self.label),) + values.shape[1:], np.nan)
                     data[name][self.stress_nodes] = values
-        return _mesh(PETSc.COMM_WORLD, self.coordinates, self.elements, data)
+        return _mesh(self.comm, self.coordinates, self.elements, data)
 
 
 def _mesh(comm, points, elements, point_data, sets=None):
@@ -318,7 +322,7 @@ def _unpickled(whole):
         file = os.path.join(folder, "body.h5")
         with open(file, "wb") as out:
             out.write(whole)
-        return ReducedBody.load(file)
+        return ReducedBody.load(file, PETSc.COMM_SELF)
 
 
 def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] = 20, max_frequency=0., keep_below=0., keep: Sequence[int] = (),
@@ -371,7 +375,7 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
     core = _flexible.reduce(model._core, dict(node_sets=list(node_sets), nodes=_integers(nodes, "nodes"), loads=loads, attachments=_attachments(attachments), method=method,
                                               modes=modes, max_frequency=max_frequency, keep_below=keep_below, keep=_integers(keep, "keep"), stiffening=stiffening,
                                               all_nodes=all_nodes, progress=progress))
-    body = ReducedBody(core)
+    body = ReducedBody(core, model.comm)
     return body.add_stress_modes(model) if stress else body
 
 
@@ -431,7 +435,7 @@ class FullBody:
 
 
 class FullFeBody:
-    """A whole FE model in a scene; call it on all ranks in the same order as the scene's other parts. Pages show its surface, coloured by stress where its
+    """A whole FE model in a scene of the same communicator; call it on all ranks in the same order as the scene's other parts. Pages show its surface, coloured by stress where its
     elements have materials.
     """
 
@@ -441,7 +445,7 @@ class FullFeBody:
         if body.law not in ("small", "large"):
             raise ValueError("%s: law is %r, must be 'small' or 'large'" % (name, body.law))
         self._scene, self._model, self._core, self.name = scene, model, _flexible.FullFeBody(), name
-        self._placed = body.position, body.rotation
+        self._placed = copied((body.position, body.rotation))
         scene._describe()
         fields = dict(vars(body), attachments=_attachments(body.attachments))
         self._core.add(scene._core, name, model._core, fields)

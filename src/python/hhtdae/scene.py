@@ -74,11 +74,11 @@ class Body(_Handle):
 
     def surface(self, body: Any, stress_unit: str = "") -> "Body":
         """Draws a flexible body in pages by the surface of its mesh, deformed, and coloured by stress where the `hhtdae.flexible.ReducedBody` has stress
-        modes; it must have kept its elements and the modes at all nodes. Collective."""
+        modes; it must have kept its elements and the modes at all nodes, and be on one rank or on those of the scene. Collective."""
         from . import flexible
 
         self._scene._describe()
-        flexible._flexible.show(self._scene._core, self, body._core, stress_unit)
+        flexible._flexible.show(self._scene._core, self._scene.comm, self, body._core, stress_unit)
         return self
 
 
