@@ -19,7 +19,7 @@ void Value(const Frame<double> &e, const Frame<double> &i, double *phi)
 {
   const Frame<double> f[2] = {e, i};
   for (int c = 0; c < 3; c++) phi[c] = i.x(c) - e.x(c);
-  Orient::value<double>(Empty(), f, 0, phi + 3);
+  Orient::value<double>(Orient::Data(), f, 0, phi + 3);
 }
 
 /* The reaction of an attachment is the sum of what elements do to its frame */
@@ -107,7 +107,7 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
   rows.length = true;
   Value(f[0], f[1], rows.value);
   for (double &x : rows.rate) x = 0;
-  Orient::gradient(Empty(), f, 0, J);
+  Orient::gradient(Orient::Data(), f, 0, J);
   rows.J.topLeftCorner<6, 12>().setZero();
   rows.J.block<3, 3>(0, 0) = -Matrix3::Identity();
   rows.J.block<3, 3>(0, 6) = Matrix3::Identity();

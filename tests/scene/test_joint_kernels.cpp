@@ -109,12 +109,22 @@ TEST(JointKernels, MultipliersOfAxesAreMoments)
   }
 }
 
-/* Antiparallel axes are the other branch of the same joint: closed, and with reactions of the same size */
+/* Antiparallel axes are the other branch of the same joint: closed, and with the same reactions */
 TEST(JointKernels, AlignmentsHaveTwoBranches)
 {
-  Random     random(4);
-  const Pair flipped(random, {0, 0, 0}, AboutAxis(Vec3<double>::UnitX(), M_PI));
-  for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(flipped, r), -flipped.j(r));
+  Random random(4);
+  double misses;
+  for (int axis = 0; axis < 3; axis++) {
+    const Pair flipped(random, {0, 0, 0}, AboutAxis(Vec3<double>(Vec3<double>::Unit(axis)), M_PI));
+    for (int r = 0; r < 2; r++) ExpectMoment(Reaction<Parallel>(flipped, r, Parallel::branch(flipped.f[0], flipped.f[1])), flipped.j(r));
+    for (int r = 0; r < 3; r++) ExpectMoment(Reaction<Orient>(flipped, r, Orient::branch(flipped.f[0], flipped.f[1], &misses)), flipped.j(r));
+    EXPECT_NEAR(misses, 1, 1e-12);
+  }
+  const Pair in_plane(random, {0, 0, 0}, AboutAxis(Vec3<double>::UnitZ(), M_PI));
+  ExpectMoment(Reaction<OrientInPlane>(in_plane, 0, OrientInPlane::branch(in_plane.f[0], in_plane.f[1])), in_plane.j(2));
+  const Pair third(random, {0, 0, 0}, AboutAxis(Vec3<double>(1, 1, 1).normalized(), 2 * M_PI / 3));
+  Orient::branch(third.f[0], third.f[1], &misses);
+  EXPECT_NEAR(misses, -0.5, 1e-12);
 }
 
 /* Shafts bent by a constant angle that turn by the same angle, however far, satisfy the row; those that do not turn

@@ -316,3 +316,42 @@ TEST(Query, MarkersMadeAfterwards)
   must(resumed.solve());
   EXPECT_EQ(state(resumed), state(run));
 }
+
+/* A body of 1 kg at the end of an arm of 1 m: a joint's multipliers are about the axes of marker j, wherever those of i point */
+TEST(JointMultipliers, AxesThatPointAwayFromEachOther)
+{
+  for (int flip : {-1, 0, 1, 2})
+    for (bool fixed : {false, true}) {
+      Scene s(PETSC_COMM_SELF);
+      s.gravity({0, 0, -10});
+      RigidBody b;
+      b.position         = {1, 0, 0};
+      const Body    arm  = s.add("arm", b);
+      const Matrix3 axes = flip < 0 ? Matrix3(Matrix3::Identity()) : Eigen::AngleAxisd(M_PI, Vector3::Unit(flip)).toRotationMatrix();
+      const Marker  i = s.markerAt(arm, {0, 0, 0}, axes), j = s.marker(s.ground());
+      const Element joint = fixed ? s.add("joint", Fixed{i, j}) : s.add("joint", Revolute{i, j});
+      SceneRun      run(s, 1, "");
+      Snapshot      now;
+      double        x;
+      must(now.take(run.ts));
+      must(now.value(Measure::jointMoment(joint, 1), &x));
+      EXPECT_NEAR(x, -10, 1e-9);
+      must(now.value(Measure::multiplier(joint, 4), &x));
+      EXPECT_NEAR(x, -10, 1e-9) << fixed << flip;
+    }
+  for (int flip : {-1, 2}) {
+    Scene s(PETSC_COMM_SELF, Space::Planar);
+    s.gravity({0, -10, 0});
+    RigidBody b;
+    b.position         = {1, 0, 0};
+    const Body    arm  = s.add("arm", b);
+    const Matrix3 axes = flip < 0 ? Matrix3(Matrix3::Identity()) : Eigen::AngleAxisd(M_PI, Vector3::Unit(flip)).toRotationMatrix();
+    const Element joint = s.add("joint", Fixed{s.markerAt(arm, {0, 0, 0}, axes), s.marker(s.ground())});
+    SceneRun      run(s, 1, "");
+    Snapshot      now;
+    double        x;
+    must(now.take(run.ts));
+    must(now.value(Measure::multiplier(joint, 2), &x));
+    EXPECT_NEAR(x, 10, 1e-9) << flip;
+  }
+}

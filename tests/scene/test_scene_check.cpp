@@ -224,3 +224,16 @@ TEST(SceneCheck, ShearOfAPlanarBeam)
   s.add("beam", beam);
   SAYS(complaint(s), "beam beam: G is 0");
 }
+
+/* Products vanish after a third of a turn, too, where the axes have changed places */
+TEST(SceneCheck, MarkersWithOtherAxes)
+{
+  for (double angle : {2 * M_PI / 3, -2 * M_PI / 3}) {
+    Scene         s(PETSC_COMM_SELF);
+    const Body    b    = s.add("arm", RigidBody());
+    const Matrix3 axes = Eigen::AngleAxisd(angle, Vector3(1, 1, 1).normalized()).toRotationMatrix();
+    const Marker  i = s.marker(b, {0, 0, 0}, axes), j = s.marker(s.ground());
+    s.add("fixed", hhtdae::Fixed{i, j});
+    SAYS(complaint(s), "fixed: the axes of markers i and j are not parallel at the start");
+  }
+}

@@ -47,6 +47,21 @@ public:
     if (good()) constrain<K>({marker_[0], marker_[1]}, data);
   }
 
+  /* Axes that stay parallel: on the branch on which they are described */
+  template <class K> void branchRows()
+  {
+    if (good()) rows<K>(K::branch(start(0), start(1)));
+  }
+  /* All of them: a description that is nearer to axes that have changed places, as a slip of axes is, is refused (SceneCheck.MarkersWithOtherAxes) */
+  template <class K> void orientationRows()
+  {
+    if (!good()) return;
+    double     misses;
+    const auto data = K::branch(start(0), start(1), &misses);
+    require(misses > -0.25, "the axes of markers i and j are not parallel at the start: x_i, y_i and z_i must be along x_j, y_j and z_j, or two of them opposite");
+    rows<K>(data);
+  }
+
 private:
   Marker   marker_[2];
   PetscInt body(int k) const { return scene().markers[marker_[k].id].body; }

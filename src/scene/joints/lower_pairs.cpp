@@ -28,7 +28,7 @@ template <> Element Scene::enter(const std::string &name, const Revolute &s)
     e.rows<Coincide2>();
   } else {
     e.rows<Coincide>();
-    e.rows<Parallel>();
+    e.branchRows<Parallel>();
   }
   return e.done();
 }
@@ -63,10 +63,10 @@ template <> Element Scene::enter(const std::string &name, const Translational &s
   JointBuilder e(*this, name, "translational", s.i, s.j);
   if (e.planar()) {
     e.rows<OnPlane<1>>();
-    e.rows<OrientInPlane>();
+    e.branchRows<OrientInPlane>();
   } else {
     e.rows<OnLine>();
-    e.rows<Orient>();
+    e.orientationRows<Orient>();
   }
   return e.done();
 }
@@ -77,7 +77,7 @@ template <> Element Scene::enter(const std::string &name, const Cylindrical &s)
   JointBuilder e(*this, name, "cylindrical", s.i, s.j);
   e.spatialOnly();
   e.rows<OnLine>();
-  e.rows<Parallel>();
+  e.branchRows<Parallel>();
   return e.done();
 }
 
@@ -87,7 +87,7 @@ template <> Element Scene::enter(const std::string &name, const Planar &s)
   JointBuilder e(*this, name, "planar", s.i, s.j);
   e.spatialOnly();
   e.rows<OnPlane<2>>();
-  e.rows<Parallel>();
+  e.branchRows<Parallel>();
   return e.done();
 }
 
@@ -97,10 +97,10 @@ template <> Element Scene::enter(const std::string &name, const Fixed &s)
   JointBuilder e(*this, name, "fixed", s.i, s.j);
   if (e.planar()) {
     e.rows<Coincide2>();
-    e.rows<OrientInPlane>();
+    e.branchRows<OrientInPlane>();
   } else {
     e.rows<Coincide>();
-    e.rows<Orient>();
+    e.orientationRows<Orient>();
   }
   return e.done();
 }

@@ -29,7 +29,7 @@ template <> Element Scene::enter(const std::string &name, const ParallelAxes &s)
 {
   JointBuilder e(*this, name, "parallel axes", s.i, s.j);
   e.spatialOnly();
-  e.rows<Parallel>();
+  e.branchRows<Parallel>();
   return e.done();
 }
 
@@ -47,7 +47,7 @@ template <> Element Scene::enter(const std::string &name, const Orientation &s)
 {
   JointBuilder e(*this, name, "orientation", s.i, s.j);
   e.spatialOnly();
-  e.rows<Orient>();
+  e.orientationRows<Orient>();
   return e.done();
 }
 

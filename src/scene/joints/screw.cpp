@@ -20,7 +20,7 @@ template <> Element Scene::enter(const std::string &name, const Screw &s)
     d.pitch = s.pitch;
     ScrewRow::begin(d, f);
     e.constrain<OnLine>({s.i, s.j});
-    e.constrain<Parallel>({s.i, s.j});
+    e.constrain<Parallel>({s.i, s.j}, Parallel::branch(f[0], f[1]));
     e.constrain<ScrewRow>({s.i, s.j}, d);
   }
   return e.done();

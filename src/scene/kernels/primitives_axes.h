@@ -11,12 +11,14 @@
     dg/dtheta_i = W - tr(W) 1,   dg/dtheta_j = -(W^T - tr(W) 1)
 
   Signs as in primitives.h: multipliers are moments on i's body in the direction that is named, its opposite acts on j's
-  body. An alignment is met by antiparallel axes too; a joint stays on the branch on which it starts.
+  body. An alignment is met by antiparallel axes too, where the same products have the opposite gradient: a joint stays on the branch on which it starts, and
+  its data have the sign of each row there (JointMultipliers.AxesThatPointAwayFromEachOther).
 */
 #ifndef HHTDAE_SCENE_PRIMITIVES_AXES_H
 #define HHTDAE_SCENE_PRIMITIVES_AXES_H
 
 #include "scene/kernel.h"
+#include <algorithm>
 
 namespace hhtdae
 {
@@ -26,32 +28,39 @@ struct AxisProduct {
   double factor;
 };
 
+/* Signs of the rows on the branch of the start */
+template <int R> struct AxisBranch {
+  double sign[R];
+  AxisBranch() { std::fill(sign, sign + R, 1.); }
+};
+
 /* K gives `products`, an array of AxisProduct */
 template <class K, int R> struct AxisProducts : Constraint<K, 2, R> {
   using Base = Constraint<K, 2, R>;
   using typename Base::Gradient;
   using typename Base::Hessian;
+  using Data = AxisBranch<R>;
   static constexpr unsigned depends = Rotation(0) | Rotation(1);
 
-  template <class T> static void value(const Empty &, const Frame<T> *f, const T &, T *phi)
+  template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi)
   {
     for (int r = 0; r < R; r++) phi[r] = T(0);
-    for (const AxisProduct &p : K::products) phi[p.row] += T(p.factor) * f[0].R.col(p.i).dot(f[1].R.col(p.j));
+    for (const AxisProduct &p : K::products) phi[p.row] += T(d.sign[p.row] * p.factor) * f[0].R.col(p.i).dot(f[1].R.col(p.j));
   }
-  static void gradient(const Empty &, const Frame<double> *f, double, Gradient &J)
+  static void gradient(const Data &d, const Frame<double> *f, double, Gradient &J)
   {
     J.setZero();
     for (const AxisProduct &p : K::products) {
-      const Vec3<double> g = p.factor * Vec3<double>(f[0].R.col(p.i)).cross(Vec3<double>(f[1].R.col(p.j)));
+      const Vec3<double> g = d.sign[p.row] * p.factor * Vec3<double>(f[0].R.col(p.i)).cross(Vec3<double>(f[1].R.col(p.j)));
       J.template block<1, 3>(p.row, 3) += g.transpose();
       J.template block<1, 3>(p.row, 9) -= g.transpose();
     }
   }
-  static void curvature(const Empty &, const Frame<double> *f, double, const double *lambda, Hessian &H)
+  static void curvature(const Data &d, const Frame<double> *f, double, const double *lambda, Hessian &H)
   {
     Mat3<double> W = Mat3<double>::Zero();
     for (const AxisProduct &p : K::products)
-      W += lambda[p.row] * p.factor * f[0].R.col(p.i) * f[1].R.col(p.j).transpose();
+      W += lambda[p.row] * d.sign[p.row] * p.factor * f[0].R.col(p.i) * f[1].R.col(p.j).transpose();
     W.diagonal().array() -= W.trace();
     H.setZero();
     H.template block<3, 3>(3, 3) = W;
@@ -74,18 +83,50 @@ template <int A, int B> struct AxesPerpendicular : AxisProducts<AxesPerpendicula
 struct Parallel : AxisProducts<Parallel, 2> {
   static constexpr const char *name       = "parallel axes";
   static constexpr AxisProduct products[] = {{0, 2, 1, 1}, {1, 2, 0, -1}};
+
+  static Data branch(const Frame<double> &i, const Frame<double> &j)
+  {
+    Data d;
+    if (i.R.col(2).dot(j.R.col(2)) < 0) d.sign[0] = d.sign[1] = -1;
+    return d;
+  }
 };
 
 /* All axes parallel: z_i . y_j, x_i . z_j, y_i . x_j = 0. Multipliers: moment on i's body about j's axes. */
 struct Orient : AxisProducts<Orient, 3> {
   static constexpr const char *name       = "orientation";
   static constexpr AxisProduct products[] = {{0, 2, 1, 1}, {1, 0, 2, 1}, {2, 1, 0, 1}};
+
+  /* The nearest one: z_i, x_i and y_i along those of j, or after half a turn two of them opposite. *misses: cosine of the angle that is missing to it, 1 with
+     none; the products vanish after a third of a turn about (1, 1, 1) as well, where it is -1/2 for all of them. */
+  static Data branch(const Frame<double> &i, const Frame<double> &j, double *misses)
+  {
+    constexpr double half[4][3] = {{1, 1, 1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, 1}}; /* of rows */
+    const double     same[3]    = {i.R.col(2).dot(j.R.col(2)), i.R.col(0).dot(j.R.col(0)), i.R.col(1).dot(j.R.col(1))};
+    double           most       = -1;
+    Data             d;
+    for (const double *sign : half) {
+      const double trace = sign[0] * same[0] + sign[1] * same[1] + sign[2] * same[2];
+      if (trace <= most) continue;
+      most = trace;
+      std::copy(sign, sign + 3, d.sign);
+    }
+    *misses = (most - 1) / 2;
+    return d;
+  }
 };
 
 /* No turn of i relative to j about z, for planar scenes: y_i . x_j = 0. Multiplier: moment on i's body about z. */
 struct OrientInPlane : AxisProducts<OrientInPlane, 1> {
   static constexpr const char *name       = "orientation in the plane";
   static constexpr AxisProduct products[] = {{0, 1, 0, 1}};
+
+  static Data branch(const Frame<double> &i, const Frame<double> &j)
+  {
+    Data d;
+    if (i.R.col(1).dot(j.R.col(1)) < 0) d.sign[0] = -1;
+    return d;
+  }
 };
 
 } // namespace hhtdae
