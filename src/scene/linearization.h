@@ -3,7 +3,7 @@
 #define HHTDAE_SCENE_LINEARIZATION_H
 
 #include "hhtdae/linearize.h"
-#include "runtime.h"
+#include "snapshot.h"
 #include <array>
 
 namespace hhtdae
@@ -24,6 +24,7 @@ struct Linearization::Work {
   Vector3                    spin = Vector3::Zero(), spin_rate = Vector3::Zero(); /* of the axes of displacements and rotations */
   Matrix3                    axes = Matrix3::Identity(); /* these axes in space */
   Vec                        state[3] = {};   /* u, u', u'' */
+  mutable Origin             origin;          /* what these count from; the run may have gone on */
   Mat                        M = nullptr, C = nullptr, K = nullptr;
   Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
   std::vector<unsigned char> role;         /* of own unknowns */
@@ -49,6 +50,7 @@ struct Linearization::Work {
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
   PetscErrorCode rates(const std::vector<PetscInt> &rows, RowRates *out) const;
   PetscErrorCode fastest(double *rate) const;
+  PetscErrorCode look(Vec at[3]) const; /* `moved` at this state, near `state` */
   PetscErrorCode nearby(double later, double time, Work *w) const;
 };
 

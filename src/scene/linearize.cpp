@@ -200,7 +200,7 @@ PetscErrorCode Linearization::Work::chooseAxes(Body of)
   spin_rate.setZero();
   PetscCheck(of.id < 0 || s.valid(of), comm(), PETSC_ERR_ARG_WRONG, "Linearization::take(): the body whose axes are asked for is not one of this scene");
   if (of.id == -1) PetscFunctionReturn(0); /* the ground */
-  PetscCall(moved.take(*R, t, at));
+  PetscCall(look(at));
   for (std::size_t b = 0; b < s.bodies.size(); b++) {
     if (of.id >= 0 ? (PetscInt)b != of.id : !s.bodies[b].flexible) continue;
     all.emplace_back();
@@ -223,9 +223,18 @@ PetscErrorCode Linearization::Work::chooseAxes(Body of)
   PetscFunctionReturn(0);
 }
 
+PetscErrorCode Linearization::Work::look(Vec at[3]) const
+{
+  PetscFunctionBegin;
+  PetscCall(moved.take(*R, t, at));
+  moved.work_->origin = origin;
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode Linearization::Work::differentiate()
 {
-  Mat F[3];
+  Mat             F[3];
+  const CountFrom then(*R, origin);
   PetscFunctionBegin;
   PetscCall(DerivativeMatrix(*R, t, state, 0, 0, nullptr, &F[0]));
   PetscCall(DerivativeMatrix(*R, t, state, apart, 0, F[0], &F[1]));
@@ -304,6 +313,7 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
     PetscCall(StateOfStart(ts, t, w.state, &w.start));
     if (w.start) w.R = RunOf(w.start);
   }
+  w.origin.take(*w.R);
   w.t    = t;
   w.size = SceneSize(w.R->scene);
   if (!(w.size > 0)) w.size = 1;

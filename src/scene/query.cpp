@@ -125,7 +125,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   PetscErrorCode failed = StateAt(ts, t, W, &copy);
   if (!failed) failed = take(*w.R, t, W);
   /* attitudes that a first step in the run's place has found count from what that step has referred them to */
-  for (std::size_t b = 0; copy && !failed && b < w.references.size(); b++) w.references[b] = RunOf(copy)->bodies.body[b].C;
+  for (std::size_t b = 0; copy && !failed && b < w.origin.references.size(); b++) w.origin.references[b] = RunOf(copy)->bodies.body[b].C;
   PetscCall(TSDestroy(&copy));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
   PetscCall(failed);
@@ -137,13 +137,10 @@ PetscErrorCode Snapshot::take(Runtime &run, PetscReal t, Vec state[3])
 {
   Work &w = *work_;
   PetscFunctionBegin;
-  w.R                         = &run;
-  w.t                         = t;
-  w.moved                     = -1;
-  w.counted                   = run.asked;
-  w.accepts                   = run.accepts;
-  w.references.clear();
-  for (const LocalBody &b : run.bodies.body) w.references.push_back(b.C);
+  w.R     = &run;
+  w.t     = t;
+  w.moved = -1;
+  w.origin.take(run);
   std::vector<double> *out[3] = {&w.u, &w.v, &w.a};
   PetscCall(Localize(run, state, out));
   PetscFunctionReturn(0);
@@ -266,24 +263,6 @@ PetscErrorCode Snapshot::modes(Body b, std::vector<double> *coordinates)
 
 /* ---- loads ---- */
 
-/* What elements remember is that of the run as it is now */
-PetscErrorCode Snapshot::Work::checkMemory(PetscInt element)
-{
-  const ElementData &e = scene().elements[element];
-  double             n = 0, all = 0;
-  PetscFunctionBegin;
-  if (accepts == R->accepts) PetscFunctionReturn(0);
-  for (const Part &p : e.parts) {
-    PetscCall(FromOwner(*R, OwnerOf(*R->model, *p.store, p.index), &n, 1, [&](double *y) { *y = (double)ReaderOf(*R, p).memory(); }));
-    all += n;
-  }
-  PetscCheck(all == 0, scene().comm, PETSC_ERR_ARG_WRONGSTATE,
-             "Snapshot: the run has gone on since its state at t = %g was taken, and %s %s counts full turns or follows a curve, which it does for the "
-             "present state alone; ask earlier, or take() again",
-             t, e.type, e.name.c_str());
-  PetscFunctionReturn(0);
-}
-
 PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
 {
   using Six = Eigen::Matrix<double, 6, 1>;
@@ -296,12 +275,12 @@ PetscErrorCode Snapshot::Work::load(PetscInt element, PetscInt on, Load *x)
   const PetscInt loaded = scene().loadedBody(e, scene().markers[on].body, &elsewhere);
   PetscCheck(elsewhere < 0, scene().comm, PETSC_ERR_ARG_WRONG, "Snapshot: %s %s acts on %s, not on %s, which is another part of the same flexible body: ask at a marker there", e.type, e.name.c_str(),
              scene().bodyName(elsewhere).c_str(), scene().bodyName(scene().markers[on].body).c_str());
-  PetscCall(checkMemory(element));
   PetscCall(motion(on, &at_marker));
   for (const Part &p : e.parts) {
     PetscCall(FromOwner(*R, OwnerOf(*R->model, *p.store, p.index), part.data(), 6, [&](double *y) {
       Eigen::Map<Six> sum(y);
       move();
+      const CountFrom             then(*R, origin);
       const Evaluation            ev     = at();
       Probe                      &reader = ReaderOf(*R, p);
       std::vector<Wrench<double>> wrench(reader.markers());

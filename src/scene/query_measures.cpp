@@ -35,10 +35,10 @@ PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, boo
     } else if (p.store->carried(p.index)) {
       PetscCall(scalar(owner, p.store->start[p.index] + row, x));
     } else {
-      PetscCall(checkMemory(p.store->element(p.index)));
       PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) {
         std::vector<double> c(p.store->rows());
         move();
+        const CountFrom then(*R, origin);
         ReaderOf(*R, p).components(at(), c.data());
         *y = c[row];
       }));
@@ -75,19 +75,20 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
 PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
 {
   const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
-  const auto                mine = std::find_if(counted.begin(), counted.end(), same);
+  const auto                mine = std::find_if(origin.counted.begin(), origin.counted.end(), same);
   std::vector<CountedAngle> now(1);
   PetscFunctionBegin;
   PetscCall(hasBody(scene().markers[i].body));
   PetscCall(hasBody(scene().markers[j].body));
   move();
-  if (mine != counted.end()) {
+  if (mine != origin.counted.end()) {
     now[0] = *mine;
   } else {
+    const CountFrom then(*R, origin);
     PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
-    const bool here = accepts == R->accepts; /* else the run has gone on since the state was taken */
+    const bool here = origin.accepts == R->accepts; /* else the run has gone on since the state was taken */
     if (here && std::none_of(R->asked.begin(), R->asked.end(), same)) R->asked.push_back(now[0]);
-    counted.push_back(now[0]);
+    origin.counted.push_back(now[0]);
   }
   PetscCall(CountAngles(*R, u.data(), now));
   *x = now[0].angle;
@@ -148,6 +149,7 @@ PetscErrorCode Snapshot::energy(double *kinetic, double *potential)
   PetscFunctionBegin;
   CHECK_TAKEN(w);
   w.move();
+  const CountFrom then(*w.R, w.origin);
   PetscCall(MakeBalance(*w.R, w.at(), b));
   *kinetic   = b.kinetic;
   *potential = b.potential();

@@ -19,22 +19,6 @@ namespace
 
 bool HasAxes(const LocalBody &k) { return TurnsInSpace(k.kind); }
 
-PetscInt Memories(const Runtime &R)
-{
-  PetscInt n = 0;
-  for (const auto &b : R.batches) n += b->memory();
-  return n;
-}
-
-/* out to x, or in from it */
-void CopyMemories(Runtime &R, double *x, bool in)
-{
-  for (auto &b : R.batches) {
-    b->copyMemory(x, in);
-    x += b->memory();
-  }
-}
-
 void Store(const Eigen::Quaterniond &q, double *x)
 {
   x[0] = q.w();
@@ -273,6 +257,21 @@ PetscErrorCode Prepare(TS ts)
 }
 
 } // namespace
+
+PetscInt Memories(const Runtime &R)
+{
+  PetscInt n = 0;
+  for (const auto &b : R.batches) n += b->memory();
+  return n;
+}
+
+void CopyMemories(Runtime &R, double *x, bool in)
+{
+  for (auto &b : R.batches) {
+    b->copyMemory(x, in);
+    x += b->memory();
+  }
+}
 
 /* Motion of the bodies in the state (U, V), with others' bodies */
 PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)

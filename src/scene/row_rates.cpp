@@ -76,7 +76,7 @@ PetscErrorCode Linearization::Work::fastest(double *rate) const
   Motion m;
   PetscFunctionBegin;
   *rate = 0;
-  PetscCall(moved.take(*R, t, at));
+  PetscCall(look(at));
   for (std::size_t b = 0; b < R->scene.bodies.size(); b++) {
     PetscCall(moved.motion(Body{(PetscInt)b, R->scene.number}, &m));
     *rate = std::max({*rate, m.angular_velocity.norm(), std::sqrt(m.angular_acceleration.norm()), m.velocity.norm() / size, std::sqrt(m.acceleration.norm() / size)});
@@ -91,6 +91,7 @@ PetscErrorCode Linearization::Work::nearby(double later, double time, Work *w) c
   double       *x;
   PetscFunctionBegin;
   w->R         = R;
+  w->origin    = origin;
   w->t         = time;
   w->spin      = spin + later * spin_rate;
   w->spin_rate = spin_rate;

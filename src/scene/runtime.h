@@ -108,6 +108,8 @@ PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
 PetscErrorCode KeepMemories(Runtime &R);
+PetscInt       Memories(const Runtime &R); /* numbers that elements and functions of this rank remember of accepted steps */
+void           CopyMemories(Runtime &R, double *x, bool in); /* out to x, or in from it */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V);
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);

@@ -45,7 +45,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
   double           here, before = INFINITY, best = INFINITY;
   PetscFunctionBegin;
   for (int c = 0; c < 3; c++) at[c] = state[c];
-  PetscCall(moved.take(*R, t, at));
+  PetscCall(look(at));
   PetscCall(moved.value(m, &here));
   for (int c = 0; c < 3; c++) {
     PetscCall(VecDuplicate(state[0], &d[c]));
@@ -63,7 +63,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
       for (int side : {1, -1}) {
         double y;
         for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
-        PetscCall(moved.take(*R, t, at));
+        PetscCall(look(at));
         PetscCall(moved.value(m, &y));
         y -= here;
         if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* half a turn is both pi and -pi */
@@ -178,7 +178,7 @@ PetscErrorCode Linearization::Work::push(const Excitation &in, std::vector<doubl
   PetscCheck(in.load.allFinite() && in.moment.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: force or moment of an excitation is not a number");
   PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");
   Vec at[3] = {state[0], state[1], state[2]};
-  PetscCall(moved.take(*R, t, at));
+  PetscCall(look(at));
   PetscCall(moved.motion(in.at, &m));
   PetscCall(moved.motion(Body{body}, &centre));
   const PetscInt local = R->local_body[body];
@@ -258,7 +258,7 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
   Motion at; /* where it is, and so is what its attachments are attached to */
   Vec    state[3] = {w.state[0], w.state[1], w.state[2]};
-  PetscCall(w.moved.take(*w.R, w.t, state));
+  PetscCall(w.look(state));
   PetscCall(w.moved.motion(b, &at));
   const PetscInt local = R.local_body[b.id];
   const bool     mine  = local >= 0 && R.bodies.body[local].owned;

@@ -10,29 +10,69 @@
 namespace hhtdae
 {
 
+/* What the unknowns of a state count from: attitudes that rotations refer to, what elements remember of accepted steps, and angles over full turns.
+   The run has others once it has gone on. */
+struct Origin {
+  std::vector<Matrix3>      references; /* of this rank's bodies, then those of others */
+  std::vector<double>       memories;   /* of all batches; empty where no element remembers */
+  std::vector<CountedAngle> counted;
+  long                      accepts = 0; /* accepted states before it */
+
+  void take(Runtime &R)
+  {
+    counted = R.asked;
+    accepts = R.accepts;
+    references.clear();
+    for (const LocalBody &b : R.bodies.body) references.push_back(b.C);
+    memories.resize(R.remembers ? Memories(R) : 0);
+    if (R.remembers) CopyMemories(R, memories.data(), false);
+  }
+};
+
+/* The run counts from there while this lives, and as before after that */
+class CountFrom
+{
+public:
+  CountFrom(Runtime &R, Origin &o) : R_(R), origin_(o), now_(o.memories.size())
+  {
+    if (!now_.empty()) CopyMemories(R_, now_.data(), false);
+    exchange();
+    if (!now_.empty()) CopyMemories(R_, origin_.memories.data(), true);
+  }
+  ~CountFrom()
+  {
+    exchange();
+    if (!now_.empty()) CopyMemories(R_, now_.data(), true);
+  }
+  CountFrom(const CountFrom &) = delete;
+
+private:
+  Runtime            &R_;
+  Origin             &origin_;
+  std::vector<double> now_; /* memories of the run */
+
+  void exchange()
+  {
+    for (std::size_t b = 0; b < origin_.references.size(); b++) std::swap(R_.bodies.body[b].C, origin_.references[b]);
+  }
+};
+
 /* The run, and the unknowns of this rank and of its neighbours at the time asked for */
 struct Snapshot::Work {
   Runtime            *R = nullptr;
   double              t = 0;
   std::vector<double> u, v, a;
   long                moved = -1; /* which move of the bodies was to this state */
-  std::vector<CountedAngle> counted; /* as the run had them when the state was taken, after so many accepted states */
-  long                      accepts = 0;
-  std::vector<Matrix3>      references; /* of the bodies' rotations then; the run has others once it has gone on */
+  Origin              origin;
 
   Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
   /* The bodies, where somebody else may have moved them */
   void move()
   {
     if (moved == R->bodies.moves) return;
-    exchangeReferences();
+    const CountFrom then(*R, origin);
     R->bodies.move(u.data(), v.data());
-    exchangeReferences();
     moved = R->bodies.moves;
-  }
-  void exchangeReferences()
-  {
-    for (std::size_t b = 0; b < references.size(); b++) std::swap(R->bodies.body[b].C, references[b]);
   }
   const SceneData &scene() const { return R->scene; }
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
@@ -46,7 +86,6 @@ struct Snapshot::Work {
   PetscErrorCode component(const ElementData &e, PetscInt row, bool constraint, double *x);
   PetscErrorCode ofMarkers(const Measure &m, double *x);
   PetscErrorCode angle(PetscInt i, PetscInt j, double *x);
-  PetscErrorCode checkMemory(PetscInt element);
 };
 
 /* Numbers that one rank computes, on all of them; what goes wrong there goes wrong everywhere */

@@ -765,3 +765,74 @@ TEST(Linearize, AShakenBase)
     must(TSDestroy(&ts));
   }
 }
+
+namespace
+{
+
+/* What a linearization says, as numbers */
+std::vector<double> said(const Linearization &small, const Excitation &in, const std::vector<Measure> &out, Body body)
+{
+  std::vector<double> all;
+  const auto          add = [&](Complex x) {
+    all.push_back(x.real());
+    all.push_back(x.imag());
+  };
+  std::vector<Mode> modes;
+  must(small.modes(&modes));
+  for (const Mode &m : modes) add(m.value);
+  for (const Measure &what : out) {
+    std::vector<Complex> h;
+    Complex              x;
+    must(small.response(in, what, {1., 3.}, &h));
+    for (const Complex &y : h) add(y);
+    must(small.value(modes[0], what, &x));
+    add(x);
+  }
+  BodyPart part;
+  must(small.part(modes[0], body, &part));
+  for (int c = 0; c < 3; c++) add(part.displacement(c));
+  StateSpace space;
+  must(small.stateSpace({in}, out, &space));
+  for (const auto *x : {&space.A, &space.B, &space.C, &space.D}) all.insert(all.end(), x->begin(), x->end());
+  return all;
+}
+
+} // namespace
+
+/* A pendulum with a spring that counts turns, which swings on after it has been linearized */
+TEST(Linearize, GoesOnBeingOfItsState)
+{
+  for (const char *rotations : {"local", "euler313"}) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b        = body(1, {0.1, 0.2, 0.3}, {1, 0, 0});
+    b.angular_velocity = {0, 0, 9};
+    b.velocity         = {0, 9, 0};
+    const Body   rod   = s.add("rod", b);
+    const Marker i = s.markerAt(rod, {0, 0, 0}), j = s.marker(s.ground()), tip = s.markerAt(rod, {1.5, 0, 0});
+    s.gravity({0, -9.81, 0});
+    s.add("pin", Spherical{i, j});
+    Bushing bush;
+    bush.i                   = i;
+    bush.j                   = j;
+    bush.torsional_stiffness = {0.03, 0.04, 0};
+    s.add("bush", bush);
+    const Element spring = s.add("spring", TorsionalSpringDamper{i, j, 0.5, 0});
+    SceneRun      run(s, .9, tolerance(1e-8) + " -scene_rotations " + rotations);
+    Linearization small;
+    must(run.solve());
+    must(small.take(run.ts));
+    const Excitation           in   = Excitation::force(tip, {0, 0, 1});
+    const std::vector<Measure> out  = {Measure::displacement(tip, 2), Measure::velocity(tip, 1), Measure::acceleration(tip, 0), Measure::force(spring, 0)};
+    const std::vector<double>  then = said(small, in, out, rod);
+    must(TSSetMaxTime(run.ts, 1.4));
+    must(run.solve());
+    const std::vector<double> now = said(small, in, out, rod);
+    ASSERT_EQ(now.size(), then.size());
+    for (std::size_t k = 0; k < now.size(); k++) EXPECT_EQ(now[k], then[k]) << rotations << " " << k;
+    Snapshot after; /* and the run has kept its own */
+    double   turns;
+    must(after.take(run.ts));
+    must(after.value(Measure::force(spring, 0), &turns));
+    EXPECT_GT(std::abs(turns), 0.5 * 2 * M_PI);
+  }
+}

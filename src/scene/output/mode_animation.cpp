@@ -23,6 +23,7 @@ PetscErrorCode Linearization::animate(const Mode &m, const std::string &prefix, 
     PetscCall(VecDuplicate(w.state[0], &d[c]));
     PetscCall(VecDuplicate(w.state[0], &at[c]));
   }
+  const CountFrom then(R, w.origin);
   for (int k = 0; k < frames; k++) {
     const auto          phase = std::polar(amplitude, 2 * M_PI * k / frames);
     SmallMotion         x;
