@@ -121,7 +121,8 @@ PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) con
   PetscFunctionReturn(0);
 }
 
-/* b = -M x'' of x'' that takes all masses along with the ground */
+/* b = -M x'' of x'' that takes all masses along with the ground, in the equations of motion alone: rows of variables, states and force states that
+   read accelerations read those relative to the ground (Linearize.GroundAccelerationAndMeasuresOfAcceleration) */
 PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<double> *b) const
 {
   Vec           along, force;
@@ -129,6 +130,8 @@ PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<dou
   const double *f;
   PetscFunctionBegin;
   PetscCheck(ground.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: the acceleration of the ground is not a number");
+  PetscCheck(!R->scene.planar || !ground.head<2>().isZero(0), comm(), PETSC_ERR_ARG_WRONG, "Linearization: the acceleration of the ground, (%g, %g, %g), moves nothing: the scene is planar", ground(0),
+             ground(1), ground(2));
   PetscCall(MatCreateVecs(M, &along, &force));
   PetscCall(VecSet(along, 0));
   PetscCall(VecGetArray(along, &x));
@@ -139,7 +142,8 @@ PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<dou
   PetscCall(VecRestoreArray(along, &x));
   PetscCall(MatMult(M, along, force));
   PetscCall(VecGetArrayRead(force, &f));
-  for (PetscInt i = 0; i < R->n; i++) (*b)[i] = -f[i];
+  for (PetscInt i = 0; i < R->n; i++)
+    if (coordinate(i)) (*b)[i] = -f[i];
   PetscCall(VecRestoreArrayRead(force, &f));
   PetscCall(VecDestroy(&along));
   PetscCall(VecDestroy(&force));
@@ -148,7 +152,6 @@ PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<dou
 
 PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<double> *b) const
 {
-  double largest = 0;
   PetscFunctionBegin;
   b->assign(R->n, 0);
   if (!in.ground.isZero(0)) {
@@ -160,11 +163,6 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
     PetscFunctionReturn(0);
   }
   PetscCall(push(in, b));
-  for (double x : *b) largest = std::max(largest, std::abs(x));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm()));
-  PetscCheck(largest > 0 || (in.load.isZero(0) && in.moment.isZero(0)), comm(), PETSC_ERR_ARG_WRONG,
-             "Linearization: the load of an excitation, force (%g, %g, %g) and moment (%g, %g, %g), moves nothing: the body %s %s", in.load(0), in.load(1), in.load(2), in.moment(0), in.moment(1), in.moment(2),
-             R->scene.bodies[R->scene.markers[in.at.id].body].name.c_str(), R->scene.planar ? "stays in the plane" : "does not turn");
   PetscFunctionReturn(0);
 }
 
@@ -177,6 +175,12 @@ PetscErrorCode Linearization::Work::push(const Excitation &in, std::vector<doubl
   const PetscInt body = s.markers[in.at.id].body;
   PetscCheck(in.load.allFinite() && in.moment.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: force or moment of an excitation is not a number");
   PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");
+  /* each by itself: what has no effect is not to be dropped beside what has one */
+  const bool force_acts  = in.load.isZero(0) || !s.planar || !in.load.head<2>().isZero(0);
+  const bool moment_acts = in.moment.isZero(0) || (!s.turnless(body) && (!s.planar || in.moment(2) != 0));
+  PetscCheck(force_acts && moment_acts, comm(), PETSC_ERR_ARG_WRONG, "Linearization: %s of an excitation, (%g, %g, %g), moves nothing: the body %s %s", force_acts ? "the moment" : "the force",
+             (force_acts ? in.moment : in.load)(0), (force_acts ? in.moment : in.load)(1), (force_acts ? in.moment : in.load)(2), s.bodies[body].name.c_str(),
+             force_acts && s.turnless(body) ? "does not turn" : "stays in the plane");
   Vec at[3] = {state[0], state[1], state[2]};
   PetscCall(look(at));
   PetscCall(moved.motion(in.at, &m));

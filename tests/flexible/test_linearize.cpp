@@ -836,3 +836,60 @@ TEST(Linearize, GoesOnBeingOfItsState)
     EXPECT_GT(std::abs(turns), 0.5 * 2 * M_PI);
   }
 }
+
+/* m z'' = -k z - c z' - a z'' - m g'': measures of accelerations are relative to the ground, of variables and of forces that read them as well */
+TEST(Linearize, GroundAccelerationAndMeasuresOfAcceleration)
+{
+  for (double feedback : {0., 3.}) {
+    Scene     s(PETSC_COMM_SELF);
+    PointMass p;
+    p.mass         = m;
+    const Marker q = s.marker(s.add("mass", p)), g = s.marker(s.ground());
+    s.add("line", InLine{q, g});
+    s.add("spring", SpringDamper{q, s.marker(s.ground(), {0, 0, -1}), 50, c, 1});
+    const Measure  z = Measure::displacement(q, 2), a = Measure::acceleration(q, 2);
+    const Variable v = s.variable("acceleration", a);
+    UserForce      f;
+    f.i     = q;
+    f.force = {TimeFunction(0), TimeFunction(0), Expression({a}, [=](const Real *x) -> Real { return -feedback * x[0]; })};
+    s.add("feedback", f);
+    const Started        start(s);
+    const double         w = 4;
+    const Complex        x = -m / Complex(50 - (m + feedback) * w * w, c * w), expected[] = {x, -w * w * x, -w * w * x};
+    const std::vector<Measure> what = {z, a, Measure::value(v)};
+    StateSpace           space;
+    must(start.small.stateSpace({Excitation::groundAcceleration({0, 0, 1})}, what, &space));
+    for (int k = 0; k < 3; k++) {
+      std::vector<Complex> h;
+      must(start.small.response(Excitation::groundAcceleration({0, 0, 1}), what[k], {w}, &h));
+      EXPECT_LT(std::abs(h[0] - expected[k]), 1e-8 * std::abs(expected[k])) << feedback << k << h[0] << expected[k];
+    }
+    EXPECT_NEAR(space.D[1], -m / (m + feedback), 1e-8);
+    EXPECT_NEAR(space.D[2], -m / (m + feedback), 1e-8);
+  }
+}
+
+/* Each of force, moment and ground: what has no effect is not dropped beside what has one */
+TEST(Linearize, ExcitationsWithoutEffect)
+{
+  Scene        s(PETSC_COMM_SELF, Space::Planar);
+  const Body   b = s.add("body", body(1, {1, 1, 1})), d = s.add("dot", PointMass());
+  const Marker q = s.marker(b), r = s.marker(d), g = s.marker(s.ground(), {1, 0, 0}), h = s.marker(s.ground(), {0, 1, 0});
+  for (Marker k : {q, r}) {
+    s.add("", SpringDamper{k, g, 3, 1, .5});
+    s.add("", SpringDamper{k, h, 3, 1, .5});
+  }
+  const Started        start(s);
+  std::vector<Complex> x;
+  const auto           refused = [&](const Excitation &in, const std::string &why) {
+    ErrorTrap trap;
+    EXPECT_NE(start.small.response(in, Measure::displacement(q, 0), {1.}, &x), 0) << why;
+    EXPECT_TRUE(trap.says(why)) << trap.message;
+  };
+  refused(Excitation::groundAcceleration({0, 0, 1}), "the acceleration of the ground, (0., 0., 1.), moves nothing");
+  refused(Excitation::force(q, {0, 0, 1}), "the force of an excitation, (0., 0., 1.), moves nothing: the body body stays in the plane");
+  Excitation both = Excitation::force(r, {1, 0, 0});
+  both.moment     = {0, 0, 1};
+  refused(both, "the moment of an excitation, (0., 0., 1.), moves nothing: the body dot does not turn");
+  must(start.small.response(Excitation::force(r, {1, 0, 0}), Measure::displacement(r, 0), {1.}, &x));
+}
