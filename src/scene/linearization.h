@@ -48,11 +48,18 @@ struct Linearization::Work {
   PetscErrorCode push(const Excitation &in, std::vector<double> *b) const;
   PetscErrorCode shake(const Vector3 &ground, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
-  PetscErrorCode rates(const std::vector<PetscInt> &rows, RowRates *out) const;
+  /* of these rows of constraints, less the variables that they read; global numbers */
+  PetscErrorCode rates(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
+  PetscErrorCode ratesInTime(double e, bool still, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
+  PetscErrorCode ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
+  PetscErrorCode rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd *of_C, Eigen::MatrixXd *of_K) const;
   PetscErrorCode fastest(double *rate) const;
   PetscErrorCode look(Vec at[3]) const; /* `moved` at this state, near `state` */
   PetscErrorCode nearby(double later, double time, Work *w) const;
 };
+
+/* Rows less what they read of variables, which are eliminated by their own rows; not a number where these are singular */
+void EliminateVariables(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd &C, Eigen::MatrixXd &K);
 
 /* All of a distributed matrix on every rank */
 PetscErrorCode Whole(Mat A, Eigen::MatrixXd &out);

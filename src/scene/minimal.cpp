@@ -7,6 +7,8 @@
     W (q'', s', lambda, V, F) = b f - K_q q - C_q v - K_s s,    rows of constraints: Phi_q q'' = -2 Phi_q. v - Phi_q.. q,
                                                                 Psi_v q'' = -(Psi_v. + Psi_q) v - Psi_q. q - Psi_s s' - Psi_s. s
 
+  Variables that rows of velocities read are eliminated from them beforehand: V of positions and states goes into Psi_q and Psi_s.
+
   Positions are q = N z, N an orthonormal basis of what Phi_q leaves; velocities v = L y + P q + S s, L of what Phi_q and Psi_v leave, P and S the least
   ones for which Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q - Psi_s s. Where the rows change, N and L go with them by the least rates, so that their columns are moved
   parallel to themselves: coordinates of a single freedom are lengths along its path, in units of masses, whatever the speed. So
@@ -162,9 +164,11 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   PetscCall(Whole(w.K, K));
   PetscCall(Gather(w, MPI_UNSIGNED_CHAR, w.role, role));
   PetscCall(Gather(w, MPI_DOUBLE, w.unit, unit));
-  std::vector<PetscInt> definitions;
+  std::vector<PetscInt> definitions, variables;
   for (PetscInt i = 0; i < n; i++)
     (role[i] == TSHHT3_COORDINATE ? m.q : role[i] == TSHHT3_STATE ? m.s : role[i] == TSHHT3_HOLONOMIC ? m.holonomic : role[i] == TSHHT3_NONHOLONOMIC ? m.velocity : definitions).push_back(i);
+  for (PetscInt i : definitions)
+    if (role[i] == TSHHT3_VARIABLE) variables.push_back(i);
   m.rest = m.holonomic;
   m.rest.insert(m.rest.end(), m.velocity.begin(), m.velocity.end());
   m.rest.insert(m.rest.end(), definitions.begin(), definitions.end());
@@ -172,7 +176,11 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   std::vector<PetscInt> both = m.holonomic;
   both.insert(both.end(), m.velocity.begin(), m.velocity.end());
   RowRates rates;
-  PetscCall(w.rates(both, &rates));
+  PetscCall(w.rates(both, variables, &rates));
+  EliminateVariables(m.velocity, variables, C, K);
+  for (PetscInt i : m.velocity)
+    PetscCheck(std::all_of(m.rest.begin(), m.rest.end(), [&](PetscInt j) { return K(i, j) == 0; }), w.comm(), PETSC_ERR_SUP,
+               "Linearization: %s reads a variable that does not follow from positions, velocities, states and time", UnknownName(*w.R->model, i).c_str());
   ToUnits(m, M, C, K, both, rates);
 
   const Subspace     position(Block(K, m.holonomic, m.q));

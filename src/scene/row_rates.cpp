@@ -4,10 +4,17 @@
     q + q' e + q'' e^2/2,    v + q'' e,
 
   which has all that first rates of C and second ones of K depend on. Only rows' directions matter: what multiplies a whole row leaves the reduction as it
-  is. Time is taken along where rows depend on it by themselves, as a user's may.
+  is. Time is taken along where rows depend on it by themselves, as a user's may: how far is then found out, since their time may be any
+  (Linearize.RowsThatTurnByThemselves).
+
+  Rows of velocities may read variables, V = -K_VV^-1 (K_Vq q + C_Vq v + K_Vs s + ...) by the variables' own rows: these are taken out of them, here and in
+  minimal.cpp.
 */
 #include "linearization.h"
 #include "rotation.h"
+#include <petscblaslapack.h>
+#include <algorithm>
+#include <iterator>
 #include <limits>
 
 namespace hhtdae
@@ -16,8 +23,13 @@ namespace hhtdae
 namespace
 {
 
-/* Angles and parts of the scene's size that the motion covers in a step of the differences, and seconds where rows depend on time */
+/* Angles and parts of the scene's size that the motion covers in a step of the differences; seconds at first, where rows depend on time */
 constexpr double reach = 1e-2;
+/* Where rows depend on time: steps of the differences are by this factor from each other, so many at most either way; two that agree to this part of
+   the rates are as good as differences of fourth order are */
+constexpr double golden        = 1.6180339887498949; /* steps with such factors between them are not all periods of a row, which would count as constant */
+constexpr double apart_in_time = 5 * golden, agreed = 1e-6;
+constexpr int    most_steps = 16;
 
 Eigen::MatrixXd Rows(const Eigen::MatrixXd &A, const std::vector<PetscInt> &rows)
 {
@@ -121,43 +133,129 @@ PetscErrorCode Linearization::Work::nearby(double later, double time, Work *w) c
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, RowRates *out) const
+void EliminateVariables(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd &C, Eigen::MatrixXd &K)
+{
+  const auto           reads = [&](PetscInt i) { return std::any_of(variables.begin(), variables.end(), [&](PetscInt v) { return K(i, v) != 0; }); };
+  std::vector<PetscInt> reading;
+  std::copy_if(rows.begin(), rows.end(), std::back_inserter(reading), reads);
+  if (reading.empty()) return;
+  const Eigen::Index        n = K.cols();
+  const PetscBLASInt        nv = (PetscBLASInt)variables.size(), columns = (PetscBLASInt)(2 * n);
+  Eigen::MatrixXd           V(nv, nv), right(nv, 2 * n), by(reading.size(), nv);
+  std::vector<PetscBLASInt> pivot(nv);
+  PetscBLASInt              info = 0;
+  right << Rows(C, variables), Rows(K, variables);
+  for (PetscBLASInt k = 0; k < nv; k++) {
+    V.col(k)  = right.col(n + variables[k]);
+    by.col(k) = Rows(K, reading).col(variables[k]);
+  }
+  LAPACKgesv_(&nv, &columns, V.data(), &nv, pivot.data(), right.data(), &nv, &info);
+  if (info) right.setConstant(NAN);
+  const Eigen::MatrixXd less = by * right;
+  for (std::size_t i = 0; i < reading.size(); i++) {
+    C.row(reading[i]) -= less.row((Eigen::Index)i).head(n);
+    K.row(reading[i]) -= less.row((Eigen::Index)i).tail(n);
+    for (PetscInt v : variables) K(reading[i], v) = 0;
+  }
+}
+
+/* These rows of C and K `later` on the motion, at a time */
+PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd *of_C,
+                                           Eigen::MatrixXd *of_K) const
+{
+  Work            w;
+  Eigen::MatrixXd X, Y;
+  PetscFunctionBegin;
+  PetscCall(nearby(later, time, &w));
+  PetscCall(Whole(w.C, X));
+  PetscCall(Whole(w.K, Y));
+  EliminateVariables(rows, variables, X, Y);
+  *of_C = Rows(X, rows);
+  *of_K = Rows(Y, rows);
+  PetscFunctionReturn(0);
+}
+
+/* By differences of steps e */
+PetscErrorCode Linearization::Work::ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   constexpr double first[5] = {1. / 12, -8. / 12, 0, 8. / 12, -1. / 12}, second[5] = {-1. / 12, 16. / 12, -30. / 12, 16. / 12, -1. / 12};
-  Eigen::MatrixXd  X, at_a_time[2];
-  double           rate, e;
+  Eigen::MatrixXd  of_C, of_K, C0, K0;
   PetscFunctionBegin;
-  if (rows.empty()) { /* of any rank */
-    PetscInt n;
-    PetscCall(MatGetSize(K, &n, nullptr));
-    for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) x->resize(0, n);
-    PetscFunctionReturn(0);
-  }
-  for (int k = 0; k < 2; k++) {
-    Work w;
-    PetscCall(nearby(0, t + k * reach, &w));
-    PetscCall(Whole(w.K, X));
-    at_a_time[k] = Rows(X, rows);
-  }
-  const bool of_time = at_a_time[0] != at_a_time[1];
-  for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero((Eigen::Index)rows.size(), X.cols());
-  PetscCall(fastest(&rate));
-  if (!(rate > 0) && !of_time) PetscFunctionReturn(0);
-  e = reach / (of_time ? std::max(1., rate) : rate);
   for (int k = 0; k < 5; k++) {
     const double at = (k - 2) * e;
-    Work         w;
-    PetscCall(nearby(at, of_time ? t + at : t, &w));
-    PetscCall(Whole(w.C, X));
-    out->C += first[k] / e * Rows(X, rows);
-    PetscCall(Whole(w.K, X));
-    out->K += first[k] / e * Rows(X, rows);
-    out->second_K += second[k] / (e * e) * Rows(X, rows);
+    PetscCall(rowsAt(at, of_time ? t + at : t, rows, variables, &of_C, &of_K));
+    if (!k)
+      for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero(of_K.rows(), of_K.cols());
+    out->C += first[k] / e * of_C;
+    out->K += first[k] / e * of_K;
+    out->second_K += second[k] / (e * e) * of_K;
+    if (k != 2) continue;
+    C0 = of_C;
+    K0 = of_K;
   }
-  PetscCall(Whole(C, X));
-  DropRounding(Rows(X, rows), 1 / e, out->C);
-  DropRounding(at_a_time[0], 1 / e, out->K);
-  DropRounding(at_a_time[0], 1 / (e * e), out->second_K);
+  DropRounding(C0, 1 / e, out->C);
+  DropRounding(K0, 1 / e, out->K);
+  DropRounding(K0, 1 / (e * e), out->second_K);
+  PetscFunctionReturn(0);
+}
+
+/* Parts of themselves that rows are apart */
+static double Apart(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
+{
+  const double size = std::max(a.size() ? a.cwiseAbs().maxCoeff() : 0, b.size() ? b.cwiseAbs().maxCoeff() : 0);
+  return size > 0 ? (a - b).cwiseAbs().maxCoeff() / size : 0;
+}
+
+/* Rows that depend on time: steps from e on downwards, until two agree; else of those that agree best. Where the scene is still e is first made so long that
+   rows change by `reach` of themselves. */
+PetscErrorCode Linearization::Work::ratesInTime(double e, bool still, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
+{
+  Eigen::MatrixXd C0, K0, X, Y;
+  RowRates        now, before;
+  double          best = INFINITY;
+  PetscFunctionBegin;
+  PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
+  for (int k = 0; still && k < most_steps; k++) {
+    double change = 0;
+    for (double at : {e, e / golden}) {
+      PetscCall(rowsAt(at, t + at, rows, variables, &X, &Y));
+      change = std::max(change, Apart(X, C0) + Apart(Y, K0));
+    }
+    if (change >= reach) break;
+    e *= apart_in_time;
+  }
+  for (int k = 0; k < most_steps; k++, e /= apart_in_time) {
+    PetscCall(ratesBy(e, true, rows, variables, &now));
+    const double apart = k ? std::max({Apart(now.C, before.C), Apart(now.K, before.K), Apart(now.second_K, before.second_K)}) : INFINITY;
+    if (apart < best || !k) {
+      best = apart;
+      *out = now;
+    }
+    if (best <= agreed) break;
+    before = now;
+  }
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
+{
+  Eigen::MatrixXd C0, K0, X, Y;
+  double          rate;
+  bool            of_time = false;
+  PetscInt        n;
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(K, &n, nullptr));
+  for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero((Eigen::Index)rows.size(), n);
+  if (rows.empty()) PetscFunctionReturn(0); /* of any rank */
+  PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
+  for (double later : {reach, reach / golden}) {
+    if (of_time) break;
+    PetscCall(rowsAt(0, t + later, rows, variables, &X, &Y));
+    of_time = X != C0 || Y != K0;
+  }
+  PetscCall(fastest(&rate));
+  if (of_time) PetscCall(ratesInTime(rate > 0 ? std::max(reach, reach / rate) : reach, !(rate > 0), rows, variables, out));
+  else if (rate > 0) PetscCall(ratesBy(reach / rate, false, rows, variables, out));
   PetscFunctionReturn(0);
 }
 

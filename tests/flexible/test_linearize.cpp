@@ -869,6 +869,70 @@ TEST(Linearize, GroundAccelerationAndMeasuresOfAcceleration)
   }
 }
 
+/* z' = V, V = -2 z + (y - 1)/2, y'' = -5 (y - z) - 0.3 (y' - z') + f: variables of rows of velocities, as if their definitions were written there */
+TEST(Linearize, VariablesInRowsOfVelocities)
+{
+  std::vector<Complex> values[2];
+  for (bool written : {false, true}) {
+    Scene     s(PETSC_COMM_SELF);
+    PointMass p;
+    p.mass         = 2;
+    const Marker q = s.marker(s.add("follower", p)), g = s.marker(s.ground());
+    p.mass         = 1;
+    p.position     = {0, 0, 1};
+    const Marker y = s.marker(s.add("mass", p));
+    s.add("line", InLine{q, g});
+    s.add("other line", InLine{y, g});
+    s.add("spring", SpringDamper{q, y, 5, .3, 1});
+    const Measure zq = Measure::displacement(q, 2), zy = Measure::displacement(y, 2), speed = Measure::velocity(q, 2);
+    if (written) s.add("row", UserConstraint{{Expression({speed, zq, zy}, [](const Real *x) -> Real { return x[0] + 2 * x[1] - .5 * (x[2] - 1); })}});
+    else {
+      const Variable half = s.variable("half", Expression({zy}, [](const Real *x) -> Real { return .5 * (x[0] - 1); }));
+      const Variable v    = s.variable("speed", Expression({zq, Measure::value(half)}, [](const Real *x) -> Real { return -2 * x[0] + x[1]; }));
+      s.add("row", UserConstraint{{Expression({speed, Measure::value(v)}, [](const Real *x) -> Real { return x[0] - x[1]; })}});
+    }
+    const Started start(s);
+    for (const Mode &mode : start.modes()) values[written].push_back(mode.value);
+    const Excitation in = Excitation::force(y, {0, 0, 1});
+    StateSpace       space;
+    must(start.small.stateSpace({in}, {zq, zy}, &space));
+    ASSERT_EQ(space.states, 3);
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const double           w = 2;
+    const Eigen::MatrixXcd A = Eigen::Map<Rows>(space.A.data(), 3, 3).cast<Complex>(), B = Eigen::Map<Rows>(space.B.data(), 3, 1).cast<Complex>(),
+                           C = Eigen::Map<Rows>(space.C.data(), 2, 3).cast<Complex>();
+    const Eigen::MatrixXcd h     = C * (Complex(0, w) * Eigen::MatrixXcd::Identity(3, 3) - A).partialPivLu().solve(B);
+    const Complex          iw(0, w), of_y = 1. / (-w * w + 5 + .3 * iw - (5. + .3 * iw) * .5 / (iw + 2.));
+    EXPECT_LT(std::abs(h(1) - of_y), 1e-8) << h(1) << of_y;
+    EXPECT_LT(std::abs(h(0) - .5 * of_y / (iw + 2.)), 1e-8) << h(0);
+  }
+  ASSERT_EQ(values[0].size(), values[1].size());
+  for (std::size_t k = 0; k < values[0].size(); k++) EXPECT_LT(std::abs(values[0][k] - values[1][k]), 1e-8);
+}
+
+/* A bead on a line that turns with w about the place where the bead rests, k = 5 w^2: 2i times w, whatever the unit of time */
+TEST(Linearize, RowsThatTurnByThemselves)
+{
+  for (double w : {1e-5, 0.1, 1., 50., 2 * M_PI / 0.01, 2 * M_PI / 0.00125, 1e3, 1e6}) {
+    Scene     s(PETSC_COMM_SELF, Space::Planar);
+    PointMass p;
+    p.position           = {1, 0, 0};
+    const Marker  q      = s.marker(s.add("bead", p)), g = s.marker(s.ground(), {1, 0, 0});
+    const Measure x      = Measure::displacement(q, 0, g), y = Measure::displacement(q, 1, g);
+    s.add("line", UserConstraint{{Expression({x, y, Measure::time()}, [=](const Real *m) -> Real { return m[0] * sin(w * m[2]) - m[1] * cos(w * m[2]); })}});
+    UserForce f;
+    f.i           = q;
+    const auto of = [=](const Measure &m) { return Expression({m}, [=](const Real *d) -> Real { return -5 * w * w * d[0]; }); };
+    f.force       = {of(x), of(y), TimeFunction(0)};
+    s.add("springs", f);
+    const Started start(s);
+    const auto    modes = start.modes();
+    ASSERT_EQ(modes.size(), 1u);
+    EXPECT_NEAR(modes[0].value.imag() / w, 2, 1e-5) << w;
+    EXPECT_NEAR(modes[0].value.real() / w, 0, 1e-5) << w;
+  }
+}
+
 /* Each of force, moment and ground: what has no effect is not dropped beside what has one */
 TEST(Linearize, ExcitationsWithoutEffect)
 {
