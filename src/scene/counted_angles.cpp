@@ -110,16 +110,18 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
   double                    most = PETSC_NINFINITY, x;
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
-  if (s.planar) {
+  for (const auto &b : R.batches)
+    if (b->countedAngle(i, j, &x)) most = std::max(most, x);
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
+  if (most > PETSC_NINFINITY) {
+    std::vector<Axes> axes;
+    PetscCall(GatherAxes(R, u, now, axes));
+    now[0].angle  = most;
+    now[0].turned = axes[0][9];
+  } else if (s.planar) {
     now[0].angle  = StartAngle(*R.model, Marker{i}, Marker{j});
     now[0].turned = StartOf(s, i) - StartOf(s, j);
-  } else {
-    for (const auto &b : R.batches)
-      if (b->countedAngle(i, j, &x)) most = std::max(most, x);
-    if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
-    if (most > PETSC_NINFINITY) now[0].angle = most;
-    else if (AngleOfMotion(*R.model, t, i, j, &x)) now[0].angle = x;
-  }
+  } else if (AngleOfMotion(*R.model, t, i, j, &x)) now[0].angle = x;
   PetscCall(CountAngles(R, u, now));
   *first = now[0];
   PetscFunctionReturn(0);

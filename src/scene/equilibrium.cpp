@@ -363,6 +363,8 @@ static PetscErrorCode MoveToEquilibrium(Model &M, Runtime &R, Vec U, Vec V)
   PetscFunctionBegin;
   PetscCall(InitialState(R, U, V));
   PetscCall(RelaxAt(R, s.start.time, U, &s.started.equilibrium_iterations));
+  M.turned.resize(Memories(R)); /* the run begins with the turns made on the way (SceneEquilibrium.TurnsOnTheWay) */
+  CopyMemories(R, M.turned.data(), false);
   PetscCall(WriteState(M, R, U, nullptr));
   PetscCall(ReportMoves(s, before, "equilibrium"));
   PetscFunctionReturn(0);

@@ -26,6 +26,7 @@ struct Model {
   PetscMPIInt rank = 0, size = 1;
   Numbering   number;
   std::vector<Matrix3> described; /* attitudes of the bodies, before assembly and equilibrium moved them */
+  std::vector<double>  turned;    /* what this rank's elements and functions remember of the way to equilibrium: angles over full turns, points on curves */
   PetscInt             n = 0, start = 0; /* own unknowns, global number of the first */
 };
 

@@ -353,6 +353,7 @@ PetscErrorCode MakeAxes(Runtime &R)
     Store(Eigen::Quaterniond(C), x + 4 * b);
   }
   PetscCall(VecRestoreArray(R.axes, &x));
+  if ((PetscInt)R.model->turned.size() == Memories(R)) CopyMemories(R, const_cast<double *>(R.model->turned.data()), true);
   PetscCall(KeepMemories(R));
   PetscCall(UseAxes(R));
   PetscFunctionReturn(0);

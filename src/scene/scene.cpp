@@ -254,6 +254,7 @@ PetscErrorCode Scene::setUp()
     else PetscCall(Partition(s, M.size, M.number.owner));
     FillLight(s);
     M.described.clear();
+    M.turned.clear();
     for (const BodyData &b : s.bodies) M.described.push_back(b.A);
     PetscCall(Assemble(M));
     PetscCall(DropRedundant(M));

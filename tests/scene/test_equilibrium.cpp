@@ -203,3 +203,41 @@ TEST(SceneEquilibrium, OfBodiesOnSprings)
     must(TSDestroy(&ts));
   }
 }
+
+/* A torsional spring turns the body by more than half a turn on the way to its free angle, and a wheel that a gear joins to it by another part of turns: a run
+   that begins there begins without a moment */
+TEST(SceneEquilibrium, TurnsOnTheWay)
+{
+  for (Space space : {Space::Planar, Space::Spatial})
+    for (bool gear : {false, true}) {
+      Scene     s(PETSC_COMM_SELF, space);
+      RigidBody b;
+      const Body   wheel = s.add("wheel", b);
+      const Marker i = s.marker(wheel), j = s.marker(s.ground());
+      s.add("axle", Revolute{i, j});
+      TorsionalSpringDamper spring{i, j, 1, .1};
+      spring.angle         = 7;
+      const Element torque = s.add("spring", spring);
+      if (gear) {
+        b.position         = {1, 0, 0};
+        const Body   other = s.add("other", b);
+        const Marker k = s.marker(other), l = s.marker(s.ground(), {1, 0, 0});
+        s.add("other axle", Revolute{k, l});
+        s.add("gear", Gear{i, j, k, l, .7});
+      }
+      s.channel("angle", Measure::angle(i, j));
+      s.start().equilibrium = true;
+      SceneRun            run(s, .5, "");
+      std::vector<double> sampled;
+      Snapshot            now;
+      double              x;
+      must(s.sample(run.ts, 0, sampled));
+      EXPECT_NEAR(sampled[0], 7, 1e-6) << gear;
+      must(run.solve());
+      must(now.take(run.ts));
+      must(now.value(Measure::force(torque, 0), &x));
+      EXPECT_NEAR(x, 0, 1e-6) << gear;
+      must(now.value(Measure::angle(i, j), &x));
+      EXPECT_NEAR(x, 7, 1e-6) << gear;
+    }
+}
