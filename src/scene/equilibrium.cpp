@@ -31,11 +31,15 @@ constexpr double at_rest = 1e-9;        /* a step that moves no more than this *
 constexpr double noise   = 10;          /* times the forces that rounding of the coordinates makes: no step comes nearer (Equilibrium.AMeshFarFromTheOrigin) */
 constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
+constexpr double settled = 1e-8;                     /* what states, variables and motions of velocities would still do in the last step, parts of themselves */
+constexpr double state_floor = 1e-6;               /* of states that are zero: their rounding is that of numbers of one */
 constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
 
 struct Equilibrium : StillSystem {
   Vec      start = nullptr, undamped = nullptr;
   double   scale = 0; /* of forces */
+  double   h = 0;     /* of the last step */
+  std::vector<double> most; /* of own unknowns on the way */
   PetscInt iterations = 0;
 
   using StillSystem::StillSystem;
@@ -50,6 +54,7 @@ struct Attempt {
   bool   good        = false;
   int    corrections = 0; /* after the first */
   double reach = INFINITY, work[2] = {0, 0};
+  double at_the_states_before = INFINITY; /* the second work, as if states had not changed */
 };
 
 /* The forces that rounding makes of the coordinates, and of places of bodies, which are held against those of markers (Stops.ALoadOnAStopAnywhere) */
@@ -118,6 +123,45 @@ PetscErrorCode Work(const Equilibrium &E, Vec F, Vec d, double *work)
   PetscCall(VecRestoreArrayRead(d, &x));
   PetscCall(VecRestoreArrayRead(F, &f));
   PetscCallMPI(MPI_Allreduce(&mine, work, 1, MPI_DOUBLE, MPI_SUM, R.scene.comm));
+  PetscFunctionReturn(0);
+}
+
+/* What states that are read have changed is no stiffness: the work of the forces after a step where they are as before, and with them variables and force
+   states, by one correction */
+PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
+{
+  const Runtime  &R = E.R;
+  const PetscInt *i;
+  PetscInt        all, n;
+  const double   *from, *f;
+  double         *to;
+  PetscFunctionBegin;
+  PetscCall(ISGetSize(R.roles[TSHHT3_STATE], &all));
+  if (!all) PetscFunctionReturn(0);
+  PetscCall(VecCopy(E.next, E.A));
+  const auto replace = [&](TSHHT3Role role) -> PetscErrorCode { /* states by those of U; others less their rows */
+    PetscFunctionBegin;
+    PetscCall(ISGetLocalSize(R.roles[role], &n));
+    PetscCall(ISGetIndices(R.roles[role], &i));
+    PetscCall(VecGetArrayRead(E.U, &from));
+    PetscCall(VecGetArrayRead(E.F, &f));
+    PetscCall(VecGetArray(E.A, &to));
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt own = i[k] - R.start;
+      to[own]            = role == TSHHT3_STATE ? from[own] : to[own] - f[own];
+    }
+    PetscCall(VecRestoreArray(E.A, &to));
+    PetscCall(VecRestoreArrayRead(E.F, &f));
+    PetscCall(VecRestoreArrayRead(E.U, &from));
+    PetscCall(ISRestoreIndices(R.roles[role], &i));
+    PetscFunctionReturn(0);
+  };
+  PetscCall(replace(TSHHT3_STATE));
+  PetscCall(E.residual(E.A));
+  for (TSHHT3Role role : {TSHHT3_VARIABLE, TSHHT3_FORCE}) PetscCall(replace(role));
+  PetscCall(E.residual(E.A));
+  PetscCall(Work(E, E.F, E.d, work));
+  PetscCall(E.residual(E.next));
   PetscFunctionReturn(0);
 }
 
@@ -238,6 +282,8 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
   PetscCall(E.residual(E.next));
   PetscCall(Work(E, E.start, E.d, &a.work[0]));
   PetscCall(Work(E, E.F, E.d, &a.work[1]));
+  PetscCall(WorkAtStatesBefore(E, &a.at_the_states_before));
+  E.h = h;
   PetscCall(VecCopy(E.next, E.U));
   after.step = a.reach * largest_turn;
   PetscFunctionReturn(0);
@@ -246,25 +292,61 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 /*
   Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong (SceneEquilibrium.StrongDamping), h need
   not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
-  against the forces has been Newton's towards a saddle.
+  against the forces has been Newton's towards a saddle. Where states take balanced bodies along, what their change does to the forces is left out, and where
+  no work is done but that of forces that count as balanced, only time goes on (SceneEquilibrium.SlowStates).
 */
-double Growth(const Attempt &a, double before, const Unbalanced &after)
+double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbalanced &after)
 {
   const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
-  if (a.work[0] <= 0) return 0.25;
-  const bool in_hollow = a.work[1] > 0 && a.work[1] < a.work[0];
+  const bool   idle    = std::abs(a.work[0]) <= balanced * E.scale * after.step * E.size;
+  if (!idle && a.work[0] < 0) return 0.25;
+  const bool in_hollow = idle || (a.work[1] > 0 && std::min(a.work[1], a.at_the_states_before) < a.work[0]);
   return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);
 }
 
-/* Stiff springs and meshes leave rounding that is no small part of the weights: what it makes of the forces where the scene stands is as good as zero. */
+/* What is left in F of rows that are no forces, each as a part of what it is of: of definitions of the value, of rates of states and of velocities what they
+   would do in the last, longest step, which knows the scene's own time (SceneEquilibrium.SlowStates, SceneEquilibrium.AMotionOfASmallVelocity) */
+PetscErrorCode Unsettled(const Equilibrium &E, Vec F, double *part)
+{
+  const Runtime &R = E.R;
+  const double  *f;
+  double         mine = 0;
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(F, &f));
+  for (TSHHT3Role role : {TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE, TSHHT3_STATE}) {
+    const PetscInt *i;
+    PetscInt        n;
+    PetscCall(ISGetLocalSize(R.roles[role], &n));
+    PetscCall(ISGetIndices(R.roles[role], &i));
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt own  = i[k] - R.start;
+      const double   size = E.most[own];
+      if (std::binary_search(E.unread.begin(), E.unread.end(), i[k])) continue;
+      const double x = role == TSHHT3_NONHOLONOMIC ? f[own] * E.h / E.size : role == TSHHT3_VARIABLE ? f[own] / std::max(1., size) : role == TSHHT3_FORCE ? f[own] / std::max({1., E.scale, size}) :
+                                                                                                       f[own] * E.h / std::max(state_floor, size);
+      mine = std::max(mine, std::isnan(x) ? INFINITY : std::abs(x));
+    }
+    PetscCall(ISRestoreIndices(R.roles[role], &i));
+  }
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCallMPI(MPI_Allreduce(&mine, part, 1, MPI_DOUBLE, MPI_MAX, R.scene.comm));
+  PetscFunctionReturn(0);
+}
+
+/* Stiff springs and meshes leave rounding that is no small part of the weights: what it makes of the forces where the scene stands is as good as zero.
+   F: what is left at U */
 PetscErrorCode Balanced(Equilibrium &E, const Unbalanced &at, bool *found)
 {
-  double rounded = 0;
+  double unsettled, rounded = 0, rounded_rest = 0;
   PetscFunctionBegin;
   *found = false;
-  if (at.misfit > balanced * E.size || at.other > 1e-8 * std::max(1.0, E.scale)) PetscFunctionReturn(0);
-  if (at.force > balanced * E.scale) PetscCall(Rounding(E, &rounded));
-  *found = at.force <= std::max(balanced * E.scale, noise * rounded);
+  PetscCall(Unsettled(E, E.F, &unsettled));
+  if (at.misfit > balanced * E.size) PetscFunctionReturn(0);
+  if (at.force > balanced * E.scale || unsettled > settled) {
+    PetscCall(Rounding(E, &rounded));
+    PetscCall(Unsettled(E, E.start, &rounded_rest));
+  }
+  *found = at.force <= std::max(balanced * E.scale, noise * rounded) && unsettled <= std::max(settled, noise * rounded_rest);
   PetscFunctionReturn(0);
 }
 
@@ -283,9 +365,21 @@ PetscErrorCode FindUnread(Equilibrium &E)
   PetscCall(MatGetColumnNorms(E.J, NORM_INFINITY, column.data()));
   PetscCall(ISGetLocalSize(states, &n));
   PetscCall(ISGetIndices(states, &i));
+  E.unread.clear();
   std::copy_if(i, i + n, std::back_inserter(E.unread), [&](PetscInt s) { return column[s] == 0; });
   PetscCall(ISRestoreIndices(states, &i));
   std::sort(E.unread.begin(), E.unread.end());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode NoteLargest(Equilibrium &E)
+{
+  const double *u;
+  PetscFunctionBegin;
+  E.most.resize(E.R.n);
+  PetscCall(VecGetArrayRead(E.U, &u));
+  for (PetscInt i = 0; i < E.R.n; i++) E.most[i] = std::max(E.most[i], std::abs(u[i]));
+  PetscCall(VecRestoreArrayRead(E.U, &u));
   PetscFunctionReturn(0);
 }
 
@@ -309,6 +403,7 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
   Attempt a;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
+  PetscCall(NoteLargest(E));
   first  = h;
   before = at.force = E.scale;
   *found = false;
@@ -321,12 +416,43 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
       h /= 4;
       continue;
     }
+    PetscCall(NoteLargest(E));
     E.scale = std::max(E.scale, at.force); /* variables that carry loads may begin at zero (SceneEquilibrium.ALoopThroughAVariable) */
     PetscCall(Balanced(E, at, found));
-    h     *= Growth(a, before, at);
+    h     *= Growth(E, a, before, at);
     before = at.force;
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.zero));
+  }
+  PetscFunctionReturn(0);
+}
+
+/* A column that is zero at the start may be that of a factor that is: x of the stiffness x at no displacement (SceneEquilibrium.AStateThatIsAFactor). States
+   stay as they were in `begin` where nothing reads them at the end either, and the end is balanced with them so. */
+PetscErrorCode RelaxAndKeep(Equilibrium &E, Vec begin, bool *found, Unbalanced &at)
+{
+  PetscFunctionBegin;
+  PetscCall(FindUnread(E));
+  PetscCall(Relax(E, found, at));
+  while (*found) {
+    const std::vector<PetscInt> before = E.unread;
+    const PetscInt              own    = (PetscInt)before.size();
+    PetscInt                    unread;
+    PetscCallMPI(MPI_Allreduce(&own, &unread, 1, MPIU_INT, MPI_SUM, E.R.scene.comm));
+    if (!unread) PetscFunctionReturn(0);
+    PetscCall(FindUnread(E));
+    std::vector<PetscInt> both;
+    std::set_intersection(before.begin(), before.end(), E.unread.begin(), E.unread.end(), std::back_inserter(both));
+    E.unread = both;
+    PetscCall(VecCopy(E.U, E.A));
+    PetscCall(KeepUnread(E, begin));
+    PetscCall(E.residual(E.U));
+    PetscCall(E.measure(E.F, at));
+    PetscCall(Balanced(E, at, found));
+    if (*found) PetscFunctionReturn(0);
+    PetscCall(VecCopy(E.A, E.U));
+    E.unread.clear();
+    PetscCall(Relax(E, found, at));
   }
   PetscFunctionReturn(0);
 }
@@ -343,9 +469,7 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   PetscCall(E.create(U, "scene_equilibrium_"));
   PetscCall(VecDuplicate(U, &E.start));
   PetscCall(VecDuplicate(U, &E.undamped));
-  PetscCall(FindUnread(E));
-  PetscCall(Relax(E, &found, at));
-  PetscCall(KeepUnread(E, U));
+  PetscCall(RelaxAndKeep(E, U, &found, at));
   PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
              "constraints are violated by %g, motions of velocities, rates of states and definitions by %g.\n"

@@ -204,6 +204,127 @@ TEST(SceneEquilibrium, OfBodiesOnSprings)
   }
 }
 
+namespace
+{
+
+/* A body of 1 kg in a guide along z, and what its run says after StaticEquilibrium() */
+struct Levelled {
+  Scene  scene{PETSC_COMM_SELF};
+  Marker q, g;
+  explicit Levelled(double z)
+  {
+    PointMass m;
+    m.position = {0, 0, z};
+    q          = scene.marker(scene.add("mass", m));
+    g          = scene.marker(scene.ground());
+    scene.gravity({0, 0, -10});
+    scene.add("line", InLine{q, g});
+  }
+  std::vector<double> find(const std::vector<Measure> &what, bool at_the_start)
+  {
+    TS                  ts;
+    Snapshot            now;
+    std::vector<double> x(what.size());
+    scene.start().equilibrium = at_the_start;
+    must(scene.createTS(&ts));
+    if (!at_the_start) must(StaticEquilibrium(ts, 0));
+    must(now.take(ts));
+    for (std::size_t k = 0; k < what.size(); k++) must(now.value(what[k], &x[k]));
+    must(TSDestroy(&ts));
+    return x;
+  }
+};
+
+} // namespace
+
+/* The stiffness x of a spring that levels the mass at -0.05, x' = 200 (-0.05 - z): at z = 0 nothing reads x, in equilibrium the weight does */
+TEST(SceneEquilibrium, AStateThatIsAFactor)
+{
+  for (bool at_the_start : {false, true})
+    for (double z0 : {0., -0.01}) {
+      Levelled      s(z0);
+      const Measure z = Measure::displacement(s.q, 2);
+      const State   x = s.scene.state("stiffness", Expression({z}, [](const Real *m) { return 200 * (-0.05 - m[0]); }), 100);
+      UserForce     f;
+      f.i     = s.q;
+      f.force = {TimeFunction(0), TimeFunction(0), Expression({Measure::value(x), z}, [](const Real *m) { return -m[0] * m[1]; })};
+      s.scene.add("spring", f);
+      SpringDamper d;
+      d.i         = s.q;
+      d.j         = s.scene.marker(s.scene.ground(), {0, 0, -5});
+      d.damping   = 5;
+      d.stiffness = 0;
+      s.scene.add("damper", d);
+      const std::vector<double> found = s.find({z, Measure::value(x), Measure::acceleration(s.q, 2)}, at_the_start);
+      EXPECT_NEAR(found[0], -0.05, 1e-9) << at_the_start << z0;
+      EXPECT_NEAR(found[1], 200, 1e-5) << at_the_start << z0;
+      EXPECT_NEAR(found[2], 0, 1e-6) << at_the_start << z0;
+    }
+}
+
+/* A pendulum with a moment x about its axis of symmetry, x' = rate (1 - x): x comes to 1, however slow it is, however heavy the body, in whatever unit,
+   from where the body is balanced and from elsewhere */
+TEST(SceneEquilibrium, SlowStates)
+{
+  for (double unit : {1., 1e-6})
+    for (double rate : {1., 0.05, 1e-4})
+      for (double mass : {1., 1500., 1e6})
+        for (double tilt : {0., 0.3}) {
+          Scene     s(PETSC_COMM_SELF);
+          RigidBody b;
+          b.mass         = mass;
+          b.inertia      = mass * Matrix3::Identity();
+          b.rotation     = Eigen::AngleAxisd(tilt, Vector3::UnitX()).toRotationMatrix();
+          b.position     = b.rotation * Vector3(0, 0, -1);
+          const Body   p = s.add("pendulum", b);
+          const Marker i = s.marker(p, {0, 0, 1}), j = s.marker(s.ground());
+          s.gravity({0, 0, -9.81});
+          s.add("pin", Spherical{i, j});
+          Bushing bush;
+          bush.i                   = i;
+          bush.j                   = j;
+          bush.torsional_stiffness = {mass, mass, mass};
+          s.add("bush", bush);
+          const Measure x = Measure::value(State{0});
+          s.state("x", Expression({x}, [=](const Real *m) -> Real { return rate * (unit - m[0]); }), 0);
+          UserForce f;
+          f.i      = s.marker(p);
+          f.j      = j;
+          f.moment = {TimeFunction(0), TimeFunction(0), Expression({x}, [=](const Real *m) -> Real { return m[0] / unit; })};
+          s.add("load", f);
+          TS       ts;
+          Snapshot now;
+          double   found;
+          must(s.createTS(&ts));
+          must(StaticEquilibrium(ts, 0));
+          must(now.take(ts));
+          must(now.value(x, &found));
+          EXPECT_NEAR(found, unit, 1e-6 * unit) << rate << " " << mass << " " << tilt;
+          must(TSDestroy(&ts));
+        }
+}
+
+/* A motion of a velocity that is not zero has no equilibrium, however small it is beside the weight */
+TEST(SceneEquilibrium, AMotionOfASmallVelocity)
+{
+  for (double mass : {1., 1e6, 1e8}) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    b.mass         = mass;
+    b.velocity     = {0, 0, 0.01};
+    const Body   p = s.add("lift", b);
+    const Marker i = s.marker(p), j = s.marker(s.ground());
+    TS           ts;
+    s.gravity({0, 0, -9.81});
+    s.add("guide", Translational{i, j});
+    s.add("drive", TranslationalMotion{i, j, TimeFunction(0.01), MotionOf::Velocity});
+    must(s.createTS(&ts));
+    ErrorTrap trap;
+    EXPECT_NE(StaticEquilibrium(ts, 0), 0) << mass;
+    must(TSDestroy(&ts));
+  }
+}
+
 /* A torsional spring turns the body by more than half a turn on the way to its free angle, and a wheel that a gear joins to it by another part of turns: a run
    that begins there begins without a moment */
 TEST(SceneEquilibrium, TurnsOnTheWay)
