@@ -150,6 +150,7 @@ PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
   PetscFunctionBegin;
   *R = RunOf(ts);
   PetscCheck(*R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "%s: the TS is not one of a scene, Scene::createTS() makes them", call);
+  PetscCall(ReadCheckpoint(ts)); /* a run that goes on from one has begun */
   PetscCall(TSGetStepNumber(ts, &steps));
   PetscCheck(!steps, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "%s: the run has begun and is not to be moved; make one that goes on from it, Scene::createTS(&next, ts)", call);

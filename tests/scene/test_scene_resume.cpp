@@ -1,4 +1,5 @@
 /* Scenes that go on from a checkpoint: the same bits, and what is recorded goes on in the same files; what users' functions do wrong */
+#include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene/model.h"
 #include "scene_output.h"
@@ -149,6 +150,21 @@ TEST(SceneResume, QueriesSeeTheFile)
   must(now.motion(again.tip[1], &m[1]));
   EXPECT_NEAR(now.time(), 0.6, 1e-12);
   EXPECT_LT((m[1].position - m[0].position).norm(), 1e-12);
+  Rods                fourth(2);
+  std::vector<double> values;
+  fourth.scene.channel("x", Measure::displacement(fourth.tip[1], 0));
+  SceneRun sampled(fourth.scene, 1, accurate);
+  must(TSHHT3CheckpointLoad(sampled.ts, file.name.c_str()));
+  must(fourth.scene.sample(sampled.ts, 0.6, values));
+  EXPECT_NEAR(values[0], m[0].position(0), 1e-12);
+  Rods     fifth(2);
+  SceneRun begun(fifth.scene, 1, accurate);
+  must(TSHHT3CheckpointLoad(begun.ts, file.name.c_str()));
+  {
+    ErrorTrap trap;
+    EXPECT_NE(StaticEquilibrium(begun.ts, 0), 0);
+    EXPECT_TRUE(trap.says("the run has begun")) << trap.message;
+  }
   must(TSHHT3CheckpointLoad(last.ts, file.name.c_str()));
   must(third.scene.createTS(&ts, last.ts));
   must(TSGetTime(ts, &t));

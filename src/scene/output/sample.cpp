@@ -36,6 +36,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(CheckUnchanged(run->scene, start_));
+  PetscCall(ReadCheckpoint(ts));
   for (Vec &x : W) {
     PetscCall(VecCreate(run->scene.comm, &x));
     PetscCall(VecSetSizes(x, run->n, PETSC_DETERMINE));
