@@ -185,6 +185,14 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscFunctionReturn(0);
 }
 
+/* Functions of the state read present values */
+static std::vector<double> ParametersNow(const SceneData &s)
+{
+  std::vector<double> x;
+  for (const ParameterData &p : s.parameters) x.push_back(*p.present);
+  return x;
+}
+
 PetscErrorCode KeepStart(TS ts, Vec A)
 {
   Runtime &R = *RunOf(ts);
@@ -197,6 +205,7 @@ PetscErrorCode KeepStart(TS ts, Vec A)
     PetscCall(VecCopy(now[k], R.start_state[k]));
   }
   PetscCall(TSGetTime(ts, &R.start_time));
+  R.start_parameters = ParametersNow(R.scene);
   PetscFunctionReturn(0);
 }
 
@@ -211,7 +220,7 @@ PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy)
   PetscCall(TSGetTime(ts, &now));
   PetscCheck(t == now, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Time %g: the run has not begun, and its state is that of t = %g", (double)t, (double)now);
   PetscCall(TS2GetSolution(ts, &U, &V));
-  if (R.start_state[2] && t == R.start_time) {
+  if (R.start_state[2] && t == R.start_time && R.start_parameters == ParametersNow(R.scene)) {
     PetscCall(VecEqual(U, R.start_state[0], &same[0]));
     PetscCall(VecEqual(V, R.start_state[1], &same[1]));
   }

@@ -56,6 +56,7 @@ struct Runtime {
   /* Not begun, but analyses have found accelerations, and multipliers, for this state: u, u', u'' at a time */
   Vec       start_state[3] = {};
   PetscReal start_time     = 0;
+  std::vector<double> start_parameters; /* values then, which functions read */
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
   bool                  steps_limited = false; /* some element says how long a step may be */
   std::vector<double>   reference_before; /* of local rotations, own bodies: quaternions */

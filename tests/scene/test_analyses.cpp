@@ -504,3 +504,34 @@ TEST(Analyses, AssemblyOfWhatIsNoNumber)
   EXPECT_NE(AssembleAt(run.ts, 2), 0);
   EXPECT_TRUE(error.says("the scene cannot be assembled at t = 2")) << error.message;
 }
+
+/* What an analysis has found is that of the parameters it was made with: functions read the present ones */
+TEST(Analyses, AParameterChangesAfterEquilibrium)
+{
+  Scene           s(PETSC_COMM_SELF);
+  const Parameter p = s.parameter("load", 0);
+  s.gravity({0, 0, -10});
+  PointMass    m;
+  const Body   b = s.add("mass", m);
+  const Marker q = s.marker(b), g = s.marker(s.ground());
+  s.add("line", InLine{q, g});
+  UserForce f;
+  f.i                 = q;
+  f.force             = {TimeFunction(0), TimeFunction(0), Expression({Measure::displacement(q, 2)}, [p](const Real *x) { return -100 * x[0] + p; })};
+  const Element force = s.add("force", f);
+  TS            ts;
+  Snapshot      now;
+  double        x;
+  must(s.createTS(&ts));
+  must(StaticEquilibrium(ts, 0));
+  must(now.take(ts));
+  must(now.value(Measure::force(force, 2), &x));
+  EXPECT_NEAR(x, 10, 1e-8);
+  must(s.set("load", 5));
+  must(now.take(ts));
+  must(now.value(Measure::force(force, 2), &x));
+  EXPECT_NEAR(x, 15, 1e-8);
+  must(now.value(Measure::acceleration(q, 2), &x));
+  EXPECT_NEAR(x, 5, 1e-8);
+  must(TSDestroy(&ts));
+}
