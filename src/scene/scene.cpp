@@ -149,6 +149,7 @@ PetscInt SceneData::loadedBody(const ElementData &e, PetscInt body, PetscInt *el
   PetscInt       loaded = -2, other = -1;
   for (const Part &p : e.parts)
     for (int k = 0; k < p.store->markers(); k++) {
+      if (!p.store->loads(k)) continue;
       const PetscInt b = markers[p.store->marker(p.index, k)].body;
       if (b == body) loaded = body;
       else if (carrier >= 0 && b == carrier && loaded == -2) loaded = carrier;

@@ -37,6 +37,7 @@ public:
   virtual PetscInt      element(PetscInt e) const         = 0;
   virtual bool          isConstraint() const { return false; }
   virtual bool          isHolonomic() const { return false; } /* of constraints */
+  virtual bool          loads(int) const { return true; } /* whether the body of the k-th marker takes a load; else it is read alone */
   virtual int           rows() const                      = 0; /* of a constraint, components of a force */
   virtual unsigned char active(PetscInt) const { return 0; } /* bits of the rows of a constraint that stay */
   virtual void          setActive(PetscInt, unsigned char) {}
@@ -108,6 +109,7 @@ template <class K> class ConstraintStore : public StoreOf<K>
 public:
   bool          isConstraint() const override { return true; }
   bool          isHolonomic() const override { return K::holonomic; }
+  bool          loads(int k) const override { return Depends(K::depends, 2 * k) || Depends(K::depends, 2 * k + 1); }
   bool          usesVelocities() const override { return !K::holonomic; }
   bool          curves() const override { return ConstraintBatch<K>::curvedAtAll(); }
   int           rows() const override { return K::rows; }
@@ -156,6 +158,7 @@ template <class K> class ForceStore : public StoreOf<K>
 {
 public:
   bool usesVelocities() const override { return K::damped; }
+  bool loads(int k) const override { return Depends(K::acts, 2 * k) || Depends(K::acts, 2 * k + 1); }
   int  rows() const override { return K::count; }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override

@@ -355,3 +355,24 @@ TEST(JointMultipliers, AxesThatPointAwayFromEachOther)
     EXPECT_NEAR(x, 10, 1e-9) << flip;
   }
 }
+
+/* A force in the axes of a marker does not act on that marker's body, which is an error to ask for */
+TEST(Query, TheFrameOfAForceTakesNoLoad)
+{
+  Scene        s(PETSC_COMM_SELF);
+  const Body   a = s.add("a", RigidBody()), b = s.add("b", RigidBody());
+  const Marker i = s.marker(a), frame = s.marker(b);
+  UserForce    f;
+  f.i                = i;
+  f.frame            = frame;
+  f.force            = {TimeFunction(1), TimeFunction(2), TimeFunction(3)};
+  const Element force = s.add("force", f);
+  SceneRun      run(s, 1, "");
+  Snapshot      now;
+  double        x;
+  must(now.take(run.ts));
+  must(now.value(Measure::elementForce(force, i, 0), &x));
+  EXPECT_NEAR(x, 1, 1e-12);
+  ErrorTrap trap;
+  EXPECT_NE(now.value(Measure::elementForce(force, frame, 0), &x), 0);
+}

@@ -158,6 +158,7 @@ public:
   int           markers() const override { return K::markers; }
   PetscInt      marker(PetscInt e, int k) const override { return all[e].marker[k]; }
   PetscInt      element(PetscInt e) const override { return all[e].element; }
+  bool          loads(int k) const override { return Depends(K::acts, 2 * k) || Depends(K::acts, 2 * k + 1); }
   int           rows() const override { return K::count; }
   bool          carried(PetscInt e) const override { return all[e].carried; }
 
