@@ -40,13 +40,9 @@ template <int R, int M> void MakeLengths(DescribedRows &rows)
   }
 }
 
-/* Variables and states are what they are at the start, multipliers and force states nothing yet */
-inline double InitialInput(const SceneData &s, const ScalarRef &r)
-{
-  if (r.kind == ScalarRef::Variable && r.id >= 0) return s.variables[r.id].initial;
-  if (r.kind == ScalarRef::State && r.id >= 0) return s.states[r.id].initial;
-  return 0;
-}
+/* expressions.cpp: an input at the start. States have their initial values, variables what their definitions make of these, of time and of where the bodies
+   are (UserConstraint.StartVelocitiesByAVariable); multipliers and force states nothing yet. */
+double InitialInput(const SceneData &s, const ScalarRef &r, double t);
 
 template <class K, class D> void DescribeRows(const SceneData &s, const D &d, double t, DescribedRows &rows)
 {
@@ -70,7 +66,7 @@ template <class K, class D> void DescribeRows(const SceneData &s, const D &d, do
     double               z[Z > 0 ? Z : 1], zj[R * (Z > 0 ? Z : 1)];
     typename K::Gradient P;
     for (int k = 0; k < M; k++) w[k] = {Vec3<double>::Zero(), Vec3<double>::Zero()};
-    for (int i = 0; i < Z; i++) z[i] = InitialInput(s, d.input[i]);
+    for (int i = 0; i < Z; i++) z[i] = InitialInput(s, d.input[i], t);
     if constexpr (Z > 0)
       K::template value<double>(d.data, f, w, t, z, rows.rate);
     else

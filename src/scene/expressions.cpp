@@ -1,6 +1,7 @@
 /* User-defined variables and first-order states: who owns them, where their expressions find their arguments, what can
  * be wrong. */
 #include "expression_batch.h"
+#include "kernels/marker_measure.h"
 #include "runtime.h"
 #include <cmath>
 
@@ -44,7 +45,54 @@ bool UsesAcceleration(const SceneData &s)
   return false;
 }
 
+MarkerMotion<double> Described(const SceneData &s, Marker m)
+{
+  return {s.frame(m), s.twist(m), Vector3::Zero(), Vector3::Zero()};
+}
+
+bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x);
+
+/* A measure where the description puts the bodies; false if it is not one of time, positions, velocities, states and variables of these */
+bool DescribedValue(const SceneData &s, const Measure &m, double t, std::size_t depth, double *x)
+{
+  if (m.kind == Measure::Time) *x = t;
+  else if (m.kind == Measure::StateValue && m.target >= 0 && m.target < (PetscInt)s.states.size()) *x = s.states[m.target].initial;
+  else if (m.kind == Measure::Value && m.target >= 0 && m.target < (PetscInt)s.variables.size()) return DescribedValue(s, s.variables[m.target].expression, t, depth + 1, x);
+  else if (m.kind == Measure::Displacement || m.kind == Measure::Distance || m.kind == Measure::Angle || m.kind == Measure::Velocity || m.kind == Measure::Rate ||
+           m.kind == Measure::AngularVelocity) {
+    MarkerMotion<double> of[3];
+    const Marker         marker[3] = {m.i, m.j, m.frame};
+    for (int k = 0; k < 3; k++) {
+      const bool any = marker[k].id != -1;
+      if ((!any && k == 0) || (any && (!s.valid(marker[k]) || s.markers[marker[k].id].body < -1))) return false;
+      if (any) of[k] = Described(s, marker[k]);
+    }
+    if (m.j.id == -1 && (m.kind == Measure::Angle || m.kind == Measure::Rate)) return false;
+    *x = MarkerMeasure<double>(m.kind, m.component, 0, of[0], m.j.id == -1 ? nullptr : &of[1], m.frame.id == -1 ? nullptr : &of[2]);
+  } else return false;
+  return true;
+}
+
+bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x)
+{
+  double m[Real::most];
+  if (depth > s.variables.size() || e.arguments.size() > Real::most || !e.f) return false; /* variables that read each other */
+  for (std::size_t k = 0; k < e.arguments.size(); k++)
+    if (!DescribedValue(s, e.arguments[k], t, depth, m + k)) return false;
+  *x = UserFunction("variable", e).value(m);
+  return true;
+}
+
 } // namespace
+
+double InitialInput(const SceneData &s, const ScalarRef &r, double t)
+{
+  double x;
+  if (r.kind == ScalarRef::State && r.id >= 0) return s.states[r.id].initial;
+  if (r.kind != ScalarRef::Variable || r.id < 0) return 0;
+  const ExpressionData &v = s.variables[r.id];
+  return !v.reached && DescribedValue(s, v.expression, t, 0, &x) ? x : v.initial;
+}
 
 PetscMPIInt OwnerOf(const Model &M, const Expression &e)
 {

@@ -89,6 +89,7 @@ struct ExpressionData { /* variable or state */
   std::string name;
   Expression  expression;
   double      initial;
+  bool        reached = false; /* initial is what a run has made of it */
 };
 
 struct ChannelData {

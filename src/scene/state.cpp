@@ -85,7 +85,10 @@ PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
   }
   if (!sum.empty())
     PetscCallMPI(MPI_Allreduce(scalars.data(), sum.data(), (PetscMPIInt)sum.size(), MPI_DOUBLE, MPI_SUM, s.comm));
-  for (std::size_t i = 0; i < s.variables.size(); i++) s.variables[i].initial = sum[i];
+  for (std::size_t i = 0; i < s.variables.size(); i++) {
+    s.variables[i].initial = sum[i];
+    s.variables[i].reached = true;
+  }
   for (std::size_t i = 0; i < s.states.size(); i++) s.states[i].initial = sum[s.variables.size() + i];
   PetscFunctionReturn(0);
 }

@@ -326,3 +326,29 @@ TEST(UserConstraint, Refuses)
   for (int k = 0; k < 7; k++) many.push_back(Measure::distance(b.at, b.scene.marker(b.scene.ground(), Vector3(k, 1, 1))));
   says(one(many, same), "names 8 markers, at most 6");
 }
+
+/* z' = V, V = -2 z, from 0.1: the velocity that the definition of V asks for is consistent, whatever the variable's own value at first */
+TEST(UserConstraint, StartVelocitiesByAVariable)
+{
+  for (Assembly how : {Assembly::Report, Assembly::Project})
+    for (double initial : {0., -0.2}) {
+      Scene     s(PETSC_COMM_SELF);
+      PointMass m;
+      m.position           = {0, 0, 0.1};
+      m.velocity           = {0, 0, how == Assembly::Report ? -0.2 : 0};
+      s.start().assembly   = how;
+      const Body     b     = s.add("mass", m);
+      const Marker   q     = s.marker(b);
+      const Measure  z     = Measure::displacement(q, 2);
+      s.add("line", InLine{q, s.marker(s.ground())});
+      const Variable v = s.variable("speed", Expression({z}, [](const Real *x) { return -2 * x[0]; }), initial);
+      s.add("row", UserConstraint{{Expression({Measure::velocity(q, 2), Measure::value(v)}, [](const Real *x) { return x[0] - x[1]; })}});
+      SceneRun run(s, 1, tolerance(1e-7));
+      Snapshot now;
+      double   x;
+      must(run.solve());
+      must(now.take(run.ts, 1));
+      must(now.value(z, &x));
+      EXPECT_NEAR(x, 0.1 * std::exp(-2), 1e-5) << initial;
+    }
+}

@@ -138,10 +138,10 @@ private:
       f[k] = e_.frame(markers_[k]);
       w[k] = e_.scene().twist(markers_[k]);
     }
-    for (std::size_t i = 0; i < inputs_.size(); i++) z[i] = InitialInput(e_.scene(), inputs_[i]);
     const UserRow::At at{f, velocities_ ? w : nullptr, t_, z, data_.memory};
     double            value = 0, sum = 0;
     try {
+      for (std::size_t i = 0; i < inputs_.size(); i++) z[i] = InitialInput(e_.scene(), inputs_[i], t_);
       value = row_->value(at);
       row_->gradient(at, x, y, by);
       for (int d = 0; d < 6 * most_markers; d++) sum += std::abs(x[d]) + std::abs(y[d]);
