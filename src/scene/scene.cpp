@@ -205,6 +205,17 @@ void ElementBuilder::require(Marker m, const char *what)
   require(data_.valid(m) && data_.markers[m.id].body >= -1, std::string(what) + " is not a marker of this scene");
 }
 
+bool ElementBuilder::coincident(Marker i, Marker j) const
+{
+  constexpr double rounding = 1e-13;
+  double           size     = 0;
+  for (Marker m : {i, j}) {
+    const MarkerData &k = data_.markers[m.id];
+    size += k.s.norm() + (k.body < 0 ? 0 : data_.bodies[k.body].r.norm());
+  }
+  return (frame(i).x - frame(j).x).norm() <= rounding * size;
+}
+
 Element Scene::absent(const std::string &name)
 {
   ElementData e;

@@ -210,6 +210,7 @@ public:
   void require(Marker m, const char *what);                 /* m is a marker of this scene */
   Frame<double>    frame(Marker m) const { return data_.frame(m); } /* at the start; only if good() */
   const SceneData &scene() const { return data_; }
+  bool             coincident(Marker i, Marker j) const; /* at the start, but for rounding of where bodies and markers are */
 
   /* a constraint kernel on these markers; returns the first of its rows among the element's rows */
   template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});

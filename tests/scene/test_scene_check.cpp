@@ -225,6 +225,23 @@ TEST(SceneCheck, ShearOfAPlanarBeam)
   SAYS(complaint(s), "beam beam: G is 0");
 }
 
+/* Points that were put at one place of two bodies, one of them turned, are not apart, as far as they can be told */
+TEST(SceneCheck, PointsAtOnePlaceButForRounding)
+{
+  const Vector3 p(.1, .2, .3);
+  for (bool link : {false, true}) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    b.position           = {1, .7, .2};
+    b.rotation           = Eigen::AngleAxisd(.3, Vector3::UnitZ()).toRotationMatrix();
+    const Body   turned  = s.add("turned", b);
+    const Marker i = s.markerAt(turned, p), j = s.marker(s.ground(), p);
+    if (link) s.add("link", hhtdae::PointDistance{i, j});
+    else s.add("push", hhtdae::UserScalarForce{i, j, hhtdae::TimeFunction(5)});
+    SAYS(complaint(s), "coincide");
+  }
+}
+
 /* Products vanish after a third of a turn, too, where the axes have changed places */
 TEST(SceneCheck, MarkersWithOtherAxes)
 {

@@ -37,7 +37,7 @@ void CheckPlacement(ElementBuilder &e, const Beam &s)
   const Frame<double>    f[2] = {e.frame(s.i), e.frame(s.j)};
   Mat3<double>           E;
   const Relative<double> r = BeamForce<false>::relative<double>(f, nullptr, E);
-  e.require(!Coincident(f[0], f[1]), "the markers coincide at the start; a beam runs from j to i");
+  e.require(!e.coincident(s.i, s.j), "the markers coincide at the start; a beam runs from j to i");
   e.require(r.phi.norm() < 3, "marker i is turned by " + Show(r.phi.norm()) +
                                   " rad from j at the start; the x axes of both must run along the beam, from j to i");
   if (e.good())

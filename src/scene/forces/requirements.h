@@ -63,12 +63,6 @@ inline void RequireNoPoint(ElementBuilder &e, Marker m, const char *marker)
   if (b >= 0 && e.scene().bodies[b].point) RequireTurning(e, m, marker);
 }
 
-/* no distance but rounding */
-inline bool Coincident(const Frame<double> &i, const Frame<double> &j)
-{
-  return (i.x - j.x).norm() <= 1e-13 * (i.x.norm() + j.x.norm());
-}
-
 } // namespace hhtdae
 
 #endif

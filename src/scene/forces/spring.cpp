@@ -43,7 +43,7 @@ template <> Element Scene::enter(const std::string &name, const SpringDamper &s)
   RequireTwoBodies(e, s.i, s.j);
   if (e.good()) {
     const Frame<double> i = e.frame(s.i), j = e.frame(s.j);
-    const bool          coincident = Coincident(i, j);
+    const bool          coincident = e.coincident(s.i, s.j);
     if (coincident) CheckDirection(e, s);
     if (length < 0) length = coincident ? 0 : (i.x - j.x).norm();
   }
@@ -63,7 +63,7 @@ template <> Element Scene::enter(const std::string &name, const NonlinearSpring 
     const Frame<double> f[2] = {e.frame(s.i), e.frame(s.j)};
     const Twist<double> w[2] = {data().twist(s.i), data().twist(s.j)};
     const Line<double>  line(f);
-    e.require(!Coincident(f[0], f[1]),
+    e.require(!e.coincident(s.i, s.j),
               "the markers coincide at the start, which leaves the tension without a direction; move one of them");
     if (e.good()) CheckTension(e, s.tension, line.length, line.rate(w));
   }

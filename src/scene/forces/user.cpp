@@ -261,7 +261,7 @@ template <> Element Scene::enter(const std::string &name, const UserScalarForce 
   ElementBuilder e(*this, name, s.rotational ? "user scalar moment" : "user scalar force", ElementData::Force, s.i,
                    s.j);
   if (e.good() && !s.rotational)
-    e.require((e.frame(s.i).x - e.frame(s.j).x).norm() > 0,
+    e.require(!e.coincident(s.i, s.j),
               "the origins of markers i and j coincide, the line between them has no direction");
   if (s.rotational) {
     RequireTurning(e, s.i, "i");

@@ -58,7 +58,7 @@ template <> Element Scene::enter(const std::string &name, const PointDistance &s
   if (!(s.length < 0)) e.positive("length", s.length);
   if (!e.good()) return e.done();
   const double start = e.startDistance();
-  e.require(start > 0, "the markers coincide at the start, must be apart; a spherical joint keeps points together");
+  e.require(!e.coincident(s.i, s.j), "the markers coincide at the start, must be apart; a spherical joint keeps points together");
   e.rows<Distance>({s.length < 0 ? start : s.length});
   return e.done();
 }

@@ -54,7 +54,7 @@ private:
   }
 };
 
-/* Along the line from j to i, repulsive when positive */
+/* Along the line from j to i, repulsive when positive; none where the points meet on the way and the line has no direction */
 struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   static constexpr const char *name   = "user scalar force";
   static constexpr int         inputs = 1;
@@ -71,7 +71,7 @@ struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   {
     using std::sqrt;
     const Vec3<T> d = f[0].x - f[1].x;
-    const T       k = c[0] / sqrt(d.dot(d));
+    const T       l2 = d.dot(d), k = Plain(l2) > 0 ? T(c[0] / sqrt(l2)) : T(0);
     on[0].f         = d * k;
     on[1].f         = -on[0].f;
     for (int i = 0; i < 2; i++) on[i].m.fill(T(0));
