@@ -72,7 +72,7 @@ void FillLight(SceneData &s)
     }
     const double size = SceneSize(s);
     b.light_mass      = std::isfinite(lightest) ? light * lightest : 1;
-    b.light_inertia   = std::max(light * b.inertia.norm(), light * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));
+    b.light_inertia   = std::max(light * (s.planar ? b.inertia(2, 2) : b.inertia.norm()), light * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));
   }
 }
 

@@ -254,3 +254,17 @@ TEST(SceneCheck, MarkersWithOtherAxes)
     SAYS(complaint(s), "fixed: the axes of markers i and j are not parallel at the start");
   }
 }
+
+/* A planar body without a moment about z has that of others to be assembled by, whatever the rest of its inertia says */
+TEST(SceneCheck, LightInertiaInThePlane)
+{
+  Scene     s(PETSC_COMM_SELF, hhtdae::Space::Planar);
+  RigidBody b;
+  b.inertia(2, 2)  = 0;
+  b.mass           = 1e-6;
+  const Body   rod = s.add("rod", b);
+  s.add("pin", hhtdae::Fixed{s.marker(rod), s.marker(s.ground(), {0, 0, 0})});
+  s.marker(rod, {1e-3, 0, 0});
+  must(s.setUp());
+  EXPECT_LT(hhtdae::DataOf(s).bodies[rod.id].light_inertia, 1e-9);
+}
