@@ -352,3 +352,17 @@ TEST(UserConstraint, StartVelocitiesByAVariable)
       EXPECT_NEAR(x, 0.1 * std::exp(-2), 1e-5) << initial;
     }
 }
+
+/* Derivatives that are none where the row is tried do not make it a linear one */
+TEST(UserConstraint, NoNumberIsNotLinear)
+{
+  const UserRowData d = row({reads(Measure::Velocity, 0, 1)}, [](const Real *m) { return pow(m[0], 1.5); });
+  Random            random(1);
+  Frame<double>     f[2];
+  Twist<double>     w[2];
+  for (int k = 0; k < 2; k++) {
+    f[k] = {random.vector(), random.rotation()};
+    w[k] = {Vector3::Zero(), Vector3::Zero()};
+  }
+  EXPECT_FALSE(d.row->linear({f, w, 0, nullptr, d.memory}));
+}

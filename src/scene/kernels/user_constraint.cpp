@@ -178,7 +178,7 @@ bool UserRow::linear(const At &at) const
     f.gradient(m, g[trial]);
   }
   for (std::size_t k = 0; k < arguments.size(); k++)
-    if (ofVelocities(arguments[k].kind) && std::abs(g[1][k] - g[0][k]) > 1e-9 * std::max(std::abs(g[0][k]), std::abs(g[1][k]))) return false;
+    if (ofVelocities(arguments[k].kind) && !(std::abs(g[1][k] - g[0][k]) <= 1e-9 * std::max(std::abs(g[0][k]), std::abs(g[1][k])))) return false; /* NaN is not linear */
   return true;
 }
 
