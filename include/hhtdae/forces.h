@@ -152,7 +152,8 @@ struct EllipsoidPlane {
   ContactLaw law      = {};
   bool       state    = false;
 };
-/* tire: torus about z_i, plane as above (planar scenes: none; a wheel is a SpherePlane of the outer radius) */
+/* tire: torus about z_i, plane as above (planar scenes: none; a wheel is a SpherePlane of the outer radius). A torus that lies flat has no lowest point: tilted
+   by less than 1e-3 rad it presses as if it were lower, by 3.75e-4 of `radius` where it is not tilted at all. */
 struct TorusPlane {
   Marker     i, j;
   double     radius = 1, tube = 0.1;

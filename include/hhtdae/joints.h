@@ -67,7 +67,9 @@ struct InLine { Marker i, j; };         /* origin of i on the z axis of j. Rows:
 struct InPlane { Marker i, j; };        /* origin of i in the xy plane of j. Row: force z_j */
 struct ParallelAxes { Marker i, j; };   /* z axes. Rows: moment x_j y_j */
 struct Perpendicular { Marker i, j; };  /* z axes. Row: moment about z_j x z_i */
-struct Orientation { Marker i, j; };    /* all axes parallel. Rows: moment x_j y_j z_j */
+/* All axes parallel, or two of them opposite; as described they stay. Axes that have changed places are an error, as those of Fixed and Translational are.
+   Rows: moment x_j y_j z_j */
+struct Orientation { Marker i, j; };
 struct PointDistance { Marker i, j; double length = -1; }; /* negative: the distance at the start. Row: the tension, which pulls the origins together */
 /* Origin of i on the curve (c_x(s), c_y(s), c_z(s)) in j's axes. Rows: force along two normals of the curve, perpendicular to each other, which turn about its
    tangent as little as can be (planar scenes: force along z x tangent, the tangent in the order of the points) */
