@@ -9,6 +9,7 @@
 #include "guard.h"
 #include "still.h"
 #include <algorithm>
+#include <string>
 #include <vector>
 
 namespace hhtdae
@@ -93,6 +94,21 @@ PetscErrorCode Advance(Assembling &E, double part, bool *nearer)
   PetscFunctionReturn(0);
 }
 
+/* Of the constraints at U, for messages; none where they are no numbers */
+PetscErrorCode WorstRow(Assembling &E, std::string *name)
+{
+  const double misfit = E.misfit;
+  PetscReal    most;
+  PetscInt     row;
+  PetscFunctionBegin;
+  PetscCall(E.look(E.U));
+  E.misfit = misfit;
+  PetscCall(VecAbs(E.F));
+  PetscCall(VecMax(E.F, &row, &most));
+  if (row >= 0 && std::isfinite(misfit)) *name = ", most in " + UnknownName(*E.R.model, row);
+  PetscFunctionReturn(0);
+}
+
 /* From U, V to the nearest positions that meet the constraints at t; velocities go along with the axes of angles */
 PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
 {
@@ -122,9 +138,13 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
      so large that lengths are rounded by more (Analyses.KinematicsInAnyUnitsOfLength) */
   const double tolerance = E.R.scene.start.tolerance;
   const bool   met       = E.misfit <= tolerance * std::min(1.0, E.size) || part * largest_turn <= tolerance;
-  PetscCheck(met, E.R.scene.comm, PETSC_ERR_CONV_FAILED,
-             "the scene cannot be assembled at t = %g: constraints or motions are violated by %g.\nTake smaller steps in time, or start nearer to where they are met", E.t,
-             E.misfit);
+  if (!met) {
+    std::string worst;
+    PetscCall(WorstRow(E, &worst));
+    SETERRQ(E.R.scene.comm, PETSC_ERR_CONV_FAILED,
+            "the scene cannot be assembled at t = %g: constraints or motions are violated by %g%s.\nTake smaller steps in time, or start nearer to where they are met", E.t,
+            E.misfit, worst.c_str());
+  }
   PetscCall(VecCopy(E.U, U));
   PetscCall(VecCopy(E.V, V));
   PetscFunctionReturn(0);

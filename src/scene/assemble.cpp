@@ -1,8 +1,13 @@
-/* Initial poses and velocities against the constraints: what does not meet is named, and moved where that is asked for.
- */
+/*
+  Initial poses and velocities against the constraints: what does not meet is named, and moved where that is asked for.
+
+  Here bodies move as rigid ones, since that is how parts are put together. What is left where flexible bodies take part, as in a press fit or where a motion
+  drives one end of a beam, these have to deform for: that is done on the first state of a run, in the metric of its mass matrix, LeftToDeform().
+*/
 #include "start.h"
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 
 namespace hhtdae
@@ -123,6 +128,59 @@ double Merit(const std::vector<RowBlock> &blocks, const std::vector<double> &wei
   return std::sqrt(sum);
 }
 
+/* What joints hang together, over bodies that may move, with a flexible body among it and none that fixed_start holds, which would have to be moved along with one that
+   deforms: its number by bodies and elements, -1 of the others */
+struct Deformable {
+  std::vector<PetscInt> body, element;
+  std::vector<char>     deforms, rigid; /* elements in one, and the others */
+};
+
+Deformable FindDeformable(const SceneData &s, Hold hold)
+{
+  const std::vector<RowBlock> all = DescribeAll(s, s.start.time, Hold::None);
+  std::vector<PetscInt>       root(s.bodies.size());
+  std::vector<char>           flexible(s.bodies.size(), 0), held(s.bodies.size(), 0);
+  const auto                  ofNodes = [&](PetscInt b) { return s.bodies[b].massless && s.bodies[b].carrier < 0; };
+  const auto                  isHeld  = [&](PetscInt b) { return hold == Hold::FixedStart && s.bodies[b].fixed_start && !ofNodes(b); };
+  const auto                  rootOf  = [&](PetscInt b) {
+    while (root[b] != b) b = root[b] = root[root[b]];
+    return b;
+  };
+  std::iota(root.begin(), root.end(), 0);
+  for (const RowBlock &b : all) {
+    PetscInt last = -1;
+    for (PetscInt k : b.body) {
+      if (isHeld(k)) continue;
+      if (last >= 0) root[rootOf(k)] = rootOf(last);
+      last = k;
+    }
+  }
+  for (PetscInt b = 0; b < (PetscInt)root.size(); b++)
+    if (!isHeld(b) && (s.bodies[b].flexible || ofNodes(b))) flexible[rootOf(b)] = 1;
+  for (const RowBlock &b : all)
+    if (std::any_of(b.body.begin(), b.body.end(), isHeld))
+      for (PetscInt k : b.body) held[rootOf(k)] = 1;
+  Deformable d{std::vector<PetscInt>(s.bodies.size(), -1), std::vector<PetscInt>(s.elements.size(), -1), std::vector<char>(s.elements.size(), 0),
+               std::vector<char>(s.elements.size(), 1)};
+  for (PetscInt b = 0; b < (PetscInt)root.size(); b++)
+    if (!isHeld(b) && flexible[rootOf(b)] && !held[rootOf(b)]) d.body[b] = rootOf(b);
+  for (const RowBlock &b : all)
+    for (PetscInt k : b.body)
+      if (d.body[k] >= 0) {
+        d.element[b.element] = d.body[k];
+        d.deforms[b.element] = 1;
+        d.rigid[b.element]   = 0;
+      }
+  return d;
+}
+
+std::vector<RowBlock> BlocksOf(const SceneData &s, Hold hold, const std::vector<char> *part)
+{
+  std::vector<RowBlock> all = DescribeAll(s, s.start.time, hold);
+  if (part) all.erase(std::remove_if(all.begin(), all.end(), [&](const RowBlock &b) { return !(*part)[b.element]; }), all.end());
+  return all;
+}
+
 void RightHandSide(const std::vector<RowBlock> &blocks, Eigen::VectorXd RowBlock::*of, std::vector<double> &rhs)
 {
   rhs.clear();
@@ -188,12 +246,12 @@ PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const 
 
 /* Gauss-Newton: every step is the smallest that meets the linearized constraints; halved where it does not bring them
  * nearer */
-PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok)
+PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part)
 {
   SceneData            &s    = M.scene;
   const double          size = SceneSize(s), enough = 1e-3 * s.start.tolerance;
   NearestSystem         system(M);
-  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, hold);
+  std::vector<RowBlock> blocks = BlocksOf(s, hold, part);
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
   PetscFunctionBegin;
@@ -208,7 +266,7 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok)
     for (int cut = 0; cut < 6; cut++, factor /= 2) {
       SetPoses(s, before);
       Move(s, d, factor);
-      blocks = DescribeAll(s, s.start.time, hold);
+      blocks = BlocksOf(s, hold, part);
       next   = Merit(blocks, weight);
       if (next < merit) break;
       if (misfit < enough) break; /* down to rounding */
@@ -231,14 +289,15 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok)
 namespace
 {
 
-PetscErrorCode ProjectVelocities(Model &M, Hold hold)
+PetscErrorCode ProjectVelocities(Model &M, Hold hold, const std::vector<char> *part)
 {
   SceneData          &s = M.scene;
   NearestSystem       system(M);
   std::vector<double> rhs, d;
   PetscFunctionBegin;
   for (int it = 0; it < 3; it++) {
-    const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, hold);
+    const std::vector<RowBlock> blocks = BlocksOf(s, hold, part);
+    if (blocks.empty()) break;
     if (it == 0) PetscCall(system.factor(blocks));
     RightHandSide(blocks, &RowBlock::speed, rhs);
     PetscCall(system.solve(blocks, rhs, nullptr, d));
@@ -279,45 +338,91 @@ PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool goi
   PetscFunctionReturn(0);
 }
 
-} // namespace
+std::vector<Misfit> OfRigid(std::vector<Misfit> m, const Deformable &d)
+{
+  for (std::size_t e = 0; e < m.size(); e++)
+    if (d.deforms[e]) m[e] = Misfit();
+  return m;
+}
 
-PetscErrorCode Assemble(Model &M)
+PetscErrorCode AssemblePositions(Model &M, Hold hold, const Deformable &d)
 {
   SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
   std::vector<Misfit>     m;
   bool                    ok;
   PetscFunctionBegin;
+  PetscCall(ProjectPositions(M, hold, &ok, &d.rigid));
+  if (!ok) {
+    PetscCall(MeasureMisfit(s, m));
+    const std::string left = WorstPositions(s, OfRigid(m, d), s.start.tolerance);
+    SetPoses(s, before);
+    SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
+            "the scene cannot be assembled; after %d iterations these constraints are not met:%s\n"
+            "Start nearer to where they are met, or free a body that is held by fixed_start",
+            (int)s.started.assembly_iterations, left.c_str());
+  }
+  PetscCall(ProjectPositions(M, hold, &ok, &d.deforms)); /* the rest is left to the run */
+  PetscFunctionReturn(0);
+}
+
+/* Velocities that rigid motions cannot meet stay as they are given where flexible bodies take part: the nearest ones are those after a plastic impact, which makes bodies
+   vibrate. So do all of these in a run that goes on, where new joints take hold of what vibrates. */
+PetscErrorCode AssembleVelocities(Model &M, Hold hold, const Deformable &d)
+{
+  SceneData          &s = M.scene;
+  std::vector<Misfit> m;
+  std::vector<char>   impact(s.bodies.size(), 0); /* by the numbers of what hangs together */
+  PetscFunctionBegin;
+  PetscCall(ProjectVelocities(M, hold, &d.rigid));
+  if (M.continues) PetscFunctionReturn(0);
+  const std::vector<Pose> before = Poses(s);
+  PetscCall(ProjectVelocities(M, hold, &d.deforms));
+  PetscCall(MeasureMisfit(s, m));
+  for (std::size_t e = 0; e < m.size(); e++)
+    if (d.deforms[e] && !(m[e].relative_velocity <= s.start.tolerance)) impact[d.element[e]] = 1;
+  for (std::size_t b = 0; b < before.size(); b++)
+    if (d.body[b] >= 0 && impact[d.body[b]]) {
+      s.bodies[b].v = before[b].v;
+      s.bodies[b].w = before[b].w;
+    }
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+bool LeftToDeform(const SceneData &s)
+{
+  return s.start.assembly == Assembly::Project && !(s.started.misfit <= s.start.tolerance && s.started.velocity_misfit <= s.start.tolerance);
+}
+
+PetscErrorCode Assemble(Model &M)
+{
+  SceneData              &s      = M.scene;
+  const std::vector<Pose> before = Poses(s);
+  std::vector<Misfit>     m;
+  PetscFunctionBegin;
   if (s.start.assembly == Assembly::Off) PetscFunctionReturn(0);
   PetscCall(MeasureMisfit(s, m));
-  const Hold hold = M.continues ? Hold::None : Hold::FixedStart; /* fixed_start is of the start */
+  const Hold hold = M.continues ? Hold::Nodes : Hold::FixedStart; /* fixed_start is of the start */
   if (s.start.assembly == Assembly::Report) {
     PetscCall(Report(s, m, M.continues, M.left));
     PetscFunctionReturn(0);
   }
-  if (s.started.misfit > 0) {
-    PetscCall(ProjectPositions(M, hold, &ok));
-    if (!ok) {
-      PetscCall(MeasureMisfit(s, m));
-      const std::string left = WorstPositions(s, m, s.start.tolerance);
-      SetPoses(s, before);
-      SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
-              "the scene cannot be assembled; after %d iterations these constraints are not met:%s\n"
-              "Start nearer to where they are met, or free a body that is held by fixed_start",
-              (int)s.started.assembly_iterations, left.c_str());
-    }
-  }
+  const Deformable d = FindDeformable(s, hold);
+  if (s.started.misfit > 0) PetscCall(AssemblePositions(M, hold, d));
   PetscCall(MeasureMisfit(s, m));
-  if (s.started.velocity_misfit > 0) PetscCall(ProjectVelocities(M, hold));
+  if (s.started.velocity_misfit > 0) PetscCall(AssembleVelocities(M, hold, d));
   PetscCall(MeasureMisfit(s, m));
-  if (!(s.started.velocity_misfit <= s.start.tolerance)) {
-    const std::string left = WorstVelocities(s, m, s.start.tolerance);
-    SetPoses(s, before);
-    SETERRQ(s.comm, PETSC_ERR_CONV_FAILED,
-            "no initial velocities satisfy all constraints:%s\n"
-            "Look for motions that contradict each other, or bodies held by fixed_start",
-            left.c_str());
-  }
+  const std::string left = WorstVelocities(s, OfRigid(m, d), s.start.tolerance);
+  if (!left.empty()) SetPoses(s, before);
+  PetscCheck(left.empty(), s.comm, PETSC_ERR_CONV_FAILED,
+             "no initial velocities satisfy all constraints:%s\n"
+             "Look for motions that contradict each other, or bodies held by fixed_start",
+             left.c_str());
+  if (LeftToDeform(s))
+    PetscCall(PetscInfo(nullptr, "scene: flexible bodies have to deform for%s%s\n", WorstPositions(s, m, s.start.tolerance).c_str(),
+                        WorstVelocities(s, m, s.start.tolerance).c_str()));
   PetscCall(ReportMoves(s, before, "assembly"));
   PetscFunctionReturn(0);
 }

@@ -45,13 +45,19 @@ void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, 
     b.J.middleCols(b.column[at] + (int)direction.size(), d.modal.cols()) += d.modal;
 }
 
+bool Holds(Hold hold, const BodyData &b)
+{
+  const bool of_nodes = b.massless && b.carrier < 0;
+  return b.fixed_start && (hold == Hold::FixedStart || (hold == Hold::Nodes && of_nodes));
+}
+
 /* The bodies that can move, and where their columns begin */
 void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hold, Modes modes, RowBlock &b)
 {
   int columns = 0;
   for (int k = 0; k < store.markers(); k++) {
     const PetscInt id = s.markers[store.marker(e, k)].body;
-    if (id < 0 || (hold == Hold::FixedStart && s.bodies[id].fixed_start)) continue;
+    if (id < 0 || Holds(hold, s.bodies[id])) continue;
     if (std::find(b.body.begin(), b.body.end(), id) != b.body.end()) continue;
     b.body.push_back(id);
     b.column.push_back(columns);

@@ -35,7 +35,7 @@ struct RowBlock {
 
   bool has(int r) const { return active >> r & 1; }
 };
-enum class Hold { None, FixedStart }; /* bodies that count as ground */
+enum class Hold { None, Nodes, FixedStart }; /* what counts as ground: nothing, frames that nodes of another library hold, these and bodies with fixed_start */
 enum class Modes { Held, Free };      /* modal coordinates: not among the columns, or behind those of their body */
 
 std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes = Modes::Held);
@@ -84,9 +84,10 @@ struct Pose {
 std::vector<Pose> Poses(const SceneData &s);
 void              SetPoses(SceneData &s, const std::vector<Pose> &p);
 PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what);
-/* bodies to the constraints: largest misfit left; ok: within the tolerance */
-PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok);
+/* rigid motions of bodies to the constraints of all elements, or of those marked in `part`; ok: within the tolerance */
+PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part = nullptr);
 PetscErrorCode Assemble(Model &M); /* reports or projects, as the policy says */
+bool           LeftToDeform(const SceneData &s); /* Assemble() has left misfits that flexible bodies have to deform for: the run's first state is to be projected */
 
 /* ---- redundancy.cpp ---- */
 PetscErrorCode DropRedundant(Model &M);

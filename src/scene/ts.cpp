@@ -1,4 +1,5 @@
 /* The scene as a problem of PETSc's TS. */
+#include "hhtdae/analyses.h"
 #include "extension.h"
 #include "guard.h"
 #include "runtime.h"
@@ -188,7 +189,12 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(setUp());
   PetscCall(CheckUnchanged(data(), start_));
   PetscCall(CreateRun(model_, ts));
-  if (data().start.equilibrium && !model_->continues) PetscCall(Guarded([&] { return StartWithMotions(*ts); }));
+  if (model_->continues) PetscFunctionReturn(0); /* createTS(ts, from) projects what the run begins with */
+  PetscErrorCode failed = 0;
+  if (data().start.equilibrium) failed = Guarded([&] { return StartWithMotions(*ts); });
+  else if (LeftToDeform(data())) failed = AssembleAt(*ts, data().start.time);
+  if (failed) PetscCall(TSDestroy(ts));
+  PetscCall(failed);
   PetscFunctionReturn(0);
 }
 

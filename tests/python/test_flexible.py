@@ -322,6 +322,127 @@ class Beam(unittest.TestCase):
         np.testing.assert_allclose(found.real, np.real(exact), rtol=1e-5)
         np.testing.assert_allclose(found.imag, np.imag(exact), rtol=1e-3)
 
+    def held(self, whole, assembly, place=(0., 0., 0.), law=None, **policy):
+        """The beam clamped at its root, and at its tip by `law` or a clamp that misses it by `place`: scene, body, tip, what is at the tip"""
+        scene = h.Scene()
+        scene.start(assembly=assembly, **policy)
+        if whole:
+            b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law=whole, attachments=[flexible.Attachment("root"), flexible.Attachment("tip")]))
+        else:
+            b = scene.add("beam", h.FlexibleBody(self.body))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        tip, goal = b.attachment("tip").marker(), scene.ground.marker(np.array([1., 0, 0]) + place)
+        at = scene.add("drive", h.TranslationalMotion(tip, goal, law)) if law else scene.add("other", h.Fixed(tip, goal))
+        return scene, b, tip, at
+
+    def test_driven_end(self):
+        """Clamped at one end and driven at the other, which moves at the start: no rigid motion has these velocities"""
+        for whole in (None, "small"):
+            scene, b, tip, _ = self.held(whole, "project", law=lambda t: 0.001 * h.sin(200 * t))
+            scene.channel("z", h.displacement(tip, 2))
+            now = scene.run().snapshot()
+            np.testing.assert_allclose(now.motion(tip).velocity[2], 0.2, rtol=1e-9)
+            run = scene.solve(0.01, tolerance=1e-6)
+            self.assertAlmostEqual(run["z"][-1], 0.001 * np.sin(2), delta=1e-8)
+        scene, b, tip, _ = self.held(None, "report", law=lambda t: 0.001 * h.sin(200 * t))
+        with self.assertRaisesRegex(h.Error, r"drive: velocities violate it by 0\.2(.|\n)*assembly=\"project\""):
+            scene.run()
+
+    def test_velocities_after_an_impact(self):
+        """The nearest velocities in the metric of the mass matrix, dense and of the modal body"""
+        scene, b, tip, _ = self.held(None, "project", law=lambda t: 0.2 * t)
+        modal, n = self.body.modal(), len(self.body.frequencies)
+        shape = self.body.shape.reshape(-1, n)
+        rigid = np.zeros((shape.shape[0], 6))
+        x = self.model.coordinates - modal.center
+        for c in range(3):
+            rigid[c::3, c] = 1
+            rigid[(c + 1) % 3::3, 3 + c], rigid[(c + 2) % 3::3, 3 + c] = -x[:, (c + 2) % 3], x[:, (c + 1) % 3]
+        V = np.hstack([rigid, shape])
+        M = V.T @ np.array(self.model.M.copy().convert("dense").getDenseArray()) @ V
+        rows, goal = [], []
+        for name in ("root", "tip"):
+            k = self.model.sets[name]
+            fit, *_ = np.linalg.lstsq(np.hstack([np.tile(np.eye(3), (len(k), 1)), self.turn(self.model.coordinates[k] - modal.attachments[name])]), V.reshape(-1, 3, V.shape[1])[k].reshape(3 * len(k), -1), rcond=None)
+            rows.append(fit if name == "root" else fit[2:3])
+            goal += [0.] * 6 if name == "root" else [0.2]
+        C = np.vstack(rows)
+        least = np.linalg.solve(M, C.T @ np.linalg.solve(C @ np.linalg.solve(M, C.T), goal))
+        now = scene.run().snapshot()
+        exact = least @ M @ least / 2
+        self.assertAlmostEqual(now.energy()[0], exact, delta=1e-8 * exact)
+
+    @staticmethod
+    def turn(x):
+        G = np.zeros((3 * len(x), 3))
+        for c in range(3):
+            G[(c + 1) % 3::3, c], G[(c + 2) % 3::3, c] = -x[:, (c + 2) % 3], x[:, (c + 1) % 3]
+        return G
+
+    def test_press_fit(self):
+        """Clamped at both ends in a gap that is too wide or too narrow: EA d / L, from the start and from a run's analysis"""
+        for whole, gap in ((None, 1e-4), (None, 1e-3), (None, -1e-3), ("small", 1e-3), ("large", 1e-4)):
+            exact = E * D * D * gap / L
+            for at_once in (False, True):
+                scene, b, tip, other = self.held(whole, "project", (gap, 0, 0), equilibrium=at_once)
+                run = scene.run()
+                if not at_once:
+                    np.testing.assert_allclose(run.snapshot().motion(tip).position, [1 + gap, 0, 0], atol=1e-9)
+                    run.equilibrium()
+                force = run.snapshot().load(other, tip).force[0]
+                self.assertAlmostEqual(abs(force), abs(exact), delta=(1e-3 if whole == "large" else 1e-6) * abs(exact), msg=str((whole, gap, at_once)))
+
+    def test_element_that_appears(self):
+        """What a lock leaves of a vibration is the same whether misfits are reported or projected"""
+        energies = []
+        for whole in (None, "small"):
+            for assembly in ("report", "project"):
+                scene = h.Scene()
+                scene.start(assembly=assembly)
+                on, z = scene.parameter("on", 0.), scene.parameter("z", 0.)
+                if whole:
+                    b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law=whole, attachments=[flexible.Attachment("root"), flexible.Attachment("tip")]))
+                else:
+                    b = scene.add("beam", h.FlexibleBody(self.body))
+                scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+                tip, goal = b.attachment("tip").marker(), scene.ground.marker((1., 0, z))
+                scene.add("push", h.UserForce(tip, force=(0, 0, 200 * h.sin(300 * h.time()))))
+                first = [True]
+
+                def lock():
+                    there = first.pop() if first else float(on) > 0
+                    return h.InPlane(tip, goal) if there else None
+
+                scene.add("lock", lock)
+                scene.set(z=0.1)
+                run = scene.run(tolerance=1e-8).solve(0.01)
+                before = run.snapshot()
+                scene.set(on=1., z=before.motion(tip).position[2])
+                after = scene.run(tolerance=1e-8, after=run).snapshot()
+                self.assertGreater(abs(before.motion(tip).velocity[2]), 0.01)
+                self.assertAlmostEqual(after.motion(tip).velocity[2], 0, delta=1e-9)
+                energies.append(after.energy()[0])
+                self.assertLess(energies[-1], before.energy()[0])
+            self.assertAlmostEqual(energies[-1], energies[-2], delta=1e-7 * energies[-2])
+
+    def test_contradictions_beside_flexible_bodies(self):
+        """Are named, of rigid bodies and of what holds a flexible one"""
+        scene, b, tip, _ = self.held(None, "project", law=lambda t: 0.001 * h.sin(200 * t))
+        slider = scene.add("slider", h.RigidBody(mass=1, inertia=np.eye(3)))
+        for name, speed in (("one", 1.), ("two", 2.)):
+            scene.add(name, h.TranslationalMotion(slider.marker(), scene.ground.marker(), lambda t, speed=speed: speed * t))
+        with self.assertRaisesRegex(h.Error, "no initial velocities satisfy all constraints:(.|\n)*(one|two)") as raised:
+            scene.run()
+        self.assertNotIn("drive", str(raised.exception))
+        scene, b, tip, _ = self.held(None, "project", law=lambda t: 0.001 * h.sin(200 * t))
+        scene.add("another", h.TranslationalMotion(tip, scene.ground.marker((1., 0, 0)), lambda t: 0.001 * h.sin(300 * t)))
+        with self.assertRaisesRegex(h.Error, "another(.|\n)*was dropped as redundant at the start, and is violated"):
+            scene.solve(0.01)
+        scene, b, tip, _ = self.held(None, "project", (1e-3, 0, 0))
+        scene.add("third", h.Fixed(tip, scene.ground.marker((1.002, 0, 0))))
+        with self.assertRaisesRegex(h.Error, "(other|third)"):
+            scene.run()
+
     def test_mistakes(self):
         try:
             import scipy.sparse

@@ -309,7 +309,8 @@ class Run(Channels):
 
     def equilibrium(self, time: Any = None) -> "Run":
         """Moves the run to static equilibrium at a time, at rest; returns the run. States whose values nothing reads, integrals for later use, keep them.
-        Initial values that violate constraints need ``scene.start(assembly="project")`` before the run is made. Collective."""
+        Initial values that violate constraints need ``scene.start(assembly="project")`` before the run is made, or "off": bodies then go
+        from where they are described. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 

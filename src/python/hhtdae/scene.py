@@ -365,7 +365,11 @@ class Scene:
         Parameters
         ----------
         assembly : {"report", "off", "project"}
-            About initial values that violate the constraints: an error that names the elements; nothing; move bodies and velocities.
+            About initial values that violate the constraints: an error that names the elements; nothing, they are left to the run's own start (option
+            ``ts_hhtdae_start``); or "project": bodies and velocities move to the nearest consistent ones in the metric of the masses. Bodies move as rigid ones
+            first. What rigid motions cannot meet, a press fit or a motion that drives one end of a clamped beam, flexible bodies deform for when the run is
+            made: velocities become those after a plastic impact, positions are strained near the attachments, most in whole bodies, until
+            `Run.equilibrium` relaxes them. ``fixed_start`` holds a body; joints that hang together with one are met by rigid motions alone.
         tolerance : float
             Of misfits, times the scene's size for lengths; radians.
         redundant : {"drop", "refuse", "keep"}
