@@ -221,15 +221,16 @@ PetscErrorCode CheckRanks(const Scene &scene, const std::string &name, const FeM
 
 } // namespace
 
-PetscErrorCode FullFeBody::add(Scene &scene, const std::string &name, const FeModel &model, const FullBody &body)
+PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeModel &model, const FullBody &body)
 {
   auto        x = std::make_unique<FullExtension>();
   PetscMPIInt rank, size;
   double      mass;
   Vector3     corner[2];
   PetscFunctionBegin;
+  const std::string name  = given.empty() ? "fe body " + std::to_string(DataOf(scene).extensions.size()) : given,
+                    fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCall(CheckRanks(scene, name, model));
-  const std::string fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
   PetscCall(Agree(model.comm, fault.empty() ? "" : "finite-element body " + name + ": " + fault, PETSC_ERR_ARG_WRONG));
   PetscCall(CheckAttachments(model, body.attachments));
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));

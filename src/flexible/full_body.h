@@ -51,6 +51,7 @@ public:
   void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override;
   PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *mesh) const override; /* full_surface.cpp */
 
+  const std::string &bodyName() const override { return name; }
   std::string    nameOf(PetscMPIInt rank, PetscInt unknown) const override;
 
   PetscMPIInt ownerOf(PetscInt node) const;

@@ -1,4 +1,5 @@
 /* What can be wrong with a description, found before anything is numbered and reported all at once. */
+#include "extension.h"
 #include "measures.h"
 #include "runtime.h"
 #include "symmetric.h"
@@ -130,6 +131,9 @@ private:
                   : "both markers are on " + s_.bodyName(i) + "; they must be on different bodies");
   }
 
+  struct Named {
+    const std::string &name;
+  };
   template <class List> void unique(const char *what, const List &list)
   {
     std::set<std::string> seen, told;
@@ -140,7 +144,10 @@ private:
   }
   void names()
   {
-    unique("body", s_.bodies);
+    std::vector<Named> bodies;
+    for (const BodyData &b : s_.bodies) bodies.push_back({b.name});
+    for (const auto &x : s_.extensions) bodies.push_back({x->bodyName()});
+    unique("body", bodies);
     unique("element", s_.elements);
     unique("variable", s_.variables);
     unique("state", s_.states);

@@ -28,6 +28,7 @@ public:
     (void)most_nodes;
     return 0;
   }
+  virtual const std::string &bodyName() const = 0; /* one that no other body of the scene has */
   virtual std::string nameOf(PetscMPIInt rank, PetscInt unknown) const = 0; /* of the unknowns of a rank, for messages */
   PetscInt         unknowns() const { return coordinates() + multipliers(); }
 

@@ -443,6 +443,20 @@ class Beam(unittest.TestCase):
         with self.assertRaisesRegex(h.Error, "(other|third)"):
             scene.run()
 
+    def test_names_of_bodies(self):
+        """A whole model has one that no other body has"""
+        whole = lambda scene, name: flexible.FullFeBody(scene, name, self.model, flexible.FullBody(law="small"))
+        for others in (whole, lambda scene, name: scene.add(name, h.RigidBody()), lambda scene, name: scene.add(name, h.FlexibleBody(self.body))):
+            scene = h.Scene()
+            whole(scene, "beam")
+            others(scene, "beam")
+            with self.assertRaisesRegex(h.Error, "body beam: the name is given more than once"):
+                scene.run()
+        scene = h.Scene()
+        whole(scene, "")
+        whole(scene, "")
+        scene.run()
+
     def test_mistakes(self):
         try:
             import scipy.sparse
