@@ -1,6 +1,8 @@
 /* Whether K and M can be those of solid elements: sizes, symmetry, the form of M, diagonals. */
+#include "attachments.h"
 #include "diagnose_nodes.h"
 #include "modes.h"
+#include "scene/symmetric.h"
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -127,6 +129,56 @@ static PetscErrorCode CheckMass(const FeModel &model)
   PetscFunctionReturn(0);
 }
 
+/*
+  Is M positive definite? The smallest eigenvalue of D^-1/2 M D^-1/2, D the diagonal, by steps of Lanczos's method: a value below zero is a velocity of negative
+  kinetic energy whether it has converged or not. Of solid elements all are above some 0.01 (Wathen), so that one below zero stands apart and comes early; and these are
+  products with M alone, nothing beside the factorization of K. M being m_ij times the identity, x stands for y and z.
+*/
+static PetscErrorCode CheckPositive(const FeModel &model)
+{
+  constexpr int    steps  = 60, each = 10;
+  constexpr double beyond = -1e-4; /* files of five digits may move zero as far */
+  VectorXd         alpha(steps), beta(steps);
+  Vec              D, q, last, x, w;
+  PetscReal        beta_k = 1, least = 0;
+  PetscScalar     *start;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateVecs(model.M, &D, &q));
+  for (Vec *v : {&last, &x, &w}) PetscCall(VecDuplicate(q, v));
+  PetscCall(MatGetDiagonal(model.M, D));
+  PetscCall(VecSqrtAbs(D));
+  PetscCall(VecReciprocal(D));
+  PetscCall(VecSet(last, 0));
+  PetscCall(VecSet(q, 0));
+  PetscCall(VecGetArray(q, &start));
+  for (PetscInt i = 0; i < model.own; i++) start[3 * i] = Wave(NodeLabel(model, i), 12.9898) + Wave(NodeLabel(model, i), 1.7);
+  PetscCall(VecRestoreArray(q, &start));
+  PetscCall(VecNormalize(q, nullptr));
+  for (int k = 0; k < steps && least > beyond && beta_k > 1e-12; k++) {
+    PetscCall(VecPointwiseMult(x, D, q));
+    PetscCall(MatMult(model.M, x, w));
+    PetscCall(VecPointwiseMult(w, D, w));
+    if (k) PetscCall(VecAXPY(w, -beta_k, last));
+    PetscCall(VecDot(w, q, &alpha[k]));
+    PetscCall(VecAXPY(w, -alpha[k], q));
+    PetscCall(VecNormalize(w, &beta_k));
+    beta[k] = beta_k;
+    PetscCall(VecCopy(q, last));
+    PetscCall(VecCopy(w, q));
+    if ((k + 1) % each && k + 1 < steps && beta_k > 1e-12) continue;
+    MatrixXd T = alpha.head(k + 1).asDiagonal();
+    for (int i = 0; i < k; i++) T(i + 1, i) = beta[i];
+    least = SymmetricEigen(T).values[0];
+  }
+  for (Vec *v : {&D, &q, &last, &x, &w}) PetscCall(VecDestroy(v));
+  PetscCheck(least > beyond, model.comm, PETSC_ERR_ARG_WRONG,
+             "M is not positive definite: some velocities have a negative kinetic energy, %.3g of the sum of m_ii v_i^2 / 2. Are entries of it missing or of the wrong sign, or were its parts not "
+             "added up?",
+             (double)least);
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode CheckStiffness(const FeModel &model)
 {
   std::vector<PetscInt> loose, negative;
@@ -178,6 +230,7 @@ PetscErrorCode CheckMatrices(const FeModel &model)
   PetscCall(CheckSymmetric(model, model.K, "K"));
   PetscCall(CheckSymmetric(model, model.M, "M"));
   PetscCall(CheckMass(model));
+  PetscCall(CheckPositive(model));
   PetscCall(CheckStiffness(model));
   PetscFunctionReturn(0);
 }

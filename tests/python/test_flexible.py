@@ -457,6 +457,27 @@ class Beam(unittest.TestCase):
         whole(scene, "")
         scene.run()
 
+    def test_indefinite_mass(self):
+        """A negative direction that no diagonal entry shows"""
+        try:
+            import scipy.sparse
+        except ImportError:
+            self.skipTest("no scipy")
+        K, M = (scipy.sparse.csr_matrix(A.getValuesCSR()[::-1], shape=A.getSize()) for A in (self.model.K, self.model.M))
+        m = M.toarray()[::3, ::3]
+        for seed in range(3):
+            w = np.random.default_rng(seed).normal(size=len(m))
+            w /= np.linalg.norm(w)
+            for part, refused in ((1.5, True), (1.05, True), (0.5, False)):
+                wrong = scipy.sparse.csr_matrix(np.kron(m - part * np.outer(w, w) / (w @ np.linalg.solve(m, w)), np.eye(3)))
+                model = flexible.FeModel.from_matrices(K, wrong, self.model.coordinates)
+                model.add_set("root", self.model.sets["root"])
+                if refused:
+                    with self.assertRaisesRegex(h.Error, "M is not positive definite"):
+                        flexible.reduce(model, [flexible.Attachment("root")], modes=3)
+                else:
+                    flexible.reduce(model, [flexible.Attachment("root")], modes=3)
+
     def test_mistakes(self):
         try:
             import scipy.sparse
