@@ -274,6 +274,9 @@ PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShap
   PetscCheck(!m.symmetric || !both, comm, PETSC_ERR_FILE_UNEXPECTED,
              "cannot read the matrix %s: it is said to be symmetric, but has entries in both triangles",
              m.file.c_str());
+  PetscCheck(m.kind != MatrixFile::Market || m.symmetric || triangle[0] == triangle[1], comm, PETSC_ERR_FILE_UNEXPECTED,
+             "cannot read the matrix %s: it is not symmetric: its head calls it general, and it has entries in one triangle alone; say symmetric there, or give both",
+             m.file.c_str());
   if (!both && m.kind == MatrixFile::Text) Mirror(triplets);
   if (m.symmetric) Mirror(triplets);
   PetscFunctionReturn(0);
@@ -344,7 +347,7 @@ PetscErrorCode CheckSymmetric(MPI_Comm comm, const std::string &name, Mat A)
   PetscCheck(std::isfinite(size), comm, PETSC_ERR_FP, "the matrix %s has entries that are not finite numbers",
              name.c_str());
   PetscCheck(difference <= 1e-8 * size, comm, PETSC_ERR_ARG_WRONG,
-             "the matrix %s is not symmetric: |A - A^T| = %g |A| (both triangles are needed, or one alone)",
+             "the matrix %s is not symmetric: |A - A^T| = %g |A| (both triangles are needed; one alone does in text without a head and in Matrix Market files that say symmetric)",
              name.c_str(), (double)(difference / size));
   PetscFunctionReturn(0);
 }

@@ -33,6 +33,11 @@ static PetscErrorCode CheckReduction(const FeModel &model, const Reduction &r)
   for (PetscInt k : r.keep)
     PetscCheck(k >= 0, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
                "Reduction::keep lists mode %" PetscInt_FMT "; modes have numbers from 0", k);
+  if (r.method != Method::Static && r.modes == PETSC_DEFAULT) PetscFunctionReturn(0);
+  const PetscInt most = (r.method == Method::Static ? 0 : r.modes) + 6 * std::max<PetscInt>((PetscInt)r.attachments.size() - 1, 0); /* rigid motions are none of them */
+  for (PetscInt k : r.keep)
+    PetscCheck(k < most, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
+               "Reduction::keep lists mode %" PetscInt_FMT ", but there are %" PetscInt_FMT " elastic modes at most (numbers from 0)", k, most);
   PetscFunctionReturn(0);
 }
 

@@ -105,10 +105,10 @@ PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(body.comm, &rank));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT64, MPI_SUM, body.comm));
-  std::string error;
-  if (!count[1]) error = "body " + body.modal.name + " has no elements: its surface is not known";
+  std::string error, who = body.modal.name.empty() ? "the body" : "body " + body.modal.name;
+  if (!count[1]) error = who + " has no elements: its surface is not known";
   else if (!count[0] || body.coordinates.size() != 3 * (std::size_t)body.own || body.shape.rows() != 3 * body.own || body.shape.cols() != body.modal.modes())
-    error = "body " + body.modal.name + " has no modes at its nodes: it has to be reduced with all nodes for its surface to be shown";
+    error = who + " has no modes at its nodes: it has to be reduced with all nodes for its surface to be shown";
   PetscCall(Agree(body.comm, error, PETSC_ERR_ARG_INCOMP));
   *surface = Surface();
   PetscCall(GatherTo0(body.comm, body.elements.data(), body.elements.size(), &elements, &of));

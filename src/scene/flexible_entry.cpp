@@ -70,7 +70,7 @@ double RigidContent(const ModalBody &m)
 }
 
 /* empty: nothing is wrong */
-std::string Fault(const FlexibleBody &b, bool planar)
+std::string FaultOfModel(const FlexibleBody &b, bool planar)
 {
   if (!b.model) return "it has no model; give a ModalBody";
   const ModalBody &m = *b.model;
@@ -84,6 +84,13 @@ std::string Fault(const FlexibleBody &b, bool planar)
     if (n && !x.size() && b.mass == ModalMass::Full) return "its ModalBody has no invariants quadratic in the modes; use ModalMass::Partial or Constant";
   if (b.mass == ModalMass::Constant && RigidContent(m) > 1e-6)
     return "its modes move the centre of mass or turn the body as a whole; a constant mass matrix needs modes that are free of that";
+  return "";
+}
+
+/* of what is said beside a model that is right */
+std::string FaultOfValues(const FlexibleBody &b)
+{
+  const PetscInt n = b.model->modes();
   for (const Eigen::VectorXd *x : {&b.ratios, &b.deformation, &b.deformation_rate})
     if (x->size() && x->size() != n) return "it has " + std::to_string(n) + " modes, and damping ratios or a deformation of " + std::to_string(x->size());
   if (!b.deformation.allFinite() || !b.deformation_rate.allFinite()) return "its deformation at the start is not finite";
@@ -107,7 +114,8 @@ Eigen::VectorXd ModalDamping(const FlexibleData &f)
 Body Scene::add(const std::string &name, const FlexibleBody &b)
 {
   if (recording()) record([=](Scene &s) { s.add(name, b); });
-  const std::string who = name.empty() ? "body " + std::to_string(data().bodies.size()) : name, fault = Fault(b, data().planar);
+  const std::string who = name.empty() ? "body " + std::to_string(data().bodies.size()) : name, wrong_model = FaultOfModel(b, data().planar),
+                    fault = wrong_model.empty() ? FaultOfValues(b) : wrong_model;
   RigidBody         r;
   r.rotation         = b.rotation;
   r.velocity         = b.velocity;
@@ -120,17 +128,15 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
     r.center  = b.model->center;
   }
   const Body body = addRigid(who, r);
-  if (!fault.empty()) {
-    data().errors.push_back("flexible body " + who + ": " + fault);
-    return body;
-  }
+  if (!fault.empty()) data().errors.push_back("flexible body " + who + ": " + fault);
+  if (!wrong_model.empty()) return body; /* with a right one it is flexible all the same: nothing that is said of its modes is wrong for that */
   auto           f = std::make_shared<FlexibleData>();
   const PetscInt n = b.model->modes();
   f->model            = b.model;
   f->mass             = b.mass;
   f->deformation      = Sized(b.deformation, n);
   f->deformation_rate = Sized(b.deformation_rate, n);
-  for (PetscInt k = 0; k < n; k++) f->damping.push_back(b.ratios.size() ? b.ratios(k) : RatioOf(b, b.model->omega(k) / (2 * M_PI)));
+  for (PetscInt k = 0; k < n; k++) f->damping.push_back(b.ratios.size() == n && n ? b.ratios(k) : RatioOf(b, b.model->omega(k) / (2 * M_PI)));
   f->frame = (PetscInt)data().markers.size();
   data().markers.push_back({body.id, Vector3::Zero(), Matrix3::Identity()});
   data().bodies[body.id].flexible = f;

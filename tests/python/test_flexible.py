@@ -478,6 +478,32 @@ class Beam(unittest.TestCase):
                 else:
                     flexible.reduce(model, [flexible.Attachment("root")], modes=3)
 
+    def test_messages(self):
+        """Say what is wrong and no more"""
+        with self.assertRaisesRegex(h.Error, "keep lists mode 99, but there are 9 elastic modes at most"):
+            flexible.reduce(self.model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=3, keep=[0, 99])
+        with self.assertRaisesRegex(h.Error, "field of the body with 12 modes"):
+            self.body.write_field(np.zeros(13), os.path.join(self.folder.name, "no.vtu"))
+        scene = h.Scene()
+        scene.add("load", h.ModalLoad(scene.add("stone", h.RigidBody()), "case", 1.))
+        with self.assertRaisesRegex(h.Error, "modal load load: its body is not a flexible one of this scene") as raised:
+            scene.run()
+        self.assertNotIn("marker", str(raised.exception))
+        scene = h.Scene()
+        b = scene.add("beam", h.FlexibleBody(self.body, deformation=[1., 2.]))
+        scene.channel("m", h.modal(b, 0))
+        with self.assertRaisesRegex(h.Error, "has 12 modes, and damping ratios or a deformation of 2") as raised:
+            scene.run()
+        self.assertNotIn("channel m", str(raised.exception))
+        lower = os.path.join(self.folder.name, "lower.mtx")
+        with open(lower, "w") as text:
+            text.write("%%MatrixMarket matrix coordinate real general\n3 3 4\n1 1 1.\n2 2 1.\n3 3 1.\n2 1 0.1\n")
+        nodes = os.path.join(self.folder.name, "one.nodes")
+        with open(nodes, "w") as text:
+            text.write("1 0 0 0\n")
+        with self.assertRaisesRegex(h.Error, "general, and it has entries in one triangle alone"):
+            flexible.FeModel.from_files(lower, lower, nodes)
+
     def test_mistakes(self):
         try:
             import scipy.sparse

@@ -238,9 +238,13 @@ template <> Element Scene::enter(const std::string &name, const ModalLoad &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  const Marker at{flexible ? s.bodies[x.body.id].flexible->frame : -1, number_};
+  if (!flexible) { /* without a marker that it could be at */
+    const Element none = absent(name);
+    s.errors.push_back("modal load " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
+    return none;
+  }
+  const Marker at{s.bodies[x.body.id].flexible->frame, number_};
   ElementBuilder e(*this, name, "modal load", ElementData::Force, at, Marker{}, false);
-  e.require(flexible, "its body is not a flexible one of this scene");
   if (!e.good()) return e.done();
   const ModalBody     &m = *s.bodies[x.body.id].flexible->model;
   ModalLoadStore::Item item;

@@ -118,9 +118,13 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  const Marker at{flexible ? s.bodies[x.body.id].flexible->frame : -1, number_};
+  if (!flexible) { /* without a marker that it could be at */
+    const Element none = absent(name);
+    s.errors.push_back("node contact " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
+    return none;
+  }
+  const Marker at{s.bodies[x.body.id].flexible->frame, number_};
   ElementBuilder e(*this, name, "node contact", ElementData::Force, at, x.j);
-  e.require(flexible, "its body is not a flexible one of this scene");
   if (!e.good()) return e.done();
   const PetscInt other = s.markers[x.j.id].body;
   e.require(other < 0 || s.bodies[other].carrier != x.body.id, "marker j is on the same flexible body " + s.bodyName(x.body.id));
