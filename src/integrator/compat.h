@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <petsc/private/snesimpl.h>
 #include <petsc/private/tsimpl.h>
+#include <vector>
 
 #if PETSC_VERSION_LT(3, 19, 0)
   #define PETSC_SUCCESS 0
@@ -108,11 +109,51 @@ static inline PetscBool HHT3EventActive(TS ts)
 #endif
 }
 
+/* Whether the step to come is the first one behind an event. Where it ends at the final time TSEvent takes that for the place of any zero within it: it looks for it with a step of what is
+   left until then, which is nothing */
+static inline PetscBool HHT3BehindEvent(TS ts)
+{
+#if PETSC_VERSION_LT(3, 21, 0)
+  return (PetscBool)(ts->event && ts->event->status == TSEVENT_RESET_NEXTSTEP);
+#else
+  (void)ts;
+  return PETSC_FALSE;
+#endif
+}
+
+/* Whether a zero of this function has been found at the present time */
+static inline bool HHT3IsLocated(TS ts, PetscInt event)
+{
+  const auto    &r = ts->event->recorder;
+  const PetscInt k = r.ctr - 1;
+  return k >= 0 && r.time[k] == ts->ptime && std::find(r.eventidx[k], r.eventidx[k] + r.nevents[k], event) != r.eventidx[k] + r.nevents[k];
+}
+
+/* The functions whose zeros TSEvent looks for */
+static inline PetscErrorCode HHT3EventFunctions(TS ts, PetscReal t, Vec U, std::vector<PetscScalar> &f)
+{
+  PetscErrorCode failed;
+
+  PetscFunctionBegin;
+  f.resize(ts->event->nevents);
+  PetscCall(VecLockReadPush(U));
+#if PETSC_VERSION_LT(3, 21, 0)
+  failed = (*ts->event->eventhandler)(ts, t, U, f.data(), ts->event->ctx);
+#else
+  std::vector<PetscReal> real(f.size());
+  failed = (*ts->event->indicator)(ts, t, U, real.data(), ts->event->ctx);
+  std::copy(real.begin(), real.end(), f.begin());
+#endif
+  PetscCall(VecLockReadPop(U));
+  PetscCall(failed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After the steps to an event TSEvent goes on with the step that it was begun with, unless the user sets another one: with h, where it is one of those that nobody has set */
 static inline void HHT3StepAfterEvent(TS ts, std::initializer_list<PetscReal> unset, PetscReal h)
 {
 #if PETSC_VERSION_LT(3, 21, 0)
-  if (!ts->event || ts->event->status != TSEVENT_NONE) return;
+  if (!ts->event || (ts->event->status != TSEVENT_NONE && !HHT3BehindEvent(ts))) return;
   PetscReal &after = ts->event->timestep_posteventinterval;
   if (std::find(unset.begin(), unset.end(), after) != unset.end()) after = h;
 #else

@@ -403,6 +403,9 @@ static PetscErrorCode Finalize(void)
   chosen by another type is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
   or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
 
+  Where the function of an event begins a step at its zero, as behind the event, the step ends before it comes back to it: `TSEvent` does not see a zero that lies within its tolerance from the one before. So a ball
+  that bounces lower than the tolerance falls through the floor unless the function called at the event lays it to rest.
+
   Forces that jump where the integrator cannot see it, between two calls of `TSSolve()` or in a monitor, want `TSRestartStep()`; its history is that of the forces before.
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's

@@ -455,6 +455,7 @@ PetscErrorCode StartFromState(TS ts, Prepared have)
   PetscCall(ConsistentStart(ts, have, rate));
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCall(LimitStepByEvents(ts));
   PetscCall(MakeHistory(ts, rate));
   PetscCall(HistoryForces(ts, ts->ptime));
   PetscFunctionReturn(PETSC_SUCCESS);

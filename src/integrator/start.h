@@ -58,6 +58,9 @@ inline bool IsEndOf(TS ts, PetscReal t) { return PetscAbsReal(ts->ptime - t) <= 
 /* U0 and V0 to the nearest ones that the constraints allow */
 PetscErrorCode ProjectState(TS ts, Prepared *prepared);
 
+/* U0, V0, A0 hold a consistent start: the step ends before a function of an event that begins at its zero there comes back to it, events.cpp */
+PetscErrorCode LimitStepByEvents(TS ts);
+
 /* Everything of t_n from U0, V0: the common part of a start and of a repair */
 PetscErrorCode StartFromState(TS ts, Prepared have);
 

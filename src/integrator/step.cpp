@@ -142,7 +142,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
   ts->time_step = I.h_next = next;
-  if (I.h_chosen) HHT3StepAfterEvent(ts, {unset_step, petsc_step, I.h_after_event}, next);
+  if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_step, I.h_after_event}, next);
   if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
   /* the step to the stop was what was left, and would be taken for what the user wants */
   if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
@@ -321,6 +321,7 @@ PetscErrorCode Step(TS ts)
   if (another) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(CheckpointIfDue(ts));
+  if (HHT3BehindEvent(ts) && !I.fixed_h && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, (ts->max_time - ts->ptime) / 2); /* Events.TwoInOneStep */
   PetscCall(Begin(ts));
   if (I.fixed_h) NoteGivenStep(ts);
   PetscCall(LookFurther(ts));

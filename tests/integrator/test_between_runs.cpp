@@ -679,6 +679,129 @@ TEST(Events, StepsBehindThemAreThoseBefore)
   EXPECT_LE(run.statistics().rejected + run.statistics().corrector_fails, plain.statistics().rejected + plain.statistics().corrector_fails);
 }
 
+namespace
+{
+
+/* Balls in free flight, thrown back where their height is zero */
+struct Balls : Problem {
+  std::vector<double> height, restitution;
+  Balls(std::vector<double> heights, std::vector<double> e, double end) : height(std::move(heights)), restitution(std::move(e))
+  {
+    name = "balls";
+    n    = (PetscInt)height.size();
+    t1   = end;
+    role.assign(n, TSHHT3_COORDINATE);
+  }
+  void initial(double *u, double *v) const override
+  {
+    for (PetscInt i = 0; i < n; i++) u[i] = height[i], v[i] = 0.;
+  }
+  void residual(double, const double *, const double *, const double *a, double *f) const override
+  {
+    for (PetscInt i = 0; i < n; i++) f[i] = a[i] + 10.;
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    for (PetscInt i = 0; i < n; i++) J.add(i, i, sa);
+  }
+  double exact(PetscInt i, double t, int *bounces = nullptr) const
+  {
+    double begin = std::sqrt(2. * height[i] / 10.), v = 10. * begin * restitution[i];
+    if (t < begin) return height[i] - 5. * t * t;
+    for (int k = 1;; k++, begin += 2. * v / 10., v *= restitution[i]) {
+      if (bounces) *bounces = k;
+      if (t < begin + 2. * v / 10.) return (t - begin) * (v - 5. * (t - begin));
+    }
+  }
+};
+
+struct Thrown {
+  const Balls *p;
+  int          times = 0;
+};
+
+PetscErrorCode heights(TS, PetscReal, Vec U, PetscScalar *f, void *)
+{
+  const Array u = whole(U);
+  std::copy(u.begin(), u.end(), f);
+  return 0;
+}
+
+PetscErrorCode throwBack(TS ts, PetscInt count, PetscInt *which, PetscReal, Vec, PetscBool, void *ctx)
+{
+  auto *thrown = static_cast<Thrown *>(ctx);
+  Vec   U, V;
+
+  PetscFunctionBegin;
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  for (PetscInt k = 0; k < count; k++) {
+    PetscScalar *v;
+    PetscCall(VecGetArray(V, &v));
+    v[which[k]] *= -thrown->p->restitution[which[k]];
+    PetscCall(VecRestoreArray(V, &v));
+    thrown->times++;
+  }
+  PetscFunctionReturn(0);
+}
+
+void throwBalls(Simulation &run, Thrown &thrown)
+{
+  std::vector<PetscInt>  down(thrown.p->n, -1);
+  std::vector<PetscBool> go(thrown.p->n, PETSC_FALSE);
+  must(TSSetTimeStep(run.ts, hht3::unset_step));
+  must(TSSetEventHandler(run.ts, thrown.p->n, down.data(), go.data(), heights, throwBack, &thrown));
+  must(TSSetEventTolerances(run.ts, 1e-9, nullptr));
+  must(run.solve());
+}
+
+} // namespace
+
+/* In free flight nothing but the event ends a step: its function returns to zero within what is left of the step that had the last one */
+TEST(Events, ABallIsNotLost)
+{
+  for (double end : {.8, 1.1, 1.3, 1.5, 1.8, 2., 2.5, 3., 3.5, 4., 5., 7.}) {
+    const Balls p({1.}, {.9}, end);
+    Thrown      thrown{&p};
+    Simulation  run(p, tolerance(1e-4));
+    int          bounces;
+    const double exact = p.exact(0, end, &bounces);
+    throwBalls(run, thrown);
+    EXPECT_EQ(thrown.times, bounces) << end;
+    EXPECT_NEAR(run.u()[0], exact, 1e-6) << end;
+    EXPECT_LE(run.statistics().steps, 20 * (bounces + 1)) << end;
+  }
+}
+
+/* The rest of the step that had one event, up to the end of the run, has another one */
+TEST(Events, TwoInOneStep)
+{
+  const Balls         p({1.}, {1.}, 1.);
+  Simulation          run(p, tolerance(1e-4));
+  std::vector<double> times;
+  const PetscInt      up[]   = {1, 1};
+  const PetscBool     go[]   = {PETSC_FALSE, PETSC_FALSE};
+  const auto          clocks = [](TS, PetscReal t, Vec, PetscScalar *f, void *) -> PetscErrorCode { return f[0] = t - .5, f[1] = t - .8, 0; };
+  const auto          note   = [](TS, PetscInt, PetscInt *, PetscReal t, Vec, PetscBool, void *list) -> PetscErrorCode { return static_cast<std::vector<double> *>(list)->push_back(t), 0; };
+  must(TSSetTimeStep(run.ts, hht3::unset_step));
+  must(TSSetEventHandler(run.ts, 2, (PetscInt *)up, (PetscBool *)go, clocks, note, &times));
+  must(run.solve());
+  ASSERT_EQ(times.size(), 2u);
+  EXPECT_NEAR(times[0], .5, 1e-5);
+  EXPECT_NEAR(times[1], .8, 1e-5);
+}
+
+/* Bounces that accumulate end where they are smaller than the tolerance of the event */
+TEST(Events, BouncesThatAccumulate)
+{
+  const Balls p({1.}, {.5}, 3.);
+  Thrown      thrown{&p};
+  Simulation  run(p, tolerance(1e-4));
+  throwBalls(run, thrown);
+  EXPECT_GE(thrown.times, 14);
+  EXPECT_LE(thrown.times, 30);
+  EXPECT_LE(run.statistics().steps, 600);
+}
+
 /* Velocities in another vector, whose count of changes happens to be that of the old one */
 TEST(BetweenRuns, VelocitiesInAnotherVector)
 {
