@@ -255,6 +255,8 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
   PetscFunctionBegin;
+  *ok = true;
+  if (blocks.empty()) PetscFunctionReturn(0);
   for (int it = 0, stuck = 0; it < assembly_iterations && misfit > 1e-15 && stuck < 5; it++) {
     PetscCall(system.factor(blocks));
     RightHandSide(blocks, &RowBlock::value, rhs);
@@ -390,6 +392,8 @@ PetscErrorCode AssembleVelocities(Model &M, Hold hold, const Deformable &d)
 }
 
 } // namespace
+
+std::vector<char> RigidElements(const SceneData &s, Hold hold) { return FindDeformable(s, hold).rigid; }
 
 bool LeftToDeform(const SceneData &s)
 {

@@ -319,7 +319,7 @@ double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
   return worst;
 }
 
-/* To a neighbouring position that all constraints are met at, redundant ones to less than what a start may be off.
+/* To a neighbouring position that all constraints are met at, but for those that flexible bodies have yet to deform for, redundant ones to less than what a start may be off.
    Found without the redundant ones, which near a position that is not consistent contradict the others; where that
    leads away from them, with them */
 PetscErrorCode Neighbour(Model &M, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
@@ -328,19 +328,20 @@ PetscErrorCode Neighbour(Model &M, const std::vector<RowBlock> &blocks, const st
   SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
   const double            enough = 1e-3 * s.start.tolerance;
+  const std::vector<char> part   = LeftToDeform(s) ? RigidElements(s, Hold::None) : std::vector<char>(s.elements.size(), 1);
   PetscFunctionBegin;
   *ok = false;
   PetscCall(MoveAside(M, DescribeAll(s, s.start.time, Hold::None), moved));
   if (!*moved) PetscFunctionReturn(0);
   const std::vector<Pose> aside = Poses(s);
   SetActive(blocks, redundant, false);
-  const PetscErrorCode failed = ProjectPositions(M, Hold::None, ok);
+  const PetscErrorCode failed = ProjectPositions(M, Hold::None, ok, &part);
   SetActive(blocks, redundant, true);
   PetscCall(failed);
   *ok = *ok && LargestMisfit(s, redundant) <= enough;
   if (*ok) PetscFunctionReturn(0);
   SetPoses(s, aside);
-  PetscCall(ProjectPositions(M, Hold::None, ok));
+  PetscCall(ProjectPositions(M, Hold::None, ok, &part));
   *ok = *ok && LargestMisfit(s, redundant) <= enough;
   if (!*ok) SetPoses(s, before);
   PetscFunctionReturn(0);

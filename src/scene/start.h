@@ -87,6 +87,7 @@ PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, con
 /* rigid motions of bodies to the constraints of all elements, or of those marked in `part`; ok: within the tolerance */
 PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part = nullptr);
 PetscErrorCode Assemble(Model &M); /* reports or projects, as the policy says */
+std::vector<char> RigidElements(const SceneData &s, Hold hold); /* those that no flexible body deforms for */
 bool           LeftToDeform(const SceneData &s); /* Assemble() has left misfits that flexible bodies have to deform for: the run's first state is to be projected */
 
 /* ---- redundancy.cpp ---- */

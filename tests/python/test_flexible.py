@@ -392,6 +392,17 @@ class Beam(unittest.TestCase):
                 force = run.snapshot().load(other, tip).force[0]
                 self.assertAlmostEqual(abs(force), abs(exact), delta=(1e-3 if whole == "large" else 1e-6) * abs(exact), msg=str((whole, gap, at_once)))
 
+    def test_redundant_rows_beside_a_press_fit(self):
+        """A four-bar linkage whose hinges are redundant in space, and a beam that has yet to be strained"""
+        scene, b, tip, other = self.held(None, "project", (1e-3, 0, 0))
+        corners = np.array([[0., 1, 0], [0, 2, 0], [1, 2, 0], [1, 1, 0]])
+        links = [scene.add("link %d" % k, h.RigidBody(mass=1, inertia=np.eye(3), position=(corners[k] + corners[k + 1]) / 2)) for k in range(3)]
+        bodies = [scene.ground] + links + [scene.ground]
+        for k, x in enumerate(corners):
+            scene.connect("hinge %d" % k, h.Revolute, bodies[k], bodies[k + 1], x)
+        force = scene.run().equilibrium().snapshot().load(other, tip).force[0]
+        self.assertAlmostEqual(abs(force), E * D * D * 1e-3 / L, delta=1e-5 * abs(force))
+
     def test_element_that_appears(self):
         """What a lock leaves of a vibration is the same whether misfits are reported or projected"""
         energies = []
