@@ -29,6 +29,8 @@ constexpr double largest_growth = 8;  /* of h in one step */
 constexpr double downhill_growth = 2; /* of h in one step on the way down a hollow */
 constexpr double at_rest = 1e-9;        /* a step that moves no more than this */
 constexpr double noise   = 10;          /* times the forces that rounding of the coordinates makes: no step comes nearer (Equilibrium.AMeshFarFromTheOrigin) */
+constexpr double exhausted = 1e-7;                 /* of the way in the metric of energy: what a last step of a mesh may leave (Beam.test_reactions_to_small_loads) */
+constexpr int    most_finishing = 4;               /* steps more of forces that count as balanced */
 constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
 constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
 constexpr double settled = 1e-8;                     /* what states, variables and motions of velocities would still do in the last step, parts of themselves */
@@ -39,6 +41,7 @@ struct Equilibrium : StillSystem {
   Vec      start = nullptr, undamped = nullptr;
   double   scale = 0; /* of forces */
   double   h = 0;     /* of the last step */
+  double   work = 0;  /* most of a step */
   std::vector<double> most; /* of own unknowns on the way */
   PetscInt iterations = 0;
 
@@ -397,9 +400,19 @@ PetscErrorCode KeepUnread(Equilibrium &E, Vec begin)
   PetscFunctionReturn(0);
 }
 
+/* Of a mesh forces may be small at every node, below what rounding makes there, and still add up, as those of inertia do after a step that was not yet Newton's. What is
+   left of the way is w_1/sqrt(w_0 w) by the work of the forces after and before this step, and of those before the longest one. Steps that grow are drift of rounding where nothing
+   holds the body. */
+bool Unfinished(Equilibrium &E, const Attempt &a, double reach_before)
+{
+  if (E.R.scene.extensions.empty()) return false;
+  return std::abs(a.work[1]) > exhausted * std::sqrt(std::abs(a.work[0]) * E.work) && a.reach < 4 * reach_before;
+}
+
 PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
 {
-  double  h = 0, first, before;
+  double  h = 0, first, before, reach = INFINITY;
+  int     finishing = 0;
   Attempt a;
   PetscFunctionBegin;
   PetscCall(Scales(E, &h));
@@ -419,8 +432,14 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
     PetscCall(NoteLargest(E));
     E.scale = std::max(E.scale, at.force); /* variables that carry loads may begin at zero (SceneEquilibrium.ALoopThroughAVariable) */
     PetscCall(Balanced(E, at, found));
-    h     *= Growth(E, a, before, at);
+    E.work = std::max(E.work, std::abs(a.work[0]));
+    if (*found && finishing < most_finishing && Unfinished(E, a, reach)) {
+      *found = false;
+      finishing++;
+      h *= largest_growth;
+    } else h *= Growth(E, a, before, at);
     before = at.force;
+    reach  = a.reach;
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.zero));
   }

@@ -454,6 +454,20 @@ class Beam(unittest.TestCase):
         with self.assertRaisesRegex(h.Error, "(other|third)"):
             scene.run()
 
+    def test_reactions_to_small_loads(self):
+        """A clamped whole beam: reaction and deflection in proportion to the load, however small its forces are beside what rounding makes of the nodes"""
+        deflections = []
+        for load in (1e-3, 1e-2, 0.1, 1., 10.):
+            scene = h.Scene()
+            b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(law="small", attachments=[flexible.Attachment("root"), flexible.Attachment("tip", tie="average")]))
+            root, tip = b.attachment("root").marker(), b.attachment("tip").marker()
+            clamp = scene.add("clamp", h.Fixed(root, scene.ground.marker()))
+            scene.add("load", h.UserForce(tip, force=(0, 0, load)))
+            now = scene.run().equilibrium().snapshot()
+            self.assertAlmostEqual(now.load(clamp, root).force[2] / -load, 1, delta=1e-6, msg=load)
+            deflections.append(now.motion(tip).position[2] / load)
+        np.testing.assert_allclose(deflections, deflections[-1], rtol=1e-5)
+
     def test_names_of_bodies(self):
         """A whole model has one that no other body has"""
         whole = lambda scene, name: flexible.FullFeBody(scene, name, self.model, flexible.FullBody(law="small"))
