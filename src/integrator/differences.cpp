@@ -22,6 +22,7 @@ struct Differences {
   PetscReal t = 0;
   Vec       at[3] = {};
   int       which = 0;
+  PetscReal size = 1; /* steps in U'' are no smaller than for accelerations of this size */
   /* the user's, in place of ours; 0: none is given */
   PetscReal relative = 0, least = 0;
 };
@@ -193,6 +194,71 @@ static PetscErrorCode TakeSteps(Differences *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+namespace
+{
+
+constexpr PetscReal shows    = 1e-6;  /* change of a row, relative to its value, that leaves ten digits of an inertia */
+constexpr PetscReal of_a_row = 8 * PETSC_MACHINE_EPSILON; /* of a row: its change is none */
+constexpr PetscReal may_hide = 1e-6;  /* of the largest inertia: what may be lost in rounding */
+constexpr PetscReal no_mass  = 1e-12; /* of the largest inertia: what a change beyond rounding need not be, but for sums in another order */
+constexpr PetscReal larger   = 1e4;   /* the next size */
+constexpr PetscReal too_much = 1e16;
+
+/* Whether steps in U'' of this size let no row hide an inertia behind its forces */
+PetscErrorCode TrySize(TS ts, const WorkVec (&x)[3], PetscReal size, Vec F0, Vec A, Vec F, bool *enough, bool *finite)
+{
+  const PetscReal step   = relative_step[2] * size;
+  PetscReal       change = 0, max;
+  PetscInt        more   = 0;
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(x[2], A));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar &a) { a += step; }, Write(A)));
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], A, F));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar f0, PetscScalar f) { change = PetscIsInfOrNanScalar(f - f0) ? PETSC_MAX_REAL : PetscMax(change, PetscAbsScalar(f - f0)); }, Read(F0), Read(F)));
+  PetscCallMPI(MPI_Allreduce(&change, &max, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  *finite = max < PETSC_MAX_REAL;
+  PetscCall(ForEntries(
+    [&](PetscInt, PetscScalar f0, PetscScalar f) {
+      const PetscReal d = PetscAbsScalar(f - f0), size0 = PetscAbsScalar(f0);
+      if (d < shows * size0 && (d > of_a_row * size0 ? d > no_mass * max : PETSC_MACHINE_EPSILON * size0 > may_hide * max)) more = 1;
+    },
+    Read(F0), Read(F)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &more, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  *enough = !more;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* F is affine in q'', so that a step may be as large as it takes for inertia to show beside large forces: a stiff coordinate whose inertia is lost would be
+   taken for a variable (Differences.InertiaBesideStiffSprings) */
+PetscErrorCode SizeOfAccelerations(TS ts, Differences *d)
+{
+  WorkVec x[3], F0, A, F;
+  bool    enough, finite;
+
+  PetscFunctionBegin;
+  for (WorkVec *v : {&x[0], &x[1], &x[2], &F0, &A, &F}) PetscCall(v->like(ts->vec_sol));
+  for (const bool elsewhere : {false, true}) {
+    PetscCall(VecCopy(ts->vec_sol, x[0]));
+    PetscCall(VecCopy(ts->vec_dot, x[1]));
+    PetscCall(VecZeroEntries(x[2]));
+    if (elsewhere) PetscCall(OffTheStart(ts, 1, 0, x[0], x[1], x[2]));
+    PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+    for (PetscReal size = d->size; size <= too_much; size *= larger) {
+      PetscCall(TrySize(ts, x, size, F0, A, F, &enough, &finite));
+      if (!finite) break;
+      if (enough) { /* never where there is no inertia */
+        d->size = size;
+        break;
+      }
+    }
+  }
+  if (d->size > 1) PetscCall(PetscInfo(ts, "dF/dU'' by differences: forces are large, steps are those of accelerations of %g\n", (double)d->size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
 /* *P: the matrix to use, or NULL to have one made */
 PetscErrorCode DifferencesCreate(TS ts, Mat *P)
 {
@@ -234,6 +300,7 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
     PetscCall(SetLocalValues(d->part, ones, col, offset));
     PetscCall(CheckPattern(ts, d->part, colors));
   }
+  PetscCall(SizeOfAccelerations(ts, d));
   PetscInt n;
   PetscCall(ISColoringGetColors(colors, NULL, &n, NULL));
   PetscCall(ISColoringDestroy(&colors));
@@ -262,13 +329,16 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   Vec             at[3]    = {U, V, A};
 
   PetscFunctionBegin;
+  PetscReal norm;
+  PetscCall(VecNorm(A, NORM_2, &norm));
+  const PetscReal size = PetscMax(1, d->size / PetscSqrtReal(1 + norm)); /* MatFDColoring makes steps relative to this root */
   d->t = t;
   for (int k = 0; k < 3; k++) d->at[k] = at[k];
   PetscCall(MatZeroEntries(P));
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
-    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which], d->least > 0 ? d->least : 1));
+    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? size : 1), d->least > 0 ? d->least : 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }

@@ -245,3 +245,31 @@ TEST(Differences, StepsOfTheUser)
   EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_err 1e-4").u, u);
   EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds -mat_fd_coloring_umin 1e-3").u, withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds").u);
 }
+
+/* An inertia of 1 that is lost in rounding of a force of 1e13 would make a variable of its coordinate; so would one of 1e-6 beside one of 1 */
+TEST(Differences, InertiaBesideStiffSprings)
+{
+  struct Springs : Problem {
+    double m, k, q;
+    Springs(double mass, double stiffness, double at) : m(mass), k(stiffness), q(at)
+    {
+      name = "springs";
+      n    = 2;
+      t1   = 10. / std::sqrt(k / m);
+      role.assign(2, TSHHT3_COORDINATE);
+    }
+    void initial(double *u, double *v) const override { u[0] = q, u[1] = 1., v[0] = v[1] = 0.; }
+    void residual(double, const double *u, const double *, const double *a, double *f) const override { f[0] = m * a[0] + k * u[0], f[1] = a[1] + u[1]; }
+    void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+    {
+      J.add(0, 0, m * sa + k);
+      J.add(1, 1, sa + 1.);
+    }
+  };
+  for (const Springs &p : {Springs(1., 9e12, 1.), Springs(1., 1e14, 1.), Springs(1., 1e18, 1.), Springs(1e-6, 1e9, 1e-2)}) {
+    const End end = withoutJacobian(p, "-ts_rtol 1e-6 -ts_atol 1e-12");
+    EXPECT_NEAR(end.u[0] / p.q, std::cos(10.), 1e-2) << p.k;
+    EXPECT_NEAR(end.u[1], std::cos(p.t1), 1e-6) << p.k;
+    EXPECT_GT(end.statistics.steps, 20) << p.k;
+  }
+}
