@@ -77,6 +77,18 @@ PetscErrorCode SolverDefaults(TS ts, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The KSP is PETSc's to choose again for another type of TS */
+PetscErrorCode LeaveSolver(TS ts)
+{
+  KSP ksp;
+
+  PetscFunctionBegin;
+  if (!ts->snes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(LinearLeave(ksp, &Get(ts).linear));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 constexpr PetscReal petsc_abstol = 1e-50; /* PETSc's own, which tells whether the user has set one */
 
 /* An absolute tolerance ends a solve before it has begun where the residual, whose units differ from row to row and with h, is below it: a correction of zero, which proves

@@ -187,6 +187,7 @@ PetscErrorCode Destroy(TS ts)
 {
   PetscFunctionBegin;
   PetscCall(Reset(ts));
+  PetscCall(LeaveSolver(ts));
   if (ts->time_step == unset_step) ts->time_step = petsc_step;
   if (ts->max_snes_failures == HHT3_UNLIMITED && Get(ts).failures_unlimited) ts->max_snes_failures = 1;
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
@@ -402,6 +403,7 @@ static PetscErrorCode Finalize(void)
   waits for loads and motions that set in later. A step size
   chosen by another type is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
   or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
+  Types of `KSP` and `PC` and a package of factors that were chosen because nobody had set any go with a change of type.
 
   Where the function of an event begins a step at its zero, as behind the event, the step ends before it comes back to it: `TSEvent` does not see a zero that lies within its tolerance from the one before. So a ball
   that bounces lower than the tolerance falls through the floor unless the function called at the event lays it to rest.

@@ -9,6 +9,7 @@ namespace hht3
 
 /* Before options are read: a direct solver, where the program has set none */
 PetscErrorCode SolverDefaults(TS ts, KSP ksp);
+PetscErrorCode LeaveSolver(TS ts);
 
 /* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearState *linear);

@@ -5,6 +5,8 @@
 #include "linear.h"
 #include "mumpsmixed.h"
 #include "mumpsnd.h"
+#include <petsc/private/kspimpl.h>
+#include <petsc/private/pcimpl.h>
 
 static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
                                              MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
@@ -28,26 +30,26 @@ PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given)
 /* Marks on a preconditioner, named after the type and the package that were set here. What stands there under another name, or under none, is the program's, whenever it has set it. */
 static const char MARK_TYPE[] = "hhtdae_linear_type", MARK_PACKAGE[] = "hhtdae_linear_package";
 
-static PetscErrorCode SetMark(PC pc, const char mark[], const char name[])
+static PetscErrorCode SetMark(PetscObject pc, const char mark[], const char name[])
 {
   PetscContainer ours;
 
   PetscFunctionBegin;
-  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)pc), &ours));
+  PetscCall(PetscContainerCreate(PetscObjectComm(pc), &ours));
   PetscCall(PetscObjectSetName((PetscObject)ours, name));
-  PetscCall(PetscObjectCompose((PetscObject)pc, mark, (PetscObject)ours));
+  PetscCall(PetscObjectCompose(pc, mark, (PetscObject)ours));
   PetscCall(PetscContainerDestroy(&ours));
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode BearsMark(PC pc, const char mark[], const char name[], PetscBool *marked)
+static PetscErrorCode BearsMark(PetscObject pc, const char mark[], const char name[], PetscBool *marked)
 {
   PetscObject ours;
   const char *was;
 
   PetscFunctionBegin;
   *marked = PETSC_FALSE;
-  PetscCall(PetscObjectQuery((PetscObject)pc, mark, &ours));
+  PetscCall(PetscObjectQuery(pc, mark, &ours));
   if (!ours) PetscFunctionReturn(0);
   PetscCall(PetscObjectGetName(ours, &was));
   PetscCall(PetscStrcmp(was, name, marked));
@@ -58,7 +60,7 @@ PetscErrorCode LinearSetType(PC pc, PCType type)
 {
   PetscFunctionBegin;
   PetscCall(PCSetType(pc, type));
-  PetscCall(SetMark(pc, MARK_TYPE, type));
+  PetscCall(SetMark((PetscObject)pc, MARK_TYPE, type));
   PetscFunctionReturn(0);
 }
 
@@ -69,7 +71,7 @@ static PetscErrorCode PackageByProgram(PC pc, PetscBool *by_program)
 
   PetscFunctionBegin;
   PetscCall(PCFactorGetMatSolverType(pc, &package));
-  if (package) PetscCall(BearsMark(pc, MARK_PACKAGE, package, &ours));
+  if (package) PetscCall(BearsMark((PetscObject)pc, MARK_PACKAGE, package, &ours));
   *by_program = package && !ours ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
@@ -81,7 +83,7 @@ static PetscErrorCode TypeByProgram(PC pc, PetscBool *by_program)
 
   PetscFunctionBegin;
   PetscCall(PCGetType(pc, &type));
-  if (type) PetscCall(BearsMark(pc, MARK_TYPE, type, &ours));
+  if (type) PetscCall(BearsMark((PetscObject)pc, MARK_TYPE, type, &ours));
   *by_program = type && !ours ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
@@ -118,7 +120,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PCType    pc_type;
   PetscBool operators, triangle = PETSC_FALSE;
   Mat       P;
-  PetscBool pc_by_program = PETSC_FALSE, pc_by_option, package_by_program = PETSC_FALSE, package_by_option, solver = PETSC_TRUE;
+  PetscBool pc_by_program = PETSC_FALSE, pc_by_option, by_option, package_by_program = PETSC_FALSE, package_by_option, solver = PETSC_TRUE;
 
   PetscFunctionBegin;
   *choice = LinearChoice();
@@ -128,7 +130,11 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(PCGetType(pc, &pc_type));
   PetscCall(TypeByProgram(pc, &pc_by_program));
   PetscCall(IsSolver(ksp, pc, pc_by_program, &solver));
-  if (!ksp_type) PetscCall(KSPSetType(ksp, solver ? KSPPREONLY : KSPGMRES)); /* GMRES is PETSc's own choice */
+  if (!ksp_type) { /* GMRES is PETSc's own choice */
+    PetscCall(KSPSetType(ksp, solver ? KSPPREONLY : KSPGMRES));
+    PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
+    if (!by_option) PetscCall(SetMark((PetscObject)ksp, MARK_TYPE, solver ? KSPPREONLY : KSPGMRES));
+  }
   PetscCall(LinearOptionGiven(ksp, "-pc_type", &pc_by_option));
   PetscCall(PackageByProgram(pc, &package_by_program));
   PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
@@ -140,6 +146,56 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
     if (operators) PetscCall(LinearStoresTriangle(P, &triangle));
     PetscCall(LinearSetType(pc, triangle ? PCCHOLESKY : PCLU));
   }
+  PetscFunctionReturn(0);
+}
+
+/* There is no function for it: as before KSPSetType() and PCSetType(), so that PETSc takes its own choice at the next set-up */
+static PetscErrorCode MakeTypeless(KSP ksp)
+{
+  PetscFunctionBegin;
+  PetscTryTypeMethod(ksp, destroy);
+  ksp->data = NULL;
+  PetscCall(PetscMemzero(ksp->ops, sizeof(*ksp->ops)));
+  ksp->ops->buildsolution = KSPBuildSolutionDefault;
+  ksp->ops->buildresidual = KSPBuildResidualDefault;
+  PetscCall(PetscObjectChangeTypeName((PetscObject)ksp, NULL));
+  PetscFunctionReturn(0);
+}
+
+static PetscErrorCode MakeTypeless(PC pc)
+{
+  PetscFunctionBegin;
+  PetscTryTypeMethod(pc, destroy);
+  pc->data = NULL;
+  PetscCall(PetscMemzero(pc->ops, sizeof(*pc->ops)));
+  PetscCall(PetscObjectChangeTypeName((PetscObject)pc, NULL));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode LinearLeave(KSP ksp, LinearChoice *choice)
+{
+  PC        pc;
+  KSPType   method;
+  PCType    type;
+  PetscBool given, ours = PETSC_FALSE, package_by_program;
+
+  PetscFunctionBegin;
+  PetscCall(LinearTakeFactor(ksp, choice));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPGetType(ksp, &method));
+  PetscCall(PCGetType(pc, &type));
+  if (!method && !type) PetscFunctionReturn(0);
+  PetscCall(KSPReset(ksp));
+  PetscCall(LinearOptionGiven(ksp, "-ksp_type", &given));
+  if (method && !given) PetscCall(BearsMark((PetscObject)ksp, MARK_TYPE, method, &ours));
+  if (ours) PetscCall(MakeTypeless(ksp));
+  ours = PETSC_FALSE;
+  PetscCall(LinearOptionGiven(ksp, "-pc_type", &given));
+  if (type && !given) PetscCall(BearsMark((PetscObject)pc, MARK_TYPE, type, &ours));
+  PetscCall(PackageByProgram(pc, &package_by_program));
+  PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &given));
+  if (ours) PetscCall(MakeTypeless(pc));
+  else if (!package_by_program && !given) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));
   PetscFunctionReturn(0);
 }
 
@@ -234,7 +290,7 @@ static PetscErrorCode SetPackage(PC pc, const char package[])
   PetscCall(MatDestroy(&A));
   PetscCall(MatDestroy(&P));
   PetscCall(PCFactorSetMatSolverType(pc, package));
-  PetscCall(SetMark(pc, MARK_PACKAGE, package));
+  PetscCall(SetMark((PetscObject)pc, MARK_PACKAGE, package));
   PetscFunctionReturn(0);
 }
 

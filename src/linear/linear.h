@@ -29,6 +29,9 @@ PetscErrorCode LinearRegister(void);
 /* Before KSPSetFromOptions(): preonly with a factorization where the program set no types, and notes what it did set */
 PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice);
 
+/* What LinearDefaults() and LinearChoose() have set is taken back: types and packages that nobody has set are none */
+PetscErrorCode LinearLeave(KSP ksp, LinearChoice *choice);
+
 /* Once the Newton matrix P has its first values: the package and factorization, where the user chose none.
    The integrator calls it again with symmetric = PETSC_FALSE if the matrix ceases to be symmetric. */
 PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice);

@@ -117,6 +117,34 @@ TEST(Hooks, AnotherTypeAfterDifferences)
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
 }
 
+/* Types that were chosen go with a change of type, those that were set do not */
+TEST(Hooks, SolversOfAnotherType)
+{
+  for (const bool set : {false, true}) {
+    Simulation run(springs(), tolerance(1e-6) + (set ? "-ksp_type gmres -pc_type jacobi" : ""));
+    KSP        ksp;
+    PC         pc;
+    must(run.solve());
+    const Array u = run.u();
+    must(TSSetType(run.ts, TSALPHA2));
+    must(SNESGetKSP(snesOf(run.ts), &ksp));
+    must(KSPGetPC(ksp, &pc));
+    KSPType method;
+    PCType  type;
+    must(KSPGetType(ksp, &method));
+    must(PCGetType(pc, &type));
+    EXPECT_STREQ(method, set ? KSPGMRES : nullptr);
+    EXPECT_STREQ(type, set ? PCJACOBI : nullptr);
+    rewind(run);
+    must(run.solve());
+    EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << set;
+    must(TSSetType(run.ts, TSHHT3)); /* and back */
+    rewind(run);
+    must(run.solve());
+    EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << set;
+  }
+}
+
 TEST(Hooks, GoWithReset)
 {
   Simulation run(springs(), tolerance(1e-5));
