@@ -140,6 +140,13 @@ PetscErrorCode RemoveJacobian(TS ts)
     if (ts->snes) PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
     if (P) PetscCall(PetscObjectGetId((PetscObject)P, &id));
     if (ts->snes && H.J && id == H.matrices[1]) PetscCall(SNESSetJacobian(ts->snes, H.J, H.P, NULL, NULL)); /* unless the user has given others since */
+    if (ts->snes && !sdm->ops->computejacobian) { /* SNESSetUp() makes matrices, and chooses who fills them, where there are none (Hooks.AnotherTypeWithoutAJacobian) */
+      if (!H.J && id == H.matrices[1]) {
+        PetscCall(MatDestroy(&ts->snes->jacobian));
+        PetscCall(MatDestroy(&ts->snes->jacobian_pre));
+      }
+      ts->snes->setupcalled = PETSC_FALSE;
+    }
   }
   H.jacobian = PETSC_FALSE;
   PetscCall(PetscContainerDestroy(&H.jacobianctx));

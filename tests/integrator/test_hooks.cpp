@@ -117,6 +117,41 @@ TEST(Hooks, AnotherTypeAfterDifferences)
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
 }
 
+/* Without any Jacobian the SNES of another type makes its own, whatever was in it */
+TEST(Hooks, AnotherTypeWithoutAJacobian)
+{
+  for (const bool reset : {false, true})
+    for (const bool options : {false, true}) {
+      Simulation   run(springs(), tolerance(1e-6));
+      TSI2Function function;
+      void        *ctx;
+      Vec          F;
+      const TS     given = run.ts;
+      TS           ts;
+      must(TSGetI2Function(given, nullptr, &function, &ctx));
+      must(VecDuplicate(run.U, &F));
+      must(TSCreate(PETSC_COMM_SELF, &ts));
+      must(TSSetType(ts, TSHHT3));
+      must(TSSetI2Function(ts, F, function, ctx));
+      must(TS2SetSolution(ts, run.U, run.V));
+      must(TSSetMaxTime(ts, springs().t1));
+      must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+      must(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
+      must(TSSolve(ts, run.U));
+      const Array u = run.u();
+      run.ts        = ts;
+      if (reset) must(TSReset(ts));
+      must(TSSetType(ts, TSALPHA2));
+      rewind(run);
+      if (options) must(TSSetFromOptions(ts));
+      must(TSSolve(ts, run.U));
+      run.ts = given;
+      EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << reset << options;
+      must(TSDestroy(&ts));
+      must(VecDestroy(&F));
+    }
+}
+
 /* Types that were chosen go with a change of type, those that were set do not */
 TEST(Hooks, SolversOfAnotherType)
 {
