@@ -83,18 +83,25 @@ PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of constraints must not depend on accelerations, holonomic ones not on velocities. Which they are said to be, which they are by what they depend on. */
+/* Rows of constraints must not depend on accelerations, holonomic ones not on velocities, and no row on derivatives of an unknown that by its role has none: the row that belongs to it may be
+   the only one that tells (Roles.NamedAgainstTheirRows). Which they are said to be, which they are by what they depend on. */
 PetscErrorCode RefuseRates(TS ts, Dependence &d)
 {
   Integrator       &I = Get(ts);
-  std::vector<char> velocity(I.role.size(), 0), acceleration(I.role.size(), 0);
+  const std::size_t n = I.role.size();
+  std::vector<char> velocity(n, 0), acceleration(n, 0), first(n, 0), second(n, 0);
 
   PetscFunctionBegin;
   PetscCall(d.vary(d.V, [&](PetscInt i) { return IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { velocity[i] = RoleOf(I, i) == TSHHT3_HOLONOMIC; }));
   PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
+  PetscCall(d.vary(d.V, [&](PetscInt i) { return !IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { first[i] = 1; }));
+  PetscCall(d.vary(d.A, [&](PetscInt i) { return !IsCoordinate(I, i); }, [&](PetscInt i) { second[i] = 1; }));
   PetscCall(Refuse(ts, acceleration, PETSC_ERR_ARG_WRONG, "Row",
                    "is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown TSHHT3_VARIABLE if the row defines it"));
   PetscCall(Refuse(ts, velocity, PETSC_ERR_ARG_WRONG, "Row", "is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC"));
+  PetscCall(Refuse(ts, second, PETSC_ERR_ARG_WRONG, "Row", "depends on the second derivative of an unknown that is no coordinate by TSHHT3SetIS(): its own one, or another one, is to be named TSHHT3_COORDINATE"));
+  PetscCall(Refuse(ts, first, PETSC_ERR_ARG_WRONG, "Row",
+                   "depends on the first derivative of an unknown that is neither a coordinate nor a first-order state by TSHHT3SetIS(): its own one, or another one, is to be named TSHHT3_STATE or TSHHT3_COORDINATE"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,9 +177,13 @@ PetscErrorCode CheckDependence(TS ts)
 
   PetscFunctionBegin;
   I.follow = PETSC_FALSE;
-  if (!I.constraints() || (!I.is_set && defined + I.count[TSHHT3_STATE] == 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.coordinatesAlone() || (!I.is_set && (!I.constraints() || defined + I.count[TSHHT3_STATE] == 0))) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(d.begin());
   if (I.is_set) PetscCall(RefuseRates(ts, d));
+  if (!I.constraints()) {
+    I.stat = saved;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (defined + I.count[TSHHT3_STATE]) PetscCall(RefuseHolonomic(ts, d));
   if (defined && I.count[TSHHT3_NONHOLONOMIC]) {
     PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i); }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_NONHOLONOMIC) uses[i] = 1; }));

@@ -109,6 +109,43 @@ TEST(Roles, AnODECarriesNoRoleMachinery)
   EXPECT_EQ(I.constraints(), 0);
 }
 
+/* The row that has inertia, or a rate, is that of the unknown that is named wrongly */
+TEST(Roles, NamedAgainstTheirRows)
+{
+  struct Two : Problem {
+    bool second;
+    explicit Two(bool s) : second(s)
+    {
+      name = "two";
+      n    = 2;
+      t1   = 1.;
+      role.assign(2, TSHHT3_COORDINATE);
+      if (!second) role[1] = TSHHT3_STATE;
+    }
+    void initial(double *u, double *v) const override { u[0] = u[1] = 1., v[0] = 0., v[1] = second ? 0. : -1.; }
+    void residual(double, const double *u, const double *v, const double *a, double *f) const override
+    {
+      f[0] = a[0] + u[0];
+      f[1] = second ? a[1] + 4. * u[1] : v[1] + u[1];
+    }
+    void jacobian(double, const double *, const double *, const double *, double sv, double sa, Entries &J) const override
+    {
+      J.add(0, 0, sa + 1.);
+      J.add(1, 1, second ? sa + 4. : sv + 1.);
+    }
+  };
+  for (const bool second : {true, false})
+    for (TSHHT3Role role : {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE, TSHHT3_STATE}) {
+      if (!second && role == TSHHT3_STATE) continue;
+      const Two  p(second);
+      Simulation run(p, tolerance(1e-6));
+      ErrorTrap  trap;
+      setIS(run.ts, role, {1});
+      EXPECT_NE(TSSetUp(run.ts), 0) << second << TSHHT3Roles[role];
+      EXPECT_NE(trap.message.find(second ? "second derivative" : "first derivative"), std::string::npos) << trap.message;
+    }
+}
+
 /* A velocity-level row that is named holonomic would be scaled by 1/(beta h^2), and its multiplier be wrong without a word */
 TEST(Roles, RowsThatAreNotWhatTheyAreNamed)
 {
