@@ -70,7 +70,7 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   PetscCallMPI(MPI_Allreduce(local, global, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   I.norm_size = (PetscInt)(global[1] + 0.5);
   PetscCheck(global[2] > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
-             "No unknown enters the error test: there is neither a coordinate nor a first-order state with a tolerance above 0 (-ts_rtol, -ts_atol)");
+             "No unknown enters the error test: there is neither a coordinate nor a first-order state with a tolerance above 0 (-ts_rtol, -ts_atol). Where all are 0 at the start, a relative tolerance is none: -ts_atol says how small is small");
   /* rounding of q moves a by eps |q| / (beta h^2), and with it the estimate by this much, at any h */
   I.corrector.floor = 4 * PetscAbsReal(I.p.k) / I.p.beta * PETSC_MACHINE_EPSILON * PetscSqrtReal(global[0] / I.norm_size);
   if (I.corrector.floor > CorrectorTolerance(I))

@@ -298,7 +298,7 @@ PetscErrorCode InterpolateSolution(TS ts, PetscReal t, Vec U)
 {
   PetscFunctionBegin;
   PetscCheck(U, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_NULL,
-             "There is no vector for the solution at t = %g, which -ts_exact_final_time interpolate needs: call TSSolve(ts, U), or use matchstep or stepover", (double)t);
+             "There is no vector for the solution at t = %g: where -ts_exact_final_time interpolate asks for it, call TSSolve(ts, U), or use matchstep or stepover", (double)t);
   PetscCall(Interpolate(ts, t, U, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

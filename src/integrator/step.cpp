@@ -353,6 +353,7 @@ PetscErrorCode RollBack(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
+  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to take back, at t = %g", (double)ts->ptime);
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   I.have_step = PETSC_FALSE;

@@ -802,6 +802,31 @@ TEST(Events, BouncesThatAccumulate)
   EXPECT_LE(run.statistics().steps, 600);
 }
 
+/* TSRollBack() of a run that has not begun, set up or not */
+TEST(BetweenRuns, NoStepToTakeBack)
+{
+  for (const bool setUp : {false, true}) {
+    Simulation run(oscillator(), tolerance(1e-6));
+    if (setUp) must(TSSetUp(run.ts));
+    const Array before = run.u();
+    ErrorTrap   trap;
+    EXPECT_NE(TSRollBack(run.ts), 0);
+    EXPECT_NE(trap.message.find("no step to take back"), std::string::npos) << trap.message;
+    EXPECT_EQ(run.u(), before);
+  }
+}
+
+/* Of what begins at zero a relative tolerance is none, and the message says so */
+TEST(BetweenRuns, RelativeToleranceFromZero)
+{
+  Simulation run(oscillator(), "-ts_rtol 1e-6 -ts_atol 0");
+  must(VecZeroEntries(run.U));
+  must(VecSet(run.V, 1.));
+  ErrorTrap trap;
+  EXPECT_NE(run.solve(), 0);
+  EXPECT_NE(trap.message.find("-ts_atol says how small is small"), std::string::npos) << trap.message;
+}
+
 /* Velocities in another vector, whose count of changes happens to be that of the old one */
 TEST(BetweenRuns, VelocitiesInAnotherVector)
 {
