@@ -119,7 +119,7 @@ def manual_page(text):
 def manual_pages(folder):
     """By name: the page, and the function's declaration with the names of its arguments"""
     pages = {}
-    for file in sorted(glob.glob(os.path.join(folder, "*.cpp"))):
+    for file in sorted(glob.glob(os.path.join(folder, "**", "*.cpp"), recursive=True)):
         with open(file) as source:
             text = source.read()
         for match in re.finditer(r"/\*(?:@C?|MC)\n(.*?)(?:@|M)\*/\n((?:[^{;]*?\))?)", text, re.S):

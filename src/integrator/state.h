@@ -7,11 +7,11 @@
 #ifndef HHTDAE_STATE_H
 #define HHTDAE_STATE_H
 
-#include "bdf.h"
+#include "integrator/step/bdf.h"
 #include "compat.h"
 #include "hhtdae/hhtdae.h"
 #include "linear/linear.h"
-#include "policy.h"
+#include "integrator/step/policy.h"
 #include <vector>
 
 namespace hht3

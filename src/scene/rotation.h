@@ -6,7 +6,7 @@
   at the last accepted state, so that x is the rotation in the present step: singular where that makes a full turn, which fails and is made
   shorter; steps of variable length stay far below (step_limit.cpp). Velocities and accelerations that belong to it are the angular velocity w and its derivative, which do not depend on the
   reference: with x = 0 at the beginning of a step, Newmark's relations are those of the generalized-alpha method on the rotation group, see
-  src/integrator/rotations.cpp. The rows of a body's moments are multiplied by G^T in both cases, as those of generalized forces.
+  src/integrator/coordinates/rotations.cpp. The rows of a body's moments are multiplied by G^T in both cases, as those of generalized forces.
 
     exp([x]) = 1 + S1 [x] + S2 [x]^2,    G = 1 + S2 [x] + S3 [x]^2,    w = G x',    S_m(z) = sum (-z)^k/(2k+m)!,  z = |x|^2
 

@@ -17,7 +17,7 @@ with open(os.path.join(tree, "makefile.petsc")) as file:
     targets = set(re.findall(r"^([a-z0-9]+):", file.read(), re.M))
 sources = {os.path.splitext(name)[0] for folder, _, names in os.walk(tree) for name in names if name.endswith((".cpp", ".c"))} | {"hhtreduce", "fuzz"}
 options = set()
-for name in ("src/integrator/unused.cpp", "src/scene/option_names.cpp"):
+for name in ("src/integrator/type/unused.cpp", "src/scene/option_names.cpp"):
     with open(os.path.join(tree, name)) as file:
         options |= set(re.findall(r'"((?:ts_hhtdae|scene)_\w+)"', file.read()))
 faults, links, programs = [], 0, 0

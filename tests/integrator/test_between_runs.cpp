@@ -1,5 +1,5 @@
 /* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
-#include "integrator/start.h"
+#include "integrator/start/start.h"
 #include "integrator/state.h"
 #include "support.h"
 #include <array>

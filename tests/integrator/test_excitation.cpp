@@ -1,5 +1,5 @@
 /* Starts from rest of runs that are long for the loads and motions that set in: 100 Hz in 100 s, periods that parts of the run hold wholly */
-#include "integrator/start.h"
+#include "integrator/start/start.h"
 #include "support.h"
 
 using namespace hhtest;

@@ -1,5 +1,5 @@
 /* A first step that the user has set stands, however it was set; otherwise it is chosen, whether options were read or not */
-#include "integrator/start.h"
+#include "integrator/start/start.h"
 #include "support.h"
 #include <vector>
 

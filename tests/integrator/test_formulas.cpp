@@ -1,5 +1,5 @@
 /* The formulas by what they promise: exact for polynomials, consistent with each other, error constants measured */
-#include "integrator/bdf.h"
+#include "integrator/step/bdf.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 /* What the integrator puts into a SNES goes with TSReset(), TSDestroy() and another type, and the user's comes back */
-#include "integrator/corrector.h"
+#include "integrator/step/corrector.h"
 #include "support.h"
 #include <cstdio>
 #include <unistd.h>

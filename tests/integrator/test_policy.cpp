@@ -1,5 +1,5 @@
 /* The corrector's decisions, on numbers: when an iteration ends, and when a matrix is due */
-#include "integrator/policy.h"
+#include "integrator/step/policy.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 /* Rotation vectors of orders above two, against formulas of Rodrigues and a tangent by series of matrices */
-#include "integrator/rotation_vector.h"
+#include "integrator/coordinates/rotation_vector.h"
 #include "support.h"
 #include <array>
 #include <random>

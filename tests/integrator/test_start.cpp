@@ -1,6 +1,6 @@
 /* The consistent start: accelerations and multipliers, projection and report of inconsistent values, singular problems
  */
-#include "integrator/start.h"
+#include "integrator/start/start.h"
 #include "support.h"
 
 using namespace hhtest;

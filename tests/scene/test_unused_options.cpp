@@ -1,5 +1,5 @@
 /* Options of ours that nobody reads are reported, with the name that was meant */
-#include "integrator/unused.h"
+#include "integrator/type/unused.h"
 #include "support.h"
 
 #include <hhtdae/scene.h>

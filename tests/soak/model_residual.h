@@ -9,7 +9,7 @@
   their definitions make of dq.
 
   And it may miss accelerations that move a position by a tenth of the tolerance within the step, which is what the
-  integrator proves (src/integrator/verify.cpp): about an event, where steps are short, forces are known no better.
+  integrator proves (src/integrator/proofs/verify.cpp): about an event, where steps are short, forces are known no better.
 
   The same loads by channels have rounding of their own: stiffness and damping times some last digits of the unknowns.
 */

@@ -1,0 +1,340 @@
+/*
+  Checkpoints: all that the next step depends on, so that a run that is resumed repeats the uninterrupted one bit for bit, and writing
+  changes nothing in the run that writes.
+
+  The plain structs of state.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
+  the coordinates and the memory that it was made in), and what its solver has taken over from the matrices before it, LinearSaveState().
+  It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
+
+  Whether a file belongs to the run: checkpoint_identity.cpp.
+*/
+#include "integrator/coordinates/change.h"
+#include "checkpoint.h"
+#include "checkpoint_parts.h"
+#include "integrator/step/step.h"
+#include "integrator/work_vec.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* Numbers of TS and SNES */
+void Transfer(TS ts, Archive &a)
+{
+  SNES           snes = ts->snes;
+  const PetscInt lag  = snes->lagjacobian;
+
+  for (PetscInt *x : {&ts->steps, &ts->reject, &ts->snes_its, &ts->ksp_its, &ts->num_snes_failures, &ts->adapt->timestepjustdecreased, &snes->lagjacobian, &snes->jac_iter, &snes->pre_iter})
+    a.plain(*x);
+  if (a.reading && (Get(ts).corrector.user_lag || snes->lagjacobian > 0)) snes->lagjacobian = lag; /* the user's, of this run or of the other one */
+  for (PetscReal *x : {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step}) a.plain(*x);
+  a.plain(ts->steprestart);
+}
+
+void TransferStructs(TS ts, Archive &a)
+{
+  Integrator &I = Get(ts);
+
+  Transfer(ts, a);
+  a.plain(static_cast<StepState &>(I));
+  a.plain(static_cast<CorrectorState &>(I.corrector));
+  a.plain(static_cast<PredictorState &>(I.predictor));
+  a.plain(static_cast<OrderState &>(I.order));
+  a.plain(I.p);
+  a.plain(static_cast<ChangeState &>(I.change));
+  a.plain(static_cast<VerificationState &>(I.verify));
+}
+
+PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
+{
+  PetscScalar *array;
+  PetscInt     n;
+
+  PetscFunctionBegin;
+  if (!*x) PetscCall(VecDuplicate(ts->vec_sol, x));
+  PetscCall(VecGetLocalSize(*x, &n));
+  PetscCall(a.reading ? VecGetArray(*x, &array) : VecGetArrayRead(*x, (const PetscScalar **)&array)); /* nobody is to believe that a vector has changed which goes to a file */
+  a.array(array, (size_t)n);
+  PetscCall(a.reading ? VecRestoreArray(*x, &array) : VecRestoreArrayRead(*x, (const PetscScalar **)&array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
+{
+  PetscBool there = (PetscBool)(*x != NULL);
+
+  PetscFunctionBegin;
+  a.plain(there);
+  if (a.good && there) PetscCall(TransferVec(ts, a, x));
+  else if (a.good && a.reading) PetscCall(VecDestroy(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last step's two ends, the history, and what else there is at the time */
+PetscErrorCode TransferVectors(TS ts, Archive &a)
+{
+  Integrator        &I   = Get(ts);
+  std::vector<Vec *> all = {&ts->vec_sol, &ts->vec_dot, &I.U0, &I.V0, &I.A0, &I.X0, &I.U1, &I.V1, &I.A1, &I.X, &I.ymax, &I.weight};
+
+  PetscFunctionBegin;
+  if (I.F0) all.push_back(&I.F0);
+  for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.D[k]);
+  for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
+  if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
+  for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
+  for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What this rank has to say */
+PetscErrorCode Gather(TS ts, Archive &a)
+{
+  Identity          id;
+  std::string       options;
+  std::vector<char> words;
+  WorkVec           probe;
+
+  PetscFunctionBegin;
+  PetscCall(Identify(ts, &id));
+  PetscCall(OptionsInWords(ts, &options));
+  words.assign(options.begin(), options.end());
+  PetscCall(probe.like(ts->vec_sol));
+  PetscCall(TellingResidual(ts, probe));
+  a.plain(id);
+  a.list(words);
+  TransferStructs(ts, a);
+  PetscCall(TransferVectors(ts, a));
+  Vec of_it = probe;
+  PetscCall(TransferVec(ts, a, &of_it));
+  PetscCall(SaveMatrix(ts, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Spread(TS ts, const char file[], Archive &a)
+{
+  Integrator       &I    = Get(ts);
+  MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
+  Identity          id;
+  std::string       options;
+  std::vector<char> words;
+  WorkVec           was, is;
+  bool              good;
+
+  PetscFunctionBegin;
+  a.plain(id);
+  a.list(words);
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckIdentity(ts, file, id));
+  TransferStructs(ts, a);
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(was.like(ts->vec_sol));
+  PetscCall(is.like(ts->vec_sol));
+  PetscCall(TransferVectors(ts, a));
+  Vec of_file = was;
+  PetscCall(TransferVec(ts, a, &of_file));
+  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  I.stage_id = 0;
+  PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
+  PetscCall(OptionsInWords(ts, &options));
+  const std::string theirs(words.begin(), words.end());
+  if (theirs != options) /* the user's right, but then the run is another one */
+    PetscCall(PetscPrintf(comm, "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
+  PetscCall(TellingResidual(ts, is));
+  PetscCall(CheckTellingResidual(ts, file, was, is));
+  PetscCall(LoadMatrix(ts, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode CheckpointSave(TS ts, const char file[])
+{
+  Integrator &I = Get(ts);
+  Archive     a;
+
+  PetscFunctionBegin;
+  PetscCheck(I.have_step || I.at_begin, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
+  PetscTryMethod(ts, "TSHHT3CheckpointPrepare_C", (TS), (ts));
+  StopClocks(I, false);
+  PetscCall(Gather(ts, a));
+  PetscCall(CheckpointFileWrite(PetscObjectComm((PetscObject)ts), file, a.data));
+  PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before the set-up it is only noted, and read at its end */
+PetscErrorCode CheckpointLoad(TS ts, const char file[])
+{
+  Integrator &I = Get(ts);
+  Archive     a;
+
+  PetscFunctionBegin;
+  if (!I.U0) {
+    PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(CheckpointFileRead(PetscObjectComm((PetscObject)ts), file, a.data));
+  a.reading = true;
+  PetscCall(Spread(ts, file, a));
+  I.checkpoint_steps = I.stat.steps;
+  I.timed            = PETSC_FALSE;
+  if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));
+  PetscCall(PetscInfo(ts, "resumed at t = %g, step %" PetscInt_FMT ", from %s\n", (double)ts->ptime, ts->steps, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ReadCheckpoint(TS ts)
+{
+  PetscFunctionBegin;
+  if (Get(ts).resume_file[0]) PetscCall(TSSetUp(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SetCheckpointVec(TS ts, Vec extra)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectReference((PetscObject)extra));
+  PetscCall(VecDestroy(&I.checkpoint_vec));
+  I.checkpoint_vec = extra;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At the beginning of a step. While an event is being located the last step may yet be taken back: then after it. */
+PetscErrorCode CheckpointIfDue(TS ts)
+{
+  Integrator    &I     = Get(ts);
+  const PetscInt every = I.checkpoint_every;
+
+  PetscFunctionBegin;
+  if (!I.checkpoint_file[0] || every <= 0 || !I.have_step || ts->steprollback) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.stat.steps / every <= I.checkpoint_steps / every || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CheckpointSave(ts, I.checkpoint_file));
+  I.checkpoint_steps = I.stat.steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckCheckpointFile(TS ts)
+{
+  PetscFunctionBegin;
+  if (Get(ts).checkpoint_file[0]) PetscCall(CheckpointFileCheck(PetscObjectComm((PetscObject)ts), Get(ts).checkpoint_file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the last step there is no other one: TSSolve() calls its monitors then with the reason set. A file without a number of steps is
+   written here alone. */
+PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
+{
+  PetscFunctionBegin;
+  if (ts->ops->step != Step || ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  const Integrator &I = Get(ts);
+  if (I.checkpoint_every > 0) PetscCall(CheckpointIfDue(ts));
+  else if (I.checkpoint_file[0] && I.have_step) PetscCall(CheckpointSave(ts, I.checkpoint_file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@C
+  TSHHT3CheckpointSave - Writes all that a `TSHHT3` run needs to go on to a file
+
+  Collective
+
+  Input Parameters:
++ ts   - the `TS` context, after at least one step
+- file - name of the file; written beside and renamed when complete
+
+  Options Database Keys:
++ -ts_hhtdae_checkpoint <file>    - write checkpoints to the file, whose directory has to exist when the run begins
+- -ts_hhtdae_checkpoint_every <n> - after every n accepted steps; without it one is written at the end of `TSSolve()`
+
+  Level: intermediate
+
+  Note:
+  Writing changes nothing in the run that writes, and one that resumes repeats it bit for bit: the Newton matrix and what its solver has
+  taken over from earlier ones are part of the file. Where that cannot be had the matrix is made anew in the run that resumes, which
+  then agrees to the accuracy of the tolerance, and -info says so: matrices that give no rows (shell, nest), and preconditioners that
+  keep something of which nothing is known. These are all but `hhtconstraint` and the direct solvers that are chosen by default, also where they are
+  the solvers within `hhtconstraint`; "mumpsnd" on several ranks repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of
+  their own (dsp) start anew. The file carries a checksum. After an error within a step, of a callback for one, the state that the
+  step began with is written.
+
+.seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
+@*/
+PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscUseMethod(ts, "TSHHT3CheckpointSave_C", (TS, const char[]), (ts, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@C
+  TSHHT3CheckpointLoad - Goes on from a file written by `TSHHT3CheckpointSave()`
+
+  Collective
+
+  Input Parameters:
++ ts   - the `TS` context, with the same problem and method as the run that wrote the file
+- file - name of the file
+
+  Options Database Key:
+. -ts_hhtdae_resume <file> - the same by option
+
+  Level: intermediate
+
+  Note:
+  Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones, before `TSSetUp()` not yet: the set-up reads the file,
+  until then `TSGetTime()` and `TS2GetSolution()` give what was there before. Queries of scenes set up. A file of another
+  problem, method, version or number of ranks is refused. Other tolerances and other options of the solvers are taken, and reported.
+  Points of `TSSetTimeSpan()` behind the checkpoint are not gone back for: `TSGetTimeSpanSolutions()` gives vectors of NaN there.
+
+.seealso: `TSHHT3`, `TSHHT3CheckpointSave()`
+@*/
+PetscErrorCode TSHHT3CheckpointLoad(TS ts, const char file[])
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscUseMethod(ts, "TSHHT3CheckpointLoad_C", (TS, const char[]), (ts, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*@
+  TSHHT3SetCheckpointVec - Gives checkpoints a vector of the application's to save and restore with the state
+
+  Collective
+
+  Input Parameters:
++ ts    - the `TS` context
+- extra - the vector, of any size and layout, on the communicator of `ts`; `NULL` for none. A reference is kept
+
+  Level: advanced
+
+  Notes:
+  It is meant for what the application's residual depends on besides the state, such as the reference frames that
+  `TSHHT3SetCoordinateChange()` changes. A file is written with the values that the vector has then, and `TSHHT3CheckpointLoad()`
+  overwrites them; then it calls commit of `TSHHT3SetCoordinateChange()`, if there is one, for the application to take them over. A
+  file whose vector has another size, or that has one where the run has none or the other way round, is refused.
+
+  An application that has to do something before a file is written, to bring the vector up to date or to write what it has recorded so far,
+  composes a function of `ts` with it: PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", function).
+
+.seealso: `TSHHT3`, `TSHHT3CheckpointSave()`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCoordinateChange()`
+@*/
+PetscErrorCode TSHHT3SetCheckpointVec(TS ts, Vec extra)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  if (extra) {
+    PetscValidHeaderSpecific(extra, VEC_CLASSID, 2);
+    PetscCheckSameComm(ts, 1, extra, 2);
+  }
+  PetscTryMethod(ts, "TSHHT3SetCheckpointVec_C", (TS, Vec), (ts, extra));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,306 @@
+/*
+  New coordinates for the state and for the history.
+
+  The application's map takes (q, q', q'') at one time from the old to the new coordinates. The predictor keeps
+  accelerations alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at
+  which neither q nor q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the
+  a_{n-k} at x_k, q' and q as its integrals from the state at t_n. The integrals are as smooth in time as the
+  polynomial, and so are the mapped accelerations: their divided differences predict as well as the old ones did.
+  (Newmark's formulas backwards would give the stored q, q', but with the jumps that changes of h leave in them, which
+  divided differences magnify.)
+
+  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep. The nodes
+  may end in a double one, at a start, where the second value is a slope.
+
+  Entries that the map leaves alone keep their bits.
+*/
+#include "change.h"
+#include "integrator/entries.h"
+#include "integrator/work_vec.h"
+#include <algorithm>
+#include <petscblaslapack.h>
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscInt max_basis = max_degree + 1;
+
+/* The motion about t_n in old coordinates, by stored vectors */
+struct Motion {
+  PetscInt  nodes = 0;                            /* of the predictor */
+  PetscInt  n     = 0;                            /* stored vectors in use */
+  Vec       stored[max_basis];                    /* D_0, D_1, ..., or D_0 and A0 */
+  PetscReal x[max_basis];                         /* times of the nodes, from t_n */
+  bool      slope[max_basis]                = {}; /* second of a double node */
+  PetscReal to_values[max_basis][max_basis] = {}; /* node values (slopes) by stored vectors */
+  PetscReal unit                            = 1;
+};
+
+/* Newton's polynomial of degree j at node k, or its slope there */
+PetscReal NewtonBasis(const PetscReal t[], PetscInt k, PetscInt j, bool slope)
+{
+  PetscReal value = 1, derivative = 0;
+  for (PetscInt i = 0; i < j; i++) {
+    derivative = derivative * (t[k] - t[i]) + value;
+    value *= t[k] - t[i];
+  }
+  return slope ? derivative : value;
+}
+
+Motion Recall(const Integrator &I)
+{
+  const Predictor &p = I.predictor;
+  Motion           m;
+  PetscReal        lag = I.p.lag() * I.h_last;
+  m.nodes = m.n = p.available + 1;
+  m.unit        = I.h_last > 0 ? I.h_last : 1;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    /* the step that ended at t_{n-k}; of the last node it is not known */
+    if (k > 0 && k < m.nodes - 1 && p.t[k] > p.t[k + 1]) lag = I.p.lag() * (p.t[k] - p.t[k + 1]);
+    m.slope[k]  = k > 0 && p.t[k] == p.t[k - 1];
+    m.x[k]      = m.slope[k] ? m.x[k - 1] : p.t[k] - p.t[0] + lag;
+    m.stored[k] = p.D[k];
+    for (PetscInt j = 0; j <= k; j++) m.to_values[k][j] = NewtonBasis(p.t, k, j, m.slope[k]);
+  }
+  if (m.nodes == 1 && m.x[0] != 0) { /* a history of one: q'' at t_n tells the slope */
+    m.n               = 2;
+    m.x[1]            = 0;
+    m.stored[1]       = I.A0;
+    m.to_values[1][1] = 1;
+  }
+  return m;
+}
+
+/* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
+PetscErrorCode Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
+{
+  PetscReal       L[max_basis][max_basis] = {}, y[3][max_basis], power = 1;
+  const PetscReal z = x / m.unit, u = m.unit;
+  PetscBLASInt    n, sides = 3, stride = max_basis, pivots[max_basis], failed;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < m.n; j++, power *= z) {
+    y[0][j] = power;
+    y[1][j] = u * power * z / (j + 1);
+    y[2][j] = u * u * power * z * z / ((j + 1) * (j + 2));
+    for (PetscInt k = 0; k < m.n; k++) {
+      const PetscReal zk = m.x[k] / u;
+      if (!m.slope[k])
+        L[k][j] = PetscPowRealInt(zk, j);
+      else
+        L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
+    }
+  }
+  PetscCall(PetscBLASIntCast(m.n, &n));
+  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &y[0][0], &stride, &failed)); /* of L^T, as it reads columns */
+  PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_LIB, "The polynomial through the last steps cannot be evaluated: LAPACK's gesv returns %d", (int)failed);
+  for (int s = 0; s < 3; s++)
+    for (PetscInt i = 0; i < m.n; i++) {
+      w[s][i] = 0;
+      for (PetscInt k = 0; k < m.n; k++) w[s][i] += y[s][k] * m.to_values[k][i];
+    }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the map is given, what came of it, and which entries it has changed in any triple */
+struct Mapping {
+  enum : unsigned char { Triple = 1, Acceleration = 2 };
+  WorkVec                    old[3], now[3];
+  std::vector<unsigned char> changed;
+
+  PetscErrorCode like(Vec U)
+  {
+    PetscInt n;
+
+    PetscFunctionBegin;
+    for (int k = 0; k < 3; k++) {
+      PetscCall(old[k].like(U));
+      PetscCall(now[k].like(U));
+    }
+    PetscCall(VecGetLocalSize(U, &n));
+    changed.assign((size_t)n, 0);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
+
+/* From old to now at t_n + x */
+PetscErrorCode Apply(TS ts, Mapping &map, PetscReal x)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 3; k++) PetscCall(VecCopy(map.old[k], map.now[k]));
+  PetscCall((*I.change.map)(ts, ts->ptime + x, map.now[0], map.now[1], map.now[2], I.change.ctx));
+  for (int k = 0; k < 3; k++) {
+    const unsigned char what = k == 2 ? Mapping::Triple | Mapping::Acceleration : Mapping::Triple;
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar a, PetscScalar b) { if (a != b) map.changed[i] |= what; }, Read(map.old[k]), Read(map.now[k])));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The motion at t_n + x; what is not a coordinate as at t_n, without accelerations */
+PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkVec (&to)[3])
+{
+  PetscReal w[3][max_basis];
+  Vec       stored[max_basis];
+
+  PetscFunctionBegin;
+  PetscCall(Weights(m, x, w));
+  std::copy(m.stored, m.stored + m.n, stored);
+  for (int s = 0; s < 3; s++) {
+    PetscCall(VecZeroEntries(to[2 - s]));
+    PetscCall(VecMAXPY(to[2 - s], m.n, w[s], stored));
+  }
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      const bool moves = IsCoordinate(I, i);
+      u = moves ? u0 + x * v0 + u : u0;
+      v = moves ? v0 + v : v0;
+      if (!moves) a = 0;
+    },
+    Read(I.U0), Read(I.V0), Write(to[0]), Write(to[1]), Write(to[2])));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* New values of q'' (slopes at the second of a double node) at the nodes */
+PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec value[])
+{
+  Integrator     &I = Get(ts);
+  const PetscReal d = 0.01 * m.unit;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    PetscCall(At(I, m, m.x[k] + (m.slope[k] ? d : 0), map.old));
+    PetscCall(Apply(ts, map, m.x[k] + (m.slope[k] ? d : 0)));
+    PetscCall(VecCopy(map.now[2], value[k]));
+    if (!m.slope[k]) continue;
+    PetscCall(At(I, m, m.x[k] - d, map.old));
+    PetscCall(Apply(ts, map, m.x[k] - d));
+    PetscCall(VecAXPY(value[k], -1, map.now[2]));
+    PetscCall(VecScale(value[k], 1 / (2 * d)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* d of misfit.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine
+   in q'', and its difference for two q'' is that tangent. */
+PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
+{
+  Integrator     &I = Get(ts);
+  const PetscReal d = 0.01 * m.unit;
+  WorkVec         jerk;
+
+  PetscFunctionBegin;
+  if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
+  PetscCall(jerk.like(I.U0));
+  PetscCall(VecZeroEntries(I.bend));
+  PetscCall(VecZeroEntries(jerk));
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(At(I, m, sign * d, map.old));
+    PetscCall(Apply(ts, map, sign * d));
+    PetscCall(VecAXPY(I.bend, sign / (2 * d), map.now[2]));
+    PetscCall(VecAXPY(jerk, sign / (2 * d), map.old[2]));
+  }
+  for (int sign = -1; sign <= 1; sign += 2) {
+    PetscCall(VecCopy(I.U0, map.old[0]));
+    PetscCall(VecCopy(I.V0, map.old[1]));
+    PetscCall(VecWAXPY(map.old[2], sign * m.unit, jerk, I.A0));
+    PetscCall(Apply(ts, map, 0));
+    PetscCall(VecAXPY(I.bend, -sign / (2 * m.unit), map.now[2]));
+  }
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &b) { if (!(map.changed[i] & Mapping::Acceleration)) b = 0; /* rounding */ }, Write(I.bend)));
+  I.bent = Bend::Rates;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The state, from old to now */
+PetscErrorCode MapState(TS ts, Mapping &map)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(VecCopy(I.U0, map.old[0]));
+  PetscCall(VecCopy(I.V0, map.old[1]));
+  PetscCall(VecCopy(I.A0, map.old[2]));
+  PetscCall(Apply(ts, map, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Multipliers and the like have no second derivative to map, and states are no coordinates */
+PetscErrorCode CheckRoles(TS ts, const Mapping &map)
+{
+  Integrator &I = Get(ts);
+  PetscInt    first;
+
+  PetscFunctionBegin;
+  PetscCall(FirstWhere([&](PetscInt i, PetscScalar) { return map.changed[i] && !IsCoordinate(I, i); }, &first, Read(I.U0)));
+  PetscCheck(first < 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+             "The map of TSHHT3SetCoordinateChange() has changed unknown %" PetscInt_FMT
+             " at t = %g, which is not a coordinate: it may change U, U', U'' of coordinates only",
+             first, (double)ts->ptime);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes over what has changed: D_0, D_1, ... from the values at the nodes by forward substitution, and the state; in the paper's form q''_n is a_n but for a start */
+PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const WorkVec value[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m.nodes; k++) {
+    for (PetscInt j = 0; j < k; j++) PetscCall(VecAXPY(value[k], -m.to_values[k][j], value[j]));
+    PetscCall(VecScale(value[k], 1 / m.to_values[k][k]));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &d) { if (map.changed[i] & Mapping::Acceleration) d = x; }, Read(value[k]), Write(I.predictor.D[k])));
+  }
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar d0, PetscScalar &u0, PetscScalar &v0, PetscScalar &a0, PetscScalar &x0) {
+      if (!map.changed[i]) return;
+      const bool same = I.form == TSHHT3_FORM_PAPER && a0 == x0, accelerates = map.changed[i] & Mapping::Acceleration;
+      u0 = u;
+      v0 = v;
+      if (accelerates) x0 = d0;
+      a0 = same && accelerates ? d0 : a;
+    },
+    Read(map.now[0]), Read(map.now[1]), Read(map.now[2]), Read(value[0]), Write(I.U0), Write(I.V0), Write(I.A0), Write(I.X0)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U0 and V0 before a consistent start: there is no history, and accelerations are still to come */
+PetscErrorCode MapStart(TS ts)
+{
+  Integrator &I = Get(ts);
+  Mapping     map;
+
+  PetscFunctionBegin;
+  PetscCall(map.like(I.U0));
+  PetscCall(VecZeroEntries(I.A0));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(VecCopy(map.now[0], I.U0));
+  PetscCall(VecCopy(map.now[1], I.V0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U0, V0, A0, X0, the predictor's differences, and what misfit.cpp needs to know */
+PetscErrorCode MapHistory(TS ts)
+{
+  Integrator  &I = Get(ts);
+  const Motion m = Recall(I);
+  Mapping      map;
+  WorkVec      value[max_basis];
+
+  PetscFunctionBegin;
+  PetscCall(map.like(I.U0));
+  for (PetscInt k = 0; k < m.nodes; k++) PetscCall(value[k].like(I.U0));
+  PetscCall(MapNodes(ts, m, map, value));
+  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
+  PetscCall(MapState(ts, map));
+  PetscCall(CheckRoles(ts, map));
+  PetscCall(TakeOver(I, m, map, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,189 @@
+/* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "proofs.h"
+#include "integrator/random.h"
+#include "integrator/step/stage.h"
+#include "verify.h"
+#include "integrator/work_vec.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
+constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
+constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+
+} // namespace
+
+/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
+
+/* claim_i of the matrix P with the inertia at hand, and the largest */
+static PetscErrorCode MakeClaims(TS ts, Mat P)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscReal     largest = 0;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetDiagonal(P, v.claim));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m, PetscScalar &p) {
+      p       = PetscRealPart(m) > 0 ? PetscAbsScalar(p) / (m * (RoleOf(I, i) == TSHHT3_STATE ? StateInertia(I.p) : I.p.ca())) : 0;
+      largest = PetscMax(largest, PetscRealPart(p));
+    },
+    Read(v.inertia), Write(v.claim)));
+  PetscCallMPI(MPI_Allreduce(&largest, &v.largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the matrix P of the start. inertia_i: M_ii of coordinates, dF/ds' of states; 0 for a coordinate without mass, but for rounding, and
+   for all others: of these nothing is asked */
+PetscErrorCode NoteInertia(TS ts, Mat P)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscReal     local[2] = {0, 0}, sum[2];
+  PetscBool     has;
+
+  PetscFunctionBegin;
+  v.largest = v.since = 0;
+  PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
+  if (!has) PetscFunctionReturn(PETSC_SUCCESS);
+  for (Vec *x : {&v.inertia, &v.claim, &v.noise, &v.unproved})
+    if (!*x) PetscCall(VecDuplicate(I.X, x));
+  PetscCall(VecZeroEntries(v.unproved));
+  PetscCall(MatGetDiagonal(P, v.inertia));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar m) {
+      if (IsCoordinate(I, i) && PetscAbsScalar(m) > 0) local[0] += PetscLogReal(PetscAbsScalar(m)), local[1] += 1;
+    },
+    Read(v.inertia)));
+  PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  const PetscReal least = massless * (sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1);
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &m) { m = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(m) > least ? PetscAbsScalar(m) : 0; }, Write(v.inertia)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To be called for every new matrix P of a step, made at X */
+PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
+{
+  Integrator   &I = Get(ts);
+  Verification &v = I.verify;
+  PetscBool     has;
+
+  PetscFunctionBegin;
+  PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
+  if (!has || !v.inertia) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MakeClaims(ts, P));
+  PetscCall(VecZeroEntries(v.noise));
+  v.measured = PETSC_FALSE;
+  if (Claims(I)) {
+    if (!v.where) PetscCall(VecDuplicate(X, &v.where));
+    PetscCall(VecCopy(X, v.where));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* |F(x + dx) - F| for the residual F at X and dx of pseudo-random signs and sizes: rounding of all that the residual is made of, the unknowns, and
+   positions, states and velocities as sums of terms; of one unknown with one factor, lest they cancel. (By changes of X alone, rounding of
+   positions would be one of velocities too, far above theirs where h is small: what stands still in a steep brake would have no force.) */
+static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
+{
+  Integrator &I = Get(ts);
+  WorkVec     near;
+  PetscInt    first;
+
+  PetscFunctionBegin;
+  PetscCall(near.like(X, I.spare));
+  PetscCall(VecCopy(X, near));
+  PetscCall(VecGetOwnershipRange(X, &first, NULL));
+  const auto rounding = [=](PetscInt i) { return rounding_of_sums * RandomRounding(first + i, salt); };
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &x) { x += rounding(i) * PetscAbsScalar(x); }, Write(near)));
+  PetscCall(StageVectors(ts, near));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar y, PetscScalar a, PetscScalar &u, PetscScalar &v) {
+      const TSHHT3Role r = RoleOf(I, i);
+      if (!IsDifferential(r)) return;
+      const PetscReal way = I.h * PetscAbsScalar(v), turn = r == TSHHT3_STATE ? 0 : I.h * PetscAbsScalar(a);
+      u += rounding(i) * (PetscRealPart(y) + way);
+      v += rounding(i) * (PetscAbsScalar(v) + turn);
+    },
+    Read(I.ymax), Read(I.A1), Write(I.U1), Write(I.V1)));
+  PetscCall(SNESComputeFunction(ts->snes, near, noise));
+  PetscCall(VecAXPY(noise, -1, F));
+  PetscCall(VecAbs(noise));
+  PetscCall(StageVectors(ts, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* noise = the larger of it and of another sample: in one of them the unknowns of a stiff spring may move with each other, which leaves its force as it is
+   (Stiff.FastModeBesideASlowOne) */
+PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
+{
+  WorkVec other;
+
+  PetscFunctionBegin;
+  PetscCall(other.like(noise, Get(ts).spare));
+  PetscCall(SampleRounding(ts, X, F, salt, other));
+  PetscCall(VecPointwiseMax(noise, noise, other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rounding of the residual F at X, by two samples */
+PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
+{
+  PetscFunctionBegin;
+  PetscCall(SampleRounding(ts, X, F, 1, noise));
+  PetscCall(AddRounding(ts, X, F, 2, noise));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel: 1/weight with random signs, accelerations of the
+   size that the tolerances mean, zero where there is no coordinate */
+static PetscErrorCode MeasureInertia(TS ts)
+{
+  Integrator &I = Get(ts);
+  WorkVec     Z, A, F, change;
+  PetscInt    first;
+
+  PetscFunctionBegin;
+  for (WorkVec *v : {&Z, &A, &F, &change}) PetscCall(v->like(I.X, I.spare));
+  PetscCall(VecGetOwnershipRange(Z, &first, NULL));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar w, PetscScalar &z) { z = IsCoordinate(I, i) ? RandomSign(first + i, 1) / (PetscRealPart(w) > 0 ? w : 1) : 0; }, Read(I.weight), Write(Z)));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, F));
+  PetscCall(VecWAXPY(A, 1, Z, I.A1));
+  PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, A, change));
+  PetscCall(VecAXPY(change, -1, F));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar z, PetscScalar f, PetscScalar noise, PetscScalar &m) {
+      if (!IsCoordinate(I, i)) return;
+      const PetscReal now = PetscAbsScalar(f / z);
+      if (PetscAbsScalar(f) > PetscRealPart(noise)) m = now;
+    },
+    Read(Z), Read(change), Read(I.verify.noise), Write(I.verify.inertia)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces have rounding, and inertia that varies with the position looks like stiffness to a matrix of the start. Where a doubt has been
+   raised, both are measured at the state of the stage, inertia once for each matrix. */
+PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
+{
+  Verification &v = Get(ts).verify;
+  Mat           P;
+
+  PetscFunctionBegin;
+  PetscCall(MeasureRounding(ts, X, F, v.noise));
+  if (v.measured) PetscFunctionReturn(PETSC_SUCCESS);
+  v.measured = PETSC_TRUE;
+  PetscCall(MeasureInertia(ts));
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(MakeClaims(ts, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

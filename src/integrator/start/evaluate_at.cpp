@@ -1,0 +1,279 @@
+/*
+  The state at a time within the last step, with accelerations and multipliers as accurate as the positions there.
+
+  Between the ends of a step q, q' and s come from Hermite polynomials (dense.cpp). Linear interpolation of q'', lambda, V and F
+  misses them by h^2/8 times their second derivatives, which in a long step may be as large as they are. So they are solved for at
+  the interpolated (q, q', s, t), see consistent.cpp.
+
+  At the ends of the step the values of the step itself are returned. These satisfy the differentiated constraints to O(h^2) only, so
+  that the two differ by the error of the step.
+
+  The matrix and the KSP are of their own: a run with samples goes on bit for bit like one without. Residuals and matrices of samples are
+  not counted in the statistics; -log_view shows them as HHT3Sample.
+*/
+#include "consistent.h"
+#include "integrator/step/dense.h"
+#include "integrator/entries.h"
+#include "integrator/equations/roles.h"
+#include "integrator/coordinates/rotations.h"
+#include "integrator/equations/solver.h"
+#include "integrator/work_vec.h"
+
+namespace hht3
+{
+
+struct Sampler {
+  Consistent  at;
+  LinearState linear;
+  PetscReal   t1 = PETSC_NINFINITY; /* end of the step of the last sample */
+};
+
+namespace
+{
+
+/* Points of Phi from which its derivatives in time are taken, over the step: errors of third order and more, far below those of the
+   method. Over less than this part of the motion's time scale rounding of Phi would show (5e-14 |q| over the length squared). */
+constexpr int       time_points   = 5;
+constexpr PetscReal shortest = 1e-4;
+
+/* Preconditioners of functions or parts that the program has given cannot be had twice */
+PetscErrorCode HasParts(PC pc, PetscBool *yes)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, yes, PCSHELL, PCFIELDSPLIT, PCCOMPOSITE, ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The KSP takes what the user has set for the run's, by options or by program. */
+PetscErrorCode CreateSolver(TS ts, Sampler &S)
+{
+  const Integrator &I = Get(ts);
+  KSP               run;
+  PC                from, to;
+  KSPType           type;
+  PCType            pctype;
+  MatSolverType     package;
+  PetscBool         parts;
+  const char       *prefix;
+  PetscReal         rtol, atol, dtol;
+  PetscInt          its;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetKSP(ts->snes, &run));
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)ts), &S.at.ksp));
+  PetscCall(PetscObjectSetOptions((PetscObject)S.at.ksp, ((PetscObject)run)->options));
+  PetscCall(KSPGetOptionsPrefix(run, &prefix));
+  PetscCall(KSPSetOptionsPrefix(S.at.ksp, prefix));
+  PetscCall(KSPGetType(run, &type));
+  if (type && !I.linear.iterative) PetscCall(KSPSetType(S.at.ksp, type)); /* conjugate gradients of our choice are chosen again */
+  PetscCall(KSPGetTolerances(run, &rtol, &atol, &dtol, &its));
+  PetscCall(KSPSetTolerances(S.at.ksp, rtol, atol, dtol, its));
+  PetscCall(KSPSetOperators(S.at.ksp, S.at.P, S.at.P));
+  PetscCall(KSPGetPC(run, &from));
+  PetscCall(KSPGetPC(S.at.ksp, &to));
+  PetscCall(PCGetType(from, &pctype));
+  PetscCall(HasParts(from, &parts));
+  if (I.linear.user_pc && pctype && !parts) {
+    PetscCall(PCSetType(to, pctype));
+    if (I.linear.user_package) {
+      PetscCall(PCFactorGetMatSolverType(from, &package));
+      if (package) PetscCall(PCFactorSetMatSolverType(to, package));
+    }
+  }
+  PetscCall(LinearDefaults(S.at.ksp, &S.linear));
+  if (!I.linear.user_pc && I.linear.user_package && !S.linear.user_package) { /* a package that the program has named, and no factorization */
+    PetscCall(PCFactorGetMatSolverType(from, &package));
+    PetscCall(PCFactorSetMatSolverType(to, package));
+    S.linear.user_package = PETSC_TRUE;
+  }
+  PetscCall(KSPSetFromOptions(S.at.ksp));
+  PetscCall(HasParts(to, &parts));
+  if (parts) { /* by an option */
+    PetscCall(PCSetType(to, PCLU));
+    S.linear.user_pc = S.linear.user_package = PETSC_FALSE;
+  }
+  S.linear.may_be_rough = I.linear.iterative; /* where the run has no factor its samples make none */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* *S: null where the run's matrix is no assembled one, or where the application has a product beside it: that one belongs to the run, and whoever looks into it would not find it in another matrix */
+PetscErrorCode GetSampler(TS ts, Sampler **S)
+{
+  Integrator &I = Get(ts);
+  Mat         J, P;
+  PetscBool   shell, product;
+
+  PetscFunctionBegin;
+  *S = I.sampler;
+  if (*S) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)P, &shell, MATMFFD, MATSHELL, ""));
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSHELL, &product));
+  if (shell || product) PetscFunctionReturn(PETSC_SUCCESS);
+  *S = I.sampler = new Sampler;
+  Consistent &c = I.sampler->at;
+  PetscCall(MatDuplicate(P, MAT_DO_NOT_COPY_VALUES, &c.P));
+  PetscCall(CopyNodes(P, c.P));
+  for (Vec *v : {&c.U, &c.V, &c.A, &c.X, &c.F, &c.d}) PetscCall(VecDuplicate(I.U0, v));
+  if (I.constraints()) PetscCall(VecDuplicate(I.U0, &c.gamma));
+  c.linear = &I.sampler->linear;
+  PetscCall(CreateSolver(ts, *I.sampler));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Weights of values at z_k for the first and second derivative at 0 of the polynomial through them (Fornberg 1988) */
+void DerivativeWeights(const PetscReal z[time_points], PetscReal weight[time_points][3])
+{
+  PetscReal c1 = 1, c4 = z[0];
+  for (int k = 0; k < time_points; k++)
+    for (int m = 0; m < 3; m++) weight[k][m] = k == 0 && m == 0;
+  for (int i = 1; i < time_points; i++) {
+    const PetscReal c5 = c4;
+    PetscReal       c2 = 1;
+    c4                 = z[i];
+    for (int j = 0; j < i; j++) {
+      const PetscReal c3 = z[i] - z[j];
+      c2 *= c3;
+      if (j == i - 1)
+        for (int m = 2; m >= 0; m--) weight[i][m] = c1 * ((m ? m * weight[i - 1][m - 1] : 0) - c5 * weight[i - 1][m]) / c2;
+      for (int m = 2; m >= 0; m--) weight[j][m] = (c4 * weight[j][m] - (m ? m * weight[j][m - 1] : 0)) / c3;
+    }
+    c1 = c2;
+  }
+}
+
+/* gamma: second derivatives of Phi and first ones of Psi in time along U + (t_k - t) V, from t_k within the step where it is long
+   enough: what happens before or after it is not seen */
+PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T, z[time_points], weight[time_points][3];
+
+  PetscFunctionBegin;
+  PetscCall(TimeScale(ts, &T));
+  const bool      wide   = I.h < shortest * T;
+  const PetscReal length = wide ? shortest * T : I.h, begin = wide ? c.t - length / 2 : I.t0, apart = SpanFrom(begin, length / (time_points - 1));
+  for (int k = 0; k < time_points; k++) z[k] = begin - c.t + k * apart;
+  DerivativeWeights(z, weight);
+  PetscCall(VecZeroEntries(c.gamma));
+  for (int k = 0; k < time_points; k++) {
+    PetscCall(VecWAXPY(c.d, z[k], c.V, c.U));
+    PetscCall(ResidualAlong(ts, c.t + z[k], c.d, c.V, c.A, c.F));
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar f, PetscScalar &g) {
+        if (IsConstraint(I, i)) g += weight[k][I.role[i] == TSHHT3_HOLONOMIC ? 2 : 1] * f;
+      },
+      Read(c.F), Write(c.gamma)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From U, V, A as they were interpolated, which are the first guess. Packages keep pivots from one matrix to the next: in a new step the factors are made from
+   nothing, so that samples do not depend on those of earlier steps and a resumed run gives the same to the last bit. */
+PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  const char            *why;
+  WorkVec                before;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
+  if (S.t1 != I.t1) PetscCall(KSPReset(S.at.ksp));
+  S.t1      = I.t1;
+  S.at.t    = t;
+  S.at.tiny = vanishing * I.h;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
+    Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
+  PetscCall(ReferTo(ts, S.at.U, before));
+  PetscErrorCode failed = S.at.gamma ? ConstraintTerms(ts, S.at) : PETSC_SUCCESS;
+  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, &why);
+  PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
+  I.stat = saved;
+  PetscCall(failed);
+  if (!*ok) S.t1 = PETSC_NINFINITY; /* a factor that failed may keep its error */
+  if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));
+  PetscCall(PetscLogEventEnd(events.sample, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
+PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
+{
+  Integrator &I  = Get(ts);
+  PetscBool   ok = PETSC_FALSE;
+  Sampler    *S  = NULL;
+
+  PetscFunctionBegin;
+  const PetscReal x = StepFraction(I, t);
+  if (I.have_step && x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
+  if (S) {
+    PetscCall(Interpolate(ts, t, S->at.U, S->at.V, S->at.A));
+    PetscCall(SampleInside(ts, *S, t, &ok));
+  }
+  if (ok) {
+    if (U) PetscCall(VecCopy(S->at.U, U));
+    if (V) PetscCall(VecCopy(S->at.V, V));
+    if (A) PetscCall(VecCopy(S->at.A, A));
+  } else PetscCall(Interpolate(ts, t, U, V, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SamplerDestroy(Integrator &I)
+{
+  PetscFunctionBegin;
+  if (!I.sampler) PetscFunctionReturn(PETSC_SUCCESS);
+  Sampler &S = *I.sampler;
+  PetscCall(MatDestroy(&S.at.P));
+  PetscCall(KSPDestroy(&S.at.ksp));
+  for (Vec *v : {&S.at.U, &S.at.V, &S.at.A, &S.at.X, &S.at.gamma, &S.at.F, &S.at.d}) PetscCall(VecDestroy(v));
+  delete I.sampler;
+  I.sampler = nullptr;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3
+
+/*@
+  TSHHT3EvaluateAt - State at a time within the last accepted step, with accelerations and multipliers that satisfy the equations
+  of motion there
+
+  Collective
+
+  Input Parameters:
++ ts - the `TS` context
+- t  - a time between the ends of the last step
+
+  Output Parameters:
++ U - coordinates and states as by `TSHHT3Interpolate()`; multipliers, variables and force states from the equations, or `NULL`
+. V - velocities as by `TSHHT3Interpolate()`; derivatives of states from the equations, or `NULL`
+- A - accelerations from the equations, or `NULL`
+
+  Level: intermediate
+
+  Notes:
+  Between the ends it solves for accelerations, derivatives of states, multipliers, variables and force states at the interpolated
+  positions and velocities: one Jacobian, one factorization and
+  two residuals as a rule, five more with constraints, where `TSHHT3Interpolate()` costs none.
+  They are then as accurate as the positions, in long steps, too. Its matrix and factors are made at the first call and kept. The
+  solver is the one chosen for the run, by the same options.
+
+  At both ends of the step, the values of the step itself are returned, to the last bit. The run is not changed, and nothing is
+  added to its counters; -log_view shows the samples as HHT3Sample. Where a step was rolled back, or ended by an error, only the
+  state that it began with is known, at the present time.
+
+  Where the equations cannot be solved (a singular position, a Jacobian without an assembled matrix, or with a `MATSHELL` of the application's
+  as its operator), accelerations and multipliers are those of `TSHHT3Interpolate()`, linear in a step of order two, and -info says so.
+
+.seealso: `TSHHT3`, `TSHHT3Interpolate()`, `TSHHT3GetAcceleration()`
+@*/
+PetscErrorCode TSHHT3EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
+{
+  PetscFunctionBegin;
+  PetscValidHeaderSpecific(ts, TS_CLASSID, 1);
+  PetscUseMethod(ts, "TSHHT3EvaluateAt_C", (TS, PetscReal, Vec, Vec, Vec), (ts, t, U, V, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,163 @@
+/*
+  How fast loads and motions are that depend on time alone. Velocities tell the time scale of what moves. Of what is at rest they tell nothing, and the
+  length of the run is no measure for a load of 100 Hz in a run of 100 s: differences over parts of it meet whole periods, and so does a first step.
+
+  The residual is sampled at t + tau with everything else as it is, for ever shorter parts tau of the run. A row follows time within the shortest tau
+  up to which it changes by a tenth of its largest change from one sample to the next: of sin(w t) 0.08/w to 0.6/w. (From t itself a load that
+  sets in there would change within nothing.)
+*/
+#include "consistent.h"
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "start.h"
+#include "integrator/work_vec.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* The first sample's part of what is left of the run, and a sample's of the one before: powers of the golden section, since simple fractions meet whole
+   periods one after the other (Excitation.ManyFrequencies) */
+constexpr PetscReal longest = 0.618034, shorter = 0.236068;
+constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
+constexpr int       at_least = 9, at_most = 60; /* samples */
+constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
+constexpr PetscReal falling  = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
+constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
+/* Changes within the first samples alone, longer than this part of what is left of the run, are those of a ramp, which tell of no time but that: at least so much of it */
+constexpr PetscReal of_ramps = 0.03, no_faster = 10;
+constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
+
+/* Of the largest change of any row of its kind: less may be what rounding leaves of loads that cancel, with lever arms of up to 1e6 (Excitation.OfLoadsThatCancel) */
+constexpr PetscReal cancelled = 1e-9;
+
+/* What is found of a row's changes with time */
+struct Changes {
+  WorkVec   largest, number;
+  Vec       shortest = nullptr; /* I.excitation */
+  PetscReal of_kind[TSHHT3_NUM_ROLES] = {};
+};
+
+PetscErrorCode NoteLargest(const Integrator &I, Vec before, Vec after, Changes &c)
+{
+  PetscReal most[TSHHT3_NUM_ROLES] = {};
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f0, PetscScalar f) {
+      const PetscReal change = PetscAbsScalar(f - f0);
+      if (change > most[RoleOf(I, i)] && change < PETSC_MAX_REAL) most[RoleOf(I, i)] = change;
+    },
+    Read(before), Read(after)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, TSHHT3_NUM_ROLES, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)before)));
+  for (int r = 0; r < TSHHT3_NUM_ROLES; r++) c.of_kind[r] = PetscMax(c.of_kind[r], most[r]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From one sample to the next, at tau: each row's largest change so far, and tau where it changes noticeably; the largest change of any row, as a part of its largest one */
+PetscErrorCode NoteChanges(const Integrator &I, PetscReal tau, Vec before, Vec after, Changes &c, PetscReal *part)
+{
+  PetscReal most_of_all = 0;
+
+  PetscFunctionBegin;
+  PetscCall(NoteLargest(I, before, after, c));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
+      const PetscReal change = PetscAbsScalar(f - f0);
+      if (change <= cancelled * c.of_kind[RoleOf(I, i)]) return;
+      if (change > most_of_all * PetscRealPart(most)) most_of_all = PetscRealPart(most) > 0 ? PetscMin(change / PetscRealPart(most), 1) : 1;
+      if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
+      most     = PetscMax(change, PetscRealPart(most));
+      shortest = tau;
+      number += 1;
+    },
+    Read(before), Read(after), Write(c.largest), Write(c.number), Write(c.shortest)));
+  PetscCallMPI(MPI_Allreduce(&most_of_all, part, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)before)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* At U0, V0, t_n: I.excitation has the time within which each row follows time, PETSC_MAX_REAL where it does not depend on it; none: no row does */
+PetscErrorCode NoteExcitation(TS ts)
+{
+  Integrator     &I    = Get(ts);
+  PetscReal       stop = ts->max_time - ts->ptime;
+  const PetscReal step = ts->time_step != unset_step && ts->time_step > 0 ? ts->time_step : PETSC_MAX_REAL; /* of the user's, and those later: what it may follow is looked for */
+  WorkVec         zero, F[2];
+  Changes         c;
+  PetscReal       swing = PETSC_MAX_REAL, part = 1, last;
+
+  PetscFunctionBegin;
+  I.ahead = Ahead::Unknown;
+  if (!(ts->max_time < PETSC_MAX_REAL / 2 && stop > 0)) PetscCall(TimeScale(ts, &stop)); /* of a run without end */
+  for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
+  if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
+  c.shortest = I.excitation;
+  for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
+  PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
+  PetscCall(EvaluateResidual(ts, ts->ptime + longest * stop, I.U0, I.V0, zero, F[0]));
+  PetscReal tau = longest * stop;
+  for (int sample = 1, still = 0; sample < at_least || (sample < at_most && (still < quiet || (tau > step && step < stop))); sample++) {
+    tau *= shorter;
+    PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
+    last = part;
+    PetscCall(NoteChanges(I, tau, F[0], F[1], c, &part));
+    still = part > noticeable || (part > falling * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
+  }
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar &T) { if (PetscRealPart(number) > 0 && PetscRealPart(T) >= of_ramps * stop) T = no_faster * stop; }, Read(c.number), Write(I.excitation)));
+  PetscCall(VecMin(I.excitation, NULL, &I.fastest));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= all_along) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
+  PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
+  if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
+  else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* I.ahead: whether the rest of the run, from U and V at t, has loads or motions that set in, of which the start has seen nothing. Samples at multiples of the
+   golden section, nowhere further apart than coasting of the rest */
+PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
+{
+  constexpr int   samples = 89;
+  Integrator     &I       = Get(ts);
+  const PetscReal rest    = ts->max_time - t;
+  PetscReal       part = 0, change = 0;
+  WorkVec         zero, now, then;
+
+  PetscFunctionBegin;
+  I.ahead    = Ahead::Nothing;
+  I.ahead_to = ts->max_time;
+  if (!(ts->max_time < PETSC_MAX_REAL / 2 && rest > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* a run without end (Excitation.RunsWithoutEnd) */
+  for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
+  PetscCall(VecZeroEntries(zero));
+  PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
+  for (int sample = 0; sample < samples && !(change > 0); sample++) {
+    part = part + longest < 1 ? part + longest : part + longest - 1;
+    PetscCall(EvaluateResidual(ts, t + part * rest, U, V, zero, then));
+    PetscCall(VecAXPY(then, -1, now));
+    PetscCall(VecNorm(then, NORM_INFINITY, &change));
+  }
+  if (change > 0) I.ahead = Ahead::Loads;
+  PetscCall(PetscInfo(ts, "%s loads or motions set in between t = %g and the end of the run\n", change > 0 ? "some" : "no", (double)t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After an accepted step: loads that swing faster than steps follow are said, once. Where positions move by less than the tolerance, the error test lets
+   velocities that they leave pass. */
+PetscErrorCode TellUnfollowed(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.told || !(I.h / unfollowed > I.swing)) PetscFunctionReturn(PETSC_SUCCESS); /* swing may be the largest number, of which there is no multiple */
+  I.told = PETSC_TRUE;
+  PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                        "hhtdae: the step of %g at t = %g does not follow loads or motions that depend on time alone, some of which swing within %.1g or so. Where they matter, "
+                        "set a largest step (-ts_adapt_dt_max) or a smaller tolerance.\n",
+                        (double)I.h, (double)I.t0, (double)(6 * I.swing)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

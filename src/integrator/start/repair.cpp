@@ -1,0 +1,136 @@
+/* Steps so short that the corrector could not make them from where the last one ended, or not at all. */
+#include "consistent.h"
+#include "integrator/step/corrector.h"
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "integrator/step/estimate.h"
+#include "integrator/step/order.h"
+#include "start.h"
+#include "integrator/work_vec.h"
+
+namespace hht3
+{
+
+constexpr PetscReal shrink = 0.1;  /* h below this times the last one calls for a consistent start, see Repair() */
+constexpr PetscReal seen   = 1e-6; /* part of the accelerations that growth may make of rounding: ten times as much comes by the velocities
+                                      (BetweenRuns.GrowthFromAShortStepKeepsTheMultipliers) */
+
+constexpr PetscReal never_tiny = 1e-4; /* of the longest step of late: the common case, decided without a reduction */
+constexpr PetscReal drowned    = 0.01; /* part of the accelerations that may be rounding in a step that goes through the corrector */
+
+/*
+  When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
+  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So positions and
+  velocities of t_n are projected on the constraints and the step starts afresh, consistently, at the new h.
+*/
+PetscErrorCode Repair(TS ts)
+{
+  Integrator &I = Get(ts);
+  Prepared    have;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
+  PetscCall(PetscInfo(ts, "h changes from %g to %g at t = %g: positions and velocities projected, consistent start\n", (double)I.h_last, (double)ts->time_step, (double)ts->ptime));
+  I.stat.restarts++;
+  ResetOrder(ts);
+  PetscCall(ProjectState(ts, &have));
+  PetscCall(VecCopy(I.U0, ts->vec_sol)); /* by less than the tolerance */
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCall(StartFromState(ts, have));
+  PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are */
+static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
+{
+  const Integrator &I = Get(ts);
+  PetscReal         T, e;
+
+  PetscFunctionBegin;
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
+  PetscCall(TimeScale(ts, &T));
+  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
+  *part               = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h) / a;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What Taylor's series leaves out of coordinates, h^3/6 q''', and of states, h^2/2 s'', in units of the tolerance; 0 where no rates are known */
+static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
+{
+  const Integrator &I     = Get(ts);
+  PetscReal         local = 0, sum;
+
+  PetscFunctionBegin;
+  *e = 0;
+  if (I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar rate, PetscScalar w) { local += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
+    Read(I.predictor.D[1]), Read(I.weight)));
+  PetscCallMPI(MPI_Allreduce(&local, &sum, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  *e = PetscSqrtReal(sum / PetscMax(I.norm_size, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A step so short that rounding of Phi would drown the accelerations: TSEvent may ask for one, or the
+  final time. q and q' advance by Taylor series, whose error is far below rounding of the corrector's, and accelerations
+  and multipliers are made consistent anew. They must not miss more than the corrector leaves: where accelerations are rounding, as at rest, ordinary steps
+  look so short (FirstStep.StatesBesideAMechanismAtRest, FirstStep.DrivenFromNoAcceleration).
+*/
+PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
+{
+  const Integrator &I = Get(ts);
+  PetscReal         part, missed;
+
+  PetscFunctionBegin;
+  *tiny = PETSC_FALSE;
+  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > never_tiny * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(RoundingOfAccelerations(ts, h, &part));
+  if (part <= drowned) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TaylorError(ts, h, &missed));
+  *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether to begin afresh at t_n, for a step of length h: where it is far shorter than the last one, or where growth would amplify what rounding has left in that one
+   of the lag of a_n and of the misfit of the velocities, which are stretched with h and h^2. At given steps orders above two, whose steps have no such misfit, do
+   better without (HigherOrder.StepFarShorterThanTheOthers). */
+PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes)
+{
+  const Integrator &I = Get(ts);
+  PetscReal         part;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (I.order.now > 2 && I.fixed_h) PetscFunctionReturn(PETSC_SUCCESS);
+  *yes = (PetscBool)(I.constraints() && h < shrink * I.h_last);
+  if (*yes || !I.count[TSHHT3_HOLONOMIC] || h <= I.h_last || !I.h_last) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(RoundingOfAccelerations(ts, I.h_last, &part));
+  *yes = (PetscBool)(part * h > seen * I.h_last);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would */
+PetscErrorCode TinyStep(TS ts, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  WorkVec     U, V;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "step of %g is below what rounding of q allows the corrector: Taylor series\n", (double)I.h));
+  I.stat.tiny_steps++;
+  PetscCall(U.like(I.U0));
+  PetscCall(V.like(I.U0));
+  PetscCall(Advance(I, I.h, U, V));
+  PetscCall(VecCopy(I.predictor.D[0], I.X));
+  PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, {}, ok));
+  if (*ok) {
+    /* the start has differentiated the constraints at times around t1: it need not have seen their values there */
+    PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, U));
+    PetscCall(CheckNumbers(ts, I.t1, {U, I.U1, I.V1, I.A1}, ok));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

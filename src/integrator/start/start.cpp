@@ -1,0 +1,520 @@
+/*
+  A consistent start: q''_0, s'_0, lambda_0, V_0, F_0 from given q_0, q'_0, s_0 (consistent.cpp).
+
+  Then a second solve a little later gives q'''_0. From it come the first step, when the user gave none, and the start
+  value of the algorithmic acceleration, a_0 = q''(t_0 + lag h): with a_0 = q''_0 the first steps excite an oscillation of
+  the multipliers and an error of second order in q' (Arnold, Bruels 2007).
+*/
+#include "integrator/coordinates/change.h"
+#include "consistent.h"
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "integrator/step/estimate.h"
+#include "integrator/step/order.h"
+#include "integrator/step/predictor.h"
+#include "integrator/proofs/proofs.h"
+#include "integrator/coordinates/rotations.h"
+#include "integrator/equations/rows.h"
+#include "integrator/type/settings.h"
+#include "integrator/equations/solver.h"
+#include "integrator/step/stage.h"
+#include "start.h"
+#include "integrator/work_vec.h"
+#include <string>
+
+namespace hht3
+{
+
+namespace
+{
+
+constexpr PetscReal four_digits = 1e-4; /* of the rates */
+
+/* In the vectors, the matrix and the solver of the run. A matrix-free operator has nothing to differentiate before SNESSolve(): P alone. */
+PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
+{
+  Integrator &I = Get(ts);
+  PetscBool   mffd;
+
+  PetscFunctionBegin;
+  PetscCall(SNESSetUp(ts->snes));
+  PetscCall(SNESGetJacobian(ts->snes, &c->J, &c->P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompare((PetscObject)c->J, MATMFFD, &mffd));
+  if (mffd) c->J = NULL;
+  PetscCall(SNESGetKSP(ts->snes, &c->ksp));
+  PetscCall(TimeScale(ts, &c->tiny));
+  c->tiny = vanishing * PetscMin(c->tiny, 1);
+  c->t      = t;
+  c->U      = I.U1;
+  c->V      = I.V1;
+  c->A      = I.A1;
+  c->X      = I.X;
+  c->linear = &I.linear;
+  I.stage_id = 0; /* U1, V1, A1 belong to no stage from now on */
+  PetscCall(VecCopy(U, I.U1));
+  PetscCall(VecCopy(V, I.V1));
+  PetscCall(VecZeroEntries(I.A1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whose unknown stands in U, so that X knows of it before the accelerations are known */
+constexpr std::initializer_list<TSHHT3Role> algebraic = {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE};
+
+/* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
+   Leaves X as it was. */
+PetscErrorCode Rates(TS ts, Vec rate)
+{
+  Integrator &I = Get(ts);
+  PetscReal   T, Ta, rate_of_motion;
+  PetscBool   ok, rest;
+  WorkVec     X0, U, V;
+
+  PetscFunctionBegin;
+  PetscCall(TimeScale(ts, &T));
+  PetscCall(IsAtRest(I, I.V0, &rest));
+  PetscCall(TimeScaleOfAccelerations(ts, I.X, &Ta));
+  PetscCall(RelativeRate(ts, I.V0, &rate_of_motion));
+  if (!rest && Ta < PETSC_MAX_REAL) T = rate_of_motion > 0 ? PetscMax(T, 1 / rate_of_motion) : PETSC_MAX_REAL; /* what has just begun to move has no time scale of a short run: its rates would be rounding (BetweenRuns.ShortRunsHaveTheirMultipliers) */
+  const PetscReal d = SpanFrom(ts->ptime, PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest)); /* of what is at rest T may be a run without end: Units.LongRuns */
+  PetscCall(X0.like(I.X));
+  PetscCall(U.like(I.X));
+  PetscCall(V.like(I.X));
+  PetscCall(VecCopy(I.X, X0));
+  PetscCall(Advance(I, d, U, V));
+  /* from rest gamma and the matrix change with d^2, so that they have no part in the rates */
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {(bool)rest, rest ? Gamma::Made : Gamma::Near, true}, &ok));
+  PetscCall(VecZeroEntries(rate));
+  if (ok) {
+    PetscCall(VecWAXPY(rate, -1, X0, I.X));
+    PetscCall(VecScale(rate, 1 / d));
+  } else PetscCall(PetscInfo(ts, "start: no consistent accelerations at t_0 + %g, the start goes without q'''\n", (double)d));
+  PetscCall(VecCopy(X0, I.X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Local errors in units of the tolerance that steps from the start leave, by its rates: of coordinates |k| h^3 q''', of states k_s h^3 s''' with |s''|^2/|s'| in place of
+   s''', or |s''|^1.5/|s|^0.5 where s' passes through 0, but no more than s changes by s'', gamma_s h^2 s'' (FirstStep.StatesInAnyUnitOfTime, BetweenRuns.RestartsOfStates) */
+struct StartErrors {
+  PetscReal coordinates = 0, states = 0; /* over h^3 */
+  PetscReal change = 0;                  /* of states, over h^2 */
+  PetscReal at(PetscReal h) const { return PetscSqrtReal(PetscSqr(coordinates * h * h * h) + (change > 0 ? PetscSqr(PetscMin(states * h * h * h, change * h * h)) : 0)); }
+  PetscReal step(PetscReal e) const /* that leaves no more of either */
+  {
+    const PetscReal q = coordinates > 0 ? PetscPowReal(e / coordinates, (PetscReal)1 / 3) : PETSC_MAX_REAL;
+    return change > 0 ? PetscMin(q, PetscMax(PetscPowReal(e / states, (PetscReal)1 / 3), PetscSqrtReal(e / change))) : q;
+  }
+};
+
+PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
+{
+  Integrator &I           = Get(ts);
+  PetscReal   sum[3]      = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
+  Vec         coordinates = rate;
+  WorkVec     x;
+
+  PetscFunctionBegin;
+  *e = {};
+  if (I.count[TSHHT3_STATE]) {
+    PetscCall(x.like(rate));
+    PetscCall(VecCopy(rate, x));
+    coordinates = x;
+    PetscCall(ForSome(
+      I.states,
+      [&](PetscInt, PetscScalar s2, PetscScalar s1, PetscScalar y, PetscScalar w, PetscScalar &q) {
+        sum[0] += PetscSqr(PetscRealPart(s1 * w));
+        sum[1] += PetscSqr(PetscRealPart(s2 * w));
+        sum[2] += PetscSqr(PetscRealPart(y * w));
+        q = 0;
+      },
+      Read(rate), Read(I.V0), Read(I.ymax), Read(I.weight), Write(x)));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  }
+  PetscCall(CorrectionNorm(ts, coordinates, 1, &e->coordinates));
+  const PetscReal s = PetscSqrtReal(sum[1] / PetscMax(I.norm_size, 1));
+  e->change         = I.p.gamma_s * s;
+  const PetscReal by_rate = sum[0] > 0 ? PetscSqrtReal(sum[1] / sum[0]) : PETSC_MAX_REAL, by_size = sum[2] > 0 ? PetscPowReal(sum[1] / sum[2], 0.25) : PETSC_MAX_REAL;
+  const PetscReal faster  = PetscMin(by_rate, by_size);
+  e->states               = faster < PETSC_MAX_REAL ? PetscAbsReal(I.p.k_s) * s * faster : PETSC_MAX_REAL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first h: a local error of an eighth of the tolerance from q''' and from what q'' itself tells of its second derivative; without these, the length of the run. Not longer than loads and motions allow
+   that depend on time alone: of their period the error of a longer one might know nothing (Excitation.TheFirstStepFollowsTheLoad). */
+PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
+{
+  Integrator &I = Get(ts);
+  StartErrors e;
+  PetscReal   e2, T;
+
+  PetscFunctionBegin;
+  PetscCall(ErrorsOfStart(ts, rate, &e));
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &e2));
+  const PetscReal span = HHT3StopAfter(ts, ts->ptime) < PETSC_MAX_REAL / 2 ? HHT3StopAfter(ts, ts->ptime) - ts->ptime : 1;
+  PetscReal       h3 = e.step(0.125);
+  PetscCall(TimeScaleOfAccelerations(ts, I.A0, &T));
+  if (e2 > 0 && T < PETSC_MAX_REAL) h3 = PetscMin(h3, PetscPowReal(0.125 * T * T / e2, 0.25)); /* q'''' as large as q''/T^2: from rest q''' is rounding (FirstStep.FromRest) */
+  *h = PetscMin(h3, PetscMin(span / 10, I.fastest));
+  *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the user has set none, also not since the set-up; TSSolve() may have cut what stood there to the length of the run */
+PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  const bool unset = ts->time_step == unset_step || ts->time_step == HHT3StopAfter(ts, ts->ptime) - ts->ptime;
+  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
+  else if (I.auto_h && unset) {
+    PetscCall(FirstStep(ts, rate, &ts->time_step));
+    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
+    I.h_chosen = PETSC_TRUE;
+  }
+  I.auto_h = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided difference of the predictor (at a double
+   node). Rates that are too wild to be believed are left out, but for those of states: without them the error of the first step would not know these
+   (FirstStep.StatesAfterARestart). */
+PetscErrorCode MakeHistory(TS ts, Vec rate)
+{
+  Integrator        &I = Get(ts);
+  Predictor         &p = I.predictor;
+  const PetscReal    h = ts->time_step;
+  StartErrors        errors;
+  PetscReal          T;
+
+  PetscFunctionBegin;
+  PetscCall(PredictorReset(ts));
+  I.h           = h;
+  I.h_last      = h;
+  I.have_misfit = PETSC_FALSE;
+  I.bent        = Bend::None;
+  PetscCall(ErrorsOfStart(ts, rate, &errors));
+  const PetscReal e = errors.at(h);
+  I.corrector.wlte  = e;
+  PetscCall(TimeScaleOfAccelerations(ts, rate, &T));
+  const bool believed = I.fixed_h ? h * h * h <= T * T : e <= 100; /* fixed steps know no tolerance: of the coordinates */
+  if (believed) {
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar j, PetscScalar &x, PetscScalar &d) {
+        const TSHHT3Role r = RoleOf(I, i);
+        if (IsDifferential(r)) x += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j;
+        if (r == TSHHT3_COORDINATE) d = x;
+      },
+      Read(rate), Write(I.X0), Write(p.D[0])));
+    if (e > 0) PetscCall(StartMisfit(ts, rate));
+  } else PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
+  const bool follows = believed && e > 0 && p.degree_max > 0;
+  if (follows || I.count[TSHHT3_STATE]) {
+    if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
+    PetscCall(VecCopy(rate, p.D[1]));
+    p.available = 1;
+    p.degree    = follows ? 1 : 0;
+    p.t[1]      = p.t[0];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* X holds the accelerations, derivatives and algebraic unknowns at U0, V0 */
+PetscErrorCode Distribute(Integrator &I)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar x, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
+      a                                = 0;
+      UnknownOf(RoleOf(I, i), u, v, a) = x;
+    },
+    Read(I.X), Write(I.U0), Write(I.V0), Write(I.A0)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
+PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar a0, PetscScalar &u, PetscScalar &v) {
+      const TSHHT3Role r = RoleOf(I, i);
+      u                  = u0 + (r == TSHHT3_COORDINATE ? d * (v0 + d / 2 * a0) : r == TSHHT3_STATE ? d * v0 : 0);
+      v                  = v0 + (r == TSHHT3_COORDINATE ? d * a0 : 0);
+    },
+    Read(I.U0), Read(I.V0), Read(I.A0), Write(U), Write(V)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the multipliers of U: a failed correction may have left others in X, of any size, which would stand in the matrix beside the inertia
+   (Failures.MultipliersOfAFailedCorrection) */
+PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
+{
+  Integrator &I = Get(ts);
+  Consistent  c;
+  const char *why;
+  PetscBool   ok;
+
+  PetscFunctionBegin;
+  PetscCall(TakeRoles(I, U, algebraic, I.X));
+  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(TakeUnknowns(I, c));
+  PetscCall(ConsistentMatrix(ts, c, &ok, &why));
+  PetscCall(NoteInertia(ts, c.P));
+  I.corrector.matrix.forget();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrix of the start with which no solve is possible, explained: an error in any case */
+PetscErrorCode NameRedundant(TS ts)
+{
+  Integrator           &I = Get(ts);
+  IS                    multipliers;
+  std::vector<PetscInt> list(I.constrained);
+  PetscInt              start, n = 0, rows[20];
+  Mat                   P;
+  RowLabel              label;
+  constexpr PetscInt    named = 4;
+  std::string           text, names;
+  PetscBool             is_singular;
+  MatSolverType         package;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
+  PetscCall(RefuseNoNumbers(ts, P));
+  PetscCall(MatrixIsSingular(ts, &is_singular));
+  if (!is_singular) PetscCall(ExplainLinearFailure(ts, ts->ptime, 0));
+  PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
+  PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
+  for (PetscInt &i : list) i += start;
+  if (I.constraints()) {
+    PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)list.size(), list.data(), PETSC_COPY_VALUES, &multipliers));
+    PetscCall(LinearNameDependent(P, multipliers, 20, &n, rows));
+    PetscCall(ISDestroy(&multipliers));
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    text += (i ? ", " : "") + std::to_string(rows[i]);
+    if (!I.names.name || i >= named) continue;
+    PetscCall(LabelRow(ts, rows[i], &label));
+    names += std::string(i ? ", " : " Rows ") + label.text;
+  }
+  if (n == 1) PetscCall(LabelRow(ts, rows[0], &label));
+  PetscCheck(n != 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
+  PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text.c_str(),
+             names.c_str(), I.names.name && n > named ? ", ..." : "");
+  PetscCall(PackageInDoubt(ts, &package));
+  PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
+             "-pc_factor_mat_solver_type mumps or klupair exchanges rows there. If that fails, too, look for a coordinate without mass that no constraint holds",
+             package, (double)ts->ptime);
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+          "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g, and not by dependent constraints: look for a coordinate without mass that no constraint holds, "
+          "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);
+}
+
+namespace
+{
+
+PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, Consistent &c, PetscBool *ok, const char **why)
+{
+  Integrator &I = Get(ts);
+  WorkVec     F, d;
+
+  PetscFunctionBegin;
+  c.h        = h;
+  c.begin[0] = I.base[0];
+  c.begin[1] = I.base[1];
+  if (h > 0) PetscCall(VecWAXPY(c.begin[0], h, V, U));
+  if (h > 0) PetscCall(VecCopy(V, c.begin[1]));
+  if (I.constraints()) {
+    c.gamma = I.gamma;
+    PetscCall(TimeScaleOfConstraints(ts, &c.T));
+    if (have.gamma != Gamma::Made) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, have.gamma == Gamma::Near, NULL, c.gamma));
+  }
+  if (!I.count[TSHHT3_STATE]) c.T = 0;
+  PetscCall(F.like(I.X));
+  PetscCall(d.like(I.X));
+  c.F = F;
+  c.d = d;
+  PetscCall(SolveConsistent(ts, c, have.matrix, ok, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V. Reference and factors are
+   left as they were after an error of the application too, which may go on. */
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  Consistent  c;
+  const char *why;
+  PetscBool   reuse; /* the user's */
+  WorkVec     before;
+
+  PetscFunctionBegin;
+  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(KSPGetReusePreconditioner(c.ksp, &reuse));
+  c.near   = have.near && !reuse;
+  c.enough = have.near ? four_digits : 0;
+  if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_TRUE));
+  if (h == 0) PetscCall(ReferTo(ts, c.U, before));
+  const PetscErrorCode failed = SolveAt(ts, t, h, U, V, have, c, ok, &why);
+  PetscCall(KSPSetReusePreconditioner(c.ksp, reuse));
+  if (!failed && !have.matrix && !have.near && h == 0) PetscCall(NoteInertia(ts, c.P));
+  PetscCall(ReferBack(ts, c.U, before));
+  PetscCall(failed);
+  I.corrector.matrix.forget();
+  ts->snes_its += c.its;
+  ts->ksp_its += c.ksp_its;
+  I.corrector.no_solve = (PetscBool)(I.linear.failed != PC_NOERROR);
+  if (I.linear.failed) PetscCall(ExplainLinearFailure(ts, t, 0));
+  else if (!*ok && why != I.failure) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "%s in the search for accelerations and multipliers at t = %g", why, (double)t));
+  PetscCall(SNESSetConvergedReason(ts->snes, *ok ? SNES_CONVERGED_SNORM_RELATIVE : SNES_DIVERGED_INNER)); /* for TSAdapt */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+namespace
+{
+
+constexpr int max_transients = 30; /* one within the other; each time a tenth of one is left */
+
+/* Accelerations, multipliers and their rates from U0, V0 */
+PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
+{
+  Integrator &I = Get(ts);
+  PetscBool   ok;
+
+  PetscFunctionBegin;
+  PetscCall(TakeRoles(I, I.U0, algebraic, I.X));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
+  if (!ok) {
+    if (I.linear.failed) PetscCall(NameRedundant(ts));
+    SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
+  }
+  PetscCall(NoteDriven(ts));
+  PetscCall(Distribute(I));
+  PetscCall(VecCopy(I.X, I.X0));
+  PetscCall(VecCopy(I.X, I.predictor.D[0]));
+  PetscCall(Rates(ts, rate));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A consistent start from U0, V0, and the first step. Transients that are over long before its end are taken out of V0, one after the other, as
+   long as that takes their accelerations away. */
+PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
+{
+  Integrator     &I      = Get(ts);
+  const PetscReal given  = ts->time_step;
+  const PetscBool auto_h = I.auto_h;
+  PetscReal       before, after, tau;
+  PetscBool       gone = PETSC_TRUE;
+  WorkVec         V;
+
+  PetscFunctionBegin;
+  PetscCall(Consistent(ts, have, rate));
+  PetscCall(ChooseFirstStep(ts, rate));
+  PetscCall(V.like(I.V0));
+  for (int k = 0; gone && k < max_transients; k++) {
+    PetscCall(VecCopy(I.V0, V));
+    PetscCall(VecNorm(I.A0, NORM_2, &before));
+    PetscCall(SettleTransient(ts, ts->time_step, rate, &tau, &gone));
+    if (tau <= 0) break;
+    if (gone) {
+      ts->time_step = given;
+      I.auto_h      = auto_h;
+      PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
+      PetscCall(VecNorm(I.A0, NORM_2, &after));
+      gone = (PetscBool)(after < 0.5 * before);
+      if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
+      else {
+        PetscCall(VecCopy(V, I.V0));
+        PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
+      }
+      PetscCall(ChooseFirstStep(ts, rate));
+    }
+    if (!gone && k) PetscCall(VecZeroEntries(rate)); /* those of what rounding leaves of the transient */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+PetscErrorCode StartFromState(TS ts, Prepared have)
+{
+  Integrator &I = Get(ts);
+  WorkVec     rate;
+
+  PetscFunctionBegin;
+  PetscCall(rate.like(I.X));
+  PetscCall(ConsistentStart(ts, have, rate));
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCall(LimitStepByEvents(ts));
+  PetscCall(MakeHistory(ts, rate));
+  PetscCall(HistoryForces(ts, ts->ptime));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Initial values that are no numbers end up in a matrix, where nobody can tell where they came from */
+static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
+{
+  PetscScalar value;
+  PetscInt    row;
+  RowLabel    label;
+
+  PetscFunctionBegin;
+  PetscCall(FirstWhere([](PetscInt, PetscScalar v) { return PetscIsInfOrNanScalar(v); }, &row, Read(x)));
+  if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(EntryOf(x, row, &value));
+  PetscCall(LabelRow(ts, row, &label));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_FP, "The initial %s of unknown %s is %s at t = %g: set it (TS2SetSolution())", what, label.text,
+          PetscIsNanScalar(value) ? "not a number (NaN)" : PetscRealPart(value) > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
+}
+
+/* From vec_sol and vec_dot at ptime; history is forgotten */
+PetscErrorCode Start(TS ts)
+{
+  Integrator &I = Get(ts);
+  Prepared    have;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.start, ts, 0, 0, 0));
+  PetscCall(PetscInfo(ts, "start: consistent accelerations at t = %g\n", (double)ts->ptime));
+  PetscCall(CheckSettings(ts));
+  I.stat.restarts++;
+  ResetOrder(ts);
+  I.tiny_row = 0;
+  PetscCall(VecCopy(ts->vec_sol, I.U0));
+  PetscCall(TakeRoles(I, ts->vec_dot, {TSHHT3_COORDINATE, TSHHT3_STATE}, I.V0));
+  PetscCall(CheckInitialNumbers(ts, I.U0, "value"));
+  PetscCall(CheckInitialNumbers(ts, I.V0, "velocity"));
+  if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
+  PetscCall(ReferToState(ts));
+  if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were, nor its steps (Excitation.WhatSetsInLaterInANewRun) */
+    I.t_begin   = ts->ptime;
+    I.norm_size = 0;
+    I.h_regular = I.h_limit = 0;
+    I.corrector.blames = 0;
+    I.told             = PETSC_FALSE;
+    for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));
+  }
+  PetscCall(FollowTolerances(ts, I.U0));
+  PetscCall(UpdateWeights(ts, I.U0));
+  PetscCall(NoteExcitation(ts));
+  PetscCall(CheckInitialState(ts, &have));
+  if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
+    PetscCall(ReferToState(ts));
+    have = {};
+  }
+  PetscCall(StartFromState(ts, have));
+  PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,121 @@
+/*
+  The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
+  than it says. It is replaced by any other type, as by -ts_adapt_type basic.
+*/
+#include "estimate.h"
+#include "order.h"
+#include "integrator/start/start.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+using Choose = PetscErrorCode (*)(TSAdapt, TS, PetscReal, PetscInt *, PetscReal *, PetscBool *, PetscReal *, PetscReal *, PetscReal *);
+
+struct Basic {
+  Choose choose = nullptr;
+};
+
+/* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
+   in h below the threshold costs more in matrices than it saves in steps. */
+PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.h_limit > 0 && *next > I.h_limit) *next = PetscMax(h, I.h_limit);
+  if (*next <= h || *next >= I.corrector.hold * h) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
+  *next = h;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of the tolerance: nothing moves, or evenly */
+constexpr PetscReal negligible = 1e-3;
+constexpr PetscReal waiting    = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
+constexpr PetscReal regular    = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
+
+/* Where nothing moves the error says nothing of loads and motions that are to come */
+PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
+{
+  Integrator     &I        = Get(ts);
+  const PetscReal furthest = PetscMin(PetscMax(waiting * h, regular * I.h_regular), coasting * (ts->max_time - I.t_begin));
+
+  PetscFunctionBegin;
+  if (*next <= furthest) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.fastest >= PETSC_MAX_REAL && I.ahead == Ahead::Unknown) PetscCall(LookAhead(ts, I.t1, I.U1, I.V1));
+  if (I.fastest < PETSC_MAX_REAL || I.ahead == Ahead::Loads) *next = furthest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A step that is cut short where one has to end changes h at once, which leaves an error in the multipliers for as many steps as the history has: the last
+   steps before are of one length (LastSteps.AreOfOneLength) */
+PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
+{
+  const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h), equal = 1e-6; /* but for rounding */
+
+  PetscFunctionBegin;
+  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || rest < (1 - equal) * *next || rest > last_steps * *next) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal steps = PetscCeilReal(rest / *next - equal);
+  if (steps * *next - rest > equal * rest) PetscCall(PetscInfo(ts, "the last %g steps before a given time are of one length, %g in place of %g\n", (double)steps, (double)(rest / steps), (double)*next));
+  *next = rest / steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
+PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
+{
+  PetscBool ours;
+
+  PetscFunctionBegin;
+  PetscCall((*static_cast<Basic *>(adapt->data)->choose)(adapt, ts, h, scheme, next, accept, wlte, wltea, wlter));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
+  if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
+  if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
+  if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
+  else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
+  PetscCall(ShareTheRest(ts, h, next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DestroyAdapt(TSAdapt adapt)
+{
+  PetscFunctionBegin;
+  delete static_cast<Basic *>(adapt->data);
+  adapt->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn */
+PetscErrorCode LookFurther(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscBool   ours;
+
+  PetscFunctionBegin;
+  if (I.ahead != Ahead::Nothing || !(ts->max_time > I.ahead_to)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSHHT3, &ours));
+  if (!ours) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LookAhead(ts, ts->ptime, I.U0, I.V0));
+  if (I.ahead == Ahead::Loads) ts->time_step = PetscMin(ts->time_step, coasting * (ts->max_time - I.t_begin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The basic type, whose choice is looked at */
+PetscErrorCode CreateAdapt(TSAdapt adapt)
+{
+  PetscFunctionBegin;
+  PetscCall(TSAdaptSetType(adapt, TSADAPTBASIC));
+  adapt->data         = new Basic{adapt->ops->choose};
+  adapt->ops->choose  = ChooseStep;
+  adapt->ops->destroy = DestroyAdapt;
+  PetscCall(PetscObjectChangeTypeName((PetscObject)adapt, TSHHT3));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,293 @@
+/*
+  Steps of order 3 to 5: the accepted states that they need, the stage that follows from these, and the way from and to HHT, the member of order two.
+
+  HHT's unknown is an acceleration a that lags behind q'' and its velocities miss the differentiated constraints by O(h^2), misfit.cpp; backward
+  differentiation has neither. Where the order goes from two to three, the misfit is taken out of the velocities of the history, or accelerations in the directions of the
+  constraints, and with them multipliers, would be off by an error of first order for as many steps as the history has. Where it comes back, a_n
+  and the misfit are put in as at a start.
+
+  A step far shorter than the one before, as to an event or the end of a run, does not lengthen the history: its beginning is left out.
+*/
+#include "integrator/entries.h"
+#include "order.h"
+#include "stage.h"
+#include "integrator/work_vec.h"
+#include <algorithm>
+#include <utility>
+
+namespace hht3
+{
+
+namespace
+{
+
+/* A step below this part of the last one is too short to be differentiated over: what the corrector has left in the positions of its ends would
+   count so many times more in the velocities of the next one */
+constexpr PetscReal too_short = 0.2;
+
+/* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
+PetscReal MisfitOfHistory(const Order &o, const BDF &b)
+{
+  PetscReal sum = 0;
+  for (PetscInt j = 0; j < o.now; j++)
+    if (o.misfit_h > 0) sum += b.c[j] * PetscSqr(o.hht[j] / o.misfit_h);
+  return sum;
+}
+
+/* x_i = y_i of coordinates */
+PetscErrorCode CopyCoordinates(const Integrator &I, Vec y, Vec x)
+{
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar from, PetscScalar &to) { if (IsCoordinate(I, i)) to = from; }, Read(y), Write(x)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before the first attempt of order three or more from a state of HHT's: accelerations are q'', and the misfit of the velocities is measured */
+PetscErrorCode EnterBDF(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " from t = %g\n", o.now, (double)ts->ptime));
+  PetscCall(CopyCoordinates(I, I.A0, I.predictor.D[0]));
+  I.misfit = 0;
+  if (o.hht[0] > 0 && I.count[TSHHT3_HOLONOMIC] && I.corrector.matrix.have) {
+    if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
+    o.misfit_h = o.hht[0];
+  } else o.misfit_h = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before the first attempt of order two from a state of higher order's: what HHT would have left, from the slope of q'' */
+PetscErrorCode LeaveBDF(TS ts)
+{
+  Integrator &I = Get(ts);
+  Predictor  &p = I.predictor;
+
+  PetscFunctionBegin;
+  PetscCall(PetscInfo(ts, "order 2 from t = %g\n", (double)ts->ptime));
+  if (I.order.made > 2 && p.available > 0) {
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar a, PetscScalar v, PetscScalar slope, PetscScalar &x) {
+        const TSHHT3Role r = RoleOf(I, i);
+        if (r == TSHHT3_COORDINATE) x = a + I.hht.lag() * I.h_last * slope;
+        if (r == TSHHT3_STATE) x = v + I.hht.lagState() * I.h_last * slope;
+      },
+      Read(I.A0), Read(I.V0), Read(p.D[1]), Write(I.X0)));
+    I.bent = Bend::None;
+    if (I.corrector.matrix.have) PetscCall(StartMisfit(ts, p.D[1]));
+  }
+  PetscCall(CopyCoordinates(I, I.X0, p.D[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* tau_1, tau_2, ... for a step to t1 */
+void Spans(const Order &o, PetscReal t1, PetscReal tau[])
+{
+  for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
+}
+
+PetscErrorCode SetUpOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  PetscFunctionBegin;
+  o.max = o.wanted == TSHHT3_ORDER_AUTO ? max_order : o.wanted;
+  PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
+             "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
+  if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
+  if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt j = 0; j < o.max; j++) {
+    if (!o.U[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.U[j]));
+    if (!o.V[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.V[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
+{
+  const Integrator &I     = Get(ts);
+  const Order      &o     = I.order;
+  const PetscInt   *steps = I.stat.of_order;
+  char              what[64];
+
+  PetscFunctionBegin;
+  if (o.wanted == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o.wanted == TSHHT3_ORDER_AUTO) PetscCall(PetscSNPrintf(what, sizeof(what), "chosen in each step, 2 to %" PetscInt_FMT, max_order));
+  else PetscCall(PetscSNPrintf(what, sizeof(what), "%" PetscInt_FMT ", after starts from 2", o.wanted));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "order %s (now %" PetscInt_FMT "); steps of order 2 to 5: %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT ", %" PetscInt_FMT "\n", what, o.now,
+                                   steps[2], steps[3], steps[4], steps[5]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At a start: order two, and no history */
+void ResetOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  if (o.max == 2) return;
+  static_cast<OrderState &>(o) = OrderState();
+  o.t[0]                       = ts->ptime;
+  I.p                          = I.hht;
+}
+
+/* The accepted step is about to become t_n, its beginning a part of the past, and o.next the order */
+void CommitOrder(Integrator &I)
+{
+  Order &o = I.order;
+
+  if (o.max == 2) return;
+  if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * I.h_last)) {
+    /* U1, V1 take the place of what goes, and U0, V0 are the first of the past when they have been exchanged */
+    std::rotate(o.U, o.U + o.max - 1, o.U + o.max);
+    std::rotate(o.V, o.V + o.max - 1, o.V + o.max);
+    std::swap(o.U[0], I.U0);
+    std::swap(o.V[0], I.V0);
+    std::copy_backward(o.t, o.t + o.max, o.t + o.max + 1);
+    std::copy_backward(o.hht, o.hht + o.max, o.hht + o.max + 1);
+    o.past = PetscMin(o.past + 1, o.max);
+  }
+  o.t[0]   = I.t1;
+  o.hht[0] = o.accepted == 2 ? I.h : 0;
+  o.made   = o.accepted;
+  o.memory = o.after;
+  o.since  = o.next == o.now ? o.since + 1 : 0;
+  if (o.wait > 0) o.wait--;
+  o.above  = o.now > 2 ? o.above + 1 : 0;
+  o.now    = PetscMin(o.next, PetscMax(2, o.past));
+}
+
+/* Keeps n states of the past */
+PetscErrorCode CutPast(TS ts, PetscInt n)
+{
+  Order &o = Get(ts).order;
+
+  PetscFunctionBegin;
+  if (n == o.past) PetscFunctionReturn(PETSC_SUCCESS);
+  o.past = n;
+  if (o.now == 2 || o.now <= n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "bodies turn too far in %" PetscInt_FMT " steps for order %" PetscInt_FMT " at t = %g\n", o.now, o.now, (double)ts->ptime));
+  o.now   = n < 3 ? 2 : n;
+  o.since = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Before an attempt of length I.h: parameters of its order */
+PetscErrorCode UseOrder(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  PetscReal   tau[max_order + 1];
+
+  PetscFunctionBegin;
+  if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  o.measured = PETSC_FALSE;
+  if ((o.now > 2) != (o.ready > 2)) {
+    if (o.now > 2) PetscCall(EnterBDF(ts));
+    else PetscCall(LeaveBDF(ts));
+    I.corrector.matrix.want = PETSC_TRUE;
+  }
+  o.ready = o.now;
+  Spans(o, I.t1, tau);
+  I.p = o.now > 2 ? BDFParameters(o.now, I.h, tau) : I.hht;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* As PrepareStage() does it for order two: psi_q + gamma h psi_v of coordinates, psi_q of states and of rotation vectors, see StageOfRotations() */
+PetscErrorCode PrepareBDF(TS ts)
+{
+  Integrator        &I = Get(ts);
+  Order             &o = I.order;
+  PetscReal          tau[max_order + 1];
+  Vec                U[max_order] = {I.U0}, V[max_order] = {I.V0};
+  const PetscScalar *u[max_order], *v[max_order];
+
+  PetscFunctionBegin;
+  Spans(o, I.t1, tau);
+  const BDF       b      = BDFOf(o.now, tau);
+  const PetscReal misfit = MisfitOfHistory(o, b);
+  std::copy(o.U, o.U + o.now - 1, U + 1);
+  std::copy(o.V, o.V + o.now - 1, V + 1);
+  for (PetscInt j = 0; j < o.now; j++) {
+    PetscCall(VecGetArrayRead(U[j], &u[j]));
+    PetscCall(VecGetArrayRead(V[j], &v[j]));
+  }
+  const auto psi = [&](const PetscScalar *const x[], PetscInt i, PetscScalar sum) {
+    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j][i]; /* not by VecMAXPY(), which rounds otherwise: HigherOrderRotations.ObservedOrders */
+    return sum;
+  };
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar &bu, PetscScalar &bv, PetscScalar &ba, PetscScalar dV) {
+      bv = IsCoordinate(I, i) ? psi(v, i, -misfit * dV) : 0;
+      bu = IsDifferential(RoleOf(I, i)) ? psi(u, i, 0) + b.gh * bv : 0;
+      ba = 0;
+    },
+    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */)));
+  PetscCall(ForSome(
+    I.rotations.at,
+    [&](PetscInt i, PetscScalar &bu) {
+      for (PetscInt k = 0; k < 3; k++) (&bu)[k] = psi(u, i + k, 0);
+    },
+    Write(I.base[0])));
+  for (PetscInt j = 0; j < o.now; j++) {
+    PetscCall(VecRestoreArrayRead(U[j], &u[j]));
+    PetscCall(VecRestoreArrayRead(V[j], &v[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The past in new coordinates. What HHT has left in its velocities belongs to the old ones. */
+PetscErrorCode MapPast(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+  WorkVec     A;
+
+  PetscFunctionBegin;
+  if (!o.past) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(A.like(I.A0));
+  for (PetscInt j = 0; j < o.past; j++) {
+    PetscCall(VecZeroEntries(A));
+    PetscCall((*I.change.map)(ts, o.t[j + 1], o.U[j], o.V[j], A, I.change.ctx));
+  }
+  o.misfit_h = 0;
+  for (PetscReal &h : o.hht) h = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Steps of order two after a higher one has failed, doubled each time: where the corrector goes on to fail they would hide it, and where an oscillation comes back each
+   attempt at a higher order lets it grow */
+static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
+
+/* After so many times as many steps above order two it begins anew */
+static constexpr PetscInt forgiven_after = 10;
+
+void LowerToTwo(Order &o)
+{
+  if (o.above > forgiven_after * o.penalty) o.penalty = 0;
+  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  o.next             = 2;
+}
+
+/* A correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at once, at the same h */
+PetscErrorCode LowerAfterFailure(TS ts)
+{
+  Integrator &I = Get(ts);
+  Order      &o = I.order;
+
+  PetscFunctionBegin;
+  if (o.now == 2) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "the corrector has failed with order %" PetscInt_FMT " at t = %g\n", o.now, (double)ts->ptime));
+  if (!ts->reason) ts->time_step = I.h;
+  LowerToTwo(o);
+  o.now   = 2;
+  o.since = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,98 @@
+/*
+  Backward differentiation of positions and again of velocities, orders 3 to 5, as pure functions of the times of a history with variable steps.
+
+  With tau_j = t_{n+1} - t_{n+1-j}, j = 1 ... k, the derivative at t_{n+1} of the polynomial through q_{n+1} and the last k values is
+
+    q'_{n+1} = (q_{n+1} - psi_q) / (gamma h),  1/(gamma h) = Sum_j 1/tau_j,  psi_q = Sum_j c_j q_{n+1-j}
+
+  and likewise q''_{n+1} from the velocities, so that
+
+    q'_{n+1} = psi_v + gamma h q''_{n+1},  q_{n+1} = psi_q + gamma h psi_v + (gamma h)^2 q''_{n+1}
+
+  which are (2a) and (2b) with beta = gamma^2 and other values in place of those of t_n: unknowns, matrix (10) and scalings stay. The equations of motion and
+  the constraints hold at t_{n+1}. The relation of the positions misses them by (Brenan, Campbell, Petzold 1996, section 5.2; Hairer, Norsett, Wanner, III.5)
+
+    gamma h tau_1 ... tau_k q[t_{n+1}, ..., t_{n-k}] = gamma h/tau_{k+1} (q_{n+1} - what the polynomial through the last k + 1 values predicts)
+
+  On index 3 at constant steps, order k is that of q, q' and lambda (Loetstedt, Petzold, Math. Comp. 46, 1986). At variable steps a change of h leaves an error of
+  order h^(k-1) in q'' and lambda for as many steps as the history has.
+*/
+#ifndef HHTDAE_BDF_H
+#define HHTDAE_BDF_H
+
+#include "integrator/formulas.h"
+
+namespace hht3
+{
+
+constexpr PetscInt max_order = 5;
+
+struct BDF {
+  PetscReal gh;           /* gamma h */
+  PetscReal c[max_order]; /* of the values at t_n, t_{n-1}, ... */
+};
+
+/* Of order k, from tau_1 ... tau_k */
+inline BDF BDFOf(PetscInt k, const PetscReal tau[])
+{
+  BDF       b   = {};
+  PetscReal sum = 0;
+  for (PetscInt j = 0; j < k; j++) sum += 1 / tau[j];
+  b.gh = 1 / sum;
+  for (PetscInt j = 0; j < k; j++) {
+    b.c[j] = b.gh / tau[j];
+    for (PetscInt i = 0; i < k; i++)
+      if (i != j) b.c[j] *= tau[i] / (tau[i] - tau[j]);
+  }
+  return b;
+}
+
+/* What stands in place of HHT's parameters in a step of length h of order k. tau_1 ... tau_{k+1} */
+inline Parameters BDFParameters(PetscInt k, PetscReal h, const PetscReal tau[])
+{
+  const PetscReal gh = BDFOf(k, tau).gh;
+  Parameters      p;
+  p.rho     = 0;
+  p.am      = p.af = p.am_s = p.af_s = 0;
+  p.gamma   = p.gamma_s = gh / h;
+  p.beta    = p.gamma * p.gamma;
+  p.k       = p.beta * gh / tau[k];
+  p.k_s     = 0; /* states are judged as coordinates are */
+  return p;
+}
+
+/* Weights of the values at t, x_0 ... x_k for the k-th divided difference times tau_1 ... tau_k, which is the k-th backward difference where
+   steps are constant; x_0 = 0 and x_j = -tau_j. weight[0] is that of the value at t_{n+1}. */
+inline void DifferenceWeights(PetscInt k, const PetscReal tau[], PetscReal weight[])
+{
+  for (PetscInt j = 0; j <= k; j++) {
+    const PetscReal x = j ? -tau[j - 1] : 0;
+    weight[j]         = 1;
+    for (PetscInt i = 0; i <= k; i++)
+      if (i != j) weight[j] /= x + (i ? tau[i - 1] : 0);
+    for (PetscInt i = 0; i < k; i++) weight[j] *= tau[i];
+  }
+}
+
+/* The error of order k is this times the (k+1)-th scaled difference */
+inline PetscReal ErrorFactor(PetscInt k, const PetscReal tau[]) { return BDFOf(k, tau).gh / tau[k]; }
+
+/* That of HHT in a step of length h is this times the third one, which is tau_1 tau_2 tau_3 q'''/6 */
+inline PetscReal HHTErrorFactor(const Parameters &p, PetscReal h, const PetscReal tau[])
+{
+  return PetscAbsReal(p.k) * 6 * h / tau[0] * h / tau[1] * h / tau[2];
+}
+
+/* Weights of the values at nodes x_0 ... x_k in the polynomial through them, at x; exactly one and zero at the nodes */
+inline void LagrangeWeights(PetscInt k, const PetscReal node[], PetscReal x, PetscReal weight[])
+{
+  for (PetscInt j = 0; j <= k; j++) {
+    weight[j] = 1;
+    for (PetscInt i = 0; i <= k; i++)
+      if (i != j) weight[j] *= (x - node[i]) / (node[j] - node[i]);
+  }
+}
+
+} // namespace hht3
+
+#endif

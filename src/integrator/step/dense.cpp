@@ -1,0 +1,179 @@
+/*
+  Dense output within the last accepted step, section 7 of the method.
+
+  Order two: cubic Hermite polynomials for q (from q, q'), for q' (from q', q'') and for states (from s, s'); linear for q'', lambda, V and F.
+
+  Order k above it: the polynomials of degree k through the last k + 1 values of q, of q' and of states, which for q is the one that the step is made of, and of degree k
+  through those that the predictor keeps of q'', s', lambda, V and F, as far as these reach back.
+
+  Both ends give back the step's own values.
+*/
+#include "dense.h"
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "integrator/coordinates/rotations.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* The value of a polynomial, as a sum of vectors */
+struct WeightedSum {
+  PetscInt    n = 0;
+  PetscScalar weight[max_order + 2];
+  Vec         vec[max_order + 2];
+
+  void add(PetscReal w, Vec v)
+  {
+    weight[n] = w;
+    vec[n++]  = v;
+  }
+  PetscErrorCode value(std::vector<Vec> &spare, WorkVec &x)
+  {
+    PetscFunctionBegin;
+    PetscCall(x.like(vec[0], spare));
+    PetscCall(VecZeroEntries(x));
+    PetscCall(VecMAXPY(x, n, weight, vec));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+};
+
+/* Through the values at t_{n+1}, t_n, ... of U or U' */
+WeightedSum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Vec past[])
+{
+  const Order   &o = I.order;
+  const PetscInt k = o.now;
+  PetscReal      node[max_order + 1] = {}, weight[max_order + 1];
+  WeightedSum    sum;
+
+  node[0] = I.t1;
+  for (PetscInt j = 1; j <= k; j++) node[j] = o.t[j - 1];
+  LagrangeWeights(k, node, t, weight);
+  for (PetscInt j = 0; j <= k; j++) sum.add(weight[j], j == 0 ? end : j == 1 ? begin : past[j - 2]);
+  return sum;
+}
+
+/* Through `end` at t_{n+1} and the values whose divided differences the predictor keeps:
+   N(t) + (end - N(t_{n+1})) pi(t)/pi(t_{n+1}) with Newton's polynomial N and the product pi of all (t - t_j) */
+WeightedSum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
+{
+  const Predictor &p = I.predictor;
+  const PetscInt   n = PetscMin(p.available + 1, I.order.now);
+  PetscReal        pi = 1, pi1 = 1, here[max_order + 1], there[max_order + 1];
+  WeightedSum      sum;
+
+  for (PetscInt j = 0; j < n; j++) {
+    here[j]  = pi;
+    there[j] = pi1;
+    pi *= t - p.t[j];
+    pi1 *= I.t1 - p.t[j];
+  }
+  sum.add(pi / pi1, end);
+  for (PetscInt j = 0; j < n; j++) sum.add(here[j] - pi / pi1 * there[j], p.D[j]);
+  return sum;
+}
+
+/* The second half of the basis of cubic Hermite polynomials on [0, 1], which grows from 0 to 1 */
+PetscReal HermiteEnd(PetscReal x) { return x * x * (1 + 2 * (1 - x)); }
+
+/* The cubic Hermite polynomial of values and slopes at both ends of the step */
+WeightedSum Hermite(const Integrator &I, PetscReal x, Vec y0, Vec d0, Vec y1, Vec d1)
+{
+  const PetscReal z = 1 - x;
+  WeightedSum     sum;
+
+  sum.add(HermiteEnd(z), y0);
+  sum.add(I.h * x * z * z, d0);
+  sum.add(HermiteEnd(x), y1);
+  sum.add(-I.h * x * x * z, d1);
+  return sum;
+}
+
+WeightedSum Linear(PetscReal x, Vec y0, Vec y1)
+{
+  WeightedSum sum;
+  sum.add(1 - x, y0);
+  sum.add(x, y1);
+  return sum;
+}
+
+/* The polynomials by what they are of: q and s, q', q'', s', and what is algebraic */
+struct Polynomials {
+  WeightedSum differential, velocity, acceleration, rate, algebraic;
+};
+
+Polynomials OfStep(const Integrator &I, PetscReal t)
+{
+  const PetscReal x = StepFraction(I, t), inside = PetscClipInterval(t, I.t0, I.t1);
+
+  if (I.order.accepted <= 2) return {Hermite(I, x, I.U0, I.V0, I.U1, I.V1), Hermite(I, x, I.V0, I.A0, I.V1, I.A1), Linear(x, I.A0, I.A1), Linear(x, I.V0, I.V1), Linear(x, I.U0, I.U1)};
+  const WeightedSum unknowns = ThroughUnknowns(I, inside, I.X);
+  return {ThroughStates(I, inside, I.U1, I.U0, I.order.U), ThroughStates(I, inside, I.V1, I.V0, I.order.V), unknowns, unknowns, unknowns};
+}
+
+/* The rotation vectors among U, of order two, after all coordinates */
+PetscErrorCode AtRotations(Integrator &I, PetscReal x, WeightedSum velocity, Vec U)
+{
+  WorkVec V;
+
+  PetscFunctionBegin;
+  PetscCall(velocity.value(I.spare, V));
+  PetscCall(ForSome(
+    I.rotations.at, [&](PetscInt, const PetscScalar &v0, const PetscScalar &v1, const PetscScalar &v, PetscScalar &u) { InterpolateCommutator(I, x, HermiteEnd(x), &v0, &v1, &v, &u); }, Read(I.V0),
+    Read(I.V1), Read(V), Write(U)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Where t lies in the last step: 0 to 1, and these at its ends exactly */
+PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
+
+/* Monitors are called when an event has taken the step back, too, and after an error users look for what went before it: then the state is that of t_n, and nothing is known of other times */
+bool IsBeginOfStep(TS ts, PetscReal t) { return !Get(ts).have_step && Get(ts).at_begin && t == ts->ptime; }
+
+/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
+PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
+{
+  Integrator &I = Get(ts);
+  const Vec   out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0};
+  PetscInt    n, size;
+
+  PetscFunctionBegin;
+  if (IsBeginOfStep(ts, t)) {
+    for (int k = 0; k < 3; k++)
+      if (out[k]) PetscCall(VecCopy(begin[k], out[k]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to interpolate in: none was accepted since the start, the last restart or roll-back");
+  PetscCheck(t >= I.t0 - I.h * PETSC_SQRT_MACHINE_EPSILON && t <= I.t1 + I.h * PETSC_SQRT_MACHINE_EPSILON, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "Time %g is not in the last step [%g, %g]", (double)t, (double)I.t0, (double)I.t1);
+  PetscCall(VecGetLocalSize(I.U0, &n));
+  for (Vec x : out) {
+    if (!x) continue;
+    PetscCall(VecGetLocalSize(x, &size));
+    PetscCheck(size == n, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ, "A vector for values of the last step has %" PetscInt_FMT " entries on this rank, must be %" PetscInt_FMT " as the solution has", size, n);
+  }
+  Polynomials p = OfStep(I, t);
+  WorkVec     differential, velocity, acceleration, rate, algebraic;
+  if (U) {
+    PetscCall(p.differential.value(I.spare, differential));
+    PetscCall(p.algebraic.value(I.spare, algebraic));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar q, PetscScalar l, PetscScalar &u) { u = IsDifferential(RoleOf(I, i)) ? q : l; }, Read(differential), Read(algebraic), Write(U)));
+    if (I.rotations.is && I.order.accepted <= 2) PetscCall(AtRotations(I, StepFraction(I, t), p.velocity, U));
+  }
+  if (V) {
+    PetscCall(p.velocity.value(I.spare, velocity));
+    PetscCall(p.rate.value(I.spare, rate));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar q, PetscScalar s, PetscScalar &v) { v = IsCoordinate(I, i) ? q : RoleOf(I, i) == TSHHT3_STATE ? s : 0; }, Read(velocity), Read(rate), Write(V)));
+  }
+  if (A) {
+    PetscCall(p.acceleration.value(I.spare, acceleration));
+    PetscCall(TakeRoles(I, acceleration, {TSHHT3_COORDINATE}, A));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

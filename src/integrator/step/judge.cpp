@@ -1,0 +1,337 @@
+/*
+  When a correction ends: the stopping test, and what follows from it.
+
+  Stopping, (40) and (41b): with xi the ratio of two successive corrections, the iteration ends as soon as the error left,
+  xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. The rate
+  of the last corrections with the same matrix answers already after the first iteration.
+
+  Where h is not set by the error test (fixed steps, a largest h) the step's own error is far below the tolerance, and an
+  iteration error of c times the tolerance would be all that is left of its accuracy. Then c refers to the error estimate of
+  the last step instead, down to a hundredth of the tolerance under error control and without limit (and fifty times more
+  strictly) at fixed steps.
+
+  A correction that no longer falls is accepted where rounding makes one of its size, which is measured then and there (rounding.cpp) and
+  holds for this correction alone: in a position where Phi_q nearly loses rank it is far above that of later steps, whose errors would grow with it.
+
+  With constraints and little damping c is smaller, ConstrainedTolerance(): what is left of a correction in q excites the
+  multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
+  (h fell to 1e-6). A c that the user has set stands.
+
+  A last correction that proves nothing (verify.cpp), turns back (between.cpp), is followed by another one or leaves forces of what is driven
+  (driven.cpp) goes on.
+*/
+#include "corrector.h"
+#include "estimate.h"
+#include "integrator/proofs/proofs.h"
+
+namespace hht3
+{
+
+namespace
+{
+
+/* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
+constexpr PetscReal fixed = 0.02;
+
+/* A rate below it may be an old matrix' fault, above it the iteration diverges */
+constexpr PetscReal slow = 0.8;
+
+/* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
+constexpr PetscReal stagnant = 0.5;
+
+/* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
+constexpr PetscInt max_renewals = 3;
+
+/* A correction that no longer falls is as good as it gets where rounding makes one of its size and the matrix is not to blame */
+PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
+{
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+  PetscReal   noise;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (!I.fixed_h && c.e > 1) PetscFunctionReturn(PETSC_SUCCESS); /* no step to be accepted by the error test */
+  PetscCall(RoundingOfCorrection(ts, X, &noise));
+  *yes = (PetscBool)(c.e <= of_rounding * noise);
+  if (*yes) PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A slow correction goes on with a matrix made at its present iterate */
+PetscErrorCode FreshMatrixNextIteration(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  if (I.corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: rate %g in iteration %" PetscInt_FMT ", new matrix\n", (double)I.corrector.matrix.rate, I.corrector.it));
+  PetscCall(SNESSetLagJacobian(ts->snes, -2));
+  I.corrector.renewals++;
+  I.corrector.base = I.corrector.it;
+  I.corrector.matrix.rate = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Diverge(TS ts, const char *why)
+{
+  Integrator &I = Get(ts);
+  Corrector  &c = I.corrector;
+
+  PetscFunctionBegin;
+  c.reason = SNES_DIVERGED_DTOL;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
+                          why, (double)I.t1, (double)I.h, c.it, (double)c.e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What may be left of a correction, in units of the tolerance */
+PetscReal Tolerance(const Integrator &I)
+{
+  const Corrector &c = I.corrector;
+  const PetscReal tol = CorrectorTolerance(I);
+  const PetscReal least = I.h_limit > 0 ? 0.01 : 0; /* h is short for the corrector's sake */
+  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, least, 1);
+}
+
+/* The iteration does not converge as it is: is that rounding, may a new matrix help, or has it failed? */
+PetscErrorCode Stalled(TS ts, const Corrections &so_far, Vec X)
+{
+  Corrector      &c        = Get(ts).corrector;
+  const PetscReal xi       = so_far.rate();
+  PetscBool       rounding = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (c.base || xi >= slow) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
+  if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  else if (c.renewals < max_renewals && so_far.left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
+  else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
+  c.rounding = (PetscBool)(c.reason > 0);
+  if (c.rounding) {
+    c.matrix.rate = -1; /* that of noise says nothing of the matrix */
+    c.xi_max      = 0;  /* a new matrix would not help */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
+PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
+{
+  Integrator       &I      = Get(ts);
+  Corrector        &c      = I.corrector;
+  const Corrections so_far = {e, c.e, c.it - c.base, c.limit() - c.it, (bool)I.linear.constraint};
+
+  PetscFunctionBegin;
+  c.e        = e;
+  c.rounding = PETSC_FALSE;
+  if (PetscIsInfOrNanReal(e)) {
+    PetscCall(Diverge(ts, "produced a correction that is not a number"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, Tolerance(I), c.floor);
+  const bool slow_too_early = so_far.tooEarly() && so_far.rate() >= c.of(I.linear.constraint).slow_rate;
+  if (so_far.with_matrix >= 2 && !slow_too_early && e > c.floor) {
+    c.matrix.rate = so_far.rate();
+    c.xi_max      = PetscMax(c.xi_max, c.matrix.rate);
+  }
+  if (verdict == Verdict::Converged) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
+  else if (verdict == Verdict::TooMany) PetscCall(Diverge(ts, "needs too many iterations"));
+  else if (verdict == Verdict::Stalled) PetscCall(Stalled(ts, so_far, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the user's test decides, the rate is only measured, for the reuse of the matrix */
+PetscErrorCode Measure(TS ts, PetscReal e)
+{
+  Corrector      &c  = Get(ts).corrector;
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+
+  PetscFunctionBegin;
+  c.e = e;
+  if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
+  c.matrix.rate   = xi;
+  c.xi_max = PetscMax(c.xi_max, xi);
+  if (xi >= c.slow_rate && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode FailUnproved(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.corrector.reason = SNES_DIVERGED_DTOL;
+  if (I.corrector.wrong_jacobian) I.corrector.blames += 1;
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
+                          "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
+                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two. If it is right, roles found at the start hold no longer: TSHHT3SetIS()",
+                          (double)I.t1, (double)I.h, (double)I.verify.largest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On with the iteration, whose matrices are of every iterate from now on: on the way through a stiff direction that turns, spurious forces
+   make one that is as wrong an iteration later */
+PetscErrorCode FreshMatrices(TS ts)
+{
+  PetscFunctionBegin;
+  if (Get(ts).corrector.user_lag) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FreshMatrixNextIteration(ts));
+  PetscCall(SNESSetLagJacobian(ts->snes, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual has not followed the correction: on with the iteration, whose rate will tell; then with new matrices, since stiffness may
+   end on the way of a correction; and where none is better, with a smaller h, at which less is left of it */
+PetscErrorCode GoOnUnproved(TS ts)
+{
+  Corrector &c = Get(ts).corrector;
+
+  PetscFunctionBegin;
+  c.reason  = SNES_CONVERGED_ITERATING;
+  if (c.wrong_jacobian || c.it >= c.limit()) PetscCall(FailUnproved(ts));
+  else if (c.it - c.base >= 2) {
+    if (c.renewals >= max_renewals || c.user_lag) PetscCall(FailUnproved(ts));
+    else PetscCall(FreshMatrices(ts));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A correction that has failed with a matrix of its own may have turned back and forth; one that follows a meeting point may do so at once. In a system
+   of several steep forces the next meeting point is in another one, and each earns two more iterations. */
+PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Corrector &c = Get(ts).corrector;
+  PetscBool  found;
+
+  PetscFunctionBegin;
+  if (!(c.matrix.fresh || c.user_lag) || c.it >= c.limit()) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(BetweenIterates(ts, X, dX, F, &found));
+  *evaluated = found;
+  if (!found) PetscFunctionReturn(PETSC_SUCCESS);
+  c.reason = SNES_CONVERGED_ITERATING;
+  c.met++;
+  PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the correction `next` goes on in the direction of dX */
+PetscErrorCode GoesOn(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
+{
+  PetscScalar dot, square;
+
+  PetscFunctionBegin;
+  PetscCall(WeightCorrection(I, dX, work));
+  PetscCall(VecDot(dX, work, &square));
+  PetscCall(VecDot(next, work, &dot));
+  *yes = (PetscBool)(PetscRealPart(dot) >= stagnant * PetscRealPart(square));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual F has followed the last correction, but may stand in other directions than those in which the matrix has answered it: turned
+   about the direction of a stiff spring it is a soft force, which a matrix that is a little off takes for a stiff one, correction after
+   correction. So the next correction is asked for: that it is small is no proof if it goes on in the direction of the last one. */
+PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
+{
+  Integrator     &I    = Get(ts);
+  Corrector      &c    = I.corrector;
+  const Vec       next = I.verify.work, work = I.verify.model; /* the proof has done with them */
+  const PetscReal tol  = Tolerance(I);
+  PetscReal       e;
+  PetscBool       goes_on = PETSC_TRUE, rounding = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(SizeOfAnswer(ts, F, next, &e));
+  const PetscReal xi = c.e > 0 ? e / c.e : 0;
+  if (CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e <= at_once * tol) PetscCall(GoesOn(I, dX, next, work, &goes_on));
+  if (goes_on && c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
+  if (!goes_on || rounding) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g\n", (double)c.e, (double)e));
+  c.reason = SNES_CONVERGED_ITERATING;
+  if (c.it >= c.limit()) PetscCall(Diverge(ts, "needs too many iterations"));
+  else if (xi >= stagnant) PetscCall(FreshMatrices(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces of driven coordinates are not among what has been judged so far; with an old matrix they may not converge */
+PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
+{
+  Integrator     &I      = Get(ts);
+  Corrector      &c      = I.corrector;
+  const PetscReal before = c.forces;
+  PetscBool       good;
+
+  PetscFunctionBegin;
+  PetscCall(ForcesOfDriven(ts, Tolerance(I), X, F, evaluated, &good));
+  if (good) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "corrector: forces of driven coordinates, %g of the tolerance after iteration %" PetscInt_FMT "\n", (double)c.forces, c.it));
+  c.reason = SNES_CONVERGED_ITERATING;
+  if (c.it >= c.limit()) PetscCall(Diverge(ts, "does not balance the forces of driven coordinates"));
+  else if (c.it - c.base >= 2 && c.forces >= c.slow_rate * before && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* Norms whose squares underflow are none: answers to numbers that small may be zero, and a motion that dies away gets there (LinearSolves.AMotionThatDiesAway) */
+constexpr PetscReal least_norm = 1e-150;
+
+/* A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems): the solution of J dX = F is no shorter than |F|/|J|. */
+PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
+{
+  KSP       ksp;
+  PC        pc;
+  Mat       J;
+  PetscReal d, f, norm;
+  PetscBool direct, has_norm;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(dX, NORM_INFINITY, &d));
+  PetscCall(VecNorm(F, NORM_2, &f));
+  *yes = (PetscBool)(d == 0 && f > least_norm);
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
+  if (d == 0 || after || direct || Get(ts).linear.constraint) PetscFunctionReturn(PETSC_SUCCESS); /* PCHHTCONSTRAINT is not singular where its matrix is not */
+  PetscCall(KSPGetOperators(ksp, &J, NULL));
+  PetscCall(MatHasOperation(J, MATOP_NORM, &has_norm));
+  if (!has_norm) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatNorm(J, NORM_FROBENIUS, &norm));
+  PetscCall(VecNorm(dX, NORM_2, &d));
+  *yes = (PetscBool)(f > 2 * norm * PetscMax(d, least_norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
+PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated)
+{
+  Integrator &I = Get(ts);
+  PetscBool   proved, unanswered = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  I.corrector.it++;
+  I.stat.newton++;
+  I.stat.solves++;
+  if (!I.corrector.user_test && (e == 0 || !*evaluated)) PetscCall(IsUnanswered(ts, dX, F, *evaluated, &unanswered));
+  if (unanswered) {
+    I.corrector.reason = SNES_DIVERGED_LINEAR_SOLVE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(NoteForces(ts, F, *evaluated));
+  if (I.corrector.user_test) PetscCall(Measure(ts, e));
+  else PetscCall(Judge(ts, e, X));
+  if (I.corrector.reason > 0) {
+    PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
+    if (!proved) PetscCall(GoOnUnproved(ts));
+    else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
+    if (I.corrector.reason > 0 && !I.corrector.rounding) PetscCall(AskForces(ts, X, F, evaluated));
+  } else if (I.corrector.reason < 0 && !PetscIsInfOrNanReal(e)) {
+    PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
+    if (!I.corrector.reason) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(BlameJacobian(ts, X, dX, F, evaluated));
+    if (I.corrector.wrong_jacobian) PetscCall(FailUnproved(ts));
+  } else if (!I.corrector.reason && I.corrector.met && I.corrector.it - I.corrector.base == 1) PetscCall(GoOnBetween(ts, X, dX, F, evaluated));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

@@ -1,0 +1,365 @@
+/*
+  One step: begin, predict, correct, estimate, accept or reject.
+
+  The state at t_n is U0, V0, A0 and the unknowns X0; an accepted step stays in U1, V1, A1, X until the next
+  one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
+  whatever happens in between.
+*/
+#include "integrator/coordinates/change.h"
+#include "integrator/checkpoint/checkpoint.h"
+#include "corrector.h"
+#include "dense.h"
+#include "integrator/entries.h"
+#include "integrator/equations/equations.h"
+#include "estimate.h"
+#include "integrator/equations/jacobian.h"
+#include "order.h"
+#include "predictor.h"
+#include "integrator/coordinates/rotations.h"
+#include "stage.h"
+#include "integrator/start/start.h"
+#include "step.h"
+#include "integrator/work_vec.h"
+#include <utility>
+
+namespace hht3
+{
+
+namespace
+{
+
+/* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten */
+constexpr PetscReal remembers = 0.9, relaxes = 1.02, far_above = 4;
+
+/* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
+   has them again and again */
+constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
+
+/* -ts_exact_final_time interpolate leaves the solution at the end of a run in the vector that TSSolve() was given, and takes it for that at the end of the last step
+   when it is called again with it (BetweenRuns.GoOnFromInterpolatedEnds) */
+PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)
+{
+  WorkVec x;
+
+  PetscFunctionBegin;
+  *yes = PETSC_FALSE;
+  if (ts->exact_final_time != TS_EXACTFINALTIME_INTERPOLATE || !(ts->solvetime > Get(ts).t0 && ts->solvetime < Get(ts).t1)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(x.like(ts->vec_sol));
+  PetscCall(Interpolate(ts, ts->solvetime, x, NULL, NULL));
+  PetscCall(VecEqual(ts->vec_sol, x, yes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether someone other than the integrator has changed the time or the solution since the last step: an event, a post-step function,
+   a second TSSolve() with other values */
+PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *changed)
+{
+  Integrator &I        = Get(ts);
+  PetscInt    other[2] = {0, 0};
+  PetscBool   same;
+
+  PetscFunctionBegin;
+  *changed = (PetscBool)!IsEndOf(ts, t);
+  if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForEntries(
+    [&](PetscInt, PetscScalar x, PetscScalar u, PetscScalar y, PetscScalar v) {
+      if (x != u) other[0] = 1;
+      if (y != v) other[1] = 1;
+    },
+    Read(ts->vec_sol), Read(U), Read(ts->vec_dot), Read(V)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, other, 2, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  if (other[0] && I.have_step) {
+    PetscCall(IsInterpolatedEnd(ts, &same));
+    if (same) PetscCall(VecCopy(U, ts->vec_sol));
+    if (same) other[0] = 0;
+  }
+  *changed = (PetscBool)(other[0] || other[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The accepted step becomes the history */
+PetscErrorCode Commit(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCall(PredictorUpdate(ts));
+  CommitOrder(I);
+  std::swap(I.X, I.X0);
+  std::swap(I.U1, I.U0);
+  std::swap(I.V1, I.V0);
+  std::swap(I.A1, I.A0);
+  I.have_step   = PETSC_FALSE;
+  I.at_begin    = PETSC_TRUE;
+  I.h_last      = I.h;
+  I.have_misfit = PETSC_FALSE;
+  I.bent        = Bend::None;
+  PetscCall(HistoryForces(ts, I.t1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the step starts from: the last one, the one before a roll-back, or a consistent start */
+PetscErrorCode Begin(TS ts)
+{
+  Integrator &I       = Get(ts);
+  PetscBool   changed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (!ts->steprestart) {
+    if (I.have_step) PetscCall(StateWasChanged(ts, I.t1, I.U1, I.V1, &changed));
+    else if (I.at_begin) PetscCall(StateWasChanged(ts, I.t0, I.U0, I.V0, &changed));
+    else changed = PETSC_TRUE;
+    if (changed) PetscCall(PetscInfo(ts, "the solution or the time was changed from outside: restart\n"));
+  }
+  I.own_start = PETSC_FALSE;
+  if (ts->steprestart || changed) {
+    if (I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));
+    else if (ts->steps && I.at_begin) PetscCall(IsOwnState(ts, I.t0, I.U0, I.V0, &I.own_start));
+    I.have_step = I.at_begin = PETSC_FALSE;
+    PetscCall(Start(ts));
+    I.at_begin = PETSC_TRUE;
+  } else if (I.have_step) {
+    PetscCall(Commit(ts));
+    if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
+    PetscCall(ReferToState(ts));
+  }
+  if (!ts->steprestart && !changed) PetscCall(FollowTolerances(ts, I.U0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
+{
+  Integrator     &I    = Get(ts);
+  const PetscReal h    = I.h;
+  const PetscReal stop = HHT3StopAfter(ts, ts->ptime);
+
+  PetscFunctionBegin;
+  /* the acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
+  if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
+  PetscCall(UpdateWeights(ts, I.U1));
+  ts->ptime = I.t1;
+  /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
+    ts->ptime = stop;
+  ts->time_step = I.h_next = next;
+  if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_step, I.h_after_event}, next);
+  if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
+  /* the step to the stop was what was left, and would be taken for what the user wants */
+  if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
+    const PetscReal rest = HHT3StopAfter(ts, stop) - stop;
+    I.h_next = ts->time_step = I.h_given;
+    if (rest > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(I.h_given, rest); /* BetweenRuns.FixedStepsInATimeSpan */
+  }
+  if (!tiny) I.h_regular = PetscMax(h, remembers * I.h_regular);
+  if (I.h_limit > 0) I.h_limit = I.h_limit > far_above * h ? 0 : relaxes * I.h_limit;
+  I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
+  I.stat.steps++;
+  I.stat.of_order[I.order.now]++;
+  I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
+  I.stat.h_max = PetscMax(I.stat.h_max, h);
+  I.have_step  = PETSC_TRUE;
+  PetscCall(TellUnfollowed(ts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TSSolve() cuts a step that is longer than the run; TSEvent makes its own steps on the way to a zero */
+void NoteGivenStep(TS ts)
+{
+  Integrator     &I    = Get(ts);
+  const PetscReal rest = HHT3StopAfter(ts, ts->ptime) - ts->ptime;
+
+  if (HHT3EventActive(ts)) return;
+  if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
+}
+
+PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
+{
+  Integrator &I = Get(ts);
+  PetscBool   stage, repair = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(ApplyStepLimit(ts));
+  PetscCall(IsTinyStep(ts, ts->time_step, tiny));
+  if (!*tiny) PetscCall(WantsRepair(ts, ts->time_step, &repair));
+  if (repair) PetscCall(Repair(ts));
+  if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
+  I.h  = ts->time_step;
+  I.t0 = ts->ptime;
+  I.t1 = ts->ptime + I.h;
+  if (I.t1 > I.t0 && PetscAbsReal(I.t1 - I.t0 - I.h) > 1e-9 * I.h) I.h = SpanFrom(I.t0, I.h);
+  PetscCall(TSPreStage(ts, I.t1));
+  if (*tiny) PetscCall(TinyStep(ts, ok));
+  else {
+    PetscCall(UseOrder(ts));
+    if (I.change.stale) PetscCall(MatrixAfterChange(ts));
+    PetscCall(AdaptVelocities(ts));
+    PetscCall(PrepareStage(ts));
+    PetscCall(Predict(ts, I.X));
+    PetscCall(Correct(ts, ok));
+  }
+  PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
+  /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
+  PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, &stage));
+  if (!*ok && stage) ts->time_step *= ts->adapt->scale_solve_failed;
+  *ok = (PetscBool)(*ok && stage);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TSAdaptChoose() accepts whatever step there is while an event is looked for, and the one from there to the end of the step that had it. The event
+   may have switched on what such a step cannot follow. */
+PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
+{
+  Integrator &I = Get(ts);
+  PetscInt    scheme = 0;
+  PetscReal   wlte[3];
+
+  PetscFunctionBegin;
+  if (HHT3EventActive(ts) && !I.fixed_h) PetscUseTypeMethod(ts->adapt, choose, ts, I.h, &scheme, next, accept, &wlte[0], &wlte[1], &wlte[2]);
+  else PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
+  if (*next <= 0 || (HHT3EventActive(ts) && *accept)) *next = I.h;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* vec_sol and vec_dot take the new state while TSAdapt looks at it, and the old one back if it is rejected */
+PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.status       = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
+  I.wlte_pending = -1;
+  I.order.chosen = PETSC_FALSE;
+  PetscCall(VecCopy(I.U1, ts->vec_sol));
+  PetscCall(VecCopy(I.V1, ts->vec_dot));
+  PetscCall(AskAdapt(ts, next, accept));
+  if (!*accept) {
+    PetscCall(VecCopy(I.U0, ts->vec_sol));
+    PetscCall(VecCopy(I.V0, ts->vec_dot));
+    I.stat.rejected++;
+    PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
+  } else if (!tiny) {
+    PetscCall(NoteError(ts));
+    PetscCall(ChooseOrder(ts, NULL)); /* unless our TSAdapt has done it, with its step */
+  }
+  I.order.accepted = tiny ? 0 : I.order.now;
+  I.status = *accept ? TS_STEP_COMPLETE : TS_STEP_INCOMPLETE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
+PetscErrorCode Fail(TS ts, const char *what)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
+  if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
+  ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
+             "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
+             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime, hint);
+  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a rejection: is there a point in another attempt? */
+PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
+{
+  const Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  ts->reject++;
+  if (I.corrector.blames >= max_blames) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
+  else if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
+  else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
+  else if (ts->max_reject >= 0 && I.tiny_row > ts->max_reject) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
+  else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* TSSolve() cuts the step to what is left until the next stop. Nothing is left where it is called at the end of a run, less than nothing where points of a time span, or ends of earlier runs,
+   are behind the time at which a run begins or is resumed: then the step is the one before. */
+PetscErrorCode PassStops(TS ts)
+{
+  const Integrator &I       = Get(ts);
+  const bool        resumed = (I.have_step || I.at_begin) && I.stat.steps == I.checkpoint_steps;
+  PetscBool         passed;
+
+  PetscFunctionBegin;
+  PetscCall(HHT3PassStops(ts, &passed));
+  /* of PETSc 3.18, whatever the integrator (Events.ThatGoBackAreRefused) */
+  PetscCheck(ts->time_step > 0 || !HHT3EventActive(ts), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the handler see which way it goes",
+             (double)ts->time_step, (double)ts->ptime);
+  if (ts->time_step != 0 && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
+  if (I.h_next > 0) ts->time_step = I.h_next;
+  else ts->time_step = I.auto_h ? unset_step : I.h_given;
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode Step(TS ts)
+{
+  Integrator &I          = Get(ts);
+  PetscInt    rejections = 0;
+  PetscBool   ok, tiny, accept = PETSC_TRUE;
+  PetscReal   next;
+
+  PetscFunctionBegin;
+  StartClocks(I);
+  PetscCall(PassStops(ts));
+  next = ts->time_step;
+  PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
+  I.failure[0] = 0;
+  bool another;
+  PetscCall(IsAnotherSNES(ts, &another));
+  if (another) PetscCall(TakeSNES(ts));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
+  PetscCall(CheckpointIfDue(ts));
+  if (HHT3BehindEvent(ts) && !I.fixed_h && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, (ts->max_time - ts->ptime) / 2); /* Events.TwoInOneStep */
+  PetscCall(Begin(ts));
+  if (I.fixed_h) NoteGivenStep(ts);
+  PetscCall(LookFurther(ts));
+  I.status = TS_STEP_INCOMPLETE;
+  while (!ts->reason && I.status != TS_STEP_COMPLETE) {
+    PetscCall(Attempt(ts, &tiny, &ok));
+    if (ok) {
+      PetscCall(Choose(ts, tiny, &next, &accept));
+      if (accept) {
+        PetscCall(Accept(ts, tiny, next));
+        I.tiny_row = !tiny ? 0 : I.tiny_row + (rejections > 0);
+      } else ts->time_step = next;
+    }
+    if (!ok || !accept) {
+      accept = PETSC_FALSE;
+      PetscCall(HistoryForces(ts, ts->ptime)); /* an application that failed when f_n was evaluated would spoil every attempt from t_n */
+      PetscCall(CheckRejections(ts, ++rejections));
+      if (!ok) PetscCall(LowerAfterFailure(ts));
+    }
+  }
+  PetscCall(NoteMatrices(ts));
+  if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I, true);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Back to t_n: U0, V0 and the history have not been touched since */
+PetscErrorCode RollBack(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  PetscCheck(I.have_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no step to take back, at t = %g", (double)ts->ptime);
+  PetscCall(VecCopy(I.U0, ts->vec_sol));
+  PetscCall(VecCopy(I.V0, ts->vec_dot));
+  I.have_step = PETSC_FALSE;
+  I.stat.steps--;
+  I.stat.of_order[I.order.now]--;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace hht3

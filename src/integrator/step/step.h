@@ -1,0 +1,22 @@
+/* One step, step.cpp; and what a run says of itself, report.cpp: clocks, and the monitors of -ts_hhtdae_summary and -ts_hhtdae_progress. */
+#ifndef HHTDAE_STEP_H
+#define HHTDAE_STEP_H
+
+#include "integrator/state.h"
+
+namespace hht3
+{
+
+PetscErrorCode Step(TS ts);
+PetscErrorCode RollBack(TS ts);
+
+/* The clocks of the statistics run from the first step of a solve on; their time into the statistics, and whether they stop with that */
+void StartClocks(Integrator &I);
+void StopClocks(Integrator &I, bool stop);
+
+PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
+
+} // namespace hht3
+
+#endif

@@ -1,0 +1,30 @@
+/* The PETSc that the library was built for, and the one that runs */
+#include "integrator/compat.h"
+
+static const char *Flavour(PetscInt release) { return release ? "" : " (development)"; }
+
+/*
+  Layouts and numbers of PETSc's objects change with every minor version, and between a release and the development after it: a
+  plugin built for another one would write beside them. Only functions that are the same from 3.18 on are called here. PETSc
+  writes numbers of its own width, which need not be ours and is asked for first.
+*/
+PetscErrorCode HHT3CheckPetscVersion(void)
+{
+  PetscInt number[4]; /* major, minor, subminor, release */
+  size_t   width;
+
+  PetscFunctionBegin;
+  PetscCall(PetscDataTypeGetSize(PETSC_INT, &width));
+  PetscCheck(width == sizeof(PetscInt), PETSC_COMM_SELF, PETSC_ERR_LIB,
+             "This libhhtdae was built for a PETSc with integers of %d bits, and one with %d runs: build hhtdae with the PETSc of "
+             "this program, make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...",
+             (int)(8 * sizeof(PetscInt)), (int)(8 * width));
+  PetscCall(PetscGetVersionNumber(&number[0], &number[1], &number[2], &number[3]));
+  PetscCheck(number[0] == PETSC_VERSION_MAJOR && number[1] == PETSC_VERSION_MINOR && number[3] == PETSC_VERSION_RELEASE, PETSC_COMM_SELF,
+             PETSC_ERR_LIB,
+             "This libhhtdae was built for PETSc %d.%d%s, and PETSc %d.%d.%d%s runs: build hhtdae with the PETSc of this program, "
+             "make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...",
+             PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR, Flavour(PETSC_VERSION_RELEASE), (int)number[0], (int)number[1], (int)number[2],
+             Flavour(number[3]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
