@@ -76,7 +76,12 @@ PetscErrorCode SetUpJacobian(TS ts)
     PetscCall(none);
     PetscCall(SNESSetJacobian(snes, J ? J : P, P, NULL, NULL));
     PetscCall(MatDestroy(&P));
-  } else if (!Get(ts).differences) PetscCall(SetUpDifferences(ts, dm, has && pattern ? NULL : P, has && pattern ? PETSC_TRUE : shell));
+  } else if (!Get(ts).differences) {
+    PetscBool dense = PETSC_FALSE; /* it tells no pattern; another type of TS without a Jacobian has left it */
+    if (P) PetscCall(PetscObjectTypeCompareAny((PetscObject)P, &dense, MATSEQDENSE, MATMPIDENSE, ""));
+    if (dense) P = NULL;
+    PetscCall(SetUpDifferences(ts, dm, has && pattern ? NULL : P, has && pattern ? PETSC_TRUE : shell));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
