@@ -94,7 +94,8 @@ struct FlexibleBody {
 enum class Assembly {
   Off,
   Report, /* a misfit beyond the tolerance is an error that names the elements */
-  Project /* bodies and velocities move to the nearest consistent ones in the metric of the masses; fixed_start holds a body */
+  Project /* bodies and velocities move to the nearest consistent ones in the metric of the masses; fixed_start holds a body. Bodies move as rigid ones; flexible ones deform
+             for what that cannot meet, when a run is made, unless their joints lead to a body that is held */
 };
 enum class Redundant {
   Drop,   /* redundant rows at the start are left out of the run, with a notice */
