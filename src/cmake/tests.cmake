@@ -59,7 +59,11 @@ function(hhtdae_test_program folder)
     target_compile_options(${folder}_tests PRIVATE -O1) # compiling takes longer than running
     if(HHTDAE_TOGETHER AND NOT folder MATCHES "^(linear|stability)$") # these are few
       list(LENGTH sources count)
-      math(EXPR count "(${count} + 2) / 3")
+      set(most 4)
+      if(folder STREQUAL scene) # kernels take longest
+        set(most 3)
+      endif()
+      math(EXPR count "(${count} + ${most} - 1) / ${most}")
       hhtdae_together(${folder} ${count} ${sources})
       set_target_properties(${folder}_tests PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP UNITY_BUILD_CODE_BEFORE_INCLUDE "#include \"support.h\"")
       target_compile_options(${folder}_tests PRIVATE -Wno-subobject-linkage) # fixtures in nameless namespaces

@@ -3,6 +3,7 @@
 #include "scene/model.h"
 #include "scene_start.h"
 
+using namespace hhtdae;
 using namespace hhtest;
 
 namespace
