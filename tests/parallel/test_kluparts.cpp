@@ -194,8 +194,7 @@ TEST(KluParts, UsersPackageWins)
 {
   const Triplets e = spatial_chain(50);
   EXPECT_EQ(chosen(e, "-pc_factor_mat_solver_type mumps"), MATSOLVERMUMPS);
-  const std::string kluparts = ranks() > 1 ? LINEAR_KLUPARTS : "klupair"; /* which it is on one rank */
-  EXPECT_EQ(chosen(e, "-pc_factor_mat_solver_type kluparts"), kluparts);
+  EXPECT_EQ(chosen(e, "-pc_factor_mat_solver_type kluparts"), LINEAR_KLUPARTS);
   const Triplets bricks = block(4, 4, 4, true);
-  EXPECT_EQ(chosen(bricks, "-pc_factor_mat_solver_type kluparts"), kluparts);
+  EXPECT_EQ(chosen(bricks, "-pc_factor_mat_solver_type kluparts"), LINEAR_KLUPARTS);
 }

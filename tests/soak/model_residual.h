@@ -153,6 +153,7 @@ private:
     of_.assign(R_.scene.bodies.size(), {});
     PetscCall(VecGetArrayRead(F, &f));
     for (std::size_t b = 0; b < of_.size(); b++) {
+      if (R_.number.body[b] < 0) continue; /* an attachment, whose loads are the flexible body's */
       const PetscInt           local  = R_.local_body[b];
       const hhtdae::LocalBody &body   = R_.bodies.body[(std::size_t)local];
       Vector3                  left[] = {Vector3::Zero(), Vector3::Zero()}, most[] = {Vector3::Zero(), Vector3::Zero()},
