@@ -71,6 +71,22 @@ def ranks(count, *arguments):
     return done.stdout
 
 
+FLEXIBLE = """
+import os, pickle, sys, tempfile
+import hhtdae as h
+from petsc4py import PETSc
+
+try:
+    from hhtdae import flexible
+except ImportError:  # the package was built without SLEPc
+    raise SystemExit(0)
+
+sys.path.insert(0, %r)
+from beam_mesh import beam_mesh
+
+""" % os.path.join(HERE, "..", "..", "examples", "python")
+
+
 class Ranks(unittest.TestCase):
     def test_script(self):
         results = []
@@ -122,20 +138,7 @@ integrator.set_nodes(ts, [] if PETSc.COMM_WORLD.rank else [[0, 1], [2, 3], [4, 5
 
     def test_bodies_of_other_ranks(self):
         """Bodies of one rank beside those of all; what is distributed over other ranks than the scene is refused on all of them"""
-        script = """
-import os, pickle, sys, tempfile
-import hhtdae as h
-from petsc4py import PETSc
-
-try:
-    from hhtdae import flexible
-except ImportError:  # the package was built without SLEPc
-    raise SystemExit(0)
-
-sys.path.insert(0, %r)
-from beam_mesh import beam_mesh
-
-with tempfile.TemporaryDirectory() as folder:
+        script = FLEXIBLE + """with tempfile.TemporaryDirectory() as folder:
     file = beam_mesh(os.path.join(folder, "beam.msh"), 1., 0.05, 0.05)
     one, all = (flexible.FeModel.from_mesh(file, flexible.Material(2e11, 0., 8000.), comm=c) for c in (PETSc.COMM_SELF, PETSc.COMM_WORLD))
     PETSc.COMM_WORLD.barrier()
@@ -160,25 +163,12 @@ world = h.Scene()
 beam = world.add("beam", h.FlexibleBody(spread))
 beam.surface(spread)
 beam.surface(body)
-""" % os.path.join(HERE, "..", "..", "examples", "python")
+"""
         ranks(2, "-c", script)
 
     def test_driven_whole_body(self):
         """Its attachments leave one rank's part of the matrix singular but for rounding, which is found by the pivots of what is between the ranks"""
-        script = """
-import os, sys, tempfile
-import hhtdae as h
-from petsc4py import PETSc
-
-try:
-    from hhtdae import flexible
-except ImportError:  # the package was built without SLEPc
-    raise SystemExit(0)
-
-sys.path.insert(0, %r)
-from beam_mesh import beam_mesh
-
-with tempfile.TemporaryDirectory() as folder:
+        script = FLEXIBLE + """with tempfile.TemporaryDirectory() as folder:
     model = flexible.FeModel.from_mesh(beam_mesh(os.path.join(folder, "beam.msh")), flexible.Material(2e11, 0., 8000.))
     PETSc.COMM_WORLD.barrier()
 scene = h.Scene()
@@ -190,7 +180,7 @@ scene.add("drive", h.TranslationalMotion(tip, end, lambda t: 1e-3 * h.sin(200 * 
 run = scene.solve(0.003, tolerance=1e-6)
 at = run.snapshot().motion(tip).position[2] - 1e-3 * h.sin(0.6)
 assert abs(at) < 1e-12, at
-""" % os.path.join(HERE, "..", "..", "examples", "python")
+"""
         ranks(2, "-c", script)
 
     def test_chain(self):
