@@ -4,6 +4,7 @@
   between them, and a .vtu is one file whatever the number of ranks was; its bytes do not depend on it. Rank 0 holds one
   rank's part of one array at a time.
 */
+#include "flexible/body_name.h"
 #include "flexible/exchange.h"
 #include "flexible/node_order.h"
 #include "hhtdae/flexible.h"
@@ -197,13 +198,10 @@ PetscErrorCode Total(MPI_Comm comm, Array *a)
   PetscFunctionReturn(0);
 }
 
-/* A body in memory has a name only where it was given one */
-std::string BodyOf(const ReducedBody &b) { return b.modal.name.empty() ? "the body" : "body " + b.modal.name; }
-
 /* What the body lacks for a field; "" if nothing */
 std::string Missing(const ReducedBody &b, const Eigen::VectorXd &eta, const Vector3 &origin, const Matrix3 &axes)
 {
-  const std::string body = BodyOf(b);
+  const std::string body = BodyName(b);
   if (eta.size() != b.modal.omega.size())
     return std::to_string(eta.size()) + " modal coordinates for the field of " + body + " with " +
            std::to_string(b.modal.omega.size()) + " modes";
@@ -231,7 +229,7 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
   PetscCallMPI(MPI_Comm_rank(body.comm, &rank));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT64, MPI_SUM, body.comm));
   if (error.empty() && !count[0])
-    error = BodyOf(body) + " has no nodes: it has to be reduced with all nodes for a field to be written";
+    error = BodyName(body) + " has no nodes: it has to be reduced with all nodes for a field to be written";
   PetscCall(Agree(body.comm, error, PETSC_ERR_ARG_INCOMP));
   std::vector<Array> points{MakePoints(body, origin, axes), MakeDisplacement(body, eta, axes), MakeLabels(body)};
   Array              cells[3];

@@ -1,5 +1,6 @@
 /* Stress out of modal coordinates: von Mises at the nodes, and the highest places of a run without keeping its history.
  */
+#include "flexible/body_name.h"
 #include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
 #include <algorithm>
@@ -47,14 +48,14 @@ PetscErrorCode CheckCoordinates(const ReducedBody &body, const Eigen::VectorXd &
 {
   PetscFunctionBegin;
   PetscCheck(eta.size() == body.modal.omega.size(), PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
-             "%d modal coordinates for the stress of body %s with %d modes", (int)eta.size(), body.modal.name.c_str(),
+             "%d modal coordinates for the stress of %s with %d modes", (int)eta.size(), BodyName(body).c_str(),
              (int)body.modal.omega.size());
   PetscCheck(eta.allFinite(), PETSC_COMM_SELF, PETSC_ERR_FP,
-             "a modal coordinate of body %s is not finite: no stress can be told", body.modal.name.c_str());
+             "a modal coordinate of %s is not finite: no stress can be told", BodyName(body).c_str());
   PetscCheck(body.stress.node.empty() || (body.stress.values.rows() == 6 * (Eigen::Index)body.stress.node.size() &&
                                           body.stress.values.cols() == eta.size()),
-             PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP, "the stress modes of body %s do not fit its nodes and modes",
-             body.modal.name.c_str());
+             PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP, "the stress modes of %s do not fit its nodes and modes",
+             BodyName(body).c_str());
   PetscFunctionReturn(0);
 }
 
@@ -92,7 +93,7 @@ PetscErrorCode HotSpots::add(double time, const Eigen::VectorXd &eta)
   PetscFunctionBegin;
   PetscCall(CheckCoordinates(body_, eta));
   PetscCheck(stress_.size() == body_.stress.node.size(), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONGSTATE,
-             "stress modes of body %s were changed after its hot spots were begun", body_.modal.name.c_str());
+             "stress modes of %s were changed after its hot spots were begun", BodyName(body_).c_str());
   if (!waiting_) {
     state_.resize(eta.size(), together);
     when_.resize(together);
@@ -126,14 +127,14 @@ PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<Ho
   PetscCallMPI(MPI_Comm_size(body_.comm, &size));
   PetscCallMPI(MPI_Allreduce(&mine, &total, 1, MPIU_INT64, MPI_SUM, body_.comm));
   if (!total)
-    error = "body " + body_.modal.name + " has no stress modes: there are no hot spots without AddStressModes()";
+    error = BodyName(body_) + " has no stress modes: there are no hot spots without AddStressModes()";
   else if (n != body_.stress.node.size() || (waiting_ && state_.rows() != body_.stress.values.cols()))
-    error = "stress modes of body " + body_.modal.name + " were changed after its hot spots were begun";
+    error = "stress modes of " + BodyName(body_) + " were changed after its hot spots were begun";
   else if (!(distance >= 0))
     error = "a distance of hot spots is a number from 0 up";
   else if (n &&
            (body_.coordinates.size() != 3 * (std::size_t)body_.own || body_.label.size() != (std::size_t)body_.own))
-    error = "body " + body_.modal.name + " has no coordinates of its nodes";
+    error = BodyName(body_) + " has no coordinates of its nodes";
   PetscCall(Agree(body_.comm, error, PETSC_ERR_ARG_WRONG));
   follow();
   for (std::size_t i = 0; i < n; i++) {

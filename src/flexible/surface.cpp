@@ -3,6 +3,7 @@
   first rank has it whole; the others send it their elements and their nodes' rows.
 */
 #include "flexible/surface.h"
+#include "flexible/body_name.h"
 #include "flexible/element_shapes.h"
 #include "flexible/exchange.h"
 #include <algorithm>
@@ -105,7 +106,8 @@ PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(body.comm, &rank));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT64, MPI_SUM, body.comm));
-  std::string error, who = body.modal.name.empty() ? "the body" : "body " + body.modal.name;
+  std::string       error;
+  const std::string who = BodyName(body);
   if (!count[1]) error = who + " has no elements: its surface is not known";
   else if (!count[0] || body.coordinates.size() != 3 * (std::size_t)body.own || body.shape.rows() != 3 * body.own || body.shape.cols() != body.modal.modes())
     error = who + " has no modes at its nodes: it has to be reduced with all nodes for its surface to be shown";
