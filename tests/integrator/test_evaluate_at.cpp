@@ -194,29 +194,65 @@ TEST(EvaluateAt, LeavesTheRunAlone)
     }
 }
 
-/* Nor do samples of one step depend on those of earlier ones: what a resumed run records is what the whole run records */
-TEST(EvaluateAt, SamplesDependOnTheirStepAlone)
+/* Nor do samples change with what is written or read between them: those of a resumed run are those of the whole one */
+TEST(EvaluateAt, SamplesOfAResumedRun)
 {
   for (const Factory &f : allProblems()) {
-    const auto                        p = f.make();
-    std::vector<std::array<Array, 3>> values[2];
-    for (int all = 0; all < 2; all++) {
-      Simulation run(*p, tolerance(1e-5));
-      Sample     x(run.U);
-      double     last = p->t0;
-      for (int step = 0; step < 40 && run.t() < p->t1; step++) {
+    const auto                        p    = f.make();
+    const std::string                 file = testing::TempDir() + "samples_" + f.name + ".checkpoint";
+    std::vector<std::array<Array, 3>> values[3]; /* the whole run, one that writes, one that resumes */
+    const auto                        samples = [&](Simulation &run, int first, int last, std::vector<std::array<Array, 3>> &to) {
+      Sample x(run.U);
+      double begin = run.t();
+      for (int step = first; step < last && run.t() < p->t1; step++) {
         must(run.step());
         for (double theta : {.3, .8}) {
-          if (!all && step % 10 != 9) continue;
-          must(TSHHT3EvaluateAt(run.ts, last + theta * (run.t() - last), x.U, x.V, x.A));
-          if (step % 10 == 9) values[all].push_back(x.values());
+          must(TSHHT3EvaluateAt(run.ts, begin + theta * (run.t() - begin), x.U, x.V, x.A));
+          to.push_back(x.values());
         }
-        last = run.t();
+        begin = run.t();
       }
-    }
+    };
+    Simulation plain(*p, tolerance(1e-5)), writing(*p, tolerance(1e-5)), resumed(*p, tolerance(1e-5));
+    samples(plain, 0, 30, values[0]);
+    samples(writing, 0, 12, values[1]);
+    must(TSHHT3CheckpointSave(writing.ts, file.c_str()));
+    const std::size_t read = values[1].size();
+    samples(writing, 12, 30, values[1]);
+    must(TSHHT3CheckpointLoad(resumed.ts, file.c_str()));
+    must(TSSetUp(resumed.ts));
+    samples(resumed, 12, 30, values[2]);
     EXPECT_EQ(values[0], values[1]) << f.name;
-    EXPECT_FALSE(values[0].empty()) << f.name;
+    ASSERT_GT(values[1].size(), read + 4) << f.name;
+    EXPECT_TRUE(std::equal(values[1].begin() + read, values[1].end(), values[2].begin(), values[2].end())) << f.name;
   }
+}
+
+/* Times of a grid that steps end on but for rounding take the step's own values and solve nothing */
+TEST(EvaluateAt, OnAGridOfSteps)
+{
+  const DoublePendulum p(1.);
+  Simulation           run(p, tolerance(1e-5));
+  Sample               x(run.U);
+  PetscLogEvent        event;
+  PetscEventPerfInfo   info;
+  must(PetscLogDefaultBegin());
+  for (int k = 0; k < 5; k++) must(run.step());
+  const double begin = run.t();
+  must(run.step());
+  const double end = run.t();
+  must(PetscLogEventGetId("HHT3Sample", &event));
+  must(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
+  const int before = info.count;
+  for (double t : {end - 1e-9 * (end - begin), end}) {
+    must(TSHHT3EvaluateAt(run.ts, t, x.U, x.V, x.A));
+    for (std::size_t i = 0; i < run.a().size(); i++) EXPECT_NEAR(x.values()[2][i], run.a()[i], 1e-8 * (1 + std::abs(run.a()[i])));
+  }
+  must(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
+  EXPECT_EQ(info.count, before);
+  must(TSHHT3EvaluateAt(run.ts, end - 1e-3 * (end - begin), x.U, x.V, x.A));
+  must(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &info));
+  EXPECT_EQ(info.count, before + 1);
 }
 
 /* With a user's own solver */

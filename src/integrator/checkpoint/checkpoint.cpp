@@ -108,7 +108,7 @@ PetscErrorCode Gather(TS ts, Archive &a)
   PetscCall(TransferVectors(ts, a));
   Vec of_it = probe;
   PetscCall(TransferVec(ts, a, &of_it));
-  PetscCall(SaveMatrix(ts, a));
+  PetscCall(SaveMatrices(ts, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,7 +146,7 @@ PetscErrorCode Spread(TS ts, const char file[], Archive &a)
     PetscCall(PetscPrintf(comm, "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
   PetscCall(TellingResidual(ts, is));
   PetscCall(CheckTellingResidual(ts, file, was, is));
-  PetscCall(LoadMatrix(ts, a));
+  PetscCall(LoadMatrices(ts, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

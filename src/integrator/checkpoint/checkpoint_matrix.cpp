@@ -1,10 +1,12 @@
 /*
-  The Newton matrix in a checkpoint: the values of its rows, and what the solver keeps. It is not evaluated again, because the application
+  The Newton matrix in a checkpoint, and that of samples between steps: the values of the rows, and what the solver keeps. It is not evaluated again, because the application
   may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
 */
 #include "checkpoint_parts.h"
 #include "integrator/equations/equations.h"
 #include "integrator/equations/jacobian.h"
+#include "integrator/start/consistent.h"
+#include "integrator/step/dense.h"
 #include "linear/hash.h"
 #include <cstdint>
 
@@ -56,24 +58,71 @@ PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
 }
 
 /* The solver of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
-PetscErrorCode LoadSolver(TS ts, KSP ksp, Mat J, Mat P, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
+PetscErrorCode LoadSolver(KSP ksp, Mat J, Mat P, LinearState *linear, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
 {
-  Integrator &I = Get(ts);
-  PetscBool   usable;
+  PetscBool usable;
 
   PetscFunctionBegin;
   *same = PETSC_FALSE;
   if (!m.chosen) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(ksp, J, P));
-  PetscCall(LinearLoadState(ksp, P, &I.linear, &a, same, &usable));
-  I.linear.chosen = PETSC_TRUE;
-  *good           = usable;
+  PetscCall(LinearLoadState(ksp, P, linear, &a, same, &usable));
+  linear->chosen = PETSC_TRUE;
+  *good          = usable;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-} // namespace
+/* The same on all ranks; nothing where the file ends before it */
+PetscErrorCode ReadMatrixState(TS ts, Archive &a, MatrixState *m)
+{
+  bool good;
 
-PetscErrorCode SaveMatrix(TS ts, Archive &a)
+  PetscFunctionBegin;
+  a.plain(*m);
+  PetscCall(Everywhere(ts, a.good, &good));
+  if (!good) *m = MatrixState{};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SaveSampler(TS ts, Archive &a)
+{
+  const Sampler *S = Get(ts).sampler;
+  MatrixState    m;
+
+  PetscFunctionBegin;
+  m.there = m.chosen = (PetscBool)(S && S->linear.chosen);
+  a.plain(m);
+  if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SaveRows(S->at.P, a));
+  PetscCall(LinearSaveState(S->at.ksp, S->linear, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where it cannot be had, the next sample makes it anew */
+PetscErrorCode LoadSampler(TS ts, Archive &a)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  MatrixState            m;
+  Sampler               *S;
+  PetscBool              same;
+  bool                   good;
+
+  PetscFunctionBegin;
+  PetscCall(SamplerDestroy(I));
+  PetscCall(ReadMatrixState(ts, a, &m));
+  if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(GetSampler(ts, &S));
+  if (!S) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(EvaluateJacobian(ts, I.t1, I.U1, I.V1, I.A1, ShiftV(I.p, I.h), ShiftA(I.p, I.h), S->at.P, S->at.P)); /* for the pattern alone */
+  I.stat = saved;
+  PetscCall(LoadRows(ts, S->at.P, a, &good));
+  if (good) PetscCall(LoadSolver(S->at.ksp, S->at.P, S->at.P, &S->linear, m, a, &same, &good));
+  if (!good) PetscCall(SamplerDestroy(I));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SaveNewton(TS ts, Archive &a)
 {
   Integrator &I = Get(ts);
   MatrixState m;
@@ -95,7 +144,7 @@ PetscErrorCode SaveMatrix(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode LoadMatrix(TS ts, Archive &a)
+PetscErrorCode LoadNewton(TS ts, Archive &a)
 {
   Integrator &I = Get(ts);
   MatrixState m;
@@ -105,9 +154,7 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
   bool        good;
 
   PetscFunctionBegin;
-  a.plain(m);
-  PetscCall(Everywhere(ts, a.good, &good));
-  if (!good) m = MatrixState{};
+  PetscCall(ReadMatrixState(ts, a, &m));
   PetscCall(SNESSetUp(ts->snes));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
@@ -122,12 +169,38 @@ PetscErrorCode LoadMatrix(TS ts, Archive &a)
     good = good && (rows || mffd); /* the application's product has no values to restore */
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.linear.scaled));
     if (good) PetscCall(PetscObjectStateGet((PetscObject)J, &I.scaled_operator)); /* as they were saved */
-    if (good) PetscCall(LoadSolver(ts, ksp, J, P, m, a, &same, &good));
+    if (good) PetscCall(LoadSolver(ksp, J, P, &I.linear, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();
   if (!same)
     PetscCall(PetscInfo(ts, "resumed with %s: the run agrees with the uninterrupted one to the tolerance, maybe not bit for bit\n",
                         good ? "a linear solver that does not promise the same bits" : "a new Newton matrix, as the last one cannot be restored"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* What is read of a solver may end earlier where the user has chosen another one: the samples' part is apart */
+PetscErrorCode SaveMatrices(TS ts, Archive &a)
+{
+  Archive samples;
+
+  PetscFunctionBegin;
+  PetscCall(SaveSampler(ts, samples));
+  a.list(samples.data);
+  PetscCall(SaveNewton(ts, a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode LoadMatrices(TS ts, Archive &a)
+{
+  Archive samples;
+
+  PetscFunctionBegin;
+  a.list(samples.data);
+  samples.reading = true;
+  PetscCall(LoadNewton(ts, a));
+  PetscCall(LoadSampler(ts, samples)); /* whose solver is the one of the run */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

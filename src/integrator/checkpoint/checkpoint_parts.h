@@ -1,4 +1,4 @@
-/* What a checkpoint is made of: whether it belongs to the run that reads it (checkpoint_identity.cpp), the Newton matrix and what its solver keeps
+/* What a checkpoint is made of: whether it belongs to the run that reads it (checkpoint_identity.cpp), the matrices and what their solvers keep
    (checkpoint_matrix.cpp), and the file (checkpoint_file.cpp). */
 #ifndef HHTDAE_CHECKPOINT_PARTS_H
 #define HHTDAE_CHECKPOINT_PARTS_H
@@ -31,10 +31,9 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is);
 /* An answer for all ranks */
 PetscErrorCode Everywhere(TS ts, bool mine, bool *all);
 
-PetscErrorCode SaveMatrix(TS ts, Archive &a);
-
-/* Where it cannot be restored the run makes a new one */
-PetscErrorCode LoadMatrix(TS ts, Archive &a);
+/* Where they cannot be restored the run makes new ones */
+PetscErrorCode SaveMatrices(TS ts, Archive &a);
+PetscErrorCode LoadMatrices(TS ts, Archive &a);
 
 /* A file with one sequence of bytes of every rank: written beside and renamed when it is whole and on the disk, with a checksum. Collective.
    A run that dies while writing keeps the file that was there before. */

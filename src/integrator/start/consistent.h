@@ -28,6 +28,14 @@ struct Consistent {
   PetscInt     its = 0, ksp_its = 0;
 };
 
+/* Those of samples between steps, evaluate_at.cpp. *S = null where there can be none. */
+struct Sampler {
+  Consistent  at;
+  LinearState linear;
+};
+
+PetscErrorCode GetSampler(TS ts, Sampler **S);
+
 /* The step in the matrix for h -> 0, of a time scale: h C/M and h^2 K/M must be nothing. With 1e-12 dampers of 1e12 M/T stood as inertia in the matrix,
    Start.StrongDampingIsNoInertia */
 constexpr PetscReal vanishing = 1e-28;

@@ -8,8 +8,9 @@
   At the ends of the step the values of the step itself are returned. These satisfy the differentiated constraints to O(h^2) only, so
   that the two differ by the error of the step.
 
-  The matrix and the KSP are of their own: a run with samples goes on bit for bit like one without. Residuals and matrices of samples are
-  not counted in the statistics; -log_view shows them as HHT3Sample.
+  The matrix and the KSP are of their own: a run with samples goes on bit for bit like one without. What the solver takes over from one sample to the next
+  (order, pivots) makes most of a sample's cost where it is made anew; checkpoints have it, so that samples of a resumed run are those of the whole one.
+  Residuals and matrices of samples are not counted in the statistics; -log_view shows them as HHT3Sample.
 */
 #include "consistent.h"
 #include "integrator/step/dense.h"
@@ -22,12 +23,6 @@
 namespace hht3
 {
 
-struct Sampler {
-  Consistent  at;
-  LinearState linear;
-  PetscReal   t1 = PETSC_NINFINITY; /* end of the step of the last sample */
-};
-
 namespace
 {
 
@@ -35,6 +30,9 @@ namespace
    method. Over less than this part of the motion's time scale rounding of Phi would show (5e-14 |q| over the length squared). */
 constexpr int       time_points   = 5;
 constexpr PetscReal shortest = 1e-4;
+
+/* A part of the step within which t is one of its ends: sums of steps and multiples of an interval differ by their rounding (EvaluateAt.OnAGridOfSteps) */
+constexpr PetscReal at_end = 1e-8;
 
 /* Preconditioners of functions or parts that the program has given cannot be had twice */
 PetscErrorCode HasParts(PC pc, PetscBool *yes)
@@ -96,6 +94,8 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+} // namespace
+
 /* *S: null where the run's matrix is no assembled one, or where the application has a product beside it: that one belongs to the run, and whoever looks into it would not find it in another matrix */
 PetscErrorCode GetSampler(TS ts, Sampler **S)
 {
@@ -120,6 +120,9 @@ PetscErrorCode GetSampler(TS ts, Sampler **S)
   PetscCall(CreateSolver(ts, *I.sampler));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+namespace
+{
 
 /* Weights of values at z_k for the first and second derivative at 0 of the polynomial through them (Fornberg 1988) */
 void DerivativeWeights(const PetscReal z[time_points], PetscReal weight[time_points][3])
@@ -168,8 +171,7 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From U, V, A as they were interpolated, which are the first guess. Packages keep pivots from one matrix to the next: in a new step the factors are made from
-   nothing, so that samples do not depend on those of earlier steps and a resumed run gives the same to the last bit. */
+/* From U, V, A as they were interpolated, which are the first guess */
 PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
 {
   Integrator            &I     = Get(ts);
@@ -179,8 +181,6 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
-  if (S.t1 != I.t1) PetscCall(KSPReset(S.at.ksp));
-  S.t1      = I.t1;
   S.at.t    = t;
   S.at.tiny = vanishing * I.h;
   PetscCall(ForEntries(
@@ -192,7 +192,7 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
   I.stat = saved;
   PetscCall(failed);
-  if (!*ok) S.t1 = PETSC_NINFINITY; /* a factor that failed may keep its error */
+  if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
   if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));
   PetscCall(PetscLogEventEnd(events.sample, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,7 +209,7 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 
   PetscFunctionBegin;
   const PetscReal x = StepFraction(I, t);
-  if (I.have_step && x > 0 && x < 1) PetscCall(GetSampler(ts, &S));
+  if (I.have_step && x > at_end && x < 1 - at_end) PetscCall(GetSampler(ts, &S));
   if (S) {
     PetscCall(Interpolate(ts, t, S->at.U, S->at.V, S->at.A));
     PetscCall(SampleInside(ts, *S, t, &ok));
@@ -261,7 +261,7 @@ PetscErrorCode SamplerDestroy(Integrator &I)
   They are then as accurate as the positions, in long steps, too. Its matrix and factors are made at the first call and kept. The
   solver is the one chosen for the run, by the same options.
 
-  At both ends of the step, the values of the step itself are returned, to the last bit. The run is not changed, and nothing is
+  At both ends of the step, and within 1e-8 of its length beside them, the values of the step itself are returned, at the ends to the last bit. The run is not changed, and nothing is
   added to its counters; -log_view shows the samples as HHT3Sample. Where a step was rolled back, or ended by an error, only the
   state that it began with is known, at the present time.
 
