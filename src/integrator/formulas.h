@@ -28,7 +28,7 @@ struct Parameters {
   PetscReal k_s;             /* local error k_s h^3 s''' of a state */
   PetscReal lag() const { return am - af; }         /* a_n is q'' at t_n + lag h */
   PetscReal lagState() const { return am_s - af_s; } /* w_n is s' at t_n + lagState h */
-  PetscReal bend() const { return beta + lag() / 2 - (PetscReal)1 / 6; } /* (2a) misses q by this times h^3 q''' */
+  PetscReal jerk_factor() const { return beta + lag() / 2 - (PetscReal)1 / 6; } /* (2a) misses q by this times h^3 q''' */
   PetscReal ca() const { return (1 - am) / (1 - af); } /* d q''_{n+1} / d a_{n+1}; 1/(1+alpha) for HHT */
 };
 

@@ -31,7 +31,7 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt, const Which &which)
 inline PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt) { return Shake(x, r, salt, [](PetscInt) { return true; }); }
 
 /* A state off the initial one, with accelerations about a: there entries may vanish that do not elsewhere, at rest or in a symmetric position */
-inline PetscErrorCode OffTheStart(TS ts, unsigned salt, PetscReal a, Vec U, Vec V, Vec A)
+inline PetscErrorCode StateOffStart(TS ts, unsigned salt, PetscReal a, Vec U, Vec V, Vec A)
 {
   PetscFunctionBegin;
   PetscCall(VecCopy(ts->vec_sol, U));

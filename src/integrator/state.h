@@ -42,7 +42,7 @@ struct Correction {
   PetscReal           xi_max   = 0; /* worst rate */
   PetscReal           forces   = 0; /* residual in the rows of driven coordinates, in units of the tolerance */
   SNESConvergedReason reason   = SNES_CONVERGED_ITERATING;
-  PetscBool           wrong_jacobian = PETSC_FALSE; /* as blame.cpp has seen */
+  PetscBool           wrong_jacobian = PETSC_FALSE; /* as wrong_jacobian.cpp has seen */
   PetscBool           rounding       = PETSC_FALSE; /* what is left is rounding */
 };
 
@@ -51,7 +51,7 @@ struct CorrectorState : Correction {
   MatrixPolicy matrix;
   PetscBool no_solve    = PETSC_FALSE; /* the last failure was one of the linear solve */
   PetscBool from_rest   = PETSC_FALSE; /* the last step went from where it began: at fixed steps a prediction may lead astray */
-  PetscReal blames      = 0;           /* how often of late: by one each time, down a little with every accepted step */
+  PetscReal jacobian_faults = 0;       /* how often of late: by one each time, down a little with every accepted step */
   PetscReal floor       = 0;           /* corrections below this are rounding of q */
   PetscReal wlte        = 1;           /* error estimate of the last accepted step, in units of the tolerance */
 };
@@ -76,11 +76,11 @@ struct Verification : VerificationState {
   Vec driven = nullptr; /* 1 for coordinates that the constraints alone move, driven.cpp; none where there are none */
 };
 
-constexpr PetscInt max_degree = max_order; /* of the predictor */
-constexpr PetscInt hht_degree = 3; /* that pays in steps of order two */
+constexpr PetscInt max_degree     = max_order; /* of the predictor */
+constexpr PetscInt default_degree = 3; /* that pays in steps of order two */
 
 struct PredictorOptions {
-  PetscInt  degree_max = hht_degree; /* what the user allows */
+  PetscInt  degree_max = default_degree; /* what the user allows */
   PetscBool fixed      = PETSC_FALSE;
 };
 
@@ -106,14 +106,14 @@ struct OrderMemory {
 struct OrderState {
   PetscInt  now = 2, next = 2;          /* of the step from t_n, and of the one after it when it is accepted */
   PetscInt  made = 0, accepted = 0;     /* of the step that led to t_n, and of the accepted one that leads away from it; 0: neither */
-  PetscInt  ready = 2;                  /* for which X0, D_0 and the misfit of velocities stand */
+  PetscInt  ready = 2;                  /* for which X0, D_0 and the drift of the velocities stand */
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */
   PetscInt  wait = 0, penalty = 0;      /* steps of order two after a higher one has failed: still to be made, and the last time */
   PetscBool chosen = PETSC_FALSE;       /* next is */
   PetscReal spin = 0;                   /* fastest rotation of a body in the step that led to t_n, rad per time; 0 where there is no history or no rotation vector */
-  PetscReal misfit_h = 0;               /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
+  PetscReal drift_h = 0;                /* length of the step of order two to whose end dV belongs; 0: it belongs to none */
   PetscReal t[max_order + 1] = {};      /* t_n, t_{n-1}, ... */
   PetscReal hht[max_order + 1] = {};    /* length of the steps of order two that led there; 0 for others */
 };
@@ -189,8 +189,8 @@ struct Hooks {
   PetscObjectId matrices[2] = {}; /* J and P of the SNES, as they are between steps */
 };
 
-/* What bend of the integrator holds: nothing, d of misfit.cpp, or the velocities that follow from it */
-enum class Bend { None, Rates, Velocities };
+/* What normal_jerk holds: nothing, q''' as it is known (d of drift.cpp), or its part normal to the constraints */
+enum class Jerk { None, Whole, Normal };
 
 /* What is known of loads and motions that set in later, excitation.cpp */
 enum class Ahead { Unknown, Nothing, Loads };
@@ -203,9 +203,9 @@ struct StepState {
   TSStepStatus     status      = TS_STEP_INCOMPLETE;
   PetscBool        have_step   = PETSC_FALSE; /* U1... hold an accepted step not yet committed to U0... */
   PetscBool        at_begin    = PETSC_FALSE; /* U0, V0 and A0 are the state from which the next step goes: it has been taken back, or an error has ended it */
-  PetscReal        misfit      = 0;           /* of the velocities at t_n, misfit.cpp; q_n' counts as V0 - misfit dV */
-  PetscBool        have_misfit = PETSC_FALSE; /* dV belongs to t_n */
-  Bend             bent        = Bend::None;
+  PetscReal        drift_removed = 0;         /* part of dV that is taken from the velocities at t_n: q_n' counts as V0 - drift_removed dV, drift.cpp */
+  PetscBool        have_drift  = PETSC_FALSE; /* dV belongs to t_n */
+  Jerk             jerk        = Jerk::None;
   PetscInt         norm_size   = 0;           /* entries that enter the error test, global */
   PetscReal        of_atol = -1, of_rtol = -1; /* tolerances that the weights were made of */
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
@@ -260,8 +260,8 @@ struct Integrator : StepState {
 
   /* t_n: state, true second derivative (q) and the unknowns X0 as the accepted step of length h_last left them */
   Vec       U0 = nullptr, V0 = nullptr, A0 = nullptr, X0 = nullptr;
-  Vec       dV = nullptr; /* misfit of V0 against Phi_q q' + Phi_t = 0, misfit.cpp */
-  Vec       bend = nullptr; /* change of that misfit over k h^2 by a change of coordinates at t_n */
+  Vec       dV = nullptr; /* drift of the velocities: what V0 is off Phi_q q' + Phi_t = 0, drift.cpp */
+  Vec       normal_jerk = nullptr; /* change of that drift over k h^2 at t_n: a start has none as yet, and a change of coordinates bends what there is */
   Vec       F0 = nullptr; /* f_n = F(t_n, U_n, U'_n, 0) of (9a); paper form with alpha != 0 only */
   /* t_{n+1}: unknowns a, w, lambda, V, F, and what follows from them */
   Vec       X = nullptr, U1 = nullptr, V1 = nullptr, A1 = nullptr;

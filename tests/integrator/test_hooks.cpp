@@ -189,7 +189,7 @@ TEST(Hooks, GoWithReset)
   Simulation run(springs(), tolerance(1e-5));
   const SNES snes = snesOf(run.ts);
   must(run.solve());
-  EXPECT_EQ(snes->ops->converged, hht3::ConvergenceTest);
+  EXPECT_EQ(snes->ops->converged, hht3::SNESConverged_HHT);
   must(TSReset(run.ts));
   EXPECT_EQ(snes->ops->converged, SNESConvergedDefault);
   EXPECT_EQ(snes->cnvP, nullptr);

@@ -14,7 +14,7 @@ using Vector = std::array<PetscScalar, 3>;
 /* exp([x]) y by Rodrigues' formula */
 Vector rotated(const Vector &x, const Vector &y)
 {
-  const double a = Length(x.data()), along = a > 0 ? Dot(x.data(), y.data()) / (a * a) : 0;
+  const double a = VectorLength(x.data()), along = a > 0 ? Dot(x.data(), y.data()) / (a * a) : 0;
   Vector       c, r;
   Cross(a > 0 ? std::sin(a) / a : 1, x.data(), y.data(), c.data());
   for (int i = 0; i < 3; i++) r[i] = std::cos(a) * y[i] + c[i] + (1 - std::cos(a)) * along * x[i];
@@ -54,14 +54,14 @@ TEST(RotationVector, Relative)
     for (int n = 0; n < 20; n++) {
       const Vector x = random(size), y = random(size), z = random(1);
       Vector       r;
-      Relative(x.data(), Turn(y.data()), r.data());
+      RelativeRotation(x.data(), Turn(y.data()), r.data());
       const Vector one = rotated(r, rotated(y, z)), other = rotated(x, z);
       for (int i = 0; i < 3; i++) EXPECT_NEAR(one[i], other[i], 4e-15) << size;
-      EXPECT_LE(Length(r.data()), PETSC_PI * (1 + 1e-15));
+      EXPECT_LE(VectorLength(r.data()), PETSC_PI * (1 + 1e-15));
     }
   const Vector x{1e-9, 2e-9, -1e-9}, none{};
   Vector       r;
-  Relative(x.data(), Turn(none.data()), r.data());
+  RelativeRotation(x.data(), Turn(none.data()), r.data());
   for (int i = 0; i < 3; i++) EXPECT_NEAR(r[i], x[i], 1e-24);
 }
 

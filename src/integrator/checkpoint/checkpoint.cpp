@@ -21,7 +21,7 @@ namespace
 {
 
 /* Numbers of TS and SNES */
-void Transfer(TS ts, Archive &a)
+void TransferNumbers(TS ts, Archive &a)
 {
   SNES           snes = ts->snes;
   const PetscInt lag  = snes->lagjacobian;
@@ -37,7 +37,7 @@ void TransferStructs(TS ts, Archive &a)
 {
   Integrator &I = Get(ts);
 
-  Transfer(ts, a);
+  TransferNumbers(ts, a);
   a.plain(static_cast<StepState &>(I));
   a.plain(static_cast<CorrectorState &>(I.corrector));
   a.plain(static_cast<PredictorState &>(I.predictor));
@@ -84,12 +84,12 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));
-  for (Vec *x : {&I.dV, &I.bend, &I.excitation, &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
+  for (Vec *x : {&I.dV, &I.normal_jerk, &I.excitation, &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.unproved, &I.verify.driven}) PetscCall(TransferIfThere(ts, a, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What this rank has to say */
-PetscErrorCode Gather(TS ts, Archive &a)
+PetscErrorCode GatherRun(TS ts, Archive &a)
 {
   Identity          id;
   std::string       options;
@@ -97,7 +97,7 @@ PetscErrorCode Gather(TS ts, Archive &a)
   WorkVec           probe;
 
   PetscFunctionBegin;
-  PetscCall(Identify(ts, &id));
+  PetscCall(IdentifyRun(ts, &id));
   PetscCall(OptionsInWords(ts, &options));
   words.assign(options.begin(), options.end());
   PetscCall(probe.like(ts->vec_sol));
@@ -112,7 +112,7 @@ PetscErrorCode Gather(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Spread(TS ts, const char file[], Archive &a)
+PetscErrorCode RestoreRun(TS ts, const char file[], Archive &a)
 {
   Integrator       &I    = Get(ts);
   MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
@@ -161,7 +161,7 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   PetscCheck(I.have_step || I.at_begin, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE, "There is no accepted step to checkpoint yet");
   PetscTryMethod(ts, "TSHHT3CheckpointPrepare_C", (TS), (ts));
   StopClocks(I, false);
-  PetscCall(Gather(ts, a));
+  PetscCall(GatherRun(ts, a));
   PetscCall(CheckpointFileWrite(PetscObjectComm((PetscObject)ts), file, a.data));
   PetscCall(PetscInfo(ts, "checkpoint at t = %g in %s\n", (double)ts->ptime, file));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -180,7 +180,7 @@ PetscErrorCode CheckpointLoad(TS ts, const char file[])
   }
   PetscCall(CheckpointFileRead(PetscObjectComm((PetscObject)ts), file, a.data));
   a.reading = true;
-  PetscCall(Spread(ts, file, a));
+  PetscCall(RestoreRun(ts, file, a));
   I.checkpoint_steps = I.stat.steps;
   I.timed            = PETSC_FALSE;
   if (ts->event) PetscCall(TSEventInitialize(ts->event, ts, ts->ptime, ts->vec_sol));
@@ -232,7 +232,7 @@ PetscErrorCode CheckCheckpointFile(TS ts)
 PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
   PetscFunctionBegin;
-  if (ts->ops->step != Step || ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->ops->step != TSStep_HHT || ts->reason <= 0 || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
   const Integrator &I = Get(ts);
   if (I.checkpoint_every > 0) PetscCall(CheckpointIfDue(ts));
   else if (I.checkpoint_file[0] && I.have_step) PetscCall(CheckpointSave(ts, I.checkpoint_file));

@@ -18,11 +18,11 @@ namespace
 
 /* Residuals at the state in the file that differ by more than this part of the largest row's belong to another problem: rounding of
    another machine is far below it. */
-constexpr PetscReal other_problem = 1e-11;
+constexpr PetscReal residual_mismatch = 1e-11;
 
 } // namespace
 
-PetscErrorCode Identify(TS ts, Identity *id)
+PetscErrorCode IdentifyRun(TS ts, Identity *id)
 {
   Integrator &I = Get(ts);
 
@@ -59,7 +59,7 @@ PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
   const auto form = [](PetscInt f) { return TSHHT3Forms[f == TSHHT3_FORM_PAPER ? 0 : 1]; };
 
   PetscFunctionBegin;
-  PetscCall(Identify(ts, &is));
+  PetscCall(IdentifyRun(ts, &is));
   PetscCheck(was.N == is.N, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s has %" PetscInt_FMT " unknowns, the problem %" PetscInt_FMT, file, was.N, is.N);
   PetscCheck(was.form == is.form && was.p.beta == is.p.beta && was.p.am == is.p.am && was.p.af == is.p.af, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
@@ -131,7 +131,7 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
   PetscCall(ForEntries([&](PetscInt, PetscScalar x) { if (!PetscIsInfOrNanScalar(x)) scale = PetscMax(scale, PetscAbsScalar(x)); }, Read(was)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
   PetscCall(FirstWhere(
-    [=](PetscInt, PetscScalar x, PetscScalar y) { return !(PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) && !(PetscAbsScalar(x - y) <= other_problem * scale); }, &row,
+    [=](PetscInt, PetscScalar x, PetscScalar y) { return !(PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) && !(PetscAbsScalar(x - y) <= residual_mismatch * scale); }, &row,
     Read(was), Read(is)));
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(EntryOf(was, row, &there));

@@ -18,7 +18,7 @@ struct Identity {
   std::uint64_t roles;
 };
 
-PetscErrorCode Identify(TS ts, Identity *id);
+PetscErrorCode IdentifyRun(TS ts, Identity *id);
 PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was);
 
 /* Options that the run may change, at the cost of repeating the uninterrupted one no more: for comparison and for the message */

@@ -5,7 +5,7 @@
 
   It happens at the beginning of a step, after the last one has become the history: from then on everything is in the
   new coordinates, and neither a rejection nor a roll-back leads to the old ones. What is mapped and how stands in
-  history.cpp, what the constraints make of it in misfit.cpp. Of the rest:
+  history.cpp, what the constraints make of it in drift.cpp. Of the rest:
 
   weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at once to what an angle
             happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same h would fail the test that it has
@@ -13,7 +13,7 @@
   h         shortened where the prediction tells that the error test would fail in the new coordinates
   matrix    made anew before the next correction, from the prediction, with no more factorizations than one per change
   F0        of the paper's form: evaluated anew, after commit
-  dV        of misfit.cpp belongs to a step, and is measured in the new coordinates if h changes
+  dV        of drift.cpp belongs to a step, and is measured in the new coordinates if h changes
 */
 #include "change.h"
 #include "integrator/equations/equations.h"
@@ -29,7 +29,7 @@ namespace
 {
 
 /* A predicted error of the first step in new coordinates above the tolerance calls for a shorter one: the least part of h that is left, above
-   what Repair() takes for a fall */
+   what RestartConsistently() takes for a fall */
 constexpr PetscReal least_cut = 0.2;
 
 PetscErrorCode WantsChange(TS ts, PetscBool *wanted)
@@ -47,7 +47,7 @@ PetscErrorCode WantsChange(TS ts, PetscBool *wanted)
 }
 
 /* vec_sol, vec_dot and the application follow U0, V0 */
-PetscErrorCode Publish(TS ts)
+PetscErrorCode PublishState(TS ts)
 {
   Integrator &I = Get(ts);
 
@@ -88,12 +88,12 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
              (double)ts->ptime);
   if (starting) {
     PetscCall(MapStart(ts));
-    PetscCall(Publish(ts));
+    PetscCall(PublishState(ts));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(MapHistory(ts));
   PetscCall(MapPast(ts));
-  PetscCall(Publish(ts));
+  PetscCall(PublishState(ts));
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(HistoryForces(ts, ts->ptime));
   I.corrector.matrix.forget();
@@ -114,14 +114,14 @@ PetscErrorCode StepAfterChange(TS ts)
   if (I.fixed_h || HHT3EventActive(ts)) PetscFunctionReturn(PETSC_SUCCESS);
   I.h      = ts->time_step;
   I.t1     = ts->ptime + I.h;
-  I.misfit = 0;
+  I.drift_removed = 0;
   PetscCall(UseOrder(ts));
   PetscCall(PrepareStage(ts));
   PetscCall(Predict(ts, I.X));
   PetscCall(StageVectors(ts, I.X));
   const TSStepStatus status = I.status;
   I.status                  = TS_STEP_PENDING;
-  PetscCall(EvaluateWLTE(ts, NORM_2, &order, &e));
+  PetscCall(TSEvaluateWLTE_HHT(ts, NORM_2, &order, &e));
   I.status = status;
   if (!(e > 1)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal next =
@@ -132,7 +132,7 @@ PetscErrorCode StepAfterChange(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix that the first iteration of the next correction would make, made beforehand: misfit.cpp needs it, and a
+/* The matrix that the first iteration of the next correction would make, made beforehand: drift.cpp needs it, and a
    user's -snes_lag_jacobian would go on with the one of the old coordinates */
 PetscErrorCode MatrixAfterChange(TS ts)
 {
@@ -142,7 +142,7 @@ PetscErrorCode MatrixAfterChange(TS ts)
 
   PetscFunctionBegin;
   I.change.stale = PETSC_FALSE;
-  I.misfit       = 0;
+  I.drift_removed = 0;
   PetscCall(PrepareStage(ts));
   PetscCall(Predict(ts, I.X));
   PetscCall(SNESSetUp(ts->snes));

@@ -75,7 +75,7 @@ Motion Recall(const Integrator &I)
 }
 
 /* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
-PetscErrorCode Weights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
+PetscErrorCode MotionWeights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
 {
   PetscReal       L[max_basis][max_basis] = {}, y[3][max_basis], power = 1;
   const PetscReal z = x / m.unit, u = m.unit;
@@ -127,7 +127,7 @@ struct Mapping {
 };
 
 /* From old to now at t_n + x */
-PetscErrorCode Apply(TS ts, Mapping &map, PetscReal x)
+PetscErrorCode MapAt(TS ts, Mapping &map, PetscReal x)
 {
   Integrator &I = Get(ts);
 
@@ -148,7 +148,7 @@ PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkV
   Vec       stored[max_basis];
 
   PetscFunctionBegin;
-  PetscCall(Weights(m, x, w));
+  PetscCall(MotionWeights(m, x, w));
   std::copy(m.stored, m.stored + m.n, stored);
   for (int s = 0; s < 3; s++) {
     PetscCall(VecZeroEntries(to[2 - s]));
@@ -174,45 +174,45 @@ PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec valu
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m.nodes; k++) {
     PetscCall(At(I, m, m.x[k] + (m.slope[k] ? d : 0), map.old));
-    PetscCall(Apply(ts, map, m.x[k] + (m.slope[k] ? d : 0)));
+    PetscCall(MapAt(ts, map, m.x[k] + (m.slope[k] ? d : 0)));
     PetscCall(VecCopy(map.now[2], value[k]));
     if (!m.slope[k]) continue;
     PetscCall(At(I, m, m.x[k] - d, map.old));
-    PetscCall(Apply(ts, map, m.x[k] - d));
+    PetscCall(MapAt(ts, map, m.x[k] - d));
     PetscCall(VecAXPY(value[k], -1, map.now[2]));
     PetscCall(VecScale(value[k], 1 / (2 * d)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* d of misfit.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine
+/* d of drift.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine
    in q'', and its difference for two q'' is that tangent. */
-PetscErrorCode MapBend(TS ts, const Motion &m, Mapping &map)
+PetscErrorCode MapJerk(TS ts, const Motion &m, Mapping &map)
 {
   Integrator     &I = Get(ts);
   const PetscReal d = 0.01 * m.unit;
   WorkVec         jerk;
 
   PetscFunctionBegin;
-  if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
+  if (!I.normal_jerk) PetscCall(VecDuplicate(I.U0, &I.normal_jerk));
   PetscCall(jerk.like(I.U0));
-  PetscCall(VecZeroEntries(I.bend));
+  PetscCall(VecZeroEntries(I.normal_jerk));
   PetscCall(VecZeroEntries(jerk));
   for (int sign = -1; sign <= 1; sign += 2) {
     PetscCall(At(I, m, sign * d, map.old));
-    PetscCall(Apply(ts, map, sign * d));
-    PetscCall(VecAXPY(I.bend, sign / (2 * d), map.now[2]));
+    PetscCall(MapAt(ts, map, sign * d));
+    PetscCall(VecAXPY(I.normal_jerk, sign / (2 * d), map.now[2]));
     PetscCall(VecAXPY(jerk, sign / (2 * d), map.old[2]));
   }
   for (int sign = -1; sign <= 1; sign += 2) {
     PetscCall(VecCopy(I.U0, map.old[0]));
     PetscCall(VecCopy(I.V0, map.old[1]));
     PetscCall(VecWAXPY(map.old[2], sign * m.unit, jerk, I.A0));
-    PetscCall(Apply(ts, map, 0));
-    PetscCall(VecAXPY(I.bend, -sign / (2 * m.unit), map.now[2]));
+    PetscCall(MapAt(ts, map, 0));
+    PetscCall(VecAXPY(I.normal_jerk, -sign / (2 * m.unit), map.now[2]));
   }
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar &b) { if (!(map.changed[i] & Mapping::Acceleration)) b = 0; /* rounding */ }, Write(I.bend)));
-  I.bent = Bend::Rates;
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &b) { if (!(map.changed[i] & Mapping::Acceleration)) b = 0; /* rounding */ }, Write(I.normal_jerk)));
+  I.jerk = Jerk::Whole;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +225,7 @@ PetscErrorCode MapState(TS ts, Mapping &map)
   PetscCall(VecCopy(I.U0, map.old[0]));
   PetscCall(VecCopy(I.V0, map.old[1]));
   PetscCall(VecCopy(I.A0, map.old[2]));
-  PetscCall(Apply(ts, map, 0));
+  PetscCall(MapAt(ts, map, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -284,7 +284,7 @@ PetscErrorCode MapStart(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U0, V0, A0, X0, the predictor's differences, and what misfit.cpp needs to know */
+/* U0, V0, A0, X0, the predictor's differences, and what drift.cpp needs to know */
 PetscErrorCode MapHistory(TS ts)
 {
   Integrator  &I = Get(ts);
@@ -296,7 +296,7 @@ PetscErrorCode MapHistory(TS ts)
   PetscCall(map.like(I.U0));
   for (PetscInt k = 0; k < m.nodes; k++) PetscCall(value[k].like(I.U0));
   PetscCall(MapNodes(ts, m, map, value));
-  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapBend(ts, m, map));
+  if (I.count[TSHHT3_HOLONOMIC] && m.n > 1) PetscCall(MapJerk(ts, m, map));
   PetscCall(MapState(ts, map));
   PetscCall(CheckRoles(ts, map));
   PetscCall(TakeOver(I, m, map, value));

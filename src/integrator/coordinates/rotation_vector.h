@@ -20,7 +20,7 @@ inline void Cross(PetscReal factor, const PetscScalar *a, const PetscScalar *b, 
 
 inline PetscReal Dot(const PetscScalar *a, const PetscScalar *b) { return PetscRealPart(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]); }
 
-inline PetscReal Length(const PetscScalar *a) { return PetscSqrtReal(Dot(a, a)); }
+inline PetscReal VectorLength(const PetscScalar *a) { return PetscSqrtReal(Dot(a, a)); }
 
 /* Scalar and vector of the unit quaternion of exp([x]) */
 struct Turn {
@@ -29,20 +29,20 @@ struct Turn {
 
   explicit Turn(const PetscScalar *x)
   {
-    const PetscReal a = Length(x), factor = a > 1e-8 ? PetscSinReal(0.5 * a) / a : 0.5;
+    const PetscReal a = VectorLength(x), factor = a > 1e-8 ? PetscSinReal(0.5 * a) / a : 0.5;
     scalar = PetscCosReal(0.5 * a);
     for (int i = 0; i < 3; i++) vector[i] = factor * x[i];
   }
 };
 
 /* The vector of exp([x]) q^{-1}, at most half a turn */
-inline void Relative(const PetscScalar *x, const Turn &q, PetscScalar *result)
+inline void RelativeRotation(const PetscScalar *x, const Turn &q, PetscScalar *result)
 {
   const Turn        p(x);
   PetscScalar       v[3], c[3];
   Cross(-1, p.vector, q.vector, c);
   for (int i = 0; i < 3; i++) v[i] = q.scalar * p.vector[i] - p.scalar * q.vector[i] + c[i];
-  const PetscReal s = p.scalar * q.scalar + Dot(p.vector, q.vector), sine = Length(v), sign = s < 0 ? -1 : 1;
+  const PetscReal s = p.scalar * q.scalar + Dot(p.vector, q.vector), sine = VectorLength(v), sign = s < 0 ? -1 : 1;
   const PetscReal factor = sine > 1e-8 ? 2 * sign * PetscAtan2Real(sine, sign * s) / sine : 2 * sign;
   for (int i = 0; i < 3; i++) result[i] = factor * v[i];
 }

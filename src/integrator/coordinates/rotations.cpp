@@ -138,12 +138,12 @@ static PetscErrorCode ReferPast(TS ts)
   PetscCall(VecGetArrayRead(I.U0, &u));
   for (PetscInt j = 0; j < o.past; j++) PetscCall(VecGetArray(o.U[j], &x[j]));
   for (PetscInt i : I.rotations.at) {
-    const PetscReal angle = Length(u + i);
+    const PetscReal angle = VectorLength(u + i);
     const Turn      turn(u + i);
     most[1] = PetscMax(most[1], angle);
     for (PetscInt j = 0; j < -most[0]; j++) {
-      if (!(Length(x[j] + i) + angle <= longest_turn)) most[0] = -j;
-      Relative(x[j] + i, turn, x[j] + i);
+      if (!(VectorLength(x[j] + i) + angle <= longest_turn)) most[0] = -j;
+      RelativeRotation(x[j] + i, turn, x[j] + i);
     }
   }
   for (PetscInt j = 0; j < o.past; j++) PetscCall(VecRestoreArray(o.U[j], &x[j]));

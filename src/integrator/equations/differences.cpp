@@ -33,7 +33,7 @@ namespace
 /* Of U, U', U''. F is affine in q'' but for definitions that need not be, and small entries of M must show beside forces */
 constexpr PetscReal relative_step[3] = {1.5e-8, 1.5e-8, 1e-4};
 
-PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
+PetscErrorCode EvaluateProbe(void *, Vec x, Vec F, void *ctx)
 {
   Differences *d = (Differences *)ctx;
   Vec          v[3] = {d->at[0], d->at[1], d->at[2]};
@@ -45,16 +45,16 @@ PetscErrorCode Evaluate(void *, Vec x, Vec F, void *ctx)
 }
 
 /* A state off the initial one */
-PetscErrorCode Elsewhere(TS ts, WorkVec (&x)[3])
+PetscErrorCode StateOffTheStart(TS ts, WorkVec (&x)[3])
 {
   PetscFunctionBegin;
   for (WorkVec &v : x) PetscCall(v.like(ts->vec_sol));
-  PetscCall(OffTheStart(ts, 21, 0.1, x[0], x[1], x[2]));
+  PetscCall(StateOffStart(ts, 21, 0.1, x[0], x[1], x[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* An entry for another one, which comes back: residuals are compared to the last bit, so that a state has to be the same again to the last bit */
-PetscErrorCode Exchange(Vec v, PetscInt i, PetscScalar *other)
+PetscErrorCode ExchangeEntry(Vec v, PetscInt i, PetscScalar *other)
 {
   PetscScalar *x;
 
@@ -75,7 +75,7 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetLocalSize(ts->vec_sol, &n));
   PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
-  PetscCall(Elsewhere(ts, x));
+  PetscCall(StateOffTheStart(ts, x));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(F.like(ts->vec_sol));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
@@ -86,10 +86,10 @@ PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
     for (int k = 0; here && k < 3; k++) {
       PetscCall(VecGetValues(x[k], 1, &j, &other[k]));
       other[k] += 1e-3;
-      PetscCall(Exchange(x[k], j - start, &other[k]));
+      PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
     }
     PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
-    for (int k = 0; here && k < 3; k++) PetscCall(Exchange(x[k], j - start, &other[k]));
+    for (int k = 0; here && k < 3; k++) PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
     PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar f) { if (f0 != f || start + i == j) rows[i].push_back(j); }, Read(F0), Read(F)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -120,7 +120,7 @@ PetscErrorCode CreateMatrix(TS ts, Mat *P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-constexpr int halvings = 4; /* of each color: of two of its unknowns that a row follows one is alone in some half, but for a sixteenth of the pairs */
+constexpr int color_halvings = 4; /* of each color: of two of its unknowns that a row follows one is alone in some half, but for a sixteenth of the pairs */
 
 /* A half of the unknowns, another one for each bit */
 bool InHalf(PetscInt index, int half) { return ((uint32_t)index * 2654435761u >> (31 - half / 2) & 1) == (uint32_t)(half % 2); }
@@ -165,12 +165,12 @@ PetscErrorCode CheckPattern(TS ts, Mat ones, ISColoring colors)
   WorkVec  x[3], F0;
 
   PetscFunctionBegin;
-  PetscCall(Elsewhere(ts, x));
+  PetscCall(StateOffTheStart(ts, x));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   PetscCall(ISColoringGetIS(colors, PETSC_USE_POINTER, &n, &color));
   for (PetscInt c = 0; c < n; c++)
-    for (int half = 0; half < 2 * halvings && row < 0; half++) PetscCall(RowBeside(ts, ones, color[c], half, x, F0, &row));
+    for (int half = 0; half < 2 * color_halvings && row < 0; half++) PetscCall(RowBeside(ts, ones, color[c], half, x, F0, &row));
   PetscCall(ISColoringRestoreIS(colors, PETSC_USE_POINTER, &color));
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LabelRow(ts, row, &label));
@@ -197,12 +197,12 @@ static PetscErrorCode TakeSteps(Differences *d)
 namespace
 {
 
-constexpr PetscReal shows    = 1e-6;  /* change of a row, relative to its value, that leaves ten digits of an inertia */
-constexpr PetscReal of_a_row = 8 * PETSC_MACHINE_EPSILON; /* of a row: its change is none */
-constexpr PetscReal may_hide = 1e-6;  /* of the largest inertia: what may be lost in rounding */
-constexpr PetscReal no_mass  = 1e-12; /* of the largest inertia: what a change beyond rounding need not be, but for sums in another order */
-constexpr PetscReal larger   = 1e4;   /* the next size */
-constexpr PetscReal too_much = 1e16;
+constexpr PetscReal visible_change     = 1e-6;  /* change of a row, relative to its value, that leaves ten digits of an inertia */
+constexpr PetscReal row_rounding       = 8 * PETSC_MACHINE_EPSILON; /* of a row: its change is none */
+constexpr PetscReal hidden_inertia     = 1e-6;  /* of the largest inertia: what may be lost in rounding */
+constexpr PetscReal negligible_inertia = 1e-12; /* of the largest inertia: what a change beyond rounding need not be, but for sums in another order */
+constexpr PetscReal size_ratio         = 1e4;   /* the next size */
+constexpr PetscReal largest_size       = 1e16;
 
 /* Whether steps in U'' of this size let no row hide an inertia behind its forces */
 PetscErrorCode TrySize(TS ts, const WorkVec (&x)[3], PetscReal size, Vec F0, Vec A, Vec F, bool *enough, bool *finite)
@@ -221,7 +221,7 @@ PetscErrorCode TrySize(TS ts, const WorkVec (&x)[3], PetscReal size, Vec F0, Vec
   PetscCall(ForEntries(
     [&](PetscInt, PetscScalar f0, PetscScalar f) {
       const PetscReal d = PetscAbsScalar(f - f0), size0 = PetscAbsScalar(f0);
-      if (d < shows * size0 && (d > of_a_row * size0 ? d > no_mass * max : PETSC_MACHINE_EPSILON * size0 > may_hide * max)) more = 1;
+      if (d < visible_change * size0 && (d > row_rounding * size0 ? d > negligible_inertia * max : PETSC_MACHINE_EPSILON * size0 > hidden_inertia * max)) more = 1;
     },
     Read(F0), Read(F)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &more, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
@@ -242,9 +242,9 @@ PetscErrorCode SizeOfAccelerations(TS ts, Differences *d)
     PetscCall(VecCopy(ts->vec_sol, x[0]));
     PetscCall(VecCopy(ts->vec_dot, x[1]));
     PetscCall(VecZeroEntries(x[2]));
-    if (elsewhere) PetscCall(OffTheStart(ts, 1, 0, x[0], x[1], x[2]));
+    if (elsewhere) PetscCall(StateOffStart(ts, 1, 0, x[0], x[1], x[2]));
     PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
-    for (PetscReal size = d->size; size <= too_much; size *= larger) {
+    for (PetscReal size = d->size; size <= largest_size; size *= size_ratio) {
       PetscCall(TrySize(ts, x, size, F0, A, F, &enough, &finite));
       if (!finite) break;
       if (enough) { /* never where there is no inertia */
@@ -288,7 +288,7 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatColoringApply(mc, &colors));
   PetscCall(MatColoringDestroy(&mc));
   PetscCall(MatFDColoringCreate(d->part, colors, &d->coloring));
-  PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(Evaluate)), d));
+  PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(EvaluateProbe)), d));
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
   PetscCall(TakeSteps(d));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));

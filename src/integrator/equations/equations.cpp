@@ -211,7 +211,7 @@ PetscErrorCode FormJacobian(SNES snes, Vec X, Mat J, Mat P, TS ts)
   }
   if (J != P) PetscCall(ScaleOperator(I, s, J));
   I.rotations.factor = 0;
-  PetscCall(NoteClaims(ts, X, P));
+  PetscCall(NoteStiffness(ts, X, P));
   I.corrector.matrix.made(EffectiveStep(I));
   I.stat.factorizations++;
 

@@ -23,7 +23,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal big = 1e20; /* shift of the probes */
+constexpr PetscReal probe_shift = 1e20; /* shift of the probes */
 
 struct Probe {
   std::vector<unsigned char> col_a, col_v, row_a, row_v, row_u, self; /* per local unknown or row */
@@ -32,7 +32,7 @@ struct Probe {
 };
 
 /* least: what counts as nothing in this row, for matrices made of differences */
-bool Doubles(PetscScalar one, PetscScalar two, PetscReal least)
+bool DoublesWithShift(PetscScalar one, PetscScalar two, PetscReal least)
 {
   const PetscReal d = PetscAbsScalar(two - one);
   return d > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)) && d > least;
@@ -59,9 +59,9 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   PetscInt                    start;
 
   PetscFunctionBegin;
-  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : big, acceleration ? big : 0, J, P));
+  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : probe_shift, acceleration ? probe_shift : 0, J, P));
   PetscCall(LocalValues(P, probe.triangle, one, col, offset));
-  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : 2 * big, acceleration ? 2 * big : 0, J, P));
+  PetscCall(EvaluateJacobian(ts, t, U, V, A, acceleration ? 0 : 2 * probe_shift, acceleration ? 2 * probe_shift : 0, J, P));
   PetscCall(LocalValues(P, probe.triangle, two, col2, offset2));
   PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
   PetscCall(mark.like(U));
@@ -72,7 +72,7 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
     if (Get(ts).differences)
       for (PetscInt k = offset[i]; k < offset[i + 1]; k++) least = PetscMax(least, 1e-6 * PetscAbsScalar(two[k] - one[k]));
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
-      if (!Doubles(one[k], two[k], least)) continue;
+      if (!DoublesWithShift(one[k], two[k], least)) continue;
       row_flag[i] = 1;
       PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
       if (probe.triangle) PetscCall(VecSetValue(mark, start + (PetscInt)i, 1, ADD_VALUES));
@@ -138,14 +138,14 @@ PetscErrorCode RunProbes(TS ts, Probe &probe)
   PetscCall(VecZeroEntries(I.A1));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
   PetscCall(RefuseBadMatrix(ts, P)); /* roles read from it would be wrong ones */
-  PetscCall(OffTheStart(ts, 1, 0, I.U1, I.V1, I.A1));
+  PetscCall(StateOffStart(ts, 1, 0, I.U1, I.V1, I.A1));
   PetscCall(ProbeState(ts, J, P, I.U1, I.V1, I.A1, probe));
   if (probe.triangle) PetscCall(ProbeRates(ts, I.U1, I.V1, I.A1, probe));
   I.stat = saved; /* the probes are not part of the run */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Detect(TS ts, const Probe &p)
+PetscErrorCode DetectRoles(TS ts, const Probe &p)
 {
   Integrator &I = Get(ts);
   PetscInt    start;
@@ -231,7 +231,7 @@ PetscErrorCode SetUpRoles(TS ts)
     PetscCall(RunProbes(ts, probe));
     probed = true;
   }
-  if (!I.is_set) PetscCall(Detect(ts, probe));
+  if (!I.is_set) PetscCall(DetectRoles(ts, probe));
   for (PetscInt i = 0; i < n; i++) {
     local[I.role[i]]++;
     if (probed && I.role[i] != TSHHT3_COORDINATE && probe.row_a[i]) local[TSHHT3_NUM_ROLES]++;

@@ -26,7 +26,7 @@ constexpr int max_sweeps = 20; /* definitions that refer to one another, one aft
 
 bool IsDefined(const Integrator &I, PetscInt i) { return RoleOf(I, i) == TSHHT3_VARIABLE || RoleOf(I, i) == TSHHT3_FORCE; }
 
-constexpr PetscReal of_two = 1e3; /* noise, of the difference of two residuals: the next ones may differ by more (Roles.ResidualsThatRoundDifferently*) */
+constexpr PetscReal noise_factor = 1e3; /* noise, of the difference of two residuals: the next ones may differ by more (Roles.ResidualsThatRoundDifferently*) */
 
 /* A state near the initial one, its residual, and others beside it */
 struct Dependence {
@@ -40,12 +40,12 @@ struct Dependence {
   {
     PetscFunctionBegin;
     for (WorkVec *v : {&U, &V, &A, &F, &other, &moved}) PetscCall(v->like(ts->vec_sol));
-    PetscCall(OffTheStart(ts, 11, 0, U, V, A));
+    PetscCall(StateOffStart(ts, 11, 0, U, V, A));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, F));
     PetscCall(EvaluateResidual(ts, ts->ptime, U, V, A, other));
     PetscCall(VecAXPY(other, -1, F));
     PetscCall(VecNorm(other, NORM_INFINITY, &noise));
-    noise = noise < PETSC_MAX_REAL ? of_two * noise : 0; /* rows that are no numbers tell nothing */
+    noise = noise < PETSC_MAX_REAL ? noise_factor * noise : 0; /* rows that are no numbers tell nothing */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
@@ -71,7 +71,7 @@ PetscErrorCode FirstRow(TS ts, const std::vector<char> &mark, PetscInt *row)
 }
 
 /* An error if there is one */
-PetscErrorCode Refuse(TS ts, const std::vector<char> &mark, PetscErrorCode code, const char before[], const char after[])
+PetscErrorCode RefuseMarked(TS ts, const std::vector<char> &mark, PetscErrorCode code, const char before[], const char after[])
 {
   PetscInt row;
   RowLabel label;
@@ -96,11 +96,11 @@ PetscErrorCode RefuseRates(TS ts, Dependence &d)
   PetscCall(d.vary(d.A, [&](PetscInt i) { return IsCoordinate(I, i); }, [&](PetscInt i) { acceleration[i] = IsConstraint(I, i); }));
   PetscCall(d.vary(d.V, [&](PetscInt i) { return !IsDifferential(RoleOf(I, i)); }, [&](PetscInt i) { first[i] = 1; }));
   PetscCall(d.vary(d.A, [&](PetscInt i) { return !IsCoordinate(I, i); }, [&](PetscInt i) { second[i] = 1; }));
-  PetscCall(Refuse(ts, acceleration, PETSC_ERR_ARG_WRONG, "Row",
+  PetscCall(RefuseMarked(ts, acceleration, PETSC_ERR_ARG_WRONG, "Row",
                    "is that of a constraint by TSHHT3SetIS(), but depends on accelerations, which a constraint does not: integrate it, or name its unknown TSHHT3_VARIABLE if the row defines it"));
-  PetscCall(Refuse(ts, velocity, PETSC_ERR_ARG_WRONG, "Row", "is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC"));
-  PetscCall(Refuse(ts, second, PETSC_ERR_ARG_WRONG, "Row", "depends on the second derivative of an unknown that is no coordinate by TSHHT3SetIS(): its own one, or another one, is to be named TSHHT3_COORDINATE"));
-  PetscCall(Refuse(ts, first, PETSC_ERR_ARG_WRONG, "Row",
+  PetscCall(RefuseMarked(ts, velocity, PETSC_ERR_ARG_WRONG, "Row", "is that of a holonomic constraint by TSHHT3SetIS(), but depends on velocities: name its multiplier TSHHT3_NONHOLONOMIC"));
+  PetscCall(RefuseMarked(ts, second, PETSC_ERR_ARG_WRONG, "Row", "depends on the second derivative of an unknown that is no coordinate by TSHHT3SetIS(): its own one, or another one, is to be named TSHHT3_COORDINATE"));
+  PetscCall(RefuseMarked(ts, first, PETSC_ERR_ARG_WRONG, "Row",
                    "depends on the first derivative of an unknown that is neither a coordinate nor a first-order state by TSHHT3SetIS(): its own one, or another one, is to be named TSHHT3_STATE or TSHHT3_COORDINATE"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,7 +113,7 @@ PetscErrorCode RefuseHolonomic(TS ts, Dependence &d)
   PetscFunctionBegin;
   if (!I.count[TSHHT3_HOLONOMIC]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(d.vary(d.U, [&](PetscInt i) { return IsDefined(I, i) || RoleOf(I, i) == TSHHT3_STATE; }, [&](PetscInt i) { if (RoleOf(I, i) == TSHHT3_HOLONOMIC) bad[i] = 1; }));
-  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "The holonomic constraint of row",
+  PetscCall(RefuseMarked(ts, bad, PETSC_ERR_SUP, "The holonomic constraint of row",
                    "depends on a first-order state, a user-defined variable or a force state; constraints of positions are Phi(q,t) = 0. "
                    "Make it a coordinate without mass, with its equation as one more constraint"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,7 +143,7 @@ PetscErrorCode RefuseFast(TS ts, Dependence &d)
     for (char f : fast) now += f;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &now, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)ts)));
   }
-  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "The velocity-level constraint of row",
+  PetscCall(RefuseMarked(ts, bad, PETSC_ERR_SUP, "The velocity-level constraint of row",
                    "depends on a variable or force state that itself depends on velocities, accelerations or multipliers. Write these velocities into the row instead"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,7 +158,7 @@ PetscErrorCode CheckSweeps(TS ts, Dependence &d)
   PetscCall(VecCopy(d.U, d.moved));
   PetscCall(ResidualAlong(ts, ts->ptime, d.moved, d.V, d.A, d.other));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar f) { if (IsDefined(I, i) && PetscAbsScalar(f) > 1e-8 * (1 + PetscAbsScalar(u))) bad[i] = 1; }, Read(d.moved), Read(d.other)));
-  PetscCall(Refuse(ts, bad, PETSC_ERR_SUP, "Row",
+  PetscCall(RefuseMarked(ts, bad, PETSC_ERR_SUP, "Row",
                    "defines a variable or force state, some of which stand in velocity-level constraints, but not as V - v(...) = 0, from which its value could be taken: divide the row by the factor of V"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -21,7 +21,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal held = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
+constexpr PetscReal driven_response = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
 
 /* The residual in the rows of driven coordinates, in units of the tolerance, above what is known of its rounding */
 PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
@@ -29,7 +29,7 @@ PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
   PetscReal sum[4];
 
   PetscFunctionBegin;
-  PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal driven, PetscReal f) { local[0] += PetscSqr(driven * PetscMax(0, PetscAbsReal(f) * s.answer - of_rounding * s.rounding)); },
+  PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal driven, PetscReal f) { local[0] += PetscSqr(driven * PetscMax(0, PetscAbsReal(f) * s.answer - rounding_factor * s.rounding)); },
                     Read(Get(ts).verify.driven), Read(F)));
   *left = PetscSqrtReal(sum[0] / Get(ts).norm_size);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -48,7 +48,7 @@ PetscErrorCode WholeRotations(const Integrator &I, Vec unmoved)
 }
 
 /* 1 for coordinates that do not answer a force of random signs in all rows of motion, by the factored matrix at hand, 0 for the other unknowns */
-PetscErrorCode Unmoved(TS ts, Vec unmoved)
+PetscErrorCode FindUnmoved(TS ts, Vec unmoved)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -60,8 +60,8 @@ PetscErrorCode Unmoved(TS ts, Vec unmoved)
   PetscCall(force.like(unmoved, I.spare));
   PetscCall(VecGetOwnershipRange(force, &first, NULL));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &f) { f = IsCoordinate(I, i) ? RandomSign(first + i, 2) * m : 0; }, Read(v.inertia), Write(force)));
-  PetscCall(AnswerOf(ts, force, unmoved, &solved));
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &a) { a = solved && IsCoordinate(I, i) && PetscRealPart(m) > 0 && PetscAbsScalar(a) < held; }, Read(v.inertia), Write(unmoved)));
+  PetscCall(CorrectionFor(ts, force, unmoved, &solved));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar m, PetscScalar &a) { a = solved && IsCoordinate(I, i) && PetscRealPart(m) > 0 && PetscAbsScalar(a) < driven_response; }, Read(v.inertia), Write(unmoved)));
   PetscCall(WholeRotations(I, unmoved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -88,7 +88,7 @@ PetscErrorCode NoteDriven(TS ts)
   PetscCall(VecDestroy(&I.verify.driven));
   if (!I.constraints() || !I.verify.inertia) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(I.X, &I.verify.driven));
-  PetscCall(Unmoved(ts, I.verify.driven));
+  PetscCall(FindUnmoved(ts, I.verify.driven));
   PetscCall(CountDriven(I, &all));
   if (all) PetscCall(PetscInfo(ts, "start: %" PetscInt_FMT " coordinates may be driven, their forces are judged by the residual\n", all));
   else PetscCall(VecDestroy(&I.verify.driven));
@@ -108,7 +108,7 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.matrix.fresh && c.it - c.base == 1) {
     PetscCall(unmoved.like(F)); /* a user may have zeros taken for a first guess */
-    PetscCall(Unmoved(ts, unmoved));
+    PetscCall(FindUnmoved(ts, unmoved));
     PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
     PetscCall(CountDriven(I, &all));
     if (!all) PetscCall(VecDestroy(&I.verify.driven));
@@ -123,7 +123,7 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
 {
   Integrator     &I      = Get(ts);
   Corrector      &c      = I.corrector;
-  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_error * CorrectorTolerance(I));
+  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_step_error * CorrectorTolerance(I));
 
   PetscFunctionBegin;
   *good = (PetscBool)(!I.verify.driven || (!*evaluated && before <= tol));
@@ -133,7 +133,7 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
   PetscCall(InDriven(ts, F, &c.forces));
   *good = (PetscBool)(c.forces <= tol);
   if (*good || c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c.forces < followed * before) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c.forces < unanswered_fraction * before) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MeasureRounding(ts, X, F, I.verify.noise)); /* FullBodyDynamics.CantileverSwingsAtItsFrequency */
   PetscCall(InDriven(ts, F, &c.forces));
   *good = (PetscBool)(c.forces <= tol);

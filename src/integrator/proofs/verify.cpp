@@ -11,7 +11,7 @@
   Where the matrix claims nothing, E is the correction and nothing is to be done. Else accelerations of up to A = E/(|k| h^2) may be
   missing since the last proof, a time T ago, and with them positions of A T^2/2. Before this exceeds a part of the tolerance, the
   residual is evaluated once more after the last correction. It must have followed: what is left of every entry is below
-  `followed` times what it was (P dX, the linear model that the correction has solved), or rounding, which is then measured (claims.cpp),
+  `unanswered_fraction` times what it was (P dX, the linear model that the correction has solved), or rounding, which is then measured (stiffness.cpp),
   or too little to move the positions: within this step, and since its own last proof where an entry has stayed as it was. A few of many
   entries look so by chance, other ones each time: so T is a row's own.
 
@@ -29,26 +29,26 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal allowed     = 0.1; /* unproved change of positions, in units of the tolerance */
-constexpr PetscReal taken_away  = 0.9; /* of an imbalance that a sample of rounding has explained in part */
+constexpr PetscReal allowed_unproved      = 0.1; /* unproved change of positions, in units of the tolerance */
+constexpr PetscReal explained_by_rounding = 0.9; /* of an imbalance that a sample of rounding has explained in part */
 
 /* Largest change of the positions, in units of the tolerance, by accelerations that would have made a correction of E = |k| h^2 a, over one step */
-PetscReal Drift(const Integrator &I, PetscReal E) { return E / (2 * PetscAbsReal(I.p.k)); }
+PetscReal PositionChange(const Integrator &I, PetscReal E) { return E / (2 * PetscAbsReal(I.p.k)); }
 
 /* The same by accelerations that the correction dX may have missed in each row since it was proved. Definitions hide stiffness from the
    diagonal: then what inertia alone would make of the model counts */
-PetscErrorCode Claimed(TS ts, Vec dX, PetscReal *drift)
+PetscErrorCode StiffnessClaimed(TS ts, Vec dX, PetscReal *drift)
 {
   Integrator &I = Get(ts);
   PetscReal   sum[4];
 
   PetscFunctionBegin;
   if (HasDefinitions(I)) {
-    PetscCall(Model(ts, dX));
+    PetscCall(ModelResidual(ts, dX));
     PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal model) { local[0] += PetscSqr(model * s.answer * PetscSqr(s.steps)); }, Read(I.verify.model)));
   } else /* claim dX is P_ii dX_i / inertia_i: the diagonal's part of the model */
     PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal d, PetscReal c) { local[0] += PetscSqr(c * d * s.claimed * PetscSqr(s.steps)); }, Read(dX), Read(I.verify.claim)));
-  *drift = Drift(I, PetscSqrtReal(sum[0] / I.norm_size));
+  *drift = PositionChange(I, PetscSqrtReal(sum[0] / I.norm_size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -57,7 +57,7 @@ struct Row {
   PetscReal is, was, excess; /* excess: of what may be left of it */
 
   Row(const RowScale &s, bool known, PetscReal f, PetscReal model, PetscReal force)
-    : is(f * s.answer), was(model * s.answer), excess(PetscMax(0, PetscAbsReal(is) - followed * (PetscAbsReal(was) + (known ? PetscAbsReal(force) * s.answer : 0)) - s.rounding))
+    : is(f * s.answer), was(model * s.answer), excess(PetscMax(0, PetscAbsReal(is) - unanswered_fraction * (PetscAbsReal(was) + (known ? PetscAbsReal(force) * s.answer : 0)) - s.rounding))
   {
   }
   bool stays() const { return excess > 0 && PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was); }
@@ -67,14 +67,14 @@ struct Row {
 bool RateIsKnown(const Integrator &I) { return I.corrector.matrix.rate >= 0; }
 
 /* R: the residual F, with definitions what they make of it in the equations of motion, which then stands in `passed` */
-PetscErrorCode OfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
+PetscErrorCode ResidualOfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
 {
   PetscFunctionBegin;
   *R = F;
   if (!HasDefinitions(Get(ts))) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(passed.like(F, Get(ts).spare));
   PetscCall(VecCopy(F, passed));
-  PetscCall(PassDefinitionsOn(ts, passed));
+  PetscCall(SubstituteDefinitions(ts, passed));
   *R = passed;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,7 +90,7 @@ PetscErrorCode NoteProof(TS ts, Vec F)
   Vec             R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, passed, &R));
+  PetscCall(ResidualOfMotion(ts, F, passed, &R));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar m, PetscScalar w, PetscScalar noise, PetscScalar f, PetscScalar model, PetscScalar force, PetscScalar &unproved) {
       if (!(PetscRealPart(m) > 0)) return;
@@ -105,7 +105,7 @@ PetscErrorCode NoteProof(TS ts, Vec F)
 } // namespace
 
 /* Imbalances of variables and force states act on the equations of motion: R -= P R_B for B = V, F */
-PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
+PetscErrorCode SubstituteDefinitions(TS ts, Vec R)
 {
   Integrator &I = Get(ts);
   WorkVec     defined, product;
@@ -124,7 +124,7 @@ PetscErrorCode PassDefinitionsOn(TS ts, Vec R)
 
 /* What the correction was to take away of the residual, by the linear model that it has solved, but for what the constraint forces of
    its multipliers answer: model = P dX - P_lambda dLambda. Those stand in work. */
-PetscErrorCode Model(TS ts, Vec dX)
+PetscErrorCode ModelResidual(TS ts, Vec dX)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -143,12 +143,12 @@ PetscErrorCode Model(TS ts, Vec dX)
     PetscCall(VecZeroEntries(v.work));
     PetscCall(MatMult(P, dX, v.model));
   }
-  PetscCall(PassDefinitionsOn(ts, v.model));
+  PetscCall(SubstituteDefinitions(ts, v.model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What is left in F after the correction that has the model at hand */
-PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
+PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
 {
   Integrator &I     = Get(ts);
   const bool  known = RateIsKnown(I);
@@ -157,7 +157,7 @@ PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
   Vec         R;
 
   PetscFunctionBegin;
-  PetscCall(OfMotion(ts, F, passed, &R));
+  PetscCall(ResidualOfMotion(ts, F, passed, &R));
   PetscCall(SumRows(
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal model, PetscReal force) {
@@ -169,31 +169,31 @@ PetscErrorCode Compare(TS ts, Vec F, Imbalance *left)
       local[2] += row.was * row.was;
     },
     Read(R), Read(I.verify.model), Read(I.verify.work)));
-  left->all  = Drift(I, PetscSqrtReal(sum[0] / I.norm_size));
-  left->stay = Drift(I, PetscSqrtReal(sum[3] / I.norm_size));
+  left->all  = PositionChange(I, PetscSqrtReal(sum[0] / I.norm_size));
+  left->stay = PositionChange(I, PetscSqrtReal(sum[3] / I.norm_size));
   left->part = sum[2] > 0 ? sum[1] / sum[2] : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The same with inertia and rounding measured at X, until no more than `enough` is left. Of many rows some are rounding that two samples do not show
    (Stiff.FastModesOfManyPairs): new ones are taken until one has taken next to nothing away. */
-PetscErrorCode CompareMeasured(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left)
+PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left)
 {
   Verification &v = Get(ts).verify;
 
   PetscFunctionBegin;
-  PetscCall(MeasureRows(ts, X, F));
-  PetscCall(Compare(ts, F, left));
-  for (PetscReal before = PETSC_MAX_REAL; left->all > enough && left->all < taken_away * before;) {
+  PetscCall(MeasureRowsAtStage(ts, X, F));
+  PetscCall(CompareWithModel(ts, F, left));
+  for (PetscReal before = PETSC_MAX_REAL; left->all > enough && left->all < explained_by_rounding * before;) {
     before = left->all;
     PetscCall(AddRounding(ts, X, F, v.sample++, v.noise));
-    PetscCall(Compare(ts, F, left));
+    PetscCall(CompareWithModel(ts, F, left));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* After the correction dX, which has led to X and would be the last. F: the residual at X if `evaluated`, which it then is. */
-PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved)
+PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -204,25 +204,25 @@ PetscErrorCode Verify(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBo
   PetscFunctionBegin;
   *proved  = PETSC_TRUE;
   v.looked = PETSC_FALSE;
-  if (!Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal limit = allowed * (I.fixed_h ? PetscClipInterval(c.wlte, least_error, 1) : 1);
-  PetscCall(Claimed(ts, dX, &claimed));
+  if (!MayHideForces(I)) PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal limit = allowed_unproved * (I.fixed_h ? PetscClipInterval(c.wlte, least_step_error, 1) : 1);
+  PetscCall(StiffnessClaimed(ts, dX, &claimed));
   if (claimed <= limit) {
     v.since += I.h;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = v.looked = PETSC_TRUE;
-  if (!HasDefinitions(I)) PetscCall(Model(ts, dX));
+  if (!HasDefinitions(I)) PetscCall(ModelResidual(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
-    if (attempt) PetscCall(CompareMeasured(ts, X, F, limit, &left));
-    else PetscCall(Compare(ts, F, &left));
+    if (attempt) PetscCall(CompareAboveRounding(ts, X, F, limit, &left));
+    else PetscCall(CompareWithModel(ts, F, &left));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
     const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && left.part < 0.5;
     *proved         = (PetscBool)((good || left.all <= limit) && left.stay <= limit);
     if (attempt && !*proved) {
-      PetscCall(Claimed(ts, dX, &claimed));
-      *proved = (PetscBool)(!Claims(I) || claimed <= limit);
+      PetscCall(StiffnessClaimed(ts, dX, &claimed));
+      *proved = (PetscBool)(!MayHideForces(I) || claimed <= limit);
     }
     if (*proved) {
       PetscCall(NoteProof(ts, F));

@@ -1,4 +1,4 @@
-/* Rooms of verify.cpp: what is known of rows (claims.cpp), and the comparison of the residual with what a correction has promised. */
+/* What the sources of this folder share: what is known of rows (stiffness.cpp), and the comparison of the residual with what a correction has promised. */
 #ifndef HHTDAE_VERIFY_H
 #define HHTDAE_VERIFY_H
 
@@ -8,9 +8,9 @@
 namespace hht3
 {
 
-constexpr PetscReal followed    = 0.1; /* of what a residual was: at 0.3 friction that slips within a step passed for followed */
+constexpr PetscReal unanswered_fraction = 0.1; /* of what a residual was: at 0.3 friction that slips within a step passed for followed */
 
-constexpr PetscReal least_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, StiffStart.StrongDampingStopsAtOnce */
+constexpr PetscReal least_step_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, StiffStart.StrongDampingStopsAtOnce */
 
 /* d s'/d w, which a row of a state has in place of ca */
 inline PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.beta; }
@@ -65,15 +65,15 @@ struct Imbalance {
   PetscReal part = 0; /* of the residual that is as it was */
 };
 
-/* claims.cpp */
-PetscErrorCode MeasureRows(TS ts, Vec X, Vec F);
+/* stiffness.cpp */
+PetscErrorCode MeasureRowsAtStage(TS ts, Vec X, Vec F);
 PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise);
 /* verify.cpp */
-PetscErrorCode PassDefinitionsOn(TS ts, Vec R);
-PetscErrorCode Model(TS ts, Vec dX);
-PetscErrorCode Compare(TS ts, Vec F, Imbalance *left);
-PetscErrorCode CompareMeasured(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left);
-/* blame.cpp */
+PetscErrorCode SubstituteDefinitions(TS ts, Vec R);
+PetscErrorCode ModelResidual(TS ts, Vec dX);
+PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left);
+PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left);
+/* wrong_jacobian.cpp */
 PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong);
 
 } // namespace hht3

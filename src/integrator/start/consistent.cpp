@@ -8,7 +8,7 @@
   h -> 0, [M Phi_q^T; Phi_q 0], so that neither stiffness nor damping stands in it and a few corrections solve the equations. They end where they are
   rounding, relative to the unknowns themselves: a tolerance there is none.
 
-  With h > 0 the velocities and positions follow from the accelerations, by the implicit Euler method (settle.cpp).
+  With h > 0 the velocities and positions follow from the accelerations, by the implicit Euler method (transient.cpp).
 */
 #include "consistent.h"
 #include "integrator/step/corrector.h"
@@ -25,9 +25,9 @@ namespace
 {
 
 /* Corrections relative to the unknowns, or what forces leave relative to these: converged; and the largest that may be rounding where they no longer fall */
-constexpr PetscReal converged = 1e-13, rounding = 1e-8;
-constexpr PetscReal slow      = 0.3; /* rate beyond which the matrix is made again at the iterate */
-constexpr PetscInt  max_it    = 30;  /* at a rate of `slow` 13 digits take 25 */
+constexpr PetscReal converged_correction = 1e-13, rounding_correction = 1e-8;
+constexpr PetscReal slow_rate            = 0.3; /* rate beyond which the matrix is made again at the iterate */
+constexpr PetscInt  max_iterations       = 30;  /* at a rate of `slow_rate` 13 digits take 25 */
 
 /* Rows of constraints of F: Phi_q q'' + gamma. The columns of states are left out, since gamma follows s along V. */
 PetscErrorCode ConstraintRows(const Integrator &I, Consistent &c)
@@ -61,7 +61,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   if (!failed) PetscCall(VecAXPY(c.X, -1, c.d));
   PetscCall(VecNorm(c.d, NORM_2, &d));
   PetscCall(VecNorm(c.X, NORM_2, &x));
-  if (ts->snes->ksp == c.ksp) PetscCall(IsUnanswered(ts, c.d, c.F, false, &unanswered));
+  if (ts->snes->ksp == c.ksp) PetscCall(SolveFoundNothing(ts, c.d, c.F, false, &unanswered));
   PetscCall(TakeUnknowns(Get(ts), c));
   *e  = x > 0 ? d / x : d;
   *ok = (PetscBool)(!failed && !unanswered && !PetscIsInfOrNanReal(d));
@@ -114,7 +114,7 @@ PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
     Read(c.F), Read(F), Read(held), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 5, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
   for (PetscReal &x : sum) x = PetscSqrtReal(x);
-  *yes = (PetscBool)(PetscMax(sum[0], sum[2]) < of_rounding * sum[1] && sum[3] <= rounding * sum[4]);
+  *yes = (PetscBool)(PetscMax(sum[0], sum[2]) < rounding_factor * sum[1] && sum[3] <= rounding_correction * sum[4]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,7 +138,7 @@ PetscErrorCode LeaveRates(TS ts, Consistent &c, Vec none)
 }
 
 /* F at X */
-PetscErrorCode Residual(TS ts, Consistent &c)
+PetscErrorCode ConsistentResidual(TS ts, Consistent &c)
 {
   Integrator &I = Get(ts);
 
@@ -217,11 +217,11 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
   if (Get(ts).count[TSHHT3_STATE]) PetscCall(none.like(c.X));
   *ok = PETSC_TRUE;
   PetscCall(TakeUnknowns(Get(ts), c));
-  for (c.its = c.ksp_its = 0; c.its < max_it;) {
+  for (c.its = c.ksp_its = 0; c.its < max_iterations;) {
     const PetscBool fresh = renew;
     if (renew) PetscCall(ConsistentMatrix(ts, c, ok, why));
     if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(Residual(ts, c));
+    PetscCall(ConsistentResidual(ts, c));
     PetscCall(CheckNumbers(ts, c.t, {c.F, c.U, c.V, c.A}, ok));
     *why = Get(ts).failure;
     if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
@@ -238,11 +238,11 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     if (!*ok) c.linear->failed = PC_SUBPC_ERROR;
     if (c.its == 1) first = e;
     else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
-    const bool known = c.its > 1 && !fresh, falls = e <= slow * last;
-    if (!*ok || e <= converged || (known && (falls ? CorrectorError(e / last, e) <= converged : e <= rounding))) PetscFunctionReturn(PETSC_SUCCESS);
+    const bool known = c.its > 1 && !fresh, falls = e <= slow_rate * last;
+    if (!*ok || e <= converged_correction || (known && (falls ? CorrectorError(e / last, e) <= converged_correction : e <= rounding_correction))) PetscFunctionReturn(PETSC_SUCCESS);
     if (known && !falls && c.h == 0) {
       PetscCall(ForcesLeft(Get(ts), c, &forces));
-      if (forces <= rounding) PetscFunctionReturn(PETSC_SUCCESS);
+      if (forces <= rounding_correction) PetscFunctionReturn(PETSC_SUCCESS);
       PetscCall(LeftByRounding(ts, c, &balanced));
       if (balanced) PetscFunctionReturn(PETSC_SUCCESS);
     }

@@ -38,7 +38,7 @@ PetscErrorCode GetSampler(TS ts, Sampler **S);
 
 /* The step in the matrix for h -> 0, of a time scale: h C/M and h^2 K/M must be nothing. With 1e-12 dampers of 1e12 M/T stood as inertia in the matrix,
    Start.StrongDampingIsNoInertia */
-constexpr PetscReal vanishing = 1e-28;
+constexpr PetscReal vanishing_step = 1e-28;
 
 /* Where the unknown of a role stands in U, U', U'' */
 inline PetscScalar &UnknownOf(TSHHT3Role r, PetscScalar &u, PetscScalar &v, PetscScalar &a) { return r == TSHHT3_COORDINATE ? a : r == TSHHT3_STATE ? v : u; }

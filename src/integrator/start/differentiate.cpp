@@ -18,23 +18,23 @@ namespace hht3
 namespace
 {
 
-constexpr int       levels = 9, points = 6; /* of a row: tau = T/10, T/40, ...; of fourth order in tau */
-constexpr int       max_levels = 32;        /* of all rows */
-constexpr int       longer = 16;            /* levels -1, -2, ...: tau = 4 T/10, 16 T/10, ... (Units.ForcesOfTheStart) */
-constexpr signed char none = -longer - 1;
+constexpr int         levels        = 9, points = 6; /* of a row: tau = T/10, T/40, ...; of fourth order in tau */
+constexpr int         max_levels    = 32;        /* of all rows */
+constexpr int         longer_levels = 16;            /* levels -1, -2, ...: tau = 4 T/10, 16 T/10, ... (Units.ForcesOfTheStart) */
+constexpr signed char no_level      = -longer_levels - 1;
 
-PetscReal Tau(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
+PetscReal LevelTime(PetscReal T, int level) { return 0.1 * T * PetscPowRealInt(0.25, level); }
 
 /* The first level of a row that follows time within `excitation` */
 int FirstLevel(PetscReal T, PetscReal excitation)
 {
   int level = 0;
-  while (level < max_levels - levels && Tau(T, level) > excitation) level++;
+  while (level < max_levels - levels && LevelTime(T, level) > excitation) level++;
   return level;
 }
 constexpr PetscReal first_weights[points]  = {-25. / 12, 4, -3, 4. / 3, -1. / 4, 0};
 constexpr PetscReal second_weights[points] = {45. / 12, -154. / 12, 214. / 12, -13, 61. / 12, -10. / 12};
-constexpr PetscReal first_sum = 32. / 3, second_sum = 160. / 3; /* of their sizes */
+constexpr PetscReal first_sum              = 32. / 3, second_sum = 160. / 3; /* of their sizes */
 
 /* A derivative of each row: the best one so far, and the level that it is of */
 struct Best {
@@ -45,7 +45,7 @@ struct Best {
   Best(std::vector<signed char> &at, const std::vector<signed char> &begin, PetscInt n, bool again)
     : last(n, 0), value(n, 0), change(n, PETSC_MAX_REAL), level(at), from(begin), known(again)
   {
-    if (!known) level.assign((size_t)n, none);
+    if (!known) level.assign((size_t)n, no_level);
   }
   /* noise: what rounding of the coordinates makes of x. Over a tau that is too short for anything to change the differences vanish, and agree (Units.ForcesOfTheStart).
      Of longer tau only those that go on from the longest so far, if that was the best. */
@@ -76,30 +76,30 @@ PetscErrorCode LargestCoordinate(const Integrator &I, Vec U, PetscReal *largest)
 }
 
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
-PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[longer + max_levels])
+PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[longer_levels + max_levels])
 {
-  PetscBool any[longer + max_levels] = {};
+  PetscBool any[longer_levels + max_levels] = {};
 
   PetscFunctionBegin;
   for (size_t i = 0; i < I.role.size(); i++) {
     if (!IsConstraint(I, (PetscInt)i)) continue;
     const bool holonomic = I.role[i] == TSHHT3_HOLONOMIC;
-    const int  one = first && holonomic ? I.levels[0][i] : none, two = second ? I.levels[holonomic ? 1 : 0][i] : none;
+    const int  one = first && holonomic ? I.levels[0][i] : no_level, two = second ? I.levels[holonomic ? 1 : 0][i] : no_level;
     for (int level : {one, two})
-      if (level != none) any[longer + level] = PETSC_TRUE;
+      if (level != no_level) any[longer_levels + level] = PETSC_TRUE;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, longer + max_levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
-  for (int l = 0; l < longer + max_levels; l++) used[l] = any[l];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, longer_levels + max_levels, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+  for (int l = 0; l < longer_levels + max_levels; l++) used[l] = any[l];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* First levels of rows that follow time, and which levels are to be looked at */
-PetscErrorCode LevelsToTry(const Integrator &I, PetscReal T, std::vector<signed char> &from, bool (&used)[longer + max_levels])
+PetscErrorCode LevelsToTry(const Integrator &I, PetscReal T, std::vector<signed char> &from, bool (&used)[longer_levels + max_levels])
 {
   const int last = I.excitation ? FirstLevel(T, I.fastest) : 0;
 
   PetscFunctionBegin;
-  for (int l = -longer; l < max_levels; l++) used[longer + l] = l >= 0 && l < last + levels;
+  for (int l = -longer_levels; l < max_levels; l++) used[longer_levels + l] = l >= 0 && l < last + levels;
   if (last == 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ForEntries([&](PetscInt, PetscScalar x) { from.push_back((signed char)FirstLevel(T, PetscRealPart(x))); }, Read(I.excitation)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -179,16 +179,16 @@ struct Path {
      coordinate: what is 0, as a rotation within the step, turns lengths that are rounded */
   PetscErrorCode roundingOfRows(std::vector<PetscReal> &rounding)
   {
-    constexpr int          seen = 8; /* times rounding */
+    constexpr int times_rounding = 8; /* times rounding */
     PetscInt               start;
     std::vector<PetscReal> f;
     PetscFunctionBegin;
     PetscCall(VecGetOwnershipRange(U, &start, NULL));
     rounding.assign(now.size(), PETSC_MACHINE_EPSILON * largest);
     for (unsigned salt = 0; salt < 2; salt++) {
-      PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + seen * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
+      PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + times_rounding * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
       PetscCall(rows(t, f));
-      for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / seen);
+      for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / times_rounding);
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -211,7 +211,7 @@ PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int
 }
 
 /* The derivatives of each row: of those over `used` levels, or of longer ones where these are asked for */
-PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer + max_levels], Best &d1, Best &d2)
+PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer_levels + max_levels], Best &d1, Best &d2)
 {
   const Integrator      &I = Get(along.ts);
   PetscBool              more;
@@ -220,7 +220,7 @@ PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer + ma
   PetscFunctionBegin;
   if (!d1.known) PetscCall(along.roundingOfRows(rounding));
   const auto attempt = [&](int level) -> PetscErrorCode {
-    const PetscReal tau = SpanFrom(along.t, Tau(T, level));
+    const PetscReal tau = SpanFrom(along.t, LevelTime(T, level));
     PetscFunctionBegin;
     PetscCall(along.differences(tau, s1, s2));
     for (PetscInt i = 0; i < (PetscInt)s1.size(); i++) {
@@ -230,10 +230,10 @@ PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer + ma
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   };
-  for (int level = -longer; level < max_levels; level++)
-    if (used[longer + level]) PetscCall(attempt(level));
-  for (int level = -1; level >= -longer && !d1.known; level--) {
-    PetscCall(IsLongerOf(along, d1, d2, level, Tau(T, level), &more));
+  for (int level = -longer_levels; level < max_levels; level++)
+    if (used[longer_levels + level]) PetscCall(attempt(level));
+  for (int level = -1; level >= -longer_levels && !d1.known; level--) {
+    PetscCall(IsLongerOf(along, d1, d2, level, LevelTime(T, level), &more));
     if (!more) break;
     if (level == -1) PetscCall(attempt(0)); /* the one before it */
     PetscCall(attempt(level));
@@ -264,7 +264,7 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   Integrator              &I = Get(ts);
   Path                     along(ts, t, U, V);
   PetscBool                rest;
-  bool                     used[longer + max_levels];
+  bool                     used[longer_levels + max_levels];
   std::vector<signed char> from;
 
   PetscFunctionBegin;

@@ -29,10 +29,10 @@ namespace
 /* Points of Phi from which its derivatives in time are taken, over the step: errors of third order and more, far below those of the
    method. Over less than this part of the motion's time scale rounding of Phi would show (5e-14 |q| over the length squared). */
 constexpr int       time_points   = 5;
-constexpr PetscReal shortest = 1e-4;
+constexpr PetscReal shortest_span = 1e-4;
 
 /* A part of the step within which t is one of its ends: sums of steps and multiples of an interval differ by their rounding (EvaluateAt.OnAGridOfSteps) */
-constexpr PetscReal at_end = 1e-8;
+constexpr PetscReal end_fraction = 1e-8;
 
 /* Preconditioners of functions or parts that the program has given cannot be had twice */
 PetscErrorCode HasParts(PC pc, PetscBool *yes)
@@ -154,8 +154,8 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  const bool      wide   = I.h < shortest * T;
-  const PetscReal length = wide ? shortest * T : I.h, begin = wide ? c.t - length / 2 : I.t0, apart = SpanFrom(begin, length / (time_points - 1));
+  const bool      wide   = I.h < shortest_span * T;
+  const PetscReal length = wide ? shortest_span * T : I.h, begin = wide ? c.t - length / 2 : I.t0, apart = SpanFrom(begin, length / (time_points - 1));
   for (int k = 0; k < time_points; k++) z[k] = begin - c.t + k * apart;
   DerivativeWeights(z, weight);
   PetscCall(VecZeroEntries(c.gamma));
@@ -182,7 +182,7 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
   S.at.t    = t;
-  S.at.tiny = vanishing * I.h;
+  S.at.tiny = vanishing_step * I.h;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
@@ -209,7 +209,7 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 
   PetscFunctionBegin;
   const PetscReal x = StepFraction(I, t);
-  if (I.have_step && x > at_end && x < 1 - at_end) PetscCall(GetSampler(ts, &S));
+  if (I.have_step && x > end_fraction && x < 1 - end_fraction) PetscCall(GetSampler(ts, &S));
   if (S) {
     PetscCall(Interpolate(ts, t, S->at.U, S->at.V, S->at.A));
     PetscCall(SampleInside(ts, *S, t, &ok));

@@ -13,7 +13,7 @@ namespace hht3
 namespace
 {
 
-constexpr int samples = 30; /* halvings of the step: a sign that a function keeps for less than 1e-9 of it is not seen (Events.ABallIsNotLost) */
+constexpr int max_halvings = 30; /* halvings of the step: a sign that a function keeps for less than 1e-9 of it is not seen (Events.ABallIsNotLost) */
 
 /* What is known of a function that begins at its zero, from long steps to short ones */
 struct Leaving {
@@ -63,7 +63,7 @@ PetscErrorCode LimitStepByEvents(TS ts)
   PetscCall(FunctionsAfter(ts, 0, f0));
   list         = AtZero(ts, f0);
   PetscInt any = !list.empty();
-  for (int k = 0; k <= samples; k++) {
+  for (int k = 0; k <= max_halvings; k++) {
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPIU_INT, MPI_MAX, comm));
     if (!any) break;
     const PetscReal d = PetscPowRealInt(0.5, k) * h;
@@ -83,7 +83,7 @@ PetscErrorCode LimitStepByEvents(TS ts)
   PetscCall(PetscInfo(ts, "a function of an event comes back to its zero within the step of %g: %g\n", (double)ts->time_step, (double)h));
   /* nor is the second step longer: TSEvent takes thousands on its way to a zero that is near the beginning of a step (Events.BouncesThatAccumulate) */
   if (Get(ts).h_chosen) {
-    HHT3StepAfterEvent(ts, {unset_step, petsc_step, Get(ts).h_after_event}, h);
+    HHT3StepAfterEvent(ts, {unset_step, petsc_default_step, Get(ts).h_after_event}, h);
     Get(ts).h_after_event = h;
   }
   ts->time_step = h;

@@ -20,18 +20,18 @@ namespace
 
 /* The first sample's part of what is left of the run, and a sample's of the one before: powers of the golden section, since simple fractions meet whole
    periods one after the other (Excitation.ManyFrequencies) */
-constexpr PetscReal longest = 0.618034, shorter = 0.236068;
-constexpr PetscReal noticeable = 0.1;   /* of a row's largest change */
-constexpr int       at_least = 9, at_most = 60; /* samples */
-constexpr int       quiet    = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
-constexpr PetscReal falling  = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
-constexpr int       all_along  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
+constexpr PetscReal first_sample      = 0.618034, sample_ratio = 0.236068;
+constexpr PetscReal noticeable_change = 0.1;   /* of a row's largest change */
+constexpr int       min_samples       = 9, max_samples = 60; /* samples */
+constexpr int       quiet_samples     = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
+constexpr PetscReal falling_ratio     = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
+constexpr int       changes_of_swing  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
 /* Changes within the first samples alone, longer than this part of what is left of the run, are those of a ramp, which tell of no time but that: at least so much of it */
-constexpr PetscReal of_ramps = 0.03, no_faster = 10;
-constexpr PetscReal unfollowed = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
+constexpr PetscReal ramp_spread    = 0.03, ramp_time = 10;
+constexpr PetscReal steps_of_swing = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
 /* Of the largest change of any row of its kind: less may be what rounding leaves of loads that cancel, with lever arms of up to 1e6 (Excitation.OfLoadsThatCancel) */
-constexpr PetscReal cancelled = 1e-9;
+constexpr PetscReal cancelled_change = 1e-9;
 
 /* What is found of a row's changes with time */
 struct Changes {
@@ -66,9 +66,9 @@ PetscErrorCode NoteChanges(const Integrator &I, PetscReal tau, Vec before, Vec a
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar f0, PetscScalar f, PetscScalar &most, PetscScalar &number, PetscScalar &shortest) {
       const PetscReal change = PetscAbsScalar(f - f0);
-      if (change <= cancelled * c.of_kind[RoleOf(I, i)]) return;
+      if (change <= cancelled_change * c.of_kind[RoleOf(I, i)]) return;
       if (change > most_of_all * PetscRealPart(most)) most_of_all = PetscRealPart(most) > 0 ? PetscMin(change / PetscRealPart(most), 1) : 1;
-      if (!(change > noticeable * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
+      if (!(change > noticeable_change * PetscRealPart(most))) return; /* also for what is not a number beyond the end of a table */
       most     = PetscMax(change, PetscRealPart(most));
       shortest = tau;
       number += 1;
@@ -81,7 +81,7 @@ PetscErrorCode NoteChanges(const Integrator &I, PetscReal tau, Vec before, Vec a
 } // namespace
 
 /* At U0, V0, t_n: I.excitation has the time within which each row follows time, PETSC_MAX_REAL where it does not depend on it; none: no row does */
-PetscErrorCode NoteExcitation(TS ts)
+PetscErrorCode FindExcitation(TS ts)
 {
   Integrator     &I    = Get(ts);
   PetscReal       stop = ts->max_time - ts->ptime;
@@ -98,18 +98,18 @@ PetscErrorCode NoteExcitation(TS ts)
   c.shortest = I.excitation;
   for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
   PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
-  PetscCall(EvaluateResidual(ts, ts->ptime + longest * stop, I.U0, I.V0, zero, F[0]));
-  PetscReal tau = longest * stop;
-  for (int sample = 1, still = 0; sample < at_least || (sample < at_most && (still < quiet || (tau > step && step < stop))); sample++) {
-    tau *= shorter;
+  PetscCall(EvaluateResidual(ts, ts->ptime + first_sample * stop, I.U0, I.V0, zero, F[0]));
+  PetscReal tau = first_sample * stop;
+  for (int sample = 1, still = 0; sample < min_samples || (sample < max_samples && (still < quiet_samples || (tau > step && step < stop))); sample++) {
+    tau *= sample_ratio;
     PetscCall(EvaluateResidual(ts, ts->ptime + tau, I.U0, I.V0, zero, F[sample % 2]));
     last = part;
     PetscCall(NoteChanges(I, tau, F[0], F[1], c, &part));
-    still = part > noticeable || (part > falling * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
+    still = part > noticeable_change || (part > falling_ratio * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
   }
-  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar &T) { if (PetscRealPart(number) > 0 && PetscRealPart(T) >= of_ramps * stop) T = no_faster * stop; }, Read(c.number), Write(I.excitation)));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar &T) { if (PetscRealPart(number) > 0 && PetscRealPart(T) >= ramp_spread * stop) T = ramp_time * stop; }, Read(c.number), Write(I.excitation)));
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
-  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= all_along) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= changes_of_swing) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
   PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
   if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
   else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
@@ -120,7 +120,7 @@ PetscErrorCode NoteExcitation(TS ts)
    golden section, nowhere further apart than coasting of the rest */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 {
-  constexpr int   samples = 89;
+  constexpr int samples_ahead = 89;
   Integrator     &I       = Get(ts);
   const PetscReal rest    = ts->max_time - t;
   PetscReal       part = 0, change = 0;
@@ -133,8 +133,8 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
   PetscCall(VecZeroEntries(zero));
   PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
-  for (int sample = 0; sample < samples && !(change > 0); sample++) {
-    part = part + longest < 1 ? part + longest : part + longest - 1;
+  for (int sample = 0; sample < samples_ahead && !(change > 0); sample++) {
+    part = part + first_sample < 1 ? part + first_sample : part + first_sample - 1;
     PetscCall(EvaluateResidual(ts, t + part * rest, U, V, zero, then));
     PetscCall(VecAXPY(then, -1, now));
     PetscCall(VecNorm(then, NORM_INFINITY, &change));
@@ -146,12 +146,12 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 
 /* After an accepted step: loads that swing faster than steps follow are said, once. Where positions move by less than the tolerance, the error test lets
    velocities that they leave pass. */
-PetscErrorCode TellUnfollowed(TS ts)
+PetscErrorCode WarnOfUnfollowedLoads(TS ts)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (I.told || !(I.h / unfollowed > I.swing)) PetscFunctionReturn(PETSC_SUCCESS); /* swing may be the largest number, of which there is no multiple */
+  if (I.told || !(I.h / steps_of_swing > I.swing)) PetscFunctionReturn(PETSC_SUCCESS); /* swing may be the largest number, of which there is no multiple */
   I.told = PETSC_TRUE;
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
                         "hhtdae: the step of %g at t = %g does not follow loads or motions that depend on time alone, some of which swing within %.1g or so. Where they matter, "

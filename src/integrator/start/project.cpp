@@ -1,7 +1,7 @@
 /*
   Initial values and the constraints: how far q_0 and q'_0 are from them, and the projection of both.
 
-  The misfit is measured as the distance to the nearest consistent state in the metric of the mass matrix, from
+  The inconsistency is measured as the distance to the nearest consistent state in the metric of the mass matrix, from
 
     [M Phi_q^T; Phi_q 0] [dq; mu] = [0; Phi],      the same with dq', Phi_q q' + Phi_t (and Psi) for the velocities,
 
@@ -23,7 +23,7 @@ namespace
 {
 
 /* Weighted root mean square of the entries of d that belong to coordinates, times s: in units of the tolerance */
-PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
+PetscErrorCode CoordinateNorm(TS ts, Vec d, PetscReal s, PetscReal *e)
 {
   Integrator &I   = Get(ts);
   PetscReal   sum = 0, total;
@@ -36,7 +36,7 @@ PetscErrorCode Distance(TS ts, Vec d, PetscReal s, PetscReal *e)
 }
 
 /* y -= d on coordinates */
-PetscErrorCode Move(const Integrator &I, Vec y, Vec d)
+PetscErrorCode SubtractCoordinates(const Integrator &I, Vec y, Vec d)
 {
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &z) { if (IsCoordinate(I, i)) z -= x; }, Read(d), Write(y)));
@@ -69,7 +69,7 @@ PetscErrorCode MissOfPositions(TS ts, PetscReal *e)
   PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
   PetscCall(TakeRoles(I, I.gamma, {TSHHT3_HOLONOMIC}, I.work));
   PetscCall(SolveStart(ts, I.work, I.X));
-  PetscCall(Distance(ts, I.X, 1, e));
+  PetscCall(CoordinateNorm(ts, I.X, 1, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,7 +85,7 @@ PetscErrorCode WorstRow(TS ts, Vec R, PetscInt *row, PetscReal *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode ReportMisfit(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
+PetscErrorCode ReportInconsistency(TS ts, const char *what, const char *unit, PetscReal e, PetscInt row, PetscReal value, PetscBool moved)
 {
   Integrator &I = Get(ts);
   RowLabel    label;
@@ -118,10 +118,10 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     last = e;
     PetscCall(MissOfPositions(ts, &e));
     PetscCall(WorstRow(ts, I.work, &row, &value));
-    if (it == 0) PetscCall(ReportMisfit(ts, "positions", "", e, row, value, project));
+    if (it == 0) PetscCall(ReportInconsistency(ts, "positions", "", e, row, value, project));
     *current = PETSC_TRUE;
     if (!project || e == 0 || e >= 0.5 * last) break;
-    PetscCall(Move(I, I.U0, I.X));
+    PetscCall(SubtractCoordinates(I, I.U0, I.X));
     *current = PETSC_FALSE;
   }
   if (!project || e <= 1e-3) PetscFunctionReturn(PETSC_SUCCESS);
@@ -142,9 +142,9 @@ PetscErrorCode CheckVelocities(TS ts, bool project, PetscReal *e, PetscInt *row,
   PetscCall(TimeScaleOfConstraints(ts, &along));
   PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, along, false, I.work, I.gamma));
   PetscCall(SolveStart(ts, I.work, I.X));
-  PetscCall(Distance(ts, I.X, T, e));
+  PetscCall(CoordinateNorm(ts, I.X, T, e));
   PetscCall(WorstRow(ts, I.work, row, value));
-  if (project) PetscCall(Move(I, I.V0, I.X));
+  if (project) PetscCall(SubtractCoordinates(I, I.V0, I.X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,11 +155,11 @@ Prepared PreparedBy(const Integrator &I, bool moved)
 }
 
 /* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
-constexpr PetscReal many = 1e3;
+constexpr PetscReal longest_time_scale = 1e3;
 
 /* Constraints of what moves are differentiated over what it takes, though the run were so many times shorter: differences over parts of a run of next to nothing are
    rounding (BetweenRuns.ShortRunsHaveTheirMultipliers). What would take more does not move. */
-constexpr PetscReal runs = 1e6;
+constexpr PetscReal longest_in_runs = 1e6;
 
 /* 1/rate, in place of one beyond so many runs the whole run where it has an end. Where it has none: what rounding leaves of velocities is no time scale
    (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be a millionth of what things take (Query.Units) */
@@ -167,8 +167,8 @@ PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 {
   const Integrator &I    = Get(ts);
   const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
-  PetscReal         span = ends ? ts->max_time - I.t_begin : !(rate > 0) ? 1 : ts->ptime != 0 ? many * PetscAbsReal(ts->ptime) : many * many;
-  if (I.excitation && I.fastest < span / many) span = many * I.fastest;
+  PetscReal         span = ends ? ts->max_time - I.t_begin : !(rate > 0) ? 1 : ts->ptime != 0 ? longest_time_scale * PetscAbsReal(ts->ptime) : longest_time_scale * longest_time_scale;
+  if (I.excitation && I.fastest < span / longest_time_scale) span = longest_time_scale * I.fastest;
   return rate > 0 && 1 / rate < (ends ? within : 1) * span ? 1 / rate : span;
 }
 
@@ -213,14 +213,14 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For differences of constraints: what the motion takes, though the run be `runs` times shorter */
+/* For differences of constraints: what the motion takes, though the run be `longest_in_runs` times shorter */
 PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
 {
   PetscReal rate;
 
   PetscFunctionBegin;
   PetscCall(RelativeRate(ts, Get(ts).V0, &rate));
-  *T = TimeOf(ts, rate, runs);
+  *T = TimeOf(ts, rate, longest_in_runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -235,10 +235,10 @@ PetscErrorCode IsOwnState(TS ts, PetscReal t, Vec U, Vec V, PetscBool *own)
   *own = PETSC_FALSE;
   if (!I.constraints() || !IsEndOf(ts, t)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecWAXPY(I.work, -1, U, ts->vec_sol));
-  PetscCall(Distance(ts, I.work, 1, &u));
+  PetscCall(CoordinateNorm(ts, I.work, 1, &u));
   PetscCall(TimeScale(ts, &T));
   PetscCall(VecWAXPY(I.work, -1, V, ts->vec_dot));
-  PetscCall(Distance(ts, I.work, T, &v));
+  PetscCall(CoordinateNorm(ts, I.work, T, &v));
   *own = (PetscBool)(u <= 1 && v <= 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,7 +258,7 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
   PetscCall(CheckPositions(ts, &matrix));
   if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
   PetscCall(CheckVelocities(ts, project, &e, &row, &value));
-  PetscCall(ReportMisfit(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
+  PetscCall(ReportInconsistency(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
   *prepared = PreparedBy(I, project);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,7 +274,7 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared)
 
   PetscFunctionBegin;
   PetscCall(MissOfPositions(ts, &e));
-  if (e < 1) PetscCall(Move(I, I.U0, I.X));
+  if (e < 1) PetscCall(SubtractCoordinates(I, I.U0, I.X));
   PetscCall(CheckVelocities(ts, true, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
   *prepared = PreparedBy(I, true);

@@ -28,10 +28,10 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal four_digits = 1e-4; /* of the rates */
+constexpr PetscReal rate_accuracy = 1e-4; /* of the rates */
 
 /* In the vectors, the matrix and the solver of the run. A matrix-free operator has nothing to differentiate before SNESSolve(): P alone. */
-PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
+PetscErrorCode ConsistentOfRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 {
   Integrator &I = Get(ts);
   PetscBool   mffd;
@@ -43,7 +43,7 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
   if (mffd) c->J = NULL;
   PetscCall(SNESGetKSP(ts->snes, &c->ksp));
   PetscCall(TimeScale(ts, &c->tiny));
-  c->tiny = vanishing * PetscMin(c->tiny, 1);
+  c->tiny = vanishing_step * PetscMin(c->tiny, 1);
   c->t      = t;
   c->U      = I.U1;
   c->V      = I.V1;
@@ -58,11 +58,11 @@ PetscErrorCode OfTheRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
 }
 
 /* Whose unknown stands in U, so that X knows of it before the accelerations are known */
-constexpr std::initializer_list<TSHHT3Role> algebraic = {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE};
+constexpr std::initializer_list<TSHHT3Role> algebraic_roles = {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC, TSHHT3_VARIABLE, TSHHT3_FORCE};
 
 /* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
    Leaves X as it was. */
-PetscErrorCode Rates(TS ts, Vec rate)
+PetscErrorCode RatesOfStart(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscReal   T, Ta, rate_of_motion;
@@ -75,7 +75,7 @@ PetscErrorCode Rates(TS ts, Vec rate)
   PetscCall(TimeScaleOfAccelerations(ts, I.X, &Ta));
   PetscCall(RelativeRate(ts, I.V0, &rate_of_motion));
   if (!rest && Ta < PETSC_MAX_REAL) T = rate_of_motion > 0 ? PetscMax(T, 1 / rate_of_motion) : PETSC_MAX_REAL; /* what has just begun to move has no time scale of a short run: its rates would be rounding (BetweenRuns.ShortRunsHaveTheirMultipliers) */
-  const PetscReal d = SpanFrom(ts->ptime, PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), four_digits * I.fastest)); /* of what is at rest T may be a run without end: Units.LongRuns */
+  const PetscReal d = SpanFrom(ts->ptime, PetscMin(PetscMin(1e-5 * T, 1e-2 * Ta), rate_accuracy * I.fastest)); /* of what is at rest T may be a run without end: Units.LongRuns */
   PetscCall(X0.like(I.X));
   PetscCall(U.like(I.X));
   PetscCall(V.like(I.X));
@@ -165,7 +165,7 @@ PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
 
   PetscFunctionBegin;
   const bool unset = ts->time_step == unset_step || ts->time_step == HHT3StopAfter(ts, ts->ptime) - ts->ptime;
-  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
+  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_default_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
   else if (I.auto_h && unset) {
     PetscCall(FirstStep(ts, rate, &ts->time_step));
     PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
@@ -190,8 +190,8 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   PetscCall(PredictorReset(ts));
   I.h           = h;
   I.h_last      = h;
-  I.have_misfit = PETSC_FALSE;
-  I.bent        = Bend::None;
+  I.have_drift = PETSC_FALSE;
+  I.jerk       = Jerk::None;
   PetscCall(ErrorsOfStart(ts, rate, &errors));
   const PetscReal e = errors.at(h);
   I.corrector.wlte  = e;
@@ -205,7 +205,7 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
         if (r == TSHHT3_COORDINATE) d = x;
       },
       Read(rate), Write(I.X0), Write(p.D[0])));
-    if (e > 0) PetscCall(StartMisfit(ts, rate));
+    if (e > 0) PetscCall(SetDriftOfStart(ts, rate));
   } else PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
   const bool follows = believed && e > 0 && p.degree_max > 0;
   if (follows || I.count[TSHHT3_STATE]) {
@@ -219,7 +219,7 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
 }
 
 /* X holds the accelerations, derivatives and algebraic unknowns at U0, V0 */
-PetscErrorCode Distribute(Integrator &I)
+PetscErrorCode TakeStartValues(Integrator &I)
 {
   PetscFunctionBegin;
   PetscCall(ForEntries(
@@ -257,8 +257,8 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(TakeRoles(I, U, algebraic, I.X));
-  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(TakeRoles(I, U, algebraic_roles, I.X));
+  PetscCall(ConsistentOfRun(ts, t, U, V, &c));
   PetscCall(TakeUnknowns(I, c));
   PetscCall(ConsistentMatrix(ts, c, &ok, &why));
   PetscCall(NoteInertia(ts, c.P));
@@ -275,7 +275,7 @@ PetscErrorCode NameRedundant(TS ts)
   PetscInt              start, n = 0, rows[20];
   Mat                   P;
   RowLabel              label;
-  constexpr PetscInt    named = 4;
+  constexpr PetscInt max_named_rows = 4;
   std::string           text, names;
   PetscBool             is_singular;
   MatSolverType         package;
@@ -296,7 +296,7 @@ PetscErrorCode NameRedundant(TS ts)
   }
   for (PetscInt i = 0; i < n; i++) {
     text += (i ? ", " : "") + std::to_string(rows[i]);
-    if (!I.names.name || i >= named) continue;
+    if (!I.names.name || i >= max_named_rows) continue;
     PetscCall(LabelRow(ts, rows[i], &label));
     names += std::string(i ? ", " : " Rows ") + label.text;
   }
@@ -305,7 +305,7 @@ PetscErrorCode NameRedundant(TS ts)
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text.c_str(),
-             names.c_str(), I.names.name && n > named ? ", ..." : "");
+             names.c_str(), I.names.name && n > max_named_rows ? ", ..." : "");
   PetscCall(PackageInDoubt(ts, &package));
   PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
@@ -357,10 +357,10 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
   WorkVec     before;
 
   PetscFunctionBegin;
-  PetscCall(OfTheRun(ts, t, U, V, &c));
+  PetscCall(ConsistentOfRun(ts, t, U, V, &c));
   PetscCall(KSPGetReusePreconditioner(c.ksp, &reuse));
   c.near   = have.near && !reuse;
-  c.enough = have.near ? four_digits : 0;
+  c.enough = have.near ? rate_accuracy : 0;
   if (c.near) PetscCall(KSPSetReusePreconditioner(c.ksp, PETSC_TRUE));
   if (h == 0) PetscCall(ReferTo(ts, c.U, before));
   const PetscErrorCode failed = SolveAt(ts, t, h, U, V, have, c, ok, &why);
@@ -384,23 +384,23 @@ namespace
 constexpr int max_transients = 30; /* one within the other; each time a tenth of one is left */
 
 /* Accelerations, multipliers and their rates from U0, V0 */
-PetscErrorCode Consistent(TS ts, Prepared have, Vec rate)
+PetscErrorCode ConsistentWithRates(TS ts, Prepared have, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(TakeRoles(I, I.U0, algebraic, I.X));
+  PetscCall(TakeRoles(I, I.U0, algebraic_roles, I.X));
   PetscCall(ConsistentAccelerations(ts, ts->ptime, 0, I.U0, I.V0, have, &ok));
   if (!ok) {
     if (I.linear.failed) PetscCall(NameRedundant(ts));
     SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED, "No consistent accelerations and multipliers were found at t = %g: %s", (double)ts->ptime, I.failure);
   }
   PetscCall(NoteDriven(ts));
-  PetscCall(Distribute(I));
+  PetscCall(TakeStartValues(I));
   PetscCall(VecCopy(I.X, I.X0));
   PetscCall(VecCopy(I.X, I.predictor.D[0]));
-  PetscCall(Rates(ts, rate));
+  PetscCall(RatesOfStart(ts, rate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -416,24 +416,24 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
   WorkVec         V;
 
   PetscFunctionBegin;
-  PetscCall(Consistent(ts, have, rate));
+  PetscCall(ConsistentWithRates(ts, have, rate));
   PetscCall(ChooseFirstStep(ts, rate));
   PetscCall(V.like(I.V0));
   for (int k = 0; gone && k < max_transients; k++) {
     PetscCall(VecCopy(I.V0, V));
     PetscCall(VecNorm(I.A0, NORM_2, &before));
-    PetscCall(SettleTransient(ts, ts->time_step, rate, &tau, &gone));
+    PetscCall(RemoveTransient(ts, ts->time_step, rate, &tau, &gone));
     if (tau <= 0) break;
     if (gone) {
       ts->time_step = given;
       I.auto_h      = auto_h;
-      PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
+      PetscCall(ConsistentWithRates(ts, {false, Gamma::Near}, rate));
       PetscCall(VecNorm(I.A0, NORM_2, &after));
       gone = (PetscBool)(after < 0.5 * before);
       if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
       else {
         PetscCall(VecCopy(V, I.V0));
-        PetscCall(Consistent(ts, {false, Gamma::Near}, rate));
+        PetscCall(ConsistentWithRates(ts, {false, Gamma::Near}, rate));
       }
       PetscCall(ChooseFirstStep(ts, rate));
     }
@@ -444,7 +444,7 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
 
 } // namespace
 
-/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+/* Everything of t_n from U0, V0: the common part of a start and of a consistent restart */
 PetscErrorCode StartFromState(TS ts, Prepared have)
 {
   Integrator &I = Get(ts);
@@ -478,7 +478,7 @@ static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
 }
 
 /* From vec_sol and vec_dot at ptime; history is forgotten */
-PetscErrorCode Start(TS ts)
+PetscErrorCode StartFromSolution(TS ts)
 {
   Integrator &I = Get(ts);
   Prepared    have;
@@ -500,13 +500,13 @@ PetscErrorCode Start(TS ts)
     I.t_begin   = ts->ptime;
     I.norm_size = 0;
     I.h_regular = I.h_limit = 0;
-    I.corrector.blames = 0;
+    I.corrector.jacobian_faults = 0;
     I.told             = PETSC_FALSE;
     for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));
   }
   PetscCall(FollowTolerances(ts, I.U0));
   PetscCall(UpdateWeights(ts, I.U0));
-  PetscCall(NoteExcitation(ts));
+  PetscCall(FindExcitation(ts));
   PetscCall(CheckInitialState(ts, &have));
   if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
     PetscCall(ReferToState(ts));

@@ -1,5 +1,5 @@
-/* A consistent state at t_n: at the beginning of a run (start.cpp, project.cpp, settle.cpp), and where h has fallen by much or is too short for the corrector
-   (repair.cpp). */
+/* A consistent state at t_n: at the beginning of a run (start.cpp, project.cpp, transient.cpp), and where h has fallen by much or is too short for the corrector
+   (restart.cpp). */
 #ifndef HHTDAE_START_H
 #define HHTDAE_START_H
 
@@ -9,8 +9,8 @@ namespace hht3
 {
 
 /* ts->time_step as TSCreate() makes it, and what stands for "not set": a rounding error less, so that a 0.1 of the user's differs */
-constexpr PetscReal petsc_step = 0.1;
-constexpr PetscReal unset_step = petsc_step * (1 - PETSC_MACHINE_EPSILON);
+constexpr PetscReal petsc_default_step = 0.1;
+constexpr PetscReal unset_step         = petsc_default_step * (1 - PETSC_MACHINE_EPSILON);
 
 /* Second derivatives of the constraints in time, gamma of (6c): to be made; to be made where they were a moment ago, by the same differences; made */
 enum class Gamma { New, Near, Made };
@@ -23,17 +23,17 @@ struct Prepared {
 };
 
 /* From vec_sol and vec_dot at ptime; history is forgotten */
-PetscErrorCode Start(TS ts);
+PetscErrorCode StartFromSolution(TS ts);
 
 /* How fast loads and motions are that depend on time alone, excitation.cpp */
-PetscErrorCode NoteExcitation(TS ts);
-constexpr PetscReal coasting = 0.02; /* of the run: the longest step where nothing moves, though loads or motions follow time */
+PetscErrorCode FindExcitation(TS ts);
+constexpr PetscReal coasting_fraction = 0.02; /* of the run: the longest step where nothing moves, though loads or motions follow time */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V);
-PetscErrorCode TellUnfollowed(TS ts);
+PetscErrorCode WarnOfUnfollowedLoads(TS ts);
 
 /* U0 and V0 projected on the constraints and a consistent start from there, before a step of another length than the last one, and when that is called for */
-PetscErrorCode Repair(TS ts);
-PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes);
+PetscErrorCode RestartConsistently(TS ts);
+PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes);
 
 /* Whether a step of length h is so short that rounding would drown its accelerations; such a step by Taylor series: U1, V1, A1 and X as a corrected one would
    leave them */
@@ -52,7 +52,7 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
 /* Whether the solution is what a step has left in t, U, V, but for less than the tolerance */
 PetscErrorCode IsOwnState(TS ts, PetscReal t, Vec U, Vec V, PetscBool *own);
 
-/* Whether a step that ended at t has left the time as it is; Accept() may have moved it a little */
+/* Whether a step that ended at t has left the time as it is; AcceptStep() may have moved it a little */
 inline bool IsEndOf(TS ts, PetscReal t) { return PetscAbsReal(ts->ptime - t) <= PetscMax(1e-9 * Get(ts).h, 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t)); }
 
 /* U0 and V0 to the nearest ones that the constraints allow */
@@ -61,7 +61,7 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared);
 /* U0, V0, A0 hold a consistent start: the step ends before a function of an event that begins at its zero there comes back to it, events.cpp */
 PetscErrorCode LimitStepByEvents(TS ts);
 
-/* Everything of t_n from U0, V0: the common part of a start and of a repair */
+/* Everything of t_n from U0, V0: the common part of a start and of a consistent restart */
 PetscErrorCode StartFromState(TS ts, Prepared have);
 
 /* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
@@ -69,7 +69,7 @@ PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, V
 
 /* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where a transient of time constant *tau is over long before the
    step ends, V0 is what it `leaves`, and the rest is to be made anew. */
-PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
+PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
 
 /* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
 PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V);

@@ -12,10 +12,10 @@ namespace hht3
 namespace
 {
 
-using Choose = PetscErrorCode (*)(TSAdapt, TS, PetscReal, PetscInt *, PetscReal *, PetscBool *, PetscReal *, PetscReal *, PetscReal *);
+using ChooseFunction = PetscErrorCode (*)(TSAdapt, TS, PetscReal, PetscInt *, PetscReal *, PetscBool *, PetscReal *, PetscReal *, PetscReal *);
 
 struct Basic {
-  Choose choose = nullptr;
+  ChooseFunction choose = nullptr;
 };
 
 /* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
@@ -33,15 +33,15 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 }
 
 /* Of the tolerance: nothing moves, or evenly */
-constexpr PetscReal negligible = 1e-3;
-constexpr PetscReal waiting    = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
-constexpr PetscReal regular    = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
+constexpr PetscReal negligible_error = 1e-3;
+constexpr PetscReal waiting_growth   = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
+constexpr PetscReal regular_fraction = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
 
 /* Where nothing moves the error says nothing of loads and motions that are to come */
 PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
 {
   Integrator     &I        = Get(ts);
-  const PetscReal furthest = PetscMin(PetscMax(waiting * h, regular * I.h_regular), coasting * (ts->max_time - I.t_begin));
+  const PetscReal furthest = PetscMin(PetscMax(waiting_growth * h, regular_fraction * I.h_regular), coasting_fraction * (ts->max_time - I.t_begin));
 
   PetscFunctionBegin;
   if (*next <= furthest) PetscFunctionReturn(PETSC_SUCCESS);
@@ -57,7 +57,7 @@ PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
   const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h), equal = 1e-6; /* but for rounding */
 
   PetscFunctionBegin;
-  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || rest < (1 - equal) * *next || rest > last_steps * *next) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->exact_final_time != TS_EXACTFINALTIME_MATCHSTEP || rest < (1 - equal) * *next || rest > equal_last_steps * *next) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal steps = PetscCeilReal(rest / *next - equal);
   if (steps * *next - rest > equal * rest) PetscCall(PetscInfo(ts, "the last %g steps before a given time are of one length, %g in place of %g\n", (double)steps, (double)(rest / steps), (double)*next));
   *next = rest / steps;
@@ -65,7 +65,7 @@ PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
 }
 
 /* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
-PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
+PetscErrorCode TSAdaptChoose_HHT(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
 {
   PetscBool ours;
 
@@ -74,14 +74,14 @@ PetscErrorCode ChooseStep(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, P
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
   if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
   if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
-  if (*wlte >= 0 && *wlte < negligible) PetscCall(WaitForLoads(ts, h, next));
+  if (*wlte >= 0 && *wlte < negligible_error) PetscCall(WaitForLoads(ts, h, next));
   if (*wlte >= 0) PetscCall(HoldStep(ts, h, next));
   else *next = PetscMax(*next, PetscMin(Get(ts).h_regular > 0 ? Get(ts).h_regular : 10 * h, adapt->dt_max));
   PetscCall(ShareTheRest(ts, h, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DestroyAdapt(TSAdapt adapt)
+PetscErrorCode TSAdaptDestroy_HHT(TSAdapt adapt)
 {
   PetscFunctionBegin;
   delete static_cast<Basic *>(adapt->data);
@@ -92,7 +92,7 @@ PetscErrorCode DestroyAdapt(TSAdapt adapt)
 } // namespace
 
 /* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn */
-PetscErrorCode LookFurther(TS ts)
+PetscErrorCode LookAheadAgain(TS ts)
 {
   Integrator &I = Get(ts);
   PetscBool   ours;
@@ -102,18 +102,18 @@ PetscErrorCode LookFurther(TS ts)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSHHT3, &ours));
   if (!ours) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LookAhead(ts, ts->ptime, I.U0, I.V0));
-  if (I.ahead == Ahead::Loads) ts->time_step = PetscMin(ts->time_step, coasting * (ts->max_time - I.t_begin));
+  if (I.ahead == Ahead::Loads) ts->time_step = PetscMin(ts->time_step, coasting_fraction * (ts->max_time - I.t_begin));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The basic type, whose choice is looked at */
-PetscErrorCode CreateAdapt(TSAdapt adapt)
+PetscErrorCode TSAdaptCreate_HHT(TSAdapt adapt)
 {
   PetscFunctionBegin;
   PetscCall(TSAdaptSetType(adapt, TSADAPTBASIC));
   adapt->data         = new Basic{adapt->ops->choose};
-  adapt->ops->choose  = ChooseStep;
-  adapt->ops->destroy = DestroyAdapt;
+  adapt->ops->choose  = TSAdaptChoose_HHT;
+  adapt->ops->destroy = TSAdaptDestroy_HHT;
   PetscCall(PetscObjectChangeTypeName((PetscObject)adapt, TSHHT3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,10 @@
 /*
   Steps of order 3 to 5: the accepted states that they need, the stage that follows from these, and the way from and to HHT, the member of order two.
 
-  HHT's unknown is an acceleration a that lags behind q'' and its velocities miss the differentiated constraints by O(h^2), misfit.cpp; backward
-  differentiation has neither. Where the order goes from two to three, the misfit is taken out of the velocities of the history, or accelerations in the directions of the
+  HHT's unknown is an acceleration a that lags behind q'' and its velocities miss the differentiated constraints by O(h^2), drift.cpp; backward
+  differentiation has neither. Where the order goes from two to three, the drift is taken out of the velocities of the history, or accelerations in the directions of the
   constraints, and with them multipliers, would be off by an error of first order for as many steps as the history has. Where it comes back, a_n
-  and the misfit are put in as at a start.
+  and the drift are put in as at a start.
 
   A step far shorter than the one before, as to an event or the end of a run, does not lengthen the history: its beginning is left out.
 */
@@ -23,14 +23,14 @@ namespace
 
 /* A step below this part of the last one is too short to be differentiated over: what the corrector has left in the positions of its ends would
    count so many times more in the velocities of the next one */
-constexpr PetscReal too_short = 0.2;
+constexpr PetscReal short_step_ratio = 0.2;
 
-/* The multiple of dV in psi_v: that of a step of length h counts as (h/misfit_h)^2 */
-PetscReal MisfitOfHistory(const Order &o, const BDF &b)
+/* The multiple of dV in psi_v: that of a step of length h counts as (h/drift_h)^2 */
+PetscReal DriftOfHistory(const Order &o, const BDF &b)
 {
   PetscReal sum = 0;
   for (PetscInt j = 0; j < o.now; j++)
-    if (o.misfit_h > 0) sum += b.c[j] * PetscSqr(o.hht[j] / o.misfit_h);
+    if (o.drift_h > 0) sum += b.c[j] * PetscSqr(o.hht[j] / o.drift_h);
   return sum;
 }
 
@@ -42,7 +42,7 @@ PetscErrorCode CopyCoordinates(const Integrator &I, Vec y, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the first attempt of order three or more from a state of HHT's: accelerations are q'', and the misfit of the velocities is measured */
+/* Before the first attempt of order three or more from a state of HHT's: accelerations are q'', and the drift of the velocities is measured */
 PetscErrorCode EnterBDF(TS ts)
 {
   Integrator &I = Get(ts);
@@ -51,11 +51,11 @@ PetscErrorCode EnterBDF(TS ts)
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " from t = %g\n", o.now, (double)ts->ptime));
   PetscCall(CopyCoordinates(I, I.A0, I.predictor.D[0]));
-  I.misfit = 0;
+  I.drift_removed = 0;
   if (o.hht[0] > 0 && I.count[TSHHT3_HOLONOMIC] && I.corrector.matrix.have) {
-    if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
-    o.misfit_h = o.hht[0];
-  } else o.misfit_h = 0;
+    if (!I.have_drift) PetscCall(MeasureDrift(ts));
+    o.drift_h = o.hht[0];
+  } else o.drift_h = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -75,8 +75,8 @@ PetscErrorCode LeaveBDF(TS ts)
         if (r == TSHHT3_STATE) x = v + I.hht.lagState() * I.h_last * slope;
       },
       Read(I.A0), Read(I.V0), Read(p.D[1]), Write(I.X0)));
-    I.bent = Bend::None;
-    if (I.corrector.matrix.have) PetscCall(StartMisfit(ts, p.D[1]));
+    I.jerk = Jerk::None;
+    if (I.corrector.matrix.have) PetscCall(SetDriftOfStart(ts, p.D[1]));
   }
   PetscCall(CopyCoordinates(I, I.X0, p.D[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -99,7 +99,7 @@ PetscErrorCode SetUpOrder(TS ts)
   o.max = o.wanted == TSHHT3_ORDER_AUTO ? max_order : o.wanted;
   PetscCheck(o.max == 2 || I.form == TSHHT3_FORM_SECOND_ORDER, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "Orders above two (-ts_hhtdae_order) satisfy the equations of motion at the end of a step, as the second-order form does; the paper's form (-ts_hhtdae_form paper) has order 2 alone");
-  if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, hht_degree);
+  if (!I.predictor.fixed) I.predictor.degree_max = PetscMax(o.max, default_degree);
   if (o.max == 2) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt j = 0; j < o.max; j++) {
     if (!o.U[j]) PetscCall(VecDuplicate(ts->vec_sol, &o.U[j]));
@@ -142,7 +142,7 @@ void CommitOrder(Integrator &I)
   Order &o = I.order;
 
   if (o.max == 2) return;
-  if (o.accepted > 0 && (o.past == 0 || I.h >= too_short * I.h_last)) {
+  if (o.accepted > 0 && (o.past == 0 || I.h >= short_step_ratio * I.h_last)) {
     /* U1, V1 take the place of what goes, and U0, V0 are the first of the past when they have been exchanged */
     std::rotate(o.U, o.U + o.max - 1, o.U + o.max);
     std::rotate(o.V, o.V + o.max - 1, o.V + o.max);
@@ -210,7 +210,7 @@ PetscErrorCode PrepareBDF(TS ts)
   PetscFunctionBegin;
   Spans(o, I.t1, tau);
   const BDF       b      = BDFOf(o.now, tau);
-  const PetscReal misfit = MisfitOfHistory(o, b);
+  const PetscReal drift_removed = DriftOfHistory(o, b);
   std::copy(o.U, o.U + o.now - 1, U + 1);
   std::copy(o.V, o.V + o.now - 1, V + 1);
   for (PetscInt j = 0; j < o.now; j++) {
@@ -223,11 +223,11 @@ PetscErrorCode PrepareBDF(TS ts)
   };
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar &bu, PetscScalar &bv, PetscScalar &ba, PetscScalar dV) {
-      bv = IsCoordinate(I, i) ? psi(v, i, -misfit * dV) : 0;
+      bv = IsCoordinate(I, i) ? psi(v, i, -drift_removed * dV) : 0;
       bu = IsDifferential(RoleOf(I, i)) ? psi(u, i, 0) + b.gh * bv : 0;
       ba = 0;
     },
-    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(misfit != 0 ? I.dV : I.V0 /* times zero */)));
+    Write(I.base[0]), Write(I.base[1]), Write(I.base[2]), Read(drift_removed != 0 ? I.dV : I.V0 /* times zero */)));
   PetscCall(ForSome(
     I.rotations.at,
     [&](PetscInt i, PetscScalar &bu) {
@@ -255,7 +255,7 @@ PetscErrorCode MapPast(TS ts)
     PetscCall(VecZeroEntries(A));
     PetscCall((*I.change.map)(ts, o.t[j + 1], o.U[j], o.V[j], A, I.change.ctx));
   }
-  o.misfit_h = 0;
+  o.drift_h = 0;
   for (PetscReal &h : o.hht) h = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -265,11 +265,11 @@ PetscErrorCode MapPast(TS ts)
 static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
 
 /* After so many times as many steps above order two it begins anew */
-static constexpr PetscInt forgiven_after = 10;
+static constexpr PetscInt steps_to_forgive = 10;
 
 void LowerToTwo(Order &o)
 {
-  if (o.above > forgiven_after * o.penalty) o.penalty = 0;
+  if (o.above > steps_to_forgive * o.penalty) o.penalty = 0;
   o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
   o.next             = 2;
 }

@@ -26,11 +26,11 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal shown   = 0.9; /* of h: so long a step has shown that the solver works at this length */
-constexpr PetscReal fall_to = 0.7; /* of h at which a correction has failed: what h may grow to, for a while */
+constexpr PetscReal proven_fraction        = 0.9; /* of h: so long a step has shown that the solver works at this length */
+constexpr PetscReal fraction_after_failure = 0.7; /* of h at which a correction has failed: what h may grow to, for a while */
 
 /* Once more with a matrix of its own, from the prediction or from where the step begins */
-PetscErrorCode Again(TS ts, bool from_rest, PetscBool *converged)
+PetscErrorCode RunSNESAgain(TS ts, bool from_rest, PetscBool *converged)
 {
   Integrator &I = Get(ts);
 
@@ -39,7 +39,7 @@ PetscErrorCode Again(TS ts, bool from_rest, PetscBool *converged)
   I.corrector.matrix.want = PETSC_TRUE;
   PetscCall(Predict(ts, I.X));
   if (from_rest) PetscCall(PredictRest(I, I.X));
-  PetscCall(Iterate(ts, converged));
+  PetscCall(RunSNES(ts, converged));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,7 +68,7 @@ PetscErrorCode ChoosePrediction(TS ts)
 } // namespace
 
 /* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
-PetscErrorCode Correct(TS ts, PetscBool *converged)
+PetscErrorCode RunCorrector(TS ts, PetscBool *converged)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
@@ -79,22 +79,22 @@ PetscErrorCode Correct(TS ts, PetscBool *converged)
   c.matrix.want = (PetscBool)(c.matrix.due(EffectiveStep(I), c) || (once && EffectiveStep(I) != c.matrix.h));
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
   if (c.from_rest) PetscCall(ChoosePrediction(ts));
-  PetscCall(Iterate(ts, converged));
+  PetscCall(RunSNES(ts, converged));
   const bool retry = !*converged && !c.matrix.fresh && !c.user_lag;
   if (retry) {
     PetscCall(PetscInfo(ts, "corrector: failed with an old matrix (%s), retried with a new one\n", I.failure));
-    PetscCall(Again(ts, false, converged));
+    PetscCall(RunSNESAgain(ts, false, converged));
   }
   if (!*converged && I.fixed_h && I.order.now == 2 && !c.user_lag) { /* higher orders fall to two first */
     PetscCall(PetscInfo(ts, "corrector: failed (%s), retried from where the step begins\n", I.failure));
-    PetscCall(Again(ts, true, converged));
+    PetscCall(RunSNESAgain(ts, true, converged));
     c.from_rest = *converged;
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
     /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what the last step has shown to work
        (Failures.SingularMatrixNowAndThen) */
-    if (!c.no_solve || I.h_limit <= 0 || I.h_last < shown * I.h) I.h_limit = fall_to * I.h;
+    if (!c.no_solve || I.h_limit <= 0 || I.h_last < proven_fraction * I.h) I.h_limit = fraction_after_failure * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

@@ -33,7 +33,7 @@ struct Tolerances {
 };
 
 /* Root mean square or maximum over all ranks of values accumulated locally */
-PetscErrorCode Reduce(TS ts, NormType type, PetscInt size, PetscReal local, PetscReal *norm)
+PetscErrorCode ReduceNorm(TS ts, NormType type, PetscInt size, PetscReal local, PetscReal *norm)
 {
   PetscReal global;
 
@@ -135,7 +135,7 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, Petsc
 
   PetscFunctionBegin;
   if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar d, PetscScalar w) { states += PetscSqr(d * w); }, Read(dX), Read(I.weight)));
-  PetscCall(Reduce(ts, NORM_2, I.norm_size, PetscMax(sum - states, 0) * q * q + states * s * s, e));
+  PetscCall(ReduceNorm(ts, NORM_2, I.norm_size, PetscMax(sum - states, 0) * q * q + states * s * s, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,7 +197,7 @@ static PetscErrorCode AddStateErrors(const Integrator &I, NormType type, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
+PetscErrorCode TSEvaluateWLTE_HHT(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
 {
   Integrator &I   = Get(ts);
   PetscReal   acc = 0;
@@ -212,7 +212,7 @@ PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wl
     PetscCall(CoordinateErrors(I, type, &acc));
     PetscCall(AddRotationErrors(I, type, &acc));
     PetscCall(AddStateErrors(I, type, &acc));
-    PetscCall(Reduce(ts, type, I.norm_size, acc, wlte));
+    PetscCall(ReduceNorm(ts, type, I.norm_size, acc, wlte));
   }
   I.wlte_pending = *wlte;
   PetscCall(PetscLogEventEnd(events.estimate, ts, 0, 0, 0));
@@ -226,7 +226,7 @@ PetscErrorCode NoteError(TS ts)
   PetscReal   e;
 
   PetscFunctionBegin;
-  if (I.wlte_pending < 0) PetscCall(EvaluateWLTE(ts, ts->adapt->wnormtype, NULL, &e));
+  if (I.wlte_pending < 0) PetscCall(TSEvaluateWLTE_HHT(ts, ts->adapt->wnormtype, NULL, &e));
   if (I.wlte_pending >= 0) I.corrector.wlte = I.wlte_pending;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,14 +22,14 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, Petsc
 PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to);
 
 /* The error of the attempt, as TSAdapt asks for it. NoteError() keeps that of the accepted step for the corrector's tolerance in the next one. */
-PetscErrorCode EvaluateWLTE(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
+PetscErrorCode TSEvaluateWLTE_HHT(TS ts, NormType type, PetscInt *order, PetscReal *wlte);
 PetscErrorCode NoteError(TS ts);
 
 /* Before a time at which a step has to end: of one length, and their change of h is seen by whoever reads the multipliers there */
-constexpr PetscReal last_steps = 10;
+constexpr PetscReal equal_last_steps = 10;
 
-PetscErrorCode CreateAdapt(TSAdapt adapt);
-PetscErrorCode LookFurther(TS ts); /* before the attempts from t_n, where the run goes on beyond its old end */
+PetscErrorCode TSAdaptCreate_HHT(TSAdapt adapt);
+PetscErrorCode LookAheadAgain(TS ts); /* before the attempts from t_n, where the run goes on beyond its old end */
 
 /* Before an attempt from t_n */
 PetscErrorCode ApplyStepLimit(TS ts);

@@ -19,7 +19,7 @@ namespace
 {
 
 /* The full step, and no residual after the last one: (40) needs the correction alone. The judgement is handed to SNES by
-   ConvergenceTest(). */
+   SNESConverged_HHT(). */
 PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
 {
   TS          ts = (TS)ctx;
@@ -97,7 +97,7 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
     WorkVec   next;
     PetscReal left;
     PetscCall(next.like(X));
-    PetscCall(SizeOfAnswer(ts, F, next, &left));
+    PetscCall(SizeOfCorrectionFor(ts, F, next, &left));
     e = PetscMax(e, left);
   }
   if (!newton) PetscCall(VecCopy(X, I.before));
@@ -131,7 +131,7 @@ PetscErrorCode CountForeign(TS ts, PetscBool solved)
 } // namespace
 
 /* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
-PetscErrorCode ConvergenceTest(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
+PetscErrorCode SNESConverged_HHT(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
 {
   TS          ts = (TS)ctx;
   Integrator &I  = Get(ts);
@@ -211,7 +211,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
   PetscCall(Y.like(X));
   while (!c.reason && c.it < ts->snes->max_its) {
     if (!evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
-    PetscCall(AnswerOf(ts, F, Y, &solved));
+    PetscCall(CorrectionFor(ts, F, Y, &solved));
     if (!solved) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(SubtractCorrection(ts, X, Y, &e));
     evaluated = PETSC_FALSE;
@@ -223,7 +223,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
 }
 
 /* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
-PetscErrorCode Iterate(TS ts, PetscBool *ok)
+PetscErrorCode RunSNES(TS ts, PetscBool *ok)
 {
   Integrator         &I = Get(ts);
   Corrector          &c = I.corrector;

@@ -17,7 +17,7 @@
   multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
   (h fell to 1e-6). A c that the user has set stands.
 
-  A last correction that proves nothing (verify.cpp), turns back (between.cpp), is followed by another one or leaves forces of what is driven
+  A last correction that proves nothing (verify.cpp), turns back (bisection.cpp), is followed by another one or leaves forces of what is driven
   (driven.cpp) goes on.
 */
 #include "corrector.h"
@@ -31,13 +31,13 @@ namespace
 {
 
 /* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
-constexpr PetscReal fixed = 0.02;
+constexpr PetscReal fixed_step_factor = 0.02;
 
 /* A rate below it may be an old matrix' fault, above it the iteration diverges */
-constexpr PetscReal slow = 0.8;
+constexpr PetscReal diverging_rate = 0.8;
 
 /* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
-constexpr PetscReal stagnant = 0.5;
+constexpr PetscReal stagnation_ratio = 0.5;
 
 /* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
 constexpr PetscInt max_renewals = 3;
@@ -53,7 +53,7 @@ PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
   *yes = PETSC_FALSE;
   if (!I.fixed_h && c.e > 1) PetscFunctionReturn(PETSC_SUCCESS); /* no step to be accepted by the error test */
   PetscCall(RoundingOfCorrection(ts, X, &noise));
-  *yes = (PetscBool)(c.e <= of_rounding * noise);
+  *yes = (PetscBool)(c.e <= rounding_factor * noise);
   if (*yes) PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -73,7 +73,7 @@ PetscErrorCode FreshMatrixNextIteration(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Diverge(TS ts, const char *why)
+PetscErrorCode EndDiverged(TS ts, const char *why)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
@@ -86,26 +86,26 @@ PetscErrorCode Diverge(TS ts, const char *why)
 }
 
 /* What may be left of a correction, in units of the tolerance */
-PetscReal Tolerance(const Integrator &I)
+PetscReal IterationTolerance(const Integrator &I)
 {
   const Corrector &c = I.corrector;
   const PetscReal tol = CorrectorTolerance(I);
   const PetscReal least = I.h_limit > 0 ? 0.01 : 0; /* h is short for the corrector's sake */
-  return I.fixed_h ? fixed * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, least, 1);
+  return I.fixed_h ? fixed_step_factor * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, least, 1);
 }
 
 /* The iteration does not converge as it is: is that rounding, may a new matrix help, or has it failed? */
-PetscErrorCode Stalled(TS ts, const Corrections &so_far, Vec X)
+PetscErrorCode TryNewMatrix(TS ts, const Corrections &so_far, Vec X)
 {
   Corrector      &c        = Get(ts).corrector;
   const PetscReal xi       = so_far.rate();
   PetscBool       rounding = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (c.base || xi >= slow) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
+  if (c.base || xi >= diverging_rate) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
   if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-  else if (c.renewals < max_renewals && so_far.left > 2 && (xi < slow || rounding)) PetscCall(FreshMatrixNextIteration(ts));
-  else PetscCall(Diverge(ts, xi >= 1 ? "diverges" : "converges too slowly"));
+  else if (c.renewals < max_renewals && so_far.left > 2 && (xi < diverging_rate || rounding)) PetscCall(FreshMatrixNextIteration(ts));
+  else PetscCall(EndDiverged(ts, xi >= 1 ? "diverges" : "converges too slowly"));
   c.rounding = (PetscBool)(c.reason > 0);
   if (c.rounding) {
     c.matrix.rate = -1; /* that of noise says nothing of the matrix */
@@ -115,7 +115,7 @@ PetscErrorCode Stalled(TS ts, const Corrections &so_far, Vec X)
 }
 
 /* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
-PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
+PetscErrorCode JudgeIteration(TS ts, PetscReal e, Vec X)
 {
   Integrator       &I      = Get(ts);
   Corrector        &c      = I.corrector;
@@ -125,23 +125,23 @@ PetscErrorCode Judge(TS ts, PetscReal e, Vec X)
   c.e        = e;
   c.rounding = PETSC_FALSE;
   if (PetscIsInfOrNanReal(e)) {
-    PetscCall(Diverge(ts, "produced a correction that is not a number"));
+    PetscCall(EndDiverged(ts, "produced a correction that is not a number"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, Tolerance(I), c.floor);
+  const Verdict verdict = JudgeCorrections(so_far, c.matrix.rate, IterationTolerance(I), c.floor);
   const bool slow_too_early = so_far.tooEarly() && so_far.rate() >= c.of(I.linear.constraint).slow_rate;
   if (so_far.with_matrix >= 2 && !slow_too_early && e > c.floor) {
     c.matrix.rate = so_far.rate();
     c.xi_max      = PetscMax(c.xi_max, c.matrix.rate);
   }
   if (verdict == Verdict::Converged) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
-  else if (verdict == Verdict::TooMany) PetscCall(Diverge(ts, "needs too many iterations"));
-  else if (verdict == Verdict::Stalled) PetscCall(Stalled(ts, so_far, X));
+  else if (verdict == Verdict::TooMany) PetscCall(EndDiverged(ts, "needs too many iterations"));
+  else if (verdict == Verdict::Stalled) PetscCall(TryNewMatrix(ts, so_far, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Where the user's test decides, the rate is only measured, for the reuse of the matrix */
-PetscErrorCode Measure(TS ts, PetscReal e)
+PetscErrorCode MeasureRate(TS ts, PetscReal e)
 {
   Corrector      &c  = Get(ts).corrector;
   const PetscReal xi = c.e > 0 ? e / c.e : 0;
@@ -161,7 +161,7 @@ PetscErrorCode FailUnproved(TS ts)
 
   PetscFunctionBegin;
   I.corrector.reason = SNES_DIVERGED_DTOL;
-  if (I.corrector.wrong_jacobian) I.corrector.blames += 1;
+  if (I.corrector.wrong_jacobian) I.corrector.jacobian_faults += 1;
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
                           "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
                           "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two. If it is right, roles found at the start hold no longer: TSHHT3SetIS()",
@@ -205,7 +205,7 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 
   PetscFunctionBegin;
   if (!(c.matrix.fresh || c.user_lag) || c.it >= c.limit()) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(BetweenIterates(ts, X, dX, F, &found));
+  PetscCall(BisectIterates(ts, X, dX, F, &found));
   *evaluated = found;
   if (!found) PetscFunctionReturn(PETSC_SUCCESS);
   c.reason = SNES_CONVERGED_ITERATING;
@@ -215,7 +215,7 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 }
 
 /* Whether the correction `next` goes on in the direction of dX */
-PetscErrorCode GoesOn(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
+PetscErrorCode ContinuesCorrection(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
 {
   PetscScalar dot, square;
 
@@ -223,7 +223,7 @@ PetscErrorCode GoesOn(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool
   PetscCall(WeightCorrection(I, dX, work));
   PetscCall(VecDot(dX, work, &square));
   PetscCall(VecDot(next, work, &dot));
-  *yes = (PetscBool)(PetscRealPart(dot) >= stagnant * PetscRealPart(square));
+  *yes = (PetscBool)(PetscRealPart(dot) >= stagnation_ratio * PetscRealPart(square));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -235,21 +235,21 @@ PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
   Integrator     &I    = Get(ts);
   Corrector      &c    = I.corrector;
   const Vec       next = I.verify.work, work = I.verify.model; /* the proof has done with them */
-  const PetscReal tol  = Tolerance(I);
+  const PetscReal tol  = IterationTolerance(I);
   PetscReal       e;
   PetscBool       goes_on = PETSC_TRUE, rounding = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(SizeOfAnswer(ts, F, next, &e));
+  PetscCall(SizeOfCorrectionFor(ts, F, next, &e));
   const PetscReal xi = c.e > 0 ? e / c.e : 0;
   if (CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
-  if (e <= at_once * tol) PetscCall(GoesOn(I, dX, next, work, &goes_on));
-  if (goes_on && c.base && xi >= stagnant) PetscCall(IsRounding(ts, X, &rounding));
+  if (e <= immediate_tolerance * tol) PetscCall(ContinuesCorrection(I, dX, next, work, &goes_on));
+  if (goes_on && c.base && xi >= stagnation_ratio) PetscCall(IsRounding(ts, X, &rounding));
   if (!goes_on || rounding) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: after a correction of %g of the tolerance the next one is %g\n", (double)c.e, (double)e));
   c.reason = SNES_CONVERGED_ITERATING;
-  if (c.it >= c.limit()) PetscCall(Diverge(ts, "needs too many iterations"));
-  else if (xi >= stagnant) PetscCall(FreshMatrices(ts));
+  if (c.it >= c.limit()) PetscCall(EndDiverged(ts, "needs too many iterations"));
+  else if (xi >= stagnation_ratio) PetscCall(FreshMatrices(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,11 +262,11 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
   PetscBool       good;
 
   PetscFunctionBegin;
-  PetscCall(ForcesOfDriven(ts, Tolerance(I), X, F, evaluated, &good));
+  PetscCall(ForcesOfDriven(ts, IterationTolerance(I), X, F, evaluated, &good));
   if (good) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "corrector: forces of driven coordinates, %g of the tolerance after iteration %" PetscInt_FMT "\n", (double)c.forces, c.it));
   c.reason = SNES_CONVERGED_ITERATING;
-  if (c.it >= c.limit()) PetscCall(Diverge(ts, "does not balance the forces of driven coordinates"));
+  if (c.it >= c.limit()) PetscCall(EndDiverged(ts, "does not balance the forces of driven coordinates"));
   else if (c.it - c.base >= 2 && c.forces >= c.slow_rate * before && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -277,7 +277,7 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 constexpr PetscReal least_norm = 1e-150;
 
 /* A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems): the solution of J dX = F is no shorter than |F|/|J|. */
-PetscErrorCode IsUnanswered(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
+PetscErrorCode SolveFoundNothing(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
 {
   KSP       ksp;
   PC        pc;
@@ -312,16 +312,16 @@ PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBo
   I.corrector.it++;
   I.stat.newton++;
   I.stat.solves++;
-  if (!I.corrector.user_test && (e == 0 || !*evaluated)) PetscCall(IsUnanswered(ts, dX, F, *evaluated, &unanswered));
+  if (!I.corrector.user_test && (e == 0 || !*evaluated)) PetscCall(SolveFoundNothing(ts, dX, F, *evaluated, &unanswered));
   if (unanswered) {
     I.corrector.reason = SNES_DIVERGED_LINEAR_SOLVE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(NoteForces(ts, F, *evaluated));
-  if (I.corrector.user_test) PetscCall(Measure(ts, e));
-  else PetscCall(Judge(ts, e, X));
+  if (I.corrector.user_test) PetscCall(MeasureRate(ts, e));
+  else PetscCall(JudgeIteration(ts, e, X));
   if (I.corrector.reason > 0) {
-    PetscCall(Verify(ts, X, dX, F, evaluated, &proved));
+    PetscCall(VerifyCorrection(ts, X, dX, F, evaluated, &proved));
     if (!proved) PetscCall(GoOnUnproved(ts));
     else if (I.verify.looked && !I.corrector.rounding) PetscCall(AskNextCorrection(ts, X, dX, F));
     if (I.corrector.reason > 0 && !I.corrector.rounding) PetscCall(AskForces(ts, X, F, evaluated));

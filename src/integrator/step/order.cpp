@@ -25,41 +25,41 @@ namespace
 {
 
 /* S_{m+1}/S_m up to which orders 3, 4, 5 are taken for stable: h omega = 0.4, 0.5, 0.65 */
-constexpr PetscReal stable[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
+constexpr PetscReal stable_ratio[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 
 /* From step to step that ratio counts as no more than so many times as much, from this value up: sharp places that are soon over are no oscillation */
-constexpr PetscReal recovers = 1.15, least_ratio = 0.1;
+constexpr PetscReal ratio_growth = 1.15, least_ratio = 0.1;
 
 /* Of an amplitude in the course of a step of constant length */
-constexpr PetscReal forgets = 0.8;
+constexpr PetscReal amplitude_decay = 0.8;
 
 /* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
-constexpr PetscReal silent = 0.5;
+constexpr PetscReal least_difference = 0.5;
 
 /* Of h from one step to the next above order two: coefficients of variable steps grow with it */
-constexpr PetscReal longest_growth = 2;
+constexpr PetscReal max_growth = 2;
 
-constexpr int lowest = 2, kinds = max_order; /* of the differences in use: S_2 ... S_6 */
+constexpr int lowest_difference = 2, num_differences = max_order; /* of the differences in use: S_2 ... S_6 */
 
 constexpr int most_points = max_order + 2; /* of the highest one; those that the history does not have yet weigh nothing */
 
 /* Scaled differences as sums of squares or largest entries */
 template <bool largest>
 struct Differences {
-  PetscReal          weight[kinds][most_points] = {};
+  PetscReal          weight[num_differences][most_points] = {};
   const PetscScalar *u[most_points], *w;
-  Four               result[kinds] = {};
+  Four               result[num_differences] = {};
 
   template <class At>
   HHT3_INLINE void operator()(const At &at)
   {
     const Four scale = at.get(w);
-    Four       d[kinds] = {};
+    Four       d[num_differences] = {};
     for (int j = 0; j < most_points; j++) {
       const Four x = at.get(u[j]);
-      for (int s = 0; s < kinds; s++) d[s] += weight[s][j] * x;
+      for (int s = 0; s < num_differences; s++) d[s] += weight[s][j] * x;
     }
-    for (int s = 0; s < kinds; s++) {
+    for (int s = 0; s < num_differences; s++) {
       const Four x = d[s] * scale;
       if (largest) result[s] = Larger(Absolute(x), result[s]);
       else result[s] += x * x;
@@ -70,7 +70,7 @@ struct Differences {
 
 /* Of U1, U0 and the past up to S_top, on this rank */
 template <bool largest>
-PetscErrorCode SweepDifferences(const Integrator &I, PetscInt top, PetscReal result[kinds])
+PetscErrorCode SweepDifferences(const Integrator &I, PetscInt top, PetscReal result[num_differences])
 {
   Differences<largest> d;
   Vec                  vec[most_points] = {I.U1, I.U0};
@@ -79,13 +79,13 @@ PetscErrorCode SweepDifferences(const Integrator &I, PetscInt top, PetscReal res
 
   PetscFunctionBegin;
   Spans(I.order, I.t1, tau);
-  for (PetscInt m = lowest; m <= top; m++) DifferenceWeights(m, tau, d.weight[m - lowest]);
+  for (PetscInt m = lowest_difference; m <= top; m++) DifferenceWeights(m, tau, d.weight[m - lowest_difference]);
   for (PetscInt j = 2; j < most_points; j++) vec[j] = j <= top ? I.order.U[j - 2] : I.U1;
   PetscCall(VecGetLocalSize(I.U1, &n));
   PetscCall(VecGetArrayRead(I.weight, &d.w));
   for (int j = 0; j < most_points; j++) PetscCall(VecGetArrayRead(vec[j], &d.u[j]));
   d = Sweep(n, d);
-  for (int s = 0; s < kinds; s++) result[s] = d.total(s);
+  for (int s = 0; s < num_differences; s++) result[s] = d.total(s);
   for (int j = 0; j < most_points; j++) PetscCall(VecRestoreArrayRead(vec[j], &d.u[j]));
   PetscCall(VecRestoreArrayRead(I.weight, &d.w));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,7 +97,7 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
   Integrator    &I   = Get(ts);
   Order         &o   = I.order;
   const PetscInt top = o.past + 1;
-  PetscReal      local[kinds], all[kinds];
+  PetscReal      local[num_differences], all[num_differences];
 
   PetscFunctionBegin;
   if (o.measured && type == o.norm) { /* by the estimate */
@@ -105,8 +105,8 @@ PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(type == NORM_2 ? SweepDifferences<false>(I, top, local) : SweepDifferences<true>(I, top, local));
-  PetscCallMPI(MPI_Allreduce(local, all, kinds, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt m = lowest; m < lowest + kinds; m++) S[m] = m > top ? -1 : type == NORM_2 ? PetscSqrtReal(all[m - lowest] / PetscMax(I.norm_size, 1)) : all[m - lowest];
+  PetscCallMPI(MPI_Allreduce(local, all, num_differences, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  for (PetscInt m = lowest_difference; m < lowest_difference + num_differences; m++) S[m] = m > top ? -1 : type == NORM_2 ? PetscSqrtReal(all[m - lowest_difference] / PetscMax(I.norm_size, 1)) : all[m - lowest_difference];
   o.measured = PETSC_TRUE;
   o.norm     = type;
   std::copy_n(S, max_order + 2, o.S);
@@ -132,13 +132,13 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   for (PetscReal &e : c->E) e = -1;
   Spans(I.order, I.t1, tau);
   PetscCall(ScaledDifferences(ts, ts->adapt->wnormtype, c->S));
-  for (PetscInt m = lowest; m < lowest + kinds; m++)
-    if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], forgets * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
+  for (PetscInt m = lowest_difference; m < lowest_difference + num_differences; m++)
+    if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], amplitude_decay * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
   for (PetscInt m = 3; m <= max_order; m++) {
     c->ratio[m] = 0;
     if (c->S[m + 1] < 0) continue;
-    const PetscReal ratio = c->S[m] > 0 && c->S[m + 1] > (I.fixed_h ? 0 : silent) ? c->S[m + 1] / c->S[m] : 0;
-    o.after.ratio[m]      = PetscMin(ratio, PetscMax(recovers * o.memory.ratio[m], least_ratio));
+    const PetscReal ratio = c->S[m] > 0 && c->S[m + 1] > (I.fixed_h ? 0 : least_difference) ? c->S[m + 1] / c->S[m] : 0;
+    o.after.ratio[m]      = PetscMin(ratio, PetscMax(ratio_growth * o.memory.ratio[m], least_ratio));
     if (o.wanted == TSHHT3_ORDER_AUTO) c->ratio[m] = o.after.ratio[m];
   }
   for (PetscInt m = PetscMax(now - 1, 3); m <= PetscMin(now + 1, o.max); m++)
@@ -149,22 +149,22 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
 }
 
 /* What stability leaves of the present h for order m */
-PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable[m] / c.ratio[m] : PETSC_MAX_REAL; }
+PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable_ratio[m] / c.ratio[m] : PETSC_MAX_REAL; }
 
 /* What is left of it by the m steps in which no body may turn farther than a rotation vector tells, with some room for spins that grow */
 PetscReal TurnReach(const Integrator &I, PetscInt m) { return m > 2 && I.order.spin > 0 ? 0.9 * longest_turn / (m * I.order.spin * I.h) : PETSC_MAX_REAL; }
 
 /* How much longer the next step of order m may be, with `safety` for its error */
-PetscReal Reach(const Integrator &I, const Candidates &c, PetscInt m, PetscReal safety)
+PetscReal StepRatio(const Integrator &I, const Candidates &c, PetscInt m, PetscReal safety)
 {
   return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, PetscMin(StableReach(c, m), TurnReach(I, m)));
 }
 
 /* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
-bool Better(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
+bool IsBetterOrder(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
-  if (!I.fixed_h) return Reach(I, c, m, 1) > Reach(I, c, than, 1);
+  if (!I.fixed_h) return StepRatio(I, c, m, 1) > StepRatio(I, c, than, 1);
   const bool m_stable = StableReach(c, m) >= 1, than_stable = StableReach(c, than) >= 1;
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
@@ -176,11 +176,11 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
   const PetscInt k     = o.now;
   const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
 
-  if (k == 2) return known && o.wait == 0 && Better(I, c, 3, 2) ? 3 : 2;
-  if (o.above > k && Better(I, c, 2, k)) return 2; /* differences over steps of order two have kinks where h changes */
+  if (k == 2) return known && o.wait == 0 && IsBetterOrder(I, c, 3, 2) ? 3 : 2;
+  if (o.above > k && IsBetterOrder(I, c, 2, k)) return 2; /* differences over steps of order two have kinks where h changes */
   if (o.since < k) return k;
-  if (k > 3 && Better(I, c, k - 1, k)) return k - 1;
-  return known && Better(I, c, k + 1, k) ? k + 1 : k;
+  if (k > 3 && IsBetterOrder(I, c, k - 1, k)) return k - 1;
+  return known && IsBetterOrder(I, c, k + 1, k) ? k + 1 : k;
 }
 
 /* A fixed order is reached from two as soon as the history is there */
@@ -224,8 +224,8 @@ PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
                         (double)c.E[o.now - 1], (double)c.E[o.now], (double)c.E[o.now + 1], (double)c.S[o.now], (double)c.S[o.now + 1], (double)c.S[o.now + 2]));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   if ((o.next > 2 || o.now > 2) && c.E[o.next] >= 0)
-    *next = I.h * PetscClipInterval(Reach(I, c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
-  if (o.next > 2) *next = PetscMin(*next, longest_growth * I.h);
+    *next = I.h * PetscClipInterval(StepRatio(I, c, o.next, ts->adapt->safety), ts->adapt->clip[0], ts->adapt->clip[1]);
+  if (o.next > 2) *next = PetscMin(*next, max_growth * I.h);
   *next = PetscClipInterval(*next, ts->adapt->dt_min, ts->adapt->dt_max);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -69,10 +69,10 @@ struct MatrixPolicy {
 /* A remembered rate is believed down to here: it was measured steps ago on smaller corrections, and the matrix has aged since.
    With 0.02 the error that first iterations left behind was up to ten times that of the step (heavy top, 1e-7); 0.3 costs
    5 to 20 % more iterations. */
-constexpr PetscReal remembered = 0.3;
+constexpr PetscReal least_remembered_rate = 0.3;
 
 /* Of the tolerance: a correction so small needs no rate */
-constexpr PetscReal at_once = 0.1;
+constexpr PetscReal immediate_tolerance = 0.1;
 
 enum class Verdict { Converged, GoOn, Stalled, TooMany }; /* stalled: it does not converge in the iterations that are left */
 
@@ -93,8 +93,8 @@ inline Verdict JudgeCorrections(const Corrections &c, PetscReal known_rate, Pets
 {
   if (c.last <= floor) return Verdict::Converged;
   if (c.with_matrix < 2) {
-    const bool known = known_rate >= 0 && CorrectorError(PetscMax(known_rate, remembered), c.last) <= tol;
-    return known || c.last <= at_once * tol ? Verdict::Converged : c.left > 0 ? Verdict::GoOn : Verdict::TooMany;
+    const bool known = known_rate >= 0 && CorrectorError(PetscMax(known_rate, least_remembered_rate), c.last) <= tol;
+    return known || c.last <= immediate_tolerance * tol ? Verdict::Converged : c.left > 0 ? Verdict::GoOn : Verdict::TooMany;
   }
   const PetscReal xi = c.rate(), error = CorrectorError(xi, c.last);
   if (error <= tol) return Verdict::Converged;

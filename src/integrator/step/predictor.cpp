@@ -18,7 +18,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
+constexpr PetscReal higher_degree_margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
 
 /* Predicted s' at t1 to the algorithmic w that gives it: the average of states in PrepareStage(), solved for w */
 PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
@@ -61,7 +61,7 @@ struct NewDifferences {
 /* The step at t1 is accepted. miss[k]: of degree k at t1, over the product of the times that its differences span; weights of unknowns that do not
    count are zero. */
 template <int have>
-PetscErrorCode Renew(const Integrator &I, Predictor &p, PetscReal miss[])
+PetscErrorCode RenewTo(const Integrator &I, Predictor &p, PetscReal miss[])
 {
   NewDifferences<have> sweep;
   const bool           states = I.count[TSHHT3_STATE]; /* for which s' counts: a copy of X has them */
@@ -88,7 +88,7 @@ PetscErrorCode Renew(const Integrator &I, Predictor &p, PetscReal miss[])
 
 PetscErrorCode RenewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
 {
-  static constexpr PetscErrorCode (*of[])(const Integrator &, Predictor &, PetscReal[]) = {Renew<0>, Renew<1>, Renew<2>, Renew<3>, Renew<4>, Renew<5>};
+  static constexpr PetscErrorCode (*of[])(const Integrator &, Predictor &, PetscReal[]) = {RenewTo<0>, RenewTo<1>, RenewTo<2>, RenewTo<3>, RenewTo<4>, RenewTo<5>};
   static_assert(sizeof(of) / sizeof(of[0]) == max_degree + 1, "one for each number of differences");
 
   PetscFunctionBegin;
@@ -161,7 +161,7 @@ PetscErrorCode PredictorUpdate(TS ts)
   for (PetscInt d = 0; d <= PetscMin(have, p.degree_max); d++) {
     factor *= I.t1 - p.t[d + 1];
     const PetscReal m = PetscAbsReal(factor) * PetscSqrtReal(sum[d]);
-    if (d > 0 && !(m < margin * best)) break;
+    if (d > 0 && !(m < higher_degree_margin * best)) break;
     best     = m;
     p.degree = d;
   }

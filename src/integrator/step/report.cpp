@@ -9,8 +9,8 @@ namespace hht3
 namespace
 {
 
-PetscReal Wall() { return std::chrono::duration<PetscReal>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-PetscReal Processor() { return (PetscReal)std::clock() / CLOCKS_PER_SEC; }
+PetscReal WallTime() { return std::chrono::duration<PetscReal>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+PetscReal ProcessorTime() { return (PetscReal)std::clock() / CLOCKS_PER_SEC; }
 
 } // namespace
 
@@ -18,16 +18,16 @@ PetscReal Processor() { return (PetscReal)std::clock() / CLOCKS_PER_SEC; }
 void StartClocks(Integrator &I)
 {
   if (I.timed) return;
-  I.wall0 = Wall() - I.stat.time;
-  I.cpu0  = Processor() - I.stat.cpu;
+  I.wall0 = WallTime() - I.stat.time;
+  I.cpu0  = ProcessorTime() - I.stat.cpu;
   I.timed = PETSC_TRUE;
 }
 
 void StopClocks(Integrator &I, bool stop)
 {
   if (!I.timed) return;
-  I.stat.time = Wall() - I.wall0;
-  I.stat.cpu  = Processor() - I.cpu0;
+  I.stat.time = WallTime() - I.wall0;
+  I.stat.cpu  = ProcessorTime() - I.cpu0;
   I.timed     = (PetscBool)!stop;
 }
 
@@ -35,7 +35,7 @@ void StopClocks(Integrator &I, bool stop)
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
   PetscFunctionBegin;
-  if (ts->ops->step != Step || !ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->ops->step != TSStep_HHT || !ts->reason || step < 0) PetscFunctionReturn(PETSC_SUCCESS);
   Integrator             &I = Get(ts);
   const TSHHT3Statistics &s = I.stat;
   StopClocks(I, true);
@@ -57,9 +57,9 @@ PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
   FILE *out = PETSC_STDERR;
 
   PetscFunctionBegin;
-  if (ts->ops->step != Step || step < 0) PetscFunctionReturn(PETSC_SUCCESS); /* the TS may be of another type by now */
+  if (ts->ops->step != TSStep_HHT || step < 0) PetscFunctionReturn(PETSC_SUCCESS); /* the TS may be of another type by now */
   Integrator &I = Get(ts);
-  const PetscReal now = Wall();
+  const PetscReal now = WallTime();
   if (!ts->steps) PetscFunctionReturn(PETSC_SUCCESS);
   if (!ts->reason && now - I.progress_last < 0.25) PetscFunctionReturn(PETSC_SUCCESS);
   I.progress_last          = now;

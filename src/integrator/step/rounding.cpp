@@ -13,7 +13,7 @@ namespace hht3
 {
 
 /* The correction that the matrix at hand makes of a residual r, to rounding: no other one follows */
-PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
+PetscErrorCode CorrectionFor(TS ts, Vec r, Vec dX, PetscBool *solved)
 {
   KSP                ksp;
   KSPConvergedReason reason;
@@ -34,13 +34,13 @@ PetscErrorCode AnswerOf(TS ts, Vec r, Vec dX, PetscBool *solved)
 }
 
 /* Its size; 0 if it has none */
-PetscErrorCode SizeOfAnswer(TS ts, Vec r, Vec dX, PetscReal *e)
+PetscErrorCode SizeOfCorrectionFor(TS ts, Vec r, Vec dX, PetscReal *e)
 {
   PetscBool solved;
 
   PetscFunctionBegin;
   *e = 0;
-  PetscCall(AnswerOf(ts, r, dX, &solved));
+  PetscCall(CorrectionFor(ts, r, dX, &solved));
   if (solved) PetscCall(CorrectionNorm(ts, dX, Get(ts).h, e));
   if (PetscIsInfOrNanReal(*e)) *e = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -64,7 +64,7 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
   for (unsigned salt = 0; salt < 2; salt++) {
     PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * RandomRounding(first + i, salt); }, Read(noise), Write(r)));
-    PetscCall(SizeOfAnswer(ts, r, F, &sample));
+    PetscCall(SizeOfCorrectionFor(ts, r, F, &sample));
     *e = PetscMax(*e, sample);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -17,13 +17,13 @@ namespace hht3
 namespace
 {
 
-/* q'_n less its misfit and what a change of coordinates has bent, misfit.cpp */
+/* q'_n less the part of its drift that a step of another length has to lose, and with what a start or a change of coordinates adds, drift.cpp */
 PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 {
   PetscFunctionBegin;
-  if (I.misfit != 0) PetscCall(VecWAXPY(v, -I.misfit, I.dV, I.V0));
+  if (I.drift_removed != 0) PetscCall(VecWAXPY(v, -I.drift_removed, I.dV, I.V0));
   else PetscCall(VecCopy(I.V0, v));
-  if (I.bent == Bend::Velocities) PetscCall(VecAXPY(v, -I.p.bend() * I.h * I.h, I.bend));
+  if (I.jerk == Jerk::Normal) PetscCall(VecAXPY(v, -I.p.jerk_factor() * I.h * I.h, I.normal_jerk));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,7 +148,7 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To be called when h, t_n's state or the misfit of its velocities have changed, before the first residual. The parts of U1, V1, A1 that do not depend on
+/* To be called when h, t_n's state or the drift of its velocities have changed, before the first residual. The parts of U1, V1, A1 that do not depend on
    X come from (2) and from the average that the form asks for. a_n and w_n were made by a step of length h_last; their lag behind the true values is stretched
    to the present h, without which a change of h costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true
    value, so that nothing changes. */

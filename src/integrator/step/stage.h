@@ -1,4 +1,4 @@
-/* U1, V1, A1 of the unknowns X, (2), in stage.cpp; and the misfit of the velocities at t_n against the constraints, misfit.cpp. */
+/* U1, V1, A1 of the unknowns X, (2), in stage.cpp; and the drift of the velocities at t_n off the constraints, drift.cpp. */
 #ifndef HHTDAE_STAGE_H
 #define HHTDAE_STAGE_H
 
@@ -7,7 +7,7 @@
 namespace hht3
 {
 
-/* Before the first residual of an attempt, and again where h, the state at t_n or the misfit of its velocities have changed */
+/* Before the first residual of an attempt, and again where h, the state at t_n or the drift of its velocities have changed */
 PetscErrorCode PrepareStage(TS ts);
 
 /* U1, V1, A1 from X */
@@ -19,9 +19,9 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 /* The velocities at t_n for a step of length I.h after one of length h_last */
 PetscErrorCode AdaptVelocities(TS ts);
 
-/* That misfit: the one that the method wants at a consistent start, from the rates of the accelerations, and dV at t_n in the course of a run */
-PetscErrorCode StartMisfit(TS ts, Vec rate);
-PetscErrorCode MeasureMisfit(TS ts);
+/* That drift: the one that the method wants at a consistent start, from the rates of the accelerations, and dV at t_n in the course of a run */
+PetscErrorCode SetDriftOfStart(TS ts, Vec rate);
+PetscErrorCode MeasureDrift(TS ts);
 
 } // namespace hht3
 

@@ -29,11 +29,11 @@ namespace
 {
 
 /* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten */
-constexpr PetscReal remembers = 0.9, relaxes = 1.02, far_above = 4;
+constexpr PetscReal regular_decay = 0.9, limit_growth = 1.02, limit_forgotten = 4;
 
 /* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
    has them again and again */
-constexpr PetscReal max_blames = 3, forgiven = 0.01; /* forgiven: with every accepted step */
+constexpr PetscReal max_jacobian_faults = 3, fault_decay = 0.01; /* forgiven: with every accepted step */
 
 /* -ts_exact_final_time interpolate leaves the solution at the end of a run in the vector that TSSolve() was given, and takes it for that at the end of the last step
    when it is called again with it (BetweenRuns.GoOnFromInterpolatedEnds) */
@@ -78,7 +78,7 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
 }
 
 /* The accepted step becomes the history */
-PetscErrorCode Commit(TS ts)
+PetscErrorCode CommitStep(TS ts)
 {
   Integrator &I = Get(ts);
 
@@ -92,14 +92,14 @@ PetscErrorCode Commit(TS ts)
   I.have_step   = PETSC_FALSE;
   I.at_begin    = PETSC_TRUE;
   I.h_last      = I.h;
-  I.have_misfit = PETSC_FALSE;
-  I.bent        = Bend::None;
+  I.have_drift = PETSC_FALSE;
+  I.jerk        = Jerk::None;
   PetscCall(HistoryForces(ts, I.t1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Where the step starts from: the last one, the one before a roll-back, or a consistent start */
-PetscErrorCode Begin(TS ts)
+PetscErrorCode BeginStep(TS ts)
 {
   Integrator &I       = Get(ts);
   PetscBool   changed = PETSC_FALSE;
@@ -116,10 +116,10 @@ PetscErrorCode Begin(TS ts)
     if (I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));
     else if (ts->steps && I.at_begin) PetscCall(IsOwnState(ts, I.t0, I.U0, I.V0, &I.own_start));
     I.have_step = I.at_begin = PETSC_FALSE;
-    PetscCall(Start(ts));
+    PetscCall(StartFromSolution(ts));
     I.at_begin = PETSC_TRUE;
   } else if (I.have_step) {
-    PetscCall(Commit(ts));
+    PetscCall(CommitStep(ts));
     if (I.change.test) PetscCall(ChangeCoordinates(ts, false));
     PetscCall(ReferToState(ts));
   }
@@ -127,7 +127,7 @@ PetscErrorCode Begin(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
+PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
 {
   Integrator     &I    = Get(ts);
   const PetscReal h    = I.h;
@@ -142,7 +142,7 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
     ts->ptime = stop;
   ts->time_step = I.h_next = next;
-  if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_step, I.h_after_event}, next);
+  if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_default_step, I.h_after_event}, next);
   if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
   /* the step to the stop was what was left, and would be taken for what the user wants */
   if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
@@ -150,15 +150,15 @@ PetscErrorCode Accept(TS ts, PetscBool tiny, PetscReal next)
     I.h_next = ts->time_step = I.h_given;
     if (rest > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(I.h_given, rest); /* BetweenRuns.FixedStepsInATimeSpan */
   }
-  if (!tiny) I.h_regular = PetscMax(h, remembers * I.h_regular);
-  if (I.h_limit > 0) I.h_limit = I.h_limit > far_above * h ? 0 : relaxes * I.h_limit;
-  I.corrector.blames = PetscMax(0, I.corrector.blames - forgiven);
+  if (!tiny) I.h_regular = PetscMax(h, regular_decay * I.h_regular);
+  if (I.h_limit > 0) I.h_limit = I.h_limit > limit_forgotten * h ? 0 : limit_growth * I.h_limit;
+  I.corrector.jacobian_faults = PetscMax(0, I.corrector.jacobian_faults - fault_decay);
   I.stat.steps++;
   I.stat.of_order[I.order.now]++;
   I.stat.h_min = I.stat.steps == 1 ? h : PetscMin(I.stat.h_min, h);
   I.stat.h_max = PetscMax(I.stat.h_max, h);
   I.have_step  = PETSC_TRUE;
-  PetscCall(TellUnfollowed(ts));
+  PetscCall(WarnOfUnfollowedLoads(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,16 +172,16 @@ void NoteGivenStep(TS ts)
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
 }
 
-PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
+PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
-  PetscBool   stage, repair = PETSC_FALSE;
+  PetscBool   stage, restart = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
-  if (!*tiny) PetscCall(WantsRepair(ts, ts->time_step, &repair));
-  if (repair) PetscCall(Repair(ts));
+  if (!*tiny) PetscCall(NeedsRestart(ts, ts->time_step, &restart));
+  if (restart) PetscCall(RestartConsistently(ts));
   if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
   I.h  = ts->time_step;
   I.t0 = ts->ptime;
@@ -195,7 +195,7 @@ PetscErrorCode Attempt(TS ts, PetscBool *tiny, PetscBool *ok)
     PetscCall(AdaptVelocities(ts));
     PetscCall(PrepareStage(ts));
     PetscCall(Predict(ts, I.X));
-    PetscCall(Correct(ts, ok));
+    PetscCall(RunCorrector(ts, ok));
   }
   PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
   /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
@@ -221,7 +221,7 @@ PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
 }
 
 /* vec_sol and vec_dot take the new state while TSAdapt looks at it, and the old one back if it is rejected */
-PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
+PetscErrorCode AcceptOrReject(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
 {
   Integrator &I = Get(ts);
 
@@ -247,7 +247,7 @@ PetscErrorCode Choose(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
 }
 
 /* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
-PetscErrorCode Fail(TS ts, const char *what)
+PetscErrorCode FailStep(TS ts, const char *what)
 {
   Integrator &I = Get(ts);
 
@@ -272,11 +272,11 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 
   PetscFunctionBegin;
   ts->reject++;
-  if (I.corrector.blames >= max_blames) PetscCall(Fail(ts, "the application's Jacobian is wrong"));
-  else if (ts->reason) PetscCall(Fail(ts, "too many corrections failed (-ts_max_snes_failures)"));
-  else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(Fail(ts, "the step was rejected too often"));
-  else if (ts->max_reject >= 0 && I.tiny_row > ts->max_reject) PetscCall(Fail(ts, "failures have made many steps in a row too short for the corrector"));
-  else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(Fail(ts, "the step size fell below rounding of the time"));
+  if (I.corrector.jacobian_faults >= max_jacobian_faults) PetscCall(FailStep(ts, "the application's Jacobian is wrong"));
+  else if (ts->reason) PetscCall(FailStep(ts, "too many corrections failed (-ts_max_snes_failures)"));
+  else if (ts->max_reject >= 0 && rejections > ts->max_reject) PetscCall(FailStep(ts, "the step was rejected too often"));
+  else if (ts->max_reject >= 0 && I.tiny_row > ts->max_reject) PetscCall(FailStep(ts, "failures have made many steps in a row too short for the corrector"));
+  else if (ts->time_step <= 4 * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(FailStep(ts, "the step size fell below rounding of the time"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -303,7 +303,7 @@ PetscErrorCode PassStops(TS ts)
 
 } // namespace
 
-PetscErrorCode Step(TS ts)
+PetscErrorCode TSStep_HHT(TS ts)
 {
   Integrator &I          = Get(ts);
   PetscInt    rejections = 0;
@@ -322,16 +322,16 @@ PetscErrorCode Step(TS ts)
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
   PetscCall(CheckpointIfDue(ts));
   if (HHT3BehindEvent(ts) && !I.fixed_h && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, (ts->max_time - ts->ptime) / 2); /* Events.TwoInOneStep */
-  PetscCall(Begin(ts));
+  PetscCall(BeginStep(ts));
   if (I.fixed_h) NoteGivenStep(ts);
-  PetscCall(LookFurther(ts));
+  PetscCall(LookAheadAgain(ts));
   I.status = TS_STEP_INCOMPLETE;
   while (!ts->reason && I.status != TS_STEP_COMPLETE) {
-    PetscCall(Attempt(ts, &tiny, &ok));
+    PetscCall(AttemptStep(ts, &tiny, &ok));
     if (ok) {
-      PetscCall(Choose(ts, tiny, &next, &accept));
+      PetscCall(AcceptOrReject(ts, tiny, &next, &accept));
       if (accept) {
-        PetscCall(Accept(ts, tiny, next));
+        PetscCall(AcceptStep(ts, tiny, next));
         I.tiny_row = !tiny ? 0 : I.tiny_row + (rejections > 0);
       } else ts->time_step = next;
     }
@@ -348,7 +348,7 @@ PetscErrorCode Step(TS ts)
 }
 
 /* Back to t_n: U0, V0 and the history have not been touched since */
-PetscErrorCode RollBack(TS ts)
+PetscErrorCode TSRollBack_HHT(TS ts)
 {
   Integrator &I = Get(ts);
 

@@ -7,8 +7,8 @@
 namespace hht3
 {
 
-PetscErrorCode Step(TS ts);
-PetscErrorCode RollBack(TS ts);
+PetscErrorCode TSStep_HHT(TS ts);
+PetscErrorCode TSRollBack_HHT(TS ts);
 
 /* The clocks of the statistics run from the first step of a solve on; their time into the statistics, and whether they stop with that */
 void StartClocks(Integrator &I);

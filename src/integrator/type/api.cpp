@@ -366,7 +366,7 @@ PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
   Level: intermediate
 
   Note:
-  The misfit is the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance.
+  The violation is measured as the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance.
   `TSHHT3_START_REPORT` prints it if it exceeds 1 at the start of a run, and 100 at a restart within it, where velocities are consistent to the order of the method only;
   `TSHHT3_START_PROJECT` prints nothing. -info shows it always. Accelerations and multipliers are made consistent in any case.
 

@@ -110,7 +110,7 @@ PetscErrorCode UpdateParameters(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SetUp(TS ts)
+PetscErrorCode TSSetUp_HHT(TS ts)
 {
   Integrator &I = Get(ts);
 
@@ -144,13 +144,13 @@ PetscErrorCode SetUp(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Reset(TS ts)
+PetscErrorCode TSReset_HHT(TS ts)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   PetscCall(HooksRemove(ts));
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.bend, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.normal_jerk, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
   for (Vec &v : I.spare) PetscCall(VecDestroy(&v));
   I.spare.clear();
   for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
@@ -183,12 +183,12 @@ PetscErrorCode Reset(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Destroy(TS ts)
+PetscErrorCode TSDestroy_HHT(TS ts)
 {
   PetscFunctionBegin;
-  PetscCall(Reset(ts));
+  PetscCall(TSReset_HHT(ts));
   PetscCall(LeaveSolver(ts));
-  if (ts->time_step == unset_step) ts->time_step = petsc_step;
+  if (ts->time_step == unset_step) ts->time_step = petsc_default_step;
   if (ts->max_snes_failures == HHT3_UNLIMITED && Get(ts).failures_unlimited) ts->max_snes_failures = 1;
   for (IS &is : Get(ts).is) PetscCall(ISDestroy(&is));
   PetscCall(VecDestroy(&Get(ts).checkpoint_vec));
@@ -271,7 +271,7 @@ PetscErrorCode LetOptionsIn(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
+PetscErrorCode TSSetFromOptions_HHT(TS ts, HHT3OptionItems PetscOptionsObject)
 {
   SNES        snes;
   KSP         ksp;
@@ -294,7 +294,7 @@ PetscErrorCode SetFromOptions(TS ts, HHT3OptionItems PetscOptionsObject)
 }
 
 /* TSSolve(ts, NULL) hands its null vector on, and would give it to the monitors next */
-PetscErrorCode InterpolateSolution(TS ts, PetscReal t, Vec U)
+PetscErrorCode TSInterpolate_HHT(TS ts, PetscReal t, Vec U)
 {
   PetscFunctionBegin;
   PetscCheck(U, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_NULL,
@@ -303,7 +303,7 @@ PetscErrorCode InterpolateSolution(TS ts, PetscReal t, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode View(TS ts, PetscViewer viewer)
+PetscErrorCode TSView_HHT(TS ts, PetscViewer viewer)
 {
   Integrator      &I = Get(ts);
   const Corrector &c = I.corrector;
@@ -326,7 +326,7 @@ PetscErrorCode View(TS ts, PetscViewer viewer)
   if (I.constraints() && p.rho == 1) PetscCall(PetscViewerASCIIPrintf(viewer, "the multipliers' oscillation is not damped at all\n"));
   if (c.user_lag) PetscCall(PetscViewerASCIIPrintf(viewer, "matrix renewed by -snes_lag_jacobian\n"));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "matrix reused while h changes by less than a factor %g and the rate is below %g; growth of h below %g not taken\n", (double)c.ratio, (double)c.of(I.linear.constraint).slow_rate, (double)c.hold));
-  if (Claims(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
+  if (MayHideForces(I)) PetscCall(PetscViewerASCIIPrintf(viewer, "small corrections are proved by a residual: the matrix claims up to %g times the inertia of an unknown%s\n", (double)I.verify.largest,
                                                   I.count[TSHHT3_VARIABLE] || I.count[TSHHT3_FORCE] ? ", and definitions may hide more" : ""));
   PetscCall(CountDriven(I, &n));
   if (n) PetscCall(PetscViewerASCIIPrintf(viewer, "forces of %" PetscInt_FMT " coordinates whose motion is given are judged by the residual\n", n));
@@ -435,26 +435,26 @@ static PetscErrorCode Finalize(void)
 
 .seealso: `TSCreate()`, `TSSetType()`, `TSSetI2Function()`, `TSSetI2Jacobian()`, `TS2SetSolution()`, `TSHHT3SetIS()`
 M*/
-PetscErrorCode Create(TS ts)
+PetscErrorCode TSCreate_HHT(TS ts)
 {
   PetscFunctionBegin;
   ts->data                = new Integrator();
   Get(ts).p = Get(ts).hht = HHTParameters(Get(ts).alpha, false);
-  ts->ops->setup          = SetUp;
-  ts->ops->reset          = Reset;
-  ts->ops->destroy        = Destroy;
-  ts->ops->view           = View;
-  ts->ops->setfromoptions = SetFromOptions;
-  ts->ops->step           = Step;
-  ts->ops->evaluatewlte   = EvaluateWLTE;
-  ts->ops->rollback       = RollBack;
-  ts->ops->interpolate    = InterpolateSolution;
+  ts->ops->setup          = TSSetUp_HHT;
+  ts->ops->reset          = TSReset_HHT;
+  ts->ops->destroy        = TSDestroy_HHT;
+  ts->ops->view           = TSView_HHT;
+  ts->ops->setfromoptions = TSSetFromOptions_HHT;
+  ts->ops->step           = TSStep_HHT;
+  ts->ops->evaluatewlte   = TSEvaluateWLTE_HHT;
+  ts->ops->rollback       = TSRollBack_HHT;
+  ts->ops->interpolate    = TSInterpolate_HHT;
   ts->ops->snesfunction   = FormFunction;
   ts->ops->snesjacobian   = FormJacobian;
   ts->default_adapt_type  = TSHHT3;
   ts->usessnes            = PETSC_TRUE;
   NoteRanks(PetscObjectComm((PetscObject)ts));
-  if (ts->time_step == petsc_step) ts->time_step = unset_step;
+  if (ts->time_step == petsc_default_step) ts->time_step = unset_step;
   Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, which ends the run at the first failure */
   if (Get(ts).failures_unlimited) ts->max_snes_failures = HHT3_UNLIMITED;
   PetscCall(ComposeSetters(ts, true));
@@ -484,8 +484,8 @@ PetscErrorCode TSHHT3Initialize(void)
   PetscCall(HHT3CheckPetscVersion());
   hht3::registered = PETSC_TRUE;
   PetscCall(PetscRegisterFinalize(hht3::Finalize));
-  PetscCall(TSRegister(TSHHT3, hht3::Create));
-  PetscCall(TSAdaptRegister(TSHHT3, hht3::CreateAdapt));
+  PetscCall(TSRegister(TSHHT3, hht3::TSCreate_HHT));
+  PetscCall(TSAdaptRegister(TSHHT3, hht3::TSAdaptCreate_HHT));
   PetscCall(LinearRegister());
   PetscCall(PetscClassIdRegister("hhtdae", &id));
   PetscCall(PetscLogEventRegister("HHT3Start", id, &hht3::events.start));

@@ -13,7 +13,7 @@ namespace
 {
 
 /* The test stands in the SNES of ts, put there by HooksInstall(): neither by the user since nor for another TS */
-bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == ConvergenceTest && snes->cnvP == (void *)ts; }
+bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == SNESConverged_HHT && snes->cnvP == (void *)ts; }
 
 /* Unless the user has chosen one, by the option, also where it names the default, or by the program. By exchange of the fields: SNESSetConvergenceTest() would destroy the
    context of the user's test */
@@ -28,7 +28,7 @@ PetscErrorCode InstallTest(TS ts, SNES snes)
   H.test                      = PETSC_TRUE;
   H.cnvP                      = snes->cnvP;
   H.convergeddestroy          = snes->ops->convergeddestroy;
-  snes->ops->converged        = ConvergenceTest;
+  snes->ops->converged        = SNESConverged_HHT;
   snes->ops->convergeddestroy = NULL;
   snes->cnvP                  = ts;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -156,7 +156,7 @@ PetscErrorCode RemoveJacobian(TS ts)
 }
 
 /* A SNES that has served another TS evaluates that one's functions */
-PetscErrorCode PointToUs(TS ts, SNES snes)
+PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
 {
   DM     dm;
   DMSNES sdm;
@@ -220,7 +220,7 @@ PetscErrorCode HooksJacobian(TS ts)
 PetscErrorCode HooksTakeOver(TS ts, SNES snes)
 {
   PetscFunctionBegin;
-  if (snes->ops->converged == ConvergenceTest && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP));
+  if (snes->ops->converged == SNESConverged_HHT && snes->cnvP != (void *)ts) PetscCall(HooksRemove((TS)snes->cnvP));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -235,7 +235,7 @@ PetscErrorCode HooksInstall(TS ts)
   PetscFunctionBegin;
   PetscCall(TSGetSNES(ts, &snes));
   if (H.snes != snes) {
-    PetscCall(PointToUs(ts, snes));
+    PetscCall(TakeSNESFunctions(ts, snes));
     PetscCall(PetscObjectReference((PetscObject)snes));
     PetscCall(SNESDestroy(&H.snes));
     H.snes = snes;

@@ -94,10 +94,10 @@ PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
 {
   Predictor      &p     = Get(ts).predictor;
   const PetscBool fixed = (PetscBool)(degree >= 0);
-  const PetscInt  most  = fixed ? degree : hht_degree;
+  const PetscInt  most  = fixed ? degree : default_degree;
 
   PetscFunctionBegin;
-  PetscCheck(degree >= -1 && degree <= hht_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, hht_degree);
+  PetscCheck(degree >= -1 && degree <= default_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, default_degree);
   if (fixed != p.fixed || (fixed && most != p.degree_max)) PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
   p.fixed = fixed;
   if (fixed || !ts->setupcalled) p.degree_max = most; /* SetUpOrder() has raised one that is free */

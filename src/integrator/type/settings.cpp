@@ -146,7 +146,7 @@ constexpr Unread unread[] = {
   {"-snes_linesearch_precheck_picard",  line_search, use_line_search},
 };
 
-PetscErrorCode Report(TS ts, const char name[], const Unread &what)
+PetscErrorCode ReportUnreadOption(TS ts, const char name[], const Unread &what)
 {
   PetscFunctionBegin;
   PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: %s has no effect, as only %s would read it: %s\n", TSHHT3, name, what.reader, what.instead));
@@ -162,14 +162,14 @@ PetscErrorCode ReportUnread(TS ts, bool own_test, bool own_line_search)
   for (const Unread &u : unread) {
     PetscBool given = PETSC_FALSE;
     if (u.reader == test ? own_test : own_line_search) PetscCall(OptionGiven((PetscObject)snes, u.name, &given));
-    if (given) PetscCall(Report(ts, u.name, u));
+    if (given) PetscCall(ReportUnreadOption(ts, u.name, u));
     reported = reported || (given && u.reader == test);
   }
   /* by the program */
   PetscBool newton; /* other types set tolerances themselves */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
   const bool set = newton && (snes->rtol != (PetscReal)1e-8 || snes->abstol != (PetscReal)1e-50 || snes->stol != (PetscReal)1e-8);
-  if (own_test && set && !reported) PetscCall(Report(ts, "SNESSetTolerances()", unread[0]));
+  if (own_test && set && !reported) PetscCall(ReportUnreadOption(ts, "SNESSetTolerances()", unread[0]));
   if (ts->adapt->ignore_max > 0)
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ts_adapt_max_ignore %g has no effect, as the error test takes each coordinate by the largest value that it has had; what is not to count has a tolerance of its own, TSSetTolerances() with vectors\n", TSHHT3, (double)ts->adapt->ignore_max));
   PetscFunctionReturn(PETSC_SUCCESS);

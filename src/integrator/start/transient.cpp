@@ -21,11 +21,11 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal constants  = 10;   /* time constants of the implicit step, in which the motion goes on */
-constexpr PetscReal noticeable = 1e-6; /* part of the velocities, at rest of the tolerance: what is left of a transient grows with h in the first steps */
-constexpr PetscReal slower     = 10;   /* times that: the second step */
-constexpr PetscReal damped     = 0.5;  /* part of its accelerations that this step leaves of a transient: an eleventh. Of rounding it leaves all. */
-constexpr PetscReal against    = 0.5;  /* cosine of the angle between what accelerations are and what they lose */
+constexpr PetscReal step_in_time_constants = 10;   /* time constants of the implicit step, in which the motion goes on */
+constexpr PetscReal noticeable_velocity    = 1e-6; /* part of the velocities, at rest of the tolerance: what is left of a transient grows with h in the first steps */
+constexpr PetscReal second_step_ratio      = 10;   /* times that: the second step */
+constexpr PetscReal damped_accelerations   = 0.5;  /* part of its accelerations that this step leaves of a transient: an eleventh. Of rounding it leaves all. */
+constexpr PetscReal opposing_cosine        = 0.5;  /* cosine of the angle between what accelerations are and what they lose */
 
 /* The time constant |q''|/|q'''| of what may be a transient: within a tenth of the step accelerations change by more than they are. 0: none.
    What starts at rest may have large rates where damping spreads a load that has just set in, as over a body of finite elements: there they are not
@@ -41,13 +41,13 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscCall(CorrectionNorm(ts, I.V0, 1, &v));
   PetscCall(CorrectionNorm(ts, I.A0, 1, &a));
   PetscCall(CorrectionNorm(ts, rate, 1, &j));
-  *tau = a > 0 && h * j > constants * a && h * h * j > noticeable * (v > 0 ? v : 1 / h) ? a / j : 0;
+  *tau = a > 0 && h * j > step_in_time_constants * a && h * h * j > noticeable_velocity * (v > 0 ? v : 1 / h) ? a / j : 0;
   if (*tau <= 0 || v > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(weighted.like(I.A0));
   PetscCall(WeightCorrection(I, I.A0, weighted));
   PetscCall(VecDot(I.A0, weighted, &aa));
   PetscCall(VecDot(rate, weighted, &aj));
-  if (*tau * -PetscRealPart(aj) < against * PetscRealPart(aa)) *tau = 0;
+  if (*tau * -PetscRealPart(aj) < opposing_cosine * PetscRealPart(aa)) *tau = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,7 +67,7 @@ PetscErrorCode ImplicitAccelerations(TS ts, PetscReal h, PetscBool *ok)
 
 /* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0 and an implicit
    step of that kind damps its accelerations, V0 is what the transient `leaves`, and the rest is to be made anew. Else all is as it was. */
-PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves)
+PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves)
 {
   Integrator &I = Get(ts);
   PetscReal   before, after, way;
@@ -77,17 +77,17 @@ PetscErrorCode SettleTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, Pet
   *leaves = PETSC_FALSE;
   PetscCall(TimeConstant(ts, h, rate, tau));
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal euler = constants * *tau;
+  const PetscReal euler = step_in_time_constants * *tau;
   PetscCall(gone.like(I.V0));
   PetscCall(ImplicitAccelerations(ts, euler, leaves));
   PetscCall(VecNorm(I.A0, NORM_2, &before));
   PetscCall(VecNorm(I.A1, NORM_2, &after));
-  if (after >= damped * before) *leaves = PETSC_FALSE;
+  if (after >= damped_accelerations * before) *leaves = PETSC_FALSE;
   if (*leaves) {
     PetscCall(VecCopy(I.A1, gone));
-    PetscCall(ImplicitAccelerations(ts, slower * euler, leaves));
+    PetscCall(ImplicitAccelerations(ts, second_step_ratio * euler, leaves));
     PetscCall(VecAXPY(gone, -1, I.A1));
-    PetscCall(VecScale(gone, euler / (1 - 1 / slower)));
+    PetscCall(VecScale(gone, euler / (1 - 1 / second_step_ratio)));
     PetscCall(CorrectionNorm(ts, gone, 1, &way));
     way *= *tau / PetscAbsReal(I.p.k); /* of velocities that decay with this time constant, in tolerances of positions */
     if (!I.fixed_h && !(way < 1)) *leaves = PETSC_FALSE; /* steps that are given resolve nothing */

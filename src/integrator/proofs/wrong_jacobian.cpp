@@ -10,16 +10,16 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal part_way   = 0.25; /* of the correction, to either side: near enough for a model without corners there, and far out of rounding */
-constexpr PetscReal stands_out = 10;   /* times rounding: changes that a row shows */
-constexpr PetscReal hopeless   = 0.1;  /* part of a correction that the residual answers: below it the iteration does not converge in ten */
+constexpr PetscReal probe_fraction = 0.25; /* of the correction, to either side: near enough for a model without corners there, and far out of rounding */
+constexpr PetscReal above_rounding = 10;   /* times rounding: changes that a row shows */
+constexpr PetscReal least_answer   = 0.1;  /* part of a correction that the residual answers: below it the iteration does not converge in ten */
 
-bool Followed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= followed * PetscAbsReal(was) * s.answer + s.rounding; }
+bool HasFollowed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= unanswered_fraction * PetscAbsReal(was) * s.answer + s.rounding; }
 
 /* How much of the change that the matrix expects on a part `way` of dX, from where the matrix was made, the residual shows: 1 if the Jacobian
    is right there. In the rows that have not followed dX, as far as they stand out of rounding; the constraint `forces` of dX are taken as the
    matrix has them. -1: there are no such rows. */
-PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
+PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
 {
   Verification &v = Get(ts).verify;
   PetscReal     sum[4];
@@ -31,13 +31,13 @@ PetscErrorCode Answer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forc
   PetscCall(VecWAXPY(Y, -way, dX, v.where));
   PetscCall(SNESComputeFunction(ts->snes, Y, change));
   PetscCall(VecAYPX(change, -1, F_where));
-  PetscCall(PassDefinitionsOn(ts, change));
+  PetscCall(SubstituteDefinitions(ts, change));
   PetscCall(VecAXPY(change, -way, forces));
   PetscCall(SumRows(
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
       const PetscReal model = m * s.answer;
-      if (PetscAbsReal(way * model) < stands_out * s.rounding || Followed(s, f, m)) return;
+      if (PetscAbsReal(way * model) < above_rounding * s.rounding || HasFollowed(s, f, m)) return;
       local[1] += d * s.answer * model;
       local[2] += way * model * model;
     },
@@ -60,10 +60,10 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   PetscCall(F_where.like(dX, Get(ts).spare));
   PetscCall(forces.like(dX, Get(ts).spare));
   PetscCall(VecCopy(v.work, forces));
-  PetscCall(PassDefinitionsOn(ts, forces));
+  PetscCall(SubstituteDefinitions(ts, forces));
   PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));
-  for (int k = 0; k < 2; k++) PetscCall(Answer(ts, k ? -part_way : part_way, dX, F, F_where, forces, &answer[k]));
-  *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < hopeless && answer[1] >= 0 && answer[1] < hopeless);
+  for (int k = 0; k < 2; k++) PetscCall(MeasureAnswer(ts, k ? -probe_fraction : probe_fraction, dX, F, F_where, forces, &answer[k]));
+  *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < least_answer && answer[1] >= 0 && answer[1] < least_answer);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,11 +74,11 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   Imbalance   left;
 
   PetscFunctionBegin;
-  if (!I.corrector.matrix.fresh || !Claims(I)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.corrector.matrix.fresh || !MayHideForces(I)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*evaluated) PetscCall(SNESComputeFunction(ts->snes, X, F));
   *evaluated = PETSC_TRUE;
-  PetscCall(Model(ts, dX));
-  PetscCall(CompareMeasured(ts, X, F, 0, &left));
+  PetscCall(ModelResidual(ts, dX));
+  PetscCall(CompareAboveRounding(ts, X, F, 0, &left));
   if (left.all > 0) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,4 +1,4 @@
-/* What the Newton matrix claims of the unknowns over their inertia, and what is measured where that raises a doubt, see verify.cpp */
+/* How much stiffer than inertia the Newton matrix says that each unknown is (claim_i of verify.cpp), and what is measured where that raises a doubt */
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "proofs.h"
@@ -13,17 +13,17 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal least_claim = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
-constexpr PetscReal massless    = 1e-14; /* inertia below this part of the mean is rounding */
-constexpr PetscReal rounding_of_sums = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+constexpr PetscReal stiffness_to_prove = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
+constexpr PetscReal negligible_inertia = 1e-14; /* inertia below this part of the mean is rounding */
+constexpr PetscReal rounding_of_sums   = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
 
 } // namespace
 
 /* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
-bool Claims(const Integrator &I) { return I.verify.largest >= least_claim || (I.verify.largest > 0 && HasDefinitions(I)); }
+bool MayHideForces(const Integrator &I) { return I.verify.largest >= stiffness_to_prove || (I.verify.largest > 0 && HasDefinitions(I)); }
 
 /* claim_i of the matrix P with the inertia at hand, and the largest */
-static PetscErrorCode MakeClaims(TS ts, Mat P)
+static PetscErrorCode MeasureStiffness(TS ts, Mat P)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -64,13 +64,13 @@ PetscErrorCode NoteInertia(TS ts, Mat P)
     },
     Read(v.inertia)));
   PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  const PetscReal least = massless * (sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1);
+  const PetscReal least = negligible_inertia * (sum[1] > 0 ? PetscExpReal(sum[0] / sum[1]) : 1);
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &m) { m = IsDifferential(RoleOf(I, i)) && PetscAbsScalar(m) > least ? PetscAbsScalar(m) : 0; }, Write(v.inertia)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* To be called for every new matrix P of a step, made at X */
-PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
+PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P)
 {
   Integrator   &I = Get(ts);
   Verification &v = I.verify;
@@ -79,10 +79,10 @@ PetscErrorCode NoteClaims(TS ts, Vec X, Mat P)
   PetscFunctionBegin;
   PetscCall(MatHasOperation(P, MATOP_GET_DIAGONAL, &has));
   if (!has || !v.inertia) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MakeClaims(ts, P));
+  PetscCall(MeasureStiffness(ts, P));
   PetscCall(VecZeroEntries(v.noise));
   v.measured = PETSC_FALSE;
-  if (Claims(I)) {
+  if (MayHideForces(I)) {
     if (!v.where) PetscCall(VecDuplicate(X, &v.where));
     PetscCall(VecCopy(X, v.where));
   }
@@ -171,7 +171,7 @@ static PetscErrorCode MeasureInertia(TS ts)
 
 /* Forces have rounding, and inertia that varies with the position looks like stiffness to a matrix of the start. Where a doubt has been
    raised, both are measured at the state of the stage, inertia once for each matrix. */
-PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
+PetscErrorCode MeasureRowsAtStage(TS ts, Vec X, Vec F)
 {
   Verification &v = Get(ts).verify;
   Mat           P;
@@ -182,7 +182,7 @@ PetscErrorCode MeasureRows(TS ts, Vec X, Vec F)
   v.measured = PETSC_TRUE;
   PetscCall(MeasureInertia(ts));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(MakeClaims(ts, P));
+  PetscCall(MeasureStiffness(ts, P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,21 +1,21 @@
 /*
   Velocities when h changes.
 
-  The method satisfies Phi = 0, and Phi_q q' + Phi_t = 0 only to C h^2. While h is constant so is that misfit, and nobody
+  The method satisfies Phi = 0, and Phi_q q' + Phi_t = 0 only to C h^2. While h is constant so is that drift of the velocities, and nobody
   notices. When h changes from h_n to h it has to become C h^2 within one step, which takes normal accelerations of
   C (h_n^2 - h^2)/h: a spike of first order in q'' and lambda, seen by whatever depends on them (outputs, states driven by
   accelerations), and by the error test of such states as an error that does not fall as it should.
 
-  So the part 1 - (h/h_n)^2 of the misfit is taken out of q'_n before a step of a new length: dV from
+  So the part 1 - (h/h_n)^2 of the drift is taken out of q'_n before a step of a new length: dV from
   [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the matrix at hand, since it need not be exact, and the right-hand side
   from a central difference of Phi along the motion. Two residuals and one solve per change of h; nothing else. The reported
   q'_n stays as it is.
 
-  A start, StartMisfit(), puts in that misfit, which consistent velocities do not have.
+  A start, SetDriftOfStart(), puts in that drift, which consistent velocities do not have.
 
   A change of coordinates bends the motion: (2a) misses q by k h^3 q''', which Phi = 0 does not allow in the normals' directions,
-  and that is the misfit, -k h^2 (q''')_normal. While velocities follow the new coordinates Q as tangents, Q'_n = T q'_n, the third
-  derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the misfit has to grow by -k h^2 d_normal, or there is the
+  and that is the drift, -k h^2 (q''')_normal. While velocities follow the new coordinates Q as tangents, Q'_n = T q'_n, the third
+  derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the drift has to grow by -k h^2 d_normal, or there is the
   spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
 #include "integrator/entries.h"
@@ -33,11 +33,11 @@ namespace
 
 /* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, as does whoever reads the multipliers where a run
    ends (Analyses.KinematicsOfAFourBar), and without damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
-PetscReal Least(TS ts)
+PetscReal LeastChangeOfStep(TS ts)
 {
   const Integrator &I     = Get(ts);
   const PetscReal   least = 1e-3;
-  const bool        last  = ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3StopAfter(ts, ts->ptime) - ts->ptime <= (last_steps + 0.5) * I.h;
+  const bool        last  = ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && HHT3StopAfter(ts, ts->ptime) - ts->ptime <= (equal_last_steps + 0.5) * I.h;
 
   return I.count[TSHHT3_STATE] || last ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
 }
@@ -84,27 +84,27 @@ PetscErrorCode ChangeOfConstraints(TS ts, Vec direction, PetscReal tau, bool wit
 }
 
 /* From d to its normal part, in place. Phi is followed over a length that shows above its rounding. */
-PetscErrorCode ComputeBend(TS ts)
+PetscErrorCode MakeJerkNormal(TS ts)
 {
   Integrator &I = Get(ts);
   PetscReal   d, u;
 
   PetscFunctionBegin;
-  I.bent = Bend::None;
-  PetscCall(VecNorm(I.bend, NORM_INFINITY, &d));
+  I.jerk = Jerk::None;
+  PetscCall(VecNorm(I.normal_jerk, NORM_INFINITY, &d));
   PetscCall(VecNorm(I.U0, NORM_INFINITY, &u));
   if (!(d > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal tau = 1e-5 * PetscClipInterval(u, 1e-3, 1) / d;
-  PetscCall(ChangeOfConstraints(ts, I.bend, tau, false));
-  PetscCall(SolveNormal(ts, I.bend));
-  I.bent = Bend::Velocities;
+  PetscCall(ChangeOfConstraints(ts, I.normal_jerk, tau, false));
+  PetscCall(SolveNormal(ts, I.normal_jerk));
+  I.jerk = Jerk::Normal;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
 
 /* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
-PetscErrorCode MeasureMisfit(TS ts)
+PetscErrorCode MeasureDrift(TS ts)
 {
   Integrator     &I   = Get(ts);
   const PetscReal tau = SpanFrom(ts->ptime, 0.1 * I.h_last);
@@ -113,21 +113,21 @@ PetscErrorCode MeasureMisfit(TS ts)
   if (!I.dV) PetscCall(VecDuplicate(I.U0, &I.dV));
   PetscCall(ChangeOfConstraints(ts, I.V0, tau, true));
   PetscCall(SolveNormal(ts, I.dV));
-  I.have_misfit = PETSC_TRUE;
+  I.have_drift = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A consistent start has no misfit where the method wants -k h^2 (q''')_normal: the first step would make it good by an
+/* A consistent start has no drift where the method wants -k h^2 (q''')_normal: the first step would make it good by an
    oscillation of the multipliers, which at little damping takes many steps to die out. With the matrix of the start. */
-PetscErrorCode StartMisfit(TS ts, Vec rate)
+PetscErrorCode SetDriftOfStart(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
   if (!I.count[TSHHT3_HOLONOMIC] || ts->snes->mf_operator) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!I.bend) PetscCall(VecDuplicate(I.U0, &I.bend));
-  PetscCall(TakeRoles(I, rate, {TSHHT3_COORDINATE}, I.bend));
-  PetscCall(ComputeBend(ts));
+  if (!I.normal_jerk) PetscCall(VecDuplicate(I.U0, &I.normal_jerk));
+  PetscCall(TakeRoles(I, rate, {TSHHT3_COORDINATE}, I.normal_jerk));
+  PetscCall(MakeJerkNormal(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,12 +138,12 @@ PetscErrorCode AdaptVelocities(TS ts)
   const PetscReal r = I.h_last > 0 ? I.h / I.h_last : 1;
 
   PetscFunctionBegin;
-  I.misfit = 0;
+  I.drift_removed = 0;
   if (I.order.now > 2) PetscFunctionReturn(PETSC_SUCCESS);
-  if (I.bent == Bend::Rates && I.corrector.matrix.have) PetscCall(ComputeBend(ts));
-  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < Least(ts) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!I.have_misfit) PetscCall(MeasureMisfit(ts));
-  I.misfit = 1 - r * r;
+  if (I.jerk == Jerk::Whole && I.corrector.matrix.have) PetscCall(MakeJerkNormal(ts));
+  if (!I.count[TSHHT3_HOLONOMIC] || PetscAbsReal(r - 1) < LeastChangeOfStep(ts) || !I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.have_drift) PetscCall(MeasureDrift(ts));
+  I.drift_removed = 1 - r * r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -11,19 +11,19 @@
 namespace hht3
 {
 
-constexpr PetscReal shrink = 0.1;  /* h below this times the last one calls for a consistent start, see Repair() */
-constexpr PetscReal seen   = 1e-6; /* part of the accelerations that growth may make of rounding: ten times as much comes by the velocities
+constexpr PetscReal restart_ratio  = 0.1;  /* h below this times the last one calls for a consistent start, see RestartConsistently() */
+constexpr PetscReal grown_rounding = 1e-6; /* part of the accelerations that growth may make of rounding: ten times as much comes by the velocities
                                       (BetweenRuns.GrowthFromAShortStepKeepsTheMultipliers) */
 
-constexpr PetscReal never_tiny = 1e-4; /* of the longest step of late: the common case, decided without a reduction */
-constexpr PetscReal drowned    = 0.01; /* part of the accelerations that may be rounding in a step that goes through the corrector */
+constexpr PetscReal tiny_ratio            = 1e-4; /* of the longest step of late: the common case, decided without a reduction */
+constexpr PetscReal rounded_accelerations = 0.01; /* part of the accelerations that may be rounding in a step that goes through the corrector */
 
 /*
   When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
-  starts from there turns this misfit into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So positions and
+  starts from there turns this drift of the velocities into accelerations of O(h_old^2/h_new), which no further reduction of h mends. So positions and
   velocities of t_n are projected on the constraints and the step starts afresh, consistently, at the new h.
 */
-PetscErrorCode Repair(TS ts)
+PetscErrorCode RestartConsistently(TS ts)
 {
   Integrator &I = Get(ts);
   Prepared    have;
@@ -85,18 +85,18 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
-  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > never_tiny * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > tiny_ratio * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
-  if (part <= drowned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (part <= rounded_accelerations) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaylorError(ts, h, &missed));
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether to begin afresh at t_n, for a step of length h: where it is far shorter than the last one, or where growth would amplify what rounding has left in that one
-   of the lag of a_n and of the misfit of the velocities, which are stretched with h and h^2. At given steps orders above two, whose steps have no such misfit, do
+   of the lag of a_n and of the drift of the velocities, which are stretched with h and h^2. At given steps orders above two, whose steps have no such drift, do
    better without (HigherOrder.StepFarShorterThanTheOthers). */
-PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes)
+PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes)
 {
   const Integrator &I = Get(ts);
   PetscReal         part;
@@ -104,10 +104,10 @@ PetscErrorCode WantsRepair(TS ts, PetscReal h, PetscBool *yes)
   PetscFunctionBegin;
   *yes = PETSC_FALSE;
   if (I.order.now > 2 && I.fixed_h) PetscFunctionReturn(PETSC_SUCCESS);
-  *yes = (PetscBool)(I.constraints() && h < shrink * I.h_last);
+  *yes = (PetscBool)(I.constraints() && h < restart_ratio * I.h_last);
   if (*yes || !I.count[TSHHT3_HOLONOMIC] || h <= I.h_last || !I.h_last) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, I.h_last, &part));
-  *yes = (PetscBool)(part * h > seen * I.h_last);
+  *yes = (PetscBool)(part * h > grown_rounding * I.h_last);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
