@@ -63,7 +63,7 @@ struct KluPanels {
   std::vector<double>         value;
 
   double entries = 0, flops = 0;  /* stored, zeros included, and operations with them */
-  double seconds = 0, scalar = 0; /* estimates for a factorization by panels, and by KLU */
+  double cost = 0, klu_cost = 0; /* estimates for a factorization by panels, and by KLU, in operations of a dense product */
 
   /* scratch: rows of `lower` and `upper` of the panel at work, by place; panels side by side; vectors */
   std::vector<PetscInt> row_of, col_of;

@@ -7,8 +7,8 @@
 /* Columns of panels before that are multiplied at a time */
 static const PetscInt SIDE_BY_SIDE = 256;
 
-/* Seconds: per operation of dense products, per entry copied, per entry added somewhere, per call of BLAS */
-static const double OPERATION = 0.04e-9, COPY = 0.6e-9, ADD = 0.8e-9, CALL = 0.2e-6;
+/* Costs in operations of a dense product: per entry copied, per entry added somewhere, per call of BLAS */
+static const double COPY = 15, ADD = 20, CALL = 5000;
 
 /* Products with fewer operations are made by loops */
 static const double FEW = 1000;
@@ -180,8 +180,8 @@ static bool BetterScattered(const Source &v, const Work &w)
 {
   const double columns = (double)v.width, copied = (double)w.left + (double)w.right, all = copied - (double)w.width;
   const double reached = (double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows;
-  return reached * (OPERATION * 2 * columns + ADD) + CALL <
-         columns * (all * OPERATION * 2 * (double)w.width + copied * COPY);
+  return reached * (2 * columns + ADD) + CALL <
+         columns * (all * 2 * (double)w.width + copied * COPY);
 }
 
 /* What the sources that are not scattered reach of this panel; places ascend, and so do their numbers in it */

@@ -12,8 +12,8 @@ typedef KluTree               Tree;
 static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
 
 /*
-  Seconds of KLU per operation and per entry of L and U; of the panels per operation, per entry stored, per panel and
-  per panel that one looks back to. Milliseconds of processor time with the matrices of tests/bench/linear_matrices.h,
+  Costs in operations of a dense product: of KLU per operation and per entry of L and U; of the panels per entry stored, per panel
+  and per panel that one looks back to. Milliseconds of processor time with the matrices of tests/bench/linear_matrices.h,
   for a factorization with old pivots and one solve (Debian 12, KLU 1.3.8, OpenBLAS, one core):
 
       family, size               n   nz(L+U)  operations  per nz      KLU   solve    panels   solve
@@ -29,12 +29,12 @@ static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
       block, 4^3 bricks        450   5.2e+04     3.8e+06      74     1.32   0.040      0.43   0.020
       block, 8^3 bricks       2430   7.6e+05     1.6e+08     203       56     1.0       8.2    0.63
 */
-static const double KLU_OPERATION = 0.32e-9, KLU_ENTRY = 4e-9;
-static const double OPERATION = 0.045e-9, ENTRY = 3.5e-9, PANEL = 0.5e-6, SOURCE = 0.15e-6;
+static const double KLU_OPERATION = 7, KLU_ENTRY = 90;
+static const double ENTRY = 80, PANEL = 1.1e4, SOURCE = 3300;
 
-/* Panels must promise this part of KLU's time. Before KLU has factored anything, so many seconds per entry that it takes
-   to build them count, too. */
-static const double GAIN = 0.7, BUILD = 20e-9;
+/* Panels must promise this part of KLU's cost. Before KLU has factored anything, what it costs per entry to build them
+   counts, too. */
+static const double GAIN = 0.7, BUILD = 440;
 
 /* At the end of a diagonal block, a panel so wide that several others contribute to takes in none of them: their product
    with all the others' columns is faster than their part in the factors of a wider panel */
@@ -337,9 +337,8 @@ static void FindRuns(const LinearRows &rows, KluPanels *p)
 
 static void Estimate(double entries, double flops, KluPanels *p)
 {
-  p->scalar = KLU_OPERATION * flops + KLU_ENTRY * entries;
-  p->seconds =
-      OPERATION * p->flops + ENTRY * p->entries + PANEL * (double)p->panel.size() + SOURCE * (double)p->source.size();
+  p->klu_cost = KLU_OPERATION * flops + KLU_ENTRY * entries;
+  p->cost     = p->flops + ENTRY * p->entries + PANEL * (double)p->panel.size() + SOURCE * (double)p->source.size();
 }
 
 static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
@@ -415,8 +414,8 @@ static void Build(const LinearRows &rows, const KluPair &k, const Pattern &patte
   SizePanels(reach, p);
   FindSources(reach, of, p);
   Estimate(entries, flops, p);
-  *pays = p->seconds < GAIN * p->scalar && p->entries < 0.5 * PETSC_MAX_INT;
-  if (!k.numeric && p->seconds + BUILD * p->entries > p->scalar) *pays = false;
+  *pays = p->cost < GAIN * p->klu_cost && p->entries < 0.5 * PETSC_MAX_INT;
+  if (!k.numeric && p->cost + BUILD * p->entries > p->klu_cost) *pays = false;
   if (!*pays) return;
   Allocate(rows, p);
   AimInner(e.inner, of, p);
