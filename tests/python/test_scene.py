@@ -2,6 +2,7 @@
 
 import math
 import os
+import pathlib
 import tempfile
 import unittest
 
@@ -621,7 +622,11 @@ class Runs(unittest.TestCase):
             with self.assertRaisesRegex(error, words):
                 call()
             self.assertEqual((scene._start, scene._output), before)
-        scene.output(dt=0.1)
+        for balance, kept in ((np.bool_(True), True), (np.bool_(False), False), (pathlib.Path("b.csv"), "b.csv")):
+            scene.output(balance=balance)
+            self.assertIs(type(scene._output["balance"]), type(kept))
+            self.assertEqual(scene._output["balance"], kept)
+        scene.output(dt=0.1, balance=False)
         scene.start(view=False, time=-1.)
         self.assertEqual(scene.solve(-0.9).time, -0.9)
 

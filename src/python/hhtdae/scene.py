@@ -432,16 +432,17 @@ class Scene:
             if name in choices and value not in choices[name]:
                 raise ValueError("%s is %r, must be one of %s" % (whole, value, ", ".join(choices[name])))
             kind = type(present[name])
+            if isinstance(value, np.bool_):
+                value = bool(value)
             if name == "balance":
                 kind = (bool, str)
+                value = os.fspath(value) if isinstance(value, os.PathLike) else value
             elif kind is float:
                 value = number(value, whole)
                 if name != "time" and not 0 <= value < np.inf:
                     raise ValueError("%s is %g, must not be negative, and finite" % (whole, value))
             elif kind is str:
                 value = os.fspath(value) if isinstance(value, os.PathLike) else value
-            elif kind is bool:
-                value = bool(value) if isinstance(value, np.bool_) else value
             elif kind is int:
                 value = operator.index(value) if hasattr(value, "__index__") and not isinstance(value, bool) else value
             if kind is not float and not isinstance(value, kind):
