@@ -9,6 +9,9 @@ PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given);
 /* A type of our choice, which nobody shall take for the user's */
 PetscErrorCode LinearSetType(PC pc, PCType type);
 
+/* The package that it has now is our choice, too; NULL: it is the user's */
+PetscErrorCode LinearMarkPackage(PC pc, const char package[]);
+
 /* What a factorization takes. large: for the packages that work on dense fronts; parts: for KLU on every rank; single: the factor is as large that
    single precision pays. */
 struct LinearSize {

@@ -1,7 +1,7 @@
 /*
   A consistent start: q''_0, s'_0, lambda_0, V_0, F_0 from given q_0, q'_0, s_0 (consistent.cpp).
 
-  Then a second solve a little later gives q'''_0. From it come the first step, when the user gave none, and the start
+  Then a second solve a little later gives q'''_0. From it come the first step (first_step.cpp), when the user gave none, and the start
   value of the algorithmic acceleration, a_0 = q''(t_0 + lag h): with a_0 = q''_0 the first steps excite an oscillation of
   the multipliers and an error of second order in q' (Arnold, Bruels 2007).
 */
@@ -20,7 +20,6 @@
 #include "integrator/step/stage.h"
 #include "start.h"
 #include "integrator/work_vec.h"
-#include <string>
 
 namespace hht3
 {
@@ -92,89 +91,6 @@ PetscErrorCode RatesOfStart(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Local errors in units of the tolerance that steps from the start leave, by its rates: of coordinates |k| h^3 q''', of states k_s h^3 s''' with |s''|^2/|s'| in place of
-   s''', or |s''|^1.5/|s|^0.5 where s' passes through 0, but no more than s changes by s'', gamma_s h^2 s'' (FirstStep.StatesInAnyUnitOfTime, BetweenRuns.RestartsOfStates) */
-struct StartErrors {
-  PetscReal coordinates = 0, states = 0; /* over h^3 */
-  PetscReal change = 0;                  /* of states, over h^2 */
-  PetscReal at(PetscReal h) const { return PetscSqrtReal(PetscSqr(coordinates * h * h * h) + (change > 0 ? PetscSqr(PetscMin(states * h * h * h, change * h * h)) : 0)); }
-  PetscReal step(PetscReal e) const /* that leaves no more of either */
-  {
-    const PetscReal q = coordinates > 0 ? PetscPowReal(e / coordinates, (PetscReal)1 / 3) : PETSC_MAX_REAL;
-    return change > 0 ? PetscMin(q, PetscMax(PetscPowReal(e / states, (PetscReal)1 / 3), PetscSqrtReal(e / change))) : q;
-  }
-};
-
-PetscErrorCode ErrorsOfStart(TS ts, Vec rate, StartErrors *e)
-{
-  Integrator &I           = Get(ts);
-  PetscReal   sum[3]      = {0, 0, 0}; /* squares of s', s'' and of how large s has been */
-  Vec         coordinates = rate;
-  WorkVec     x;
-
-  PetscFunctionBegin;
-  *e = {};
-  if (I.count[TSHHT3_STATE]) {
-    PetscCall(x.like(rate));
-    PetscCall(VecCopy(rate, x));
-    coordinates = x;
-    PetscCall(ForSome(
-      I.states,
-      [&](PetscInt, PetscScalar s2, PetscScalar s1, PetscScalar y, PetscScalar w, PetscScalar &q) {
-        sum[0] += PetscSqr(PetscRealPart(s1 * w));
-        sum[1] += PetscSqr(PetscRealPart(s2 * w));
-        sum[2] += PetscSqr(PetscRealPart(y * w));
-        q = 0;
-      },
-      Read(rate), Read(I.V0), Read(I.ymax), Read(I.weight), Write(x)));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  }
-  PetscCall(CorrectionNorm(ts, coordinates, 1, &e->coordinates));
-  const PetscReal s = PetscSqrtReal(sum[1] / PetscMax(I.norm_size, 1));
-  e->change         = I.p.gamma_s * s;
-  const PetscReal by_rate = sum[0] > 0 ? PetscSqrtReal(sum[1] / sum[0]) : PETSC_MAX_REAL, by_size = sum[2] > 0 ? PetscPowReal(sum[1] / sum[2], 0.25) : PETSC_MAX_REAL;
-  const PetscReal faster  = PetscMin(by_rate, by_size);
-  e->states               = faster < PETSC_MAX_REAL ? PetscAbsReal(I.p.k_s) * s * faster : PETSC_MAX_REAL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The first h: a local error of an eighth of the tolerance from q''' and from what q'' itself tells of its second derivative; without these, the length of the run. Not longer than loads and motions allow
-   that depend on time alone: of their period the error of a longer one might know nothing (Excitation.TheFirstStepFollowsTheLoad). */
-PetscErrorCode FirstStep(TS ts, Vec rate, PetscReal *h)
-{
-  Integrator &I = Get(ts);
-  StartErrors e;
-  PetscReal   e2, T;
-
-  PetscFunctionBegin;
-  PetscCall(ErrorsOfStart(ts, rate, &e));
-  PetscCall(CorrectionNorm(ts, I.A0, 1, &e2));
-  const PetscReal span = HHT3StopAfter(ts, ts->ptime) < PETSC_MAX_REAL / 2 ? HHT3StopAfter(ts, ts->ptime) - ts->ptime : 1;
-  PetscReal       h3 = e.step(0.125);
-  PetscCall(TimeScaleOfAccelerations(ts, I.A0, &T));
-  if (e2 > 0 && T < PETSC_MAX_REAL) h3 = PetscMin(h3, PetscPowReal(0.125 * T * T / e2, 0.25)); /* q'''' as large as q''/T^2: from rest q''' is rounding (FirstStep.FromRest) */
-  *h = PetscMin(h3, PetscMin(span / 10, I.fastest));
-  *h = PetscClipInterval(*h, ts->adapt->dt_min, ts->adapt->dt_max);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Where the user has set none, also not since the set-up; TSSolve() may have cut what stood there to the length of the run */
-PetscErrorCode ChooseFirstStep(TS ts, Vec rate)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  const bool unset = ts->time_step == unset_step || ts->time_step == HHT3StopAfter(ts, ts->ptime) - ts->ptime;
-  if (I.auto_h && unset && I.fixed_h) ts->time_step = PetscMin(petsc_default_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
-  else if (I.auto_h && unset) {
-    PetscCall(FirstStep(ts, rate, &ts->time_step));
-    PetscCall(PetscInfo(ts, "start: first step %g\n", (double)ts->time_step));
-    I.h_chosen = PETSC_TRUE;
-  }
-  I.auto_h = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided difference of the predictor (at a double
    node). Rates that are too wild to be believed are left out, but for those of states: without them the error of the first step would not know these
    (FirstStep.StatesAfterARestart). */
@@ -183,18 +99,16 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
   Integrator        &I = Get(ts);
   Predictor         &p = I.predictor;
   const PetscReal    h = ts->time_step;
-  StartErrors        errors;
-  PetscReal          T;
+  PetscReal          T, e;
 
   PetscFunctionBegin;
   PetscCall(PredictorReset(ts));
-  I.h           = h;
-  I.h_last      = h;
+  I.h          = h;
+  I.h_last     = h;
   I.have_drift = PETSC_FALSE;
   I.jerk       = Jerk::None;
-  PetscCall(ErrorsOfStart(ts, rate, &errors));
-  const PetscReal e = errors.at(h);
-  I.corrector.wlte  = e;
+  PetscCall(ErrorOfStart(ts, rate, h, &e));
+  I.corrector.wlte = e;
   PetscCall(TimeScaleOfAccelerations(ts, rate, &T));
   const bool believed = I.fixed_h ? h * h * h <= T * T : e <= 100; /* fixed steps know no tolerance: of the coordinates */
   if (believed) {
@@ -264,56 +178,6 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscCall(NoteInertia(ts, c.P));
   I.corrector.matrix.forget();
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The matrix of the start with which no solve is possible, explained: an error in any case */
-PetscErrorCode NameRedundant(TS ts)
-{
-  Integrator           &I = Get(ts);
-  IS                    multipliers;
-  std::vector<PetscInt> list(I.constrained);
-  PetscInt              start, n = 0, rows[20];
-  Mat                   P;
-  RowLabel              label;
-  constexpr PetscInt max_named_rows = 4;
-  std::string           text, names;
-  PetscBool             is_singular;
-  MatSolverType         package;
-
-  PetscFunctionBegin;
-  PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  PetscCall(RefuseNoNumbers(ts, P));
-  PetscCall(MatrixIsSingular(ts, &is_singular));
-  if (!is_singular) PetscCall(ExplainLinearFailure(ts, ts->ptime, 0));
-  PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
-             "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
-  PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
-  for (PetscInt &i : list) i += start;
-  if (I.constraints()) {
-    PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)ts), (PetscInt)list.size(), list.data(), PETSC_COPY_VALUES, &multipliers));
-    PetscCall(LinearNameDependent(P, multipliers, 20, &n, rows));
-    PetscCall(ISDestroy(&multipliers));
-  }
-  for (PetscInt i = 0; i < n; i++) {
-    text += (i ? ", " : "") + std::to_string(rows[i]);
-    if (!I.names.name || i >= max_named_rows) continue;
-    PetscCall(LabelRow(ts, rows[i], &label));
-    names += std::string(i ? ", " : " Rows ") + label.text;
-  }
-  if (n == 1) PetscCall(LabelRow(ts, rows[0], &label));
-  PetscCheck(n != 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
-  PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text.c_str(),
-             names.c_str(), I.names.name && n > max_named_rows ? ", ..." : "");
-  PetscCall(PackageInDoubt(ts, &package));
-  PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
-             "-pc_factor_mat_solver_type mumps or klupair exchanges rows there. If that fails, too, look for a coordinate without mass that no constraint holds",
-             package, (double)ts->ptime);
-  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-          "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g, and not by dependent constraints: look for a coordinate without mass that no constraint holds, "
-          "or a definition that does not determine its variable (-ts_view lists the roles)", (double)ts->ptime);
 }
 
 namespace

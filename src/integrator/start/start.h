@@ -46,6 +46,12 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
 /* Of use to the files of the start alone, from here on. Where no solve with that matrix is possible, NameRedundant() is the error that says why. */
 PetscErrorCode NameRedundant(TS ts);
 
+/* ts->time_step from U0, V0, A0 and the rates of a consistent start, where the user has set none, also not since the set-up */
+PetscErrorCode ChooseFirstStep(TS ts, Vec rate);
+
+/* The local error that a step of length h from there leaves by these rates, in units of the tolerance */
+PetscErrorCode ErrorOfStart(TS ts, Vec rate, PetscReal h, PetscReal *e);
+
 /* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
 
