@@ -4,7 +4,7 @@
   eigenvalues are infinite, farthest from any shift.
 
   Time is taken in a unit in which stiffness and masses are of one size, and the shift has to be of the size of the values: next to a shift far below them
-  slow modes and infinite ones look alike. So the search is repeated about what it has found, and the modes are held against the equations.
+  slow modes and infinite ones look alike. So the search is repeated about the fastest that it has found, and the modes are held against the equations.
 */
 #include "flexible/modes.h"
 #include "hhtdae/modes.h"
@@ -20,7 +20,8 @@ namespace
 {
 
 constexpr PetscReal accuracy = 1e-10;
-constexpr PetscReal beside   = 10;   /* the slowest value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes) */
+constexpr PetscReal beside   = 10;   /* a value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes, ModesOfAllSpeeds) */
+constexpr PetscReal below    = 100;  /* the shift, of a value: beyond it, too */
 constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
 constexpr int       refinements = 5; /* of a shape, at most */
@@ -297,14 +298,6 @@ PetscErrorCode Collect(PEP pep, const Balanced &by, PetscInt count, std::vector<
   PetscFunctionReturn(0);
 }
 
-/* The value of the slowest mode that is no rigid motion, 0: there is none */
-PetscReal Slowest(const std::vector<Mode> &modes, PetscReal shift)
-{
-  for (const Mode &m : modes)
-    if (!AtRest(m, modes, shift)) return std::abs(m.value);
-  return 0;
-}
-
 /* Takes from a shape its parts along unit vectors, and leaves its norm */
 PetscErrorCode Orthogonalize(MPI_Comm comm, const std::vector<Eigen::VectorXcd> &units, Eigen::VectorXcd *x, PetscReal *norm)
 {
@@ -446,24 +439,61 @@ struct Found {
   PetscReal         shift = 0, left = 0, frequency = 0;
 };
 
-PetscErrorCode SearchAbout(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+/* Where values of both are far apart, from `from` on: none is within a hundredth */
+PetscReal Gap(PetscReal from, const std::vector<Mode> &a, const std::vector<Mode> &b)
 {
+  for (bool clear = false; !clear;) {
+    clear = true;
+    for (const std::vector<Mode> *modes : {&a, &b})
+      for (const Mode &m : *modes)
+        if (std::abs(std::abs(m.value) / from - 1) < as_fast) {
+          from *= 1 + 2 * as_fast;
+          clear = false;
+        }
+  }
+  return from;
+}
+
+void EraseFrom(PetscReal value, std::vector<Mode> *modes)
+{
+  modes->erase(std::remove_if(modes->begin(), modes->end(), [&](const Mode &m) { return std::abs(m.value) >= value; }), modes->end());
+}
+
+/* A search has the digits of values that are at most `beside` times as fast as the shift. Where it has found faster ones, there is another one about a shift that is so near
+   to the fastest. Those too slow for it remain as they were, or are looked at in the same way, unless the searches do not agree on how many there are: rounding of fast
+   ones makes more out of rigid motions the farther they are from the shift, and nothing of the search before is believed (SmallBodies.SlowestModesOfAFreeBody). */
+PetscErrorCode SearchOften(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+{
+  std::vector<Mode> slow, &all = found->modes;
+  PetscReal         limit = PETSC_MAX_REAL;
   PetscFunctionBegin;
   found->shift = shift;
-  PetscCall(Search(given, shift, count, &found->modes));
-  PetscCall(Worst(given, shift, &found->modes, &found->left, &found->frequency));
-  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)shift,
-                      found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->left));
+  PetscCall(Search(given, shift, count, &slow));
+  while (!slow.empty() && std::abs(slow.back().value) > beside * std::abs(shift)) {
+    std::vector<Mode> again;
+    const PetscReal   about = std::copysign(std::abs(slow.back().value) / beside, shift);
+    if (all.empty()) found->shift = about;
+    PetscCall(Search(given, about, (PetscInt)slow.size(), &again));
+    const PetscReal split  = Gap(std::abs(about) / below, slow, again);
+    const auto      slower = [&](const Mode &m) { return std::abs(m.value) < split; };
+    const bool      agree  = std::count_if(slow.begin(), slow.end(), slower) == std::count_if(again.begin(), again.end(), slower);
+    EraseFrom(limit, &again);
+    std::copy_if(again.begin(), again.end(), std::back_inserter(all), [&](const Mode &m) { return !agree || !slower(m); });
+    EraseFrom(agree ? split : 0, &slow);
+    limit = split;
+  }
+  all.insert(all.end(), slow.begin(), slow.end());
+  Sort(count, &all);
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Find(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
 {
   PetscFunctionBegin;
-  PetscCall(SearchAbout(given, shift, count, found));
-  const PetscReal slowest = Slowest(found->modes, shift);
-  if (slowest > beside * std::abs(shift) && (found->left > balanced || slowest == std::abs(found->modes.front().value))) /* about rigid motions only where need be */
-    PetscCall(SearchAbout(given, std::copysign(slowest, shift), count, found));
+  PetscCall(SearchOften(given, shift, count, found));
+  PetscCall(Worst(given, found->shift, &found->modes, &found->left, &found->frequency));
+  PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)found->shift,
+                      found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->left));
   PetscFunctionReturn(0);
 }
 

@@ -216,6 +216,39 @@ TEST(SmallBodies, SlowestModesOfAStiffBodyOnASoftSpring)
   }
 }
 
+/* Eight modes over more than two decades, the fastest far from any shift that suits the slowest: none twice, each to six digits */
+TEST(SmallBodies, ModesOfAllSpeeds)
+{
+  Scene                 scene(PETSC_COMM_SELF);
+  Made                  made({{6, 1, 1}, {1, 0.05, 0.05}});
+  FullFeBody            fe;
+  FullBody              b;
+  RigidBody             mass;
+  TorsionalSpringDamper spring;
+  b.law         = FeLaw::Small;
+  b.attachments = both().attachments;
+  must(fe.add(scene, "beam", made.model, b));
+  mass.mass            = 5;
+  mass.inertia         = Vector3(0.01, 0.01, 0.01).asDiagonal();
+  mass.position        = Vector3(1.3, 0.025, 0.025);
+  const auto    tip    = scene.add("mass", mass);
+  const Matrix3 axes   = axesAlong({0, 1, 0});
+  spring.i             = scene.marker(tip, {-0.3, 0, 0}, axes);
+  spring.j             = scene.marker(fe.attachment("right"), Vector3::Zero(), axes);
+  spring.stiffness     = 200;
+  scene.add("clamp", Fixed{scene.marker(fe.attachment("left")), scene.marker(scene.ground(), {0, 0.025, 0.025})});
+  scene.add("hinge", Revolute{spring.i, spring.j});
+  scene.add("spring", spring);
+  const Taken       t(scene);
+  std::vector<Mode> all, slow;
+  must(t.small.modes(&all));
+  for (double shift : {1., 20., 3000.}) {
+    must(SlowestModes(t.small, 8, &slow, shift));
+    ASSERT_EQ(slow.size(), 8u);
+    for (int k = 0; k < 8; k++) EXPECT_NEAR(std::abs(slow[k].value), std::abs(all[k].value), 1e-6 * std::abs(all[k].value)) << k << " about " << shift;
+  }
+}
+
 /* Axes turn with flexible bodies where all do so alike; else a notice, in whatever order they come, but of spins that no mode sees */
 TEST(SmallBodies, AxesOfSeveralBodies)
 {
