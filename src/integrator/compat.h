@@ -121,12 +121,27 @@ static inline PetscBool HHT3BehindEvent(TS ts)
 #endif
 }
 
-/* Whether a zero of this function has been found at the present time */
+/* Whether an event has been located at the present time, and whether it is a zero of this function */
+static inline bool HHT3IsLocated(TS ts) { return ts->event && ts->event->recorder.ctr > 0 && ts->event->recorder.time[ts->event->recorder.ctr - 1] == ts->ptime; }
 static inline bool HHT3IsLocated(TS ts, PetscInt event)
 {
+  if (!HHT3IsLocated(ts)) return false;
   const auto    &r = ts->event->recorder;
   const PetscInt k = r.ctr - 1;
-  return k >= 0 && r.time[k] == ts->ptime && std::find(r.eventidx[k], r.eventidx[k] + r.nevents[k], event) != r.eventidx[k] + r.nevents[k];
+  return std::find(r.eventidx[k], r.eventidx[k] + r.nevents[k], event) != r.eventidx[k] + r.nevents[k];
+}
+
+/* Behind an event a zero that was located counts as one, if the function is still what it was there: within a long step TSEvent ends its search by the length of the interval, on the near side and
+   beyond the tolerance, and would count the same zero again as soon as it is passed (Events.InLongSteps) */
+static inline void HHT3TakeLocatedForZero(TS ts)
+{
+#if PETSC_VERSION_LT(3, 21, 0)
+  TSEvent e = ts->event;
+  for (PetscInt i = 0; i < e->nevents; i++)
+    if (HHT3IsLocated(ts, i) && PetscAbsScalar(e->fvalue_prev[i] - e->fvalue_right[i]) < e->vtol[i]) e->fvalue_prev[i] = 0;
+#else
+  (void)ts;
+#endif
 }
 
 /* The functions whose zeros TSEvent looks for */

@@ -295,6 +295,7 @@ struct Integrator : StepState {
   Rotations rotations;
   RowNames  names;
   Hooks     hooks;
+  PetscBool event_ahead        = PETSC_FALSE; /* functions of events are asked for a state to come, which stands in the solution of the TS, events.cpp */
   PetscBool failures_unlimited = PETSC_FALSE; /* in place of PETSc's default of one */
   PetscBool settings_reported  = PETSC_FALSE; /* what has no meaning here, once */
 

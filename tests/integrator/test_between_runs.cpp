@@ -772,6 +772,43 @@ TEST(Events, ABallIsNotLost)
   }
 }
 
+/* A function of an event that asks for the state at its time is answered in every step, also where it is asked before the first step behind an event */
+TEST(Events, FunctionsThatAskForTheState)
+{
+  const Balls     p({1.}, {.9}, 3.);
+  Thrown          thrown{&p};
+  Simulation      run(p, tolerance(1e-4));
+  const PetscInt  down  = -1;
+  const PetscBool go    = PETSC_FALSE;
+  const auto      asked = [](TS ts, PetscReal t, Vec U, PetscScalar *f, void *) -> PetscErrorCode {
+    PetscInt steps;
+    Vec      W[3];
+    PetscFunctionBegin;
+    PetscCall(TSGetStepNumber(ts, &steps));
+    for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
+    if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, W[0], W[1], W[2]));
+    else PetscCall(VecCopy(U, W[0]));
+    f[0] = whole(W[0])[0];
+    EXPECT_EQ(f[0], whole(U)[0]);
+    for (Vec &x : W) PetscCall(VecDestroy(&x));
+    PetscFunctionReturn(0);
+  };
+  const auto back = [](TS ts, PetscInt n, PetscInt *which, PetscReal t, Vec U, PetscBool forward, void *ctx) -> PetscErrorCode {
+    PetscFunctionBegin;
+    PetscCall(throwBack(ts, n, which, t, U, forward, ctx));
+    PetscCall(TSRestartStep(ts));
+    PetscFunctionReturn(0);
+  };
+  int bounces;
+  must(TSSetTimeStep(run.ts, hht3::unset_step));
+  must(TSSetEventHandler(run.ts, 1, const_cast<PetscInt *>(&down), const_cast<PetscBool *>(&go), asked, back, &thrown));
+  must(TSSetEventTolerances(run.ts, 1e-9, nullptr));
+  const double exact = p.exact(0, 3., &bounces);
+  must(run.solve());
+  EXPECT_EQ(thrown.times, bounces);
+  EXPECT_NEAR(run.u()[0], exact, 1e-6);
+}
+
 /* The rest of the step that had one event, up to the end of the run, has another one */
 TEST(Events, TwoInOneStep)
 {
@@ -800,6 +837,68 @@ TEST(Events, BouncesThatAccumulate)
   EXPECT_GE(thrown.times, 14);
   EXPECT_LE(thrown.times, 30);
   EXPECT_LE(run.statistics().steps, 600);
+}
+
+namespace
+{
+
+/* A point that falls with 10 m/s^2 to either side, towards x = 0: each passage turns the force, which nobody sees in the solution */
+struct Turning : Problem {
+  double         height;
+  mutable double a = -10.;
+  explicit Turning(double h) : height(h)
+  {
+    name = "turning";
+    n    = 1;
+    t1   = 3.;
+    role.assign(n, TSHHT3_COORDINATE);
+  }
+  void   initial(double *u, double *v) const override { u[0] = height, v[0] = 0.; }
+  void   residual(double, const double *, const double *, const double *acc, double *f) const override { f[0] = acc[0] - a; }
+  void   jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override { J.add(0, 0, sa); }
+  double period() const { return 4. * std::sqrt(height / 5.); }
+  int    passages() const { return (int)((t1 + period() / 4.) / (period() / 2.)); }
+  double exact(double t) const
+  {
+    const double quarter = period() / 4., rest = std::fmod(t + quarter, 2. * quarter) - quarter; /* from the last turning point of the same sign */
+    const int    half = (int)((t + quarter) / (2. * quarter));
+    return (half % 2 ? -1. : 1.) * (height - 5. * rest * rest);
+  }
+};
+
+struct Passages {
+  const Turning *p;
+  int            count = 0;
+};
+
+PetscErrorCode turn(TS, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *ctx)
+{
+  auto *passages = static_cast<Passages *>(ctx);
+  passages->p->a = -passages->p->a;
+  passages->count++;
+  return 0;
+}
+
+} // namespace
+
+/* A handler that turns a force and leaves the solution alone: the run begins afresh, and in long steps no passage is found twice */
+TEST(Events, ForcesThatAreTurned)
+{
+  const PetscInt  direction = 0;
+  const PetscBool go        = PETSC_FALSE;
+  for (const char *options : {"", "-ts_hhtdae_order auto", "-ts_adapt_type basic", "-ts_adapt_dt_max 0.1", "-ts_adapt_type none -ts_dt 0.05", "-ts_adapt_type none -ts_dt 0.3"})
+    for (double height : {0.5, 1., 1.3, 2.3}) {
+      SCOPED_TRACE(text("%s from %g m", options, height));
+      const Turning p(height);
+      Simulation    run(p, tolerance(1e-8) + options);
+      Passages      passages{&p};
+      if (!std::strstr(options, "none")) must(TSSetTimeStep(run.ts, hht3::unset_step));
+      must(TSSetEventHandler(run.ts, 1, const_cast<PetscInt *>(&direction), const_cast<PetscBool *>(&go), heights, turn, &passages));
+      must(TSSetEventTolerances(run.ts, 1e-9, nullptr));
+      must(run.solve());
+      EXPECT_EQ(passages.count, p.passages());
+      EXPECT_NEAR(run.u()[0], p.exact(run.t()), 1e-4);
+    }
 }
 
 /* TSRollBack() of a run that has not begun, set up or not */

@@ -30,9 +30,11 @@ PetscErrorCode FunctionsAfter(TS ts, PetscReal d, std::vector<PetscScalar> &f)
 
   PetscFunctionBegin;
   PetscCall(Advance(I, d, ts->vec_sol, ts->vec_dot));
-  ts->ptime = t + d;
+  ts->ptime     = t + d;
+  I.event_ahead = PETSC_TRUE;
   const PetscErrorCode failed = HHT3EventFunctions(ts, ts->ptime, ts->vec_sol, f);
-  ts->ptime = t;
+  I.event_ahead = PETSC_FALSE;
+  ts->ptime     = t;
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(failed);

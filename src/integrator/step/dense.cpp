@@ -131,14 +131,15 @@ PetscErrorCode AtRotations(Integrator &I, PetscReal x, WeightedSum velocity, Vec
 /* Where t lies in the last step: 0 to 1, and these at its ends exactly */
 PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
 
-/* Monitors are called when an event has taken the step back, too, and after an error users look for what went before it: then the state is that of t_n, and nothing is known of other times */
-bool IsBeginOfStep(TS ts, PetscReal t) { return !Get(ts).have_step && Get(ts).at_begin && t == ts->ptime; }
+/* Monitors are called when an event has taken the step back, too, and after an error users look for what went before it: then the state is that of t_n, and nothing is known of other times.
+   Functions of events are asked before the first step of a start, too. */
+bool IsBeginOfStep(TS ts, PetscReal t) { return (Get(ts).event_ahead || (!Get(ts).have_step && Get(ts).at_begin)) && t == ts->ptime; }
 
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
   Integrator &I = Get(ts);
-  const Vec   out[3] = {U, V, A}, begin[3] = {I.U0, I.V0, I.A0};
+  const Vec   out[3] = {U, V, A}, begin[3] = {I.event_ahead ? ts->vec_sol : I.U0, I.event_ahead ? ts->vec_dot : I.V0, I.A0};
   PetscInt    n, size;
 
   PetscFunctionBegin;

@@ -110,7 +110,12 @@ PetscErrorCode BeginStep(TS ts)
     else if (I.at_begin) PetscCall(StateWasChanged(ts, I.t0, I.U0, I.V0, &changed));
     else changed = PETSC_TRUE;
     if (changed) PetscCall(PetscInfo(ts, "the solution or the time was changed from outside: restart\n"));
+    if (!changed && HHT3IsLocated(ts)) {
+      PetscCall(PetscInfo(ts, "an event was located at t = %g, which may have changed forces: restart\n", (double)ts->ptime));
+      changed = PETSC_TRUE;
+    }
   }
+  if (HHT3IsLocated(ts)) HHT3TakeLocatedForZero(ts);
   I.own_start = PETSC_FALSE;
   if (ts->steprestart || changed) {
     if (I.have_step) PetscCall(IsOwnState(ts, I.t1, I.U1, I.V1, &I.own_start));

@@ -409,6 +409,7 @@ static PetscErrorCode Finalize(void)
   that bounces lower than the tolerance falls through the floor unless the function called at the event lays it to rest.
 
   Forces that jump where the integrator cannot see it, between two calls of `TSSolve()` or in a monitor, want `TSRestartStep()`; its history is that of the forces before.
+  Behind an event a run starts afresh, whatever its handler has changed.
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
