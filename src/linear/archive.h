@@ -57,8 +57,8 @@ private:
   {
     if (!good || !n) return;
     if (!reading) {
-      const char *from = static_cast<const char *>(x);
-      data.insert(data.end(), from, from + n);
+      data.resize(data.size() + n);
+      std::memcpy(data.data() + data.size() - n, x, n);
       return;
     }
     if (n > data.size() - at_) {

@@ -9,6 +9,7 @@
 #include "integrator/random.h"
 #include "rows.h"
 #include "integrator/work_vec.h"
+#include <algorithm>
 #include <cstdint>
 
 namespace hht3
@@ -65,32 +66,120 @@ PetscErrorCode ExchangeEntry(Vec v, PetscInt i, PetscScalar *other)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves U_j, U'_j, U''_j at once, one j after another, and notes which rows change */
+/* The residual at x with some of U_j, U'_j, U''_j moved by d on the rank that has them */
+PetscErrorCode ResidualMoved(TS ts, WorkVec (&x)[3], PetscInt j, PetscReal d, std::initializer_list<int> which, Vec F)
+{
+  PetscInt    start, end;
+  PetscScalar other[3] = {};
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  const bool here = j >= start && j < end;
+  for (int k : which) {
+    if (!here) continue;
+    PetscCall(VecGetValues(x[k], 1, &j, &other[k]));
+    other[k] += d;
+    PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
+  }
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
+  if (here)
+    for (int k : which) PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+constexpr PetscReal move_of_probe   = 1e-3;
+constexpr PetscReal large_positions = 1e3;  /* in whatever unit: squares of them have the rounding of small moves (Differences.LargePositions) */
+constexpr PetscReal hardly_seen     = 1e-9; /* of the largest force: a multiplier that changes rows by less may be lost in their rounding (Differences.MultipliersBesideLargeForces) */
+
+/* Moves U_j, U'_j, U''_j at once, one j after another, by so much of scale_j, and adds the rows that change. most: the largest change of any row */
+PetscErrorCode AddPattern(TS ts, WorkVec (&x)[3], const std::vector<PetscReal> &scale, std::vector<std::vector<PetscInt>> &rows, std::vector<PetscReal> *most)
+{
+  WorkVec        F0, F;
+  const PetscInt N = (PetscInt)scale.size();
+  PetscInt       start;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
+  PetscCall(F0.like(ts->vec_sol));
+  PetscCall(F.like(ts->vec_sol));
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+  most->assign(N, 0);
+  for (PetscInt j = 0; j < N; j++) {
+    PetscCall(ResidualMoved(ts, x, j, move_of_probe * scale[j], {0, 1, 2}, F));
+    PetscCall(ForEntries(
+      [&](PetscInt i, PetscScalar f0, PetscScalar f) {
+        if ((f0 != f && !(scale[j] > 1 && PetscIsInfOrNanScalar(f - f0))) || start + i == j) rows[i].push_back(j);
+        (*most)[j] = PetscMax((*most)[j], PetscAbsScalar(f - f0));
+      },
+      Read(F0), Read(F)));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most->data(), (PetscMPIInt)N, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether neither U'_j nor U''_j moves any row: the unknown is algebraic, as multipliers are */
+PetscErrorCode IsAlgebraic(TS ts, WorkVec (&x)[3], PetscInt j, Vec F0, bool *yes)
+{
+  WorkVec   F;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(F.like(F0));
+  PetscCall(ResidualMoved(ts, x, j, 1, {1, 2}, F));
+  PetscCall(VecEqual(F0, F, &same));
+  *yes = same;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where probes of the sizes of one lose products in rounding: multipliers get the size of the forces, and where positions are large all unknowns get their size. Base values are moved, too. */
+PetscErrorCode SizesOfProbes(TS ts, WorkVec (&x)[3], const std::vector<PetscReal> &most, std::vector<PetscReal> *scale, bool *larger)
+{
+  const PetscInt N = (PetscInt)scale->size();
+  PetscInt       start, end;
+  PetscReal      force, size;
+  WorkVec        F0;
+  bool           algebraic = false;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  PetscCall(F0.like(ts->vec_sol));
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+  PetscCall(VecNorm(F0, NORM_INFINITY, &force));
+  PetscCall(VecNorm(ts->vec_sol, NORM_INFINITY, &size));
+  *larger = size > large_positions && size < PETSC_MAX_REAL;
+  if (*larger) scale->assign(N, size);
+  for (PetscInt j = 0; j < N; j++) {
+    if (!(most[j] > 0 && most[j] < hardly_seen * force && force < PETSC_MAX_REAL)) continue;
+    PetscCall(IsAlgebraic(ts, x, j, F0, &algebraic));
+    if (!algebraic) continue;
+    (*scale)[j] = PetscMax((*scale)[j], force / most[j]);
+    *larger     = true;
+  }
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &u) { if ((*scale)[start + i] > 1) u += move_of_probe * (*scale)[start + i] * RandomNumber(start + i, 24); }, Write(x[0])));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows that change with each unknown */
 PetscErrorCode FindPattern(TS ts, std::vector<std::vector<PetscInt>> &rows)
 {
-  WorkVec  x[3], F0, F;
-  PetscInt N, n, start, end;
+  WorkVec                x[3];
+  PetscInt               N, n;
+  std::vector<PetscReal> scale, most;
+  bool                   larger = false;
 
   PetscFunctionBegin;
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetLocalSize(ts->vec_sol, &n));
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
   PetscCall(StateOffTheStart(ts, x));
-  PetscCall(F0.like(ts->vec_sol));
-  PetscCall(F.like(ts->vec_sol));
-  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   rows.assign(n, {});
-  for (PetscInt j = 0; j < N; j++) {
-    const bool  here     = j >= start && j < end;
-    PetscScalar other[3] = {};
-    for (int k = 0; here && k < 3; k++) {
-      PetscCall(VecGetValues(x[k], 1, &j, &other[k]));
-      other[k] += 1e-3;
-      PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
-    }
-    PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F));
-    for (int k = 0; here && k < 3; k++) PetscCall(ExchangeEntry(x[k], j - start, &other[k]));
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar f0, PetscScalar f) { if (f0 != f || start + i == j) rows[i].push_back(j); }, Read(F0), Read(F)));
+  scale.assign(N, 1);
+  PetscCall(AddPattern(ts, x, scale, rows, &most));
+  PetscCall(SizesOfProbes(ts, x, most, &scale, &larger));
+  if (!larger) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(AddPattern(ts, x, scale, rows, &most));
+  for (std::vector<PetscInt> &row : rows) {
+    std::sort(row.begin(), row.end());
+    row.erase(std::unique(row.begin(), row.end()), row.end());
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -289,6 +378,7 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatColoringDestroy(&mc));
   PetscCall(MatFDColoringCreate(d->part, colors, &d->coloring));
   PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(EvaluateProbe)), d));
+  PetscCall(MatFDColoringSetType(d->coloring, MATMFFD_DS)); /* each unknown by its own size: multipliers may be 1e9 times as large as positions */
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
   PetscCall(TakeSteps(d));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
@@ -329,16 +419,13 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   Vec             at[3]    = {U, V, A};
 
   PetscFunctionBegin;
-  PetscReal norm;
-  PetscCall(VecNorm(A, NORM_2, &norm));
-  const PetscReal size = PetscMax(1, d->size / PetscSqrtReal(1 + norm)); /* MatFDColoring makes steps relative to this root */
   d->t = t;
   for (int k = 0; k < 3; k++) d->at[k] = at[k];
   PetscCall(MatZeroEntries(P));
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
-    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? size : 1), d->least > 0 ? d->least : 1));
+    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? d->size : 1), d->least > 0 ? d->least : 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }
