@@ -11,6 +11,7 @@ class Plot {
     this.element.innerHTML = '<figcaption><span class="name"></span><span class="value"></span></figcaption><div class="key"></div><canvas role="img"></canvas>';
     this.element.querySelector('.name').textContent = title;
     this.canvas = this.element.querySelector('canvas');
+    this.picture = document.createElement('canvas');
     this.canvas.setAttribute('aria-label', title + ' over time' + (unit ? ' in ' + unit : ''));
     this.measure();
     const move = e => {
@@ -43,20 +44,35 @@ class Plot {
   draw(t, place) {
     const ratio = window.devicePixelRatio || 1, width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     if (!width || !height) return;
-    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
-      this.canvas.width = Math.round(width * ratio);
-      this.canvas.height = Math.round(height * ratio);
-    }
-    const g = this.canvas.getContext('2d'), style = getComputedStyle(document.documentElement), colour = name => style.getPropertyValue(name).trim();
+    const key = [width, height, ratio, document.documentElement.dataset.theme].join();
+    if (this.drawn !== key) this.drawCurves(width, height, ratio);
+    this.drawn = key;
+    const g = this.canvas.getContext('2d');
+    g.setTransform(1, 0, 0, 1, 0, 0);
+    g.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    g.drawImage(this.picture, 0, 0);
     g.setTransform(ratio, 0, 0, ratio, 0, 0);
-    g.clearRect(0, 0, width, height);
+    this.drawCursor(g, t, place);
+  }
+
+  /* All but the cursor, on a canvas that is kept: strokes of many samples take longer than all else that is drawn */
+  drawCurves(width, height, ratio) {
+    for (const canvas of [this.canvas, this.picture]) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const g = this.picture.getContext('2d'), style = getComputedStyle(document.documentElement), colour = name => style.getPropertyValue(name).trim();
+    g.setTransform(ratio, 0, 0, ratio, 0, 0);
     g.font = '11px system-ui, "Liberation Sans", sans-serif';
     const marks = ticks(this.low, this.high, 4), labels = tickLabels(marks, this.high - this.low);
     this.left = 8 + Math.max(...labels.map(l => g.measureText(l).width));
     this.right = 8;
-    const top = 6, bottom = 18, [t0, t1] = this.timeRange();
-    const x = time => this.left + (width - this.left - this.right) * (t1 > t0 ? (time - t0) / (t1 - t0) : 0.5);
-    const y = value => top + (height - top - bottom) * (this.high - value) / (this.high - this.low);
+    this.ink = colour('--ink');
+    this.top = 6;
+    this.bottom = height - 18;
+    const [t0, t1] = this.timeRange(), long = width - this.left - this.right, tall = this.bottom - this.top;
+    const x = this.x = time => this.left + long * (t1 > t0 ? (time - t0) / (t1 - t0) : 0.5);
+    const y = this.y = value => this.top + tall * (this.high - value) / (this.high - this.low);
     g.lineWidth = 1;
     g.strokeStyle = colour('--rule');
     g.fillStyle = colour('--faint');
@@ -81,29 +97,44 @@ class Plot {
       g.lineWidth = 1.4;
       g.beginPath();
       let down = false;
-      for (let k = 0; k < this.time.length; k++) {
+      for (const k of this.visible(s.value, ratio)) {
         const on = Number.isFinite(s.value[k]);
         if (on) g[down ? 'lineTo' : 'moveTo'](x(this.time[k]), y(s.value[k]));
         down = on;
       }
       g.stroke();
     });
-    this.drawCursor(g, t, place, x, y, top, height - bottom, colour('--ink'));
   }
 
-  drawCursor(g, t, [k, part], x, y, top, bottom, ink) {
-    g.strokeStyle = ink;
+  /* Samples through which the curve is drawn: of those in one column of pixels the first, the lowest, the highest and the last */
+  visible(value, ratio) {
+    const column = k => Number.isFinite(value[k]) ? Math.floor(ratio * this.x(this.time[k])) : NaN, list = [];
+    for (let k = 0; k < value.length;) {
+      const first = k, here = column(k);
+      let low = k, high = k;
+      while (column(++k) === here) {
+        if (value[k] < value[low]) low = k;
+        if (value[k] > value[high]) high = k;
+      }
+      list.push(...new Set([first, Math.min(low, high), Math.max(low, high), k - 1]));
+    }
+    return list;
+  }
+
+  drawCursor(g, t, [k, part]) {
+    const x = this.x(t);
+    g.strokeStyle = this.ink;
     g.lineWidth = 1;
     g.beginPath();
-    g.moveTo(x(t), top);
-    g.lineTo(x(t), bottom);
+    g.moveTo(x, this.top);
+    g.lineTo(x, this.bottom);
     g.stroke();
     const now = this.series.map(s => this.valueAt(s, k, part));
     now.forEach((v, i) => {
       if (!Number.isFinite(v)) return;
       g.fillStyle = seriesColours[i % seriesColours.length];
       g.beginPath();
-      g.arc(x(t), y(v), 3, 0, 2 * Math.PI);
+      g.arc(x, this.y(v), 3, 0, 2 * Math.PI);
       g.fill();
     });
     const value = this.element.querySelector('.value'), key = this.element.querySelector('.key');
