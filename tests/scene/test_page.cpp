@@ -172,6 +172,30 @@ TEST(Page, FlexibleBodies)
   }
 }
 
+/* Where the frames of attachments are without deformation: of a body that is deformed at the start, and whose origin is not its centre of mass */
+TEST(Page, AttachmentsWithoutDeformation)
+{
+  TemporaryFile file("attachments.html");
+  ModalCloud    cloud(9, 5, 11);
+  FlexibleBody  b;
+  const Vector3 shift(0.3, -0.2, 0.7);
+  cloud.body.center += shift;
+  for (ModalAttachment &a : cloud.body.attachments) a.position += shift;
+  b.model       = std::make_shared<ModalBody>(cloud.body);
+  b.position    = {1, 2, 3};
+  b.deformation = Eigen::VectorXd::LinSpaced(5, -0.2, 0.3);
+  Scene scene(PETSC_COMM_SELF);
+  scene.attachment(scene.add("cloud", b), "tip");
+  SceneRun run(scene, 0.01, "-scene_page " + file.name);
+  must(run.solve());
+  const std::string s = PageFile(file.text(), 14 + 5, 0).scene, mark = "\"carrier\":0,\"rest\":[";
+  const std::size_t at = s.find(mark);
+  ASSERT_NE(at, std::string::npos) << s;
+  Vector3 rest;
+  ASSERT_EQ(std::sscanf(s.c_str() + at + mark.size(), "%lf,%lf,%lf", &rest(0), &rest(1), &rest(2)), 3);
+  EXPECT_LT((rest - cloud.X[1]).norm(), 1e-10);
+}
+
 TEST(Page, SurfacesThatDoNotFit)
 {
   const ModalCloud cloud(9, 5, 3);

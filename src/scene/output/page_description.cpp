@@ -76,7 +76,12 @@ using Meshes = std::vector<std::unique_ptr<PageMesh>>;
 
 std::string MeshText(const PageMesh &m)
 {
-  return Object({{"name", JSONText(m.name)}, {"modes", "0"}, {"carrier", "-1"}, {"mesh", "true"}, {"guess", "false"}, {"shapes", "[]"}});
+  return Object({{"name", JSONText(m.name)}, {"modes", "0"}, {"carrier", "-1"}, {"rest", "[]"}, {"mesh", "true"}, {"guess", "false"}, {"shapes", "[]"}});
+}
+
+Vector3 Mean(const std::vector<double> &point)
+{
+  return Eigen::Map<const Eigen::Matrix3Xd>(point.data(), 3, (Eigen::Index)point.size() / 3).rowwise().mean();
 }
 
 std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
@@ -85,9 +90,17 @@ std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
   std::vector<char>                     drawn(s.bodies.size(), 0);
   std::vector<std::string>              out;
   std::vector<PetscInt>                 carrier;
-  for (const BodyData &b : s.bodies) carrier.push_back(b.carrier);
+  std::vector<std::string>              rest; /* of the frames of attachments */
+  for (const BodyData &b : s.bodies) {
+    carrier.push_back(b.carrier);
+    rest.push_back(b.carrier < 0 ? "[]" : JSONNumbers(Vector3(s.bodies[b.carrier].flexible->place(b.attachment).position - s.bodies[b.carrier].center)));
+  }
   for (std::size_t m = 0; m < meshes.size(); m++)
-    for (Marker frame : meshes[m]->frames) carrier[s.markers[frame.id].body] = (PetscInt)(s.bodies.size() + m);
+    for (Marker frame : meshes[m]->frames) {
+      const PetscInt b = s.markers[frame.id].body;
+      carrier[b]       = (PetscInt)(s.bodies.size() + m);
+      rest[b]          = JSONNumbers(Vector3(s.bodies[b].r - Mean(meshes[m]->surface.point)));
+    }
   for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1; /* and no shape of the user, which would lie inside of it */
   for (const ShapeData &d : s.shapes)
     if (d.body >= 0 && !drawn[d.body]) shapes[d.body].push_back(ShapeText(s, d));
@@ -105,6 +118,7 @@ std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
     out.push_back(Object({{"name", JSONText(d.name)},
                           {"modes", std::to_string(d.flexible ? d.flexible->model->modes() : 0)},
                           {"carrier", std::to_string(carrier[b])},
+                          {"rest", rest[b]},
                           {"mesh", "false"},
                           {"guess", Boolean(guess)},
                           {"shapes", List(shapes[b])}}));

@@ -12,7 +12,8 @@ namespace hhtdae
   Behind the scene's bodies there is one for each mesh, which carries the frames of its attachments. A place is [body, x, y, z, qx, qy, qz, qw]: of a marker, from the body's centre of mass in its axes; body -1 is the ground.
 
     {"format": 1, "title": text, "planar": bool, "up": [x, y, z],
-     "bodies":   [{"name", "modes", "carrier": flexible body of an attachment's frame or -1, "mesh": bool,
+     "bodies":   [{"name", "modes", "carrier": flexible body of an attachment's frame or -1, "rest": where that frame is without deformation, in the
+                   carrier's axes from its place, "mesh": bool,
                    "shapes": [{"kind": "box" | "cylinder" | "sphere", "size": [x, y, z], "at": place, "colour": 0xRRGGBB or -1}],
                    "guess": the shape is that of the inertia}],
      "ground":   [shapes],

@@ -14,6 +14,8 @@ class Model {
     this.scene3.add(this.ground);
     this.symbols = []; /* of joints */
     this.spans = [];   /* what stretches between two places: {a, b, mesh} */
+    this.deflection = 1;
+    this.hasSurface = this.bodies.map((g, k) => run.surfaces.some(s => s.body === k));
     this.first = run.frame.length ? run.frame.find(f => f.slice(0, 7 * this.bodies.length).every(Number.isFinite)) || run.frame[0] : null;
     this.findPlaces();
     this.findOrigin();
@@ -45,7 +47,14 @@ class Model {
     const x = tracks, k = 7 * body;
     position.set(x[k] - this.origin[0], x[k + 1] - this.origin[1], x[k + 2] - this.origin[2]);
     rotation.set(x[k + 3], x[k + 4], x[k + 5], x[k + 6]);
+    if (this.deflection !== 1 && this.onSurface(body)) this.scaleDeflection(tracks, this.run.scene.bodies[body], position);
     return Number.isFinite(position.x + position.y + position.z + rotation.x + rotation.y + rotation.z + rotation.w);
+  }
+
+  /* The frame of an attachment goes along with the surface of its body, whose displacements are scaled. */
+  scaleDeflection(tracks, frame, position) {
+    const rest = this.pointAt(tracks, [frame.carrier, ...frame.rest]);
+    position.sub(rest).multiplyScalar(this.deflection).add(rest);
   }
 
   pointAt(tracks, place, to = new THREE.Vector3()) {
@@ -53,6 +62,9 @@ class Model {
     this.pose(tracks, place[0], position, rotation);
     return to.set(place[1], place[2], place[3]).applyQuaternion(rotation).add(position);
   }
+
+  /* Whether it is the frame of an attachment to a body whose surface is drawn */
+  onSurface(body) { return body >= 0 && !!this.hasSurface[this.run.scene.bodies[body].carrier]; }
 
   /* Places of markers that joints, forces and lines use: all of them, and by body; frames of attachments by flexible body */
   findPlaces() {
@@ -178,7 +190,8 @@ class Model {
       if (!e.i) continue;
       const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
       if (geometry) {
-        const mesh = this.mesh(e.i[0] < 0 ? this.ground : this.bodies[e.i[0]], geometry, joint, e.i);
+        const place = e.j && this.onSurface(e.j[0]) && !this.onSurface(e.i[0]) ? e.j : e.i; /* scaled deflections take the joint away from the other body */
+        const mesh = this.mesh(place[0] < 0 ? this.ground : this.bodies[place[0]], geometry, joint, place);
         mesh.userData.element = `${e.name} (${e.type})`;
         if (few) {
           const ghost = new THREE.Mesh(geometry, hidden);
@@ -227,41 +240,41 @@ class Model {
 
   /* ---- motion ---- */
 
-  /* deflection: factor on the displacements of surfaces */
+  /* deflection: factor on the displacements of surfaces and attachments */
   moveTo(t, deflection) {
     const tracks = framesAt(this.run, t);
     if (!tracks) return;
-    this.tracks = tracks;
+    this.deflection = deflection;
     this.bodies.forEach((g, k) => { g.visible = this.pose(tracks, k, g.position, g.quaternion); });
     for (const {a, b, mesh} of this.spans) this.stretch(mesh, this.pointAt(tracks, a), this.pointAt(tracks, b));
     for (const s of this.run.surfaces) {
-      this.deform(s, tracks, t, deflection);
+      this.deform(s, tracks, t);
       this.paint(s, t);
     }
   }
 
-  addModes(s, x, tracks, deflection) {
+  addModes(s, x, tracks) {
     const eta = this.run.scene.bodies[s.body].modal;
     for (const k of s.active) {
-      const amount = deflection * tracks[eta + k], shape = s.mode[k].shape;
+      const amount = this.deflection * tracks[eta + k], shape = s.mode[k].shape;
       if (!(Math.abs(amount) * s.mode[k].largest > 1e-7 * this.size)) continue;
       for (let i = 0; i < x.length; i++) x[i] += amount * shape[i];
     }
   }
 
   /* Nodes that move by themselves */
-  addMotion(s, x, t, deflection) {
+  addMotion(s, x, t) {
     const [k, part] = placeInTime(this.run, t), a = s.motion[k], b = s.motion[Math.min(k + 1, s.motion.length - 1)];
     if (!a) return;
-    const fa = deflection * (1 - part) * a.step, fb = deflection * part * b.step;
+    const fa = this.deflection * (1 - part) * a.step, fb = this.deflection * part * b.step;
     for (let i = 0; i < x.length; i++) x[i] += fa * a.code[i] + fb * b.code[i];
   }
 
-  deform(s, tracks, t, deflection) {
+  deform(s, tracks, t) {
     const position = s.mesh.geometry.attributes.position, to = position.array, x = s.now;
     x.set(s.point);
-    if (s.moving) this.addMotion(s, x, t, deflection);
-    else this.addModes(s, x, tracks, deflection);
+    if (s.moving) this.addMotion(s, x, t);
+    else this.addModes(s, x, tracks);
     for (let v = 0; v < s.node.length; v++) {
       const i = 3 * s.node[v];
       to[3 * v] = x[i];
