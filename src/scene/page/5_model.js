@@ -222,11 +222,23 @@ class Model {
       s.mesh = this.mesh(this.bodies[s.body], geometry, material);
       s.mesh.frustumCulled = false; /* its bounds change */
       s.active = s.mode.map((m, k) => k).filter(k => s.mode[k].largest > 0);
-      s.range = this.stressRange(s);
     }
-    this.stress = this.run.surfaces.some(s => s.stress && s.field.length);
-    this.colourBy = this.stress ? 'stress' : 'body';
-    this.stressTop = Math.max(0, ...this.run.surfaces.map(s => s.range.top));
+    this.addScales();
+    this.colourBy = this.scales.length ? 'stress' : 'body';
+  }
+
+  /* Surfaces whose stress has the same unit share a scale of colours. */
+  addScales() {
+    this.scales = [];
+    for (const s of this.run.surfaces) {
+      if (!s.stress || !s.field.length) continue;
+      s.scale = this.scales.find(c => c.unit === s.unit);
+      if (!s.scale) this.scales.push(s.scale = {unit: s.unit, top: 0, largest: 0, surfaces: []});
+      s.scale.surfaces.push(s);
+      const {top, largest} = this.stressRange(s);
+      s.scale.top = Math.max(s.scale.top, top);
+      s.scale.largest = Math.max(s.scale.largest, largest);
+    }
   }
 
   /* Largest stress of the run, and what all but one in a hundred of the nodes stay below: the colours end there, for a few nodes at
@@ -287,13 +299,13 @@ class Model {
   }
 
   paint(s, t) {
-    const attribute = s.mesh.geometry.attributes.color, c = attribute.array, by = s.stress && s.field.length ? this.colourBy : 'body';
+    const attribute = s.mesh.geometry.attributes.color, c = attribute.array, by = s.scale ? this.colourBy : 'body';
     if (by === 'body') {
       if (s.painted !== by) c.fill(1);
       s.mesh.material.color.set(this.colourOf(s.body));
     } else {
       const [k, part] = placeInTime(this.run, t), a = s.field[k], b = s.field[Math.min(k + 1, s.field.length - 1)];
-      const fa = (1 - part) / this.stressTop, fb = part / this.stressTop;
+      const fa = (1 - part) / s.scale.top, fb = part / s.scale.top;
       for (let v = 0; v < s.node.length; v++) {
         const i = s.node[v], colour = stressTable[Math.min(255, Math.max(0, Math.round(fa * a.code[i] * a.largest[i] + fb * b.code[i] * b.largest[i]) || 0))];
         c[3 * v] = colour[0];

@@ -105,7 +105,7 @@ function showTag() {
   else if (group && state.node) {
     const {surface, node} = state.node;
     at = new THREE.Vector3().fromArray(surface.now, 3 * node).applyMatrix4(surface.mesh.matrixWorld);
-    if (surface.stress && surface.field.length) text += ', ' + formatWithUnit(stressAt(surface, run, node, state.t), surface.unit, 3);
+    if (surface.scale) text += ', ' + formatWithUnit(stressAt(surface, run, node, state.t), surface.unit, 3);
   }
   const p = at && text ? view.project(at) : null;
   tag.hidden = !p;
@@ -127,7 +127,7 @@ function select(body, node = null, picked = null) {
   state.node = node;
   state.element = picked;
   bodyPlots = body < 0 ? [] : [positionPlot(body)];
-  if (node && node.surface.stress && node.surface.field.length) bodyPlots.unshift(stressPlot(node));
+  if (node && node.surface.scale) bodyPlots.unshift(stressPlot(node));
   showPlots();
 }
 
@@ -227,25 +227,29 @@ function setColour(by) {
 function prepareSurfaces() {
   if (!run.surfaces.length) return;
   element('surface-tools').hidden = false;
-  element('colour').parentElement.hidden = !model.stress;
+  element('colour').parentElement.hidden = !model.scales.length;
   usable = Math.max(1, model.largestDeflection());
   element('deflection').parentElement.hidden = usable < 1.5;
   element('deflection').addEventListener('input', setDeflection);
   element('colour').addEventListener('change', e => setColour(e.target.value));
-  if (!model.stress) return;
-  const g = element('legend-colours').getContext('2d'), unit = (run.surfaces.find(s => s.stress) || {}).unit || '';
-  for (let i = 0; i < 256; i++) {
-    g.fillStyle = `rgb(${stressTable[255 - i].map(x => Math.round(255 * x)).join()})`;
-    g.fillRect(0, i, 1, 1);
-  }
-  element('legend-title').textContent = 'von Mises';
-  element('legend').title = 'Largest of the run: ' + formatWithUnit(Math.max(...run.surfaces.map(s => s.range.largest)), unit, 3) + '. The colours end where 99 % of the nodes stay below.';
-  element('legend-ticks').replaceChildren(...[1, 0.75, 0.5, 0.25, 0].map(x => {
+  if (!model.scales.length) return;
+  element('legend').replaceChildren(...model.scales.map(legendOf));
+  setColour('stress');
+}
+
+/* Of one scale of colours; where there are several, with the names of its bodies */
+function legendOf(scale) {
+  const legend = document.createElement('div'), colours = stressStops.map(([x, colour]) => `${colour} ${100 * x}%`);
+  legend.innerHTML = '<div class="name">von Mises</div><div class="bar"><div class="colours"></div><div class="ticks"></div></div>';
+  if (model.scales.length > 1) legend.querySelector('.name').textContent += ', ' + scale.surfaces.map(s => run.scene.bodies[s.body].name).join(', ');
+  legend.querySelector('.colours').style.background = `linear-gradient(to top, ${colours.join()})`;
+  legend.title = 'Largest of the run: ' + formatWithUnit(scale.largest, scale.unit, 3) + '. The colours end where 99 % of the nodes stay below.';
+  legend.querySelector('.ticks').replaceChildren(...[1, 0.75, 0.5, 0.25, 0].map(x => {
     const tick = document.createElement('span');
-    tick.textContent = x ? (x === 1 ? '≥ ' : '') + formatWithUnit(x * model.stressTop, unit, 3) : '0';
+    tick.textContent = x ? (x === 1 ? '≥ ' : '') + formatWithUnit(x * scale.top, scale.unit, 3) : '0';
     return tick;
   }));
-  setColour('stress');
+  return legend;
 }
 
 /* ---- light and dark ---- */
