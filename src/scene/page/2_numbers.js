@@ -33,6 +33,12 @@ function digitsFor(size, step) {
   return step > 0 && size > 0 ? Math.min(15, Math.max(4, 1 + Math.floor(Math.log10(size) + 1e-9) - Math.floor(Math.log10(step) + 1e-9))) : 4;
 }
 
+/* Times up to `size` that are told apart by `step`; those of a short run in a power of ten that they share: "0.70 / 1.00 · 10⁻⁶" */
+function formatTimes(times, size, step) {
+  const power = size > 0 && size < 1e-3 ? Math.floor(Math.log10(size)) : 0, digits = Math.min(12, Math.max(0, power - Math.floor(Math.log10(step))));
+  return times.map(t => (t / 10 ** power).toFixed(digits)).join(' / ') + (power ? ' · 10' + superscript(power) : '');
+}
+
 function tickLabels(list, range) {
   const digits = digitsFor(Math.max(...list.map(Math.abs)), list[1] - list[0]);
   return list.map(x => formatNumber(Math.abs(x) < 1e-9 * range ? 0 : x, digits));

@@ -90,10 +90,10 @@ function draw() {
     view.drawAxes(element('axes'));
     showTag();
   }
-  const digits = Math.min(12, Math.max(0, -Math.floor(Math.log10((end() - begin()) / 500 || Math.abs(begin()) / 1000 || 1)))); // of the time of one picture
-  element('time').textContent = state.t.toFixed(digits) + ' / ' + end().toFixed(digits);
+  const size = Math.max(Math.abs(begin()), Math.abs(end())), step = (end() - begin()) / 500 || size / 1000 || 1; // of a picture
+  element('time').textContent = formatTimes([state.t, end()], size, step);
   element('scrub').value = end() > begin() ? Math.round(1e4 * (state.t - begin()) / (end() - begin())) : 0;
-  element('scrub').setAttribute('aria-valuetext', 'time ' + state.t.toFixed(digits));
+  element('scrub').setAttribute('aria-valuetext', 'time ' + formatTimes([state.t], size, step));
   for (const p of [...bodyPlots, ...plots]) p.draw(state.t, place);
 }
 
