@@ -116,7 +116,7 @@ async function readRun(progress) {
       else readFrames(r, run);
     } catch (e) {
       if (k + 1 < elements.length || elements[k].dataset.kind === 'surface') throw e;
-      run.notice = 'The last block of this page is not whole: its writer was stopped.';
+      run.notice = 'The page was cut off while it was written: the end of the run is missing.';
     }
   }
   return run;

@@ -408,8 +408,8 @@ async function start() {
     if (!/WebGL/i.test(e.message)) throw e;
     view = null;
   }
-  say(!run.time.length ? 'The run has no frames yet.' : !view ? 'This browser shows no WebGL: there are plots, but no picture.' : '', !run.time.length || !view);
-  if (run.notice) console.info(run.notice);
+  if (!run.time.length) say('The run has no frames yet. ' + run.notice, true);
+  else say(view ? '' : 'This browser shows no WebGL: there are plots, but no picture. ' + run.notice, !view);
   state.speed = naturalSpeed();
   state.t = begin();
   showSpeed();
