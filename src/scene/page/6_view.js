@@ -130,6 +130,15 @@ class View {
     this.fitted = true;
   }
 
+  /* Turns the camera around the middle of the picture: about the axis upwards, and towards that axis or away from it, short of its ends */
+  turn(about, away) {
+    const d = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(this.up, about), angle = d.angleTo(this.up);
+    d.applyAxisAngle(this.up.clone().cross(d).normalize(), Math.min(3.1, Math.max(0.04, angle + away)) - angle);
+    this.camera.position.copy(this.controls.target).add(d);
+    this.fitted = false;
+    this.controls.update();
+  }
+
   /* The camera goes along with a body */
   follow(body) {
     const g = this.model.bodies[body];

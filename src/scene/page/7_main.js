@@ -124,6 +124,8 @@ function select(body, node = null, picked = null) {
     for (const s of run.surfaces) s.mesh.material.emissive.set(s.body === body && model.colourBy === 'body' ? 0x222222 : 0);
   }
   state.body = body;
+  element('follow').disabled = body < 0;
+  setFollow(state.follow && body >= 0);
   state.node = node;
   state.element = picked;
   bodyPlots = body < 0 ? [] : [positionPlot(body)];
@@ -285,12 +287,20 @@ function fit() {
   change();
 }
 
+function setFollow(on) {
+  state.follow = on;
+  press('follow', on);
+  change();
+}
+
+const turn = (...angles) => () => { if (view) view.turn(...angles); };
+
 const actions = {
   play: () => play(!state.playing),
   slower: () => changeSpeed(false),
   faster: () => changeSpeed(true),
   fit,
-  follow: () => { state.follow = !state.follow; press('follow', state.follow); change(); },
+  follow: () => setFollow(!state.follow && state.body >= 0),
   joints: () => {
     if (!model || !view) return;
     const on = element('joints').getAttribute('aria-pressed') !== 'true';
@@ -304,12 +314,14 @@ const actions = {
 const keys = {
   ' ': 'play', ArrowUp: 'faster', ArrowDown: 'slower', f: 'fit', l: 'follow', j: 'joints', t: 'theme', '?': 'help',
   ArrowLeft: e => goFrames(e.shiftKey ? -10 : -1), ArrowRight: e => goFrames(e.shiftKey ? 10 : 1), Home: () => scrubTo(begin()), End: () => scrubTo(end()),
+  a: turn(-0.1, 0), d: turn(0.1, 0), w: turn(0, -0.1), s: turn(0, 0.1),
 };
 
 function onKey(e) {
   if (e.ctrlKey || e.metaKey || e.altKey || element('about').open || /^(INPUT|SELECT)$/.test(e.target.tagName) && e.target.type !== 'range') return;
   if (e.key === ' ' && e.target.tagName === 'BUTTON' || e.target.tagName === 'SUMMARY') return; /* the button's own key */
-  if (e.target.id === 'deflection' && e.key.startsWith('Arrow')) return;
+  if (e.target.id === 'deflection' && /^(Arrow|Home|End)/.test(e.key)) return;
+  if (e.target.closest('aside') && /^(ArrowUp|ArrowDown|Home|End)$/.test(e.key)) return; /* scrolls the lists */
   const action = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (!action) return;
   e.preventDefault();
