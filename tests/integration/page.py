@@ -30,14 +30,27 @@ def page(program, *options):
     return file
 
 
-def look(file, *settings):
-    """What the page finds when it tests itself"""
+def look(file, *settings, checks=()):
+    """What the page finds when it tests itself; for checks of page_checks.js these go into a copy of it, in front of the data."""
+    if checks:
+        with open(file) as plain, open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "page_checks.js")) as more:
+            program = "<script>const wantedChecks = %s;\n%s</script>\n" % (json.dumps(checks), more.read())
+            text = plain.read().replace('<script id="scene"', program + '<script id="scene"', 1)
+        file = file.replace(".html", "-checks.html")
+        with open(file, "w") as out:
+            out.write(text)
     arguments = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
                  "--user-data-dir=" + os.path.join(os.path.abspath(directory), "profile"), "--window-size=1000,700", "--virtual-time-budget=60000"]
     dom = run([browser, *arguments, *settings, "--dump-dom", "file://" + file + "#selftest"], seconds=240)
     found = re.search(r'data-selftest="([^"]*)"', dom)
     check(found, "%s did not come to the end of its test: %s" % (file, re.findall(r'id="message"[^<]*<?', dom)))
-    return json.loads(html.unescape(found.group(1)))
+    result = json.loads(html.unescape(found.group(1)))
+    if checks:
+        found = re.search(r'data-checks="([^"]*)"', dom)
+        check(found, "%s did not come to the end of its checks" % file)
+        result["checks"] = json.loads(html.unescape(found.group(1)))
+        print(os.path.basename(file), result["checks"])
+    return result
 
 
 def lose_first_body(block, bodies):
@@ -73,23 +86,46 @@ for place in (result["first"], result["last"]):
     check(abs(place[0]) < 1e-4 and abs(math.hypot(place[1] - 0.1, place[2] - 0.12) - 0.04) < 1e-4, "the crank is at %s" % place)
 check(result["first"][:3] != result["last"][:3], "the crank does not move")
 
-# A flexible rod with stress; attachments are bodies, too
-expect(page("flexcrank"), 501, 5, 6, 1)
+# What its test of itself leaves open, page_checks.js
+found = look(file, checks=("curves", "times", "touch", "keys", "follow", "notice"))["checks"]
+check(found["curves"]["first"] < 5000 and found["curves"]["later"] == 10 and found["curves"]["peak"],
+      "a plot of 1e5 samples is drawn anew for each picture, or not all of it: %s" % found["curves"])
+check(found["times"] == ["2.000 / 2.000", "1.000 / 1.000 · 10⁻¹⁵", "1001.000 / 1001.000", "0.2500 / 0.2500"], "times: %s" % found["times"])
+check(found["touch"] == [0, -1, -1], "a touch that is no click selects a body: %s" % found["touch"])
+check(abs(found["keys"]["turned"] - 0.1) < 1e-6 and abs(found["keys"]["raised"] - 0.1) < 1e-6 and abs(found["keys"]["farther"]) < 1e-6, "keys: %s" % found["keys"])
+check(not found["keys"]["inList"] and found["keys"]["elsewhere"], "keys: %s" % found["keys"])
+check(found["follow"] == ["true,false", "false,true", "true,false"], "follow: %s" % found["follow"])
+check("cut off" not in found["notice"], "a whole page that says: %s" % found["notice"])
+
+# A flexible rod with stress; attachments are bodies, too. With another unit there is another scale.
+flexible = page("flexcrank")
+expect(flexible, 501, 5, 6, 1)
+found = look(flexible, checks=("units",))["checks"]["units"]
+check(found["apart"] < 0.1 and found["colours"] > 20, "the same stress in another unit has other colours: %s" % found)
+check([text[:14] for text in found["legends"]] == ["von Mises, rod", "von Mises, rod"], "legends: %s" % found)
+check(found["legends"][0].count("MPa") == 4 and found["legends"][1].replace("MPa", "").count("Pa") == 0, "legends: %s" % found)
 
 # A whole finite-element body on a hub: its nodes move by themselves
 if os.path.exists(os.path.join(bin, "spinbeam")):
-    result = look(page("spinbeam", "-body", "full", "-end", "2"))
+    result = look(page("spinbeam", "-body", "full", "-end", "2"), checks=("deflection",))
     check([result[key] for key in ("frames", "bodies", "visible", "surfaces", "errors")] == [501, 4, 4, 1, []], "a whole body: %s" % result)
+    found = result["checks"]["deflection"]
+    check(found["places"] == 3 and found["symbols"] == 1 and found["worst"] < 0.05, "where deflections are scaled attachments come off the surface: %s" % found)
     check(result["drawn"] > 300 and result["colours"] > 100 and result["played"], "a whole body is not to be seen: %s" % result)
 
-# A page whose writer was stopped within a block shows what is whole
+# A page whose writer was stopped within a block shows what is whole, and says so
 with open(file) as whole:
     text = whole.read()
 cut = file.replace(".html", "-cut.html")
 with open(cut, "w") as out:
     out.write(text[:text.rindex('data-kind="frames"') + 1000])
-result = look(cut)
-check(result["frames"] == 384 and result["errors"] == [], "a page that was cut off: %s" % result)
+result = look(cut, checks=("notice",))
+check(result["frames"] == 384 and result["errors"] == [] and "cut off" in result["checks"]["notice"], "a page that was cut off: %s" % result)
+
+# Without WebGL the plots are left, and it says both
+result = look(cut, "--disable-gpu", "--disable-3d-apis", checks=("notice",))
+check(not result["webgl"] and result["plots"] == 4, "without WebGL: %s" % result)
+check("no WebGL" in result["checks"]["notice"] and "cut off" in result["checks"]["notice"], "without WebGL: %s" % result)
 
 # A body that is nowhere, of a name that looks like a program: it is left out of the picture, and its name is text
 text = re.sub(r'(<script type="application/octet-stream" data-kind="frames">)([^<]*)', lambda m: m.group(1) + lose_first_body(m.group(2), 3), text)
@@ -99,10 +135,6 @@ with open(lost, "w") as out:
     out.write(text)
 result = look(lost)
 check(result["visible"] == 2 and result["errors"] == [] and result["frames"] == 501, "a page with a lost body: %s" % result)
-
-# Without WebGL the plots are left
-result = look(file, "--disable-gpu", "--disable-3d-apis")
-check(not result["webgl"] and result["plots"] == 4, "without WebGL: %s" % result)
 
 # What a notebook shows of a run: the same page, in a frame of the notebook's own
 if len(sys.argv) > 4:
