@@ -56,11 +56,15 @@ progress() {
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-# Lists of the last minutes are those of this target's first call.
+# Lists of the last minutes are those of this target's first call. That a list could not be fetched is an error here, and makes the lists old again.
 if [ -z "$(find /var/lib/apt/lists/partial -maxdepth 0 -mmin -20 2>/dev/null)" ]; then
   echo "setup: package lists"
   # A third party's broken list must not stop us: what counts is whether the packages can be installed.
-  apt update >"$log" 2>&1 || { echo "setup: apt-get update failed, going on with the lists there are"; cat "$log"; }
+  if ! apt -o APT::Update::Error-Mode=any update >"$log" 2>&1; then
+    echo "setup: apt-get update failed, going on with the lists there are"
+    cat "$log"
+    $root touch -d '1 day ago' /var/lib/apt/lists/partial 2>/dev/null || true
+  fi
 fi
 available() { apt install -s "$@" >/dev/null 2>&1; } # "apt-cache show" also knows packages that nobody offers any more
 # shellcheck disable=SC2086
