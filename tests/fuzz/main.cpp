@@ -31,7 +31,7 @@ std::vector<Reader> &Readers()
 namespace
 {
 
-constexpr int kinds = Outcome::Nonsense + 1, most_readers = 32, most_jobs = 256;
+constexpr int kinds = Outcome::Nonsense + 1, most_jobs = 256;
 
 /* Counts, and the inputs that took most time and memory */
 struct Tally {
@@ -133,16 +133,18 @@ long Report(const Plan &plan, const std::vector<Tally> &tally)
                 (long long)tally[r].largest);
     all += n;
   }
+  if (std::none_of(Readers().begin(), Readers().end(), [](const Reader &r) { return r.name == "body"; }))
+    std::printf("fuzz: files of reduced bodies are left out, this program was compiled without HDF5\n");
   std::printf("fuzz: %ld inputs of seed %lld, %ld faults\n", all, (long long)plan.seed, faults);
   return faults;
 }
 
 long RunJobs(const Plan &plan, const std::string &scratch)
 {
-  const std::size_t  size = sizeof(Tally) * most_readers * (std::size_t)plan.jobs;
+  const std::size_t  readers = Readers().size(), size = sizeof(Tally) * readers * (std::size_t)plan.jobs;
   Tally *const       shared =
       static_cast<Tally *>(mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
-  std::vector<Tally> sum(most_readers, Tally{});
+  std::vector<Tally> sum(readers, Tally{});
   std::vector<pid_t> job;
   long               lost = 0;
   if (shared == MAP_FAILED) return 1;
@@ -152,7 +154,7 @@ long RunJobs(const Plan &plan, const std::string &scratch)
     Folder(folder);
     job.push_back(fork());
     if (job.back()) continue;
-    Work(plan, j, folder, shared + most_readers * j);
+    Work(plan, j, folder, shared + readers * (std::size_t)j);
     std::fflush(stdout);
     _exit(0);
   }
@@ -162,9 +164,9 @@ long RunJobs(const Plan &plan, const std::string &scratch)
     lost += p <= 0 || status != 0;
   }
   for (int j = 0; j < (int)plan.jobs; j++)
-    for (int r = 0; r < most_readers; r++) {
-      const Tally &t = shared[most_readers * j + r];
-      Tally       &s = sum[(std::size_t)r];
+    for (std::size_t r = 0; r < readers; r++) {
+      const Tally &t = shared[readers * (std::size_t)j + r];
+      Tally       &s = sum[r];
       for (int k = 0; k < kinds; k++) s.of[k] += t.of[k];
       Most(&s.cpu, &s.slowest, t.cpu, t.slowest);
       Most(&s.megabytes, &s.largest, t.megabytes, t.largest);
