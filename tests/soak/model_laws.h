@@ -53,7 +53,9 @@ inline std::string Difference(const Trajectory &a, const Trajectory &b)
 template <class Build> Repeated Repeat(const Build &build, const Trajectory &a, bool options, std::string *why)
 {
   Repeated          r;
-  const std::string file = hhtbench::Text("/tmp/soak-%ld.checkpoint", (long)getpid());
+  char              scratch[PETSC_MAX_PATH_LEN];
+  PetscCallAbort(PETSC_COMM_SELF, PetscGetTmp(PETSC_COMM_SELF, scratch, sizeof scratch));
+  const std::string file = hhtbench::Text("%s/soak-%ld.checkpoint", scratch, (long)getpid());
   Settings          s;
   s.options         = options;
   const Model first = build(), second = build(); /* both described before either runs */
