@@ -915,6 +915,26 @@ TEST(BetweenRuns, NoStepToTakeBack)
   }
 }
 
+/* A TSSolve() to a time that is past does nothing, and leaves nothing behind: PETSc has cut the step to less than none */
+TEST(BetweenRuns, GoOnFromATimeThatIsPast)
+{
+  for (const char *options : {"", "-ts_adapt_type none -ts_dt 1e-2 "}) {
+    Simulation plain(oscillator(), tolerance(1e-6) + options), run(oscillator(), tolerance(1e-6) + options);
+    for (Simulation *s : {&plain, &run}) {
+      must(TSSetMaxTime(s->ts, 0.5));
+      must(s->solve());
+    }
+    must(TSSetMaxTime(run.ts, 0.25));
+    must(TSSolve(run.ts, nullptr));
+    EXPECT_EQ(run.t(), 0.5);
+    for (Simulation *s : {&plain, &run}) {
+      must(TSSetMaxTime(s->ts, 1.));
+      must(s->solve());
+    }
+    EXPECT_NEAR(run.u()[0], plain.u()[0], 1e-5) << options;
+  }
+}
+
 /* Of what begins at zero a relative tolerance is none, and the message says so */
 TEST(BetweenRuns, RelativeToleranceFromZero)
 {

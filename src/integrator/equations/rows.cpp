@@ -84,7 +84,8 @@ PetscErrorCode NameBadMatrix(TS ts, PetscReal t, Mat P, PetscBool *bad)
   *bad = (PetscBool)(row >= 0);
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LabelRow(ts, row, &label));
-  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the application's Jacobian (TSSetI2Jacobian()) is not a number at t = %g, first in row %s", (double)t, label.text));
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "%s is not a number at t = %g, first in row %s",
+                         I.differences ? "the application's residual, from whose differences the matrix comes," : "the application's Jacobian (TSSetI2Jacobian())", (double)t, label.text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -193,7 +193,7 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
   I.stat.factorizations++;
   if (!numbers && !c.linear->failed) c.linear->failed = PC_FACTOR_OTHER;
   *ok  = (PetscBool)!c.linear->failed;
-  *why = !numbers ? "the application's Jacobian is not a number" : "the matrix is singular there, or the solver failed";
+  *why = !numbers ? I.differences ? "the application's residual is not a number where the matrix is made by its differences" : "the application's Jacobian is not a number" : "the matrix is singular there, or the solver failed";
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -286,7 +286,7 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 }
 
 /* TSSolve() cuts the step to what is left until the next stop. Nothing is left where it is called at the end of a run, less than nothing where points of a time span, or ends of earlier runs,
-   are behind the time at which a run begins or is resumed: then the step is the one before. */
+   are behind the time at which a run begins, goes on or is resumed: then the step is the one before. */
 PetscErrorCode PassStops(TS ts)
 {
   const Integrator &I       = Get(ts);
@@ -299,7 +299,8 @@ PetscErrorCode PassStops(TS ts)
   PetscCheck(ts->time_step > 0 || !HHT3EventActive(ts), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the handler see which way it goes",
              (double)ts->time_step, (double)ts->ptime);
-  if (ts->time_step != 0 && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
+  const bool cut = ts->time_step < 0 && I.stat.steps > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP; /* by a TSSolve() to a time that was past */
+  if (ts->time_step != 0 && !cut && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.h_next > 0) ts->time_step = I.h_next;
   else ts->time_step = I.auto_h ? unset_step : I.h_given;
   if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP) ts->time_step = PetscMin(ts->time_step, HHT3StopAfter(ts, ts->ptime) - ts->ptime);
