@@ -131,28 +131,51 @@ PetscErrorCode IsAlgebraic(TS ts, WorkVec (&x)[3], PetscInt j, Vec F0, bool *yes
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where probes of the sizes of one lose products in rounding: multipliers get the size of the forces, and where positions are large all unknowns get their size. Base values are moved, too. */
+/* The largest initial value of an unknown that is not algebraic: multipliers may be guessed as large as forces are */
+PetscErrorCode SizeOfPositions(TS ts, WorkVec (&x)[3], Vec F0, PetscReal *size)
+{
+  std::vector<PetscReal> value;
+  PetscInt               N, start;
+  bool                   algebraic = false;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetSize(ts->vec_sol, &N));
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
+  value.assign(N, 0);
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar u) { value[start + i] = PetscAbsScalar(u); }, Read(ts->vec_sol)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value.data(), (PetscMPIInt)N, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  *size = 1;
+  for (PetscInt j = 0; j < N; j++) {
+    if (!(value[j] > PetscMax(large_positions, *size))) continue;
+    PetscCall(IsAlgebraic(ts, x, j, F0, &algebraic));
+    if (!algebraic) *size = value[j];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where probes of the size of one lose products in rounding: multipliers get the size of the forces, and where positions are large all unknowns get their size. Base values
+   are moved, too. */
 PetscErrorCode SizesOfProbes(TS ts, WorkVec (&x)[3], const std::vector<PetscReal> &most, std::vector<PetscReal> *scale, bool *larger)
 {
   const PetscInt N = (PetscInt)scale->size();
-  PetscInt       start, end;
+  PetscInt       start;
   PetscReal      force, size;
   WorkVec        F0;
   bool           algebraic = false;
 
   PetscFunctionBegin;
-  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, &end));
+  PetscCall(VecGetOwnershipRange(ts->vec_sol, &start, NULL));
   PetscCall(F0.like(ts->vec_sol));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
   PetscCall(VecNorm(F0, NORM_INFINITY, &force));
-  PetscCall(VecNorm(ts->vec_sol, NORM_INFINITY, &size));
-  *larger = size > large_positions && size < PETSC_MAX_REAL;
-  if (*larger) scale->assign(N, size);
+  PetscCall(SizeOfPositions(ts, x, F0, &size));
+  *larger = size > 1;
+  scale->assign(N, size);
   for (PetscInt j = 0; j < N; j++) {
     if (!(most[j] > 0 && most[j] < hardly_seen * force && force < PETSC_MAX_REAL)) continue;
     PetscCall(IsAlgebraic(ts, x, j, F0, &algebraic));
     if (!algebraic) continue;
-    (*scale)[j] = PetscMax((*scale)[j], force / most[j]);
+    (*scale)[j] = PetscMax(size, force / most[j]);
     *larger     = true;
   }
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &u) { if ((*scale)[start + i] > 1) u += move_of_probe * (*scale)[start + i] * RandomNumber(start + i, 24); }, Write(x[0])));
@@ -378,7 +401,6 @@ PetscErrorCode DifferencesCreate(TS ts, Mat *P)
   PetscCall(MatColoringDestroy(&mc));
   PetscCall(MatFDColoringCreate(d->part, colors, &d->coloring));
   PetscCall(MatFDColoringSetFunction(d->coloring, reinterpret_cast<HHT3ColoringFunction>(reinterpret_cast<void *>(EvaluateProbe)), d));
-  PetscCall(MatFDColoringSetType(d->coloring, MATMFFD_DS)); /* each unknown by its own size: multipliers may be 1e9 times as large as positions */
   PetscCall(MatFDColoringSetFromOptions(d->coloring));
   PetscCall(TakeSteps(d));
   PetscCall(MatFDColoringSetUp(d->part, colors, d->coloring));
@@ -419,13 +441,16 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   Vec             at[3]    = {U, V, A};
 
   PetscFunctionBegin;
+  PetscReal norm;
+  PetscCall(VecNorm(A, NORM_2, &norm));
+  const PetscReal size = PetscMax(1, d->size / PetscSqrtReal(1 + norm)); /* MatFDColoring makes steps relative to this root */
   d->t = t;
   for (int k = 0; k < 3; k++) d->at[k] = at[k];
   PetscCall(MatZeroEntries(P));
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
-    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? d->size : 1), d->least > 0 ? d->least : 1));
+    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? size : 1), d->least > 0 ? d->least : 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }
