@@ -100,7 +100,7 @@ TEST(FullPage, NodesAreWhereTheRunHasThem)
     ASSERT_EQ(asked.x.size(), (std::size_t)frames + 1);
     ASSERT_EQ(page.surface.size(), 1u);
     EXPECT_EQ(page.surface[0].triangle.size(), 3u * 2 * 2 * (6 * 2 + 2 * 2 + 2 * 6));
-    EXPECT_NE(page.scene.find("\"name\":\"bar\",\"modes\":0,\"carrier\":-1,\"mesh\":true"), std::string::npos);
+    EXPECT_NE(page.scene.find("\"name\":\"bar\",\"modes\":0,\"carrier\":-1,\"rest\":[],\"mesh\":true"), std::string::npos);
     EXPECT_NE(page.scene.find("\"name\":\"bar.left\",\"modes\":0,\"carrier\":2"), std::string::npos) << page.scene;
     double largest = 0;
     for (std::size_t i = 0; i < page.time.size(); i++) {
