@@ -1,5 +1,6 @@
 #include "tape.h"
 #include "bind.h"
+#include <algorithm>
 #include <cfloat>
 #include <cmath>
 
@@ -49,8 +50,62 @@ double ValueOf(const Tape::Function &f, const std::vector<double> &x)
   }
 }
 
-/* By the user's function, else by central differences, whose error is about 1e-10 of the function */
-std::vector<double> GradientOf(const Tape::Function &f, std::vector<double> x)
+/* Central differences over steps that become shorter by `shorter` each, at most so many: 6e-6 of the argument (or of 1) to 4.5e-14 of it. An argument may be as
+   small as micrometres in metres are, so that the first step may be longer than all that the function does. Test: Differences of test_expressions.py. */
+constexpr int    steps_tried = 10;
+constexpr double shorter     = 8;
+constexpr double agreement   = 1e-6; /* of two differences, relative: enough for the Newton matrix and for the directions of reactions */
+constexpr double noisy       = 0.1;  /* relative difference below which a difference has told something, so that what grows after it is noise */
+
+struct Difference {
+  double slope, bend, change, size, h; /* (f+ - f-) / 2h; f+ - 2 f + f-; |f+ - f-|; the largest |f|; h */
+};
+
+Difference DifferenceOf(const Tape::Function &f, std::vector<double> &x, std::size_t k, double y, double h)
+{
+  const double at = x[k], above = at + h, below = at - h;
+  x[k]            = above;
+  const double up = ValueOf(f, x);
+  x[k]            = below;
+  const double down = ValueOf(f, x);
+  x[k]              = at;
+  return {(up - down) / (above - below), up - 2 * y + down, std::abs(up - down), std::max({std::abs(up), std::abs(down), std::abs(y)}), 0.5 * (above - below)};
+}
+
+/* Whether a and b, over a shorter step, say the same but for rounding. Of a short hump between the four places the slopes may agree by chance (both are zero);
+   its bend does not fall with the step, as it does by 64 where f is smooth, and by 8 at a kink. */
+bool Agree(const Difference &a, const Difference &b)
+{
+  const double rounding = 8 * DBL_EPSILON * std::max(a.size, b.size);
+  return std::abs(a.slope - b.slope) <= std::max(rounding / b.h, agreement * std::abs(b.slope)) &&
+         std::abs(b.bend) <= std::max({std::abs(a.bend) / 4, 8 * rounding, 1e-3 * b.change});
+}
+
+/* The derivative of f by its argument k, f(x) = y: the difference over the longest step that agrees with the next one. Where none does, because f is noisy or has
+   a singularity, that of the pair which differs least: truncation falls with the step, noise grows. */
+double SlopeOf(const Tape::Function &f, std::vector<double> &x, std::size_t k, double y)
+{
+  double     h = std::cbrt(DBL_EPSILON) * std::max(1.0, std::abs(x[k])), best = 0, least = -1, before[2] = {0, 0};
+  Difference a = DifferenceOf(f, x, k, y, h);
+  for (int n = 1; n < steps_tried; n++) {
+    h /= shorter;
+    const Difference b = DifferenceOf(f, x, k, y, h);
+    if (Agree(a, b)) return a.slope;
+    const double apart = std::abs(a.slope - b.slope), relative = apart / std::max(std::abs(a.slope), std::abs(b.slope));
+    if (least < 0 ? apart == apart : apart < least) {
+      least = apart;
+      best  = a.slope;
+    }
+    if (n > 2 && before[0] < noisy && before[0] < before[1] && before[1] < relative) break;
+    before[0] = before[1];
+    before[1] = relative;
+    a         = b;
+  }
+  return least < 0 ? a.slope : best;
+}
+
+/* By the user's function, else by differences, of f(x) = y; needed: the arguments that the formula's derivatives depend on */
+std::vector<double> GradientOf(const Tape::Function &f, std::vector<double> x, double y, const std::vector<bool> &needed)
 {
   py::gil_scoped_acquire gil;
   std::vector<double>    g(x.size());
@@ -61,14 +116,8 @@ std::vector<double> GradientOf(const Tape::Function &f, std::vector<double> x)
     std::copy(a.data(), a.data() + g.size(), g.begin());
     return g;
   }
-  for (std::size_t k = 0; k < x.size(); k++) {
-    const double at = x[k], h = std::cbrt(DBL_EPSILON) * std::max(1.0, std::abs(at));
-    x[k]            = at + h;
-    const double up = ValueOf(f, x);
-    x[k]            = at - h;
-    g[k]            = (up - ValueOf(f, x)) / (2 * h);
-    x[k]            = at;
-  }
+  for (std::size_t k = 0; k < x.size(); k++)
+    if (needed[k]) g[k] = SlopeOf(f, x, k, y);
   return g;
 }
 
@@ -81,15 +130,18 @@ double Apply(const Tape::Function &f, const std::vector<double> &x)
 Real Apply(const Tape::Function &f, const std::vector<Real> &x)
 {
   std::vector<double> v;
+  std::vector<bool>   needed;
   bool                constant = true;
   for (int k : f.operands) {
     v.push_back(x[k].value());
-    constant = constant && x[k].derivatives().size() == 0;
+    needed.push_back(x[k].derivatives().size() != 0);
+    constant = constant && !needed.back();
   }
   Real y(ValueOf(f, v));
   if (constant) return y;
-  const std::vector<double> g = GradientOf(f, v);
-  for (std::size_t k = 0; k < v.size(); k++) y += (x[f.operands[k]] - v[k]) * g[k];
+  const std::vector<double> g = GradientOf(f, v, y.value(), needed);
+  for (std::size_t k = 0; k < v.size(); k++)
+    if (needed[k]) y += (x[f.operands[k]] - v[k]) * g[k];
   return y;
 }
 Number Apply(const Tape::Function &, const std::vector<Number> &)

@@ -8,6 +8,7 @@ import numpy as np
 
 import hhtdae as h
 from hhtdae import _core
+from hhtdae.expressions import Expression
 from hhtdae.tracing import compile_tape, differentiate, ordered, time_function, trace
 
 ONE = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "arcsin": np.arcsin, "arccos": np.arccos, "arctan": np.arctan, "sinh": np.sinh, "cosh": np.cosh,
@@ -70,6 +71,36 @@ class Operations(unittest.TestCase):
         for f in (lambda x: abs(x) ** 0.5 * x, lambda x: x * (x * x) ** 0.25):
             still = h.solve_mechanism(lambda t, q, v, a: [a[0] + f(q[0])], (0, 1), [0], [0], trace=True)
             self.assertTrue(still.success, still.message)
+
+    def test_differences(self):
+        """A callback without derivatives: arguments in any unit, tables, kinks, short humps, noise; four calls for each argument where it is smooth"""
+        def slope(f, x):
+            count = [0]
+
+            def counted(u):
+                count[0] += 1
+                return f(u)
+            tape = compile_tape([h.callback(counted, Expression("argument", (), 0))], {}, keep := [], 1)
+            return tape.differentiate(np.array([x]))[1][0], count[0]
+
+        for unit in (1e6, 1., 1e-3, 1e-6, 1e-9):
+            for x in (0., 0.3, 1., 2.):
+                self.assertAlmostEqual(slope(lambda u: (7 if unit <= 1 else 0) + math.sin(u / unit), x * unit)[0] * unit, math.cos(x), delta=1e-5, msg=str((unit, x)))
+                self.assertAlmostEqual(slope(lambda u: math.tanh(u / unit), x * unit)[0] * unit, 1 - math.tanh(x)**2, delta=1e-5, msg=str((unit, x)))
+            grid = np.linspace(-5, 5, 101)
+            self.assertAlmostEqual(slope(lambda u: np.interp(u / unit, grid, grid**2), 0.43 * unit)[0] * unit, 0.9, delta=1e-6)
+            self.assertAlmostEqual(slope(lambda u: max(u / unit, 0.)**1.5, 0.4 * unit)[0] * unit, 1.5 * 0.4**0.5, delta=1e-5)
+            self.assertAlmostEqual(slope(lambda u: max(0., 1 - abs(u / unit)), 0.4 * unit)[0] * unit, -1., delta=1e-5)
+        self.assertLess(abs(slope(lambda u: u * math.sqrt(abs(u)), 0.)[0]), 1e-5)
+        for x, scale in itertools.product((0.2, 0.7, 3.), (1., 1e6)):
+            self.assertEqual(slope(lambda u: 3 + scale * math.sin(u), x)[1], 5)
+        for size, kept in ((1e-13, 1e-6), (1e-10, 1e-3), (1e-8, 2e-2)):
+            noise = np.random.default_rng(5)
+            for x in (0.2, 0.7, 3.):
+                found, count = slope(lambda u: math.sin(u) + size * noise.standard_normal(), x)
+                self.assertAlmostEqual(found, math.cos(x), delta=kept)
+        self.assertAlmostEqual(slope(lambda u: float(np.float32(math.sin(u))), 0.7)[0], math.cos(0.7), delta=0.05)
+        self.assertTrue(math.isnan(slope(lambda u: math.nan, 0.7)[0]))
 
     def test_time_derivatives(self):
         """First and second derivatives of traced functions of time"""

@@ -364,8 +364,9 @@ def callback(function, *arguments, gradient=None):
     *arguments : Expression
         What it is called with.
     gradient : callable, optional
-        The derivatives by the arguments, as many numbers. Without it they are central differences: two calls for each argument in every
-        evaluation of the Jacobian.
+        The derivatives by the arguments, as many numbers. Without it they are central differences: as a rule four calls for each argument in every
+        evaluation of the Jacobian. The first two steps are 6e-6 and 8e-7 of the argument, or of 1 if it is smaller; where these differences disagree, since the
+        argument is small in its unit, at a kink, or because the function is noisy, shorter steps follow, up to twenty calls.
 
     A call costs about a microsecond and what the function does; a formula of the same operations costs some ten nanoseconds each.
     """
