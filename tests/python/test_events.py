@@ -205,6 +205,27 @@ class Reactions(unittest.TestCase):
             half, middles = math.acos(1 - depth) / 10, math.pi / 10 * np.arange(1, 10, 2)
             np.testing.assert_allclose(seen, np.sort(np.r_[middles - half, middles + half]), rtol=0, atol=2e-3)
 
+    def test_first_event_while_the_run_is_solved(self):
+        """Made by on_step() or by a callback, it has its action at every passage, as if there had been another event before"""
+        for where in ("on_step", "callback"):
+            scene, hits, armed = h.Scene(), [], []
+            m = scene.add("mass", h.PointMass(position=(1, 0, 0))).marker()
+            x = h.displacement(m, 0)
+
+            def arm(time):
+                if time > 1 and not armed:
+                    armed.append(time)
+                    run.event(x, action=lambda r: hits.append(r.time))
+                return 0.
+
+            scene.add("spring", h.UserForce(m, force=(-x + (h.callback(arm, h.time()) if where == "callback" else 0.), 0, 0)))
+            run = scene.run(tolerance=1e-6)
+            if where == "on_step":
+                run.on_step(lambda r: arm(r.time))
+            run.solve(10.)
+            self.assertEqual(run.time, 10., where)
+            np.testing.assert_allclose(hits, (np.arange(3) + 0.5) * math.pi, atol=2e-3, err_msg=where)
+
     def test_event_made_by_an_event(self):
         """A further event of a run does not make those before it forget"""
         scene, T = swing()

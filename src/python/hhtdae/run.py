@@ -147,11 +147,7 @@ class Run(Channels):
         self._ended, self._solving = False, True
         try:
             with temporary_options(self._options) as unused, self._page.settings():
-                if self._events:
-                    self._solve_with_events()
-                else:
-                    self._serial += 1
-                    self.scene._core.solve(ts)
+                self._solve_to_events()
         finally:
             self._solving = False
         if self._unused:
@@ -253,10 +249,11 @@ class Run(Channels):
             return True
         return not all([x.equal(y) for x, y in zip(self._open().getSolution2(), self._before)])
 
-    def _solve_with_events(self):
+    def _solve_to_events(self):
+        """From event to event; the first one may come while the run is under way"""
         while True:
             ts = self._open()  # an action may have destroyed it
-            if self._changed():
+            if self._events and self._changed():
                 self._signs.changed()
             self._passed = []
             self._serial += 1
