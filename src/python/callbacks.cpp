@@ -1,5 +1,6 @@
 /* Functions of the integrator that call the application's: longest step, names of rows, change of coordinates, rotations. The TS owns the Python functions. */
 #include "bind.h"
+#include "../scene/guard.h"
 #include "hhtdae/hhtdae.h"
 
 namespace hhtdae
@@ -27,10 +28,10 @@ struct Functions {
 PetscErrorCode LongestStep(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     *h = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), t, FromVec(U), FromVec(V), FromVec(A))).cast<double>();
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 
@@ -48,52 +49,52 @@ PetscErrorCode RowName(TS, PetscInt row, char name[], size_t len, void *ctx)
 PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     *change = Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), t, FromVec(U), FromVec(V))).cast<bool>() ? PETSC_TRUE : PETSC_FALSE;
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Map(TS ts, PetscReal t, Vec U, Vec V, Vec A, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     py::object u = FromVec(U), v = V ? FromVec(V) : py::none(), a = A ? FromVec(A) : py::none();
     Call(static_cast<Functions *>(ctx)->f[1], py::make_tuple(FromTS(ts), t, u, v, a));
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Commit(TS ts, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     const py::object &f = static_cast<Functions *>(ctx)->f[2];
     if (!f.is_none()) Call(f, py::make_tuple(FromTS(ts)));
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Refer(TS ts, Vec U, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     Call(static_cast<Functions *>(ctx)->f[0], py::make_tuple(FromTS(ts), FromVec(U)));
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode ReferBack(TS ts, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Guarded([&] {
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), Guarded([&] {
     Call(static_cast<Functions *>(ctx)->f[1], py::make_tuple(FromTS(ts)));
     return PetscErrorCode(0);
-  }));
+  })));
   PetscFunctionReturn(0);
 }
 

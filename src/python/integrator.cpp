@@ -49,6 +49,23 @@ py::tuple StateAt(py::object ts, double t, PetscErrorCode (*at)(TS, PetscReal, V
   return py::make_tuple(x[0], x[1], x[2]);
 }
 
+/* What the first of the ranks that have failed says, with its number, on all of them; None: none has. Collective. */
+py::object FirstFailure(py::object of, const std::string &mine)
+{
+  const MPI_Comm comm = ToComm(of);
+  PetscMPIInt    size, rank, failed, first, length = (PetscMPIInt)mine.size();
+  MPI_Comm_size(comm, &size);
+  MPI_Comm_rank(comm, &rank);
+  failed = mine.empty() ? size : rank;
+  MPI_Allreduce(&failed, &first, 1, MPI_INT, MPI_MIN, comm);
+  if (first == size) return py::none();
+  MPI_Bcast(&length, 1, MPI_INT, first, comm);
+  std::string text = mine;
+  text.resize(length);
+  MPI_Bcast(&text[0], length, MPI_CHAR, first, comm);
+  return py::make_tuple((int)first, text);
+}
+
 /* petsc4py has no TSAdapt. */
 void SetMaxStep(py::object ts, double h)
 {
@@ -112,6 +129,12 @@ void BindIntegrator(py::module_ &m)
     PetscBool used = PETSC_FALSE;
     Check(PetscOptionsUsed(nullptr, name.c_str(), &used));
     return used == PETSC_TRUE;
+  });
+  m.def("first_failure", FirstFailure);
+  m.def("abort", [](int code) {
+    int over;
+    MPI_Finalized(&over);
+    if (!over) MPI_Abort(MPI_COMM_WORLD, code);
   });
   m.def("checkpoint_save", [](py::object ts, const std::string &file) { Check(TSHHT3CheckpointSave(ToTS(ts), file.c_str())); });
   m.def("set_from_options", [](py::object ts) { Check(TSSetFromOptions(ToTS(ts))); });

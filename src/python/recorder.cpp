@@ -1,4 +1,5 @@
 #include "recorder.h"
+#include "../scene/guard.h"
 
 namespace hhtdae
 {
@@ -13,7 +14,7 @@ using RecorderPointer = std::shared_ptr<Recorder>;
 PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(CheckSignals());
+  PetscCall(OnAllRanks(PetscObjectComm((PetscObject)ts), CheckSignals()));
   PetscCall((*static_cast<RecorderPointer *>(ctx))->look(ts, step, t));
   PetscFunctionReturn(0);
 }
@@ -83,7 +84,7 @@ void BindRecorder(py::module_ &m)
       return FromDoubles(r.values().data(), {n, n ? (py::ssize_t)r.values().size() / n : 0});
     });
   m.def("attach_signals", [](py::object ts) {
-    Check(TSMonitorSet(ToTS(ts), [](TS, PetscInt, PetscReal, Vec, void *) { return CheckSignals(); }, nullptr, nullptr));
+    Check(TSMonitorSet(ToTS(ts), [](TS t, PetscInt, PetscReal, Vec, void *) { return OnAllRanks(PetscObjectComm((PetscObject)t), CheckSignals()); }, nullptr, nullptr));
   });
 }
 

@@ -1,4 +1,5 @@
 /* Residual and Jacobian of the scene: exchange, motion of the bodies, elements, bodies' own rows. */
+#include "guard.h"
 #include "runtime.h"
 #include <algorithm>
 
@@ -66,12 +67,16 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
   PetscCall(LocalState(R, u, v, a, local));
   PetscCall(VecGetArrayWrite(F, &f));
   std::fill(f, f + R.n, 0.0);
-  R.bodies.move(local[0], local[1]);
-  R.bodies.gravity = R.scene.gravityAt(t);
-  Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
-  for (auto &b : R.batches) b->residual(e);
-  R.bodies.loadCarriers();
-  R.bodies.residual(local[0], local[1], local[2], f);
+  const PetscErrorCode failed = Guarded([&] {
+    R.bodies.move(local[0], local[1]);
+    R.bodies.gravity = R.scene.gravityAt(t);
+    Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, f};
+    for (auto &b : R.batches) b->residual(e);
+    R.bodies.loadCarriers();
+    R.bodies.residual(local[0], local[1], local[2], f);
+    return PetscErrorCode(0);
+  });
+  PetscCall(OnAllRanks(R.scene.comm, failed));
   PetscCall(VecRestoreArrayWrite(F, &f));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
@@ -137,9 +142,15 @@ PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
     PetscCall(MatGetInfo(off, MAT_LOCAL, &info));
     std::fill(e.sink.off, e.sink.off + (PetscInt)info.nz_used, 0.0);
   }
-  AddAll(R, e);
+  const PetscErrorCode failed = Guarded([&] {
+    R.bodies.move(e.u, e.v);
+    R.bodies.gravity = R.scene.gravityAt(e.t);
+    AddAll(R, e);
+    return PetscErrorCode(0);
+  });
   PetscCall(MatSeqAIJRestoreArrayWrite(diagonal, &e.sink.diagonal));
   if (off) PetscCall(MatSeqAIJRestoreArrayWrite(off, &e.sink.off));
+  PetscCall(OnAllRanks(R.scene.comm, failed));
   PetscCall(MatAssemblyBegin(aij, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(aij, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(0);
@@ -156,8 +167,6 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(A, &a));
   PetscCall(LocalState(R, u, v, a, local));
-  R.bodies.move(local[0], local[1]);
-  R.bodies.gravity = R.scene.gravityAt(t);
   Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n, nullptr, sv, sa};
   PetscCall(PetscObjectTypeCompareAny((PetscObject)J, &ours, MATSEQAIJ, MATMPIAIJ, ""));
   if (ours) {

@@ -19,6 +19,29 @@ template <class Call> PetscErrorCode Guarded(Call call)
   }
 }
 
+/* The error that one rank has met, on all of them, with its text: a function of the user's may fail on the rank alone that owns its body, and the others would
+   wait for that rank for ever. Collective; on one rank it costs nothing. Test: Ranks.test_errors_of_one_rank of test_parallel.py. */
+inline PetscErrorCode OnAllRanks(MPI_Comm comm, PetscErrorCode code)
+{
+  PetscMPIInt size, rank, mine, first;
+  char        text[1024] = "";
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  if (size == 1) PetscFunctionReturn(code);
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  mine = code ? rank : size;
+  PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
+  if (first == size) PetscFunctionReturn(PetscErrorCode(0));
+  if (rank == first) {
+    char *specific = nullptr;
+    PetscCall(PetscErrorMessage(code, nullptr, &specific));
+    PetscCall(PetscStrncpy(text, specific ? specific : "", sizeof(text)));
+  }
+  PetscCallMPI(MPI_Bcast(text, sizeof(text), MPI_CHAR, first, comm));
+  if (code) PetscFunctionReturn(code);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "On rank %d: %s", (int)first, text);
+}
+
 } // namespace hhtdae
 
 #endif

@@ -98,6 +98,66 @@ class Ranks(unittest.TestCase):
             for a, b in zip(results[0], other):
                 self.assertAlmostEqual(a, b, delta=1e-7 * (1 + abs(a)))
 
+    def test_errors_of_one_rank(self):
+        """What one rank raises in a callback, a channel, an action or an on_step function is an error of all, of which they tell, after which they go on"""
+        script = """
+import sys
+import hhtdae as h
+from petsc4py import PETSc
+
+rank = PETSc.COMM_WORLD.rank
+
+def tell(line):
+    sys.stdout.write(line + "\\n")
+    sys.stdout.flush()
+
+def fail(x, where):
+    if rank == 1 and x > 0.2:
+        raise LookupError("no " + where)
+    return 0.
+
+def bodies(law=None, value=None):
+    scene = h.Scene(gravity=(0, 0, -9.81))
+    for n in range(4):
+        m = scene.add("b%d" % n, h.PointMass(position=(n, 0, 0))).marker()
+        if law:
+            scene.add("f%d" % n, h.UserForce(m, force=[0, 0, h.callback(law, h.time())]))
+        scene.channel("z%d" % n, h.callback(value, h.time() + 1e-30 * h.displacement(m, 2)) if value else h.displacement(m, 2))
+    return scene, h.displacement(m, 2)
+
+for where in ("force", "channel", "formula", "action", "step"):
+    law = lambda t: fail(t, where)
+    scene, z = bodies(law if where == "force" else None, law if where == "channel" else None)
+    run = scene.run(tolerance=1e-5)
+    if where == "formula":
+        run.event(h.callback(law, h.time()) + 1)
+    if where == "action":
+        run.event(z + 1, lambda r: fail(r.time, where))
+    if where == "step":
+        run.on_step(lambda r: fail(r.time, where))
+    try:
+        run.solve(2.)
+        tell("none: " + where)
+    except (h.Error, LookupError) as error:
+        own = isinstance(error, LookupError) or isinstance(error.__cause__, LookupError)
+        tell("said: %s %d %s %s" % (where, rank, "no " + where in str(error), own if rank else "On rank 1" in str(error)))
+tell("done %d %s" % (rank, scene.run(tolerance=1e-5).solve(0.1).time == 0.1))
+"""
+        lines = ranks(2, "-c", script).splitlines()
+        for where in ("force", "channel", "formula", "action", "step"):
+            for rank in (0, 1):
+                self.assertIn("said: %s %d True True" % (where, rank), lines)
+        self.assertEqual({"done 0 True", "done 1 True"} - set(lines), set())
+
+    def test_uncaught_errors_of_one_rank(self):
+        """They end all ranks with the traceback, wherever the others are"""
+        begin = "import hhtdae as h\nfrom petsc4py import PETSc\nscene = h.Scene(gravity=(0, 0, -9.81))\nm = scene.add('b', h.PointMass()).marker()\n"
+        for script in ("scene.add('f', h.UserForce(m, force=[0, 0, h.callback(lambda t: 1 / max(0.2 - t, 0), h.time())]))\nscene.solve(1.)\n",
+                       "if PETSc.COMM_WORLD.rank == 1:\n    1 / 0\nscene.solve(1.)\n"):
+            done = subprocess.run(MPIEXEC + ["2", sys.executable, "-B", "-c", begin + script], capture_output=True, text=True, timeout=60)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn("ZeroDivisionError", done.stderr)
+
     def test_some_ranks(self):
         """A rank that hands out work has no scene, and the others do not wait for it when PETSc ends."""
         script = """

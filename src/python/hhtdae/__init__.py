@@ -20,6 +20,8 @@ PETSc is initialized by petsc4py. For options of the command line, before anythi
     petsc4py.init(sys.argv)
     import hhtdae
 
+On several ranks an exception that nobody catches ends all ranks by MPI_Abort, once its traceback is printed; `sys.excepthook` does it, unless another is set later.
+
 Formulas of measures and parameters (`hhtdae.expressions`, `hhtdae.measures`) are evaluated in C++, see there.
 """
 
@@ -42,6 +44,9 @@ from .recipe import *
 from .results import *
 from .run import Run
 from .scene import *
+from .ranks import end_all_ranks_with_one as _end_all_ranks_with_one
+
+_end_all_ranks_with_one()
 
 __all__ = ["Error", "MechanismResult", "Run", "Statistics", "integrator", "solve_mechanism", "statistics"]
 for _module in (bodies, elements, expressions, measures, query, recipe, results, scene):

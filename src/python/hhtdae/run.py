@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from . import _core, integrator
 from .events import Signs
 from .expressions import CONDITIONS, _expression
+from .ranks import together
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
 from .spec import check_parameters, number
@@ -87,6 +88,9 @@ class Run(Channels):
     the times ``run.times``. Runs are independent of each other, and outlive changes of their scene. As a context manager the run is closed at the
     end of the block, which frees its memory; that of a run which is dropped is freed when the next one is made. What it leaves, `results`, can be
     pickled; a run that is pickled comes back as that.
+
+    On several ranks an exception of a callback, an event's action or an `on_step` function on one rank ends the run on all ranks: that rank raises it, the others
+    `Error` with its text. Functions that call collective methods call them on all ranks alike. An exception that a script does not catch ends all ranks.
 
     Attributes
     ----------
@@ -219,7 +223,7 @@ class Run(Channels):
 
     def _event_value(self, k, time):
         self._now.take(time)
-        value = self._now.value(self._events[k][0])
+        value = together(self.scene.comm, self._now.value, self._events[k][0])
         if value != value:
             raise ValueError("event %d: its formula is not a number (NaN) at t = %.9g" % (k, time))
         return value
@@ -269,7 +273,7 @@ class Run(Channels):
                 if self._events[k][1] is not None and self._signs.last[k][1] < 1e-12 * abs(time):  # Bounces.test_without_end
                     raise RuntimeError("event %d comes again and again at t = %.9g, in times that rounding cannot tell apart: let its action hold what it throws back, or make it terminal" % (k, time))
                 if self._events[k][1] is not None:
-                    self._events[k][1](self)
+                    together(self.scene.comm, self._events[k][1], self)
             self._ended = any(self._events[k][2] for k in here)
             if self._ended or time >= self._open().getMaxTime():
                 return
@@ -296,7 +300,7 @@ class Run(Channels):
                 return
             first, begun = begun != run._serial, run._serial  # the state that a part of the run begins with
             if step > 0 and not first:
-                function(run)
+                together(run.scene.comm, function, run)
         self._open().setMonitor(monitor)
 
     def _at(self, time):

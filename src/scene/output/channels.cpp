@@ -1,4 +1,5 @@
 #include "scene/output/channels.h"
+#include "scene/guard.h"
 #include "scene/measures.h"
 #include "scene/output/energy.h"
 
@@ -70,17 +71,21 @@ PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<
   Balance b;
   PetscFunctionBegin;
   if (R.channels->energies) PetscCall(MakeBalance(R, e, b));
-  const LocalMeasure *m = R.channels->own.data();
-  for (std::size_t channel : R.channels->what) {
-    const Expression &value = R.scene.channels[channel].value;
-    std::vector<Real> x;
-    for (std::size_t k = 0; k < value.arguments.size(); k++, m++) {
-      if (m->kind == Measure::KineticEnergy) x.push_back(Real(b.kinetic));
-      else if (m->kind == Measure::PotentialEnergy) x.push_back(Real(b.potential()));
-      else x.push_back(Real(MeasureValue(*m, e)));
+  const PetscErrorCode failed = Guarded([&] {
+    const LocalMeasure *m = R.channels->own.data();
+    for (std::size_t channel : R.channels->what) {
+      const Expression &value = R.scene.channels[channel].value;
+      std::vector<Real> x;
+      for (std::size_t k = 0; k < value.arguments.size(); k++, m++) {
+        if (m->kind == Measure::KineticEnergy) x.push_back(Real(b.kinetic));
+        else if (m->kind == Measure::PotentialEnergy) x.push_back(Real(b.potential()));
+        else x.push_back(Real(MeasureValue(*m, e)));
+      }
+      values.push_back(value.f(x.data()).value());
     }
-    values.push_back(value.f(x.data()).value());
-  }
+    return PetscErrorCode(0);
+  });
+  PetscCall(OnAllRanks(R.scene.comm, failed));
   PetscFunctionReturn(0);
 }
 
