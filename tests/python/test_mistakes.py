@@ -195,6 +195,41 @@ class Arguments(unittest.TestCase):
         with self.assertRaisesRegex(h.Error, r"row 0 \(x of body weight\)"):
             scene.solve(1.)
 
+    def test_jacobian(self):
+        """Compared with differences at the begin: a wrong mass matrix is an error, other derivatives that are not exact a warning; kinks are nobody's mistake"""
+        turn = lambda t, q, v, a: [(2 + math.cos(q[0])) * a[0] + 5 * q[0] + 3 * v[0] - v[1]**2, a[1] + a[0] + 40 * q[1]**3 + 1000.]
+
+        def exact(t, q, v, a):
+            return [[5 - math.sin(q[0]) * a[0], 0.], [0., 120 * q[1]**2]], [[3., -2 * v[1]], [0., 0.]], [[2 + math.cos(q[0]), 0.], [1., 1.]]
+
+        def solve(change=lambda K, C, M: (K, C, M), residual=turn, jacobian=exact, q0=(0.3, 0.2), **options):
+            given = lambda *state: change(*map(np.array, jacobian(*state)))
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                h.solve_mechanism(residual, (0, 0.01), q0, [0.1, 0.4], jacobian=given, **options)
+            return [str(w.message) for w in caught]
+
+        self.assertEqual(solve(), [])
+        with self.assertRaisesRegex(ValueError, r"derivatives by a, dF/da, is not that of residual\(\) at t = 0: in row 1, column [01] it says 2, differences say 1"):
+            solve(lambda K, C, M: (K, C, 2 * M))
+        with self.assertRaisesRegex(ValueError, "dF/da.* in row 1, column 0 it says 0, differences say 1"):
+            solve(lambda K, C, M: (K, C, np.diag(np.diag(M))))
+        self.assertRegex(solve(lambda K, C, M: (-K, C, M))[0], r"dF/dq, is not .* in row 0, column 0 it says -5.16.*, differences say 5.16.*; corrections will")
+        self.assertRegex(solve(lambda K, C, M: (K, C.T, M))[0], r"dF/dv, is not .* in row [01], column [01] it says")
+        self.assertRegex(solve(lambda K, C, M: (K * [[0, 1], [1, 1]], C, M))[0], r"dF/dq, is not .* in row 0, column 0 it says 0, differences say")
+        with self.assertRaisesRegex(ValueError, "dF/dq.* it says nan"):
+            solve(lambda K, C, M: (K * np.nan, C, M))
+        with self.assertRaisesRegex(ValueError, "must be three matrices"):
+            stone(jacobian=lambda t, q, v, a: np.eye(2))
+        rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1], velocity_constraints=lambda t, q, v: [v[0] - 0.1])
+        self.assertEqual(solve(residual=lambda t, q, v, a: [a[0], a[1] + G], q0=(1., 0.), jacobian=lambda t, q, v, a: (np.zeros((2, 2)), np.zeros((2, 2)), np.eye(2)),
+                               constraints=rod["constraints"]), [])
+        kinks = lambda t, q, v, a: [a[0] + 1e3 * max(q[0], 0) + math.copysign(1., v[0] - 0.1), a[1] + abs(v[1] - 0.4) + math.sqrt(q[1])]
+        self.assertEqual(solve(residual=kinks, jacobian=lambda t, q, v, a: ([[0, 0], [0, 0.5 / math.sqrt(q[1])]], [[0, 0], [0, 1]], np.eye(2)), q0=(0., 1e-3)), [])
+        for length in (1e-6, 1e3):  # the pendulum in other units
+            self.assertEqual(solve(residual=lambda t, q, v, a: [a[0], a[1] + G * length + 4 / length * q[1]**2], q0=(length, 0.5 * length), constraints=lambda t, q: [q[0] - length],
+                                   jacobian=lambda t, q, v, a: ([[0, 0], [0, 8 / length * q[1]]], np.zeros((2, 2)), np.eye(2)), atol=1e-6 * length), [])
+
     def test_constraint_jacobian(self):
         rod = dict(constraints=lambda t, q: [q[0]**2 + q[1]**2 - 1])
         self.assertTrue(stone(constraint_jacobian=lambda t, q: [2 * q], **rod).success)

@@ -51,6 +51,12 @@ def _scale(f, x, k):
     return next((s for s, good, small in judged if np.all(good | small | ~ever)), begin)
 
 
+def smooth(f, x, distances):
+    """Which rows of f are parabolas, by each number, over so much on both sides, or do not depend on it: not those with a kink or a jump there. (rows, numbers)"""
+    x = np.array(x, dtype=float)
+    return np.array([np.logical_or(*_parabola(f, x, k, d)) for k, d in enumerate(distances)]).T
+
+
 def _parabola(f, x, k, d):
     """Which rows of f are parabolas over x_k - 2 d to x_k + 2 d, and which do not depend on x_k to rounding. A place where f fails is too far away."""
     y = []

@@ -1,11 +1,13 @@
 """Equations of motion that one has written oneself, solved by one call in the manner of scipy.integrate.solve_ivp."""
 
+import warnings
+
 import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
 from ._errors import Error
-from .differences import differences, scales, slopes
+from .differences import differences, scales, slopes, smooth
 from .events import Signs
 from .expressions import Expression, _expression
 from .run import collect_garbage, positive, temporary_options, tell_unused
@@ -79,8 +81,9 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         velocity_constraints(t, q, v, *args) returns Psi, (k,), linear in v: rolling, blades. Their multipliers, after those of `constraints`, are forces as
         well: Psi_v^T mu.
     jacobian : callable, optional
-        jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central differences, 6 n + 1 calls of
-        `residual` for each Newton matrix.
+        jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central
+        differences, 6 n + 1 calls of `residual` for each Newton matrix. Given ones are compared with differences at the begin: a wrong one by a is an error, since
+        accelerations and multipliers follow from it, one by q or v that is not exact a warning.
     constraint_jacobian : callable, optional
         constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
@@ -92,8 +95,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     dense_output : bool
         `sol`, a function of time.
     events : callable or list of them, optional
-        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought: two zeros within a step are not seen, see
-        `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
+        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought: two zeros within a step are not seen, see `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
     max_step, first_step : float, optional
         Longest step, and the first one; the first is found otherwise.
     args : tuple
@@ -178,6 +180,8 @@ class _Problem:
             self.find_scales(self.t0, self.q0, self.v0, np.zeros(self.n))
             if self.m and constraint_jacobian is not None:
                 self.check_gradient()
+            if self.n and jacobian is not None:
+                self.check_jacobian()
 
     def name(self, row):
         """Of an unknown and its row of the whole system, by the user's functions, for messages"""
@@ -242,6 +246,43 @@ class _Problem:
             raise ValueError("constraint_jacobian() is not the derivative of constraints() at t = %g: in row %d, column %d it says %g, differences say %g"
                              % (self.t0, row, column, given[row, column], found[row, column]))
 
+    def check_jacobian(self):
+        """Given derivatives of the residual beside differences at the begin, where these are smooth: a wrong one by a makes wrong accelerations and multipliers, one by
+        q or v, which may be an approximation, makes many corrections and small steps. Terms like M(q) a are seen with accelerations that solve the equations there
+        by least squares, but for what velocities add."""
+        t, q, v, still = self.t0, self.q0, self.v0, np.zeros(self.n)
+        G = np.vstack([self.gradient(t, q), self.rate_gradient(t, q, v)])
+        M = slopes(lambda x: self.residual(t, q, v, x), still, self.n)
+        K, rest = np.block([[M, G.T], [G, np.zeros((len(G), len(G)))]]), self.residual(t, q, v, still)
+        a = np.linalg.lstsq(K, np.concatenate([-rest, np.zeros(len(G))]), rcond=None)[0][:self.n] if np.all(np.isfinite(K)) else still
+        given = self.given_matrices(t, q, v, a)
+        rounding = 1e-9 * (np.abs(rest) + np.abs(self.residual(t, q, v, a)))[:, None]  # of differences over 6e-6 of a scale
+        by_a = lambda: slopes(lambda x: self.residual(t, q, v, x), a, self.n), np.maximum(1., np.abs(a)), np.ones((self.n, self.n), dtype=bool)
+        by = [(lambda f=f, x=x, scale=scale: differences(f, x, self.n, scale), scale, smooth(f, x, 6e-6 * scale)) for f, x, scale in
+              ((lambda x: self.residual(t, x, v, a), q, self.scale_q), (lambda x: self.residual(t, q, x, a), v, self.scale_v))]
+        for name, one, (find, scale, judged) in (("a", given[2], by_a), ("q", given[0], by[0]), ("v", given[1], by[1])):
+            try:
+                two = find()
+            except Exception:  # a residual that fails beside the state of the begin
+                continue
+            wrong = judged & (np.abs(one - two) * scale > 1e-4 * np.max(np.maximum(np.abs(one), np.abs(two)) * scale, axis=1, keepdims=True) + rounding)
+            wrong |= ~np.isfinite(one)
+            if not np.any(wrong):
+                continue
+            row, column = np.unravel_index(np.argmax(np.where(np.isfinite(one), np.where(wrong, np.abs(one - two) * scale, 0.), np.inf)), wrong.shape)
+            text = "jacobian(): the matrix of derivatives by %s, dF/d%s, is not that of residual() at t = %g: in row %d, column %d it says %g, differences say %g" % (
+                name, name, t, row, column, one[row, column], two[row, column])
+            if name == "a" or not np.all(np.isfinite(one)):
+                raise ValueError(text)
+            warnings.warn(text + "; corrections will converge slowly, and steps be short", RuntimeWarning, 4)
+
+    def given_matrices(self, t, q, v, a):
+        """The three of jacobian()"""
+        three = self._jacobian(t, q.copy(), v.copy(), a.copy(), *self.args)
+        if not isinstance(three, (tuple, list, np.ndarray)) or len(three) != 3:
+            raise ValueError("what jacobian() returns is %r, must be three matrices: the derivatives by q, v and a" % (three,))
+        return [self._shaped(x, (self.n, self.n), "the matrix of derivatives by %s that jacobian() returns" % name) for name, x in zip("qva", three)]
+
     def massless(self):
         """A remark about accelerations that the residual does not know at the begin, for messages"""
         M = slopes(lambda x: self.residual(self.t0, self.q0, self.v0, x), np.zeros(self.n), self.n)
@@ -254,7 +295,7 @@ class _Problem:
         if self._jacobian is None:
             return (differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n, self.scale_q),
                     differences(lambda x: self.residual(t, q, x, a), v, self.n, self.scale_v), slopes(lambda x: self.residual(t, q, v, x), a, self.n))
-        K, C, M = (self._shaped(x, (self.n, self.n), "a matrix that jacobian() returns") for x in self._jacobian(t, q, v, a, *self.args))
+        K, C, M = self.given_matrices(t, q, v, a)
         if self.m + self.k:
             K = K + differences(lambda x: self.reactions(t, x, v, multipliers), q, self.n, self.scale_q)
         return K, C, M
