@@ -103,6 +103,16 @@ class Pendulum(unittest.TestCase):
         self.assertEqual(s.status, 1)
         self.assertAlmostEqual(s.t[-1], period / 4, delta=1e-5)
 
+    def test_events_that_are_conditions(self):
+        """Passages of truth values are found both ways, upwards where they become true, as of scenes"""
+        times = math.pi * (np.arange(6) + 0.5)
+        for kind in (bool, np.bool_, np.array):
+            events = [lambda t, q, v: kind(q[0] < 0) for _ in range(3)]
+            events[1].direction, events[2].direction = 1, -1
+            s = h.solve_mechanism(lambda t, q, v, a: [a[0] + q[0]], (0, 20), [1], [0], rtol=1e-8, atol=1e-8, events=events)
+            for found, exact in zip(s.t_events, (times, times[::2], times[1::2])):
+                np.testing.assert_allclose(found, exact, atol=1e-3)
+
     def test_many_events_in_one_step(self):
         """A stone, whose fall takes few steps: all heights are found, in order, each where it is; the first terminal one ends the run"""
         heights = [0.9, 0.89, 0.5, 0.2, 0.1]

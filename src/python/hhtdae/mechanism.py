@@ -95,7 +95,8 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     dense_output : bool
         `sol`, a function of time.
     events : callable or list of them, optional
-        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought: two zeros within a step are not seen, see `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
+        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought, or a truth value, which passes upwards where it becomes
+        true: two zeros within a step are not seen, see `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
     max_step, first_step : float, optional
         Longest step, and the first one; the first is found otherwise.
     args : tuple
@@ -481,7 +482,8 @@ class _Output:
 
     def event_value(self, ts, t, k):
         q, v = self.positions(ts, t)
-        x = float(self.events[k](t, q, v, *self.p.args))
+        x = self.events[k](t, q, v, *self.p.args)
+        x = float(x) - 0.5 if np.asarray(x).dtype == bool else float(x)  # a condition passes zero upwards where it becomes true
         if np.isnan(x):
             raise ValueError("event %d is not a number at t = %g" % (k, t))
         return x
