@@ -113,6 +113,17 @@ class Pendulum(unittest.TestCase):
             for found, exact in zip(s.t_events, (times, times[::2], times[1::2])):
                 np.testing.assert_allclose(found, exact, atol=1e-3)
 
+    def test_sparse_jacobians(self):
+        """Matrices of SciPy are as good as arrays"""
+        try:
+            from scipy import sparse
+        except ImportError:
+            self.skipTest("no scipy")
+        given = lambda kind: pendulum(jacobian=lambda t, q, v, a: (kind((2, 2)), kind((2, 2)), kind(np.eye(2))), constraint_jacobian=lambda t, q: kind([2 * q]))
+        plain = given(lambda x: np.zeros(x) if isinstance(x, tuple) else np.array(x))
+        for kind in (sparse.csr_matrix, sparse.coo_matrix, sparse.csc_array):
+            np.testing.assert_array_equal(given(kind).q, plain.q)
+
     def test_many_events_in_one_step(self):
         """A stone, whose fall takes few steps: all heights are found, in order, each where it is; the first terminal one ends the run"""
         heights = [0.9, 0.89, 0.5, 0.2, 0.1]

@@ -81,11 +81,11 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         velocity_constraints(t, q, v, *args) returns Psi, (k,), linear in v: rolling, blades. Their multipliers, after those of `constraints`, are forces as
         well: Psi_v^T mu.
     jacobian : callable, optional
-        jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n). Default: central
+        jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n), arrays or sparse ones of SciPy. Default: central
         differences, 6 n + 1 calls of `residual` for each Newton matrix. Given ones are compared with differences at the begin: a wrong one by a is an error, since
         accelerations and multipliers follow from it, one by q or v that is not exact a warning.
     constraint_jacobian : callable, optional
-        constraint_jacobian(t, q, *args) returns Phi_q, (m, n). Default: central differences, with which a given one is compared at the begin.
+        constraint_jacobian(t, q, *args) returns Phi_q, (m, n), an array or a sparse matrix of SciPy. Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
         Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3);
         where forces jump at unknown times, as tol^(1/2).
@@ -192,6 +192,8 @@ class _Problem:
             row -= n
 
     def _shaped(self, x, shape, what):
+        if hasattr(x, "toarray"):  # sparse, of SciPy
+            x = x.toarray()
         if np.iscomplexobj(x):
             raise ValueError("%s is complex, must be real" % what)
         try:
