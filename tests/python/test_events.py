@@ -297,6 +297,40 @@ class Outputs(unittest.TestCase):
                 self.assertTrue(np.all(np.diff(seen) >= 0))
                 self.assertTrue(np.any(np.abs(np.array(seen) - math.sqrt(2 / G)) < 1e-5))
 
+    def test_positions_that_parameters_ask_for(self):
+        """A motion's displacement and a user constraint are parameters that are set between parts, or in on_step()"""
+        for kind in ("motion", "constraint"):
+            for where in ("step_by", "solve", "on_step"):
+                scene = h.Scene()
+                p = scene.parameter("p", 0.)
+                rotor = scene.add("rotor", h.RigidBody(1, np.diag([.1, .1, .2])))
+                i, j = rotor.marker(), scene.ground.marker()
+                scene.add("pin", h.Revolute(i, j))
+                angle = h.angle(i, j)
+                scene.add("drive", h.RotationalMotion(i, j, lambda t: p + 0 * t) if kind == "motion" else h.UserConstraint([angle - p]))
+                scene.channel("angle", angle)
+                run = scene.run(tolerance=1e-7, options={"ts_adapt_dt_max": 0.05})
+                if where == "step_by":
+                    for k, t in enumerate(run.step_by(0.05, 0.5)):
+                        p.set(0.1 * (k + 1))
+                    expected = 0.9
+                elif where == "solve":
+                    for k in range(10):
+                        run.solve(0.05 * (k + 1))
+                        p.set(0.1 * (k + 1))
+                        run.restart()
+                    expected = 0.9
+                else:
+                    def jump(r):
+                        if r.time > 0.2 and not p.get():
+                            p.set(0.1)
+                            r.restart()
+                    run.on_step(jump)
+                    run.solve(0.5)
+                    expected = 0.1
+                self.assertEqual(run.time, 0.5)
+                self.assertAlmostEqual(run["angle"][-1], expected, delta=1e-9, msg=(kind, where))
+
     def test_terminal_event_ends_step_by(self):
         scene, z, _ = ball()
         run = scene.run(tolerance=1e-7)

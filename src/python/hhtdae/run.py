@@ -166,7 +166,7 @@ class Run(Channels):
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
         """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them, after which the integrator's history
-        begins anew. A terminal event ends it, after its time.
+        begins anew, from the nearest positions that meet motions of displacement and user constraints with the new values. A terminal event ends it, after its time.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
@@ -279,15 +279,18 @@ class Run(Channels):
                 return
 
     def _project_restarts(self):
-        """Interpolated velocities, with which a step begins after an event, meet the constraints as the step's tolerance goes. That holds for all restarts of a
-        run with events that has begun, so that it goes on from a checkpoint as it has gone on itself: test Checkpoints of test_events.py."""
-        if self._events and not PETSc.Options().hasName("ts_hhtdae_start"):
+        """Interpolated velocities, with which a step begins after an event, meet the constraints as the step's tolerance goes, and positions do not meet a constraint whose
+        parameter has been set. That holds for all restarts of a run with events or such constraints that has begun, so that it goes on from a checkpoint as it has
+        gone on itself: test Checkpoints of test_events.py."""
+        if (self._events or self.scene._constraints_jump) and not PETSc.Options().hasName("ts_hhtdae_start"):
             integrator.set_start(self._open(), "project")
 
     def restart(self) -> None:
         """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
         self._numbers = None
         self._open().restartStep()
+        if self.steps:
+            self._project_restarts()
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step. Where it sets parameters that make a formula jump, it has to call `restart`."""

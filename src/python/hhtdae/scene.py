@@ -12,6 +12,7 @@ from . import _core
 from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
 from .elements import ELEMENTS
 from .expressions import Expression, Parameter, describing
+from .joints import RotationalMotion, TranslationalMotion, UserConstraint
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
@@ -142,6 +143,7 @@ class Scene:
         self._states = self._bodies = self._elements = self._variables = 0
         self._begun = False  # whether there is more than parameters
         self._edits = 0  # calls that have described something
+        self._constraints_jump = False  # whether positions that constraints ask for depend on parameters
         self._recipe: Optional[Recipe] = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False, page="", page_title="", page_dt=0.,
@@ -177,7 +179,7 @@ class Scene:
         What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
         which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
         Between parts of a run, in `Run.on_step` and in actions of events where a value makes a formula jump call `Run.restart`: steps across a jump lose accuracy.
-        `Run.step_by` does so by itself.
+        `Run.step_by` does so by itself. Where motions of displacement or user constraints depend on parameters, positions are moved there to the nearest that meet them.
         """
         values = {name: number(value, "parameter " + name) for name, value in values.items()}
         for name in sorted(values, key=lambda name: name in self._parameters):  # all or none: one that there is not is an error before others are set
@@ -252,6 +254,8 @@ class Scene:
         keep, who = [], "%s %s" % (type(what).__name__, name)
         described, converted = what._described(self, who), what._convert(keep, who)
         self._keeps(keep, who)
+        if isinstance(what, (UserConstraint, RotationalMotion, TranslationalMotion)) and getattr(what, "of", "displacement") == "displacement":
+            self._constraints_jump |= any(isinstance(x, Expression) and x.op == "parameter" for x in keep)
         return described, converted
 
     def _keeps(self, keep, who):
