@@ -42,6 +42,11 @@ class Documentation(unittest.TestCase):
         self.assertIn("Component: the tension", text)
         self.assertIn("length: ", text)
 
+    def test_help_of_tolerances_and_threads(self):
+        self.assertIn("angle_tol", h.Scene.run.__doc__)
+        for x in (h, h.Run):
+            self.assertIn("one thread at a time", re.sub(r"\s+", " ", x.__doc__))
+
     def test_stubs(self):
         modules = [_core]
         try:

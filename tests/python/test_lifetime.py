@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+import threading
 import unittest
 import weakref
 
@@ -167,6 +168,65 @@ class WhileSolving(unittest.TestCase):
                 hook(run, lambda r: r.ts.destroy() if r.ts else None)
                 with self.assertRaisesRegex(ValueError, "closed"):
                     run.solve(0.5)
+
+
+class Threads(unittest.TestCase):
+    def test_one_at_a_time(self):
+        """A second thread that solves, makes or asks a run is told so; after the first it may; what a run calls back may ask it"""
+        for first in ("solve", "solve_mechanism"):
+            said, inside = [], []
+            runs = [oscillator().run(tolerance=1e-6) for _ in range(2)]
+
+            def other():
+                for call in (lambda: runs[1].solve(0.1), oscillator().run, lambda: h.solve_mechanism(lambda t, q, v, a: a + q, (0, 1), 1, 0), runs[0].snapshot,
+                             runs[0].linearize, runs[0].sample, runs[1].equilibrium):
+                    try:
+                        call()
+                        said.append("nothing")
+                    except RuntimeError as error:
+                        said.append(str(error))
+
+            def begin(q):
+                if not said:
+                    thread = threading.Thread(target=other)
+                    thread.start()
+                    thread.join()
+                inside.append(runs[0].snapshot().time)
+                return q
+            if first == "solve":
+                runs[0].on_step(begin)
+                runs[0].solve(0.1)
+            else:
+                h.solve_mechanism(lambda t, q, v, a: a + begin(q), (0, 1), 1, 0)
+            self.assertEqual(len(said), 7)
+            for text in said:
+                self.assertRegex(text, r"^\S+\(\): another thread is making or solving a run.*processes")
+            self.assertTrue(inside)
+            thread = threading.Thread(target=lambda: runs[1].solve(0.1))
+            thread.start()
+            thread.join()
+            self.assertEqual(runs[1].time, 0.1)
+
+    def test_in_a_copy_of_the_process(self):
+        """Made by another thread than the one that solves"""
+        if not hasattr(os, "fork"):
+            self.skipTest("no fork")
+        run, status = oscillator().run(), []
+
+        def copy():
+            process = os.fork()
+            if process == 0:
+                os._exit(0 if h.solve_mechanism(lambda t, q, v, a: a + q, (0, 1), 1, 0).success else 1)
+            status.append(os.waitpid(process, 0)[1])
+
+        def begin(r):
+            if not status:
+                thread = threading.Thread(target=copy)
+                thread.start()
+                thread.join()
+        run.on_step(begin)
+        run.solve(0.1)
+        self.assertEqual(status, [0])
 
 
 class Within(unittest.TestCase):

@@ -20,6 +20,9 @@ PETSc is initialized by petsc4py. For options of the command line, before anythi
     petsc4py.init(sys.argv)
     import hhtdae
 
+PETSc is for one thread at a time: a scene, its runs and what they are asked belong to one thread at a time, and no two threads solve at once, see `Run`; for runs
+side by side use processes.
+
 On several ranks an exception that nobody catches ends all ranks by MPI_Abort, once its traceback is printed; `sys.excepthook` does it, unless another is set later.
 
 Formulas of measures and parameters (`hhtdae.expressions`, `hhtdae.measures`) are evaluated in C++, see there.

@@ -11,6 +11,7 @@ from .differences import differences, scales, slopes, smooth
 from .events import Signs
 from .expressions import Expression, _expression
 from .run import collect_garbage, positive, temporary_options, tell_unused
+from .threads import one_thread
 from .tracing import compile_tape, differentiate
 
 __all__ = ["MechanismResult", "solve_mechanism"]
@@ -62,6 +63,7 @@ class MechanismResult(dict):
         return "\n".join("%12s: %r" % (k, x if not isinstance(x, np.ndarray) else "array of shape %s" % (x.shape,)) for k, x in self.items())
 
 
+@one_thread
 def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_constraints=None, jacobian=None, constraint_jacobian=None, rtol=1e-6,
                     atol=1e-6, t_eval=None, dense_output=False, events=None, max_step=np.inf, first_step=None, args=(), trace=False, start="project",
                     options=None):
@@ -142,7 +144,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
             result = output.result(ts, status, message)
         finally:
             ts.destroy()
-    tell_unused(unused, 2)
+    tell_unused(unused, 3)
     return result
 
 
@@ -277,7 +279,7 @@ class _Problem:
                 name, name, t, row, column, one[row, column], two[row, column])
             if name == "a" or not np.all(np.isfinite(one)):
                 raise ValueError(text)
-            warnings.warn(text + "; corrections will converge slowly, and steps be short", RuntimeWarning, 4)
+            warnings.warn(text + "; corrections will converge slowly, and steps be short", RuntimeWarning, 5)
 
     def given_matrices(self, t, q, v, a):
         """The three of jacobian()"""

@@ -9,6 +9,7 @@ from . import _core
 from .expressions import _expression
 from .measures import Measure
 from .spec import check_parameters, number
+from .threads import one_thread
 from .tracing import compile_tape, ordered
 
 __all__ = ["BodyPart", "Excitation", "Linearization", "Load", "Mode", "Motion", "Snapshot", "StateSpace"]
@@ -65,6 +66,7 @@ class Snapshot:
         if not later:
             self.take(time)
 
+    @one_thread
     def take(self, time=None):
         """Takes another time (default: the end of the last step)."""
         self._core.take(self._run._open(), None if time is None else number(time, "time"))
@@ -200,6 +202,7 @@ class Linearization:
     constraints change along the motion included; `response()` and `modes(count)`, which are sparse, are of equilibria and steady motions.
     """
 
+    @one_thread
     def __init__(self, run, time=None, axes=None):
         self._core = _core.Linearization()
         self._core.take(run._open(), None if time is None else number(time, "time"), axes)

@@ -18,6 +18,7 @@ from .ranks import together
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
 from .spec import check_parameters, number
+from .threads import one_thread
 from .tracing import ordered
 
 __all__ = ["Run"]
@@ -92,12 +93,16 @@ class Run(Channels):
     On several ranks an exception of a callback, an event's action or an `on_step` function on one rank ends the run on all ranks: that rank raises it, the others
     `Error` with its text. Functions that call collective methods call them on all ranks alike. An exception that a script does not catch ends all ranks.
 
+    PETSc is for one thread at a time: while a run is made, solved or asked in one thread, the same in another thread, of this run or any other, is a RuntimeError.
+    What a run calls back is in its thread. For runs side by side use processes, ``multiprocessing.Pool().map(job, values)``.
+
     Attributes
     ----------
     ts : petsc4py.PETSc.TS
     scene : Scene
     """
 
+    @one_thread
     def __init__(self, scene, tolerance=None, sample=0., after=None, options=None, page=False):
         self.scene, self.ts, self._recorder, self._left = scene, None, None, None
         self._signature = list(scene._channels)
@@ -136,6 +141,7 @@ class Run(Channels):
             raise RuntimeError("%s(): the run is being solved, and is at t = %g; events, on_step() and callbacks cannot do this to it: do it after solve(), or "
                                "between the parts of step_by()" % (call, self.time))
 
+    @one_thread
     def solve(self, until: float) -> "Run":
         """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
         self._not_solving("solve")
@@ -155,13 +161,13 @@ class Run(Channels):
         finally:
             self._solving = False
         if self._unused:
-            tell_unused([name for name in unused if name in self._unused], 2)
+            tell_unused([name for name in unused if name in self._unused], 3)
             self._unused = []
         reached = self._open().getTime()
         if reached < until and ts.getConvergedReason() == PETSc.TS.ConvergedReason.CONVERGED_ITS:
-            warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 2)
+            warnings.warn("the run has ended at t = %g before %g: it has made the largest number of steps, -ts_max_steps" % (reached, until), RuntimeWarning, 3)
         elif ts.getConvergedReason() < 0:  # with -ts_error_if_step_fails 0
-            warnings.warn("the run has failed at t = %g, before %g" % (reached, until), RuntimeWarning, 2)
+            warnings.warn("the run has failed at t = %g, before %g" % (reached, until), RuntimeWarning, 3)
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
@@ -311,6 +317,7 @@ class Run(Channels):
 
     # ---- analyses of a run that has not begun ----
 
+    @one_thread
     def equilibrium(self, time: Any = None) -> "Run":
         """Moves the run to static equilibrium at a time, at rest; returns the run. States whose values nothing reads, integrals for later use, keep them.
         Initial values that violate constraints need ``scene.start(assembly="project")`` before the run is made, or "off": bodies then go
@@ -318,12 +325,14 @@ class Run(Channels):
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 
+    @one_thread
     def assemble(self, time: Any = None) -> "Run":
         """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run. Those of the start have to
         meet them, or are moved by ``scene.start(assembly="project")`` where the run is made."""
         _core.assemble_at(self._open(), self._at(time))
         return self
 
+    @one_thread
     def kinematics(self, time: Any = None) -> "Run":
         """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run.
 
@@ -361,6 +370,7 @@ class Run(Channels):
         values = self._recorder.values if self._recorder else np.empty(0)
         return values if len(values) else np.empty((0, len(self._signature)))
 
+    @one_thread
     def sample(self, time: Any = None) -> Dict[str, float]:
         """Values of all channels at a time of the last step (default: its end), by name; before the first step at the start. About accelerations and
         reactions within steps see `Snapshot`."""
@@ -403,10 +413,12 @@ class Run(Channels):
 
     # ---- the rest ----
 
+    @one_thread
     def save(self, file: str) -> None:
         """Writes a checkpoint, with which the run can be resumed bit for bit. Collective."""
         integrator.checkpoint_save(self._open(), file)
 
+    @one_thread
     def load(self, file: str) -> "Run":
         """Takes the run to a checkpoint of a run of the same scene, from where it goes on bit for bit; returns the run. Collective.
 
@@ -422,6 +434,7 @@ class Run(Channels):
             self._recorder.resume(self.time)
         return self
 
+    @one_thread
     def close(self) -> None:
         """Frees what PETSc has for the run; its samples stay. While the run is being solved this is an error."""
         if self.ts:

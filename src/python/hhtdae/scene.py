@@ -17,6 +17,7 @@ from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
 from .spec import Formula, Spec, check_parameters, copied, has_formula, number, plain, text
+from .threads import one_thread
 from .tracing import time_function
 
 __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
@@ -387,7 +388,7 @@ class Scene:
         rotations : {"local", "euler313"}
             Coordinates of the rotations of bodies in space.
         angle_tol : float
-            Of the error test for rotations, radians; 0: the TS's absolute tolerance.
+            Of the error test for rotations, radians; 0: the tolerance of the run, as of lengths, which in small units is too small a number for angles.
         """
         chosen = self._choose(self._start, policy, "start", assembly=("report", "off", "project"), redundant=("drop", "refuse", "keep"), rotations=("local", "euler313"))
         self._core.start(*[chosen[k] for k in ("assembly", "redundant", "rotations", "equilibrium", "view", "tolerance", "time", "angle_tol")])
@@ -461,6 +462,7 @@ class Scene:
 
     # ---- runs ----
 
+    @one_thread
     def set_up(self) -> None:
         """Checks and assembles the scene; the first run does it otherwise. Collective."""
         self._core.set_up()
@@ -474,7 +476,8 @@ class Scene:
         tolerance : float, optional
             Of the error of positions in every step, in their units and radians, times the largest of one and what the coordinates reach (PETSc's default: 1e-4).
             Where everything moves by micrometres, in metres, or where a contact a hundred metres away gives way by millimetres, it has to be as much smaller, or
-            what is smaller than the tolerance is not there.
+            what is smaller than the tolerance is not there. Rotations are tested with the same number, in radians: where lengths are small in their unit give them
+            a tolerance of their own, ``scene.start(angle_tol=1e-6)``, or steps are a hundred times as many as they need be.
         sample : float or None
             Time between samples of the channels, at its multiples and the start; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
             within steps are more accurate than those at their ends, as a rule, but not with fast modes that hardly anything damps, of flexible bodies
