@@ -1,6 +1,8 @@
 """solve_mechanism: the scale of its differences, and what it says of arguments and functions that are wrong."""
 
 import math
+import os
+import tempfile
 import unittest
 import warnings
 
@@ -194,6 +196,28 @@ class Arguments(unittest.TestCase):
         scene.add("wind", h.UserForce(mass.marker(), force=(h.callback(lambda t: math.nan if t > 0.1 else 0., h.time()), 0., 0.)))
         with self.assertRaisesRegex(h.Error, r"row 0 \(x of body weight\)"):
             scene.solve(1.)
+
+    def test_names_in_messages(self):
+        """The library's messages name Python's functions"""
+        scene = h.Scene()
+        k = scene.parameter("k", 1.)
+        b = scene.add("b", h.PointMass(position=(1 * k, 0, 0)))
+        run = scene.solve(0.1)
+        for call, text in ((run.equilibrium, r"^Run.equilibrium\(\): the run has begun.* Scene.run\(after=run\)"), (lambda: scene.set(nothing=1), r"^Scene.set\(\): there is no")):
+            with self.assertRaisesRegex(h.Error, text):
+                call()
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "checkpoint")
+            run.save(file)
+            scene.set(k=2.)
+            with self.assertRaisesRegex(h.Error, r"set it by Scene.set\(\) before"):
+                scene.run().load(file)
+        scene = h.Scene()
+        m = scene.add("b", h.PointMass()).marker()
+        force = scene.add("f", h.UserForce(m, force=[1., 0, 0]))
+        scene.add("g", h.UserForce(m, force=[h.force(force, 0), 0, 0]))
+        with self.assertRaisesRegex(h.Error, "set state=True on it"):
+            scene.set_up()
 
     def test_jacobian(self):
         """Compared with differences at the begin: a wrong mass matrix is an error, other derivatives that are not exact a warning; kinks are nobody's mistake"""

@@ -41,5 +41,32 @@ def fail(code, text, specific, cause):
         raise cause
     trace = [line.split("] ", 1)[-1] for line in getattr(PETSc.Error, "_traceback_", [])]
     message = re.sub(r"\s+\Z", "", specific) or text
-    message = message.replace("-scene_assemble project", 'scene.start(assembly="project"), or the option -scene_assemble project')
-    raise Error(code, message, trace) from cause
+    raise Error(code, in_python(message), trace) from cause
+
+
+# What the library's messages, which name its own functions, call in Python; the first that fits. What is left of Class::functionName is Class.function_name.
+_NAMES = [
+    (r"-scene_assemble project", 'scene.start(assembly="project"), or the option -scene_assemble project'),
+    (r"Scene::createTS\(&next, ts\)", "Scene.run(after=run)"),
+    (r"(Scene::)?\bcreateTS\(\)", "Scene.run()"),
+    (r"Scene::set\(\) it", "set it by Scene.set()"),
+    (r"\bsetUp\(\)", "Scene.set_up()"),
+    (r"\bStaticEquilibrium\(\)", "Run.equilibrium()"),
+    (r"\bAssembleAt\(\)", "Run.assemble()"),
+    (r"\bKinematics\(\)", "Run.kinematics()"),
+    (r"\bTSHHT3CheckpointLoad\(\)", "Run.load()"),
+    (r"\bSnapshot::take\(\)", "Run.snapshot()"),
+    (r"\bLinearization::take\(\)", "Run.linearize()"),
+    (r"\bSlowestModes\(\)", "Linearization.modes(count)"),
+    (r"\bFeModel::readMesh\b", "FeModel.from_mesh()"),
+    (r"\bReduction::(\w+)", r"reduce(): \1"),
+    (r"\b(state|all_nodes) = true\b", r"\1=True"),
+    (r"\b(state|all_nodes) = false\b", r"\1=False"),
+]
+
+
+def in_python(message):
+    """A message of the library with Python's names"""
+    for name, here in _NAMES:
+        message = re.sub(name, here, message)
+    return re.sub(r"\b(Scene|Run|Snapshot|Linearization)::(\w+)", lambda m: m[1] + "." + re.sub("[A-Z]", lambda c: "_" + c[0].lower(), m[2]), message)
