@@ -51,7 +51,7 @@ double ValueOf(const Tape::Function &f, const std::vector<double> &x)
 }
 
 /* Central differences over steps that become shorter by `shorter` each, at most so many: 6e-6 of the argument (or of 1) to 4.5e-14 of it. An argument may be as
-   small as micrometres in metres are, so that the first step may be longer than all that the function does. Test: Differences of test_expressions.py. */
+   small as micrometres in metres are, so that the first step may be longer than all that the function does. Test: Operations.test_differences of test_expressions.py. */
 constexpr int    steps_tried = 10;
 constexpr double shorter     = 8;
 constexpr double agreement   = 1e-6; /* of two differences, relative: enough for the Newton matrix and for the directions of reactions */
