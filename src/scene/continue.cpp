@@ -185,8 +185,7 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscFunctionReturn(0);
 }
 
-/* Functions of the state read present values */
-static std::vector<double> ParametersNow(const SceneData &s)
+std::vector<double> ParametersNow(const SceneData &s)
 {
   std::vector<double> x;
   for (const ParameterData &p : s.parameters) x.push_back(*p.present);
@@ -230,6 +229,74 @@ PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy)
   }
   PetscCall(BeginCopy(ts, TSHHT3_START_REPORT, copy));
   PetscCall(TSHHT3EvaluateAt(*copy, t, state[0], state[1], state[2]));
+  PetscFunctionReturn(0);
+}
+
+namespace
+{
+
+/* A change is one everywhere: ranks whose values differ would wait for each other */
+PetscErrorCode ParametersChanged(const Runtime &R, PetscBool *changed)
+{
+  PetscMPIInt other = R.step_parameters != ParametersNow(R.scene);
+  PetscFunctionBegin;
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &other, 1, MPI_INT, MPI_MAX, R.scene.comm));
+  *changed = other ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done)
+{
+  Runtime  &R = *RunOf(ts);
+  PetscBool changed;
+  PetscErrorCode (*evaluate)(TS, PetscBool, Vec, Vec, Vec, PetscBool *);
+  PetscFunctionBegin;
+  PetscCall(ParametersChanged(R, &changed));
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3EvaluatePresent_C", &evaluate));
+  PetscCall(evaluate(ts, changed, state[0], state[1], state[2], done));
+  PetscFunctionReturn(0);
+}
+
+/* Other TS types know neither accelerations nor times between steps */
+PetscErrorCode StateOfOtherType(TS ts, PetscReal t, Vec state[3])
+{
+  PetscReal now;
+  TSType    type;
+  Vec       U, V;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &now));
+  PetscCall(TSGetType(ts, &type));
+  PetscCheck(t == now, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+             "Time %g: TS type %s gives the state at the end of its last step alone, which is t = %g; hhtdae at any time of the step", (double)t, type, (double)now);
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecCopy(U, state[0]));
+  PetscCall(VecCopy(V, state[1]));
+  PetscCall(VecSet(state[2], std::numeric_limits<double>::quiet_NaN()));
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS *copy)
+{
+  PetscInt  steps;
+  PetscReal now;
+  PetscBool ours, done = PETSC_FALSE;
+  PetscFunctionBegin;
+  *copy = nullptr;
+  PetscCall(TSGetStepNumber(ts, &steps));
+  PetscCall(TSGetTime(ts, &now));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
+  if (!ours) {
+    PetscCall(StateOfOtherType(ts, t, state));
+    PetscFunctionReturn(0);
+  }
+  if (!steps) {
+    PetscCall(StateOfStart(ts, t, state, copy));
+    PetscFunctionReturn(0);
+  }
+  if (t == now) PetscCall(PresentState(ts, state, &done));
+  if (!done) PetscCall((from_equations ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, state[0], state[1], state[2]));
   PetscFunctionReturn(0);
 }
 

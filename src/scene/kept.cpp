@@ -13,7 +13,7 @@ namespace hhtdae
 namespace
 {
 
-static_assert(kept >= recorded + 2, "room for the digest and for the recording");
+static_assert(kept >= recorded + 3, "room for the digest, the recording, and whether parameters have changed");
 
 /* FNV-1a over what is given, numbers in single precision: other machines and compilers round differently */
 class Digest
@@ -136,6 +136,7 @@ PetscErrorCode WriteKept(Runtime &R)
   std::fill(end, end + kept, 0.0);
   MakeDigest(R.scene).put(end);
   PetscCall(SaveOutput(R, end + 2));
+  end[kept - 1] = !R.step_parameters.empty() && R.step_parameters != ParametersNow(R.scene);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscFunctionReturn(0);
 }
@@ -150,6 +151,8 @@ PetscErrorCode ReadKept(Runtime &R, const double *x)
   PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
   PetscCall(ResumeOutput(R, x + 2));
+  R.step_parameters = ParametersNow(R.scene);
+  if (x[kept - 1] != 0) R.step_parameters.clear(); /* set since the last step */
   PetscFunctionReturn(0);
 }
 

@@ -295,7 +295,6 @@ Linearization::~Linearization() = default;
 PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
 {
   Work     &w = *work_;
-  PetscInt  steps;
   PetscBool ours;
   Vec       U, V;
   PetscFunctionBegin;
@@ -305,14 +304,10 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
   PetscCheck(w.R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "Linearization::take(): the TS is not one of a scene, Scene::createTS() makes them");
   PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours));
   PetscCheck(ours, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP, "Linearization::take(): only TS type hhtdae gives accelerations and multipliers");
-  PetscCall(TSGetStepNumber(ts, &steps));
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
-  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, w.state[0], w.state[1], w.state[2]));
-  else {
-    PetscCall(StateOfStart(ts, t, w.state, &w.start));
-    if (w.start) w.R = RunOf(w.start);
-  }
+  PetscCall(StateAt(ts, t, true, w.state, &w.start));
+  if (w.start) w.R = RunOf(w.start);
   w.origin.take(*w.R);
   w.t    = t;
   w.size = SceneSize(w.R->scene);

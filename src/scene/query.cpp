@@ -93,17 +93,6 @@ void Resolve(Motion &m, const Matrix3 &R)
   m.axes = R.transpose() * m.axes;
 }
 
-/* u, u' and u'' of a run at t, or before its first step at where it stands; *copy: to be destroyed, whatever happens */
-PetscErrorCode StateAt(TS ts, PetscReal t, Vec W[3], TS *copy)
-{
-  PetscInt steps;
-  PetscFunctionBegin;
-  PetscCall(TSGetStepNumber(ts, &steps));
-  if (steps) PetscCall(TSHHT3EvaluateAt(ts, t, W[0], W[1], W[2]));
-  else PetscCall(StateOfStart(ts, t, W, copy));
-  PetscFunctionReturn(0);
-}
-
 } // namespace
 
 PetscErrorCode Snapshot::take(TS ts, PetscReal t)
@@ -122,7 +111,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   PetscCheck(ours, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP, "Snapshot::take(): TS type %s gives no accelerations; use hhtdae", type);
   PetscCall(TSGetSolution(ts, &U));
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
-  PetscErrorCode failed = StateAt(ts, t, W, &copy);
+  PetscErrorCode failed = StateAt(ts, t, true, W, &copy);
   if (!failed) failed = take(*w.R, t, W);
   /* attitudes that a first step in the run's place has found count from what that step has referred them to */
   for (std::size_t b = 0; copy && !failed && b < w.origin.references.size(); b++) w.origin.references[b] = RunOf(copy)->bodies.body[b].C;

@@ -293,6 +293,7 @@ PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
   const double *u;
   PetscFunctionBegin;
   R.accepts++;
+  R.step_parameters = ParametersNow(R.scene);
   if (!R.remembers && R.asked.empty()) PetscFunctionReturn(0);
   PetscCall(MoveBodies(R, U, V));
   R.moved = R.bodies.local ? R.bodies.moves : -1;

@@ -57,6 +57,7 @@ struct Runtime {
   Vec       start_state[3] = {};
   PetscReal start_time     = 0;
   std::vector<double> start_parameters; /* values then, which functions read */
+  std::vector<double> step_parameters; /* values when the last step began */
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
   bool                  steps_limited = false; /* some element says how long a step may be */
   std::vector<double>   reference_before; /* of local rotations, own bodies: quaternions */
@@ -155,6 +156,11 @@ PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, w
 /* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has
    found them, null if none was needed */
 PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy);
+std::vector<double> ParametersNow(const SceneData &s); /* functions of the state read present values */
+/* u, u', u'' of a run at t: of the start; within the last step, from the equations or, where nobody needs these, interpolated; at the present time, where parameters
+   or the solution have been changed since the last step or a restart is due, those that a start from there has. TS types other than hhtdae: the end of the last
+   step, without accelerations. copy: as above */
+PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS *copy);
 
 } // namespace hhtdae
 

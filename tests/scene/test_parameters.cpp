@@ -1,4 +1,6 @@
 /* Parameters: other numbers without another description. */
+#include "hhtdae/linearize.h"
+#include "hhtdae/query.h"
 #include "scene_output.h"
 #include <cmath>
 
@@ -204,6 +206,66 @@ TEST(Parameters, AFunctionReadsThePresentValue)
   must(run.solve());
   must(scene.sample(run.ts, 1.5, x));
   EXPECT_NEAR(x[0], 1.5, 1e-9);
+}
+
+/* At the present time of a run whose parameters or velocities have been changed since its last step: forces, accelerations and reactions are those of a start from there. A mass on
+   a link of length 1 is pulled along it */
+TEST(Parameters, TheStateAfterAChangeIsOne)
+{
+  const double g = 9.81;
+  for (bool restart : {false, true})
+    for (bool velocity : {false, true}) {
+      Scene           scene(PETSC_COMM_SELF);
+      const Parameter pull = scene.parameter("pull", 0);
+      PointMass       m;
+      m.position         = {0, -1, 0};
+      const Marker  on   = scene.marker(scene.add("mass", m));
+      const Element link = scene.add("link", PointDistance{on, scene.marker(scene.ground())});
+      const auto    none = Expression{{}, [](const Real *) -> Real { return 0.0; }};
+      scene.gravity({0, -g, 0});
+      scene.add("plane", InPlane{on, scene.marker(scene.ground())});
+      scene.add("pull", UserForce{on, {}, {}, {none, Expression{{}, [=](const Real *) -> Real { return -pull.value(); }}, none}, {}});
+      scene.channel("tension", Measure::multiplier(link, 0));
+      SceneRun            run(scene, 1, tolerance(1e-7));
+      std::vector<double> x;
+      std::vector<Mode>   modes;
+      Snapshot            now;
+      Linearization       small;
+      double              fastest = 0;
+      must(run.solve());
+      must(scene.sample(run.ts, 1, x));
+      const double before = std::abs(x[0]);
+      EXPECT_NEAR(before, g, 1e-9);
+      if (velocity) {
+        Vec     U, V;
+        double *v;
+        must(TS2GetSolution(run.ts, &U, &V));
+        must(VecGetArray(V, &v));
+        v[0] = 3;
+        must(VecRestoreArray(V, &v));
+      } else must(scene.set("pull", 90));
+      if (restart) must(TSRestartStep(run.ts));
+      const double tension = velocity ? g + 9 : g + 90;
+      must(scene.sample(run.ts, 1, x));
+      EXPECT_NEAR(std::abs(x[0]), tension, 1e-6);
+      must(now.take(run.ts));
+      double y;
+      must(now.value(Measure::multiplier(link, 0), &y));
+      EXPECT_NEAR(std::abs(y), tension, 1e-6);
+      Motion of;
+      must(now.motion(on, &of));
+      EXPECT_NEAR(of.velocity(0), velocity ? 3 : 0, 1e-12);
+      EXPECT_NEAR(of.acceleration(1), velocity ? 9 : 0, 1e-6);
+      if (velocity) continue;
+      must(small.take(run.ts));
+      must(small.modes(&modes));
+      for (const Mode &each : modes) fastest = std::max(fastest, std::abs(each.value));
+      EXPECT_NEAR(fastest, std::sqrt(tension), 1e-5);
+      must(TSSetMaxTime(run.ts, 1.1)); /* the run goes on */
+      must(run.solve());
+      must(scene.sample(run.ts, 1.1, x));
+      EXPECT_NEAR(std::abs(x[0]), tension, 1e-6);
+    }
 }
 
 TEST(Parameters, SayWhatIsWrong)

@@ -61,6 +61,7 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
 PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T);
 PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T);
+PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T); /* of other velocities than those the step begins with */
 PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most); /* the largest of coordinates' rates or accelerations x, each by the coordinate's size */
 
 } // namespace hht3

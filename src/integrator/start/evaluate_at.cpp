@@ -222,6 +222,97 @@ PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+namespace
+{
+
+/* Whether positions, velocities or states are others than those of the last step at this time */
+PetscErrorCode SolutionWasSet(TS ts, PetscBool *set)
+{
+  Integrator &I     = Get(ts);
+  PetscMPIInt other = 0;
+  WorkVec     U, V;
+
+  PetscFunctionBegin;
+  PetscCall(U.like(I.U0));
+  PetscCall(V.like(I.U0));
+  PetscCall(Interpolate(ts, ts->ptime, U, V, NULL));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar x, PetscScalar y) {
+      if (IsDifferential(RoleOf(I, i)) && u != x) other = 1;
+      if (IsCoordinate(I, i) && v != y) other = 1;
+    },
+    Read(ts->vec_sol), Read(ts->vec_dot), Read(U), Read(V)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &other, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  *set = other ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Accelerations and multipliers of the sampler's U and V, as a start from there would find them */
+PetscErrorCode SolveAsStart(TS ts, Sampler &S, PetscBool *ok, const char **why)
+{
+  Integrator            &I     = Get(ts);
+  const TSHHT3Statistics saved = I.stat;
+  WorkVec                before;
+
+  PetscFunctionBegin;
+  std::vector<signed char> levels[2] = {I.levels[0], I.levels[1]};
+  const PetscBool          known     = I.levels_known;
+  PetscReal                T;
+  PetscCall(TimeScaleOfConstraints(ts, S.at.V, &T));
+  S.at.t    = ts->ptime;
+  S.at.tiny = vanishing_step * PetscMin(T, 1);
+  S.at.T    = I.constraints() && I.count[TSHHT3_STATE] ? T : 0;
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
+    Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
+  PetscCall(ReferTo(ts, S.at.U, before));
+  PetscErrorCode failed = S.at.gamma ? ConstraintDerivatives(ts, S.at.t, S.at.U, S.at.V, T, false, NULL, S.at.gamma) : PETSC_SUCCESS;
+  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, why);
+  PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
+  S.at.T = 0;
+  for (int k = 0; k < 2; k++) I.levels[k].swap(levels[k]);
+  I.levels_known = known;
+  I.stat         = saved;
+  PetscCall(failed);
+  if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+PetscErrorCode EvaluatePresent(TS ts, PetscBool changed, Vec U, Vec V, Vec A, PetscBool *done)
+{
+  Integrator     &I      = Get(ts);
+  const PetscReal t      = ts->ptime;
+  const bool      begin  = IsBeginOfStep(ts, t);
+  const bool      within = begin || (I.have_step && t >= I.t0 && t <= I.t1);
+  Sampler        *S      = NULL;
+  PetscBool       ok     = PETSC_FALSE, set = PETSC_FALSE;
+  const char     *why    = "";
+
+  PetscFunctionBegin;
+  *done = PETSC_FALSE;
+  if (!I.have_step && !I.at_begin) PetscFunctionReturn(PETSC_SUCCESS);
+  if (within) PetscCall(SolutionWasSet(ts, &set));
+  const bool other = changed || set || !within, due = ts->steprestart && ts->reason >= 0; /* after a failed step one is due, but nothing is new */
+  if (!other && !due) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(GetSampler(ts, &S));
+  if (!S) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(ts->vec_sol, S->at.U));
+  PetscCall(TakeRoles(I, ts->vec_dot, {TSHHT3_COORDINATE, TSHHT3_STATE}, S->at.V));
+  PetscCall(VecCopy(begin ? I.A0 : I.A1, S->at.A));
+  PetscCall(SolveAsStart(ts, *S, &ok, &why));
+  PetscCheck(ok || !other, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
+             "The solution, or what forces depend on, was changed since the last step, and no consistent accelerations and multipliers were found at t = %g: %s", (double)t, why);
+  if (!ok) PetscCall(PetscInfo(ts, "state at t = %g, where a restart is due: %s; accelerations and multipliers are those of the last step\n", (double)t, why));
+  if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(S->at.U, U));
+  PetscCall(VecCopy(S->at.V, V));
+  PetscCall(VecCopy(S->at.A, A));
+  *done = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SamplerDestroy(Integrator &I)
 {
   PetscFunctionBegin;

@@ -214,15 +214,16 @@ PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T)
 }
 
 /* For differences of constraints: what the motion takes, though the run be `longest_in_runs` times shorter */
-PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T)
+PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T)
 {
   PetscReal rate;
 
   PetscFunctionBegin;
-  PetscCall(RelativeRate(ts, Get(ts).V0, &rate));
+  PetscCall(RelativeRate(ts, V, &rate));
   *T = TimeOf(ts, rate, longest_in_runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T) { return TimeScaleOfConstraints(ts, Get(ts).V0, T); }
 
 /* Whether the solution is what a step has left in t, U, V, but for less than the tolerance: after a roll-back, or where a post-step function has brought attitudes
    to length 1. What it misses of the constraints is not the application's (BetweenRuns.WhatAStepHasLeft). */

@@ -15,6 +15,10 @@ PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 bool           IsBeginOfStep(TS ts, PetscReal t);
 PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 
+/* Where a restart is due, the solution is another one than the last step's, or the application says that its forces have `changed` since: the state of the TS at its
+   present time, with the accelerations and multipliers that it has by the equations. *done: whether this is so, and they were found; else U, V, A are untouched. */
+PetscErrorCode EvaluatePresent(TS ts, PetscBool changed, Vec U, Vec V, Vec A, PetscBool *done);
+
 /* The matrix, solver and vectors of EvaluateAt() */
 PetscErrorCode SamplerDestroy(Integrator &I);
 

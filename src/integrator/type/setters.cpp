@@ -192,6 +192,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(GetStatistics);
   HHT3_COMPOSE(Interpolate);
   HHT3_COMPOSE(EvaluateAt);
+  HHT3_COMPOSE(EvaluatePresent);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
   HHT3_COMPOSE(ReadCheckpoint);

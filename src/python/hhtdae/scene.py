@@ -179,6 +179,7 @@ class Scene:
 
         What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
         which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
+        So do `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time, whose forces, accelerations and reactions are then those with which the run goes on.
         Between parts of a run, in `Run.on_step` and in actions of events where a value makes a formula jump call `Run.restart`: steps across a jump lose accuracy.
         `Run.step_by` does so by itself. Where motions of displacement or user constraints depend on parameters, positions are moved there to the nearest that meet them.
         """

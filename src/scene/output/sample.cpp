@@ -32,7 +32,6 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   std::vector<double> own, acceleration;
   PetscFunctionBegin;
   Runtime *run;
-  PetscInt steps;
   TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(CheckUnchanged(run->scene, start_));
@@ -42,9 +41,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
     PetscCall(VecSetSizes(x, run->n, PETSC_DETERMINE));
     PetscCall(VecSetType(x, VECSTANDARD));
   }
-  PetscCall(TSGetStepNumber(ts, &steps));
-  if (!steps) PetscCall(StateOfStart(ts, t, W, &copy));
-  else PetscCall((ChannelsFollowFromEquations(*run) ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, W[0], W[1], W[2]));
+  PetscCall(StateAt(ts, t, ChannelsFollowFromEquations(*run), W, &copy));
   Runtime &R = copy ? *RunOf(copy) : *run;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
   PetscCall(LocalMotion(R, w[0], w[1], w[2], acceleration, local));
