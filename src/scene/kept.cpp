@@ -3,6 +3,8 @@
   recording of results stands, so that a run which is resumed goes on in the same files.
 */
 #include "runtime.h"
+#include "start.h"
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -101,6 +103,57 @@ Digest MakeDigest(const SceneData &s)
   return d;
 }
 
+/* What ranks have to agree in, section by section: a digest of the description as checkpoints have it, and what these need not know */
+struct Section {
+  const char *name;
+  Digest      digest;
+};
+
+std::vector<Section> SectionsOf(const SceneData &s)
+{
+  std::vector<Section> all(6);
+  all[0].name = "bodies, markers, gravity, elements and what they connect";
+  all[0].digest = MakeDigest(s);
+  all[0].digest.whole((long)s.errors.size());
+  all[1].name = "positions and velocities of bodies at the start";
+  for (const BodyData &b : s.bodies) {
+    all[1].digest.numbers(b.r);
+    all[1].digest.numbers(b.A);
+    all[1].digest.numbers(b.v);
+    all[1].digest.numbers(b.w);
+  }
+  all[2].name = "parameters";
+  for (const ParameterData &p : s.parameters) {
+    all[2].digest.text(p.name);
+    all[2].digest.number(*p.present);
+  }
+  all[3].name = "names of bodies, elements, variables and states";
+  for (const BodyData &b : s.bodies) all[3].digest.text(b.name);
+  for (const ElementData &e : s.elements) all[3].digest.text(e.name);
+  all[4].name = "channels";
+  for (const ChannelData &c : s.channels) {
+    all[4].digest.text(c.name);
+    for (const Measure &m : c.value.arguments) all[4].digest.whole((long)m.kind);
+  }
+  all[5].name = "variables, states and how runs start";
+  for (const auto *unknowns : {&s.variables, &s.states})
+    for (const ExpressionData &x : *unknowns) {
+      all[5].digest.text(x.name);
+      all[5].digest.number(x.initial);
+    }
+  for (const double x : {s.start.tolerance, s.start.time, s.start.angle_tol, (double)s.start.assembly, (double)s.start.redundant, (double)s.start.equilibrium}) all[5].digest.number(x);
+  return all;
+}
+
+/* "rank 1", "ranks 1, 2, 5 and 7 more" */
+std::string Ranks(const std::vector<PetscMPIInt> &r)
+{
+  constexpr std::size_t most = 5;
+  std::string           text = r.size() > 1 ? "ranks " : "rank ";
+  for (std::size_t k = 0; k < std::min(most, r.size()); k++) text += (k ? ", " : "") + std::to_string(r[k]);
+  return r.size() > most ? text + " and " + std::to_string(r.size() - most) + " more" : text;
+}
+
 /* The value of a checkpoint, to so many digits */
 bool Same(double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(a); }
 
@@ -118,6 +171,46 @@ PetscErrorCode CheckParameters(const SceneData &s, const double *x)
 }
 
 } // namespace
+
+PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size)
+{
+  const std::vector<Section> sections = SectionsOf(s);
+  const std::size_t          n        = 2 * sections.size();
+  std::vector<double>        own(n), all(n * size);
+  std::string                differences;
+  PetscFunctionBegin;
+  for (std::size_t k = 0; k < sections.size(); k++) sections[k].digest.put(&own[2 * k]);
+  PetscCallMPI(MPI_Allgather(own.data(), (PetscMPIInt)n, MPI_DOUBLE, all.data(), (PetscMPIInt)n, MPI_DOUBLE, s.comm));
+  for (std::size_t k = 0; k < sections.size(); k++) {
+    std::vector<PetscMPIInt> others;
+    for (PetscMPIInt r = 1; r < size; r++)
+      if (all[n * r + 2 * k] != all[2 * k] || all[n * r + 2 * k + 1] != all[2 * k + 1]) others.push_back(r);
+    if (!others.empty()) differences += std::string("\n  ") + sections[k].name + ": " + Ranks(others);
+  }
+  PetscCheck(differences.empty(), s.comm, PETSC_ERR_ARG_NOTSAMETYPE,
+             "ranks describe different scenes; on these ranks it is another one than on rank 0:%s\nEvery rank has to make the same calls in the same order, with the same numbers", differences.c_str());
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckSame(const Runtime &R, TS ts)
+{
+  constexpr int n = 4;
+  PetscReal     x[n], least[2 * n];
+  PetscFunctionBegin;
+  if (R.size == 1) PetscFunctionReturn(0);
+  PetscCall(TSGetTime(ts, &x[0]));
+  PetscCall(TSGetMaxTime(ts, &x[1]));
+  PetscCall(TSGetTolerances(ts, &x[2], nullptr, &x[3], nullptr));
+  for (int k = 0; k < n; k++) {
+    least[k]     = x[k];
+    least[n + k] = -x[k];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 2 * n, MPIU_REAL, MPIU_MIN, R.scene.comm));
+  const char *name[n] = {"time", "final time (TSSetMaxTime())", "absolute tolerance", "relative tolerance"};
+  for (int k = 0; k < n; k++)
+    PetscCheck(least[k] == -least[n + k], R.scene.comm, PETSC_ERR_ARG_NOTSAMETYPE, "Scene::solve(): the run's %s differs between ranks: from %g to %g", name[k], (double)least[k], (double)-least[n + k]);
+  PetscFunctionReturn(0);
+}
 
 PetscInt Kept(const Runtime &R) { return 2 * (PetscInt)R.scene.parameters.size() + kept; }
 

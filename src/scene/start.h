@@ -14,6 +14,9 @@ PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
 struct Runtime;
+/* kept.cpp: an error that names the ranks whose description, up to here, is another one than that of rank 0. Collective, before anything else that is */
+PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size);
+PetscErrorCode CheckSame(const Runtime &R, TS ts); /* the same of a run's time, end and tolerances */
 PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer); /* view.cpp; R: a run of it, or null */
 
 /* ---- rows.cpp: all constraints where the description puts the bodies ---- */

@@ -247,6 +247,7 @@ PetscErrorCode Scene::solve(TS ts)
   PetscFunctionBegin;
   PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
   PetscCall(CheckUnchanged(R->scene, start_));
+  PetscCall(CheckSame(*R, ts));
   PetscCall(AttachOutput(*R, output_, ts));
   const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
