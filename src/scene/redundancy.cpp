@@ -34,6 +34,10 @@ namespace
 constexpr double clearly_independent = 1e-3; /* least pivot for a body to be cut off */
 constexpr double neighbour           = 0.02; /* how far away: radians, parts of the scene's size */
 
+/* Dimensions and directions are given to some seven digits: rows whose independence is less than this are dependent as far as the description tells. With 1e-9 a hinge that
+   was 1e-8 rad out of line locked a linkage, without a word and by any moment (SceneStart.AHingeSlightlyOutOfLine). What is dropped has to hold at a neighbouring position, too. */
+constexpr double rounding_of_descriptions = 1e-6;
+
 using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
 struct RowRef {
@@ -58,6 +62,15 @@ void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
       if (norm > 0) b.J.row(r) /= norm;
     }
   }
+}
+
+/* A length by which translations and rotations compare: the scene's size, but not far beyond the bodies' own, where a small mechanism is far from the origin or from others */
+double LengthOfBodies(const SceneData &s)
+{
+  double arm = 0, size = SceneSize(s);
+  for (std::size_t m = 0; m < s.ownMarkers(); m++)
+    if (s.markers[m].body >= 0) arm = std::max(arm, s.markers[m].s.norm());
+  return arm > 0 ? std::min(size, 10 * arm) : size;
 }
 
 /* The rows left after trees have been cut off, in the order of the blocks */
@@ -260,11 +273,11 @@ std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &b
 /* Redundant rows where the description puts the bodies */
 std::vector<RowRef> Find(SceneData &s, std::vector<RowBlock> &blocks)
 {
-  Scale(s, blocks, SceneSize(s));
+  Scale(s, blocks, LengthOfBodies(s));
   const std::vector<RowRef> core = Pruning(s, blocks).core();
   s.started.core                 = (PetscInt)core.size();
   /* rows that are redundant are so to the accuracy to which the constraints are met */
-  const double threshold = std::min(1e-5, std::max(1e-9, 100 * s.started.misfit));
+  const double threshold = std::min(1e-5, std::max(rounding_of_descriptions, 100 * s.started.misfit));
   return Dependent(s, blocks, core, threshold);
 }
 

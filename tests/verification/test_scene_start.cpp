@@ -244,6 +244,43 @@ TEST(SceneRedundant, APlanarFourBarOfSpatialHinges)
   MEASURED("%s", printed.text().c_str());
 }
 
+/* One hinge that is out of line by less than what is written down of a direction locks nothing: its rows are dropped, or an error says that it does */
+TEST(SceneRedundant, AHingeSlightlyOutOfLine)
+{
+  for (double tilt : {0., 1e-10, 1e-9, 3e-9, 1e-8, 3e-8, 1e-7, 3e-7, 6e-7}) {
+    Scene      s(PETSC_COMM_SELF);
+    const Body a = s.add("a", rod({0, 0, 0}, {0, 1, 0})), b = s.add("b", rod({0, 1, 0}, {2, 1, 0})), c = s.add("c", rod({2, -0.5, 0}, {2, 1, 0}));
+    pin(s, "A", a, s.ground(), {0, 0, 0});
+    pin(s, "B", b, a, {0, 1, 0});
+    pin(s, "C", c, b, {2, 1, 0});
+    pin(s, "D", c, s.ground(), {2, -0.5, 0}, Vector3(tilt, 0.3 * tilt, 1).normalized());
+    Printed              printed;
+    ErrorTrap            trap;
+    const PetscErrorCode failed = s.setUp();
+    if (failed) {
+      EXPECT_TRUE(trap.says("with them it is locked")) << trap.message;
+      EXPECT_GT(tilt, 1e-8);
+    } else EXPECT_EQ(DataOf(s).started.degreesOfFreedom(), 1) << tilt;
+  }
+}
+
+/* A small mechanism far from the origin has all of its constraints */
+TEST(SceneRedundant, FarFromTheOrigin)
+{
+  Scene         s(PETSC_COMM_SELF);
+  const Vector3 far(7e6, 0, 0), arm(0.1, 0, 0);
+  const Body    a = s.add("a", rod(far - arm, far + arm));
+  RigidBody     other = rod(far - arm, far + arm);
+  const Body    b = s.add("b", other);
+  s.add("one", hhtdae::Spherical{s.markerAt(a, far - arm), s.markerAt(b, far - arm)});
+  s.add("two", hhtdae::InLine{s.markerAt(a, far + arm), s.markerAt(b, far + arm, axesAlong({1, 0, 0}))});
+  s.add("three", hhtdae::Spherical{s.markerAt(a, far), s.marker(s.ground(), far)});
+  s.marker(s.ground());
+  Printed quiet;
+  ASSERT_EQ(s.setUp(), 0);
+  EXPECT_EQ(DataOf(s).started.redundant, 0);
+}
+
 /* Dropping rows leaves the motion as it is: the same as that of the planar scene, which has none to drop */
 TEST(SceneRedundant, TheMotionIsThatOfTheMinimalMechanism)
 {
