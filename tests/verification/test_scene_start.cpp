@@ -208,6 +208,29 @@ TEST(SceneAssembly, ContradictingMotions)
   SAYS(text, "rotational motion slow");
 }
 
+/* A constant velocity joint has no direction in which it comes nearer where its shafts, free to turn, are described a quarter turn apart */
+TEST(SceneAssembly, AQuarterTurnOff)
+{
+  for (double more : {0., 1e-9}) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody shaft;
+    shaft.inertia       = Vector3(0.1, 0.1, 0.2).asDiagonal();
+    shaft.position      = {0, 0, -0.5};
+    const Body a        = s.add("a", shaft);
+    shaft.position      = {0, 0, 0.5};
+    shaft.rotation      = Eigen::AngleAxisd(M_PI / 2 + more, Vector3::UnitZ()).toRotationMatrix();
+    const Body b        = s.add("b", shaft);
+    s.add("ja", hhtdae::Revolute{s.marker(a), s.marker(s.ground(), {0, 0, -0.5})});
+    s.add("jb", hhtdae::Cylindrical{s.marker(b), s.marker(s.ground(), {0, 0, 0.5})});
+    s.add("cv", hhtdae::ConstantVelocity{s.marker(a, {0, 0, 0.5}), s.marker(b, {0, 0, -0.5})});
+    s.start().assembly = Assembly::Project;
+    Printed quiet;
+    EXPECT_EQ(s.setUp(), 0) << more;
+    EXPECT_LT(DataOf(s).started.misfit, 1e-9);
+    EXPECT_NEAR(DataOf(s).started.turned, M_PI / 4, 0.1); /* half of it each */
+  }
+}
+
 /* ---- redundant constraints ---- */
 
 TEST(SceneRedundant, TreesCostNothing)
