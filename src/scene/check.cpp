@@ -182,6 +182,7 @@ PetscErrorCode CheckDescription(SceneData &s)
   PetscCheck(!s.bodies.empty() || !s.extensions.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
   check.all();
   PetscCall(Report(s, check.errors(), "the scene cannot be built"));
+  if (s.planar && s.gravity(2) != 0) PetscCall(PetscPrintf(s.comm, "scene: gravity along z, %g, moves nothing: the scene is planar, its bodies move along x and y\n", s.gravity(2)));
   PetscFunctionReturn(0);
 }
 

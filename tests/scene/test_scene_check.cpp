@@ -1,6 +1,8 @@
 /* What is wrong with the description of a scene is said by name, all of it at once. */
+#include "hhtdae/query.h"
 #include "hhtdae/scene.h"
 #include "scene/model.h"
+#include "scene_output.h"
 #include "scene_start.h"
 
 using namespace hhtdae;
@@ -106,6 +108,35 @@ TEST(SceneCheck, ThePlaneOfAPlanarScene)
   const std::string text = complaint(s);
   SAYS(text, "marker 0 on arm: z is 1");
   SAYS(text, "marker tip: its z axis is 1, 0, 0");
+}
+
+/* A planar scene has forces in its plane and moments about z: others are errors, and gravity along z, which every spatial model has, is told */
+TEST(SceneCheck, LoadsOutOfThePlane)
+{
+  using hhtdae::Expression;
+  using hhtdae::Measure;
+  using hhtdae::Real;
+  const auto constant = [](double x) { return Expression{{}, [=](const Real *) -> Real { return x; }}; };
+  {
+    Scene        s(PETSC_COMM_SELF, hhtdae::Space::Planar);
+    const Marker m = s.marker(s.add("arm", RigidBody()));
+    s.add("push", hhtdae::UserForce{m, {}, {}, {constant(1), constant(0), constant(5)}, {constant(2), constant(0), constant(3)}});
+    const std::string text = complaint(s);
+    SAYS(text, "user force push: the force along z is 5; a planar scene has forces in its plane");
+    SAYS(text, "the moment about x is 2");
+  }
+  Scene        s(PETSC_COMM_SELF, hhtdae::Space::Planar);
+  const Marker m = s.marker(s.add("arm", RigidBody()));
+  const auto   f = s.add("push", hhtdae::UserForce{m, {}, {}, {constant(1), constant(0), Expression{{Measure::time()}, [](const Real *t) { return t[0] + 1; }}}, {}});
+  s.gravity({0, -1, -9.81});
+  Printed             printed;
+  hhtdae::Snapshot    now;
+  double              z;
+  hhtest::SceneRun    run(s, 0.1, "");
+  EXPECT_TRUE(printed.says("gravity along z, -9.81, moves nothing")) << printed.text();
+  must(now.take(run.ts));
+  must(now.value(Measure::force(f, 2), &z));
+  EXPECT_EQ(z, 0);
 }
 
 TEST(SceneCheck, NamesAreUnique)

@@ -119,7 +119,8 @@ class Scene:
     gravity : (3,), optional
         Acceleration of gravity, space axes; formulas of parameters have to be given by `set_gravity`.
     planar : bool
-        Bodies move in the xy plane: 3 coordinates, position and angle about z.
+        Bodies move in the xy plane: 3 coordinates, position and angle about z. Forces along z and moments about x and y are none: constants of a `UserForce` that say
+        otherwise are an error, gravity along z is told.
     comm : petsc4py or mpi4py communicator
         Default: the world's.
 

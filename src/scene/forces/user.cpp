@@ -225,6 +225,21 @@ void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename
 
 } // namespace
 
+/* A planar scene has forces in its plane and moments about z: the others of user's forces are none. One that is plainly not zero is an error. */
+static void LeaveInPlane(ElementBuilder &e, std::vector<Expression> &force, std::vector<Expression> &moment)
+{
+  const auto leave = [&](Expression &x, const char *what) {
+    double value = 0;
+    if (x.arguments.empty() && x.f) value = x.f(nullptr).value();
+    e.require(value == 0, std::string(what) + " is " + Show(value) + "; a planar scene has forces in its plane and moments about z");
+    x = Expression{{}, [](const Real *) -> Real { return 0.0; }};
+  };
+  if (!force.empty()) leave(force[2], "the force along z");
+  if (moment.empty()) return;
+  leave(moment[0], "the moment about x");
+  leave(moment[1], "the moment about y");
+}
+
 /* Components as measures and force states: forces first, then moments. */
 template <> Element Scene::enter(const std::string &name, const UserForce &s)
 {
@@ -241,8 +256,10 @@ template <> Element Scene::enter(const std::string &name, const UserForce &s)
   if (!s.moment.empty()) RequireTurning(e, s.i, "i");
   if (reaction) RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
   if (!e.good()) return e.done();
-  std::vector<Expression> f = s.force;
-  f.insert(f.end(), s.moment.begin(), s.moment.end());
+  std::vector<Expression> f = s.force, moment = s.moment;
+  if (e.planar()) LeaveInPlane(e, f, moment);
+  if (!e.good()) return e.done();
+  f.insert(f.end(), moment.begin(), moment.end());
   d.force                           = s.force.empty() ? -1 : 0;
   d.moment                          = s.moment.empty() ? -1 : (int)s.force.size();
   d.reaction                        = reaction;
