@@ -246,7 +246,6 @@ PetscErrorCode Scene::solve(TS ts)
   Runtime *R;
   PetscFunctionBegin;
   PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
-  PetscCall(CheckUnchanged(R->scene, start_));
   PetscCall(CheckSame(*R, ts));
   PetscCall(AttachOutput(*R, output_, ts));
   const PetscErrorCode failed = Solve(ts);

@@ -421,6 +421,22 @@ class Runs(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "parameter m came too late"):
             other.parameter("m", 1.)
 
+    def test_what_comes_too_late(self):
+        """After the set-up every call that describes something raises, and neither the scene nor its runs are changed"""
+        scene = h.Scene(gravity=(0, 0, -10.))
+        ball = scene.add("ball", h.PointMass())
+        z = h.displacement(ball.marker(), 2)
+        scene.channel("z", z)
+        run = scene.run().solve(0.5)
+        for name, late in (("channel v", lambda: scene.channel("v", z)), ("other", lambda: scene.add("other", h.PointMass())), ("a shape of ball", lambda: ball.shape(h.Shape.sphere(1.))),
+                           ("variable V", lambda: scene.variable("V", z)), ("state x", lambda: scene.state("x", z, 0.)), ("gravity", lambda: scene.set_gravity((0, 0, 0)))):
+            with self.assertRaisesRegex(RuntimeError, name + " came too late"):
+                late()
+        self.assertEqual(run.solve(1.).sample()["z"], run["z"][-1])
+        self.assertAlmostEqual(run["z"][-1], -5., delta=1e-9)
+        self.assertAlmostEqual(scene.solve(1.)["z"][-1], -5., delta=1e-9)
+        self.assertAlmostEqual(run.snapshot().value(h.displacement(ball.marker(), 2)), -5., delta=1e-9)  # markers of questions may come at any time
+
     def test_motions_with_parameters(self):
         """What a function of time takes of parameters changes from run to run"""
         scene = h.Scene()

@@ -213,7 +213,26 @@ TEST(SceneOutput, FilesWithoutChannelsAndLateChannels)
   rods.scene.channel("t", Measure::time());
   ErrorTrap trap;
   EXPECT_NE(run.solve(), 0);
-  EXPECT_TRUE(trap.says("too late")) << trap.message;
+  EXPECT_TRUE(trap.says("channel t came too late")) << trap.message; /* where files are asked for that would not have it */
+}
+
+/* Runs outlive changes of their scene: what comes too late is an error of the next one alone */
+TEST(SceneOutput, ARunOutlivesALateChannel)
+{
+  Rods rods(1);
+  rods.scene.channel("t", Measure::time());
+  SceneRun            run(rods.scene, 0.1, "");
+  std::vector<double> x;
+  must(run.solve());
+  rods.scene.channel("late", Measure::time());
+  must(rods.scene.sample(run.ts, 0.1, x));
+  EXPECT_EQ(x.size(), 1u);
+  must(TSSetMaxTime(run.ts, 0.2));
+  must(run.solve());
+  TS        next;
+  ErrorTrap trap;
+  EXPECT_NE(rods.scene.createTS(&next), 0);
+  EXPECT_TRUE(trap.says("channel late came too late")) << trap.message;
 }
 
 /* ---- animation ---- */

@@ -446,7 +446,7 @@ class FullFeBody:
             raise ValueError("%s: law is %r, must be 'small' or 'large'" % (name, body.law))
         self._scene, self._model, self._core, self.name = scene, model, _flexible.FullFeBody(), name
         self._placed = copied((body.position, body.rotation))
-        scene._describe()
+        scene._describe("finite-element body " + name)
         fields = dict(vars(body), attachments=_attachments(body.attachments))
         self._core.add(scene._core, name, model._core, fields)
         scene._keep.append(model)

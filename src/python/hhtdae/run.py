@@ -120,6 +120,7 @@ class Run(Channels):
         collect_garbage(scene.comm)
         with temporary_options(self._options) as self._unused:
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
+            scene._fixed = True
             self.ts.setAttr("hhtdae", scene._keep)
             if tolerance is not None:
                 self.ts.setTolerances(rtol=tolerance, atol=tolerance)

@@ -70,7 +70,7 @@ class Body(_Handle):
 
     def shape(self, shape: Shape) -> "Body":
         """Draws the body in animations and pages."""
-        self._scene._describe()
+        self._scene._describe("a shape of %s" % self.name)
         self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes, shape._rgb())
         return self
 
@@ -79,7 +79,7 @@ class Body(_Handle):
         modes; it must have kept its elements and the modes at all nodes, and be on one rank or on those of the scene. Collective."""
         from . import flexible
 
-        self._scene._describe()
+        self._scene._describe("a surface of %s" % self.name)
         flexible._flexible.show(self._scene._core, self._scene.comm, self, body._core, stress_unit)
         return self
 
@@ -146,6 +146,7 @@ class Scene:
         self._begun = False  # whether there is more than parameters
         self._edits = 0  # calls that have described something
         self._constraints_jump = False  # whether positions that constraints ask for depend on parameters
+        self._fixed = False  # from the first set-up that has succeeded
         self._recipe: Optional[Recipe] = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False, page="", page_title="", page_dt=0.,
@@ -154,7 +155,11 @@ class Scene:
         if gravity is not None:
             self.set_gravity(gravity)
 
-    def _describe(self):
+    def _describe(self, late=None):
+        """Every call that describes something begins with this; `late`: what it is called where it can only come before the set-up"""
+        if self._fixed and late is not None:
+            raise RuntimeError("%s came too late: the scene is fixed from its set-up or first run on, and stays as it was. Describe it before, or make another scene; a formula "
+                               "can be asked of any run by Snapshot.value()" % late)
         self._begun = True
         self._edits += 1
 
@@ -191,17 +196,20 @@ class Scene:
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
         """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
         described = has_formula(acceleration, self, "gravity")
-        self._edits += 1
+        begun = self._begun
+        self._describe("gravity")
+        self._begun = begun
         if described:
             acceleration = copied(acceleration)
         self._core.gravity(self._later(lambda: plain(acceleration)) if described else acceleration)
 
     def ground_acceleration(self, x=0., y=0., z=0.) -> None:
         """Base excitation: the ground's acceleration along the space axes, functions of time. All coordinates are relative to the ground."""
-        keep = []
+        keep, begun = [], self._begun
+        self._describe("the ground's acceleration")
+        self._begun = begun
         functions = [time_function(f, keep) for f in (x, y, z)]
         self._keeps(keep, "ground_acceleration()")
-        self._edits += 1
         self._core.ground_acceleration(*functions)
 
     def add(self, name: str, what: Union[Spec, Callable[[], Optional[Spec]]]) -> Any:
@@ -273,7 +281,7 @@ class Scene:
         return given
 
     def _enter(self, name, what, given):
-        self._describe()
+        self._describe(name)
         kind = type(what)
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
@@ -324,7 +332,7 @@ class Scene:
         """A user-defined variable: an unknown V = formula. Names are as of `add`."""
         name = text(name, "Scene.variable()") or "variable %d" % self._variables
         initial = number(initial, "variable %s: its initial value" % name)
-        self._describe()
+        self._describe("variable " + name)
         variable = Variable(self, self._core.variable(name, self._formula(definition, "variable " + name), initial), name)
         self._variables += 1
         return variable
@@ -333,7 +341,7 @@ class Scene:
         """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``. Names are as of `add`."""
         name = text(name, "Scene.state()") or "state %d" % self._states
         initial = number(initial, "state %s: its initial value" % name)
-        self._describe()
+        self._describe("state " + name)
         if callable(rate) and not isinstance(rate, Expression):
             own = State(self, (self._states, self.ground._number), name)
             rate = rate(Measure("state", target=own))
@@ -357,13 +365,13 @@ class Scene:
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record: a measure, or a formula of some."""
         text(name, "Scene.channel()")
-        self._describe()
+        self._describe("channel " + name)
         self._core.channel(name, self._formula(value, "channel " + name), unit)
         self._channels.append((name, unit))
 
     def line(self, *markers: Marker) -> None:
         """A line through markers in animations and pages, a spring for example."""
-        self._edits += 1
+        self._describe("a line")
         self._core.line(list(markers))
 
     def start(self, **policy):
@@ -468,6 +476,7 @@ class Scene:
     def set_up(self) -> None:
         """Checks and assembles the scene; the first run does it otherwise. Collective."""
         self._core.set_up()
+        self._fixed = True
 
     def run(self, tolerance: Optional[float] = None, sample: Optional[float] = 0., after: Optional[Run] = None,
             options: Optional[Dict[str, Any]] = None, page: Union[bool, str] = False) -> Run:
@@ -502,4 +511,5 @@ class Scene:
     def view(self, file: str = "") -> None:
         """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""
         self._core.set_up()
+        self._fixed = True
         self._core.view(self.comm, file)

@@ -34,7 +34,6 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   Runtime *run;
   TS       copy = nullptr; /* of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
-  PetscCall(CheckUnchanged(run->scene, start_));
   PetscCall(ReadCheckpoint(ts));
   for (Vec &x : W) {
     PetscCall(VecCreate(run->scene.comm, &x));
