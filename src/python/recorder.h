@@ -18,6 +18,7 @@ public:
 
   void                        resume(PetscReal t); /* from a checkpoint at t: what was recorded after it counts no longer */
   PetscErrorCode              look(TS ts, PetscInt step, PetscReal t);
+  PetscErrorCode              lookAtEnd(TS ts, PetscInt step, PetscReal t);
   const std::vector<double>  &times() const { return times_; }
   const std::vector<double>  &values() const { return values_; } /* all channels of a time behind one another */
 

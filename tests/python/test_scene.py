@@ -437,6 +437,13 @@ class Runs(unittest.TestCase):
         self.assertAlmostEqual(scene.solve(1.)["z"][-1], -5., delta=1e-9)
         self.assertAlmostEqual(run.snapshot().value(h.displacement(ball.marker(), 2)), -5., delta=1e-9)  # markers of questions may come at any time
 
+    def test_channels_of_another_ts_type(self):
+        scene = h.Scene(gravity=(0, 0, -2.))
+        scene.channel("z", h.displacement(scene.add("ball", h.PointMass()).marker(), 2))
+        run = scene.run(options={"ts_type": "alpha2", "ts_dt": 0.1, "ts_adapt_type": "none"}).solve(1.)
+        self.assertAlmostEqual(run["z"][-1], -1., delta=1e-6)
+        self.assertEqual(run.times[0], 0.)
+
     def test_motions_with_parameters(self):
         """What a function of time takes of parameters changes from run to run"""
         scene = h.Scene()

@@ -201,3 +201,20 @@ TEST(SceneSamples, OnlyWhereTheyAreNeeded)
   must(PetscLogEventGetPerfInfo(PETSC_DETERMINE, sample, &after));
   EXPECT_GT(after.count, before.count + 100);
 }
+
+/* Another TS type has the ends of its steps alone */
+TEST(SceneSamples, OfOtherTypes)
+{
+  Scene     s(PETSC_COMM_SELF);
+  PointMass b;
+  s.gravity({0, 0, -2});
+  s.channel("z", Measure::displacement(s.marker(s.add("ball", b)), 2));
+  SceneRun            run(s, 1, "-ts_type alpha2 -ts_dt 0.1 -ts_adapt_type none");
+  std::vector<double> x;
+  must(run.solve());
+  must(s.sample(run.ts, 1, x));
+  EXPECT_NEAR(x[0], -1, 1e-6);
+  ErrorTrap trap;
+  EXPECT_NE(s.sample(run.ts, 0.95, x), 0);
+  EXPECT_TRUE(trap.says("TS type alpha2 gives the state at the end of its last step alone, which is t = 1")) << trap.message;
+}
