@@ -95,6 +95,7 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
   Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
   PetscCall(CheckTime(R, t));
+  PetscCall(TellOfNoOutput(R, ts));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
   PetscCall(CheckDropped(R, t, U, V));

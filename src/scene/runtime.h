@@ -139,6 +139,10 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
 PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
+/* output/recorder.cpp: Scene::output() was set when the TS was made, and Scene::solve() has not been called yet; a notice if the TS is solved all the same */
+PetscErrorCode ExpectOutput(TS ts, const OutputSettings &settings);
+PetscErrorCode OutputIsAttached(TS ts);
+PetscErrorCode TellOfNoOutput(const Runtime &R, TS ts);
 constexpr PetscInt recorded = 68; /* numbers by which a recording goes on */
 PetscErrorCode     SaveOutput(Runtime &R, double *x);
 PetscErrorCode     ResumeOutput(Runtime &R, const double *x);

@@ -189,6 +189,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(setUp());
   PetscCall(CheckUnchanged(data(), start_));
   PetscCall(CreateRun(model_, ts));
+  PetscCall(ExpectOutput(*ts, output_));
   if (model_->continues) PetscFunctionReturn(0); /* createTS(ts, from) projects what the run begins with */
   PetscErrorCode failed = 0;
   if (data().start.equilibrium) failed = Guarded([&] { return StartWithMotions(*ts); });
@@ -248,6 +249,7 @@ PetscErrorCode Scene::solve(TS ts)
   PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
   PetscCall(CheckSame(*R, ts));
   PetscCall(AttachOutput(*R, output_, ts));
+  PetscCall(OutputIsAttached(ts));
   const PetscErrorCode failed = Solve(ts);
   /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
   if (!failed || R->size == 1) PetscCall(FinishOutput(*R));

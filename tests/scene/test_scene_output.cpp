@@ -235,6 +235,27 @@ TEST(SceneOutput, ARunOutlivesALateChannel)
   EXPECT_TRUE(trap.says("channel late came too late")) << trap.message;
 }
 
+/* Scene::solve() writes results, TSSolve() says that it does not */
+TEST(SceneOutput, TSSolveInPlaceOfSolve)
+{
+  TemporaryFile file("tssolve.csv");
+  Rods          rods(1);
+  rods.scene.channel("t", Measure::time());
+  rods.scene.output().csv = file.name;
+  {
+    SceneRun run(rods.scene, 0.1, "");
+    Printed  printed;
+    must(TSSolve(run.ts, nullptr));
+    EXPECT_TRUE(printed.says("which Scene::solve() writes")) << printed.text();
+    EXPECT_FALSE(file.exists());
+  }
+  SceneRun run(rods.scene, 0.1, "");
+  Printed  printed;
+  must(run.solve());
+  EXPECT_FALSE(printed.says("which Scene::solve() writes"));
+  EXPECT_TRUE(file.exists());
+}
+
 /* ---- animation ---- */
 
 namespace

@@ -239,6 +239,40 @@ PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
   PetscFunctionReturn(0);
 }
 
+static constexpr const char *expected_output = "hhtdae scene output";
+
+PetscErrorCode ExpectOutput(TS ts, const OutputSettings &o)
+{
+  PetscContainer mark;
+  PetscFunctionBegin;
+  if (o.file.empty() && o.csv.empty() && o.animation.empty() && o.page.empty() && !o.balance) PetscFunctionReturn(0);
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)ts), &mark));
+  PetscCall(PetscObjectCompose((PetscObject)ts, expected_output, (PetscObject)mark));
+  PetscCall(PetscContainerDestroy(&mark));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode OutputIsAttached(TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectCompose((PetscObject)ts, expected_output, nullptr));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode TellOfNoOutput(const Runtime &R, TS ts)
+{
+  PetscInt    steps;
+  PetscObject mark;
+  PetscFunctionBegin;
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (steps) PetscFunctionReturn(0);
+  PetscCall(PetscObjectQuery((PetscObject)ts, expected_output, &mark));
+  if (!mark) PetscFunctionReturn(0);
+  PetscCall(PetscPrintf(R.scene.comm, "scene: Scene::output() asks for results, which Scene::solve() writes; TSSolve() and TSStep() in its place write none\n"));
+  PetscCall(OutputIsAttached(ts));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode SaveOutput(Runtime &R, double *x)
 {
   PetscFunctionBegin;
