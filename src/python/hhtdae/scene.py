@@ -384,7 +384,9 @@ class Scene:
             ``ts_hhtdae_start``); or "project": bodies and velocities move to the nearest consistent ones in the metric of the masses. Bodies move as rigid ones
             first. What rigid motions cannot meet, a press fit or a motion that drives one end of a clamped beam, flexible bodies deform for when the run is
             made: velocities become those after a plastic impact, positions are strained near the attachments, most in whole bodies, until
-            `Run.equilibrium` relaxes them. ``fixed_start`` holds a body; joints that hang together with one are met by rigid motions alone.
+            `Run.equilibrium` relaxes them. A whole finite-element body (`hhtdae.flexible.FullFeBody`) is not moved as a rigid one: attachments go where joints and
+            motions want them, and its other nodes stay where, and as fast as, ``FullBody(position=, velocity=, angular_velocity=)`` has put them, so that it is strained
+            and vibrates unless these meet the joints. ``fixed_start`` holds a body; joints that hang together with one are met by rigid motions alone.
         tolerance : float
             Of misfits, times the scene's size for lengths; radians.
         redundant : {"drop", "refuse", "keep"}
