@@ -218,7 +218,8 @@ TEST(SceneAssembly, AQuarterTurnOff)
     shaft.position      = {0, 0, -0.5};
     const Body a        = s.add("a", shaft);
     shaft.position      = {0, 0, 0.5};
-    shaft.rotation      = Eigen::AngleAxisd(M_PI / 2 + more, Vector3::UnitZ()).toRotationMatrix();
+    shaft.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1; /* exactly, as the cosine of M_PI / 2 is not */
+    shaft.rotation = shaft.rotation * Eigen::AngleAxisd(more, Vector3::UnitZ()).toRotationMatrix();
     const Body b        = s.add("b", shaft);
     s.add("ja", hhtdae::Revolute{s.marker(a), s.marker(s.ground(), {0, 0, -0.5})});
     s.add("jb", hhtdae::Cylindrical{s.marker(b), s.marker(s.ground(), {0, 0, 0.5})});
