@@ -132,7 +132,7 @@ static inline bool HHT3IsLocated(TS ts, PetscInt event)
 }
 
 /* Behind an event a zero that was located counts as one, if the function is still what it was there: within a long step TSEvent ends its search by the length of the interval, on the near side and
-   beyond the tolerance, and would count the same zero again as soon as it is passed (Events.InLongSteps) */
+   beyond the tolerance, and would count the same zero again as soon as it is passed (Events.ForcesThatAreTurned) */
 static inline void HHT3TakeLocatedForZero(TS ts)
 {
 #if PETSC_VERSION_LT(3, 21, 0)

@@ -349,7 +349,7 @@ std::vector<Misfit> OfRigid(std::vector<Misfit> m, const Deformable &d)
 }
 
 /* Where no direction brings constraints nearer, as shafts of a constant velocity joint that stand a quarter turn apart, any other place serves: this far away, radians and
-   parts of the scene's size (SceneStart.AQuarterTurnOff) */
+   parts of the scene's size (SceneAssembly.AQuarterTurnOff) */
 constexpr double disturbance = 1e-3;
 
 void Disturb(SceneData &s, const std::vector<RowBlock> &blocks)

@@ -35,7 +35,7 @@ constexpr double clearly_independent = 1e-3; /* least pivot for a body to be cut
 constexpr double neighbour           = 0.02; /* how far away: radians, parts of the scene's size */
 
 /* Dimensions and directions are given to some seven digits: rows whose independence is less than this are dependent as far as the description tells. With 1e-9 a hinge that
-   was 1e-8 rad out of line locked a linkage, without a word and by any moment (SceneStart.AHingeSlightlyOutOfLine). What is dropped has to hold at a neighbouring position, too. */
+   was 1e-8 rad out of line locked a linkage, without a word and by any moment (SceneRedundant.AHingeSlightlyOutOfLine). What is dropped has to hold at a neighbouring position, too. */
 constexpr double rounding_of_descriptions = 1e-6;
 
 using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
