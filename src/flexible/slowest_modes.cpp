@@ -4,8 +4,9 @@
   eigenvalues are infinite, farthest from any shift.
 
   Time is taken in a unit in which stiffness and masses are of one size, and the shift has to be of the size of the values: next to a shift far below them
-  slow modes and infinite ones look alike. So the search is repeated about the fastest that it has found, and the modes are held against the equations.
+  slow modes and infinite ones look alike. So the search is repeated about the fastest that it has found, and the modes are held against the equations (mode_check.cpp).
 */
+#include "flexible/mode_check.h"
 #include "flexible/modes.h"
 #include "hhtdae/modes.h"
 #include <Eigen/Core>
@@ -20,77 +21,11 @@ namespace
 {
 
 constexpr PetscReal accuracy = 1e-10;
-constexpr PetscReal beside   = 10;   /* a value, of the shift: beyond it digits are lost (SmallBodies.SlowestModes, ModesOfAllSpeeds) */
 constexpr PetscReal below    = 100;  /* the shift, of a value: beyond it, too */
-constexpr PetscReal at_rest  = 1e-2; /* of the fastest mode: or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
-constexpr PetscReal balanced = 1e-3; /* part of the forces of inertia and damping that may be left (SmallBodies.SlowestModesAreChecked) */
-constexpr int       refinements = 5; /* of a shape, at most */
-constexpr PetscInt  workspace = 100; /* percent more than MUMPS estimates, ICNTL(14): pivots change places where constraints are (FullBodyRanks.SlowestModes) */
 constexpr PetscReal as_fast  = 1e-2; /* part of the value: modes that close may be of one value, of which each combination is one, found with less digits */
 constexpr PetscReal apart    = 0.1;  /* part of its norm that a shape has beside those of modes as fast, or it is none of its own (SmallBodies.SlowestModesOfAFreeBody) */
 constexpr PetscReal accurate = 1e-6; /* values differ by less than this part are not told apart */
 constexpr int       searches = 20, failures = 3; /* at most, from other random vectors (SmallBodies.SlowestModesOfEqualParts); without a Schur form */
-constexpr int       sweeps   = 6; /* of balancing: each takes the root of how far rows are from a size of 1 */
-
-/* The operators of D y = x, where D makes all rows of the matrix that is factored about as large (Ruiz, RAL-TR-2001-034): constraints have entries of 1
-   beside stiffness, and the accuracy of slow modes would be lost between the two */
-struct Balanced {
-  Mat operators[3] = {nullptr, nullptr, nullptr}; /* K, C, M */
-  Vec D            = nullptr;
-};
-
-PetscErrorCode Balance(const Mat given[3], PetscReal shift, Balanced *b)
-{
-  Mat T;
-  Vec row;
-  PetscFunctionBegin;
-  PetscCall(MatDuplicate(given[0], MAT_COPY_VALUES, &T));
-  PetscCall(MatAXPY(T, shift, given[1], DIFFERENT_NONZERO_PATTERN));
-  PetscCall(MatAXPY(T, shift * shift, given[2], DIFFERENT_NONZERO_PATTERN));
-  PetscCall(MatCreateVecs(T, &row, &b->D));
-  PetscCall(VecSet(b->D, 1));
-  for (int k = 0; k < sweeps; k++) {
-    PetscScalar *x;
-    PetscInt     n;
-    PetscCall(MatGetRowMaxAbs(T, row, nullptr));
-    PetscCall(VecGetLocalSize(row, &n));
-    PetscCall(VecGetArray(row, &x));
-    for (PetscInt i = 0; i < n; i++) x[i] = PetscAbsScalar(x[i]) > 0 ? 1 / PetscSqrtReal(PetscAbsScalar(x[i])) : 1;
-    PetscCall(VecRestoreArray(row, &x));
-    PetscCall(MatDiagonalScale(T, row, row));
-    PetscCall(VecPointwiseMult(b->D, b->D, row));
-  }
-  for (int k = 0; k < 3; k++) {
-    PetscCall(MatDuplicate(given[k], MAT_COPY_VALUES, &b->operators[k]));
-    PetscCall(MatDiagonalScale(b->operators[k], b->D, b->D));
-  }
-  PetscCall(MatDestroy(&T));
-  PetscCall(VecDestroy(&row));
-  PetscFunctionReturn(0);
-}
-
-/* The factor is made here, before SLEPc gives its solver the matrix to be factored, so that MUMPS gets more workspace; A: of the same size and type */
-PetscErrorCode GiveRoom(KSP ksp, Mat A)
-{
-  PC            pc;
-  MatSolverType package = nullptr;
-  PetscBool     direct, mumps = PETSC_FALSE;
-  Mat           F;
-  PetscFunctionBegin;
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
-  if (!direct) PetscFunctionReturn(0);
-  PetscCall(PCFactorGetMatSolverType(pc, &package));
-  if (package) PetscCall(PetscStrcmp(package, MATSOLVERMUMPS, &mumps));
-  if (!mumps) PetscFunctionReturn(0);
-  PetscCall(KSPSetOperators(ksp, A, A));
-  PetscCall(PCFactorSetUpMatSolverType(pc));
-  PetscCall(PCFactorGetMatrix(pc, &F));
-#if defined(PETSC_HAVE_MUMPS)
-  PetscCall(MatMumpsSetIcntl(F, 14, workspace));
-#endif
-  PetscFunctionReturn(0);
-}
 
 PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
 {
@@ -121,139 +56,7 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 #endif
   PetscCall(PEPSetFromOptions(pep));
-  PetscCall(GiveRoom(ksp, operators[0]));
-  PetscFunctionReturn(0);
-}
-
-/* (value^2 M + value C + K) x of the balanced operators, real and imaginary part, and its norm relative to the forces of rates: of inertia and damping, and
-   the rates of states */
-PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, Vec sum[2], PetscReal *part)
-{
-  const std::complex<double> power[3] = {1, m.value, m.value * m.value};
-  Vec                        x, product;
-  PetscReal                  norm, left = 0, rates = 0;
-  PetscFunctionBegin;
-  PetscCall(VecDuplicate(by.D, &x));
-  PetscCall(VecDuplicate(by.D, &product));
-  for (int imaginary = 0; imaginary < 2; imaginary++) PetscCall(VecSet(sum[imaginary], 0));
-  for (int imaginary = 0; imaginary < 2; imaginary++) {
-    PetscScalar *put;
-    PetscCall(VecGetArrayWrite(x, &put));
-    for (std::size_t i = 0; i < m.shape.size(); i++) put[i] = imaginary ? m.shape[i].imag() : m.shape[i].real();
-    PetscCall(VecRestoreArrayWrite(x, &put));
-    PetscCall(VecPointwiseDivide(x, x, by.D));
-    for (int k = 0; k < 3; k++) {
-      PetscCall(MatMult(by.operators[k], x, product));
-      PetscCall(VecAXPY(sum[imaginary], power[k].real(), product));
-      PetscCall(VecAXPY(sum[1 - imaginary], imaginary ? -power[k].imag() : power[k].imag(), product));
-      PetscCall(VecNorm(product, NORM_2, &norm));
-      if (k > 0) rates += std::norm(power[k]) * norm * norm;
-    }
-  }
-  for (int imaginary = 0; imaginary < 2; imaginary++) {
-    PetscCall(VecNorm(sum[imaginary], NORM_2, &norm));
-    left += norm * norm;
-  }
-  PetscCall(VecDestroy(&x));
-  PetscCall(VecDestroy(&product));
-  *part = PetscSqrtReal(left / rates);
-  PetscFunctionReturn(0);
-}
-
-/* A factor of shift^2 M + shift C + K, balanced */
-PetscErrorCode Factor(const Balanced &by, PetscReal shift, KSP *ksp)
-{
-  Mat T;
-  PC  pc;
-  PetscFunctionBegin;
-  PetscCall(MatDuplicate(by.operators[0], MAT_COPY_VALUES, &T));
-  PetscCall(MatAXPY(T, shift, by.operators[1], DIFFERENT_NONZERO_PATTERN));
-  PetscCall(MatAXPY(T, shift * shift, by.operators[2], DIFFERENT_NONZERO_PATTERN));
-  PetscCall(KSPCreate(PetscObjectComm((PetscObject)T), ksp));
-  PetscCall(KSPSetOptionsPrefix(*ksp, "scene_modes_st_"));
-  PetscCall(KSPSetType(*ksp, KSPPREONLY));
-  PetscCall(KSPGetPC(*ksp, &pc));
-  PetscCall(PCSetType(pc, PCLU));
-#if defined(PETSC_HAVE_MUMPS)
-  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-#endif
-  PetscCall(KSPSetFromOptions(*ksp));
-  PetscCall(GiveRoom(*ksp, T));
-  PetscCall(KSPSetOperators(*ksp, T, T));
-  PetscCall(MatDestroy(&T));
-  PetscFunctionReturn(0);
-}
-
-/* Residual inverse iteration (Neumaier, SIAM J. Numer. Anal. 22, 1985) at the value as it is: takes from a slow shape what the search has left of fast ones,
-   1e-10 of whose stiffness exceeds the inertia of a stiff body on a soft spring. A value that is none keeps its residual. */
-PetscErrorCode Refine(const Balanced &by, KSP factor, Vec sum[2], Mode *m, PetscReal *part)
-{
-  Mode      better = *m;
-  PetscReal left   = *part;
-  PetscFunctionBegin;
-  for (int k = 0; k < refinements && left <= *part && left > balanced; k++) {
-    *m    = better;
-    *part = left;
-    for (int imaginary = 0; imaginary < 2; imaginary++) {
-      const PetscScalar *d;
-      PetscCall(KSPSolve(factor, sum[imaginary], sum[imaginary]));
-      PetscCall(VecPointwiseMult(sum[imaginary], sum[imaginary], by.D));
-      PetscCall(VecGetArrayRead(sum[imaginary], &d));
-      for (std::size_t i = 0; i < m->shape.size(); i++) better.shape[i] -= imaginary ? std::complex<double>(0, d[i]) : std::complex<double>(d[i], 0);
-      PetscCall(VecRestoreArrayRead(sum[imaginary], &d));
-    }
-    PetscCall(Unbalanced(by, better, sum, &left));
-  }
-  if (left < *part) {
-    *m    = better;
-    *part = left;
-  }
-  PetscFunctionReturn(0);
-}
-
-PetscErrorCode Destroy(Balanced *b)
-{
-  PetscFunctionBegin;
-  for (Mat &x : b->operators) PetscCall(MatDestroy(&x));
-  PetscCall(VecDestroy(&b->D));
-  PetscFunctionReturn(0);
-}
-
-/* Motions that nothing drives back, as far as this can be told beside other modes and the shift */
-bool AtRest(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { return std::abs(m.value) < at_rest * std::max(std::abs(modes.back().value), std::abs(shift)); }
-
-/* Each mode that is no rigid motion in the equations, balanced as they are where it is: next to a shift far from it rigid motions weigh too much. Shapes
-   that do not satisfy them well enough are refined. */
-PetscErrorCode Worst(const Mat given[3], PetscReal shift, std::vector<Mode> *modes, PetscReal *worst, PetscReal *frequency)
-{
-  Balanced  by;
-  KSP       factor = nullptr;
-  Vec       sum[2];
-  PetscReal at = 0, left = 0;
-  PetscFunctionBegin;
-  *worst = *frequency = 0;
-  for (Vec &v : sum) PetscCall(MatCreateVecs(given[0], nullptr, &v));
-  for (Mode &m : *modes) {
-    const PetscReal here = std::abs(m.value);
-    if (AtRest(m, *modes, shift)) continue;
-    if (!(here <= beside * at)) {
-      PetscCall(KSPDestroy(&factor));
-      PetscCall(Destroy(&by));
-      PetscCall(Balance(given, here, &by));
-      at = here;
-    }
-    PetscCall(Unbalanced(by, m, sum, &left));
-    if (left > balanced) {
-      if (!factor) PetscCall(Factor(by, at, &factor));
-      PetscCall(Refine(by, factor, sum, &m, &left));
-    }
-    if (left <= *worst) continue;
-    *worst     = left;
-    *frequency = m.frequency();
-  }
-  for (Vec &v : sum) PetscCall(VecDestroy(&v));
-  PetscCall(KSPDestroy(&factor));
-  PetscCall(Destroy(&by));
+  PetscCall(GiveFactorRoom(ksp, operators[0]));
   PetscFunctionReturn(0);
 }
 
@@ -335,7 +138,7 @@ PetscErrorCode AddNew(const Mode &m, const Balanced &by, PetscReal shift, std::v
   PetscReal                     norm, whole;
   PetscFunctionBegin;
   for (const Mode &k : *modes) {
-    const bool rest = AtRest(m, *modes, shift) && AtRest(k, *modes, shift);
+    const bool rest = IsAtRest(m, *modes, shift) && IsAtRest(k, *modes, shift);
     if (!rest && std::abs(k.value - m.value) > as_fast * std::abs(m.value)) continue;
     PetscCall(BalancedShape(k, by, &x));
     PetscCall(Orthogonalize(comm, {}, &x, &whole));
@@ -376,18 +179,18 @@ PetscErrorCode Merge(const Mat given[3], PEP pep, const Balanced &b, PetscReal s
   }
   const PetscReal slow = (PetscInt)modes->size() < count ? PETSC_MAX_REAL : (1 - accurate) * std::abs(modes->back().value);
   for (const Mode &m : found) {
-    const PetscReal where = AtRest(m, *modes, shift) ? std::abs(shift) : std::abs(m.value);
+    const PetscReal where = IsAtRest(m, *modes, shift) ? std::abs(shift) : std::abs(m.value);
     bool            added = false;
     if (std::abs(m.value) >= slow) continue;
     if (!(where <= beside * at && at <= beside * where)) {
-      PetscCall(Destroy(&here));
-      PetscCall(Balance(given, where, &here));
+      PetscCall(DestroyBalanced(&here));
+      PetscCall(BalanceOperators(given, where, &here));
       at = where;
     }
     PetscCall(AddNew(m, here, shift, modes, &added));
     *news += added;
   }
-  PetscCall(Destroy(&here));
+  PetscCall(DestroyBalanced(&here));
   Sort(count, modes);
   PetscFunctionReturn(0);
 }
@@ -403,7 +206,7 @@ PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::
   bool        solved = false;
   PetscFunctionBegin;
   modes->clear();
-  PetscCall(Balance(given, shift, &b));
+  PetscCall(BalanceOperators(given, shift, &b));
   PetscCall(VecDuplicate(b.D, &begin));
   PetscCall(PetscRandomCreate(PetscObjectComm((PetscObject)given[0]), &numbers));
   for (int k = 0, news = 1, failed = 0; k < searches && news > 0; k++) {
@@ -429,7 +232,7 @@ PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::
   PetscCall(PetscRandomDestroy(&numbers));
   PetscCall(VecDestroy(&begin));
   PetscCall(PEPDestroy(&pep));
-  PetscCall(Destroy(&b));
+  PetscCall(DestroyBalanced(&b));
   PetscFunctionReturn(0);
 }
 
@@ -491,7 +294,7 @@ PetscErrorCode Find(const Mat given[3], PetscReal shift, PetscInt count, Found *
 {
   PetscFunctionBegin;
   PetscCall(SearchOften(given, shift, count, found));
-  PetscCall(Worst(given, found->shift, &found->modes, &found->left, &found->frequency));
+  PetscCall(CheckModes(given, found->shift, &found->modes, &found->left, &found->frequency));
   PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)found->shift,
                       found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->left));
   PetscFunctionReturn(0);

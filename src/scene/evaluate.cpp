@@ -76,11 +76,11 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
     R.bodies.residual(local[0], local[1], local[2], f);
     return PetscErrorCode(0);
   });
-  PetscCall(OnAllRanks(R.scene.comm, failed));
   PetscCall(VecRestoreArrayWrite(F, &f));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
   PetscCall(VecRestoreArrayRead(A, &a));
+  PetscCall(OnAllRanks(R.scene.comm, failed));
   PetscFunctionReturn(0);
 }
 
