@@ -15,6 +15,7 @@
 #include "consistent.h"
 #include "integrator/step/dense.h"
 #include "integrator/entries.h"
+#include "integrator/equations/equations.h"
 #include "integrator/equations/roles.h"
 #include "integrator/coordinates/rotations.h"
 #include "integrator/equations/solver.h"
