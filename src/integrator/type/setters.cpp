@@ -5,6 +5,7 @@
 #include "integrator/checkpoint/checkpoint.h"
 #include "integrator/step/dense.h"
 #include "integrator/step/estimate.h"
+#include "integrator/step/step.h"
 #include "integrator/coordinates/rotations.h"
 #include "integrator/equations/rows.h"
 #include "settings.h"
