@@ -28,7 +28,7 @@ version = run(["pkg-config", "--modversion", "PETSc"], PKG_CONFIG_PATH=pkg_confi
 with tempfile.TemporaryDirectory(prefix="second-petsc-") as work:
     build = os.path.join(work, "build")
     said = run([cmake, "-S", source, "-B", build, "-G", "Unix Makefiles", "-DPETSC_DIR=" + directory, "-DPETSC_ARCH=" + arch,
-                "-DHHTDAE_PROGRAMS=OFF", "-DBUILD_TESTING=OFF"])
+                "-DHHTDAE_PROGRAMS=OFF", "-DBUILD_TESTING=OFF", "-DHHTDAE_TOGETHER=OFF"])
     for package in ("MUMPS", "HDF5"):
         has = re.search(r"^#define PETSC_HAVE_%s\s+1" % package, configuration, flags=re.MULTILINE)
         check(bool(has) != bool(re.search("PETSc has no %s: .*left out" % package, said)), "%s: %s" % (package, said))
