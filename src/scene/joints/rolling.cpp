@@ -40,7 +40,7 @@ template <> Element Scene::enter(const std::string &name, const RollingDisc &s)
     return e.done();
   }
   if (e.good())
-    e.require(CosineToNormal(e, 2) < 1 - 1e-8,
+    e.require(CosineToNormal(e, 2) < std::cos(DiscOnPlane::flat),
               "the disc lies flat on the plane at the start, z_i must not be normal to the plane");
   e.rows<DiscOnPlane>(data);
   e.rows<DiscNoSlip>(data);
