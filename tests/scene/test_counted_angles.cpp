@@ -67,6 +67,30 @@ TEST(CountedAngles, AfterTheRunByWhatCounts)
   }
 }
 
+/* Half a turn is +pi, in whatever axes: a spring that is free there pulls at nothing, and a stop stays open */
+TEST(CountedAngles, HalfATurnAtTheStart)
+{
+  for (Space space : {Space::Spatial, Space::Planar})
+    for (int k = 0; k < 40; k++) {
+      const double a = .157 * k;
+      const auto   turned = [](double angle) { return Matrix3(Eigen::AngleAxisd(angle, Vector3::UnitZ())); };
+      Scene        s(PETSC_COMM_SELF, space);
+      RigidBody    b;
+      b.rotation = turned(a + M_PI);
+      const Body   wheel = s.add("wheel", b);
+      const Marker i = s.marker(wheel), j = s.markerAt(s.ground(), Vector3::Zero(), turned(a));
+      s.add("axle", Revolute{i, j});
+      const Element spring = s.add("spring", TorsionalSpringDamper{i, j, 2, 0, M_PI, 0});
+      SceneRun      run(s, 1, "-ts_rtol 1e-6 -ts_atol 1e-6");
+      Snapshot      now;
+      double        moment;
+      must(now.take(run.ts));
+      must(now.value(Measure::force(spring, 0), &moment));
+      EXPECT_NEAR(moment, 0, 1e-9) << k;
+      EXPECT_NEAR(angleOf(run.ts, i, j), M_PI, 1e-12) << k;
+    }
+}
+
 /* Nothing else counts: from the first question on */
 TEST(CountedAngles, FromTheFirstQuestion)
 {

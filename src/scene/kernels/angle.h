@@ -28,12 +28,13 @@ template <class T> T Unwind(const T &theta, double near)
   return theta + T(kTurn * std::round((near - Plain(theta)) / kTurn));
 }
 
-/* in (-pi, pi] */
+/* in (-pi, pi]; half a turn is pi in whatever axes rounding finds it (CountedAngles.HalfATurnAtTheStart) */
 template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
 {
   const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
   using std::atan2;
-  return atan2(s, c);
+  const T theta = atan2(s, c);
+  return Plain(theta) < -kTurn / 2 + 1e-12 ? theta + T(kTurn) : theta;
 }
 
 /* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn
