@@ -22,6 +22,7 @@ constexpr double heavy = 1099511627776.; /* 2^40: masses against stiffnesses */
 constexpr double rates = 0.7310585786300049; /* 1/s, of states: the row of one that integrates what it does not change would be zero without; no round number, which a rate
                                                might be (Analyses.KinematicsBesideIntegrators) */
 constexpr int    most_iterations = 100, most_cuts = 6;
+constexpr double longest_way = 1e4; /* in moves, between two assemblies */
 constexpr double largest_part = 1; /* rad, of a motion between two assemblies: far enough from half a turn; CountedAngles.KinematicsOverManyTurns */
 constexpr double still = 1e-13; /* parts of the scene's size, radians: a move that is rounding */
 
@@ -120,9 +121,11 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
   PetscCall(RolesOf(E.R, E.role));
   PetscCall(VecCopy(V, E.V));
   PetscCall(E.look(E.U));
-  for (int it = 0; it < most_iterations && E.misfit > 0; it++) {
+  double allowed = most_iterations;
+  for (int it = 0; it < allowed && E.misfit > 0; it++) {
     const double before = E.misfit;
     PetscCall(E.direction(&part));
+    if (it == 0) allowed += std::min(2 * part, longest_way); /* a slow motion may turn what it drives by far (Analyses.KinematicsOfWhatIsGearedUp) */
     if (!std::isfinite(part) || part * largest_turn <= still) break;
     PetscCall(Advance(E, part, &nearer));
     PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, part * largest_turn));

@@ -99,6 +99,48 @@ TEST(Analyses, TurnsAreCountedOnTheWay)
   EXPECT_NEAR(run.time(), 40.01, 1e-12);
 }
 
+/* A slow motion may turn what it drives by many turns, over a thread, gears, a rack or a formula */
+TEST(Analyses, KinematicsOfWhatIsGearedUp)
+{
+  const double ratio = .002;
+  for (int how = 0; how < 4; how++) {
+    Scene        s(PETSC_COMM_SELF);
+    s.start().assembly = Assembly::Project;
+    const Body   fast = s.add("fast", RigidBody{}), slow = s.add("slow", RigidBody{});
+    const Marker i = s.marker(fast), j = s.marker(s.ground()), k = s.marker(slow), l = s.marker(s.ground());
+    if (how == 0) { /* the nut itself moves */
+      s.add("thread", Screw{i, j, 2 * M_PI * ratio});
+      s.add("feed", TranslationalMotion{i, j, TimeFunction::polynomial({0, 1})});
+      s.add("held", Fixed{k, l});
+    } else if (how == 1) {
+      s.add("axle", Revolute{i, j});
+      s.add("other", Revolute{k, l});
+      s.add("gears", Gear{k, l, i, j, -ratio});
+      s.add("feed", RotationalMotion{k, l, TimeFunction::polynomial({0, 1})});
+    } else {
+      s.add("axle", Revolute{i, j});
+      s.add("guide", Translational{k, l});
+      if (how == 2)
+        s.add("rack", RackAndPinion{i, j, k, l, ratio});
+      else {
+        UserConstraint tie;
+        tie.rows = {Expression{{Measure::displacement(k, 2, l), Measure::angle(i, j)}, [=](const Real *m) { return m[0] - ratio * m[1]; }}};
+        s.add("tie", tie);
+      }
+      s.add("feed", TranslationalMotion{k, l, TimeFunction::polynomial({0, 1})});
+    }
+    OwnTS run(s);
+    for (double t : {.01, .5, 1., .2}) {
+      Snapshot now;
+      double   angle;
+      must(Kinematics(run.ts, t));
+      must(now.take(run.ts));
+      must(now.value(Measure::angle(i, j), &angle));
+      EXPECT_NEAR(std::abs(angle), t / ratio, 1e-6 * t / ratio) << how << " at " << t;
+    }
+  }
+}
+
 /* A stone that nothing holds has no equilibrium */
 TEST(Analyses, WhatFailsLeavesTheRunWhereItWas)
 {
