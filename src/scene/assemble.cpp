@@ -20,7 +20,7 @@ namespace
 constexpr int    assembly_iterations = 100, most_named = 10;
 constexpr double largest_turn = 0.3, largest_move = 0.3; /* in one iteration: radians, parts of the scene's size */
 
-/* Misfit of an element in its own units, and relative to the size of the scene */
+/* Misfit of an element in its own units, and relative to the size of the mechanism */
 struct Misfit {
   double position = 0, velocity = 0, relative_position = 0, relative_velocity = 0;
 };
@@ -250,9 +250,9 @@ PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const 
 PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part)
 {
   SceneData            &s    = M.scene;
-  const double          size = SceneSize(s), enough = 1e-3 * s.start.tolerance;
   NearestSystem         system(M);
   std::vector<RowBlock> blocks = BlocksOf(s, hold, part);
+  const double          size = MechanismSize(s, blocks), enough = 1e-3 * s.start.tolerance;
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
   PetscFunctionBegin;
@@ -282,7 +282,7 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector
     misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
     s.started.assembly_iterations++;
     PetscCall(
-        PetscInfo(nullptr, "scene: assembly %d: misfit %g of the scene's size, step cut to %g\n", it, misfit, factor));
+        PetscInfo(nullptr, "scene: assembly %d: misfit %g of the mechanism's size, step cut to %g\n", it, misfit, factor));
     if (!std::isfinite(misfit)) break;
   }
   *ok = misfit <= s.start.tolerance;
@@ -314,8 +314,8 @@ PetscErrorCode ProjectVelocities(Model &M, Hold hold, const std::vector<char> *p
 
 PetscErrorCode MeasureMisfit(SceneData &s, std::vector<Misfit> &m)
 {
-  const double                size   = SceneSize(s);
   const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  const double                size   = MechanismSize(s, blocks);
   PetscFunctionBegin;
   s.started.speed =
       std::max(s.started.speed, Speed(s, blocks, size)); /* of what was given too, where it has vanished */
@@ -331,9 +331,9 @@ PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool goi
   PetscFunctionBegin;
   const std::string positions = WorstPositions(s, m, tol), velocities = going_on ? "" : WorstVelocities(s, m, tol);
   PetscCheck(positions.empty() && velocities.empty(), s.comm, PETSC_ERR_ARG_WRONG,
-             "the initial values violate constraints by more than %g of the scene's size (%.3g) or speed:%s%s\n"
+             "the initial values violate constraints by more than %g of the mechanism's size (%.3g) or the scene's speed:%s%s\n"
              "Give consistent values, or let the bodies be moved: -scene_assemble project",
-             tol, SceneSize(s), positions.c_str(), velocities.c_str());
+             tol, MechanismSize(s, DescribeAll(s, s.start.time, Hold::None)), positions.c_str(), velocities.c_str());
   if (s.started.misfit > 0 || s.started.velocity_misfit > 0)
     PetscCall(PetscInfo(nullptr, "scene: initial values within the tolerance, misfit %g, of velocities %g%s%s\n",
                         s.started.misfit, s.started.velocity_misfit, WorstPositions(s, m, 1e-3 * tol).c_str(),

@@ -405,7 +405,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.begin        = t;
     M.first        = old->model->continues ? old->model->first : old->scene.start.time;
     M.number.owner = old->number.owner;
-    M.left         = 1e-2 * (atol + rtol) / std::max(SceneSize(M.scene), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
+    M.left         = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, Hold::None)), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
     PetscErrorCode failed = CarryTurns(*old, M.scene);
     if (!failed) failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);

@@ -1,6 +1,7 @@
 /* All constraint rows of a scene where its description puts the bodies. */
 #include "start.h"
 #include <algorithm>
+#include <numeric>
 
 namespace hhtdae
 {
@@ -131,6 +132,34 @@ double SceneSize(const SceneData &s)
     if (s.markers[m].body >= -1) box.extend(s.frame(Marker{(PetscInt)m}).x);
   const double size = box.isEmpty() ? 0 : box.diagonal().norm();
   return size > 0 ? size : 1;
+}
+
+/* What hangs by nothing, however far away, does not blunt a check of joints, nor do markers that only measure; SceneAssembly.FarMarkersAndBodies. At least 1e-5 of
+   the coordinates, to which rounding leaves 1e-11 of it. */
+double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
+{
+  std::vector<PetscInt>           root(s.bodies.size());
+  std::vector<Eigen::AlignedBox3d> box(s.bodies.size());
+  double                          size = 0, far = 0;
+  const auto                      rootOf = [&](PetscInt b) {
+    while (root[b] != b) b = root[b] = root[root[b]];
+    return b;
+  };
+  std::iota(root.begin(), root.end(), 0);
+  for (const RowBlock &b : blocks)
+    for (PetscInt k : b.body) root[rootOf(k)] = rootOf(b.body[0]);
+  for (const RowBlock &b : blocks) {
+    if (b.body.empty()) continue;
+    Eigen::AlignedBox3d &all = box[rootOf(b.body[0])];
+    for (PetscInt k : b.body) all.extend(s.bodies[k].r);
+    for (int k = 0; k < b.store->markers(); k++) all.extend(s.frame(Marker{b.store->marker(b.instance, k)}).x);
+  }
+  for (const Eigen::AlignedBox3d &b : box) {
+    if (b.isEmpty()) continue;
+    size = std::max(size, b.diagonal().norm());
+    far  = std::max({far, b.min().norm(), b.max().norm()});
+  }
+  return size > 0 ? std::max(size, 1e-5 * far) : SceneSize(s);
 }
 
 std::string RowName(const SceneData &s, PetscInt element, int row, const char *kernel)

@@ -43,6 +43,7 @@ enum class Modes { Held, Free };      /* modal coordinates: not among the column
 
 std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes = Modes::Held);
 double                SceneSize(const SceneData &s); /* diagonal of the box around bodies and markers */
+double                MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks); /* of the largest group of bodies that these rows hang together, and of their markers */
 std::string           RowName(const SceneData &s, PetscInt element, int row, const char *kernel);
 
 /* Directions of motion of a body: indices among (v, w) */

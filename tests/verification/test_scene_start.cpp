@@ -64,6 +64,21 @@ TEST(SceneAssembly, ASmallMisfitPasses)
   EXPECT_NEAR(DataOf(s).started.misfit, 2e-8, 1e-10); /* of the size, half a metre */
 }
 
+/* Neither what hangs by nothing nor a marker that only measures makes a gap smaller */
+TEST(SceneAssembly, FarMarkersAndBodies)
+{
+  for (int other = 0; other < 4; other++) {
+    Scene         s(PETSC_COMM_SELF);
+    const Vector3 at(1e4, 0, 0);
+    const Body    arm = s.add("arm", rod(at, at + Vector3(1, 0, 0)));
+    s.add("hinge", hhtdae::Revolute{s.marker(arm, {-0.5 + 5e-3, 0, 0}), s.markerAt(s.ground(), at)});
+    if (other == 1) s.channel("height", Measure::displacement(s.marker(arm), 2, s.marker(s.ground())));
+    if (other == 2) s.add("far", PointMass{});
+    if (other == 3) s.add("another", hhtdae::Spherical{s.marker(s.add("bob", rod({0, 0, 0}, {1, 0, 0})), {-.5, 0, 0}), s.marker(s.ground())});
+    SAYS(complaint(s), "revolute hinge: not met by 0.005");
+  }
+}
+
 TEST(SceneAssembly, OffLetsEverythingPass)
 {
   Scene      s(PETSC_COMM_SELF);
