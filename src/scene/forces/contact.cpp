@@ -61,6 +61,7 @@ template <> Element Scene::enter(const std::string &name, const SphereSphere &s)
   ElementBuilder e = Entry(*this, name, "sphere-sphere contact", s.i, s.j, s.law, Round::Both);
   RequirePositive(e, "radius of i", s.radius_i);
   RequirePositive(e, "radius of j", s.radius_j);
+  if (e.good()) e.require(!e.coincident(s.i, s.j), "the spheres are concentric at the start, without a direction to be pushed apart");
   e.load<Contact<SphereSphereShape>>({s.i, s.j}, {{s.radius_i, s.radius_j}, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();
 }

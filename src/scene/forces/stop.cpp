@@ -54,6 +54,7 @@ template <> Element Scene::enter(const std::string &name, const DistanceStop &s)
   RequireTwoBodies(e, s.i, s.j);
   e.require(!(s.lower < 0), "lower is " + Show(s.lower) + ", a distance is not negative");
   e.require(s.lower > 0 || std::isfinite(s.upper), "neither lower nor upper is given");
+  if (e.good() && s.lower > 0) e.require(!e.coincident(s.i, s.j), "the markers coincide at the start: below lower, without a direction to be pushed apart");
   const StopData d = CheckedStop(e, s.lower, s.upper, s.law);
   e.load<LengthStop>({s.i, s.j}, d, {}, s.state);
   return e.done();
