@@ -71,7 +71,8 @@ struct NonlinearTorsionalSpring {
 
     force = f_0 - K d - C v,  moment = m_0 - K_t phi - C_t w    on i's body, about i's origin
 
-  for rotations small or about one axis; in general the elastic moment is the one that makes the bushing conservative.
+  for small rotations; in general m_0 - K_t phi is multiplied by 1 + [phi]/2 + O(phi^2), which makes the bushing conservative: it has the potential
+  d^T K d/2 - f_0 . d + phi^T K_t phi/2 - m_0 . phi. Along the axis of a rotation about one axis this changes nothing; a preload across it turns with phi.
   Rotations stay below half a turn. The reaction on j's body balances both. Components: force and moment on i in j's
   axes (planar scenes: x and y of forces, z of moments count).
 */
