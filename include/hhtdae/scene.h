@@ -109,7 +109,7 @@ enum class Rotations {
 };
 struct StartPolicy {
   Assembly  assembly    = Assembly::Report;  /* -scene_assemble off,report,project */
-  double    tolerance   = 1e-6;              /* -scene_assemble_tol: of misfits, times the scene's size for lengths; radians */
+  double    tolerance   = 1e-6;              /* -scene_assemble_tol: of misfits, times the size of the largest mechanism, bodies that joints hang together and their markers, for lengths; radians */
   Redundant redundant   = Redundant::Drop;   /* -scene_redundant drop,refuse,keep */
   bool      equilibrium = false;             /* -scene_equilibrium: the run starts at rest in static equilibrium */
   bool      view        = false;             /* -scene_view: prints what the start has done */

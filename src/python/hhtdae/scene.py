@@ -388,7 +388,7 @@ class Scene:
             motions want them, and its other nodes stay where, and as fast as, ``FullBody(position=, velocity=, angular_velocity=)`` has put them, so that it is strained
             and vibrates unless these meet the joints. ``fixed_start`` holds a body; joints that hang together with one are met by rigid motions alone.
         tolerance : float
-            Of misfits, times the scene's size for lengths; radians.
+            Of misfits, times the size of the largest mechanism (bodies that joints hang together, and their markers) for lengths; radians.
         redundant : {"drop", "refuse", "keep"}
             About constraints that say the same thing twice.
         equilibrium : bool
