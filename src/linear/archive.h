@@ -1,4 +1,4 @@
-/* A sequence of bytes that is written and read by the same lines of code: what a checkpoint holds of one rank. */
+/* One rank's part of a checkpoint: a sequence of bytes that the same calls write and read. */
 #ifndef HHTDAE_LINEAR_ARCHIVE_H
 #define HHTDAE_LINEAR_ARCHIVE_H
 
@@ -12,9 +12,9 @@ class Archive
 public:
   std::vector<char> data;
   bool              reading = false;
-  bool              good    = true; /* all that was read so far was there, and of the size it should have */
+  bool              good    = true; /* false once a read item is missing or has another size than expected */
 
-  /* Whole structs: a field added to one is kept without another line */
+  /* A whole struct, so that a new field of it is saved without further code */
   template <class T> void plain(T &x)
   {
     static_assert(std::is_trivially_copyable<T>::value, "only plain structs are saved as they are");
@@ -23,7 +23,7 @@ public:
     if (size != sizeof(T)) good = false;
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_clear_padding)
-    if (!reading) __builtin_clear_padding(&x); /* the same state makes the same file */
+    if (!reading) __builtin_clear_padding(&x); /* so that equal states give equal files */
 #endif
 #endif
     bytes(&x, sizeof(T));
@@ -41,7 +41,7 @@ public:
     bytes(x.data(), count * sizeof(T));
   }
 
-  /* An array whose length is known on both sides */
+  /* An array whose length the reader knows, too */
   template <class T> void array(T *x, std::size_t count)
   {
     std::uint64_t n = count;

@@ -8,12 +8,12 @@
 #include <petsc/private/kspimpl.h>
 #include <petsc/private/pcimpl.h>
 
-static const char *const small_packages[] = {LINEAR_KLUPAIR,   MATSOLVERKLU,   MATSOLVERUMFPACK,
-                                             MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
-static const char *const large_packages[] = {LINEAR_MUMPSND,   MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST, MATSOLVERUMFPACK,
-                                             MATSOLVERSUPERLU, LINEAR_KLUPAIR, MATSOLVERKLU};
+static const char *const packages_for_little_work[] = {LINEAR_KLUPAIR, MATSOLVERKLU, MATSOLVERUMFPACK,
+                                                       MATSOLVERSUPERLU, LINEAR_MUMPSND, MATSOLVERMUMPS};
+static const char *const packages_for_much_work[]   = {LINEAR_MUMPSND, MATSOLVERMUMPS, MATSOLVERSUPERLU_DIST, MATSOLVERUMFPACK,
+                                                       MATSOLVERSUPERLU, LINEAR_KLUPAIR, MATSOLVERKLU};
 
-/* What PETSc says is there, but for LDL^T of matrices of blocks by MUMPS: its interface announces it and then refuses them (MatrixTypesRanks.SameRunAsWithAIJ) */
+/* MatGetFactorAvailable() without one false positive: PETSc's interface to MUMPS announces LDL^T of MATBAIJ and then refuses it (MatrixTypesRanks.SameRunAsWithAIJ) */
 static PetscErrorCode FactorAvailable(Mat P, const char name[], MatFactorType type, PetscBool *available)
 {
   PetscBool blocks, mumps;
@@ -26,7 +26,7 @@ static PetscErrorCode FactorAvailable(Mat P, const char name[], MatFactorType ty
   PetscFunctionReturn(0);
 }
 
-/* *package stays as it is if the one asked for does not factor P in this way */
+/* Sets *package to `name` if that package factors P in this way; else leaves it as it is */
 static PetscErrorCode IfAvailable(Mat P, const char name[], MatFactorType type, const char **package)
 {
   PetscBool available;
@@ -40,7 +40,7 @@ static PetscErrorCode IfAvailable(Mat P, const char name[], MatFactorType type, 
   PetscFunctionReturn(0);
 }
 
-/* The first of the list that factors P in this way; NULL if none does */
+/* The first package of the list that factors P in this way; NULL if none does */
 static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large, const char **package)
 {
   PetscBool dense;
@@ -49,13 +49,13 @@ static PetscErrorCode FirstAvailable(Mat P, MatFactorType type, PetscBool large,
   *package = NULL;
   PetscCall(PetscObjectTypeCompare((PetscObject)P, MATSEQDENSE, &dense));
   if (dense) PetscCall(IfAvailable(P, MATSOLVERPETSC, type, package)); /* LAPACK; PETSc 3.21 and newer have an interface to MUMPS for these, too */
-  const auto begin = large ? std::begin(large_packages) : std::begin(small_packages);
-  const auto end   = large ? std::end(large_packages) : std::end(small_packages);
+  const auto begin = large ? std::begin(packages_for_much_work) : std::begin(packages_for_little_work);
+  const auto end   = large ? std::end(packages_for_much_work) : std::end(packages_for_little_work);
   for (auto p = begin; p != end && !*package; ++p) PetscCall(IfAvailable(P, *p, type, package));
   PetscFunctionReturn(0);
 }
 
-/* Packages that exploit symmetry of an indefinite matrix; the others' PCCHOLESKY wants a definite one */
+/* Whether LDL^T of the package factors indefinite matrices; PCCHOLESKY of other packages needs definite ones */
 static PetscErrorCode FactorsIndefinite(const char package[], PetscBool *yes)
 {
   PetscBool same;
@@ -82,8 +82,8 @@ PetscErrorCode LinearExchangesRows(const char package[], PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-/* A package cannot be exchanged under a factor that exists, and PCSetFromOptions() may have made one by PETSc's own
-   choice without a word of it: a change starts the preconditioner anew */
+/* The package of an existing factor cannot be changed, and PCSetFromOptions() may have created a factor of PETSc's default
+   package: the preconditioner is reset before a change */
 static PetscErrorCode SetPackage(PC pc, const char package[])
 {
   MatSolverType current = NULL;
@@ -107,9 +107,9 @@ static PetscErrorCode SetPackage(PC pc, const char package[])
 }
 
 /*
-  Type and package of a preconditioner whose type the user left to us. A new type has lost what the options said about
+  Sets type and package of a preconditioner whose type the user did not set. PCSetType() discards what the options set for
   the factorization, so they are read again. The package orders by itself unless the user named an ordering: PETSc would
-  hand it the ordering that suits its own factorization.
+  pass the ordering that suits its own factorization.
 */
 static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char package[])
 {
@@ -126,7 +126,7 @@ static PetscErrorCode SetFactorization(KSP ksp, PC pc, PCType type, const char p
   PetscFunctionReturn(0);
 }
 
-/* Of one triangle only PETSc's own LDL^T is left, which does not pivot: multipliers are beyond it */
+/* For MATSBAIJ without MUMPS: PETSc's own LDL^T, which does not pivot and fails at the zero diagonal entries of multipliers */
 static PetscErrorCode ChoosePetscCholesky(KSP ksp, Mat P, PC pc, LinearChoice *choice)
 {
   Vec       d;
@@ -150,8 +150,8 @@ static PetscErrorCode ChoosePetscCholesky(KSP ksp, Mat P, PC pc, LinearChoice *c
   PetscFunctionReturn(0);
 }
 
-/* Only PETSc's own LU is left: it does not pivot, so zeros are moved off the diagonal by a permutation */
-static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
+/* No package was found: PETSc's own LU, which does not pivot, with zeros moved off the diagonal by a permutation; else GMRES without preconditioner */
+static PetscErrorCode ChooseLastResort(KSP ksp, Mat P, PC pc, LinearChoice *choice)
 {
   PetscBool available, by_option, triangle;
 
@@ -179,16 +179,16 @@ static PetscErrorCode ChooseNone(KSP ksp, Mat P, PC pc, LinearChoice *choice)
   PetscFunctionReturn(0);
 }
 
-/* Factors in single precision in place of those of "mumpsnd" where the factor is the solver: a Krylov method multiplies its rough solves by as many
-   iterations as it makes */
+/* Takes "mumpsmixed" in place of "mumpsnd" with preonly. As a preconditioner single precision does not pay: a Krylov method needs more iterations with
+   its rough solves. */
 static PetscErrorCode PreferSingle(KSP ksp, Mat P, MatFactorType type, const char **package)
 {
-  PetscBool ours, preonly;
+  PetscBool is_mumpsnd, preonly;
 
   PetscFunctionBegin;
-  PetscCall(PetscStrcmp(*package, LINEAR_MUMPSND, &ours));
+  PetscCall(PetscStrcmp(*package, LINEAR_MUMPSND, &is_mumpsnd));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &preonly));
-  if (ours && preonly) PetscCall(IfAvailable(P, LINEAR_MUMPSMIXED, type, package));
+  if (is_mumpsnd && preonly) PetscCall(IfAvailable(P, LINEAR_MUMPSMIXED, type, package));
   PetscFunctionReturn(0);
 }
 
@@ -196,7 +196,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
 {
   LinearSize  size;
   const char *package = NULL;
-  PetscBool   lu, cholesky, many, krylov = PETSC_FALSE;
+  PetscBool   lu, cholesky, many_entries, krylov = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCLU, &lu));
@@ -205,13 +205,13 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
     PetscFunctionReturn(0);
   }
-  PetscCall(LinearHasManyEntries(P, &many));
-  if (many) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov)); /* without ordering it */
+  PetscCall(LinearHasManyEntries(P, &many_entries));
+  if (many_entries) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov)); /* before the matrix is ordered, which takes time */
   if (!krylov) PetscCall(LinearMeasure(P, symmetric, choice->many_solves, &size));
   if (!krylov && size.single) PetscCall(LinearPreferKrylov(ksp, P, symmetric, choice, &krylov));
   if (krylov) PetscFunctionReturn(0);
   if (!choice->user_pc) {
-    /* LDL^T where it halves a large work and a package for indefinite matrices is there */
+    /* LDL^T for MUMPS' fronts, where it halves the work, if a package for indefinite matrices is installed */
     PetscBool indefinite = PETSC_FALSE;
     if (symmetric && size.large && !size.parts) PetscCall(FirstAvailable(P, MAT_FACTOR_CHOLESKY, PETSC_TRUE, &package));
     if (package) PetscCall(FactorsIndefinite(package, &indefinite));
@@ -224,7 +224,7 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
                              &package));
   if (!package && !cholesky) PetscCall(IfAvailable(P, LINEAR_KLUPARTS, MAT_FACTOR_LU, &package)); /* without MUMPS */
   if (!package && !choice->user_pc) {
-    PetscCall(ChooseNone(ksp, P, pc, choice));
+    PetscCall(ChooseLastResort(ksp, P, pc, choice));
     PetscFunctionReturn(0);
   }
   if (choice->user_pc && cholesky && !symmetric)
@@ -243,8 +243,8 @@ static PetscErrorCode ChoosePackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   PetscFunctionReturn(0);
 }
 
-/* The user's package with the factorization it offers: LDL^T where the matrix is symmetric, possibly indefinite */
-static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
+/* The factorization for the package that the user set: LDL^T if the matrix is symmetric and the package factors indefinite matrices, or offers no LU */
+static PetscErrorCode ChooseForUsersPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, LinearChoice *choice)
 {
   MatSolverType package = NULL;
   PetscBool     lu, cholesky, indefinite = PETSC_FALSE;
@@ -257,15 +257,15 @@ static PetscErrorCode FollowPackage(KSP ksp, Mat P, PetscBool symmetric, PC pc, 
   if (symmetric && cholesky) PetscCall(FactorsIndefinite(package, &indefinite));
   choice->cholesky = indefinite || (cholesky && !lu) ? PETSC_TRUE : PETSC_FALSE;
   char name[64];
-  PetscCall(PetscStrncpy(name, package, sizeof name)); /* a change of type frees the string */
+  PetscCall(PetscStrncpy(name, package, sizeof name)); /* PCSetType() frees the string */
   PetscCall(SetFactorization(ksp, pc, choice->cholesky ? PCCHOLESKY : PCLU, name));
-  PetscCall(LinearMarkPackage(pc, NULL)); /* it is still the user's */
+  PetscCall(LinearMarkPackage(pc, NULL)); /* the package is still the user's choice */
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s, with %s as the user chose",
                           choice->cholesky ? "LDL^T" : "LU", name));
   PetscFunctionReturn(0);
 }
 
-/* An LU that the user has asked for */
+/* Refuses LU, if the user asked for it, of a matrix that stores one triangle */
 static PetscErrorCode RefuseTriangle(PC pc, Mat P)
 {
   PetscBool triangle, lu;
@@ -302,7 +302,7 @@ PetscErrorCode LinearChoose(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *c
   else if (choice->user_pc && choice->user_package)
     PetscCall(PetscStrncpy(choice->text, "as the user chose", sizeof choice->text));
   else if (choice->user_package)
-    PetscCall(FollowPackage(ksp, P, symmetric, pc, choice));
+    PetscCall(ChooseForUsersPackage(ksp, P, symmetric, pc, choice));
   else
     PetscCall(ChoosePackage(ksp, P, symmetric, pc, choice));
   PetscCall(RefuseTriangle(pc, P));
@@ -319,9 +319,9 @@ PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, Linear
 
   PetscFunctionBegin;
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(LinearTakeFactor(ksp, choice)); /* of a KSP that has solved for another run before */
-  choice->slow    = was.slow;
-  choice->no_room = was.no_room;
+  PetscCall(LinearTakeFactor(ksp, choice)); /* the KSP may have been set up for another run before */
+  choice->krylov_given_up = was.krylov_given_up;
+  choice->no_room         = was.no_room;
   if (was.iterative) PetscCall(LinearTakeKrylovAgain(ksp, P, was.cholesky, choice, &krylov));
   if (available) PetscCall(FactorAvailable(P, was.package, was.cholesky ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, &available));
   const bool by_user = choice->user_pc && choice->user_package;

@@ -1,4 +1,4 @@
-/* What the sources of the choice share */
+/* Declarations shared by choose.cpp, settled.cpp, krylov.cpp, work.cpp and state.cpp */
 #ifndef HHTDAE_LINEAR_CHOOSE_H
 #define HHTDAE_LINEAR_CHOOSE_H
 
@@ -6,14 +6,14 @@
 
 PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given);
 
-/* A type of our choice, which nobody shall take for the user's */
+/* Sets the preconditioner's type and marks it as chosen here, not by the user */
 PetscErrorCode LinearSetType(PC pc, PCType type);
 
-/* The package that it has now is our choice, too; NULL: it is the user's */
+/* Marks the package as chosen here; NULL removes the mark: the package is the user's */
 PetscErrorCode LinearMarkPackage(PC pc, const char package[]);
 
-/* What a factorization takes. large: for the packages that work on dense fronts; parts: for KLU on every rank; single: the factor is as large that
-   single precision pays. */
+/* What the size of a factorization suggests. large: packages that work on dense fronts, as MUMPS; parts: KLU on every rank ("kluparts"); single: the
+   factor is so large that single precision pays. */
 struct LinearSize {
   PetscBool large = PETSC_FALSE, parts = PETSC_FALSE, single = PETSC_FALSE;
   char      text[160] = "";
@@ -22,33 +22,33 @@ struct LinearSize {
 /* many_solves: hundreds of solves follow each factorization */
 PetscErrorCode LinearMeasure(Mat P, PetscBool symmetric, PetscBool many_solves, LinearSize *size);
 
-/* Whether the matrix alone says that its factor is large */
+/* Whether the matrix has so many entries that its factor is large whatever the ordering */
 PetscErrorCode LinearHasManyEntries(Mat P, PetscBool *yes);
 
-/* Whether hhtconstraint is in use, and the tolerance of its Krylov method where nobody has set one */
+/* Records in *choice whether hhtconstraint is in use, and loosens the relative tolerance of its Krylov method unless the user has set one */
 PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice);
 
-/* The Krylov method in place of a factor, where no option names one */
+/* Sets the type of the KSP that replaces a factor, unless -ksp_type names one */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice);
 
-/* For a matrix whose factor is large, by default: *taken, where most unknowns are those of nodes of finite elements */
+/* For a matrix whose factor is large: takes the Krylov method if the user chose no solver and at least half of the unknowns belong to nodes of finite elements */
 PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken);
 
-/* What has been chosen, for a run that goes on with it */
+/* The choice as a checkpoint stores it */
 struct LinearChosen {
-  PetscBool cholesky    = PETSC_FALSE; /* LDL^T, or the Krylov method for a symmetric matrix */
-  PetscBool iterative   = PETSC_FALSE, no_room = PETSC_FALSE, slow = PETSC_FALSE; /* as in LinearChoice */
-  PetscBool set_up      = PETSC_FALSE; /* the preconditioner was, and may have a state of its own */
+  PetscBool cholesky  = PETSC_FALSE;                                                       /* LDL^T, or the Krylov method for a symmetric matrix */
+  PetscBool iterative = PETSC_FALSE, no_room = PETSC_FALSE, krylov_given_up = PETSC_FALSE; /* as in LinearChoice */
+  PetscBool set_up      = PETSC_FALSE;                                                     /* the preconditioner was set up: its state follows in the archive, if it has one */
   char      package[64] = "";
 };
 
-/* LinearChoose() where a run goes on with the solver that it had: nothing is looked for anew, but for what the user chooses otherwise now */
+/* LinearChoose() for a run that resumes with the solver `was`: nothing is measured again, and what the user chooses now takes precedence */
 PetscErrorCode LinearChooseAgain(KSP ksp, Mat P, const LinearChosen &was, LinearChoice *choice);
 
-/* The Krylov method that the run had by choice->no_room or as the faster one: *taken, unless the user chooses a solver now */
+/* Takes the Krylov method that the resumed run had; *taken = PETSC_FALSE if the user chooses a solver now */
 PetscErrorCode LinearTakeKrylovAgain(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken);
 
-/* Types that were set for a Krylov method, back to those of a factor; nothing where they are the user's */
+/* Sets the types of a factorization in place of a Krylov method that was chosen here; does nothing if the user chose the types */
 PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice);
 
 #endif

@@ -1,29 +1,35 @@
 /*
-  Conjugate gradients with the preconditioner "hhtconstraint" in place of a factor: where there is no room for one, and where most unknowns belong to
-  nodes of finite elements, so that a large factor is the slower way (README.md). A body for which they take many iterations gets its factor.
+  Conjugate gradients with the preconditioner "hhtconstraint" in place of a factor: where memory does not suffice for a factor, and where most unknowns
+  belong to nodes of finite elements, so that a large factor is slower (README.md). Where they take many iterations, a factor replaces them.
 */
 #include "choose.h"
 #include "constraint.h"
 
-static const PetscInt  MOST_ITERATIONS = 100; /* of a solve: with 17,000 to 120,000 unknowns a factor and its solves take as long as 65 to 360 (src/flexible/README.md) */
-static const PetscInt  END = 300; /* of one that does not converge */
-static const PetscReal PETSCS = 1e-5, LOOSE = 1e-2; /* relative tolerances, PETSc's default and ours */
+/* A solve that takes more iterations makes a factor replace the Krylov method: with 17,000 to 120,000 unknowns a factorization and its solves take as long as 65
+   to 360 iterations (src/flexible/README.md). */
+static const PetscInt GIVE_UP_ITERATIONS = 100;
 
-/* On a KSP whose types were set here, which nobody shall take for the user's */
-static const char OURS[] = "hhtdae_linear_krylov";
+/* Limit of iterations of a solve that does not converge, unless -ksp_max_it is given */
+static const PetscInt MAX_ITERATIONS = 300;
 
-static PetscErrorCode IsOurs(KSP ksp, PetscBool *ours)
+/* Relative tolerances: PETSc's default, and the one that replaces it with hhtconstraint */
+static const PetscReal PETSC_RTOL = 1e-5, LOOSE_RTOL = 1e-2;
+
+/* Name of the object composed with a KSP whose types were set here, which tells them from the user's */
+static const char MARK_KRYLOV[] = "hhtdae_linear_krylov";
+
+static PetscErrorCode HasKrylovMark(KSP ksp, PetscBool *marked)
 {
   PetscObject mark;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectQuery((PetscObject)ksp, OURS, &mark));
-  *ours = (PetscBool)(mark != NULL);
+  PetscCall(PetscObjectQuery((PetscObject)ksp, MARK_KRYLOV, &mark));
+  *marked = (PetscBool)(mark != NULL);
   PetscFunctionReturn(0);
 }
 
-/* A correction is followed by the next one, which makes up for what the Krylov method leaves: with PETSc's 1e-5 a step of a finite-element body takes
-   twice the iterations. */
+/* The next corrector iteration removes the error that a loose tolerance leaves; with PETSc's 1e-5 a step of a finite-element body takes twice as many Krylov
+   iterations. */
 PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice)
 {
   PetscReal rtol;
@@ -36,14 +42,14 @@ PetscErrorCode LinearLoosen(KSP ksp, LinearChoice *choice)
   choice->constraint = constraint;
   PetscCall(LinearOptionGiven(ksp, "-ksp_rtol", &given));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
-  if (!constraint || given || rtol != PETSCS) PetscFunctionReturn(0);
-  PetscCall(KSPSetTolerances(ksp, LOOSE, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(PetscInfo(ksp, "Linear solver: relative tolerance %g with " PCHHTCONSTRAINT ", -ksp_rtol sets another\n", (double)LOOSE));
+  if (!constraint || given || rtol != PETSC_RTOL) PetscFunctionReturn(0);
+  PetscCall(KSPSetTolerances(ksp, LOOSE_RTOL, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(PetscInfo(ksp, "Linear solver: relative tolerance %g with " PCHHTCONSTRAINT ", -ksp_rtol sets another\n", (double)LOOSE_RTOL));
   PetscFunctionReturn(0);
 }
 
-/* hhtconstraint sets both for conjugate gradients, whose successor shall not depend on them */
-static PetscErrorCode ForgetGuess(KSP ksp)
+/* Resets the initial guess that hhtconstraint sets for conjugate gradients, so that the method that replaces them does not use it */
+static PetscErrorCode ResetInitialGuess(KSP ksp)
 {
   PetscFunctionBegin;
   PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_FALSE));
@@ -51,8 +57,9 @@ static PetscErrorCode ForgetGuess(KSP ksp)
   PetscFunctionReturn(0);
 }
 
-/* Joints and motions make a few rows unsymmetric, which the preconditioner solves exactly: conjugate gradients take as many iterations then as FGMRES, in less time
-   and without its basis (tests/bench/whole_bodies.md), and where they do not serve a factor follows. Where there is no room for one, FGMRES is the safe way. */
+/* Joints and motions make a few rows of the matrix unsymmetric, but the preconditioner solves these exactly: conjugate gradients take as many iterations as FGMRES,
+   in less time and without storing a basis (tests/bench/whole_bodies.md), and a factor replaces them if they fail. Where memory does not suffice for a factor,
+   FGMRES is taken for unsymmetric matrices. */
 PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choice)
 {
   const bool cg = symmetric || !choice->no_room;
@@ -61,7 +68,7 @@ PetscErrorCode LinearSetKrylov(KSP ksp, PetscBool symmetric, LinearChoice *choic
   PetscFunctionBegin;
   PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
   if (!by_option) PetscCall(KSPSetType(ksp, cg ? KSPCG : KSPFGMRES));
-  if (!by_option && !cg) PetscCall(ForgetGuess(ksp));
+  if (!by_option && !cg) PetscCall(ResetInitialGuess(ksp));
   PetscCall(PetscSNPrintf(choice->text, sizeof choice->text, "%s with %s: %s", cg ? "conjugate gradients" : "FGMRES", PCHHTCONSTRAINT,
                           choice->no_room ? "there is no room for a factor (-mat_mumps_memory)" : "most unknowns are those of nodes of finite elements (a factor by -pc_type lu or cholesky)"));
   PetscFunctionReturn(0);
@@ -77,15 +84,15 @@ static PetscErrorCode TakeKrylov(KSP ksp, PetscBool symmetric, LinearChoice *cho
   choice->iterative = PETSC_TRUE;
   choice->cholesky  = symmetric;
   PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)ksp), &mark));
-  PetscCall(PetscObjectCompose((PetscObject)ksp, OURS, (PetscObject)mark));
+  PetscCall(PetscObjectCompose((PetscObject)ksp, MARK_KRYLOV, (PetscObject)mark));
   PetscCall(PetscContainerDestroy(&mark));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(LinearSetType(pc, PCHHTCONSTRAINT));
   PetscCall(PCSetFromOptions(pc));
   PetscCall(LinearSetKrylov(ksp, symmetric, choice));
-  PetscCall(KSPSetFromOptions(ksp)); /* of "preonly" it has read none */
+  PetscCall(KSPSetFromOptions(ksp)); /* options of the new type have not been read yet */
   PetscCall(LinearOptionGiven(ksp, "-ksp_max_it", &given));
-  if (!given && !choice->no_room) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, END));
+  if (!given && !choice->no_room) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, MAX_ITERATIONS));
   PetscFunctionReturn(0);
 }
 
@@ -99,7 +106,7 @@ PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBo
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factors, PCLU, PCCHOLESKY, ""));
   PetscCall(PetscObjectBaseTypeCompareAny((PetscObject)P, &rows, MATSEQAIJ, MATMPIAIJ, ""));
-  if (choice->user_pc || choice->user_package || choice->slow || !factors || !rows) PetscFunctionReturn(0);
+  if (choice->user_pc || choice->user_package || choice->krylov_given_up || !factors || !rows) PetscFunctionReturn(0);
   choice->no_room = *changed = PETSC_TRUE;
   PetscCall(TakeKrylov(ksp, choice->cholesky, choice));
   PetscCall(LinearLoosen(ksp, choice));
@@ -108,7 +115,7 @@ PetscErrorCode LinearChooseSmaller(KSP ksp, Mat P, LinearChoice *choice, PetscBo
 }
 
 /* Whether at least half of the rows belong to nodes whose positions are known */
-static PetscErrorCode HasNodes(Mat P, PetscBool *yes)
+static PetscErrorCode MostRowsAreNodes(Mat P, PetscBool *yes)
 {
   IS       nodes;
   Vec      positions;
@@ -126,8 +133,8 @@ static PetscErrorCode HasNodes(Mat P, PetscBool *yes)
   PetscFunctionReturn(0);
 }
 
-/* Whether the choice of the faster solver is left to us, and the matrix gives its rows */
-static PetscErrorCode IsFree(KSP ksp, Mat P, const LinearChoice &choice, PetscBool *yes)
+/* Whether the user has chosen neither method, preconditioner nor package, and the matrix is a MATAIJ, as hhtconstraint needs */
+static PetscErrorCode ChoiceIsFree(KSP ksp, Mat P, const LinearChoice &choice, PetscBool *yes)
 {
   PetscBool rows, preonly, given;
 
@@ -145,10 +152,10 @@ PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, PetscBool symmetric, LinearCho
 
   PetscFunctionBegin;
   *taken = PETSC_FALSE;
-  if (!choice->may_be_rough || choice->slow) PetscFunctionReturn(0);
-  PetscCall(IsFree(ksp, P, *choice, taken));
+  if (!choice->may_be_rough || choice->krylov_given_up) PetscFunctionReturn(0);
+  PetscCall(ChoiceIsFree(ksp, P, *choice, taken));
   if (!*taken) PetscFunctionReturn(0);
-  PetscCall(HasNodes(P, &nodes));
+  PetscCall(MostRowsAreNodes(P, &nodes));
   *taken = nodes;
   if (nodes) PetscCall(TakeKrylov(ksp, symmetric, choice));
   PetscFunctionReturn(0);
@@ -157,7 +164,7 @@ PetscErrorCode LinearPreferKrylov(KSP ksp, Mat P, PetscBool symmetric, LinearCho
 PetscErrorCode LinearTakeKrylovAgain(KSP ksp, Mat P, PetscBool symmetric, LinearChoice *choice, PetscBool *taken)
 {
   PetscFunctionBegin;
-  PetscCall(IsFree(ksp, P, *choice, taken));
+  PetscCall(ChoiceIsFree(ksp, P, *choice, taken));
   if (*taken) PetscCall(TakeKrylov(ksp, symmetric, choice));
   PetscFunctionReturn(0);
 }
@@ -176,22 +183,22 @@ PetscErrorCode LinearUsersMethod(KSP ksp, const LinearChoice &choice, KSPType *t
 PetscErrorCode LinearTakeFactor(KSP ksp, LinearChoice *choice)
 {
   PC        pc;
-  PetscBool ours = PETSC_FALSE;
+  PetscBool marked = PETSC_FALSE;
   PetscReal rtol;
-  PetscInt  end;
+  PetscInt  max_it;
 
   PetscFunctionBegin;
-  PetscCall(IsOurs(ksp, &ours));
-  if (!ours) PetscFunctionReturn(0);
+  PetscCall(HasKrylovMark(ksp, &marked));
+  if (!marked) PetscFunctionReturn(0);
   choice->iterative = choice->constraint = PETSC_FALSE;
-  PetscCall(PetscObjectCompose((PetscObject)ksp, OURS, NULL));
+  PetscCall(PetscObjectCompose((PetscObject)ksp, MARK_KRYLOV, NULL));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(LinearSetType(pc, PCLU));
-  PetscCall(PCSetFromOptions(pc)); /* of a factor the preconditioner has read none */
+  PetscCall(PCSetFromOptions(pc)); /* options of the factorization have not been read yet */
   PetscCall(KSPSetType(ksp, KSPPREONLY));
-  PetscCall(ForgetGuess(ksp));
-  PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, &end));
-  PetscCall(KSPSetTolerances(ksp, rtol == LOOSE ? PETSCS : rtol, PETSC_DEFAULT, PETSC_DEFAULT, end == END ? 10000 : end));
+  PetscCall(ResetInitialGuess(ksp));
+  PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, &max_it));
+  PetscCall(KSPSetTolerances(ksp, rtol == LOOSE_RTOL ? PETSC_RTOL : rtol, PETSC_DEFAULT, PETSC_DEFAULT, max_it == MAX_ITERATIONS ? 10000 : max_it));
   PetscFunctionReturn(0);
 }
 
@@ -209,12 +216,12 @@ PetscErrorCode LinearGiveUpKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBoo
   PetscCall(KSPGetIterationNumber(ksp, &its));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PCGetFailedReason(pc, &failed));
-  const bool nan = reason == KSP_DIVERGED_NANORINF && !failed; /* of the residual, which no solver helps */
-  *changed       = (PetscBool)(!nan && (reason < 0 || failed || its > MOST_ITERATIONS));
+  const bool nan = reason == KSP_DIVERGED_NANORINF && !failed; /* the right-hand side is not finite: no other solver helps */
+  *changed       = (PetscBool)(!nan && (reason < 0 || failed || its > GIVE_UP_ITERATIONS));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ksp)));
   if (!*changed) PetscFunctionReturn(0);
   PetscCall(PetscInfo(ksp, "Linear solver: conjugate gradients took %" PetscInt_FMT " iterations (%s), a factor from now on\n", its, failed ? PCFailedReasons[failed] : KSPConvergedReasons[reason]));
-  choice->slow              = PETSC_TRUE;
+  choice->krylov_given_up   = PETSC_TRUE;
   const PetscBool symmetric = choice->cholesky;
   PetscCall(LinearTakeFactor(ksp, choice));
   PetscCall(LinearChoose(ksp, P, symmetric, choice));

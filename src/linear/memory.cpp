@@ -1,4 +1,4 @@
-/* Free memory as Linux tells it: /proc/meminfo, and the limits of version 2 of control groups */
+/* Free memory under Linux, from /proc/meminfo and the limits of control groups, version 2 */
 #include "memory.h"
 #include <fstream>
 #include <limits>
@@ -28,7 +28,7 @@ static double NumberOf(const std::string &file)
   return in >> value ? value : -1;
 }
 
-/* A limit holds for the groups below the one that has it: SLURM's is that of the job, systemd's that of a slice */
+/* Least free memory of this process' control group and all groups above it, since a limit holds for all groups below (SLURM limits the job, systemd a slice) */
 static double FreeInGroups(const std::string &root)
 {
   std::ifstream in(root + "/proc/self/cgroup");
@@ -37,9 +37,9 @@ static double FreeInGroups(const std::string &root)
     if (line.compare(0, 3, "0::") == 0) path = line.substr(3);
   double least = INFINITE;
   for (;; path.resize(path.rfind('/'))) {
-    const std::string group = root + "/sys/fs/cgroup" + path + "/memory.";
-    const double      most = NumberOf(group + "max"), used = NumberOf(group + "current"), files = NumberIn(group + "stat", "file");
-    if (most >= 0 && used >= 0) least = PetscMin(least, (most - used + (files > 0 ? files : 0)) / 1e6); /* what is cached of files gives way */
+    const std::string group       = root + "/sys/fs/cgroup" + path + "/memory.";
+    const double      limit_bytes = NumberOf(group + "max"), used_bytes = NumberOf(group + "current"), cache_bytes = NumberIn(group + "stat", "file");
+    if (limit_bytes >= 0 && used_bytes >= 0) least = PetscMin(least, (limit_bytes - used_bytes + (cache_bytes > 0 ? cache_bytes : 0)) / 1e6); /* the kernel evicts cached files when memory is needed */
     if (path.find('/') == std::string::npos) return least;
   }
 }
@@ -54,23 +54,23 @@ double LinearFreeMemory(const std::string &root)
 PetscErrorCode LinearMemoryOf(MPI_Comm comm, double mine, double limit, LinearMemory *fullest)
 {
   MPI_Comm machine;
-  double   have[2] = {mine, limit < 0 ? LinearFreeMemory() : limit}, less;
+  double   need_and_free[2] = {mine, limit < 0 ? LinearFreeMemory() : limit}, margin;
   struct {
-    double less;
+    double margin;
     int    rank;
   } worst;
   PetscMPIInt rank;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &have[0], 1, MPI_DOUBLE, MPI_SUM, machine));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &have[1], 1, MPI_DOUBLE, MPI_MIN, machine));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &need_and_free[0], 1, MPI_DOUBLE, MPI_SUM, machine));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &need_and_free[1], 1, MPI_DOUBLE, MPI_MIN, machine));
   PetscCallMPI(MPI_Comm_free(&machine));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  less  = have[1] - have[0];
-  worst = {less, rank};
+  margin = need_and_free[1] - need_and_free[0];
+  worst  = {margin, rank};
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_DOUBLE_INT, MPI_MINLOC, comm));
-  PetscCallMPI(MPI_Bcast(have, 2, MPI_DOUBLE, worst.rank, comm));
-  *fullest = {have[0], have[1]};
+  PetscCallMPI(MPI_Bcast(need_and_free, 2, MPI_DOUBLE, worst.rank, comm));
+  *fullest = {need_and_free[0], need_and_free[1]};
   PetscFunctionReturn(0);
 }

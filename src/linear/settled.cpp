@@ -1,4 +1,4 @@
-/* What options and the program have settled about a linear solver, told apart from what was set here; and a solver of our choice taken back */
+/* Tells which parts of a linear solver the user has set, by options or by program, and which were set here; sets the defaults and undoes them */
 #include "choose.h"
 #include "linear.h"
 #include <petsc/private/kspimpl.h>
@@ -16,7 +16,8 @@ PetscErrorCode LinearOptionGiven(KSP ksp, const char name[], PetscBool *given)
   PetscFunctionReturn(0);
 }
 
-/* Marks on a preconditioner, named after the type and the package that were set here. What stands there under another name, or under none, is the program's, whenever it has set it. */
+/* Marks composed with KSP and PC: containers whose names are the type and the package that were set here. A type or package that differs from its mark, or has none, was set by
+   the program. */
 static const char MARK_TYPE[] = "hhtdae_linear_type", MARK_PACKAGE[] = "hhtdae_linear_package";
 
 static PetscErrorCode SetMark(PetscObject pc, const char mark[], const char name[])
@@ -85,7 +86,7 @@ static PetscErrorCode TypeByProgram(PC pc, PetscBool *by_program)
   PetscFunctionReturn(0);
 }
 
-/* Whether the preconditioner that the user has chosen, if any, is a solver by itself */
+/* Whether the preconditioner solves exactly, so that preonly is the default KSP: true for direct solvers and if the user chose no preconditioner */
 static PetscErrorCode IsSolver(KSP ksp, PC pc, PetscBool by_program, PetscBool *solver)
 {
   PetscOptions options;
@@ -127,7 +128,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(PCGetType(pc, &pc_type));
   PetscCall(TypeByProgram(pc, &pc_by_program));
   PetscCall(IsSolver(ksp, pc, pc_by_program, &solver));
-  if (!ksp_type) { /* GMRES is PETSc's own choice */
+  if (!ksp_type) { /* GMRES, PETSc's default, for preconditioners that are no solvers */
     PetscCall(KSPSetType(ksp, solver ? KSPPREONLY : KSPGMRES));
     PetscCall(LinearOptionGiven(ksp, "-ksp_type", &by_option));
     if (!by_option) PetscCall(SetMark((PetscObject)ksp, MARK_TYPE, solver ? KSPPREONLY : KSPGMRES));
@@ -137,7 +138,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscCall(LinearOptionGiven(ksp, "-pc_factor_mat_solver_type", &package_by_option));
   choice->user_pc      = pc_by_program || pc_by_option ? PETSC_TRUE : PETSC_FALSE;
   choice->user_package = package_by_program || package_by_option ? PETSC_TRUE : PETSC_FALSE;
-  if (!pc_type) { /* options that name a package have PETSc look for its factorization of this matrix at once */
+  if (!pc_type) { /* PCSetFromOptions() looks for the factorization at once if options name a package: it must be one that the matrix has */
     PetscCall(KSPGetOperatorsSet(ksp, NULL, &operators));
     if (operators) PetscCall(KSPGetOperators(ksp, NULL, &P));
     if (operators) PetscCall(LinearStoresTriangle(P, &triangle));
@@ -146,7 +147,7 @@ PetscErrorCode LinearDefaults(KSP ksp, LinearChoice *choice)
   PetscFunctionReturn(0);
 }
 
-/* There is no function for it: as before KSPSetType() and PCSetType(), so that PETSc takes its own choice at the next set-up */
+/* Puts the KSP into the state before KSPSetType(), for which PETSc has no function, so that PETSc's defaults apply at the next set-up */
 static PetscErrorCode MakeTypeless(KSP ksp)
 {
   PetscFunctionBegin;
@@ -159,6 +160,7 @@ static PetscErrorCode MakeTypeless(KSP ksp)
   PetscFunctionReturn(0);
 }
 
+/* Likewise the state before PCSetType() */
 static PetscErrorCode MakeTypeless(PC pc)
 {
   PetscFunctionBegin;

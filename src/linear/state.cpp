@@ -1,8 +1,8 @@
-/* What a solver takes over from one matrix to the next, asked of the preconditioner or the factor that it holds; and what its solves are for */
+/* Saving and loading the state of a solver, by functions composed with its preconditioner or factor; and the marks of a matrix that tell what its solves are for */
 #include "choose.h"
 #include <petsc/private/pcimpl.h>
 
-/* NULL where there is none */
+/* The factor of a KSP with LU or LDL^T; NULL with other preconditioners */
 static PetscErrorCode FactorOf(KSP ksp, Mat *F)
 {
   PC        pc;
@@ -29,10 +29,10 @@ PetscErrorCode LinearSaveState(KSP ksp, const LinearChoice &choice, Archive *arc
   if (package) PetscCall(PetscStrncpy(chosen.package, package, sizeof chosen.package));
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &chosen.cholesky));
   if (choice.iterative) chosen.cholesky = choice.cholesky;
-  chosen.iterative = choice.iterative;
-  chosen.no_room   = choice.no_room;
-  chosen.slow      = choice.slow;
-  chosen.set_up    = (PetscBool)!!pc->setupcalled;
+  chosen.iterative       = choice.iterative;
+  chosen.no_room         = choice.no_room;
+  chosen.krylov_given_up = choice.krylov_given_up;
+  chosen.set_up          = (PetscBool) !!pc->setupcalled;
   archive->plain(chosen);
   if (!chosen.set_up) PetscFunctionReturn(0);
   PetscCall(FactorOf(ksp, &F));
@@ -41,7 +41,7 @@ PetscErrorCode LinearSaveState(KSP ksp, const LinearChoice &choice, Archive *arc
   PetscFunctionReturn(0);
 }
 
-/* The same choice on all ranks; none where a part of the file is not what it should be */
+/* The choice of rank 0 on all ranks; the default choice, and *good = PETSC_FALSE, if any rank's archive is damaged */
 static PetscErrorCode LoadChosen(MPI_Comm comm, Archive *archive, LinearChosen *was, PetscBool *good)
 {
   PetscFunctionBegin;
@@ -82,11 +82,11 @@ PetscErrorCode LinearLoadState(KSP ksp, Mat P, LinearChoice *choice, Archive *ar
   PetscCall(PCGetFailedReason(pc, &reason));
   *usable = (PetscBool)(!error && !reason);
   for (PetscBool *answer : {same, usable}) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, answer, 1, MPIU_BOOL, MPI_LAND, comm));
-  if (!*usable) PetscCall(PCReset(pc)); /* a factor keeps its error */
+  if (!*usable) PetscCall(PCReset(pc)); /* the error code of a factor would persist */
   PetscFunctionReturn(0);
 }
 
-static const char ROUGH[] = "hhtdae_linear_rough", OFTEN[] = "hhtdae_linear_often";
+static const char MARK_ROUGH_SOLVES[] = "hhtdae_linear_rough", MARK_MANY_SOLVES[] = "hhtdae_linear_often";
 
 static PetscErrorCode Mark(Mat P, const char name[])
 {
@@ -112,28 +112,28 @@ static PetscErrorCode IsMarked(Mat P, const char name[], PetscBool *yes)
 PetscErrorCode LinearSolveRoughly(Mat P, PetscBool rough)
 {
   PetscFunctionBegin;
-  if (rough) PetscCall(Mark(P, ROUGH));
-  else PetscCall(PetscObjectCompose((PetscObject)P, ROUGH, NULL));
+  if (rough) PetscCall(Mark(P, MARK_ROUGH_SOLVES));
+  else PetscCall(PetscObjectCompose((PetscObject)P, MARK_ROUGH_SOLVES, NULL));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LinearSolvesRoughly(Mat P, PetscBool *rough)
 {
   PetscFunctionBegin;
-  PetscCall(IsMarked(P, ROUGH, rough));
+  PetscCall(IsMarked(P, MARK_ROUGH_SOLVES, rough));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LinearSolveOften(Mat P)
 {
   PetscFunctionBegin;
-  PetscCall(Mark(P, OFTEN));
+  PetscCall(Mark(P, MARK_MANY_SOLVES));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LinearSolvesOften(Mat P, PetscBool *often)
 {
   PetscFunctionBegin;
-  PetscCall(IsMarked(P, OFTEN, often));
+  PetscCall(IsMarked(P, MARK_MANY_SOLVES, often));
   PetscFunctionReturn(0);
 }

@@ -1,7 +1,7 @@
 #include "linear.h"
 #include "vectors.h"
 
-/* Row i and column i are scaled by 1/sqrt(largest entry of row i), lest small entries hide behind large ones */
+/* d_i = 1/sqrt(largest entry of row i), to scale row and column i, so that an unsymmetric pair of small entries is not lost beside large ones */
 static PetscErrorCode Scaling(Mat A, Vec d)
 {
   PetscScalar *array;
@@ -17,7 +17,6 @@ static PetscErrorCode Scaling(Mat A, Vec d)
   PetscFunctionReturn(0);
 }
 
-/* MATSBAIJ: the upper triangle alone is stored, by block rows */
 PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle)
 {
   PetscFunctionBegin;
@@ -26,8 +25,9 @@ PetscErrorCode LinearStoresTriangle(Mat A, PetscBool *triangle)
 }
 
 /*
-  With entries of order one at most, y^T A x is a sum of nz terms of random sign: rounding leaves about eps sqrt(nz) in
-  the difference. A hundred times that is still far below what one wrong entry of relative size 1e-10 contributes.
+  With scaled entries of order one at most, y^T A x is a sum of nz terms of random sign: rounding leaves about eps sqrt(nz) in
+  the difference. The limit is a hundred times that, still far below the contribution of one wrong entry of relative size
+  1e-10 (LinearSymmetry.OneWrongEntryIsSeen has one of 1e-9).
 */
 PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric)
 {

@@ -5,7 +5,7 @@
 #include "hash.h"
 #include <petscvec.h>
 
-/* A value of size 1/2 to 1, of either sign: none is small by chance */
+/* A value with 1/2 <= |value| < 1 and either sign, so that no component is small by chance */
 inline PetscReal LinearPseudoRandomValue(uint64_t index, uint64_t stream)
 {
   const uint64_t  z    = HashMix(index + (stream << 48) + 0x9e3779b97f4a7c15u);

@@ -1,41 +1,43 @@
-/* The work of a factorization, by which its package is chosen (choose.cpp) */
+/* Estimates the work of a factorization, by which its package is chosen (choose.cpp) */
 #include "choose.h"
 #include "graph.h"
 #include "kluparts.h"
 
 /*
-  KLU works column by column in scalar loops; MUMPS works on dense fronts with BLAS, at a cost per call and per front.
-  The number of unknowns says little: what counts is the work, and how much of it there is per entry of the factor. A run
-  needs dozens of factorizations, the first of which is klupair's dearest. The measurements are in README.md, made by
-  tests/bench/linear_crossover.cpp. PETSc's "klu", without klupair's panels, leaves the field earlier.
+  From these numbers of operations of L D L^T on, MUMPS is chosen in place of KLU, provided that there are more than
+  MUMPS_FLOPS_PER_ENTRY operations per entry of L. KLU works column by column in scalar loops; MUMPS works on dense fronts
+  with BLAS, at a cost per call and per front. The number of unknowns says little about which is faster. A run makes dozens of
+  factorizations, and klupair's first one takes the most time. Measurements in README.md, by tests/bench/linear_crossover.cpp. Without
+  klupair's panels, that is with PETSc's "klu", the limits are lower.
 */
 #if defined(HHTDAE_HAVE_KLU)
-static const double LARGE_SYMMETRIC = 6e7, LARGE_UNSYMMETRIC = 1e8;
+static const double MUMPS_FLOPS_LDLT = 6e7, MUMPS_FLOPS_LU = 1e8;
 #else
-static const double LARGE_SYMMETRIC = 2.5e6, LARGE_UNSYMMETRIC = 7e6;
+static const double MUMPS_FLOPS_LDLT = 2.5e6, MUMPS_FLOPS_LU = 7e6;
 #endif
-static const double LARGE_PER_ENTRY = 40;
+static const double MUMPS_FLOPS_PER_ENTRY = 40;
 
-/* Where hundreds of solves follow a factorization the time of a solve counts, in which MUMPS has the greater overhead: coarse matrices of 308,028 and 1,043,130 unknowns (README.md) */
-static const double MANY_SOLVES = 30;
+/* Multiplies the limits above where hundreds of solves follow each factorization: the time of a solve counts then, in which MUMPS has the larger overhead. Measured
+   with coarse matrices of bodies of 308,028 and 1,043,130 unknowns. */
+static const double MANY_SOLVES_FACTOR = 30;
 
 /*
-  Matrices distributed over ranks: KLU on every rank and a dense matrix for the interface (kluparts.h), or MUMPS.
-  Both are weighed by operations on one rank, in units of KLU's, of one factorization and three solves: dense ones cost a
-  fifth of them, those of MUMPS' fronts a quarter, and where fronts are small MUMPS takes its time per unknown (README.md).
+  Cost model for matrices distributed over ranks, which either "kluparts" (kluparts.h) or MUMPS factors: operations on one rank
+  for one factorization and three solves, in units of KLU's. A dense operation costs 0.2 of KLU's, one in MUMPS' fronts
+  0.25, and MUMPS needs 6500 for each unknown, which dominates where fronts are small (README.md).
 */
 static const double DENSE_OPERATION = 0.2, MUMPS_UNKNOWN = 6500, MUMPS_OPERATION = 0.25;
 
-/* More than this between ranks is left to MUMPS without a closer look */
-static const double   MANY_COUPLINGS  = 2e5;
-static const PetscInt LARGE_INTERFACE = 2000;
+/* Matrices with more entries between ranks, or interface unknowns, go to MUMPS without an estimate of the work */
+static const double   MAX_COUPLINGS = 2e5;
+static const PetscInt MAX_INTERFACE = 2000;
 
-/* Counting stops here: a factor with this many entries is large by any measure */
-static const double COUNT_LIMIT = 1e7;
+/* Counting of the factor's entries stops here: for a larger factor KLU is out of the question, and single precision pays */
+static const double MAX_COUNTED_ENTRIES = 1e7;
 
-/* Matrices distributed over ranks, or of one triangle: entries of the whole matrix from which its factor is as large in all likelihood. Fewer are factored in a
-   fraction of a second in any precision. */
-static const double MANY_ENTRIES = 4e6;
+/* For matrices whose factor is not counted, as distributed ones and MATSBAIJ: from this number of entries of the matrix on its factor is taken to exceed
+   MAX_COUNTED_ENTRIES. Smaller ones are factored in a fraction of a second in any precision. */
+static const double LARGE_MATRIX_ENTRIES = 4e6;
 
 PetscErrorCode LinearHasManyEntries(Mat P, PetscBool *yes)
 {
@@ -45,7 +47,7 @@ PetscErrorCode LinearHasManyEntries(Mat P, PetscBool *yes)
   PetscFunctionBegin;
   PetscCall(LinearStoresTriangle(P, &triangle));
   PetscCall(MatGetInfo(P, MAT_GLOBAL_SUM, &info));
-  *yes = (PetscBool)((triangle ? 2 : 1) * info.nz_used > MANY_ENTRIES);
+  *yes = (PetscBool)((triangle ? 2 : 1) * info.nz_used > LARGE_MATRIX_ENTRIES);
   PetscFunctionReturn(0);
 }
 
@@ -57,7 +59,7 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, LinearSize 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)P), &ranks));
   size->large = PETSC_TRUE;
-  PetscCall(LinearPartsCount(P, MANY_COUPLINGS, LARGE_INTERFACE, &w));
+  PetscCall(LinearPartsCount(P, MAX_COUPLINGS, MAX_INTERFACE, &w));
   if (!w.possible) {
     PetscCall(PetscSNPrintf(size->text, sizeof size->text,
                             w.couplings > 0 ? "matrix distributed over %d processes, %g entries between them"
@@ -76,7 +78,7 @@ static PetscErrorCode MeasureDistributed(Mat P, PetscBool symmetric, LinearSize 
   PetscFunctionReturn(0);
 }
 
-/* By counting; with rows elsewhere only the packages for distributed matrices come into question */
+/* Counts the work in AMD's order, METIS' where AMD is not installed; for distributed matrices see MeasureDistributed() */
 PetscErrorCode LinearMeasure(Mat P, PetscBool symmetric, PetscBool many_solves, LinearSize *size)
 {
   PetscMPIInt     processes;
@@ -90,7 +92,7 @@ PetscErrorCode LinearMeasure(Mat P, PetscBool symmetric, PetscBool many_solves, 
   *size = LinearSize();
   PetscCall(LinearStoresTriangle(P, &triangle));
   PetscCall(LinearHasManyEntries(P, &size->single));
-  if (triangle) { /* MUMPS reads it, KLU and the like do not: a chain of 50 unknowns takes 0.28 ms in place of 0.007 ms (above) */
+  if (triangle) { /* only MUMPS reads MATSBAIJ: a chain of 50 unknowns takes 0.28 ms in place of KLU's 0.007 ms (README.md) */
     size->large = PETSC_TRUE;
     PetscCall(PetscStrncpy(size->text, "the matrix holds one triangle", sizeof size->text));
     PetscFunctionReturn(0);
@@ -108,14 +110,14 @@ PetscErrorCode LinearMeasure(Mat P, PetscBool symmetric, PetscBool many_solves, 
   PetscCall(LinearGraphFromMat(P, &graph, &done));
   PetscCall(MatGetOrdering(P, PetscDefined(HAVE_SUITESPARSE) ? "amd" : "metisnd", &row, &col));
   PetscCall(ISGetIndices(row, &order));
-  LinearCountWork(graph, order, COUNT_LIMIT, &work, &bounded);
+  LinearCountWork(graph, order, MAX_COUNTED_ENTRIES, &work, &bounded);
   PetscCall(ISRestoreIndices(row, &order));
   PetscCall(ISDestroy(&row));
   PetscCall(ISDestroy(&col));
-  const double threshold = (symmetric ? LARGE_SYMMETRIC : LARGE_UNSYMMETRIC) * (many_solves ? MANY_SOLVES : 1);
+  const double threshold = (symmetric ? MUMPS_FLOPS_LDLT : MUMPS_FLOPS_LU) * (many_solves ? MANY_SOLVES_FACTOR : 1);
   const double per_entry = work.flops / PetscMax(work.factor, 1.0);
-  size->single = (PetscBool)!bounded;
-  size->large = !bounded || (work.flops > threshold && per_entry > LARGE_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
+  size->single           = (PetscBool)!bounded;
+  size->large            = !bounded || (work.flops > threshold && per_entry > MUMPS_FLOPS_PER_ENTRY) ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(PetscSNPrintf(size->text, sizeof size->text, "factor with %s%.2g entries, %.2g operations",
                           bounded ? "" : "more than ", work.factor, work.flops));
   PetscFunctionReturn(0);
