@@ -1,11 +1,11 @@
 /*
   "klupair": the factor matrix. Options, with the prefix of the solver:
 
-    -mat_klupair_pivot_tol <0.001>              a pivot is left where it was planned if it is so large a part of its column
+    -mat_klupair_pivot_tol <0.001>              the planned pivot is kept if it is at least this part of the largest entry of its column
     -mat_klupair_row_scale <none,sum,max>       scaling of rows, none by default
-    -mat_klupair_ordering <auto,amd,metis>      auto: METIS where AMD foresees much work and METIS less
-    -mat_klupair_refactor <true>                keep the pivots from one matrix to the next while they are good
-    -mat_klupair_panels <true>                  dense panels for that where they pay (klupair_panels.h)
+    -mat_klupair_ordering <auto,amd,metis>      auto: AMD, or METIS where AMD predicts much work and METIS less
+    -mat_klupair_refactor <true>                keep the pivots from one matrix to the next while element growth stays small
+    -mat_klupair_panels <true>                  refactor with dense panels where they pay (klupair_panels.h)
 */
 #include "klupair.h"
 
@@ -27,7 +27,7 @@ PetscErrorCode KluPairGetRows(Mat A, LinearRows *rows)
   PetscCheck(done, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
              "The matrix does not give its rows; convert it to type seqaij");
   PetscCall(MatSeqAIJGetArrayRead(A, &rows->val));
-  if (!rows->col) rows->col = &none; /* a matrix without entries has no places for them, which KLU insists on */
+  if (!rows->col) rows->col = &none; /* a matrix without entries has no arrays, but KLU refuses null pointers */
   if (!rows->val) rows->val = &zero;
   PetscFunctionReturn(0);
 }
@@ -114,10 +114,10 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorIn
 
   PetscFunctionBegin;
   PetscCall(ReadOptions(F));
-  k->given.clear();
+  k->given_order.clear();
   if (row) {
     PetscCall(ISGetIndices(row, &order));
-    k->given.assign(order, order + A->rmap->n);
+    k->given_order.assign(order, order + A->rmap->n);
     PetscCall(ISRestoreIndices(row, &order));
   }
   PetscCall(KluPairGetRows(A, &rows));
@@ -129,7 +129,7 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS row, IS, const MatFactorIn
   PetscFunctionReturn(0);
 }
 
-/* ---- what can be asked of the factor ---- */
+/* ---- information and view ---- */
 
 static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_KLUPAIR, 0; }
 
@@ -177,10 +177,10 @@ static PetscErrorCode View(Mat F, PetscViewer viewer)
   if (k->panels)
     PetscCall(PetscViewerASCIIPrintf(
         viewer, "  dense panels for these pivots: %zu, %g entries, %g operations; used %" PetscInt_FMT " times\n",
-        k->panels->panel.size(), k->panels->entries, k->panels->flops, k->panels_made));
+        k->panels->panel.size(), k->panels->entries, k->panels->flops, k->panel_factorizations));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  no dense panels%s\n",
-                                     k->panels_looked ? ": they would not pay" : " looked for"));
+                                     k->panels_tried ? ": they would not pay" : " looked for"));
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  analyses: %" PetscInt_FMT ", factorizations with pivoting: %" PetscInt_FMT
                                    ", with old pivots: %" PetscInt_FMT ", of these given up: %" PetscInt_FMT "\n",
@@ -218,7 +218,7 @@ PetscErrorCode LinearKLUPairFactor(Mat A, MatFactorType type, Mat *factor)
   k->common.scale          = 0;
   F->data                  = k;
   F->factortype            = type;
-  F->assembled             = PETSC_TRUE; /* so that -ksp_view shows it */
+  F->assembled             = PETSC_TRUE; /* otherwise -ksp_view does not show the factor */
   F->canuseordering        = PETSC_TRUE;
   F->ops->lufactorsymbolic = FactorSymbolic;
   F->ops->getinfo          = GetInfo;

@@ -1,15 +1,15 @@
 /*
-  KLU with pivots that we find, as the factorization package "klupair" for MATSEQAIJ, LU.
+  KLU with pivots chosen here, as the factorization package "klupair" for LU of MATSEQAIJ.
 
   Multipliers have no diagonal entry. KLU's own analysis therefore looks for a permutation with a zero-free diagonal by
   depth-first search from one column after the other, which for nets and rings of bodies costs the square of their
-  number. Here every unknown without a diagonal value is paired with an unknown that it is coupled to, all of them at
-  once and in a few sweeps; the pairs are ordered as one vertex each, and KLU gets both permutations. The factorization
-  of a matrix with the same pattern keeps the pivots (klu_refactor) while they remain good. KLU's diagonal
+  number. Here every unknown without a diagonal value is paired with an unknown that it is coupled to, by a maximum
+  matching that takes a few sweeps; each pair is ordered as one vertex, and KLU gets both permutations. The factorization
+  of a matrix with the same pattern keeps the pivots (klu_refactor) while element growth stays small. KLU's diagonal
   blocks (BTF) are used only where the whole diagonal has values.
 
-  Milliseconds with tests/bench/klupair.cpp (Debian 12, KLU 1.3.8, a busy machine; "again": values changed; residuals of
-  a solve with entries of order one):
+  Milliseconds with tests/bench/klupair.cpp (Debian 12, KLU 1.3.8, a busy machine; "again": same pattern, other values;
+  residual of a solve with entries of order one):
 
       bodies in space, by revolute joints       n   package    analysis   factor   again   solve   residual
       chain, 10,000                       110,000   klu              61       91      74     2.5      8e-14
@@ -28,10 +28,10 @@
 
 #define LINEAR_KLUPAIR "klupair"
 
-/* Does nothing where the library was built without KLU */
+/* Does nothing if the library was built without KLU */
 PetscErrorCode LinearRegisterKLUPair(void);
 
-/* The factor of a SEQAIJ matrix that is registered under that name */
+/* Creates the factor of a SEQAIJ matrix, as MatGetFactor() with this package does */
 PetscErrorCode LinearKLUPairFactor(Mat A, MatFactorType type, Mat *factor);
 
 #endif

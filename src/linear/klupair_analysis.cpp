@@ -1,27 +1,29 @@
-/* The analysis of "klupair": pivots, an ordering of the groups of unknowns that share them, and both as KLU wants them
- */
+/* The analysis of "klupair": finds pivots, orders the groups of unknowns that exchange their pivots, and passes both permutations to KLU */
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_data.h"
 #include <algorithm>
 
-/* METIS is tried where AMD foresees so many operations per unknown: a chain stays below, a plate does not */
-static const double TRY_METIS = 1000;
+/* METIS nested dissection is tried only where AMD predicts more than this many operations of L D L^T per unknown: chains stay
+   below (some 10), plates of bricks exceed it (5000; table in README.md) */
+static const double METIS_FLOPS_PER_UNKNOWN = 1000;
 
-/* An ordering with more entries than this is not compared any further */
-static const double COUNT_LIMIT = 1e9;
+/* An ordering with more entries in L is not counted to the end, and loses the comparison */
+static const double MAX_COUNTED_ENTRIES = 1e9;
 
-/* Fill beyond this multiple of what was foreseen means that the pivots no longer fit the values */
-static const double TOO_MUCH_FILL = 1.5;
+/* Pivots are planned anew if L and U have more than this multiple of the predicted entries: row exchanges during the
+   factorization show that the planned pivots no longer fit the values. KluPair.PlansAnewWhenTheFillGrows. */
+static const double REPLAN_FILL = 1.5;
 
-/* Bound on KLU's search for diagonal blocks, in multiples of the entries of the matrix */
-static const double BLOCK_SEARCH = 10;
+/* Bound on KLU's search for diagonal blocks (BTF), in multiples of the entries of the matrix: it is quadratic in the worst case */
+static const double MAX_BTF_WORK = 10;
 
 namespace
 {
 
-/* The cycles of the permutation of pivots: single unknowns, pairs, rarely more */
+/* The cycles of the permutation of pivots: single unknowns, pairs, rarely more. Group g has the members members[start[g]] to
+   members[start[g + 1] - 1]. */
 struct Groups {
-  std::vector<PetscInt> of, start, member;
+  std::vector<PetscInt> group_of, start, members;
 };
 
 } // namespace
@@ -30,20 +32,21 @@ static Groups FindGroups(const std::vector<PetscInt> &pivot)
 {
   Groups         g;
   const PetscInt n = (PetscInt)pivot.size();
-  g.of.assign(n, -1);
+  g.group_of.assign(n, -1);
   g.start.assign(1, 0);
   for (PetscInt i = 0; i < n; ++i) {
-    if (g.of[i] >= 0) continue;
+    if (g.group_of[i] >= 0) continue;
     const PetscInt group = (PetscInt)g.start.size() - 1;
-    for (PetscInt j = i; g.of[j] < 0; j = pivot[j]) {
-      g.of[j] = group;
-      g.member.push_back(j);
+    for (PetscInt j = i; g.group_of[j] < 0; j = pivot[j]) {
+      g.group_of[j] = group;
+      g.members.push_back(j);
     }
-    g.start.push_back((PetscInt)g.member.size());
+    g.start.push_back((PetscInt)g.members.size());
   }
   return g;
 }
 
+/* The graph of the groups */
 static LinearGraph Compress(const LinearGraph &graph, const Groups &g)
 {
   LinearGraph           c;
@@ -54,8 +57,8 @@ static LinearGraph Compress(const LinearGraph &graph, const Groups &g)
   for (PetscInt v = 0; v < c.n; ++v) {
     seen[v] = v;
     for (PetscInt m = g.start[v]; m < g.start[v + 1]; ++m)
-      for (PetscInt k = graph.xadj[g.member[m]]; k < graph.xadj[g.member[m] + 1]; ++k) {
-        const PetscInt other = g.of[graph.adj[k]];
+      for (PetscInt k = graph.xadj[g.members[m]]; k < graph.xadj[g.members[m] + 1]; ++k) {
+        const PetscInt other = g.group_of[graph.adj[k]];
         if (seen[other] != v) c.adj.push_back(other);
         seen[other] = v;
       }
@@ -65,12 +68,13 @@ static LinearGraph Compress(const LinearGraph &graph, const Groups &g)
   return c;
 }
 
+/* The order of the unknowns that follows from an order of the groups */
 static std::vector<PetscInt> Expand(const Groups &g, const std::vector<PetscInt> &order)
 {
   std::vector<PetscInt> unknowns;
-  unknowns.reserve(g.member.size());
+  unknowns.reserve(g.members.size());
   for (PetscInt v : order)
-    unknowns.insert(unknowns.end(), g.member.begin() + g.start[v], g.member.begin() + g.start[v + 1]);
+    unknowns.insert(unknowns.end(), g.members.begin() + g.start[v], g.members.begin() + g.start[v + 1]);
   return unknowns;
 }
 
@@ -78,7 +82,7 @@ static PetscErrorCode OrderByAMD(const LinearGraph &c, std::vector<PetscInt> *or
 {
   PetscFunctionBegin;
   order->resize(c.n);
-  const KluInt dummy = 0; /* AMD refuses a null pointer even where there are no entries */
+  const KluInt dummy = 0; /* AMD refuses a null pointer even if there are no entries */
   const int    status =
       (int)AMD(order)((KluInt)c.n, KluIndices(c.xadj.data()), c.adj.empty() ? &dummy : KluIndices(c.adj.data()),
                       KluIndices(order->data()), NULL, NULL);
@@ -88,65 +92,65 @@ static PetscErrorCode OrderByAMD(const LinearGraph &c, std::vector<PetscInt> *or
   PetscFunctionReturn(0);
 }
 
-/* Groups by their first unknown in the order that PETSc gave */
-static std::vector<PetscInt> OrderAsGiven(const Groups &g, const std::vector<PetscInt> &given)
+/* Groups in the order of their first unknown in PETSc's order */
+static std::vector<PetscInt> OrderAsGiven(const Groups &g, const std::vector<PetscInt> &given_order)
 {
   std::vector<PetscInt> order;
   std::vector<bool>     done(g.start.size(), false);
-  for (PetscInt i : given)
-    if (!done[g.of[i]]) {
-      done[g.of[i]] = true;
-      order.push_back(g.of[i]);
+  for (PetscInt i : given_order)
+    if (!done[g.group_of[i]]) {
+      done[g.group_of[i]] = true;
+      order.push_back(g.group_of[i]);
     }
   return order;
 }
 
 /*
-  From far to near the ends, level by level: a chain that ends at the outside is eaten up from its free end, so that the
-  outside meets only the last few columns. Groups that no path joins to the ends come first, in the order that is there.
+  Level by level from far to near the coupled unknowns: a chain is eliminated from its free end, so that the interface is
+  coupled to the last few columns of L only. Groups that no path joins to coupled unknowns come first, in the order `others`.
 */
-static std::vector<PetscInt> OrderTowards(const LinearGraph &c, const Groups &g, const std::vector<PetscInt> &ends,
-                                          const std::vector<PetscInt> &others)
+static std::vector<PetscInt> OrderTowardsInterface(const LinearGraph &c, const Groups &g, const std::vector<PetscInt> &coupled_unknowns,
+                                                   const std::vector<PetscInt> &others)
 {
-  std::vector<PetscInt> near;
+  std::vector<PetscInt> breadth_first;
   std::vector<bool>     met(c.n, false);
   const auto            meet = [&](PetscInt v) {
-    if (!met[v]) near.push_back(v);
+    if (!met[v]) breadth_first.push_back(v);
     met[v] = true;
   };
-  near.reserve(c.n);
-  for (PetscInt i : ends) meet(g.of[i]);
-  for (size_t head = 0; head < near.size(); ++head)
-    for (PetscInt k = c.xadj[near[head]]; k < c.xadj[near[head] + 1]; ++k) meet(c.adj[k]);
+  breadth_first.reserve(c.n);
+  for (PetscInt i : coupled_unknowns) meet(g.group_of[i]);
+  for (size_t head = 0; head < breadth_first.size(); ++head)
+    for (PetscInt k = c.xadj[breadth_first[head]]; k < c.xadj[breadth_first[head] + 1]; ++k) meet(c.adj[k]);
   std::vector<PetscInt> order;
   order.reserve(c.n);
   for (PetscInt v : others)
     if (!met[v]) order.push_back(v);
-  order.insert(order.end(), near.rbegin(), near.rend());
+  order.insert(order.end(), breadth_first.rbegin(), breadth_first.rend());
   return order;
 }
 
 namespace
 {
 
-/* An order and what it costs: the factorization and, for the outside, two sweeps over the columns of L that the ends
- * reach */
+/* An order and its cost in operations: the factorization and, for the interface, two sweeps over the columns of L that the
+   coupled unknowns reach, and the product for the Schur complement */
 struct WeighedOrder {
   const char           *name;
   std::vector<PetscInt> order;
   LinearWork            work;
-  double                columns = 0, entries = 0, total = PETSC_MAX_REAL;
+  double                reached = 0, entries = 0, total = PETSC_MAX_REAL;
 };
 
 } // namespace
 
-static void FollowPaths(const LinearTree &tree, const std::vector<PetscInt> &ends, WeighedOrder *c)
+static void CountReachedColumns(const LinearTree &tree, const std::vector<PetscInt> &coupled_unknowns, WeighedOrder *c)
 {
   std::vector<bool> met(tree.parent.size(), false);
-  for (PetscInt i : ends)
+  for (PetscInt i : coupled_unknowns)
     for (PetscInt j = tree.place[i]; j >= 0 && !met[j]; j = tree.parent[j]) {
       met[j] = true;
-      c->columns += 1;
+      c->reached += 1;
       c->entries += (double)tree.count[j];
     }
 }
@@ -159,14 +163,14 @@ static WeighedOrder Weigh(const char *name, const LinearGraph &graph, const Grou
   PetscBool    bounded;
   c.name  = name;
   c.order = Expand(g, groups);
-  LinearCountWork(graph, c.order.data(), COUNT_LIMIT, &c.work, &bounded, k.ends.empty() ? NULL : &tree);
+  LinearCountWork(graph, c.order.data(), MAX_COUNTED_ENTRIES, &c.work, &bounded, k.coupled_unknowns.empty() ? NULL : &tree);
   if (!bounded) return c;
-  if (!k.ends.empty()) FollowPaths(tree, k.ends, &c);
-  c.total = 2 * c.work.flops + (2 * c.entries + c.columns * (double)k.width) * (double)k.width;
+  if (!k.coupled_unknowns.empty()) CountReachedColumns(tree, k.coupled_unknowns, &c);
+  c.total = 2 * c.work.flops + (2 * c.entries + c.reached * (double)k.interface_size) * (double)k.interface_size;
   return c;
 }
 
-/* Leaves the order of the unknowns in *order and the work it takes in k */
+/* Chooses the order of the unknowns; its work is stored in k */
 static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *k, std::vector<PetscInt> *order)
 {
   const LinearGraph     c = Compress(graph, g);
@@ -178,35 +182,35 @@ static PetscErrorCode Order(const LinearGraph &graph, const Groups &g, KluPair *
   };
 
   PetscFunctionBegin;
-  if (!k->given.empty()) {
-    best = Weigh("given by PETSc", graph, g, OrderAsGiven(g, k->given), *k);
+  if (!k->given_order.empty()) {
+    best = Weigh("given by PETSc", graph, g, OrderAsGiven(g, k->given_order), *k);
   } else if (k->ordering == KLUPAIR_METIS) {
     PetscCall(LinearMetisOrder(c, {}, &groups));
     best = Weigh("METIS", graph, g, groups, *k);
   } else {
     PetscCall(OrderByAMD(c, &groups));
     best = Weigh("AMD", graph, g, groups, *k);
-    if (k->ordering == KLUPAIR_AUTO && !k->ends.empty())
-      try_this("towards the ends", OrderTowards(c, g, k->ends, groups));
-    const bool much =
-        best.total >= 2 * TRY_METIS * (double)graph.n || 2 * best.entries * (double)k->width > best.work.flops;
-    if (k->ordering == KLUPAIR_AUTO && much) {
+    if (k->ordering == KLUPAIR_AUTO && !k->coupled_unknowns.empty())
+      try_this("towards the ends", OrderTowardsInterface(c, g, k->coupled_unknowns, groups));
+    const bool try_metis =
+        best.total >= 2 * METIS_FLOPS_PER_UNKNOWN * (double)graph.n || 2 * best.entries * (double)k->interface_size > best.work.flops;
+    if (k->ordering == KLUPAIR_AUTO && try_metis) {
       PetscCall(LinearMetisOrder(c, {}, &groups));
       try_this("METIS", groups);
     }
   }
-  k->ordering_used = best.name;
-  k->work          = best.work;
-  k->path_columns  = best.columns;
-  k->path_entries  = best.entries;
+  k->ordering_used   = best.name;
+  k->work            = best.work;
+  k->reached_columns = best.reached;
+  k->reached_entries = best.entries;
   order->swap(best.order);
   PetscFunctionReturn(0);
 }
 
 /*
-  KLU factors the transpose: its columns are our rows. A pair (q, lambda) is taken with the pivots a(q,q) and what is
-  left at (lambda,lambda) where the diagonal is the larger, and with a(q,lambda), a(lambda,q) otherwise. The entries
-  that fill in are the same.
+  The permutations P and Q for KLU, which factors the transpose: its columns are the rows of A. The pivots of a pair
+  (q, lambda) are a(q,q) and the Schur complement at (lambda,lambda) if the diagonal entry is the largest of the pair, and
+  a(q,lambda), a(lambda,q) otherwise. The fill is the same.
 */
 static void Permutations(const LinearRows &A, const Groups &g, const std::vector<PetscInt> &order,
                          const std::vector<PetscInt> &pivot, std::vector<PetscInt> *P, std::vector<PetscInt> *Q)
@@ -219,7 +223,7 @@ static void Permutations(const LinearRows &A, const Groups &g, const std::vector
   Q->clear();
   P->clear();
   for (size_t k = 0; k < order.size();) {
-    const PetscInt v = g.of[order[k]], count = g.start[v + 1] - g.start[v];
+    const PetscInt v = g.group_of[order[k]], count = g.start[v + 1] - g.start[v];
     PetscInt       i = order[k], j = pivot[i];
     if (count == 2) {
       if (size(i, i) < size(j, j)) std::swap(i, j);
@@ -239,22 +243,23 @@ static void Permutations(const LinearRows &A, const Groups &g, const std::vector
 }
 
 /*
-  A matrix with a full diagonal can fall into blocks that are solved one after the other, as where some unknowns are
-  only computed from others. KLU finds the blocks by itself, with a bound on the search that is quadratic at its worst.
+  A reducible matrix falls into diagonal blocks (BTF) that are solved one after the other, as where some unknowns are
+  only computed from others. KLU's own analysis is taken if it finds several blocks and predicts less fill. Only for matrices
+  with a full diagonal: for others KLU's search for pivots is slow (klupair.h).
 */
 static void TryBlocks(const LinearRows &rows, KluPair *k)
 {
-  if (k->pivots.zeros || k->whole || !k->given.empty() || k->ordering != KLUPAIR_AUTO) return;
+  if (k->pivots.zeros || k->single_block || !k->given_order.empty() || k->ordering != KLUPAIR_AUTO) return;
   const double unlimited = k->common.maxwork;
   k->common.btf          = 1;
-  k->common.maxwork      = BLOCK_SEARCH;
+  k->common.maxwork      = MAX_BTF_WORK;
   k->symbolic            = KLU(analyze)((KluInt)rows.n, KluIndices(rows.start), KluIndices(rows.col), &k->common);
   k->common.maxwork      = unlimited;
   k->common.btf          = 0;
   if (!k->symbolic) return;
-  const double entries = k->symbolic->lnz + k->symbolic->unz;
-  const bool   whole   = k->symbolic->structural_rank == (KluInt)rows.n;
-  if (whole && k->symbolic->nblocks > 1 && entries < 2 * k->work.factor) {
+  const double entries      = k->symbolic->lnz + k->symbolic->unz;
+  const bool   single_block = k->symbolic->structural_rank == (KluInt)rows.n;
+  if (single_block && k->symbolic->nblocks > 1 && entries < 2 * k->work.factor) {
     k->ordering_used = "AMD in diagonal blocks";
     k->work.factor   = 0.5 * entries;
     k->work.flops    = k->symbolic->est_flops / 2;
@@ -262,8 +267,8 @@ static void TryBlocks(const LinearRows &rows, KluPair *k)
     KLU(free_symbolic)(&k->symbolic, &k->common);
 }
 
-static PetscErrorCode AnalyseGiven(const LinearRows &rows, const Groups &g, const std::vector<PetscInt> &order,
-                                   KluPair *k)
+static PetscErrorCode AnalyseWithOrder(const LinearRows &rows, const Groups &g, const std::vector<PetscInt> &order,
+                                       KluPair *k)
 {
   std::vector<PetscInt> P, Q;
 
@@ -276,7 +281,7 @@ static PetscErrorCode AnalyseGiven(const LinearRows &rows, const Groups &g, cons
              "KLU's analysis of the matrix with %" PetscInt_FMT " rows failed with status %d", rows.n,
              (int)k->common.status);
   for (KluInt b = 0; b < k->symbolic->nblocks; ++b)
-    k->symbolic->Lnz[b] = k->work.factor; /* how much KLU allocates at first */
+    k->symbolic->Lnz[b] = k->work.factor; /* determines KLU's first allocation */
   PetscFunctionReturn(0);
 }
 
@@ -294,13 +299,13 @@ PetscErrorCode KluPairAnalyse(Mat A, const LinearRows &rows, KluPair *k)
   const Groups g = FindGroups(k->pivots.col);
   PetscCall(Order(graph, g, k, &order));
   TryBlocks(rows, k);
-  if (!k->symbolic) PetscCall(AnalyseGiven(rows, g, order, k));
-  k->tolerated = TOO_MUCH_FILL * 2 * k->work.factor;
+  if (!k->symbolic) PetscCall(AnalyseWithOrder(rows, g, order, k));
+  k->replan_entries = REPLAN_FILL * 2 * k->work.factor;
   ++k->analyses;
   PetscCall(PetscInfo(A,
                       "%" PetscInt_FMT " rows without diagonal, %" PetscInt_FMT " in pairs, %" PetscInt_FMT
                       " without a pivot, found in %g looks; %s: %g entries in L, %g operations\n",
-                      k->pivots.zeros, k->pivots.pairs, k->pivots.unmatched, k->pivots.looked, k->ordering_used,
+                      k->pivots.zeros, k->pivots.pairs, k->pivots.unmatched, k->pivots.edges_visited, k->ordering_used,
                       k->work.factor, k->work.flops));
   PetscFunctionReturn(0);
 }

@@ -1,13 +1,14 @@
+/* Pivots for "klupair": maximum matchings between rows without a diagonal value and columns, preferring symmetric pairs of large entries */
 #include "klupair_matching.h"
 #include <algorithm>
 
 typedef std::vector<PetscInt> Indices;
 
-/* ---- largest matching ---- */
+/* ---- maximum matching ---- */
 
-/* Breadth-first search from all free left vertices at once, down to the level where the first free right one is met */
+/* Breadth-first search from all unmatched left vertices at once, down to the level of the first unmatched right vertex; false if none is reached */
 static bool Levels(const LinearBipartite &G, const Indices &of_left, const Indices &of_right, Indices *level,
-                   double *looked)
+                   double *edges_visited)
 {
   const PetscInt n = (PetscInt)of_left.size();
   Indices        queue;
@@ -24,7 +25,7 @@ static bool Levels(const LinearBipartite &G, const Indices &of_left, const Indic
     if ((*level)[l] >= last) break;
     for (PetscInt k = G.start[l]; k < G.start[l + 1]; ++k) {
       const PetscInt owner = of_right[G.adj[k]];
-      *looked += 1;
+      *edges_visited += 1;
       if (owner < 0)
         last = (*level)[l] + 1;
       else if ((*level)[owner] < 0) {
@@ -36,10 +37,10 @@ static bool Levels(const LinearBipartite &G, const Indices &of_left, const Indic
   return last < PETSC_MAX_INT;
 }
 
-/* Depth-first search along the levels. next[l] moves on only, so that all searches of a sweep together look at every
-   edge once; an explicit stack, because paths can be as long as a chain of bodies. */
+/* Depth-first search for an augmenting path along the levels. next[l] only advances, so that all searches of a sweep together visit every
+   edge once. The stack is explicit because paths can be as long as a chain of bodies. */
 static bool Augment(const LinearBipartite &G, PetscInt root, Indices *of_left, Indices *of_right, Indices *level,
-                    Indices *next, double *looked)
+                    Indices *next, double *edges_visited)
 {
   Indices path(1, root);
   while (!path.empty()) {
@@ -50,7 +51,7 @@ static bool Augment(const LinearBipartite &G, PetscInt root, Indices *of_left, I
       continue;
     }
     const PetscInt owner = (*of_right)[G.adj[(*next)[l]++]];
-    *looked += 1;
+    *edges_visited += 1;
     if (owner < 0) {
       for (PetscInt v : path) {
         const PetscInt r = G.adj[(*next)[v] - 1];
@@ -65,17 +66,17 @@ static bool Augment(const LinearBipartite &G, PetscInt root, Indices *of_left, I
   return false;
 }
 
-void LinearMaximumMatching(const LinearBipartite &graph, Indices *of_left, Indices *of_right, double *looked)
+void LinearMaximumMatching(const LinearBipartite &graph, Indices *of_left, Indices *of_right, double *edges_visited)
 {
   Indices level;
-  while (Levels(graph, *of_left, *of_right, &level, looked)) {
+  while (Levels(graph, *of_left, *of_right, &level, edges_visited)) {
     Indices next(graph.start.begin(), graph.start.end() - 1);
     for (PetscInt l = 0; l < (PetscInt)of_left->size(); ++l)
-      if ((*of_left)[l] < 0 && level[l] == 0) Augment(graph, l, of_left, of_right, &level, &next, looked);
+      if ((*of_left)[l] < 0 && level[l] == 0) Augment(graph, l, of_left, of_right, &level, &next, edges_visited);
   }
 }
 
-/* ---- a good start for it ---- */
+/* ---- initial matching ---- */
 
 static LinearBipartite Transpose(const LinearBipartite &G)
 {
@@ -93,11 +94,12 @@ static LinearBipartite Transpose(const LinearBipartite &G)
 }
 
 /*
-  Left vertices with the fewest free neighbours first (Karp, Sipser 1981), each to the neighbour with the largest weight
-  per left vertex that could want it. Buckets hold left vertices by that number; one that is no longer right is skipped.
+  Matches left vertices with the fewest unmatched neighbours first (Karp, Sipser 1981), each with the neighbour of the largest
+  weight per adjacent left vertex. Buckets hold the left vertices by their number of unmatched neighbours; outdated entries
+  of buckets are skipped.
 */
 static void GreedyMatching(const LinearBipartite &G, const std::vector<PetscReal> &weight, Indices *of_left,
-                           Indices *of_right, double *looked)
+                           Indices *of_right, double *edges_visited)
 {
   const LinearBipartite T    = Transpose(G);
   const PetscInt        left = (PetscInt)of_left->size();
@@ -117,23 +119,23 @@ static void GreedyMatching(const LinearBipartite &G, const std::vector<PetscReal
     const PetscInt l = bucket[b].back();
     bucket[b].pop_back();
     if ((*of_left)[l] >= 0 || free_count[l] != (PetscInt)b) continue;
-    PetscInt  best  = -1;
-    PetscReal score = -1;
+    PetscInt  best       = -1;
+    PetscReal best_score = -1;
     for (PetscInt k = G.start[l]; k < G.start[l + 1]; ++k) {
       const PetscInt r = G.adj[k];
-      *looked += 1;
+      *edges_visited += 1;
       if ((*of_right)[r] >= 0) continue;
       const PetscReal s = weight[k] / (PetscReal)(T.start[r + 1] - T.start[r]);
-      if (s > score) {
-        score = s;
-        best  = r;
+      if (s > best_score) {
+        best_score = s;
+        best       = r;
       }
     }
     (*of_left)[l]     = best;
     (*of_right)[best] = l;
     for (PetscInt k = T.start[best]; k < T.start[best + 1]; ++k) {
       const PetscInt other = T.adj[k];
-      *looked += 1;
+      *edges_visited += 1;
       if ((*of_left)[other] >= 0 || --free_count[other] == 0) continue;
       bucket[free_count[other]].push_back(other);
       b = std::min(b, (size_t)free_count[other]);
@@ -149,10 +151,10 @@ static PetscReal Size(const LinearRows &A, PetscInt i, PetscInt j)
   return at < last && *at == j ? PetscAbsScalar(A.val[at - A.col]) : 0;
 }
 
-/* From the unknowns without diagonal to those with one, by entries that are nonzero on both sides; weights from 0 to 1
- */
-static void Candidates(const LinearRows &A, const Indices &zeros, const std::vector<bool> &is_zero, LinearBipartite *G,
-                       std::vector<PetscReal> *weight)
+/* Graph of possible pairs: joins unknowns without a diagonal value to those with one where a(i,j) and a(j,i) are both nonzero. The weight is
+   sqrt|a(i,j) a(j,i)|, divided by the largest of the row. */
+static void CollectPairs(const LinearRows &A, const Indices &zeros, const std::vector<bool> &is_zero, LinearBipartite *G,
+                         std::vector<PetscReal> *weight)
 {
   G->right = A.n;
   G->start.assign(1, 0);
@@ -187,8 +189,8 @@ static void KeepLarge(const LinearBipartite &all, const std::vector<PetscReal> &
   }
 }
 
-/* An entry below this part of the largest in its row is taken only where nothing else is left */
-static const PetscReal LARGE = 0.1;
+/* Pairs of a smaller weight, relative to the largest of the row, are taken only if the maximum matching needs them. KluPairPivots.LargeEntryIsPreferred. */
+static const PetscReal MIN_PAIR_WEIGHT = 0.1;
 
 static void PairZeros(const LinearRows &A, const Indices &zeros, const std::vector<bool> &is_zero, LinearPivots *pivots)
 {
@@ -196,11 +198,11 @@ static void PairZeros(const LinearRows &A, const Indices &zeros, const std::vect
   std::vector<PetscReal> weight, large_weight;
   Indices                of_zero(zeros.size(), -1), of_col(A.n, -1);
 
-  Candidates(A, zeros, is_zero, &all, &weight);
-  KeepLarge(all, weight, LARGE, &large, &large_weight);
-  GreedyMatching(large, large_weight, &of_zero, &of_col, &pivots->looked);
-  LinearMaximumMatching(large, &of_zero, &of_col, &pivots->looked);
-  LinearMaximumMatching(all, &of_zero, &of_col, &pivots->looked);
+  CollectPairs(A, zeros, is_zero, &all, &weight);
+  KeepLarge(all, weight, MIN_PAIR_WEIGHT, &large, &large_weight);
+  GreedyMatching(large, large_weight, &of_zero, &of_col, &pivots->edges_visited);
+  LinearMaximumMatching(large, &of_zero, &of_col, &pivots->edges_visited);
+  LinearMaximumMatching(all, &of_zero, &of_col, &pivots->edges_visited);
   for (size_t k = 0; k < zeros.size(); ++k)
     if (of_zero[k] >= 0) {
       pivots->col[zeros[k]]   = of_zero[k];
@@ -209,7 +211,7 @@ static void PairZeros(const LinearRows &A, const Indices &zeros, const std::vect
     }
 }
 
-/* Two unknowns without diagonal that are coupled and both still alone */
+/* Pairs coupled unknowns that both have no diagonal value and no partner yet */
 static void PairAmongZeros(const LinearRows &A, const Indices &zeros, LinearPivots *pivots)
 {
   for (PetscInt z : zeros) {
@@ -219,7 +221,7 @@ static void PairAmongZeros(const LinearRows &A, const Indices &zeros, LinearPivo
       const PetscInt j = A.col[k];
       if (j == z || pivots->col[j] >= 0) continue;
       const PetscReal w = PetscSqrtReal(PetscAbsScalar(A.val[k])) * PetscSqrtReal(Size(A, j, z));
-      pivots->looked += 1;
+      pivots->edges_visited += 1;
       if (w <= largest) continue;
       largest = w;
       best    = j;
@@ -231,7 +233,7 @@ static void PairAmongZeros(const LinearRows &A, const Indices &zeros, LinearPivo
   }
 }
 
-/* ---- what no pair can do: rows to columns ---- */
+/* ---- rows that no pair covers: matching of rows and columns ---- */
 
 static void MatchRows(const LinearRows &A, bool values, LinearPivots *pivots)
 {
@@ -245,10 +247,11 @@ static void MatchRows(const LinearRows &A, bool values, LinearPivots *pivots)
     G.start.push_back((PetscInt)G.adj.size());
     if (pivots->col[i] >= 0) of_col[pivots->col[i]] = i;
   }
-  LinearMaximumMatching(G, &pivots->col, &of_col, &pivots->looked);
+  LinearMaximumMatching(G, &pivots->col, &of_col, &pivots->edges_visited);
 }
 
-static void FillUp(LinearPivots *pivots)
+/* Structurally singular: any permutation does */
+static void AssignRemainingColumns(LinearPivots *pivots)
 {
   std::vector<bool> taken(pivots->col.size(), false);
   for (PetscInt c : pivots->col)
@@ -280,6 +283,6 @@ void LinearFindPivots(const LinearRows &A, LinearPivots *pivots)
   PairZeros(A, zeros, is_zero, pivots);
   if (!complete()) PairAmongZeros(A, zeros, pivots);
   if (!complete()) MatchRows(A, true, pivots);
-  if (!complete()) MatchRows(A, false, pivots); /* explicit zeros may get values later */
-  if (!complete()) FillUp(pivots);
+  if (!complete()) MatchRows(A, false, pivots); /* zeros stored in the pattern may get values later */
+  if (!complete()) AssignRemainingColumns(pivots);
 }

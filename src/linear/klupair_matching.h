@@ -1,4 +1,4 @@
-/* Which entry becomes the pivot of each row, where the diagonal has zeros */
+/* Chooses the pivot of each row, off the diagonal where the diagonal has zeros */
 #ifndef HHTDAE_LINEAR_KLUPAIR_MATCHING_H
 #define HHTDAE_LINEAR_KLUPAIR_MATCHING_H
 
@@ -18,17 +18,16 @@ struct LinearBipartite {
   std::vector<PetscInt> start, adj;
 };
 
-/* Extends a matching (-1: free) to a largest one; *looked grows by the number of edges looked at (Hopcroft, Karp 1973)
- */
+/* Extends a matching (-1: unmatched) to a maximum one (Hopcroft, Karp 1973); adds the number of edges visited to *edges_visited */
 void LinearMaximumMatching(const LinearBipartite &graph, std::vector<PetscInt> *of_left,
-                           std::vector<PetscInt> *of_right, double *looked);
+                           std::vector<PetscInt> *of_right, double *edges_visited);
 
 struct LinearPivots {
-  std::vector<PetscInt> col;       /* the pivot of row i stands in column col[i]: a permutation */
-  PetscInt              zeros = 0; /* rows without a value on the diagonal */
-  PetscInt              pairs = 0; /* ... of which so many have the pivots a(i,j) and a(j,i) together with a row j */
-  PetscInt              unmatched = 0; /* rows left without any pivot: the matrix is singular by its pattern */
-  double                looked    = 0; /* entries looked at by the search, to show what it costs */
+  std::vector<PetscInt> col;               /* the pivot of row i stands in column col[i]: a permutation */
+  PetscInt              zeros         = 0; /* rows without a value on the diagonal */
+  PetscInt              pairs         = 0; /* those of these rows that form a pair with a row j: the pivots are a(i,j) and a(j,i) */
+  PetscInt              unmatched     = 0; /* rows without a pivot: the matrix is structurally singular */
+  double                edges_visited = 0; /* by the search for pivots: a measure of its cost */
 };
 
 void LinearFindPivots(const LinearRows &A, LinearPivots *pivots);

@@ -1,19 +1,19 @@
-/* Numbers for the panels of "klupair": what the panels before contribute, the factors of each, how much entries grow */
+/* Numerical factorization by the panels of "klupair": contributions of earlier panels, factors of one panel, element growth */
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_panels.h"
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* Columns of panels before that are multiplied at a time */
-static const PetscInt SIDE_BY_SIDE = 256;
+/* Columns of earlier panels that one product multiplies: bounds the scratch memory */
+static const PetscInt MAX_BATCH_COLUMNS = 256;
 
-/* Costs in operations of a dense product: per entry copied, per entry added somewhere, per call of BLAS */
-static const double COPY = 15, ADD = 20, CALL = 5000;
+/* Costs in operations of a dense product: per entry copied to the batch, per entry of a product added to its target, per call of BLAS */
+static const double COST_COPY = 15, COST_ADD = 20, COST_CALL = 5000;
 
-/* Products with fewer operations are made by loops */
-static const double FEW = 1000;
+/* Smaller products, in operations, are computed by loops in place of BLAS */
+static const double MIN_BLAS_FLOPS = 1000;
 
-/* Largest allowed width + rows is that of a matrix with PETSc's indices for BLAS */
+/* BLAS' integers: they bound width + rows of a panel */
 typedef PetscBLASInt Int;
 
 /* ---- contributions ---- */
@@ -21,8 +21,8 @@ typedef PetscBLASInt Int;
 namespace
 {
 
-/* Rows of `lower` or of K and `upper` that others reach: before `last`, not before `first` */
-struct Reached {
+/* Range [first, last) of rows of `lower`, or of K and `upper`, of the active panel that receive contributions */
+struct RowRange {
   Int first, last;
   Int count() const { return last - first; }
   void add(PetscInt begin, PetscInt end)
@@ -32,16 +32,16 @@ struct Reached {
   }
 };
 
-/* The panel at work, and how many columns of others stand side by side in left and right */
-struct Work {
+/* The panel to which contributions are added, and the batch of columns of earlier panels that KluPanels::left and right hold side by side */
+struct ActivePanel {
   const KluPanel *q;
-  Int             width, left, right, columns; /* left: rows of `lower`; right: those of `upper` under K's own */
-  Reached         rows, cols;                  /* what stands side by side, of these */
+  Int             width, left, right, columns; /* left: rows of `lower`; right: width + rows of `upper`; columns: of the batch */
+  RowRange        rows, cols;                  /* rows of left and right that the batch holds */
 };
 
 } // namespace
 
-static PetscErrorCode Multiply(Work *w, KluPanels *p)
+static PetscErrorCode Multiply(ActivePanel *w, KluPanels *p)
 {
   const PetscScalar minus = -1, one = 1;
   const Int         rows = w->rows.count(), cols = w->cols.count(), below = w->right - w->width;
@@ -66,9 +66,9 @@ static PetscErrorCode Multiply(Work *w, KluPanels *p)
   PetscFunctionReturn(0);
 }
 
-/* `count` rows of a matrix to the rows of another one with the given numbers, less the first it has; the rest of it is zero */
-static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt columns, const PetscInt places[],
-                   const PetscInt row_of[], const Reached &reached, double to[])
+/* Copies `count` rows of a matrix to the rows row_of[places[i]] - reached.first of another one; sets its other rows to zero */
+static void ScatterColumns(const double from[], PetscInt ld, PetscInt count, PetscInt columns, const PetscInt places[],
+                           const PetscInt row_of[], const RowRange &reached, double to[])
 {
   const PetscInt rows = reached.count(), first = count ? row_of[places[0]] - reached.first : 0;
   if (count && row_of[places[count - 1]] - reached.first == first + count - 1) { /* without gaps */
@@ -87,9 +87,9 @@ static void Spread(const double from[], PetscInt ld, PetscInt count, PetscInt co
 namespace
 {
 
-/* Where the panel before lies in the values, and its parts that count: rows after those of K only together with columns
-   of K, and the other way round */
-struct Source {
+/* The values of an earlier panel, and the sizes of its parts that contribute to the active one, whose places are K: rows after K contribute only
+   together with columns of K, and columns after K only with rows of K */
+struct SourceView {
   const KluPanelSource *s;
   PetscInt              width, ld_lower, ld_upper, rows, cols, inner_rows, inner_cols;
   const double         *lower, *upper;
@@ -98,10 +98,10 @@ struct Source {
 
 } // namespace
 
-static Source Look(const KluPanels &p, const KluPanelSource &s)
+static SourceView ViewSource(const KluPanels &p, const KluPanelSource &s)
 {
   const KluPanel &q = p.panel[s.panel];
-  Source          v;
+  SourceView      v;
   v.s          = &s;
   v.width      = q.width;
   v.ld_lower   = q.width + q.rows.count;
@@ -120,8 +120,8 @@ static Source Look(const KluPanels &p, const KluPanelSource &s)
 namespace
 {
 
-/* Columns of a narrow panel that reach a part of the panel at work: to(row_of[row], col) -= (a b^T)(row, col) */
-struct Product {
+/* The contribution of a narrow panel to a part of the active panel: to(row_of[row], col) -= (a b^T)(row, col) */
+struct NarrowProduct {
   const double   *a, *b;
   PetscInt        lda, ldb, rows, cols, width;
   const PetscInt *row, *col, *row_of;
@@ -129,7 +129,7 @@ struct Product {
 
 } // namespace
 
-static void SubtractLoop(const Product &m, PetscInt first, PetscInt ld, double to[])
+static void SubtractLoop(const NarrowProduct &m, PetscInt first, PetscInt ld, double to[])
 {
   for (PetscInt j = 0; j < m.cols; ++j) {
     double *t = to + (size_t)(m.col[j] - first) * ld;
@@ -141,7 +141,7 @@ static void SubtractLoop(const Product &m, PetscInt first, PetscInt ld, double t
   }
 }
 
-static PetscErrorCode Subtract(const Product &m, PetscInt first, PetscInt ld, double to[], std::vector<double> *scratch)
+static PetscErrorCode Subtract(const NarrowProduct &m, PetscInt first, PetscInt ld, double to[], std::vector<double> *scratch)
 {
   const Int         rows = (Int)m.rows, cols = (Int)m.cols, width = (Int)m.width, lda = (Int)m.lda, ldb = (Int)m.ldb;
   const PetscScalar zero = 0, one = 1;
@@ -149,7 +149,7 @@ static PetscErrorCode Subtract(const Product &m, PetscInt first, PetscInt ld, do
 
   PetscFunctionBegin;
   if (!size) PetscFunctionReturn(0);
-  if (2 * (double)size * (double)width < FEW) {
+  if (2 * (double)size * (double)width < MIN_BLAS_FLOPS) {
     SubtractLoop(m, first, ld, to);
     PetscFunctionReturn(0);
   }
@@ -164,42 +164,42 @@ static PetscErrorCode Subtract(const Product &m, PetscInt first, PetscInt ld, do
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode Scatter(const Source &v, const Work &w, KluPanels *p)
+static PetscErrorCode SubtractDirectly(const SourceView &v, const ActivePanel &w, KluPanels *p)
 {
-  const Product to_lower = {v.lower,      v.upper, v.ld_lower, v.ld_upper, v.rows,
-                            v.inner_cols, v.width, v.row,      v.col,      p->row_of.data()};
-  const Product to_upper = {v.upper + v.inner_cols, v.lower, v.ld_upper,           v.ld_lower, v.cols - v.inner_cols,
-                            v.inner_rows,           v.width, v.col + v.inner_cols, v.row,      p->col_of.data()};
+  const NarrowProduct to_lower = {v.lower, v.upper, v.ld_lower, v.ld_upper, v.rows,
+                                  v.inner_cols, v.width, v.row, v.col, p->row_of.data()};
+  const NarrowProduct to_upper = {v.upper + v.inner_cols, v.lower, v.ld_upper, v.ld_lower, v.cols - v.inner_cols,
+                                  v.inner_rows, v.width, v.col + v.inner_cols, v.row, p->col_of.data()};
   PetscFunctionBegin;
   PetscCall(Subtract(to_lower, w.q->first, w.left, p->value.data() + w.q->lower, &p->product));
   PetscCall(Subtract(to_upper, w.q->first, w.right - w.width, p->value.data() + w.q->upper - w.width, &p->product));
   PetscFunctionReturn(0);
 }
 
-static bool BetterScattered(const Source &v, const Work &w)
+static bool DirectIsFaster(const SourceView &v, const ActivePanel &w)
 {
   const double columns = (double)v.width, copied = (double)w.left + (double)w.right, all = copied - (double)w.width;
   const double reached = (double)v.rows * (double)v.inner_cols + (double)(v.cols - v.inner_cols) * (double)v.inner_rows;
-  return reached * (2 * columns + ADD) + CALL <
-         columns * (all * 2 * (double)w.width + copied * COPY);
+  return reached * (2 * columns + COST_ADD) + COST_CALL <
+         columns * (all * 2 * (double)w.width + copied * COST_COPY);
 }
 
-/* What the sources that are not scattered reach of this panel; places ascend, and so do their numbers in it */
-static void FindReached(Work *w, const KluPanels &p)
+/* Ranges of the active panel that the sources of the batch contribute to; places ascend, and so do their rows in it */
+static void FindTargetRanges(ActivePanel *w, const KluPanels &p)
 {
   w->rows = {w->left, 0};
   w->cols = {w->right, 0};
   for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
-    const Source v = Look(p, p.source[k]);
-    if (!v.rows || !v.cols || BetterScattered(v, *w)) continue;
+    const SourceView v = ViewSource(p, p.source[k]);
+    if (!v.rows || !v.cols || DirectIsFaster(v, *w)) continue;
     w->rows.add(p.row_of[v.row[0]], p.row_of[v.row[v.rows - 1]] + 1);
     w->cols.add(p.col_of[v.col[0]], p.col_of[v.col[v.cols - 1]] + 1);
   }
 }
 
-/* Columns from the first one on that do, or do not, contribute: the part that counts is zero neither in `lower` nor in
-   `upper` */
-static PetscInt Alike(const Source &v, PetscInt first, PetscInt end, bool *live)
+/* Number of columns from the first one on that all contribute, or all do not. A column contributes if its relevant parts of `lower` and of `upper`
+   are both nonzero. */
+static PetscInt ContributingRun(const SourceView &v, PetscInt first, PetscInt end, bool *contributing)
 {
   const auto zero        = [](double e) { return e == 0; };
   const auto contributes = [&](PetscInt c) {
@@ -207,31 +207,31 @@ static PetscInt Alike(const Source &v, PetscInt first, PetscInt end, bool *live)
     return !std::all_of(x, x + v.rows, zero) && !std::all_of(y, y + v.cols, zero);
   };
   PetscInt last = first + 1;
-  *live         = contributes(first);
-  while (last < end && contributes(last) == *live) ++last;
+  *contributing = contributes(first);
+  while (last < end && contributes(last) == *contributing) ++last;
   return last - first;
 }
 
-static PetscErrorCode Collect(Work *w, KluPanels *p)
+static PetscErrorCode SubtractContributions(ActivePanel *w, KluPanels *p)
 {
   PetscFunctionBegin;
-  FindReached(w, *p);
+  FindTargetRanges(w, *p);
   for (PetscInt k = w->q->source; k < w->q->source + w->q->sources; ++k) {
-    const Source v = Look(*p, p->source[k]);
+    const SourceView v = ViewSource(*p, p->source[k]);
     if (!v.rows || !v.cols) continue;
-    if (BetterScattered(v, *w)) {
-      PetscCall(Scatter(v, *w, p));
+    if (DirectIsFaster(v, *w)) {
+      PetscCall(SubtractDirectly(v, *w, p));
       continue;
     }
     for (PetscInt done = 0, count; done < v.width; done += count) {
-      bool live;
-      if (w->columns == SIDE_BY_SIDE) PetscCall(Multiply(w, p));
-      count = Alike(v, done, PetscMin(v.width, done + SIDE_BY_SIDE - (PetscInt)w->columns), &live);
-      if (!live) continue;
-      Spread(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->rows,
-             p->left.data() + (size_t)w->columns * w->rows.count());
-      Spread(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->cols,
-             p->right.data() + (size_t)w->columns * w->cols.count());
+      bool contributing;
+      if (w->columns == MAX_BATCH_COLUMNS) PetscCall(Multiply(w, p));
+      count = ContributingRun(v, done, PetscMin(v.width, done + MAX_BATCH_COLUMNS - (PetscInt)w->columns), &contributing);
+      if (!contributing) continue;
+      ScatterColumns(v.lower + (size_t)done * v.ld_lower, v.ld_lower, v.rows, count, v.row, p->row_of.data(), w->rows,
+                     p->left.data() + (size_t)w->columns * w->rows.count());
+      ScatterColumns(v.upper + (size_t)done * v.ld_upper, v.ld_upper, v.cols, count, v.col, p->col_of.data(), w->cols,
+                     p->right.data() + (size_t)w->columns * w->cols.count());
       w->columns += (Int)count;
     }
   }
@@ -263,7 +263,7 @@ static PetscErrorCode DivideWide(Int n, const double a[], Int ld, double x[], In
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
+static PetscErrorCode FactorPanel(const ActivePanel &w, KluPanels *p, bool *good)
 {
   const PetscInt n = w.width, rows = w.q->rows.count, cols = w.q->cols.count;
   double        *a = p->value.data() + w.q->lower, *x = a + n, *y = p->value.data() + w.q->upper;
@@ -293,8 +293,8 @@ static PetscErrorCode FactorPanel(const Work &w, KluPanels *p, bool *good)
 
 static double Larger(double a, double b) { return a > b ? a : b; }
 
-/* The largest entries of U in its columns; false where a pivot is not finite */
-static bool MeasurePanel(const KluPanel &q, KluPanels *p)
+/* Updates the largest entry of each column of U in factor_size; false if a pivot is zero or not finite */
+static bool MeasureEntries(const KluPanel &q, KluPanels *p)
 {
   const double  *a = p->value.data() + q.lower, *y = p->value.data() + q.upper;
   const PetscInt ld = q.width + q.rows.count, cols = q.cols.count;
@@ -319,15 +319,15 @@ static double ReciprocalGrowth(const KluPanels &p)
   return smallest;
 }
 
-/* ---- all together ---- */
+/* ---- assembly and factorization ---- */
 
 namespace
 {
 
-/* The largest absolute values of two halves of what was looked at: one would wait for itself */
+/* Two running maxima of absolute values: with a single one every comparison would wait for the result of the one before */
 struct Largest {
   double even = 0, odd = 0;
-  void   see(double a, double b)
+  void   update(double a, double b)
   {
     even = Larger(PetscAbsReal(a), even);
     odd  = Larger(PetscAbsReal(b), odd);
@@ -343,38 +343,38 @@ static void CopyRun(const double *PETSC_RESTRICT from, PetscInt count, double *P
   for (; i + 2 <= count; i += 2) {
     to[i]     = from[i];
     to[i + 1] = from[i + 1];
-    l.see(from[i], from[i + 1]);
+    l.update(from[i], from[i + 1]);
   }
   if (i < count) {
     to[i] = from[i];
-    l.see(from[i], 0);
+    l.update(from[i], 0);
   }
   *largest = l;
 }
 
-/* Entries from the number `outer` on are between diagonal blocks and do not count */
-template <bool has_outer>
-static void CopyEach(const double *PETSC_RESTRICT from, PetscInt count, const PetscInt *PETSC_RESTRICT target, size_t outer,
+/* Copies entries to value[target[e]]. Entries with targets from `off_block` on lie between diagonal blocks and do not enter the maximum. */
+template <bool has_off_block>
+static void CopyEach(const double *PETSC_RESTRICT from, PetscInt count, const PetscInt *PETSC_RESTRICT target, size_t off_block,
                      double *PETSC_RESTRICT value, Largest *largest)
 {
-  const auto inner = [&](PetscInt e) { return !has_outer || (size_t)target[e] < outer ? from[e] : 0; };
+  const auto inner = [&](PetscInt e) { return !has_off_block || (size_t)target[e] < off_block ? from[e] : 0; };
   Largest    l     = *largest;
   PetscInt   e     = 0;
   for (; e + 2 <= count; e += 2) {
     value[target[e]]     = from[e];
     value[target[e + 1]] = from[e + 1];
-    l.see(inner(e), inner(e + 1));
+    l.update(inner(e), inner(e + 1));
   }
   if (e < count) {
     value[target[e]] = from[e];
-    l.see(inner(e), 0);
+    l.update(inner(e), 0);
   }
   *largest = l;
 }
 
-/* The entries go to their places, and the largest of each column is noted, of those inside of diagonal blocks. Rows of the
-   PETSc matrix are columns for KLU. */
-template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels *p)
+/* Copies the entries of the matrix into the panels, and stores the largest of each column within diagonal blocks in matrix_size. Rows of the
+   PETSc matrix are KLU's columns. */
+template <bool has_off_block> static void Assemble(const LinearRows &rows, KluPanels *p)
 {
   double         *value  = p->value.data();
   const PetscInt *target = p->target.data();
@@ -382,7 +382,7 @@ template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels
   for (PetscInt k = 0; k < p->n; ++k) {
     Largest    largest;
     PetscInt   e         = rows.start[p->col[k]];
-    const auto each_upto = [&](PetscInt end) { CopyEach<has_outer>(rows.val + e, end - e, target + e, p->outer_values, value, &largest); };
+    const auto each_upto = [&](PetscInt end) { CopyEach<has_off_block>(rows.val + e, end - e, target + e, p->off_block_values, value, &largest); };
     for (PetscInt r = p->run_start[k]; r < p->run_start[k + 1]; ++r) {
       const KluRun &run = p->run[r];
       each_upto(run.entry);
@@ -394,33 +394,33 @@ template <bool has_outer> static void Assemble(const LinearRows &rows, KluPanels
   }
 }
 
-static Work Begin(const KluPanel &q, KluPanels *p)
+static ActivePanel Activate(const KluPanel &q, KluPanels *p)
 {
-  const Work w = {&q, (Int)q.width, (Int)(q.width + q.rows.count), (Int)(q.width + q.cols.count), 0, {0, 0}, {0, 0}};
+  const ActivePanel w = {&q, (Int)q.width, (Int)(q.width + q.rows.count), (Int)(q.width + q.cols.count), 0, {0, 0}, {0, 0}};
   KluPanelsSetPlaces(q, p);
-  const size_t left = (size_t)w.left * SIDE_BY_SIDE, right = (size_t)w.right * SIDE_BY_SIDE;
+  const size_t left = (size_t)w.left * MAX_BATCH_COLUMNS, right = (size_t)w.right * MAX_BATCH_COLUMNS;
   if (p->left.size() < left) p->left.resize(left);
   if (p->right.size() < right) p->right.resize(right);
   return w;
 }
 
-PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *growth)
+PetscErrorCode KluPanelsFactor(const LinearRows &rows, KluPanels *p, double *reciprocal_growth)
 {
   PetscFunctionBegin;
-  *growth = 0;
-  if (p->outer.empty())
+  *reciprocal_growth = 0;
+  if (p->off_block.empty())
     Assemble<false>(rows, p);
   else
     Assemble<true>(rows, p);
   std::fill(p->factor_size.begin(), p->factor_size.end(), 0.0);
   for (const KluPanel &q : p->panel) {
-    bool good = false;
-    Work w    = Begin(q, p);
-    PetscCall(Collect(&w, p));
+    bool        good = false;
+    ActivePanel w    = Activate(q, p);
+    PetscCall(SubtractContributions(&w, p));
     PetscCall(FactorPanel(w, p, &good));
-    if (!good || !MeasurePanel(q, p)) PetscFunctionReturn(0);
+    if (!good || !MeasureEntries(q, p)) PetscFunctionReturn(0);
   }
-  *growth = ReciprocalGrowth(*p);
+  *reciprocal_growth = ReciprocalGrowth(*p);
   PetscFunctionReturn(0);
 }
 

@@ -1,10 +1,9 @@
 /*
-  Narrow panels of "klupair": factors of their blocks, and what these make of the long columns below.
+  Narrow panels of "klupair": LU of their diagonal blocks, and the elimination of the columns below.
 
-  Calls of LAPACK and BLAS cost more than the work in such blocks, which are mostly zeros besides: coordinates that
-  constraints of their own hold have unit matrices for pivots. Zeros are looked for and left out, and so are, in solves,
-  the long columns that have nothing else. As in
-  src/scene/modal_products.cpp the loops over long columns are compiled twice, and the processor at hand decides.
+  Calls of LAPACK and BLAS cost more than the work in such blocks, which moreover consist mostly of zeros: the pivot block of
+  coordinates with constraints of their own is a unit matrix. Zero factors, and in solves zero columns, are skipped. As in
+  src/scene/modal_products.cpp the loops over long columns are compiled with and without AVX2, and the processor decides.
 */
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_panels.h"
@@ -12,10 +11,10 @@
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 #if defined(__x86_64__) && defined(__GNUC__)
-#define NEWER __attribute__((target("avx2,fma")))
+#define AVX2 __attribute__((target("avx2,fma")))
 #endif
 
-/* A pivot must have a reciprocal */
+/* Smaller pivots count as zero, so that reciprocals are finite */
 static const double SMALLEST_PIVOT = 1e-300;
 
 typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
@@ -25,8 +24,8 @@ typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
 namespace
 {
 
-/* Columns and their factors, in so many rows: to = (to - sum of them) scale */
-struct Sum {
+/* to = (to - sum_k factor[k] column[k]) scale, for `rows` rows and `count` columns */
+struct ColumnSum {
   PetscInt      rows, count;
   double       *to, scale;
   const double *column[KLU_PANELS_NARROW];
@@ -35,7 +34,7 @@ struct Sum {
 
 } // namespace
 
-template <int columns> ALWAYS_INLINE void TakeSome(const Sum &s, PetscInt first, double scale)
+template <int columns> ALWAYS_INLINE void SubtractColumns(const ColumnSum &s, PetscInt first, double scale)
 {
   const double *x[4];
   double        f[4];
@@ -57,23 +56,23 @@ template <int columns> ALWAYS_INLINE void TakeSome(const Sum &s, PetscInt first,
   }
 }
 
-ALWAYS_INLINE void TakeAll(const Sum &s)
+ALWAYS_INLINE void SubtractAllColumns(const ColumnSum &s)
 {
   PetscInt k = 0;
-  for (; k + 4 < s.count; k += 4) TakeSome<4>(s, k, 1);
+  for (; k + 4 < s.count; k += 4) SubtractColumns<4>(s, k, 1);
   switch (s.count - k) {
-  case 4: return TakeSome<4>(s, k, s.scale);
-  case 3: return TakeSome<3>(s, k, s.scale);
-  case 2: return TakeSome<2>(s, k, s.scale);
-  case 1: return TakeSome<1>(s, k, s.scale);
+  case 4: return SubtractColumns<4>(s, k, s.scale);
+  case 3: return SubtractColumns<3>(s, k, s.scale);
+  case 2: return SubtractColumns<2>(s, k, s.scale);
+  case 1: return SubtractColumns<1>(s, k, s.scale);
   }
-  if (s.scale != 1) TakeSome<0>(s, k, s.scale);
+  if (s.scale != 1) SubtractColumns<0>(s, k, s.scale);
 }
 
-/* Of up to four columns, what each makes of x */
+/* Dot products of `columns` columns, at most four, with x */
 template <int columns> ALWAYS_INLINE void Dots(PetscInt rows, const double *const column[], const double x[], double dot[])
 {
-  Four     sum[columns] = {}, next[columns] = {}; /* one would wait for itself */
+  Four     sum[columns] = {}, next[columns] = {}; /* two accumulators hide the latency of the addition */
   PetscInt i            = 0;
   for (; i + 8 <= rows; i += 8)
     for (int c = 0; c < columns; ++c) {
@@ -94,20 +93,20 @@ ALWAYS_INLINE void AllDots(PetscInt rows, PetscInt count, const double *const co
   for (; k < count; ++k) Dots<1>(rows, column + k, x, dot + k);
 }
 
-typedef void Take(const Sum &);
-typedef void Dot(PetscInt, PetscInt, const double *const[], const double[], double[]);
+typedef void SubtractKernel(const ColumnSum &);
+typedef void DotKernel(PetscInt, PetscInt, const double *const[], const double[], double[]);
 
-static void TakePlain(const Sum &s) { TakeAll(s); }
+static void SubtractPlain(const ColumnSum &s) { SubtractAllColumns(s); }
 static void DotsPlain(PetscInt n, PetscInt m, const double *const a[], const double x[], double y[]) { AllDots(n, m, a, x, y); }
-#if defined(NEWER)
-NEWER static void TakeNewer(const Sum &s) { TakeAll(s); }
-NEWER static void DotsNewer(PetscInt n, PetscInt m, const double *const a[], const double x[], double y[]) { AllDots(n, m, a, x, y); }
-static const bool newer      = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-static Take *const take      = newer ? TakeNewer : TakePlain;
-static Dot *const  make_dots = newer ? DotsNewer : DotsPlain;
+#if defined(AVX2)
+AVX2 static void SubtractAVX2(const ColumnSum &s) { SubtractAllColumns(s); }
+AVX2 static void DotsAVX2(PetscInt n, PetscInt m, const double *const a[], const double x[], double y[]) { AllDots(n, m, a, x, y); }
+static const bool            has_avx2         = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+static SubtractKernel *const subtract_columns = has_avx2 ? SubtractAVX2 : SubtractPlain;
+static DotKernel *const      dot_products     = has_avx2 ? DotsAVX2 : DotsPlain;
 #else
-static Take *const take      = TakePlain;
-static Dot *const  make_dots = DotsPlain;
+static SubtractKernel *const subtract_columns = SubtractPlain;
+static DotKernel *const      dot_products     = DotsPlain;
 #endif
 
 /* ---- factors ---- */
@@ -133,27 +132,27 @@ bool KluPanelsFactorNarrow(PetscInt n, double a[], PetscInt ld, PetscInt exchang
   return true;
 }
 
-/* Column c of X or Y: the columns before it with the factors f(k) */
-static void TakeOut(PetscInt c, double x[], PetscInt ld, PetscInt rows, const double f[], PetscInt step, double scale)
+/* Column c of X or Y: subtracts f(k) times each column k before it, and scales */
+static void EliminateColumn(PetscInt c, double x[], PetscInt ld, PetscInt rows, const double f[], PetscInt step, double scale)
 {
-  Sum s   = Sum();
-  s.rows  = rows;
-  s.to    = x + c * ld;
-  s.scale = scale;
+  ColumnSum s = ColumnSum();
+  s.rows      = rows;
+  s.to        = x + c * ld;
+  s.scale     = scale;
   for (PetscInt k = 0; k < c; ++k) {
     if (f[k * step] == 0) continue;
     s.column[s.count]   = x + k * ld;
     s.factor[s.count++] = f[k * step];
   }
-  take(s);
+  subtract_columns(s);
 }
 
 void KluPanelsDivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[], PetscInt rows, double y[],
                            PetscInt cols)
 {
   for (PetscInt c = 0; c < n; ++c) {
-    TakeOut(c, x, ld, rows, a + c * ld, 1, 1 / a[c + c * ld]);
-    TakeOut(c, y, cols, cols, a + c, ld, 1);
+    EliminateColumn(c, x, ld, rows, a + c * ld, 1, 1 / a[c + c * ld]);
+    EliminateColumn(c, y, cols, cols, a + c, ld, 1);
   }
 }
 
@@ -162,16 +161,16 @@ void KluPanelsDivideNarrow(PetscInt n, const double a[], PetscInt ld, double x[]
 void KluPanelsSubtractNarrow(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const char zero[],
                              const double x[], double y[])
 {
-  Sum s   = Sum();
-  s.rows  = rows;
-  s.to    = y;
-  s.scale = 1;
+  ColumnSum s = ColumnSum();
+  s.rows      = rows;
+  s.to        = y;
+  s.scale     = 1;
   for (PetscInt k = 0; k < cols; ++k) {
     if (zero && zero[k]) continue;
     s.column[s.count]   = a + k * ld;
     s.factor[s.count++] = x[k];
   }
-  take(s);
+  subtract_columns(s);
 }
 
 void KluPanelsSubtractTransposedNarrow(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const char zero[],
@@ -179,14 +178,14 @@ void KluPanelsSubtractTransposedNarrow(PetscInt rows, PetscInt cols, const doubl
 {
   const double *column[KLU_PANELS_NARROW] = {};
   double        dot[KLU_PANELS_NARROW];
-  PetscInt      of[KLU_PANELS_NARROW], count = 0;
+  PetscInt      column_number[KLU_PANELS_NARROW], count = 0;
   for (PetscInt k = 0; k < cols; ++k) {
     if (zero && zero[k]) continue;
-    column[count] = a + k * ld;
-    of[count++]   = k;
+    column[count]          = a + k * ld;
+    column_number[count++] = k;
   }
-  make_dots(rows, count, column, x, dot);
-  for (PetscInt k = 0; k < count; ++k) y[of[k]] -= dot[k];
+  dot_products(rows, count, column, x, dot);
+  for (PetscInt k = 0; k < count; ++k) y[column_number[k]] -= dot[k];
 }
 
 #endif

@@ -1,21 +1,21 @@
 /*
   Solves with the panels of "klupair".
 
-  With M = L U by blocks, where the pivots of a panel are P L_K U_K, the places of a panel and what it reaches are taken
-  together into one dense vector; a range of columns at a time is solved entry by entry, and the rest of the range's
-  columns is a product of a dense matrix with a vector.
+  M = L U by blocks; the diagonal block of a panel is P L_K U_K. The components of the vector at the places that a panel reaches are
+  gathered into a dense vector. Within a panel BLOCK_COLUMNS columns at a time are solved entry by entry, and the rows
+  outside of these columns by a product of a dense matrix with a vector.
 */
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_panels.h"
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* Columns solved entry by entry at a time; products with fewer entries than SMALL are made here */
-static const PetscInt CHUNK = KLU_PANELS_NARROW, SMALL = 200;
+/* Columns solved entry by entry at a time; products of matrices with fewer than MIN_BLAS_ENTRIES entries are computed by loops in place of BLAS */
+static const PetscInt BLOCK_COLUMNS = KLU_PANELS_NARROW, MIN_BLAS_ENTRIES = 200;
 
 /* ---- dense matrices times vectors ---- */
 
-/* y -= A x; columns of A may be known to be zero */
+/* y -= A x; zero[k]: column k of A is zero */
 static PetscErrorCode Subtract(PetscInt rows, PetscInt cols, const double a[], PetscInt ld, const double x[],
                                double y[], const char zero[] = NULL)
 {
@@ -27,7 +27,7 @@ static PetscErrorCode Subtract(PetscInt rows, PetscInt cols, const double a[], P
     KluPanelsSubtractNarrow(rows, cols, a, ld, zero, x, y);
     PetscFunctionReturn(0);
   }
-  if (rows * cols > SMALL) {
+  if (rows * cols > MIN_BLAS_ENTRIES) {
     PetscCallBLAS("BLASgemv", BLASgemv_("N", &m, &n, &minus, a, &lda, x, &step, &one, y, &step));
     PetscFunctionReturn(0);
   }
@@ -48,7 +48,7 @@ static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const dou
     KluPanelsSubtractTransposedNarrow(rows, cols, a, ld, zero, x, y);
     PetscFunctionReturn(0);
   }
-  if (rows * cols > SMALL) {
+  if (rows * cols > MIN_BLAS_ENTRIES) {
     PetscCallBLAS("BLASgemv", BLASgemv_("T", &m, &n, &minus, a, &lda, x, &step, &one, y, &step));
     PetscFunctionReturn(0);
   }
@@ -65,17 +65,17 @@ static PetscErrorCode SubtractTransposed(PetscInt rows, PetscInt cols, const dou
 namespace
 {
 
-struct Panel {
+struct PanelView {
   PetscInt        width, ld, rows, cols;
   const double   *lower, *upper;
   const PetscInt *row, *col, *exchange;
   const char     *zero_lower, *zero_upper;
-  double         *x, *y; /* its own part of the vector; scratch for what it reaches */
+  double         *x, *y; /* the panel's part of the vector; scratch for the places that it reaches */
 };
 
 } // namespace
 
-static Panel Look(const KluPanel &q, KluPanels *p)
+static PanelView ViewPanel(const KluPanel &q, KluPanels *p)
 {
   return {q.width,
           q.width + q.rows.count,
@@ -92,8 +92,8 @@ static Panel Look(const KluPanel &q, KluPanels *p)
           p->y.data()};
 }
 
-/* Places without gaps: vectors are used where they are */
-static bool Together(const PetscInt place[], PetscInt count) { return count && place[count - 1] - place[0] == count - 1; }
+/* Consecutive places need no gathering */
+static bool AreConsecutive(const PetscInt place[], PetscInt count) { return count && place[count - 1] - place[0] == count - 1; }
 
 static void Gather(const double x[], const PetscInt place[], PetscInt count, double y[])
 {
@@ -105,20 +105,20 @@ static void Scatter(const double y[], const PetscInt place[], PetscInt count, do
   for (PetscInt i = 0; i < count; ++i) x[place[i]] += y[i];
 }
 
-/* Exchanges, L^-1, and what follows from it further on */
-static PetscErrorCode LowerForward(const Panel &q, double x[])
+/* Row exchanges and L_K^-1; subtracts L(R,K) x_K from the components R */
+static PetscErrorCode LowerForward(const PanelView &q, double x[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < q.width; ++k)
     if (q.exchange[k] != k) std::swap(q.x[k], q.x[q.exchange[k]]);
   for (PetscInt first = 0, last; first < q.width; first = last) {
-    last = PetscMin(first + CHUNK, q.width);
+    last = PetscMin(first + BLOCK_COLUMNS, q.width);
     for (PetscInt j = first; j < last; ++j)
       for (PetscInt i = j + 1; i < last; ++i) q.x[i] -= q.lower[i + j * q.ld] * q.x[j];
     PetscCall(Subtract(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + first, q.x + last));
   }
   const double *below = q.lower + q.width;
-  if (Together(q.row, q.rows)) {
+  if (AreConsecutive(q.row, q.rows)) {
     PetscCall(Subtract(q.rows, q.width, below, q.ld, q.x, x + q.row[0], q.zero_lower));
     PetscFunctionReturn(0);
   }
@@ -128,15 +128,15 @@ static PetscErrorCode LowerForward(const Panel &q, double x[])
   PetscFunctionReturn(0);
 }
 
-/* What is known further on goes in, L^-T, exchanges back */
-static PetscErrorCode LowerBackward(const Panel &q, const double x[])
+/* Subtracts L(R,K)^T x_R from x_K, applies L_K^-T and the inverse row exchanges */
+static PetscErrorCode LowerBackward(const PanelView &q, const double x[])
 {
   PetscFunctionBegin;
-  const double *known = Together(q.row, q.rows) ? x + q.row[0] : q.y;
-  if (known == q.y) Gather(x, q.row, q.rows, q.y);
-  PetscCall(SubtractTransposed(q.rows, q.width, q.lower + q.width, q.ld, known, q.x, q.zero_lower));
+  const double *later = AreConsecutive(q.row, q.rows) ? x + q.row[0] : q.y;
+  if (later == q.y) Gather(x, q.row, q.rows, q.y);
+  PetscCall(SubtractTransposed(q.rows, q.width, q.lower + q.width, q.ld, later, q.x, q.zero_lower));
   for (PetscInt last = q.width, first; last > 0; last = first) {
-    first = (last - 1) / CHUNK * CHUNK;
+    first = (last - 1) / BLOCK_COLUMNS * BLOCK_COLUMNS;
     PetscCall(SubtractTransposed(q.width - last, last - first, q.lower + last + first * q.ld, q.ld, q.x + last,
                                  q.x + first));
     for (PetscInt j = last; j-- > first;) {
@@ -150,12 +150,12 @@ static PetscErrorCode LowerBackward(const Panel &q, const double x[])
   PetscFunctionReturn(0);
 }
 
-/* U^-T, and what follows from it further on */
-static PetscErrorCode UpperForward(const Panel &q, double x[])
+/* U_K^-T; subtracts U(K,C)^T x_K from the components C */
+static PetscErrorCode UpperForward(const PanelView &q, double x[])
 {
   PetscFunctionBegin;
   for (PetscInt first = 0, last; first < q.width; first = last) {
-    last = PetscMin(first + CHUNK, q.width);
+    last = PetscMin(first + BLOCK_COLUMNS, q.width);
     PetscCall(SubtractTransposed(first, last - first, q.lower + first * q.ld, q.ld, q.x, q.x + first));
     for (PetscInt j = first; j < last; ++j) {
       double rest = q.x[j];
@@ -163,7 +163,7 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
       q.x[j] = rest / q.lower[j + j * q.ld];
     }
   }
-  if (Together(q.col, q.cols)) {
+  if (AreConsecutive(q.col, q.cols)) {
     PetscCall(Subtract(q.cols, q.width, q.upper, q.cols, q.x, x + q.col[0], q.zero_upper));
     PetscFunctionReturn(0);
   }
@@ -173,15 +173,15 @@ static PetscErrorCode UpperForward(const Panel &q, double x[])
   PetscFunctionReturn(0);
 }
 
-/* What is known further on goes in, U^-1 */
-static PetscErrorCode UpperBackward(const Panel &q, const double x[])
+/* Subtracts U(K,C) x_C from x_K and applies U_K^-1 */
+static PetscErrorCode UpperBackward(const PanelView &q, const double x[])
 {
   PetscFunctionBegin;
-  const double *known = Together(q.col, q.cols) ? x + q.col[0] : q.y;
-  if (known == q.y) Gather(x, q.col, q.cols, q.y);
-  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, known, q.x, q.zero_upper));
+  const double *later = AreConsecutive(q.col, q.cols) ? x + q.col[0] : q.y;
+  if (later == q.y) Gather(x, q.col, q.cols, q.y);
+  PetscCall(SubtractTransposed(q.cols, q.width, q.upper, q.cols, later, q.x, q.zero_upper));
   for (PetscInt last = q.width, first; last > 0; last = first) {
-    first = (last - 1) / CHUNK * CHUNK;
+    first = (last - 1) / BLOCK_COLUMNS * BLOCK_COLUMNS;
     for (PetscInt j = last; j-- > first;) {
       q.x[j] /= q.lower[j + j * q.ld];
       for (PetscInt i = first; i < j; ++i) q.x[i] -= q.lower[i + j * q.ld] * q.x[j];
@@ -191,7 +191,7 @@ static PetscErrorCode UpperBackward(const Panel &q, const double x[])
   PetscFunctionReturn(0);
 }
 
-/* ---- one diagonal block, and what lies between them ---- */
+/* ---- one diagonal block, and the entries between diagonal blocks ---- */
 
 static PetscErrorCode SolveBlock(KluPanels *p, PetscInt b, bool transposed)
 {
@@ -199,41 +199,41 @@ static PetscErrorCode SolveBlock(KluPanels *p, PetscInt b, bool transposed)
 
   PetscFunctionBegin;
   for (PetscInt k = p->block[b]; k < p->block[b + 1]; ++k) {
-    const Panel q = Look(p->panel[k], p);
+    const PanelView q = ViewPanel(p->panel[k], p);
     PetscCall(transposed ? UpperForward(q, x) : LowerForward(q, x));
   }
   for (PetscInt k = p->block[b + 1]; k-- > p->block[b];) {
-    const Panel q = Look(p->panel[k], p);
+    const PanelView q = ViewPanel(p->panel[k], p);
     PetscCall(transposed ? LowerBackward(q, x) : UpperBackward(q, x));
   }
   PetscFunctionReturn(0);
 }
 
-static void Places(const KluPanels &p, PetscInt b, PetscInt *first, PetscInt *last)
+static void BlockRange(const KluPanels &p, PetscInt b, PetscInt *first, PetscInt *last)
 {
   const KluPanel &end = p.panel[p.block[b + 1] - 1];
   *first              = p.panel[p.block[b]].first;
   *last               = end.first + end.width;
 }
 
-/* The blocks that stand above this one lose its part */
-static void TakeOut(KluPanels *p, PetscInt b)
+/* Subtracts the product of the columns of block b with its solution from the blocks above it */
+static void SubtractOffBlock(KluPanels *p, PetscInt b)
 {
   PetscInt first, last;
-  Places(*p, b, &first, &last);
+  BlockRange(*p, b, &first, &last);
   for (PetscInt c = first; c < last; ++c)
-    for (PetscInt e = p->outer_start[c]; e < p->outer_start[c + 1]; ++e)
-      p->x[p->outer[e]] -= p->value[p->outer_values + (size_t)e] * p->x[c];
+    for (PetscInt e = p->off_block_start[c]; e < p->off_block_start[c + 1]; ++e)
+      p->x[p->off_block[e]] -= p->value[p->off_block_values + (size_t)e] * p->x[c];
 }
 
-/* Of the transpose, this one loses the part of the blocks above it */
-static void TakeOutTransposed(KluPanels *p, PetscInt b)
+/* For the transpose: subtracts the contributions of the blocks above block b from its right-hand side */
+static void SubtractOffBlockTransposed(KluPanels *p, PetscInt b)
 {
   PetscInt first, last;
-  Places(*p, b, &first, &last);
+  BlockRange(*p, b, &first, &last);
   for (PetscInt c = first; c < last; ++c)
-    for (PetscInt e = p->outer_start[c]; e < p->outer_start[c + 1]; ++e)
-      p->x[c] -= p->value[p->outer_values + (size_t)e] * p->x[p->outer[e]];
+    for (PetscInt e = p->off_block_start[c]; e < p->off_block_start[c + 1]; ++e)
+      p->x[c] -= p->value[p->off_block_values + (size_t)e] * p->x[p->off_block[e]];
 }
 
 PetscErrorCode KluPanelsSolve(KluPanels *p, bool transposed, double x[])
@@ -244,10 +244,10 @@ PetscErrorCode KluPanelsSolve(KluPanels *p, bool transposed, double x[])
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->n; ++k) p->x[k] = x[in[k]];
   for (PetscInt b = 0; b < blocks; ++b) {
-    const PetscInt now = transposed ? b : blocks - 1 - b;
-    if (transposed) TakeOutTransposed(p, now);
-    PetscCall(SolveBlock(p, now, transposed));
-    if (!transposed) TakeOut(p, now);
+    const PetscInt current = transposed ? b : blocks - 1 - b;
+    if (transposed) SubtractOffBlockTransposed(p, current);
+    PetscCall(SolveBlock(p, current, transposed));
+    if (!transposed) SubtractOffBlock(p, current);
   }
   for (PetscInt k = 0; k < p->n; ++k) x[out[k]] = p->x[k];
   PetscFunctionReturn(0);

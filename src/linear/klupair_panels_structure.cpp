@@ -1,4 +1,4 @@
-/* Structure of the panels of "klupair": from the elimination tree to panels, what they cost, where entries go */
+/* Structure of the panels of "klupair": supernodes of the elimination tree, their cost, and the target of each matrix entry */
 #if defined(HHTDAE_HAVE_KLU)
 #include "klupair_panels_tree.h"
 #include <algorithm>
@@ -8,13 +8,13 @@ typedef std::vector<PetscInt> Indices;
 typedef KluPattern            Pattern;
 typedef KluTree               Tree;
 
-/* Below so many operations in all, or per entry of L and U, KLU is as fast and nobody looks for panels */
-static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
+/* With fewer operations in all, or per entry of L and U, KLU is as fast, and panels are not tried (KluPairPanels.OnlyWhereTheyPay) */
+static const double MIN_FLOPS = 5e4, MIN_FLOPS_PER_ENTRY = 15;
 
 /*
-  Costs in operations of a dense product: of KLU per operation and per entry of L and U; of the panels per entry stored, per panel
-  and per panel that one looks back to. Milliseconds of processor time with the matrices of tests/bench/linear_matrices.h,
-  for a factorization with old pivots and one solve (Debian 12, KLU 1.3.8, OpenBLAS, one core):
+  Costs in operations of a dense product: of KLU per operation and per entry of L and U; of panels per stored entry, per panel
+  and per pair of a panel and one that contributes to it. Milliseconds of processor time with the matrices of
+  tests/bench/linear_matrices.h, for a factorization with old pivots and one solve (Debian 12, KLU 1.3.8, OpenBLAS, one core):
 
       family, size               n   nz(L+U)  operations  per nz      KLU   solve    panels   solve
       chain in space, 1000   11000   1.8e+05     1.3e+06       7     1.20    0.18      1.79    0.27   not used
@@ -29,97 +29,98 @@ static const double LEAST_FLOPS = 5e4, LEAST_PER_ENTRY = 15;
       block, 4^3 bricks        450   5.2e+04     3.8e+06      74     1.32   0.040      0.43   0.020
       block, 8^3 bricks       2430   7.6e+05     1.6e+08     203       56     1.0       8.2    0.63
 */
-static const double KLU_OPERATION = 7, KLU_ENTRY = 90;
-static const double ENTRY = 80, PANEL = 1.1e4, SOURCE = 3300;
+static const double COST_KLU_OPERATION = 7, COST_KLU_ENTRY = 90;
+static const double COST_ENTRY = 80, COST_PANEL = 1.1e4, COST_SOURCE = 3300;
 
-/* Panels must promise this part of KLU's cost. Before KLU has factored anything, what it costs per entry to build them
-   counts, too. */
-static const double GAIN = 0.7, BUILD = 440;
+/* Panels are used if their estimated cost is below this part of KLU's. Before KLU has factored anything, the cost of building
+   them is added, in operations per stored entry. */
+static const double MAX_COST_RATIO = 0.7, COST_BUILD_ENTRY = 440;
 
-/* At the end of a diagonal block, a panel so wide that several others contribute to takes in none of them: their product
-   with all the others' columns is faster than their part in the factors of a wider panel */
-static const PetscInt WIDE = 64;
+/* The last panel of a diagonal block is not merged with its children if it is at least this wide and has several: their contributions
+   in one product with all other columns are faster than as part of the LU of a wider panel */
+static const PetscInt WIDE_PANEL = 64;
 
-/* Entries that go to places one after the other are copied together from so many on */
-static const PetscInt RUN = 8;
+/* Entries of a column with consecutive targets are copied as a block if there are at least this many */
+static const PetscInt MIN_RUN = 8;
 
 /* ---- panels ---- */
 
 namespace
 {
 
-/* Ranges of places; all of `block` begin one, too */
-struct Range {
-  PetscInt first, last, rows; /* with so many places after the last */
-  double   zeros;
-  bool     junction; /* several places have the first one for their parent */
+/* A range [first, last] of places that may become a panel */
+struct Supernode {
+  PetscInt first, last, rows; /* rows: number of later places that the last place fills */
+  double   zeros;             /* zeros stored in `lower` and `upper` because structures were merged */
+  bool     several_children;  /* more than one place has `first` for its parent */
 };
 
 } // namespace
 
-/* Pivots in a row of which each reaches the next one and what that reaches, and nothing else reaches the next one first */
-static std::vector<Range> Fundamental(const Indices &parent, const Indices &count)
+/* Fundamental supernodes: consecutive places, each the only child of the next, whose structures differ by the place itself only */
+static std::vector<Supernode> FundamentalSupernodes(const Indices &parent, const Indices &count)
 {
-  std::vector<Range> ranges;
-  const PetscInt     n = (PetscInt)parent.size();
-  Indices            children(n, 0);
+  std::vector<Supernode> supernodes;
+  const PetscInt         n = (PetscInt)parent.size();
+  Indices                children(n, 0);
   for (PetscInt k = 0; k < n; ++k)
     if (parent[k] >= 0) ++children[parent[k]];
   for (PetscInt k = 0; k < n; ++k)
     if (k && children[k] == 1 && parent[k - 1] == k && count[k - 1] == count[k] + 1) {
-      ranges.back().last = k;
-      ranges.back().rows = count[k];
+      supernodes.back().last = k;
+      supernodes.back().rows = count[k];
     } else
-      ranges.push_back({k, k, count[k], 0, children[k] > 1});
-  return ranges;
+      supernodes.push_back({k, k, count[k], 0, children[k] > 1});
+  return supernodes;
 }
 
-/* A range taken together with the one that follows, if that is its parent: worth it where few zeros are stored or both
-   are narrow */
-static bool Joined(const Range &a, const Range &b, Range *both)
+/* Merges a supernode with the following one, which contains its parent. Worthwhile if few zeros have to be stored; narrow supernodes may have a larger
+   part of zeros. */
+static bool CanMerge(const Supernode &a, const Supernode &b, Supernode *both)
 {
   const double wa = (double)(a.last - a.first + 1), wb = (double)(b.last - b.first + 1), w = wa + wb;
-  *both            = {a.first, b.last, b.rows, a.zeros + b.zeros + 2 * wa * (wb + (double)(b.rows - a.rows)), a.junction};
-  if (b.junction && b.rows == 0 && wb >= (double)WIDE) return false;
+  *both = {a.first, b.last, b.rows, a.zeros + b.zeros + 2 * wa * (wb + (double)(b.rows - a.rows)), a.several_children};
+  if (b.several_children && b.rows == 0 && wb >= (double)WIDE_PANEL) return false;
   const double all = w * (w + 2 * (double)b.rows), part = both->zeros / all;
   return w <= 4 ? part < 0.6 : w <= 16 ? part < 0.25 : w <= 48 ? part < 0.1 : part < 0.05;
 }
 
-static std::vector<Range> Amalgamate(const std::vector<Range> &fine, const Indices &parent)
+/* Relaxed supernodes, by merging from the last one to the first */
+static std::vector<Supernode> Amalgamate(const std::vector<Supernode> &fundamental, const Indices &parent)
 {
-  std::vector<Range> ranges; /* from the last to the first */
-  for (size_t k = fine.size(); k-- > 0;) {
-    Range both;
-    if (!ranges.empty() && parent[fine[k].last] >= 0 && parent[fine[k].last] <= ranges.back().last &&
-        Joined(fine[k], ranges.back(), &both))
-      ranges.back() = both;
+  std::vector<Supernode> supernodes; /* from the last to the first */
+  for (size_t k = fundamental.size(); k-- > 0;) {
+    Supernode both;
+    if (!supernodes.empty() && parent[fundamental[k].last] >= 0 && parent[fundamental[k].last] <= supernodes.back().last &&
+        CanMerge(fundamental[k], supernodes.back(), &both))
+      supernodes.back() = both;
     else
-      ranges.push_back(fine[k]);
+      supernodes.push_back(fundamental[k]);
   }
-  std::reverse(ranges.begin(), ranges.end());
-  return ranges;
+  std::reverse(supernodes.begin(), supernodes.end());
+  return supernodes;
 }
 
-static Indices PanelOf(const KluPanels &p)
+static Indices NumberPanels(const KluPanels &p)
 {
-  Indices of(p.n);
-  for (size_t k = 0; k < p.panel.size(); ++k) std::fill_n(of.begin() + p.panel[k].first, p.panel[k].width, (PetscInt)k);
-  return of;
+  Indices panel_of(p.n);
+  for (size_t k = 0; k < p.panel.size(); ++k) std::fill_n(panel_of.begin() + p.panel[k].first, p.panel[k].width, (PetscInt)k);
+  return panel_of;
 }
 
-/* Within a panel, pivots whose columns have the fewest entries outside of it go first: what a later pivot leaves there
-   does not fill them, and columns that stay zero need no products. Otherwise by number, so that entries lie together. */
-static void SortPlaces(const LinearRows &rows, const Indices &of, KluPanels *p)
+/* Within a panel, pivots whose columns have the fewest entries outside of it go first: a later pivot does not fill these
+   columns, and columns that stay zero need no products. Ties by column number, so that targets of matrix entries are consecutive. */
+static void SortPlaces(const LinearRows &rows, const Indices &panel_of, KluPanels *p)
 {
   typedef std::pair<PetscInt, std::pair<PetscInt, PetscInt>> Pivot; /* entries outside, column, row */
   Indices                                                   panel_of_row(p->n);
   std::vector<Pivot>                                        pivots;
-  for (PetscInt k = 0; k < p->n; ++k) panel_of_row[p->row[k]] = of[k];
+  for (PetscInt k = 0; k < p->n; ++k) panel_of_row[p->row[k]] = panel_of[k];
   for (const KluPanel &q : p->panel) {
     pivots.clear();
     for (PetscInt k = q.first; k < q.first + q.width; ++k) {
       const PetscInt *first = rows.col + rows.start[p->col[k]], *last = rows.col + rows.start[p->col[k] + 1];
-      const auto      outside = std::count_if(first, last, [&](PetscInt i) { return panel_of_row[i] != of[k]; });
+      const auto      outside = std::count_if(first, last, [&](PetscInt i) { return panel_of_row[i] != panel_of[k]; });
       pivots.push_back({(PetscInt)outside, {p->col[k], p->row[k]}});
     }
     std::sort(pivots.begin(), pivots.end());
@@ -132,18 +133,18 @@ static void SortPlaces(const LinearRows &rows, const Indices &of, KluPanels *p)
 namespace
 {
 
-/* Entries of the matrix, as places, inside of diagonal blocks or between them */
+/* Matrix entries by number and places */
 struct Entry {
   PetscInt number, row, col;
 };
 
 struct Entries {
-  std::vector<Entry> inner, outer;
+  std::vector<Entry> in_block, off_block; /* within diagonal blocks of KLU, and between them */
 };
 
 } // namespace
 
-static Entries Place(const LinearRows &rows, const Indices &block_of, const KluPanels &p)
+static Entries PlaceEntries(const LinearRows &rows, const Indices &block_of, const KluPanels &p)
 {
   Entries e;
   Indices row(p.n), col(p.n);
@@ -151,11 +152,11 @@ static Entries Place(const LinearRows &rows, const Indices &block_of, const KluP
     row[p.row[k]] = k;
     col[p.col[k]] = k;
   }
-  e.inner.reserve(rows.start[rows.n]);
+  e.in_block.reserve(rows.start[rows.n]);
   for (PetscInt j = 0; j < rows.n; ++j)
     for (PetscInt k = rows.start[j]; k < rows.start[j + 1]; ++k) {
       const Entry entry = {k, row[rows.col[k]], col[j]};
-      (block_of[entry.row] == block_of[entry.col] ? e.inner : e.outer).push_back(entry);
+      (block_of[entry.row] == block_of[entry.col] ? e.in_block : e.off_block).push_back(entry);
     }
   return e;
 }
@@ -163,8 +164,8 @@ static Entries Place(const LinearRows &rows, const Indices &block_of, const KluP
 namespace
 {
 
-/* What the panels before hand over to one panel, sorted, each once */
-struct Reach {
+/* The places R and C of each panel, ascending, each once */
+struct PanelReach {
   std::vector<Indices> rows, cols;
 };
 
@@ -176,83 +177,83 @@ static void SortUnique(Indices *a)
   a->erase(std::unique(a->begin(), a->end()), a->end());
 }
 
-/* Appends what lies after the places of panel q */
-static void Append(const Indices &from, const KluPanel &q, Indices *to)
+/* Appends the places of `from` that lie after those of panel q */
+static void AppendPlacesAfter(const Indices &from, const KluPanel &q, Indices *to)
 {
   to->insert(to->end(), std::lower_bound(from.begin(), from.end(), q.first + q.width), from.end());
 }
 
 /* Calls use(panel) for every panel that has some of these ascending places */
-template <typename Use> static void EachPanel(const Indices &places, const Indices &of, Use use)
+template <typename Use> static void EachPanel(const Indices &places, const Indices &panel_of, Use use)
 {
   PetscInt last = -1;
   for (PetscInt i : places) {
-    if (of[i] != last) use(of[i]);
-    last = of[i];
+    if (panel_of[i] != last) use(panel_of[i]);
+    last = panel_of[i];
   }
 }
 
-/* Places met again and again are sorted out early, before a panel's turn comes */
-static void Spread(const Indices &rows, const Indices &cols, const Indices &of, const KluPanels &p,
-                   std::vector<Indices> *to)
+/* Appends the rows of a panel to the rows of each panel that has one of its columns; long lists are reduced to unique places at once to bound the memory */
+static void PassToPanels(const Indices &rows, const Indices &cols, const Indices &panel_of, const KluPanels &p,
+                         std::vector<Indices> *to)
 {
-  EachPanel(cols, of, [&](PetscInt k) {
+  EachPanel(cols, panel_of, [&](PetscInt k) {
     Indices &r = (*to)[k];
-    Append(rows, p.panel[k], &r);
+    AppendPlacesAfter(rows, p.panel[k], &r);
     if (r.size() > 4 * (size_t)p.n) SortUnique(&r);
   });
 }
 
-static Reach FindReach(const Entries &e, const Indices &of, const KluPanels &p)
+static PanelReach FindReach(const Entries &e, const Indices &panel_of, const KluPanels &p)
 {
-  Reach r;
+  PanelReach r;
   r.rows.resize(p.panel.size());
   r.cols.resize(p.panel.size());
-  for (const Entry &a : e.inner)
-    if (of[a.row] > of[a.col])
-      r.rows[of[a.col]].push_back(a.row);
-    else if (of[a.row] < of[a.col])
-      r.cols[of[a.row]].push_back(a.col);
+  for (const Entry &a : e.in_block)
+    if (panel_of[a.row] > panel_of[a.col])
+      r.rows[panel_of[a.col]].push_back(a.row);
+    else if (panel_of[a.row] < panel_of[a.col])
+      r.cols[panel_of[a.row]].push_back(a.col);
   for (size_t k = 0; k < p.panel.size(); ++k) {
     SortUnique(&r.rows[k]);
     SortUnique(&r.cols[k]);
-    Spread(r.rows[k], r.cols[k], of, p, &r.rows);
-    Spread(r.cols[k], r.rows[k], of, p, &r.cols);
+    PassToPanels(r.rows[k], r.cols[k], panel_of, p, &r.rows);
+    PassToPanels(r.cols[k], r.rows[k], panel_of, p, &r.cols);
   }
   return r;
 }
 
-static KluReach Store(const Indices &places, KluPanels *p)
+static KluReach StoreReach(const Indices &places, KluPanels *p)
 {
   const KluReach r = {(PetscInt)p->reached.size(), (PetscInt)places.size()};
   p->reached.insert(p->reached.end(), places.begin(), places.end());
   return r;
 }
 
-static void SizePanels(const Reach &reach, KluPanels *p)
+static void SizePanels(const PanelReach &reach, KluPanels *p)
 {
   size_t values = 0;
   for (size_t k = 0; k < p->panel.size(); ++k) {
     KluPanel &q    = p->panel[k];
-    q.rows         = Store(reach.rows[k], p);
-    q.cols         = Store(reach.cols[k], p);
+    q.rows         = StoreReach(reach.rows[k], p);
+    q.cols         = StoreReach(reach.cols[k], p);
     q.lower        = values;
     q.upper        = q.lower + (size_t)q.width * (size_t)(q.width + q.rows.count);
     values         = q.upper + (size_t)q.width * (size_t)q.cols.count;
     const double w = (double)q.width, l = (double)q.rows.count, u = (double)q.cols.count;
     p->flops += 2.0 / 3 * w * w * w + w * w * (l + u) + 2 * w * l * u;
   }
-  p->outer_values = values;
-  p->entries      = (double)values;
+  p->off_block_values = values;
+  p->entries          = (double)values;
 }
 
-static PetscInt Find(const Indices &places, PetscInt place)
+static PetscInt PositionOf(const Indices &places, PetscInt place)
 {
   return (PetscInt)(std::lower_bound(places.begin(), places.end(), place) - places.begin());
 }
 
-/* Which panels each one looks back to */
-static void FindSources(const Reach &reach, const Indices &of, KluPanels *p)
+/* The panels that contribute to each panel */
+static void FindSources(const PanelReach &reach, const Indices &panel_of, KluPanels *p)
 {
   std::vector<std::vector<KluPanelSource>> found(p->panel.size());
   for (size_t k = 0; k < p->panel.size(); ++k) {
@@ -260,10 +261,10 @@ static void FindSources(const Reach &reach, const Indices &of, KluPanels *p)
     const auto     add = [&](PetscInt to) {
       const PetscInt first = p->panel[to].first, end = first + p->panel[to].width;
       if (found[to].empty() || found[to].back().panel != (PetscInt)k)
-        found[to].push_back({(PetscInt)k, Find(r, first), Find(r, end), Find(c, first), Find(c, end)});
+        found[to].push_back({(PetscInt)k, PositionOf(r, first), PositionOf(r, end), PositionOf(c, first), PositionOf(c, end)});
     };
-    EachPanel(r, of, add);
-    EachPanel(c, of, add);
+    EachPanel(r, panel_of, add);
+    EachPanel(c, panel_of, add);
   }
   for (size_t k = 0; k < p->panel.size(); ++k) {
     p->panel[k].source  = (PetscInt)p->source.size();
@@ -272,7 +273,7 @@ static void FindSources(const Reach &reach, const Indices &of, KluPanels *p)
   }
 }
 
-/* ---- where the entries of the matrix go ---- */
+/* ---- targets of the matrix entries ---- */
 
 void KluPanelsSetPlaces(const KluPanel &q, KluPanels *p)
 {
@@ -288,60 +289,60 @@ static size_t Position(const KluPanel &q, const KluPanels &p, const Entry &e)
   return q.upper + (size_t)(e.row - q.first) * (size_t)q.cols.count + (size_t)(p.col_of[e.col] - q.width);
 }
 
-/* Entries are dealt out to the panels that hold them first, so that places are set once for each panel */
-static void AimInner(const std::vector<Entry> &entries, const Indices &of, KluPanels *p)
+/* Entries are sorted by panels first, so that KluPanelsSetPlaces() is called once for each panel */
+static void SetInnerTargets(const std::vector<Entry> &entries, const Indices &panel_of, KluPanels *p)
 {
   Indices            start(p->panel.size() + 1, 0);
-  std::vector<Entry> dealt(entries.size());
-  const auto         panel = [&of](const Entry &e) { return std::min(of[e.row], of[e.col]); };
+  std::vector<Entry> by_panel(entries.size());
+  const auto         panel = [&panel_of](const Entry &e) { return std::min(panel_of[e.row], panel_of[e.col]); };
   for (const Entry &e : entries) ++start[panel(e) + 1];
   for (size_t k = 0; k < p->panel.size(); ++k) start[k + 1] += start[k];
   Indices next(start.begin(), start.end() - 1);
-  for (const Entry &e : entries) dealt[next[panel(e)]++] = e;
+  for (const Entry &e : entries) by_panel[next[panel(e)]++] = e;
   for (size_t k = 0; k < p->panel.size(); ++k) {
     KluPanelsSetPlaces(p->panel[k], p);
     for (PetscInt e = start[k]; e < start[k + 1]; ++e)
-      p->target[dealt[e].number] = (PetscInt)Position(p->panel[k], *p, dealt[e]);
+      p->target[by_panel[e].number] = (PetscInt)Position(p->panel[k], *p, by_panel[e]);
   }
 }
 
-static void AimOuter(const std::vector<Entry> &entries, KluPanels *p)
+static void SetOuterTargets(const std::vector<Entry> &entries, KluPanels *p)
 {
-  p->outer_start.assign(p->n + 1, 0);
-  for (const Entry &e : entries) ++p->outer_start[e.col + 1];
-  for (PetscInt k = 0; k < p->n; ++k) p->outer_start[k + 1] += p->outer_start[k];
-  p->outer.resize(entries.size());
-  Indices next(p->outer_start.begin(), p->outer_start.end() - 1);
+  p->off_block_start.assign(p->n + 1, 0);
+  for (const Entry &e : entries) ++p->off_block_start[e.col + 1];
+  for (PetscInt k = 0; k < p->n; ++k) p->off_block_start[k + 1] += p->off_block_start[k];
+  p->off_block.resize(entries.size());
+  Indices next(p->off_block_start.begin(), p->off_block_start.end() - 1);
   for (const Entry &e : entries) {
-    p->outer[next[e.col]] = e.row;
-    p->target[e.number]   = (PetscInt)p->outer_values + next[e.col]++;
+    p->off_block[next[e.col]] = e.row;
+    p->target[e.number]       = (PetscInt)p->off_block_values + next[e.col]++;
   }
 }
 
-/* Entries of a column that go to places one after the other, all inside of diagonal blocks */
+/* Entries of a column with consecutive targets, all within diagonal blocks */
 static void FindRuns(const LinearRows &rows, KluPanels *p)
 {
-  const auto inside = [p](PetscInt e) { return (size_t)p->target[e] < p->outer_values; };
+  const auto inside = [p](PetscInt e) { return (size_t)p->target[e] < p->off_block_values; };
   p->run_start.assign(1, 0);
   for (PetscInt k = 0; k < p->n; ++k) {
     const PetscInt end = rows.start[p->col[k] + 1];
     for (PetscInt e = rows.start[p->col[k]], last; e < end; e = last) {
       for (last = e + 1; last < end && inside(last) && p->target[last] == p->target[last - 1] + 1;) ++last;
-      if (last - e >= RUN && inside(e)) p->run.push_back({e, last - e});
+      if (last - e >= MIN_RUN && inside(e)) p->run.push_back({e, last - e});
     }
     p->run_start.push_back((PetscInt)p->run.size());
   }
 }
 
-/* ---- all together ---- */
+/* ---- assembly of the structure ---- */
 
-static void Estimate(double entries, double flops, KluPanels *p)
+static void EstimateCost(double entries, double flops, KluPanels *p)
 {
-  p->klu_cost = KLU_OPERATION * flops + KLU_ENTRY * entries;
-  p->cost     = p->flops + ENTRY * p->entries + PANEL * (double)p->panel.size() + SOURCE * (double)p->source.size();
+  p->klu_cost   = COST_KLU_OPERATION * flops + COST_KLU_ENTRY * entries;
+  p->panel_cost = p->flops + COST_ENTRY * p->entries + COST_PANEL * (double)p->panel.size() + COST_SOURCE * (double)p->source.size();
 }
 
-static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
+static void OrderPivots(const KluPair &k, const Indices &order, KluPanels *p, Indices *block_of)
 {
   Indices       block(p->n);
   const KluInt *row = k.numeric ? k.numeric->Pnum : k.symbolic->P;
@@ -357,19 +358,19 @@ static void Order(const KluPair &k, const Indices &order, KluPanels *p, Indices 
   }
 }
 
-static void MakePanels(const std::vector<Range> &ranges, const Indices &block_of, KluPanels *p)
+static void MakePanels(const std::vector<Supernode> &supernodes, const Indices &block_of, KluPanels *p)
 {
-  for (size_t i = 0; i < ranges.size(); ++i) {
+  for (size_t i = 0; i < supernodes.size(); ++i) {
     KluPanel q = KluPanel();
-    q.first    = ranges[i].first;
-    q.width    = ranges[i].last - ranges[i].first + 1;
+    q.first    = supernodes[i].first;
+    q.width    = supernodes[i].last - supernodes[i].first + 1;
     p->panel.push_back(q);
     if (!i || block_of[q.first] != block_of[q.first - 1]) p->block.push_back((PetscInt)i);
   }
-  p->block.push_back((PetscInt)ranges.size());
+  p->block.push_back((PetscInt)supernodes.size());
 }
 
-static std::vector<Range> Ranges(const Tree &tree, const Indices &order)
+static std::vector<Supernode> FindSupernodes(const Tree &tree, const Indices &order)
 {
   const PetscInt n = (PetscInt)order.size();
   Indices        place(n), parent(n), count(n);
@@ -378,7 +379,7 @@ static std::vector<Range> Ranges(const Tree &tree, const Indices &order)
     parent[i] = tree.parent[order[i]] < 0 ? -1 : place[tree.parent[order[i]]];
     count[i]  = (PetscInt)tree.structure[order[i]].size();
   }
-  return Amalgamate(Fundamental(parent, count), parent);
+  return Amalgamate(FundamentalSupernodes(parent, count), parent);
 }
 
 static void Allocate(const LinearRows &rows, KluPanels *p)
@@ -389,12 +390,12 @@ static void Allocate(const LinearRows &rows, KluPanels *p)
   for (auto *zero : {&p->zero_lower, &p->zero_upper}) zero->resize(p->n);
 }
 
-static bool WorthALook(double entries, double flops)
+static bool WorthTrying(double entries, double flops)
 {
-  return flops > LEAST_FLOPS && flops > LEAST_PER_ENTRY * entries && entries < 0.1 * PETSC_MAX_INT;
+  return flops > MIN_FLOPS && flops > MIN_FLOPS_PER_ENTRY * entries && entries < 0.1 * PETSC_MAX_INT;
 }
 
-/* For factors of KLU with so many entries and operations */
+/* entries, flops: of KLU's factors, for the comparison of costs */
 static void Build(const LinearRows &rows, const KluPair &k, const Pattern &pattern, double entries, double flops,
                   KluPanels *p, bool *pays)
 {
@@ -405,23 +406,23 @@ static void Build(const LinearRows &rows, const KluPair &k, const Pattern &patte
   *pays = KluTreeEliminate(pattern, 3 * entries, &tree);
   if (!*pays) return;
   const Indices order = KluTreePostorder(tree);
-  Order(k, order, p, &block_of);
-  MakePanels(Ranges(tree, order), block_of, p);
-  const Indices of = PanelOf(*p);
-  SortPlaces(rows, of, p);
-  const Entries e     = Place(rows, block_of, *p);
-  const Reach   reach = FindReach(e, of, *p);
+  OrderPivots(k, order, p, &block_of);
+  MakePanels(FindSupernodes(tree, order), block_of, p);
+  const Indices panel_of = NumberPanels(*p);
+  SortPlaces(rows, panel_of, p);
+  const Entries    e     = PlaceEntries(rows, block_of, *p);
+  const PanelReach reach = FindReach(e, panel_of, *p);
   SizePanels(reach, p);
-  FindSources(reach, of, p);
-  Estimate(entries, flops, p);
-  *pays = p->cost < GAIN * p->klu_cost && p->entries < 0.5 * PETSC_MAX_INT;
-  if (!k.numeric && p->cost + BUILD * p->entries > p->klu_cost) *pays = false;
+  FindSources(reach, panel_of, p);
+  EstimateCost(entries, flops, p);
+  *pays = p->panel_cost < MAX_COST_RATIO * p->klu_cost && p->entries < 0.5 * PETSC_MAX_INT;
+  if (!k.numeric && p->panel_cost + COST_BUILD_ENTRY * p->entries > p->klu_cost) *pays = false;
   if (!*pays) return;
   Allocate(rows, p);
-  AimInner(e.inner, of, p);
-  AimOuter(e.outer, p);
+  SetInnerTargets(e.in_block, panel_of, p);
+  SetOuterTargets(e.off_block, p);
   FindRuns(rows, p);
-  p->value.resize(p->outer_values + p->outer.size());
+  p->value.resize(p->off_block_values + p->off_block.size());
 }
 
 PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, bool *pays)
@@ -431,7 +432,7 @@ PetscErrorCode KluPanelsBuild(const LinearRows &rows, KluPair *k, KluPanels *p, 
 
   PetscFunctionBegin;
   *p    = KluPanels();
-  *pays = WorthALook(entries, flops);
+  *pays = WorthTrying(entries, flops);
   if (!*pays) PetscFunctionReturn(0);
   PetscCall(KluPatternExtract(k, &pattern));
   Build(rows, *k, pattern, entries, flops, p, pays);
@@ -443,7 +444,7 @@ void KluPanelsPlan(const LinearRows &rows, const KluPair &k, KluPanels *p, bool 
   const double entries = 2 * k.work.factor, flops = 2 * k.work.flops;
 
   *p    = KluPanels();
-  *pays = WorthALook(entries, flops) && KLU_OPERATION * flops > BUILD * entries;
+  *pays = WorthTrying(entries, flops) && COST_KLU_OPERATION * flops > COST_BUILD_ENTRY * entries;
   if (*pays) Build(rows, k, KluPatternPlanned(rows, k), entries, flops, p, pays);
 }
 

@@ -8,7 +8,7 @@ PetscErrorCode KluPatternExtract(KluPair *k, KluPattern *pattern)
 {
   const KluInt        n = k->symbolic->n;
   std::vector<KluInt> Lp(n + 1), Li(k->numeric->lnz), Up(n + 1), Ui(k->numeric->unz);
-  std::vector<double> Lx(Li.size()), Ux(Ui.size()); /* without them KLU gives no indices */
+  std::vector<double> Lx(Li.size()), Ux(Ui.size()); /* KLU returns indices only together with values */
 
   PetscFunctionBegin;
   const KluInt ok = KLU(extract)(k->numeric, k->symbolic, Lp.data(), Li.data(), Lx.data(), Up.data(), Ui.data(),

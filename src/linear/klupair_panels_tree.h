@@ -1,30 +1,30 @@
-/* What the panels of "klupair" are found from: the pattern of the factors and its elimination tree */
+/* The pattern of the factors of "klupair" and its elimination tree, from which panels are found */
 #ifndef HHTDAE_LINEAR_KLUPAIR_PANELS_TREE_H
 #define HHTDAE_LINEAR_KLUPAIR_PANELS_TREE_H
 
 #include "klupair_panels.h"
 
-/* Off the diagonal, entries of column k of L and of row k of U together, as places */
+/* For each place k: places of the off-diagonal entries of column k of L and of row k of U */
 struct KluPattern {
   std::vector<PetscInt> start, index;
 };
 
 struct KluTree {
-  std::vector<std::vector<PetscInt>> structure; /* places after each place that its pivot reaches */
-  std::vector<PetscInt>              parent;    /* -1 at roots: the last place of a diagonal block, and other ends */
+  std::vector<std::vector<PetscInt>> structure; /* of each place: the later places that its pivot fills */
+  std::vector<PetscInt>              parent;    /* -1 at roots, as the last place of each diagonal block */
 };
 
-/* Of KLU's factors */
+/* The pattern of KLU's factors */
 PetscErrorCode KluPatternExtract(KluPair *k, KluPattern *pattern);
 
-/* Instead of them, where KLU has factored nothing yet: what M(P,Q) has off the diagonal, in diagonal blocks */
+/* The off-diagonal pattern of M(P,Q) within diagonal blocks, for use before KLU has factored anything */
 KluPattern KluPatternPlanned(const LinearRows &rows, const KluPair &k);
 
-/* A pivot reaches what it meets itself and what those before hand over to it. False, and structures dropped, when `limit`
-   entries are exceeded: panels would be much fuller than KLU's factors */
+/* Symbolic elimination: the structure of a pivot is its pattern and the structures of its children. Returns false when there are more than
+   `limit` entries: panels would then have much more fill than KLU's factors. */
 bool KluTreeEliminate(const KluPattern &pattern, double limit, KluTree *tree);
 
-/* Old place of each new one: everything below a place directly before it. Roots stay in their order, and with them the
+/* The old place of each new place, such that the descendants of a place directly precede it. Roots keep their order, and so do the
    diagonal blocks. */
 std::vector<PetscInt> KluTreePostorder(const KluTree &tree);
 

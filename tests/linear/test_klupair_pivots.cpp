@@ -38,7 +38,7 @@ TEST(KluPairPivots, LongExchange)
   }
   const LinearPivots p = pivots_of(e);
   EXPECT_EQ(p.pairs, n);
-  EXPECT_LT(p.looked, 100.0 * n);
+  EXPECT_LT(p.edges_visited, 100.0 * n);
 }
 
 TEST(KluPairPivots, ExplicitZerosAreNoPivots)
@@ -101,12 +101,12 @@ TEST(KluPairPivots, SingularByItsPattern)
 TEST(KluPairPivots, WorkGrowsWithTheChain)
 {
   for (PetscInt loops : {0, 8}) {
-    const double few  = pivots_of(spatial_chain(1000, loops)).looked,
-                 many = pivots_of(spatial_chain(10000, loops)).looked;
+    const double few  = pivots_of(spatial_chain(1000, loops)).edges_visited,
+                 many = pivots_of(spatial_chain(10000, loops)).edges_visited;
     EXPECT_LT(many, 13 * few) << loops;
     EXPECT_LT(many, 300.0 * 10000) << loops;
   }
-  EXPECT_LT(pivots_of(chain(10000, 0)).looked, 13 * pivots_of(chain(1000, 0)).looked);
+  EXPECT_LT(pivots_of(chain(10000, 0)).edges_visited, 13 * pivots_of(chain(1000, 0)).edges_visited);
 }
 
 TEST(KluPairPivots, MatchingIsALargestOne)
@@ -123,8 +123,8 @@ TEST(KluPairPivots, MatchingIsALargestOne)
       G.start.push_back((PetscInt)G.adj.size());
     }
     std::vector<PetscInt> of_left(n, -1), of_right(n, -1);
-    double                looked = 0;
-    LinearMaximumMatching(G, &of_left, &of_right, &looked);
+    double                edges_visited = 0;
+    LinearMaximumMatching(G, &of_left, &of_right, &edges_visited);
     PetscInt size = 0;
     for (PetscInt l = 0; l < n; ++l) {
       if (of_left[l] < 0) continue;
