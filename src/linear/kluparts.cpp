@@ -1,6 +1,6 @@
 /*
   "kluparts": the factor matrix. Option, with the prefix of the solver:
-    -mat_kluparts_check <true>   looks at the residual of one solve after pivots were chosen anew
+    -mat_kluparts_check <true>   checks the residual of one solve after pivots were chosen anew
   and those of "klupair" for the interiors (klupair.cpp).
 */
 #include "kluparts.h"
@@ -24,7 +24,7 @@ static PetscErrorCode Reset(KluParts *p)
   PetscFunctionReturn(0);
 }
 
-/* The interior's factor takes the options of the whole, if that is there already */
+/* Creates the interior's matrix and factor; it has the options of F, unless F is NULL */
 static PetscErrorCode AnalyseInner(Mat F, KluParts *p)
 {
   MatFactorInfo info;
@@ -38,9 +38,9 @@ static PetscErrorCode AnalyseInner(Mat F, KluParts *p)
     PetscCall(MatSetOptionsPrefix(p->factor, ((PetscObject)F)->prefix));
     PetscCall(PetscObjectSetOptions((PetscObject)p->factor, ((PetscObject)F)->options));
   }
-  p->klu->ends  = PartsEnds(p->split);
-  p->klu->width = (PetscInt)p->split.local.size();
-  p->klu->whole = true;
+  p->klu->coupled_unknowns = PartsCoupledUnknowns(p->split);
+  p->klu->interface_size   = (PetscInt)p->split.local.size();
+  p->klu->single_block     = true;
   PetscCall(MatFactorInfoInitialize(&info));
   PetscCall(MatLUFactorSymbolic(p->factor, p->inner, NULL, NULL, &info));
   PetscFunctionReturn(0);
@@ -105,8 +105,8 @@ static void CountInner(const KluParts &p, double count[5])
   count[0] = (double)p.split.inner_row.size();
   count[1] = p.klu->work.factor;
   count[2] = p.klu->work.flops;
-  count[3] = 2 * p.klu->path_entries * w;
-  count[4] = p.klu->path_columns * w * w;
+  count[3] = 2 * p.klu->reached_entries * w;
+  count[4] = p.klu->reached_columns * w * w;
 }
 
 PetscErrorCode LinearPartsCount(Mat A, double max_couplings, PetscInt max_interface, LinearPartsWork *work)
@@ -160,7 +160,7 @@ static PetscErrorCode MatSolve_KLUParts(Mat F, Vec b, Vec x)
   PetscFunctionReturn(0);
 }
 
-/* Without this PETSc 3.18 would solve with the matrix itself where it does not know whether it is symmetric */
+/* An error on purpose: without this function PETSc 3.18 would solve with A in place of A^T if the symmetry of A is unknown */
 static PetscErrorCode MatSolveTranspose_KLUParts(Mat F, Vec, Vec)
 {
   PetscFunctionBegin;
@@ -185,7 +185,7 @@ static PetscErrorCode FactorSymbolic(Mat F, Mat A, IS, IS, const MatFactorInfo *
   PetscFunctionReturn(0);
 }
 
-/* ---- what can be asked of the factor ---- */
+/* ---- information and view ---- */
 
 static PetscErrorCode GetSolverType(Mat, MatSolverType *type) { return *type = LINEAR_KLUPARTS, 0; }
 
@@ -202,7 +202,7 @@ static double Entries(const KluParts *p)
   return entries;
 }
 
-/* This rank's part, as for the other distributed factors; PETSc adds them up where a sum is asked for */
+/* This rank's part for MAT_LOCAL; sum or maximum over the ranks otherwise */
 static PetscErrorCode GetInfo(Mat F, MatInfoType type, MatInfo *info)
 {
   const KluParts *p          = PartsOf(F);
@@ -274,7 +274,7 @@ static PetscErrorCode MatGetFactor_KLUParts(Mat A, MatFactorType type, Mat *fact
   PetscCall(MatSetUp(F));
   F->data                  = p;
   F->factortype            = type;
-  F->assembled             = PETSC_TRUE; /* so that -ksp_view shows it */
+  F->assembled             = PETSC_TRUE; /* otherwise -ksp_view does not show the factor */
   F->ops->lufactorsymbolic = FactorSymbolic;
   F->ops->getinfo          = GetInfo;
   F->ops->view             = View;
@@ -289,7 +289,7 @@ static PetscErrorCode MatGetFactor_KLUParts(Mat A, MatFactorType type, Mat *fact
   PetscFunctionReturn(0);
 }
 
-/* A matrix on one rank is one interior, whose factor has the name that was asked for: PCFactorSetMatSolverType() holds the two against one another */
+/* A matrix on one rank is a single interior, factored by "klupair". The factor is named "kluparts", because PCFactorSetMatSolverType() compares the names. */
 static PetscErrorCode MatGetFactor_OnePart(Mat A, MatFactorType type, Mat *factor)
 {
   PetscFunctionBegin;

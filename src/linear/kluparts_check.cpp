@@ -1,17 +1,17 @@
-/* Whether the interiors of "kluparts" are regular enough, and which unknowns should leave them if not */
+/* Checks whether the interiors of "kluparts" are far enough from singular, and finds the unknowns that should leave them if not */
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
 #include "vectors.h"
 #include <algorithm>
 #include <petsc/private/matimpl.h>
 
-/* Of inverse iteration: the first meets every null vector, the others leave little else */
-static const int SWEEPS = 3;
+/* The first iteration amplifies all null vectors of a nearly singular interior, the others reduce the remaining components */
+static const int INVERSE_ITERATIONS = 3;
 
-/* Of every entry, to make a singular matrix regular */
-static const PetscReal DISTURBANCE = 1e-7;
+/* Relative perturbation of every entry that makes a singular interior regular */
+static const PetscReal PERTURBATION = 1e-7;
 
-/* Largest entries of the interior's rows, with what couples them to the interface */
+/* Largest entry of each row of [A B] */
 static std::vector<PetscReal> RowSizes(const PartsSplit &s)
 {
   std::vector<PetscReal> size(s.inner_row.size(), 0);
@@ -22,40 +22,40 @@ static std::vector<PetscReal> RowSizes(const PartsSplit &s)
   return size;
 }
 
-/* Largest entries of its columns where the rows are divided by their sizes; interface rows by what is listed */
+/* Largest entry of each column of [A; C] after dividing the rows by their sizes; the size of an interface row is taken from C */
 static std::vector<PetscReal> ColumnSizes(const PartsSplit &s, const std::vector<PetscReal> &rows)
 {
-  std::vector<PetscReal> size(rows.size(), 0), top(s.local.size(), 0);
+  std::vector<PetscReal> size(rows.size(), 0), at_interface(s.local.size(), 0);
   const auto             take = [&size](PetscInt j, PetscReal v) { size[j] = PetscMax(size[j], v); };
   for (size_t i = 0; i < rows.size(); ++i)
     for (PetscInt k = s.start[i]; k < s.start[i + 1]; ++k)
       take(s.col[k], rows[i] > 0 ? PetscAbsScalar(s.val[k]) / rows[i] : 0);
   for (size_t e = 0; e < s.below.size(); ++e)
-    top[s.below[e].row] = PetscMax(top[s.below[e].row], PetscAbsScalar(s.below_val[e]));
+    at_interface[s.below[e].row] = PetscMax(at_interface[s.below[e].row], PetscAbsScalar(s.below_val[e]));
   for (size_t e = 0; e < s.below.size(); ++e)
-    if (top[s.below[e].row] > 0) take(s.below[e].col, PetscAbsScalar(s.below_val[e]) / top[s.below[e].row]);
+    if (at_interface[s.below[e].row] > 0) take(s.below[e].col, PetscAbsScalar(s.below_val[e]) / at_interface[s.below[e].row]);
   return size;
 }
 
 namespace
 {
 
-/* What every row leaves, and what it sums up; b is 0 in the interface */
-struct Sums {
-  std::vector<PetscScalar> left;
+/* Residual of each row and the sum of the absolute values of its terms; b is 0 in the interface */
+struct RowResiduals {
+  std::vector<PetscScalar> remainder;
   std::vector<PetscReal>   size;
 
   void add(PetscInt row, PetscScalar term)
   {
-    left[row] -= term;
+    remainder[row] -= term;
     size[row] += PetscAbsScalar(term);
   }
   PetscReal largest() const
   {
     PetscReal r = 0;
-    for (size_t i = 0; i < left.size(); ++i) {
-      if (PetscIsInfOrNanScalar(left[i])) return 1;
-      if (size[i] > 0) r = PetscMax(r, PetscAbsScalar(left[i]) / size[i]);
+    for (size_t i = 0; i < remainder.size(); ++i) {
+      if (PetscIsInfOrNanScalar(remainder[i])) return 1;
+      if (size[i] > 0) r = PetscMax(r, PetscAbsScalar(remainder[i]) / size[i]);
     }
     return r;
   }
@@ -68,36 +68,36 @@ PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual)
   const PartsSplit            &s = p->split;
   const PetscInt               n = (PetscInt)s.inner_row.size(), N = (PetscInt)s.interface.size();
   const std::vector<PetscReal> size = RowSizes(s);
-  std::vector<PetscScalar>     b(s.number.size(), 0), x(s.number.size(), 0), left(N);
-  Sums inner{{}, std::vector<PetscReal>(n, 0)}, top{std::vector<PetscScalar>(N, 0), std::vector<PetscReal>(N, 0)};
+  std::vector<PetscScalar>     b(s.number.size(), 0), x(s.number.size(), 0), remainder(N);
+  RowResiduals                 inner{{}, std::vector<PetscReal>(n, 0)}, at_interface{std::vector<PetscScalar>(N, 0), std::vector<PetscReal>(N, 0)};
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; ++i) {
     b[s.inner_row[i]] = size[i] * LinearPseudoRandomValue((uint64_t)(s.begin + s.inner_row[i]), 0);
-    inner.left.push_back(b[s.inner_row[i]]);
+    inner.remainder.push_back(b[s.inner_row[i]]);
     inner.size[i] = PetscAbsScalar(b[s.inner_row[i]]);
   }
   PetscCall(PartsSolve(p, b.data(), x.data()));
   for (PetscInt i = 0; i < n; ++i)
     for (PetscInt k = s.start[i]; k < s.start[i + 1]; ++k) inner.add(i, s.val[k] * x[s.inner_row[s.col[k]]]);
   for (size_t e = 0; e < s.right.size(); ++e)
-    inner.add(s.right[e].row, s.right_val[e] * p->top[s.local[s.right[e].col]]);
+    inner.add(s.right[e].row, s.right_val[e] * p->at_interface[s.local[s.right[e].col]]);
   for (size_t e = 0; e < s.below.size(); ++e)
-    top.add(s.local[s.below[e].row], s.below_val[e] * x[s.inner_row[s.below[e].col]]);
-  for (size_t e = 0; e < s.corner.size(); ++e) top.add(s.corner[e].row, s.corner_val[e] * p->top[s.corner[e].col]);
+    at_interface.add(s.local[s.below[e].row], s.below_val[e] * x[s.inner_row[s.below[e].col]]);
+  for (size_t e = 0; e < s.corner.size(); ++e) at_interface.add(s.corner[e].row, s.corner_val[e] * p->at_interface[s.corner[e].col]);
   if (N) {
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, top.left.data(), (PetscMPIInt)N, MPIU_SCALAR, MPI_SUM, p->comm));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, top.size.data(), (PetscMPIInt)N, MPIU_REAL, MPI_SUM, p->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, at_interface.remainder.data(), (PetscMPIInt)N, MPIU_SCALAR, MPI_SUM, p->comm));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, at_interface.size.data(), (PetscMPIInt)N, MPIU_REAL, MPI_SUM, p->comm));
   }
-  *residual = PetscMax(inner.largest(), top.largest());
+  *residual = PetscMax(inner.largest(), at_interface.largest());
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, residual, 1, MPIU_REAL, MPI_MAX, p->comm));
   ++p->checks;
   PetscFunctionReturn(0);
 }
 
 /*
-  Inverse iteration with the interior alone, rows divided by r and columns by c: the size of the inverse, and the place
-  of the largest number in the vector that it maps to that. With the transpose instead, r and c change places.
+  Inverse iteration with the interior A, its rows divided by r and its columns by c: estimates the norm of the inverse and
+  finds the index of the largest component of the vector. With the transpose the caller exchanges r and c.
 */
 static PetscErrorCode Iterate(KluPair *k, bool transposed, const std::vector<PetscReal> &r,
                               const std::vector<PetscReal> &c, PetscReal *inverse, PetscInt *largest)
@@ -107,9 +107,9 @@ static PetscErrorCode Iterate(KluPair *k, bool transposed, const std::vector<Pet
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; ++i) w[i] = LinearPseudoRandomValue((uint64_t)i, 0);
-  for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+  for (int sweep = 0; sweep < INVERSE_ITERATIONS; ++sweep) {
     for (PetscInt i = 0; i < n; ++i) z[i] = r[i] * w[i];
-    /* KLU holds the transpose */
+    /* KLU has factored the transpose */
     const KluInt ok = transposed ? KLU(solve)(k->symbolic, k->numeric, (KluInt)n, 1, z.data(), &k->common)
                                  : KLU(tsolve)(k->symbolic, k->numeric, (KluInt)n, 1, z.data(), &k->common);
     PetscCheck(ok, PETSC_COMM_SELF, PETSC_ERR_LIB, "KLU's solve with %" PetscInt_FMT " rows failed with status %d", n,
@@ -147,8 +147,8 @@ PetscErrorCode PartsNearNull(KluParts *p, PetscReal threshold, PetscReal *invers
 
 /* ---- after KLU failed ---- */
 
-/* Rows and columns that no pivot can be found for */
-static PetscErrorCode Unmatched(KluParts *p, std::vector<PetscInt> *move)
+/* Rows and columns of the interior without a pivot: it is structurally singular */
+static PetscErrorCode FindUnmatched(KluParts *p, std::vector<PetscInt> *move)
 {
   const PartsSplit &s = p->split;
   LinearPivots      pivots;
@@ -170,16 +170,16 @@ static PetscErrorCode Unmatched(KluParts *p, std::vector<PetscInt> *move)
   PetscFunctionReturn(0);
 }
 
-/* Where it is a matter of values, KLU may meet its zero far from the cause. A matrix next to this one has factors, and
-   the null vector of this one, nearly. */
-static PetscErrorCode Disturb(KluParts *p, std::vector<PetscInt> *move)
+/* For an interior that is singular by its values, KLU's zero pivot may be far from the cause. A slightly perturbed interior can be factored, and inverse
+   iteration with it converges to the null vector. */
+static PetscErrorCode PerturbAndFactor(KluParts *p, std::vector<PetscInt> *move)
 {
   MatFactorInfo  info;
   MatFactorError error;
   PetscReal      inverse;
 
   PetscFunctionBegin;
-  for (size_t k = 0; k < p->split.val.size(); ++k) p->split.val[k] *= 1 + DISTURBANCE * LinearPseudoRandomValue(k, 0);
+  for (size_t k = 0; k < p->split.val.size(); ++k) p->split.val[k] *= 1 + PERTURBATION * LinearPseudoRandomValue(k, 0);
   PetscCall(PetscObjectStateIncrease((PetscObject)p->inner));
   PetscCall(MatFactorInfoInitialize(&info));
   PetscCall(MatLUFactorNumeric(p->factor, p->inner, &info));
@@ -193,8 +193,8 @@ PetscErrorCode PartsAfterFailure(KluParts *p, std::vector<PetscInt> *move)
   const PetscInt row = p->factor->factorerror_zeropivot_row;
 
   PetscFunctionBegin;
-  PetscCall(Unmatched(p, move));
-  if (move->empty()) PetscCall(Disturb(p, move));
+  PetscCall(FindUnmatched(p, move));
+  if (move->empty()) PetscCall(PerturbAndFactor(p, move));
   if (move->empty() && row >= 0 && row < (PetscInt)p->split.inner_row.size()) move->push_back(p->split.inner_row[row]);
   PetscFunctionReturn(0);
 }

@@ -1,4 +1,9 @@
-/* What a factor of "kluparts" holds */
+/*
+  The data of a factor of "kluparts". With the interior first and the interface last, the rows of a rank are
+
+    [ A  B ]   A: interior, B: columns of the interface ("right")
+    [ C  D ]   C: rows of the interface ("below"), D: interface by interface ("corner")
+*/
 #ifndef HHTDAE_LINEAR_KLUPARTS_DATA_H
 #define HHTDAE_LINEAR_KLUPARTS_DATA_H
 
@@ -6,7 +11,7 @@
 #include "klupair_data.h"
 #include "kluparts.h"
 
-/* An entry between interior and interface, or within the interface: where it is in the block, where its value is */
+/* An entry of B, C or D: its row and column there, and the place of its value in one of the sources */
 enum class PartsSource { Diagonal, Offdiagonal, Received };
 
 struct PartsEntry {
@@ -15,42 +20,40 @@ struct PartsEntry {
   PartsSource source;
 };
 
-/* A run of entries of the rank's diagonal block that are neighbours in the interior, too */
+/* Consecutive entries of the rank's diagonal block that are consecutive in the interior, too */
 struct PartsRun {
   PetscInt from, to, count;
 };
 
-/* A rank's rows, and which of them are where. Interface unknowns are numbered alike on all ranks, by their global rows
- */
+/* The division of a rank's rows. Interface unknowns have the same numbers on all ranks, ascending with their global rows. */
 struct PartsSplit {
   PetscInt              begin = 0, end = 0; /* own global rows */
   std::vector<PetscInt> interface;          /* global rows, ascending; the same on every rank */
-  std::vector<PetscInt> local;              /* interface unknowns coupled to the interior, ascending */
+  std::vector<PetscInt> local;              /* interface unknowns coupled to this rank's interior, ascending */
   std::vector<PetscInt> inner_row;          /* own row of every interior unknown */
-  std::vector<PetscInt> top_row;            /* own rows of the interface */
-  std::vector<PetscInt> number;             /* of own rows: interior unknown, or -1 - interface unknown */
+  std::vector<PetscInt> interface_row;      /* own rows of the interface */
+  std::vector<PetscInt> number;             /* of each own row: its number in the interior, or -1 - its number in the interface */
 
-  /* the interior as a matrix */
+  /* A in compressed rows */
   std::vector<PetscInt>    start, col;
   std::vector<PetscScalar> val;
   std::vector<PartsRun>    runs;
 
-  /* right: interior rows, columns of `local`; below: rows of `local`, interior columns; corner: interface by interface
-   */
+  /* right: rows of the interior, columns by number in `local`; below: rows by number in `local`, columns of the interior; corner: numbers of the interface */
   std::vector<PartsEntry>  right, below, corner;
   std::vector<PetscScalar> right_val, below_val, corner_val;
 
-  /* entries of interface rows in columns that are other ranks' interior: everybody gets all of them */
+  /* Entries of own interface rows in columns of other ranks' interiors: every rank receives those of all ranks */
   std::vector<PetscInt>    sent; /* places in the off-diagonal block */
   std::vector<PetscScalar> send, received;
   std::vector<PetscMPIInt> counts, first;
 };
 
-/* What the next factorization goes by, besides the interior's factor: saved and restored as it is */
+/* What decides how the next matrix is factored, besides the interior's factor; checkpoints store it as it is */
 struct KluPartsState {
-  PetscInt  factorizations = 0; /* of the interior with new pivots, when the reach was found */
-  PetscReal checked_rcond  = 0; /* KLU's rough measure when a solve was last checked */
-  PetscReal residual       = 0; /* of that solve: the largest part of what a row sums up */
+  PetscInt  factorizations = 0; /* KluPair::factorizations, those with new pivots, when the reach was found */
+  PetscReal checked_rcond  = 0; /* KLU's estimate of the reciprocal condition number when a solve was last checked */
+  PetscReal residual       = 0; /* of that solve: the largest over the rows, relative to the sum of the absolute values of the row's terms */
   PetscInt  checks = 0, splits = 0;
 };
 
@@ -61,33 +64,32 @@ struct KluParts : KluPartsState {
 
   PetscBool check = PETSC_TRUE;
 
-  std::vector<PetscInt> moved; /* global rows that went to the interface because an interior needed it */
+  std::vector<PetscInt> moved; /* global rows added to the interface because an interior was singular */
 
   PetscObjectId    matrix  = 0;
   PetscObjectState pattern = 0;
 
-  Mat      inner = NULL, factor = NULL; /* the interior and its factor by "klupair"; NULL where there is none */
-  KluPair *klu = NULL;                  /* what that factor holds */
+  Mat      inner = NULL, factor = NULL; /* the interior and its factor by "klupair"; NULL if the interior is empty */
+  KluPair *klu = NULL;                  /* the data of that factor */
 
-  /* Columns k of KLU's factors that the interface reaches, ascending; where[k] is its place in the list or -1 */
-  std::vector<PetscInt> reach, where;
-  std::vector<PetscInt> right_at, below_at; /* places in the list of the entries of the split's `right` and `below` */
-  std::vector<PetscInt> in, out;            /* own row of right-hand side and solution number k */
-  /* One row per column reached, one column per unknown of `local`: what the elimination leaves of `right` and `below`
-   */
+  /* Columns of KLU's factors that B and C fill, ascending; reach_index[k] is the index of column k in `reach`, or -1 */
+  std::vector<PetscInt> reach, reach_index;
+  std::vector<PetscInt> right_reach, below_reach; /* indices in `reach` of the entries of B and C */
+  std::vector<PetscInt> rhs_row, solution_row;    /* own rows of the k-th component of right-hand side and solution in KLU's order */
+  /* U^-T Q B and L^-1 P C^T / Rs (kluparts_schur.cpp): one row per column in `reach`, one column per unknown of `local` */
   std::vector<PetscScalar> right_part, below_part;
 
   std::vector<PetscScalar>  schur, sums; /* the interface's matrix and its factors; room for sums over ranks */
   std::vector<PetscReal>    row_scale, col_scale;
   std::vector<PetscBLASInt> pivots;
-  std::vector<PetscScalar>  work, top, top_local; /* interior; interface; of it `local` */
+  std::vector<PetscScalar>  work, at_interface, at_local; /* vectors during a solve: interior, interface, and its part `local` */
 };
 
 inline KluParts *PartsOf(Mat F) { return static_cast<KluParts *>(F->data); }
 
 /* ---- kluparts.cpp ---- */
 
-/* Interface, interiors, and what is known of their patterns */
+/* Finds the interface and analyses the interiors for the pattern and values of A */
 PetscErrorCode PartsAnalyse(Mat F, Mat A, KluParts *p);
 
 /* ---- kluparts_factor.cpp ---- */
@@ -98,13 +100,13 @@ PetscErrorCode PartsLoadState(Mat F, Mat A, Archive *archive, PetscBool *same);
 
 /* ---- kluparts_interface.cpp ---- */
 
-/* Entries between ranks, in all */
+/* Number of entries between ranks, over all ranks */
 PetscErrorCode PartsCountCouplings(Mat A, double *couplings);
 
-/* The interface of A, with the rows `moved`; collective, the same on every rank */
+/* The interface of A, which includes the rows `moved`; collective, the same on every rank */
 PetscErrorCode PartsFindInterface(Mat A, const std::vector<PetscInt> &moved, std::vector<PetscInt> *interface);
 
-/* The lists of all ranks, ascending, each row once */
+/* The union of the lists of all ranks, ascending */
 PetscErrorCode PartsGather(MPI_Comm comm, const std::vector<PetscInt> &mine, std::vector<PetscInt> *all);
 
 /* ---- kluparts_split.cpp ---- */
@@ -113,34 +115,32 @@ PetscErrorCode PartsBuildSplit(Mat A, PartsSplit *split);
 PetscErrorCode PartsCopyValues(Mat A, PartsSplit *split);
 
 /* Interior unknowns that are coupled to the interface */
-std::vector<PetscInt> PartsEnds(const PartsSplit &split);
+std::vector<PetscInt> PartsCoupledUnknowns(const PartsSplit &split);
 
 /* The interior as a matrix that uses the arrays of the split */
 PetscErrorCode PartsInnerMatrix(PartsSplit *split, Mat *inner);
 
 /* ---- kluparts_schur.cpp ---- */
 
-/* After a factorization with new pivots: what the interface reaches in it */
+/* To be called after a factorization with new pivots: finds the columns of KLU's factors that B and C fill */
 PetscErrorCode PartsFindReach(KluParts *p);
 
-/* The Schur complement and its factors; *singular is the interface unknown without a pivot, or -1; *finite on all ranks
- */
+/* Forms and factors the Schur complement; *singular is the first interface unknown without a pivot, or -1; *finite: whether all entries are, on all ranks */
 PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *finite);
 
-/* Both arrays have the rank's rows */
+/* Solves; both arrays have the length of the rank's rows */
 PetscErrorCode PartsSolve(KluParts *p, const PetscScalar b[], PetscScalar x[]);
 
 /* ---- kluparts_check.cpp ---- */
 
-/* A solve with a fixed right-hand side: what is left of it, relative to the terms that every row sums up; the largest
- */
+/* Residual of a solve with a fixed right-hand side: the largest over the rows, relative to the sum of the absolute values of the row's terms */
 PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual);
 
-/* The size of the interior's inverse, rows and columns scaled to one; above the threshold the unknowns that its largest
-   vectors have most of (own rows) are added to the list */
+/* Estimates the norm of the inverse of the interior, with rows and columns scaled to one. Above the threshold, the own rows of the largest components of
+   the singular vectors are added to *move. */
 PetscErrorCode PartsNearNull(KluParts *p, PetscReal threshold, PetscReal *inverse, std::vector<PetscInt> *move);
 
-/* After KLU met a zero pivot: own rows that have to leave the interior. Its values and factor are lost. */
+/* To be called after KLU met a zero pivot: finds own rows that have to leave the interior. Destroys the values and the factor of the interior. */
 PetscErrorCode PartsAfterFailure(KluParts *p, std::vector<PetscInt> *move);
 
 #endif

@@ -6,26 +6,26 @@
 #include "linear.h"
 #include <algorithm>
 
-/* A residual above this part of the terms that a row sums up is not rounding */
-static const PetscReal RESIDUAL = 1e-8;
+/* A larger residual of a solve, relative to the sum of the absolute values of a row's terms, is more than rounding */
+static const PetscReal MAX_RESIDUAL = 1e-8;
 
-/* An interior is nearly singular from this size of its inverse on, rows and columns scaled to one: half of the digits
-   are lost. It counts if the residual is bad; from the second on, only rounding lies between the interior and a
-   singular one. */
-static const PetscReal NEARLY_SINGULAR = 1e8, SINGULAR = 1e14;
+/* Limits of the norm of the scaled interior's inverse. Above the first one half of the digits are lost: unknowns are moved
+   if the residual is bad, too. Above the second one the interior differs from a singular one by rounding only: unknowns are
+   moved in any case. */
+static const PetscReal MAX_INVERSE_BAD_RESIDUAL = 1e8, MAX_INVERSE = 1e14;
 
-/* KLU's measure of the pivots may fall so far before a solve is looked at again */
-static const PetscReal RCOND_FALL = 1e-3;
+/* With old pivots a solve is checked again if KLU's estimate of the reciprocal condition number falls below this part of its value at the last check */
+static const PetscReal RECHECK_RCOND_RATIO = 1e-3;
 
-/* Unknowns are moved so many times, each time at least one; the interface does not grow beyond this by it */
-static const PetscInt ROUNDS = 20, LARGEST = 4000;
+/* Limits of moving unknowns to the interface: rounds per factorization, and the size that the interface may reach by it (or twice its size, if that is more) */
+static const PetscInt MAX_ROUNDS = 20, MAX_GROWN_INTERFACE = 4000;
 
 namespace
 {
 
-/* How it went on the ranks: the worst error other than a zero pivot, the first row with a zero pivot, wishes */
+/* Maxima over the ranks: the error other than a zero pivot, whether there was a zero pivot, whether a solve is to be checked, whether pivots are new */
 struct Outcome {
-  PetscInt error, singular, check, anew;
+  PetscInt error, singular, check, new_pivots;
 };
 
 } // namespace
@@ -43,14 +43,14 @@ static PetscErrorCode FactorInner(KluParts *p, Outcome *all)
     PetscCall(PetscObjectStateIncrease((PetscObject)p->inner));
     PetscCall(MatLUFactorNumeric(p->factor, p->inner, &info));
     PetscCall(MatFactorGetError(p->factor, &error));
-    mine.singular = error == MAT_FACTOR_NUMERIC_ZEROPIVOT || error == MAT_FACTOR_STRUCT_ZEROPIVOT;
-    mine.error    = mine.singular ? 0 : (PetscInt)error;
-    mine.anew     = k->factorizations != p->factorizations;
-    mine.check    = !error && (mine.anew || k->common.rcond < RCOND_FALL * p->checked_rcond);
+    mine.singular   = error == MAT_FACTOR_NUMERIC_ZEROPIVOT || error == MAT_FACTOR_STRUCT_ZEROPIVOT;
+    mine.error      = mine.singular ? 0 : (PetscInt)error;
+    mine.new_pivots = k->factorizations != p->factorizations;
+    mine.check      = !error && (mine.new_pivots || k->common.rcond < RECHECK_RCOND_RATIO * p->checked_rcond);
   } else
-    mine.anew = p->factorizations == 0;
+    mine.new_pivots = p->factorizations == 0;
   PetscCallMPI(MPI_Allreduce(&mine, all, 4, MPIU_INT, MPI_MAX, p->comm));
-  if (!error && mine.anew) {
+  if (!error && mine.new_pivots) {
     PetscCall(PartsFindReach(p));
     p->factorizations = k ? k->factorizations : 1;
   }
@@ -83,8 +83,7 @@ static PetscErrorCode ReportError(Mat F, Mat A, MatFactorError error)
   PetscFunctionReturn(0);
 }
 
-/* Global rows that leave the interiors, with the first of them; *moved = PETSC_FALSE where there are none or too many
- */
+/* Moves own rows of all ranks to the interface; *first is the least global row, or -1. *moved = PETSC_FALSE if there are none or too many. */
 static PetscErrorCode Move(KluParts *p, std::vector<PetscInt> rows, PetscBool *moved, PetscInt *first)
 {
   std::vector<PetscInt> all;
@@ -94,14 +93,14 @@ static PetscErrorCode Move(KluParts *p, std::vector<PetscInt> rows, PetscBool *m
   PetscCall(PartsGather(p->comm, rows, &all));
   *first = all.empty() ? -1 : all.front();
   *moved = !all.empty() && (PetscInt)(p->split.interface.size() + all.size()) <=
-                               PetscMax(LARGEST, 2 * (PetscInt)p->split.interface.size())
+                               PetscMax(MAX_GROWN_INTERFACE, 2 * (PetscInt)p->split.interface.size())
                ? PETSC_TRUE
                : PETSC_FALSE;
   if (*moved) p->moved.insert(p->moved.end(), all.begin(), all.end());
   PetscFunctionReturn(0);
 }
 
-/* After pivots were chosen anew: whether the interiors are regular; *again if unknowns have left them */
+/* Checks after a new choice of pivots whether the interiors are regular; *again if unknowns have been moved out of them */
 static PetscErrorCode Check(Mat F, bool last, bool *again)
 {
   KluParts             *p = PartsOf(F);
@@ -112,7 +111,7 @@ static PetscErrorCode Check(Mat F, bool last, bool *again)
 
   PetscFunctionBegin;
   PetscCall(PartsResidual(p, &p->residual));
-  PetscCall(PartsNearNull(p, p->residual > RESIDUAL ? NEARLY_SINGULAR : SINGULAR, &inverse, &move));
+  PetscCall(PartsNearNull(p, p->residual > MAX_RESIDUAL ? MAX_INVERSE_BAD_RESIDUAL : MAX_INVERSE, &inverse, &move));
   if (p->klu) p->checked_rcond = p->klu->common.rcond;
   PetscCall(PetscInfo(p->inner ? (PetscObject)p->inner : (PetscObject)F,
                       "Residual of a solve %g; inverse of the scaled interior %g\n", (double)p->residual,
@@ -123,7 +122,7 @@ static PetscErrorCode Check(Mat F, bool last, bool *again)
   PetscFunctionReturn(0);
 }
 
-/* One attempt with the interface as it is; *again where it has been made larger */
+/* One attempt with the present interface; *again if it has been enlarged */
 static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
 {
   KluParts             *p = PartsOf(F);
@@ -152,9 +151,9 @@ static PetscErrorCode Attempt(Mat F, Mat A, bool last, bool *again)
   }
   PetscCall(PartsFactorSchur(p, &row, &finite));
   if (!finite || row >= 0) {
-    /* an interior that is singular but for rounding makes all others small in the Schur complement (tests/python, Ranks.test_driven_whole_body) */
+    /* an interior that is singular up to rounding has a huge contribution, beside which all others vanish in the Schur complement (tests/python, Ranks.test_driven_whole_body) */
     if (!last && p->check) {
-      PetscCall(PartsNearNull(p, NEARLY_SINGULAR, &inverse, &move));
+      PetscCall(PartsNearNull(p, MAX_INVERSE_BAD_RESIDUAL, &inverse, &move));
       PetscCall(Move(p, move, &moved, &first));
     }
     if (moved)
@@ -185,7 +184,7 @@ PetscErrorCode PartsFactorNumeric(Mat F, Mat A, const MatFactorInfo *)
     PetscCall(PartsAnalyse(F, A, p));
   }
   for (PetscInt round = 1; again; ++round) {
-    PetscCall(Attempt(F, A, round > ROUNDS, &again));
+    PetscCall(Attempt(F, A, round > MAX_ROUNDS, &again));
     if (again) PetscCall(PartsAnalyse(F, A, p));
   }
   F->assembled = PETSC_TRUE;
@@ -204,7 +203,7 @@ PetscErrorCode PartsSaveState(Mat F, Archive *archive)
   PetscFunctionReturn(0);
 }
 
-/* The same interface, the interior's factor as it was, and from both the Schur complement */
+/* Restores the interface and the interior's factor, and computes the Schur complement from both */
 PetscErrorCode PartsLoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
   KluParts     *p = PartsOf(F);
@@ -226,7 +225,7 @@ PetscErrorCode PartsLoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
   if (p->klu && !p->klu->numeric) *same = PETSC_FALSE;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, p->comm));
   F->factorerrortype = MAT_FACTOR_OTHER;
-  p->matrix          = 0; /* looked at anew unless all goes well */
+  p->matrix          = 0; /* forces a new analysis unless loading succeeds */
   if (!*same) PetscFunctionReturn(0);
   static_cast<KluPartsState &>(*p) = state;
   PetscCall(PartsFindReach(p));

@@ -1,4 +1,4 @@
-/* The interface of "kluparts": a cover of the couplings between ranks, found alike on all of them */
+/* The interface of "kluparts": a vertex cover of the couplings between ranks, computed identically on all ranks */
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
 #include <algorithm>
@@ -9,12 +9,12 @@ typedef std::vector<PetscInt> Indices;
 namespace
 {
 
-/* Unknowns coupled across ranks, by their global rows, and the couplings between them; alike on all ranks */
+/* Unknowns coupled across ranks, by global rows, and the graph of their couplings; the same on all ranks */
 struct Couplings {
   Indices           row;
   LinearGraph       graph;
   std::vector<bool> multiplier; /* no value on the diagonal */
-  Indices           weight;     /* rows that the interface gets with it, about */
+  Indices           weight;     /* number of rows that the interface gains with the unknown: itself and the multipliers it brings along, approximately */
 };
 
 } // namespace
@@ -104,7 +104,7 @@ namespace
 {
 
 /* Rows of the rank's diagonal block, and which of them have a value on the diagonal */
-struct Local {
+struct DiagonalBlock {
   Mat               diagonal;
   LinearRows        rows;
   PetscInt          begin, end;
@@ -115,7 +115,7 @@ struct Local {
 
 } // namespace
 
-static PetscErrorCode GetLocal(Mat A, Local *l)
+static PetscErrorCode GetDiagonalBlock(Mat A, DiagonalBlock *l)
 {
   Mat             off;
   const PetscInt *garray;
@@ -131,7 +131,7 @@ static PetscErrorCode GetLocal(Mat A, Local *l)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode Weigh(MPI_Comm comm, const Local &l, Couplings *c)
+static PetscErrorCode WeighUnknowns(MPI_Comm comm, const DiagonalBlock &l, Couplings *c)
 {
   const size_t n = c->row.size();
   Indices      mine(2 * n, 0), all(2 * n);
@@ -161,35 +161,35 @@ static PetscErrorCode Weigh(MPI_Comm comm, const Local &l, Couplings *c)
 
 /* ---- the cover ---- */
 
-/* The unknown that covers the most couplings per row of the interface, again and again */
+/* Greedy vertex cover: repeatedly takes the unknown that covers the most couplings per row of the interface */
 static void CoverGreedily(const Couplings &c, std::vector<bool> *taken)
 {
-  typedef std::pair<double, PetscInt> Offer; /* couplings covered per weight, then the first row */
-  std::priority_queue<Offer>          queue;
-  Indices                             open(c.graph.n);
-  const auto offer = [&](PetscInt v) { queue.push({(double)open[v] / (double)c.weight[v], -v}); };
+  typedef std::pair<double, PetscInt> Candidate; /* uncovered couplings per weight, and minus the unknown: ties go to the first one */
+  std::priority_queue<Candidate>      queue;
+  Indices                             uncovered(c.graph.n);
+  const auto                          push_candidate = [&](PetscInt v) { queue.push({(double)uncovered[v] / (double)c.weight[v], -v}); };
 
   taken->assign(c.graph.n, false);
   for (PetscInt v = 0; v < c.graph.n; ++v) {
-    open[v] = c.graph.xadj[v + 1] - c.graph.xadj[v];
-    offer(v);
+    uncovered[v] = c.graph.xadj[v + 1] - c.graph.xadj[v];
+    push_candidate(v);
   }
   while (!queue.empty()) {
-    const PetscInt v       = -queue.top().second;
-    const double   offered = queue.top().first;
+    const PetscInt v        = -queue.top().second;
+    const double   coverage = queue.top().first;
     queue.pop();
-    if ((*taken)[v] || open[v] == 0) continue;
-    if (offered > (double)open[v] / (double)c.weight[v]) { /* some of its couplings have been covered since */
-      offer(v);
+    if ((*taken)[v] || uncovered[v] == 0) continue;
+    if (coverage > (double)uncovered[v] / (double)c.weight[v]) { /* some of its couplings have been covered since */
+      push_candidate(v);
       continue;
     }
     (*taken)[v] = true;
-    for (PetscInt k = c.graph.xadj[v]; k < c.graph.xadj[v + 1]; ++k) --open[c.graph.adj[k]];
+    for (PetscInt k = c.graph.xadj[v]; k < c.graph.xadj[v + 1]; ++k) --uncovered[c.graph.adj[k]];
   }
 }
 
-/* Interface coordinates bring their multipliers along; unknowns whose neighbours are all taken are not needed */
-static void Complete(const Couplings &c, std::vector<bool> *taken)
+/* Adds the multipliers coupled to interface coordinates, and removes unknowns whose neighbours are all in the interface */
+static void CompleteCover(const Couplings &c, std::vector<bool> *taken)
 {
   const auto neighbours = [&c](PetscInt v) {
     return std::make_pair(c.graph.adj.begin() + c.graph.xadj[v], c.graph.adj.begin() + c.graph.xadj[v + 1]);
@@ -213,16 +213,16 @@ PetscErrorCode PartsFindInterface(Mat A, const Indices &moved, Indices *interfac
 {
   const MPI_Comm    comm = PetscObjectComm((PetscObject)A);
   Couplings         c;
-  Local             l;
+  DiagonalBlock     l;
   std::vector<bool> taken;
   Indices           mine;
 
   PetscFunctionBegin;
   PetscCall(GatherCouplings(A, &c));
-  PetscCall(GetLocal(A, &l));
-  PetscCall(Weigh(comm, l, &c));
+  PetscCall(GetDiagonalBlock(A, &l));
+  PetscCall(WeighUnknowns(comm, l, &c));
   CoverGreedily(c, &taken);
-  Complete(c, &taken);
+  CompleteCover(c, &taken);
   for (PetscInt v = 0; v < c.graph.n; ++v) {
     if (!taken[v] || !l.owns(c.row[v])) continue;
     const PetscInt i = c.row[v] - l.begin;

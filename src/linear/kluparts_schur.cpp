@@ -1,18 +1,18 @@
 /*
-  The interface's part in a factorization and a solve of "kluparts".
+  The Schur complement of the interface of "kluparts", and solves.
 
-  KLU holds the transpose of the interior: row i of the interior is its column, P and Q are its permutations, and
-  A(Q,P) = U^T L^T / Rs with row k of U^T in column k of U. With B the columns of the interior's rows that belong to the
-  interface and C the interface's rows, the Schur complement is D - (L^-1 P C^T / Rs)^T (U^-T Q B). The two factors have
-  entries only in the columns of L and U that B and C reach, which are few where the ordering ends at the interface.
+  KLU factors the transpose of the interior A: row i of A is KLU's column, P and Q are its permutations, and
+  A(Q,P) = U^T L^T / Rs with row k of U^T in column k of U. With the blocks B, C and D of kluparts_data.h the Schur
+  complement is D - (L^-1 P C^T / Rs)^T (U^-T Q B). The two factors have nonzero rows only for the columns of L and U that B and C
+  reach, which are few if the ordering eliminates the unknowns coupled to the interface last.
 */
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
 #include <algorithm>
 #include <petscblaslapack.h>
 
-/* A pivot of the Schur complement below this, where the terms of every row and column sum up to one, is none */
-static const PetscReal NO_PIVOT = 1e-13;
+/* Smaller pivots of the Schur complement count as zero; it is scaled so that the absolute values of the terms of every row and column sum up to about one */
+static const PetscReal MIN_SCHUR_PIVOT = 1e-13;
 
 namespace
 {
@@ -24,9 +24,9 @@ struct Column {
   KluInt        count;
 };
 
-/* The columns of one factor: indices, rounded up to whole doubles, then values. For a single unknown KLU stores nothing
-   but the pivot. */
-struct Factor {
+/* The columns of one factor in KLU's storage: indices, padded to whole doubles, then values. For a single unknown KLU stores the pivot only, and
+   data is NULL. */
+struct FactorColumns {
   const double *data;
   const KluInt *start, *length;
 
@@ -41,19 +41,19 @@ struct Factor {
 
 } // namespace
 
-static Factor Lower(const KluPair &k)
+static FactorColumns Lower(const KluPair &k)
 {
   return {static_cast<const double *>(k.numeric->LUbx[0]), k.numeric->Lip, k.numeric->Llen};
 }
 
-static Factor Upper(const KluPair &k)
+static FactorColumns Upper(const KluPair &k)
 {
   return {static_cast<const double *>(k.numeric->LUbx[0]), k.numeric->Uip, k.numeric->Ulen};
 }
 
 static const double *Pivots(const KluPair &k) { return static_cast<const double *>(k.numeric->Udiag); }
 
-/* ---- what the interface reaches ---- */
+/* ---- columns that the interface reaches ---- */
 
 static std::vector<PetscInt> Inverse(const KluInt *permutation, PetscInt n)
 {
@@ -62,7 +62,7 @@ static std::vector<PetscInt> Inverse(const KluInt *permutation, PetscInt n)
   return inverse;
 }
 
-static void MarkLower(const Factor &L, PetscInt n, std::vector<char> *met)
+static void MarkLower(const FactorColumns &L, PetscInt n, std::vector<char> *met)
 {
   for (PetscInt k = 0; k < n; ++k) {
     if (!(*met)[k]) continue;
@@ -71,7 +71,7 @@ static void MarkLower(const Factor &L, PetscInt n, std::vector<char> *met)
   }
 }
 
-static void MarkUpper(const Factor &U, PetscInt n, std::vector<char> *met)
+static void MarkUpper(const FactorColumns &U, PetscInt n, std::vector<char> *met)
 {
   PetscInt k = 0;
   while (k < n && !(*met)[k]) ++k;
@@ -91,37 +91,37 @@ PetscErrorCode PartsFindReach(KluParts *p)
 
   PetscFunctionBegin;
   p->reach.clear();
-  p->where.assign(n, -1);
-  p->in.resize(n);
-  p->out.resize(n);
+  p->reach_index.assign(n, -1);
+  p->rhs_row.resize(n);
+  p->solution_row.resize(n);
   if (!klu) PetscFunctionReturn(0);
   PetscCheck(klu->symbolic->nblocks == 1, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "KLU found %d diagonal blocks, one was asked for", (int)klu->symbolic->nblocks);
   const std::vector<PetscInt> row = Inverse(klu->symbolic->Q, n), col = Inverse(klu->numeric->Pnum, n);
   for (PetscInt k = 0; k < n; ++k) {
-    p->in[k]  = s.inner_row[klu->symbolic->Q[k]];
-    p->out[k] = s.inner_row[klu->numeric->Pnum[k]];
+    p->rhs_row[k]      = s.inner_row[klu->symbolic->Q[k]];
+    p->solution_row[k] = s.inner_row[klu->numeric->Pnum[k]];
   }
-  p->right_at.clear();
-  p->below_at.clear();
+  p->right_reach.clear();
+  p->below_reach.clear();
   for (const PartsEntry &e : s.right) upper[row[e.row]] = 1;
   for (const PartsEntry &e : s.below) lower[col[e.col]] = 1;
   MarkLower(Lower(*klu), n, &lower);
   MarkUpper(Upper(*klu), n, &upper);
   for (PetscInt k = 0; k < n; ++k)
     if (lower[k] || upper[k]) {
-      p->where[k] = (PetscInt)p->reach.size();
+      p->reach_index[k] = (PetscInt)p->reach.size();
       p->reach.push_back(k);
     }
-  for (const PartsEntry &e : s.right) p->right_at.push_back(p->where[row[e.row]]);
-  for (const PartsEntry &e : s.below) p->below_at.push_back(p->where[col[e.col]]);
+  for (const PartsEntry &e : s.right) p->right_reach.push_back(p->reach_index[row[e.row]]);
+  for (const PartsEntry &e : s.below) p->below_reach.push_back(p->reach_index[col[e.col]]);
   p->right_part.resize(p->reach.size() * s.local.size());
   p->below_part.resize(p->reach.size() * s.local.size());
   p->work.resize(n);
   PetscFunctionReturn(0);
 }
 
-/* ---- what the elimination of the interior leaves ---- */
+/* ---- elimination of the interior from B and C ---- */
 
 static void Subtract(PetscScalar *to, PetscScalar factor, const PetscScalar *from, PetscInt width)
 {
@@ -131,19 +131,19 @@ static void Subtract(PetscScalar *to, PetscScalar factor, const PetscScalar *fro
 /* U^-T Q B */
 static void EliminateRight(KluParts *p, const KluPair &klu)
 {
-  const PetscInt w = (PetscInt)p->split.local.size();
-  const Factor   U = Upper(klu);
-  PetscScalar   *Y = p->right_part.data();
+  const PetscInt      w = (PetscInt)p->split.local.size();
+  const FactorColumns U = Upper(klu);
+  PetscScalar        *Y = p->right_part.data();
 
   std::fill(p->right_part.begin(), p->right_part.end(), 0);
   for (size_t e = 0; e < p->split.right.size(); ++e)
-    Y[(size_t)p->right_at[e] * w + p->split.right[e].col] += p->split.right_val[e];
+    Y[(size_t)p->right_reach[e] * w + p->split.right[e].col] += p->split.right_val[e];
   for (size_t r = 0; r < p->reach.size(); ++r) {
     const Column       c     = U[p->reach[r]];
     const PetscScalar  pivot = Pivots(klu)[p->reach[r]];
     PetscScalar *const y     = Y + r * w;
     for (KluInt j = 0; j < c.count; ++j) {
-      const PetscInt i = p->where[c.index[j]];
+      const PetscInt i = p->reach_index[c.index[j]];
       if (i >= 0) Subtract(y, c.value[j], Y + (size_t)i * w, w);
     }
     for (PetscInt j = 0; j < w; ++j) y[j] /= pivot;
@@ -153,20 +153,20 @@ static void EliminateRight(KluParts *p, const KluPair &klu)
 /* L^-1 P C^T / Rs */
 static void EliminateBelow(KluParts *p, const KluPair &klu)
 {
-  const PetscInt w  = (PetscInt)p->split.local.size();
-  const Factor   L  = Lower(klu);
-  const double  *Rs = klu.numeric->Rs;
-  PetscScalar   *V  = p->below_part.data();
+  const PetscInt      w  = (PetscInt)p->split.local.size();
+  const FactorColumns L  = Lower(klu);
+  const double       *Rs = klu.numeric->Rs;
+  PetscScalar        *V  = p->below_part.data();
 
   std::fill(p->below_part.begin(), p->below_part.end(), 0);
   for (size_t e = 0; e < p->split.below.size(); ++e) {
-    const PetscInt r = p->below_at[e];
+    const PetscInt r = p->below_reach[e];
     V[(size_t)r * w + p->split.below[e].row] += p->split.below_val[e] / (Rs ? Rs[p->reach[r]] : 1);
   }
   for (size_t r = 0; r < p->reach.size(); ++r) {
     const Column c = L[p->reach[r]];
     for (KluInt j = 0; j < c.count; ++j) {
-      const PetscInt i = p->where[c.index[j]];
+      const PetscInt i = p->reach_index[c.index[j]];
       if (i >= 0) Subtract(V + (size_t)i * w, c.value[j], V + r * w, w);
     }
   }
@@ -174,7 +174,7 @@ static void EliminateBelow(KluParts *p, const KluPair &klu)
 
 /* ---- the Schur complement ---- */
 
-/* Column by column; what this rank's interior and interface rows give to it */
+/* This rank's contribution to the Schur complement, column by column: from its interior and its interface rows */
 static PetscErrorCode Contribution(KluParts *p, PetscScalar *S)
 {
   const PartsSplit        &s = p->split;
@@ -191,7 +191,7 @@ static PetscErrorCode Contribution(KluParts *p, PetscScalar *S)
   const PetscScalar one = 1, zero = 0;
   PetscCall(PetscBLASIntCast((PetscInt)w, &bw));
   PetscCall(PetscBLASIntCast((PetscInt)p->reach.size(), &br));
-  /* rows of the parts are columns for BLAS */
+  /* the parts are stored by rows: BLAS sees their transposes */
   PetscCallBLAS("BLASgemm", BLASgemm_("N", "T", &bw, &bw, &br, &one, p->below_part.data(), &bw, p->right_part.data(),
                                       &bw, &zero, product.data(), &bw));
   for (size_t j = 0; j < w; ++j)
@@ -246,7 +246,7 @@ static void Invert(std::vector<PetscReal> *sums)
   for (PetscReal &v : *sums) v = v > 0 && !PetscIsInfOrNanReal(1 / v) ? 1 / v : 1;
 }
 
-/* By the terms of its sums, not by what is left of them: where they cancel, nothing but rounding is left */
+/* Scales the Schur complement by the sums of the absolute values of its terms, not of its entries: where terms cancel, the entry is rounding */
 static PetscErrorCode Scale(KluParts *p)
 {
   const size_t N = p->split.interface.size();
@@ -262,7 +262,7 @@ static PetscErrorCode Scale(KluParts *p)
   PetscFunctionReturn(0);
 }
 
-/* With row exchanges; the first column without a pivot, or the number of columns */
+/* LU with row exchanges; *first is the first column without a pivot, or the number of columns */
 static PetscErrorCode FactorDense(KluParts *p, PetscInt *first)
 {
   const size_t N = p->split.interface.size();
@@ -277,7 +277,7 @@ static PetscErrorCode FactorDense(KluParts *p, PetscInt *first)
   for (size_t k = N; k-- > 0;) {
     const PetscReal pivot = PetscAbsScalar(p->schur[k + N * k]);
     least                 = PetscMin(least, pivot);
-    if (!(pivot > NO_PIVOT)) *first = (PetscInt)k;
+    if (!(pivot > MIN_SCHUR_PIVOT)) *first = (PetscInt)k;
   }
   PetscCall(
       PetscInfo(NULL, "Schur complement of %zu rows: least pivot %g of the terms that it sums up\n", N, (double)least));
@@ -297,8 +297,8 @@ PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *fini
   *finite   = PETSC_TRUE;
   p->schur.resize(N * N);
   p->sums.resize(N);
-  p->top.resize(N);
-  p->top_local.resize(p->split.local.size());
+  p->at_interface.resize(N);
+  p->at_local.resize(p->split.local.size());
   p->pivots.resize(N);
   if (!N) PetscFunctionReturn(0);
   PetscCall(Contribution(p, mine.data()));
@@ -311,7 +311,7 @@ PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *fini
     found[1] = 0;
   else
     PetscCall(FactorDense(p, &found[0]));
-  /* what one rank finds holds for all */
+  /* all ranks take the least result, because rounding may differ */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found, 2, MPIU_INT, MPI_MIN, p->comm));
   *singular = found[0] < (PetscInt)N ? found[0] : -1;
   *finite   = found[1] ? PETSC_TRUE : PETSC_FALSE;
@@ -320,37 +320,37 @@ PetscErrorCode PartsFactorSchur(KluParts *p, PetscInt *singular, PetscBool *fini
 
 /* ---- solve ---- */
 
-/* From right-hand side b down the interior */
-static void SolveDown(KluParts *p, const KluPair &klu, const PetscScalar b[])
+/* Forward sweep in the interior from the right-hand side b */
+static void SolveForward(KluParts *p, const KluPair &klu, const PetscScalar b[])
 {
-  const PetscInt n     = (PetscInt)p->in.size();
-  const Factor   U     = Upper(klu);
-  const double  *pivot = Pivots(klu);
-  PetscScalar   *z     = p->work.data();
+  const PetscInt      n     = (PetscInt)p->rhs_row.size();
+  const FactorColumns U     = Upper(klu);
+  const double       *pivot = Pivots(klu);
+  PetscScalar        *z     = p->work.data();
   for (PetscInt k = 0; k < n; ++k) {
     const Column c   = U[k];
-    PetscScalar  sum = b[p->in[k]];
+    PetscScalar  sum = b[p->rhs_row[k]];
     for (KluInt j = 0; j < c.count; ++j) sum -= c.value[j] * z[c.index[j]];
     z[k] = sum / pivot[k];
   }
 }
 
-static void SolveUp(KluParts *p, const KluPair &klu, PetscScalar x[])
+static void SolveBackward(KluParts *p, const KluPair &klu, PetscScalar x[])
 {
-  const PetscInt n  = (PetscInt)p->in.size();
-  const Factor   L  = Lower(klu);
-  const double  *Rs = klu.numeric->Rs;
-  PetscScalar   *z  = p->work.data();
+  const PetscInt      n  = (PetscInt)p->rhs_row.size();
+  const FactorColumns L  = Lower(klu);
+  const double       *Rs = klu.numeric->Rs;
+  PetscScalar        *z  = p->work.data();
   for (PetscInt k = n - 1; k >= 0; --k) {
     const Column c   = L[k];
     PetscScalar  sum = z[k];
     for (KluInt j = 0; j < c.count; ++j) sum -= c.value[j] * z[c.index[j]];
-    z[k]         = sum;
-    x[p->out[k]] = Rs ? sum / Rs[k] : sum;
+    z[k]                  = sum;
+    x[p->solution_row[k]] = Rs ? sum / Rs[k] : sum;
   }
 }
 
-/* The interface's right-hand side less what the interiors take from it, its solution in p->top */
+/* Reduces the interface's right-hand side by the contributions of the interiors and solves for p->at_interface */
 static PetscErrorCode SolveInterface(KluParts *p, const PetscScalar b[])
 {
   const PartsSplit &s = p->split;
@@ -359,19 +359,19 @@ static PetscErrorCode SolveInterface(KluParts *p, const PetscScalar b[])
 
   PetscFunctionBegin;
   std::fill(p->sums.begin(), p->sums.end(), 0);
-  std::fill(p->top_local.begin(), p->top_local.end(), 0);
-  for (PetscInt i : s.top_row) p->sums[-1 - s.number[i]] = b[i];
+  std::fill(p->at_local.begin(), p->at_local.end(), 0);
+  for (PetscInt i : s.interface_row) p->sums[-1 - s.number[i]] = b[i];
   for (size_t r = 0; r < p->reach.size(); ++r)
-    Subtract(p->top_local.data(), p->work[p->reach[r]], p->below_part.data() + r * w, (PetscInt)w);
-  for (size_t j = 0; j < w; ++j) p->sums[s.local[j]] += p->top_local[j];
-  PetscCallMPI(MPI_Allreduce(p->sums.data(), p->top.data(), (PetscMPIInt)N, MPIU_SCALAR, MPI_SUM, p->comm));
-  for (size_t g = 0; g < N; ++g) p->top[g] *= p->row_scale[g];
+    Subtract(p->at_local.data(), p->work[p->reach[r]], p->below_part.data() + r * w, (PetscInt)w);
+  for (size_t j = 0; j < w; ++j) p->sums[s.local[j]] += p->at_local[j];
+  PetscCallMPI(MPI_Allreduce(p->sums.data(), p->at_interface.data(), (PetscMPIInt)N, MPIU_SCALAR, MPI_SUM, p->comm));
+  for (size_t g = 0; g < N; ++g) p->at_interface[g] *= p->row_scale[g];
   PetscCall(PetscBLASIntCast((PetscInt)N, &n));
   PetscCallBLAS("LAPACKgetrs",
-                LAPACKgetrs_("N", &n, &one, p->schur.data(), &n, p->pivots.data(), p->top.data(), &n, &info));
+                LAPACKgetrs_("N", &n, &one, p->schur.data(), &n, p->pivots.data(), p->at_interface.data(), &n, &info));
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK's getrs refused argument %d", (int)-info);
-  for (size_t g = 0; g < N; ++g) p->top[g] *= p->col_scale[g];
-  for (size_t j = 0; j < w; ++j) p->top_local[j] = p->top[s.local[j]];
+  for (size_t g = 0; g < N; ++g) p->at_interface[g] *= p->col_scale[g];
+  for (size_t j = 0; j < w; ++j) p->at_local[j] = p->at_interface[s.local[j]];
   PetscFunctionReturn(0);
 }
 
@@ -382,19 +382,19 @@ PetscErrorCode PartsSolve(KluParts *p, const PetscScalar b[], PetscScalar x[])
   const size_t      w   = s.local.size();
 
   PetscFunctionBegin;
-  if (klu) SolveDown(p, *klu, b);
+  if (klu) SolveForward(p, *klu, b);
   if (!s.interface.empty()) {
     PetscCall(SolveInterface(p, b));
     for (size_t r = 0; r < p->reach.size(); ++r) {
       const PetscScalar *y   = p->right_part.data() + r * w;
       PetscScalar        sum = 0;
-      for (size_t j = 0; j < w; ++j) sum += y[j] * p->top_local[j];
+      for (size_t j = 0; j < w; ++j) sum += y[j] * p->at_local[j];
       p->work[p->reach[r]] -= sum;
     }
-    for (PetscInt i : s.top_row) x[i] = p->top[-1 - s.number[i]];
+    for (PetscInt i : s.interface_row) x[i] = p->at_interface[-1 - s.number[i]];
   }
   if (klu) {
-    SolveUp(p, *klu, x);
+    SolveBackward(p, *klu, x);
     PetscCall(PetscLogFlops(2.0 * ((double)klu->numeric->lnz + (double)klu->numeric->unz) +
                             4.0 * (double)w * (double)p->reach.size()));
   }

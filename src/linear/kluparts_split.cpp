@@ -1,5 +1,4 @@
-/* The blocks of "kluparts": interior, interface and what couples them, and the way of every value from the matrix there
- */
+/* The blocks A, B, C and D of "kluparts" (kluparts_data.h), and the copying of values from the matrix to them */
 #if defined(HHTDAE_HAVE_KLU)
 #include "kluparts_data.h"
 #include <algorithm>
@@ -9,8 +8,8 @@ typedef std::vector<PetscInt> Indices;
 namespace
 {
 
-/* The two blocks of a rank's rows, while they are looked at */
-struct Blocks {
+/* Read access to the diagonal and the off-diagonal block of a rank's rows */
+struct RankBlocks {
   Mat             diagonal, off;
   LinearRows      d, o;
   const PetscInt *garray;
@@ -18,7 +17,7 @@ struct Blocks {
 
 } // namespace
 
-static PetscErrorCode GetBlocks(Mat A, Blocks *b)
+static PetscErrorCode GetBlocks(Mat A, RankBlocks *b)
 {
   PetscFunctionBegin;
   PetscCall(MatMPIAIJGetSeqAIJ(A, &b->diagonal, &b->off, &b->garray));
@@ -27,7 +26,7 @@ static PetscErrorCode GetBlocks(Mat A, Blocks *b)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode RestoreBlocks(Blocks *b)
+static PetscErrorCode RestoreBlocks(RankBlocks *b)
 {
   PetscFunctionBegin;
   PetscCall(KluPairRestoreRows(b->diagonal, &b->d));
@@ -44,7 +43,7 @@ static void NumberRows(PartsSplit *s)
       s->number[s->interface[g] - s->begin] = -1 - (PetscInt)g;
   for (PetscInt i = 0; i < n; ++i)
     if (s->number[i] < 0) {
-      s->top_row.push_back(i);
+      s->interface_row.push_back(i);
     } else {
       s->number[i] = (PetscInt)s->inner_row.size();
       s->inner_row.push_back(i);
@@ -63,12 +62,12 @@ static void AddInner(PartsSplit *s, PetscInt col, PetscInt place)
   const PetscInt to = (PetscInt)s->col.size();
   s->col.push_back(col);
   if (!s->runs.empty() && s->runs.back().from + s->runs.back().count == place)
-    ++s->runs.back().count; /* places in the interior have no gaps */
+    ++s->runs.back().count; /* entries of the interior are appended without gaps */
   else
     s->runs.push_back({place, to, 1});
 }
 
-static void SortDiagonal(const LinearRows &d, PartsSplit *s)
+static void ClassifyDiagonal(const LinearRows &d, PartsSplit *s)
 {
   s->start.assign(1, 0);
   for (PetscInt i = 0; i < d.n; ++i) {
@@ -87,8 +86,8 @@ static void SortDiagonal(const LinearRows &d, PartsSplit *s)
   }
 }
 
-/* Entries of interface rows in other ranks' columns are listed as pairs of interface number and global column */
-static PetscErrorCode SortOffdiagonal(Mat A, const Blocks &b, PartsSplit *s, Indices *sent)
+/* Entries of interface rows in columns of other ranks' interiors are listed as pairs of interface number and global column */
+static PetscErrorCode ClassifyOffdiagonal(Mat A, const RankBlocks &b, PartsSplit *s, Indices *sent_positions)
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < b.o.n; ++i) {
@@ -103,15 +102,15 @@ static PetscErrorCode SortOffdiagonal(Mat A, const Blocks &b, PartsSplit *s, Ind
         s->corner.push_back({-1 - row, col, k, PartsSource::Offdiagonal});
       } else {
         s->sent.push_back(k);
-        sent->insert(sent->end(), {-1 - row, global});
+        sent_positions->insert(sent_positions->end(), {-1 - row, global});
       }
     }
   }
   PetscFunctionReturn(0);
 }
 
-/* Everybody learns which values will come, and keeps those in own columns */
-static PetscErrorCode Exchange(MPI_Comm comm, const Indices &sent, PartsSplit *s)
+/* Exchanges the positions of sent entries; each rank adds those in its own columns to C */
+static PetscErrorCode ExchangeSentEntries(MPI_Comm comm, const Indices &sent_positions, PartsSplit *s)
 {
   PetscMPIInt size;
   PetscFunctionBegin;
@@ -128,7 +127,7 @@ static PetscErrorCode Exchange(MPI_Comm comm, const Indices &sent, PartsSplit *s
     first2[r] *= 2;
   }
   Indices all(2 * (size_t)total);
-  PetscCallMPI(MPI_Allgatherv(sent.data(), 2 * n, MPIU_INT, all.data(), counts2.data(), first2.data(), MPIU_INT, comm));
+  PetscCallMPI(MPI_Allgatherv(sent_positions.data(), 2 * n, MPIU_INT, all.data(), counts2.data(), first2.data(), MPIU_INT, comm));
   for (PetscMPIInt k = 0; k < total; ++k) {
     const PetscInt global = all[2 * k + 1];
     if (global < s->begin || global >= s->end) continue;
@@ -139,7 +138,7 @@ static PetscErrorCode Exchange(MPI_Comm comm, const Indices &sent, PartsSplit *s
   PetscFunctionReturn(0);
 }
 
-/* From numbers within the interface to numbers within its part that the interior knows of */
+/* Replaces interface numbers in B and C by numbers within `local` */
 static void NumberLocal(PartsSplit *s)
 {
   Indices number(s->interface.size(), -1);
@@ -155,22 +154,22 @@ static void NumberLocal(PartsSplit *s)
   for (PartsEntry &e : s->below) e.row = number[e.row];
 }
 
-/* For the rows and the interface that are in the split already */
+/* Divides the rank's rows for the interface that *split contains */
 PetscErrorCode PartsBuildSplit(Mat A, PartsSplit *split)
 {
   PartsSplit s;
-  Blocks     b;
-  Indices    sent;
+  RankBlocks b;
+  Indices    sent_positions;
 
   PetscFunctionBegin;
   s.interface.swap(split->interface);
   PetscCall(MatGetOwnershipRange(A, &s.begin, &s.end));
   PetscCall(GetBlocks(A, &b));
   NumberRows(&s);
-  SortDiagonal(b.d, &s);
-  PetscCall(SortOffdiagonal(A, b, &s, &sent));
+  ClassifyDiagonal(b.d, &s);
+  PetscCall(ClassifyOffdiagonal(A, b, &s, &sent_positions));
   PetscCall(RestoreBlocks(&b));
-  PetscCall(Exchange(PetscObjectComm((PetscObject)A), sent, &s));
+  PetscCall(ExchangeSentEntries(PetscObjectComm((PetscObject)A), sent_positions, &s));
   NumberLocal(&s);
   s.val.assign(s.col.size(), 0);
   s.right_val.resize(s.right.size());
@@ -210,7 +209,7 @@ PetscErrorCode PartsCopyValues(Mat A, PartsSplit *s)
   PetscFunctionReturn(0);
 }
 
-Indices PartsEnds(const PartsSplit &s)
+Indices PartsCoupledUnknowns(const PartsSplit &s)
 {
   Indices ends;
   for (const PartsEntry &e : s.right) ends.push_back(e.row);
