@@ -41,7 +41,7 @@ template void LinearGraphFromEntries<PetscInt>(PetscInt, size_t, const PetscInt[
                                                LinearGraph *);
 #endif
 
-/* Rows of the transpose, ascending */
+/* Pattern of the transpose, rows ascending */
 static void Transposed(PetscInt n, const PetscInt ia[], const PetscInt ja[], std::vector<PetscInt> *start,
                        std::vector<PetscInt> *row)
 {
@@ -54,8 +54,8 @@ static void Transposed(PetscInt n, const PetscInt ia[], const PetscInt ja[], std
     for (PetscInt k = ia[i]; k < ia[i + 1]; ++k) (*row)[next[ja[k]]++] = i;
 }
 
-/* Rows of SEQAIJ are sorted: they and those of the transpose are merged, and nothing is sorted. Matrices of blocks are factored block by block, and
-   their orderings are of blocks (MatrixTypes.OrderingsOfBlocks). */
+/* Rows of SEQAIJ are sorted, so that merging them with those of the transpose needs no sorting. Block matrices are factored block by block, and PETSc orders
+   their blocks (MatrixTypes.OrderingsOfBlocks). */
 PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
 {
   PetscInt              n;
@@ -86,7 +86,7 @@ PetscErrorCode LinearGraphFromMat(Mat A, LinearGraph *graph, PetscBool *done)
   PetscFunctionReturn(0);
 }
 
-/* Merges every unknown with its partner; group[i] and the members of each group in the order of elimination */
+/* Merges every unknown with its partner. group[i]: the group of unknown i; first, second: the members of each group in the order of elimination, second -1 if there is one only. */
 static void MergePartners(PetscInt n, const std::vector<PetscInt> &partner, std::vector<PetscInt> &group,
                           std::vector<PetscInt> &first, std::vector<PetscInt> &second)
 {
@@ -134,11 +134,11 @@ PetscErrorCode LinearMetisOrder(const LinearGraph &graph, const std::vector<Pets
     xadj[g + 1] = (idx_t)adj.size();
   }
 
-  /* METIS reports an error for a graph without edges, for which every order is as good */
+  /* METIS reports an error for a graph without edges, for which all orders are equivalent */
   for (idx_t g = 0; g < groups; ++g) perm[g] = g;
   if (!adj.empty()) {
     idx_t nvtxs = groups, options[METIS_NOPTIONS];
-    METIS_SetDefaultOptions(options); /* the seed is fixed: the ordering is the same in every run */
+    METIS_SetDefaultOptions(options); /* fixed seed: the ordering is the same in every run */
     const int status = METIS_NodeND(&nvtxs, xadj.data(), adj.data(), NULL, options, perm.data(), inverse.data());
     PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB,
                "METIS_NodeND returned %d for a graph of %lld vertices and %zu edges", status, (long long)groups,
@@ -153,8 +153,8 @@ PetscErrorCode LinearMetisOrder(const LinearGraph &graph, const std::vector<Pets
 
 /*
   Row i of L has an entry in column j exactly if j lies on a path of the elimination tree from a neighbour k < i of i up
-  to i (Liu 1990). Walking these paths, each until a column already met in this row, counts every entry of L once and
-  grows the tree on the way: the parent of j is the first i that reaches it.
+  to i (Liu 1990). Following these paths, each to the first column already visited in this row, counts every entry of L once and
+  builds the tree at the same time: the parent of j is the first i that reaches it.
 */
 void LinearCountWork(const LinearGraph &graph, const PetscInt order[], double limit, LinearWork *work,
                      PetscBool *bounded, LinearTree *tree)

@@ -1,4 +1,4 @@
-/* The 64-bit hash FNV-1a of Fowler, Noll and Vo, by which files are checked and models told apart; and a mixing step. */
+/* The 64-bit hash FNV-1a of Fowler, Noll and Vo, for checksums of files and identification of models; and a mixing step. */
 #ifndef HHTDAE_LINEAR_HASH_H
 #define HHTDAE_LINEAR_HASH_H
 

@@ -1,4 +1,4 @@
-/* "mumpsmixed": the factor matrix, which holds one of "smumpsnd" or, after a fall back, of "mumpsnd" */
+/* "mumpsmixed": the factor matrix, which wraps a factor of "smumpsnd" or, after a fall back, of "mumpsnd" */
 #include "mumpsmixed.h"
 
 #if defined(HHTDAE_HAVE_SMUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
@@ -12,35 +12,37 @@
 namespace
 {
 
-/* Of the error of a solve, what the next one may leave: with more, double precision is as quick, and a corrector would see it in its rate */
-constexpr PetscReal slow = 0.05;
+/* Largest contraction rate of the refinement: the part of the error that one more solve may leave. With a larger rate double precision is as fast, and the
+   error of rough solves would raise the rate that the corrector measures. MumpsMixed.BadConditionTakesDoublePrecision. */
+constexpr PetscReal max_rate = 0.05;
 
-/* Relative to the solution: refined as far as it goes; and the largest correction that may be rounding where they no longer fall */
-constexpr PetscReal refined = 1e-14, rounding = 1e-8;
-constexpr PetscInt  max_it  = 20;
+/* Norms of corrections relative to the solution: refinement ends below the first one; where corrections stagnate, it has succeeded if they are below the second one */
+constexpr PetscReal refined_correction = 1e-14, rounding_correction = 1e-8;
+constexpr PetscInt  max_it = 20; /* steps of refinement of a solve */
 
-/* Factorizations in double precision at most before single precision is tried again */
-constexpr PetscInt most_wait = 256;
+/* Upper limit of the number of factorizations in double precision before single precision is tried again */
+constexpr PetscInt max_wait = 256;
 
 struct Mixed {
-  Mat              A = nullptr; /* that was factored, and its state then */
+  Mat              A = nullptr; /* the matrix that was factored, and its state at that time */
   PetscObjectState state;
-  Mat              F      = nullptr;
-  bool             fallen = false; /* F is of double precision */
-  PetscInt         wait = 0, left = 0; /* factorizations from then until single precision is tried again, and those to come; doubled with every fall back. wait < 0: double precision has no room */
-  char             why[128] = "";
-  bool             no_analysis = false; /* it failed: structurally singular, or no room for the factor */
-  PetscReal        rate   = 0; /* of refinement, measured */
-  IS               given  = nullptr; /* order of elimination that PETSc has handed over */
-  Vec              r = nullptr, d = nullptr;
+  Mat              F           = nullptr;
+  bool             in_double   = false;              /* F is of double precision */
+  PetscInt         retry_after = 0, until_retry = 0; /* factorizations in double precision before single precision is tried again, doubled with every fall back, and those still to
+                                                        come. retry_after < 0: memory does not suffice for double precision */
+  char             reason[128]     = "";
+  bool             analysis_failed = false;   /* structurally singular, or too little memory for the factor */
+  PetscReal        rate            = 0;       /* measured contraction rate of the refinement */
+  IS               given_order     = nullptr; /* order of elimination from PETSc */
+  Vec              r = nullptr, d = nullptr;  /* residual and correction */
 
-  std::vector<std::pair<PetscInt, PetscInt>>  icntl; /* set by the program */
+  std::vector<std::pair<PetscInt, PetscInt>>  icntl; /* controls set by the program, repeated for each new factor */
   std::vector<std::pair<PetscInt, PetscReal>> cntl;
 };
 
 Mixed &Of(Mat F) { return *static_cast<Mixed *>(F->data); }
 
-/* ---- the factor within ---- */
+/* ---- the wrapped factor ---- */
 
 PetscErrorCode MakeFactor(Mat F, Mat A, const char package[])
 {
@@ -61,10 +63,10 @@ PetscErrorCode Symbolic(Mat F, Mat A)
 
   PetscFunctionBegin;
   PetscCall(MatFactorInfoInitialize(&info));
-  if (F->factortype == MAT_FACTOR_LU) PetscCall(m.F->ops->lufactorsymbolic(m.F, A, m.given, m.given, &info));
-  else PetscCall(m.F->ops->choleskyfactorsymbolic(m.F, A, m.given, &info));
+  if (F->factortype == MAT_FACTOR_LU) PetscCall(m.F->ops->lufactorsymbolic(m.F, A, m.given_order, m.given_order, &info));
+  else PetscCall(m.F->ops->choleskyfactorsymbolic(m.F, A, m.given_order, &info));
   F->factorerrortype = m.F->factorerrortype;
-  m.no_analysis      = F->factorerrortype != MAT_FACTOR_NOERROR;
+  m.analysis_failed  = F->factorerrortype != MAT_FACTOR_NOERROR;
   PetscFunctionReturn(0);
 }
 
@@ -80,41 +82,42 @@ PetscErrorCode Numeric(Mat F, Mat A)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Sweep(const Mixed &m, Vec b, Vec x, bool transposed)
+PetscErrorCode SolveOnce(const Mixed &m, Vec b, Vec x, bool transposed)
 {
   PetscFunctionBegin;
   PetscCall((transposed ? m.F->ops->solvetranspose : m.F->ops->solve)(m.F, b, x));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FallBack(Mat F, Mat A, const char why[])
+PetscErrorCode FallBack(Mat F, Mat A, const char reason[])
 {
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  PetscCall(PetscInfo(F, "From single to double precision: %s\n", why));
-  m.fallen = true;
-  m.left = m.wait = PetscClipInterval(2 * m.wait, 1, most_wait);
-  PetscCall(PetscStrncpy(m.why, why, sizeof(m.why)));
+  PetscCall(PetscInfo(F, "From single to double precision: %s\n", reason));
+  m.in_double   = true;
+  m.until_retry = m.retry_after = PetscClipInterval(2 * m.retry_after, 1, max_wait);
+  PetscCall(PetscStrncpy(m.reason, reason, sizeof(m.reason)));
   PetscCall(MakeFactor(F, A, LINEAR_MUMPSND));
   PetscCall(Symbolic(F, A));
   if (!F->factorerrortype) PetscCall(Numeric(F, A));
   PetscFunctionReturn(0);
 }
 
-/* Where double precision has no room, what single precision says stands: the matrix may be that of one wild iterate, after which the integrator takes a smaller
-   step if it is singular, and measures what rough solves leave. The factor in single precision is made again, as both together would take three times its memory. */
-PetscErrorCode TryDouble(Mat F, Mat A, const char why[])
+/* Falls back to double precision, and returns to single precision if memory does not suffice for it. A singular matrix is then reported as such, and the integrator takes a
+   smaller step; the error of rough solves is left to the corrector (MumpsMixed.NoRoomToFallBack). The factor in single precision is computed again, because both factors
+   together would take three times its memory. */
+PetscErrorCode TryDouble(Mat F, Mat A, const char reason[])
 {
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  if (m.wait < 0) PetscFunctionReturn(0);
-  PetscCall(FallBack(F, A, why));
+  if (m.retry_after < 0) PetscFunctionReturn(0);
+  PetscCall(FallBack(F, A, reason));
   if (F->factorerrortype != MAT_FACTOR_OUTMEMORY) PetscFunctionReturn(0);
   PetscCall(PetscInfo(F, "There is no room for double precision: single precision stays\n"));
-  m.fallen = false;
-  m.wait   = -1;
+  m.in_double   = false;
+  m.retry_after = -1;
   PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
   PetscCall(Symbolic(F, A));
   if (!F->factorerrortype) PetscCall(Numeric(F, A));
@@ -123,12 +126,12 @@ PetscErrorCode TryDouble(Mat F, Mat A, const char why[])
 
 /* ---- refinement ---- */
 
-/* d = the factor's answer to A e, less e */
+/* d = F^-1 A e - e, where F is the factor: the error that remains of e after one step of refinement, up to its sign */
 PetscErrorCode ErrorOf(const Mixed &m, Vec e, Vec work, Vec d)
 {
   PetscFunctionBegin;
   PetscCall(MatMult(m.A, e, work));
-  PetscCall(Sweep(m, work, d, false));
+  PetscCall(SolveOnce(m, work, d, false));
   PetscCall(VecAXPY(d, -1, e));
   PetscFunctionReturn(0);
 }
@@ -151,7 +154,7 @@ PetscErrorCode MeasureRate(Mixed &m)
   PetscFunctionReturn(0);
 }
 
-/* x, which a sweep has made of b, to double precision unless corrections do not fall */
+/* Refines x, the first solution for b, to double precision; *good = PETSC_FALSE if corrections stagnate above rounding */
 PetscErrorCode Refine(const Mixed &m, Vec b, Vec x, bool transposed, PetscBool *good)
 {
   PetscReal e = 0, last, size;
@@ -162,19 +165,19 @@ PetscErrorCode Refine(const Mixed &m, Vec b, Vec x, bool transposed, PetscBool *
     last = e;
     PetscCall((transposed ? MatMultTranspose : MatMult)(m.A, x, m.r));
     PetscCall(VecAYPX(m.r, -1, b));
-    PetscCall(Sweep(m, m.r, m.d, transposed));
+    PetscCall(SolveOnce(m, m.r, m.d, transposed));
     PetscCall(VecAXPY(x, 1, m.d));
     PetscCall(VecNorm(m.d, NORM_2, &e));
     PetscCall(VecNorm(x, NORM_2, &size));
-    *good = (PetscBool)(e * PetscMax(m.rate, it ? e / last : 0) <= refined * size);
+    *good = (PetscBool)(e * PetscMax(m.rate, it ? e / last : 0) <= refined_correction * size);
     if (*good || PetscIsInfOrNanReal(e)) PetscFunctionReturn(0);
-    *good = (PetscBool)(e <= rounding * size);
+    *good = (PetscBool)(e <= rounding_correction * size);
     if (it && e > 0.5 * last) PetscFunctionReturn(0);
   }
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Rough(const Mixed &m, PetscBool *rough)
+PetscErrorCode MaySolveRoughly(const Mixed &m, PetscBool *rough)
 {
   PetscObjectState now;
 
@@ -199,16 +202,16 @@ PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transposed)
     PetscCall(VecSet(x, PETSC_INFINITY));
     PetscFunctionReturn(0);
   }
-  PetscCall(Sweep(m, b, x, transposed));
-  if (m.fallen) PetscFunctionReturn(0);
-  PetscCall(Rough(m, &rough));
+  PetscCall(SolveOnce(m, b, x, transposed));
+  if (m.in_double) PetscFunctionReturn(0);
+  PetscCall(MaySolveRoughly(m, &rough));
   PetscCall(VecNorm(b, NORM_INFINITY, &size));
   if (rough || PetscIsInfOrNanReal(size)) PetscFunctionReturn(0);
   PetscCall(Refine(m, b, x, transposed, &good));
   if (good) PetscFunctionReturn(0);
   PetscCall(TryDouble(F, m.A, "a solve was not refined"));
   if (F->factorerrortype) PetscCall(VecSet(x, PETSC_INFINITY));
-  else if (m.fallen) PetscCall(Sweep(m, b, x, transposed)); /* else x is what single precision makes of it */
+  else if (m.in_double) PetscCall(SolveOnce(m, b, x, transposed)); /* without memory for double precision x stays as it is */
   PetscFunctionReturn(0);
 }
 
@@ -222,13 +225,13 @@ PetscErrorCode FactorSingle(Mat F, Mat A)
 {
   Mixed          &m     = Of(F);
   const PetscBool error = A->erroriffailure;
-  char            why[128];
+  char            reason[128];
 
   PetscFunctionBegin;
-  A->erroriffailure = (PetscBool)(error && m.wait < 0); /* else double precision may do */
+  A->erroriffailure = (PetscBool)(error && m.retry_after < 0); /* otherwise double precision may succeed */
   PetscCall(Numeric(F, A));
   A->erroriffailure = error;
-  if (F->factorerrortype == MAT_FACTOR_OUTMEMORY) { /* of which double precision needs twice as much */
+  if (F->factorerrortype == MAT_FACTOR_OUTMEMORY) { /* double precision would need twice the memory */
     PetscCheck(!error, PetscObjectComm((PetscObject)F), PETSC_ERR_MEM, "There is not enough memory to factor the matrix of %" PetscInt_FMT " rows in single precision", A->rmap->N);
     PetscFunctionReturn(0);
   }
@@ -241,9 +244,9 @@ PetscErrorCode FactorSingle(Mat F, Mat A)
     PetscFunctionReturn(0);
   }
   PetscCall(MeasureRate(m));
-  if (m.rate <= slow) PetscFunctionReturn(0);
-  PetscCall(PetscSNPrintf(why, sizeof(why), "of the error of a solve %.2g is left by the next one, %g is allowed", (double)m.rate, (double)slow));
-  PetscCall(TryDouble(F, A, why));
+  if (m.rate <= max_rate) PetscFunctionReturn(0);
+  PetscCall(PetscSNPrintf(reason, sizeof(reason), "of the error of a solve %.2g is left by the next one, %g is allowed", (double)m.rate, (double)max_rate));
+  PetscCall(TryDouble(F, A, reason));
   PetscFunctionReturn(0);
 }
 
@@ -252,31 +255,31 @@ PetscErrorCode FactorNumeric(Mat F, Mat A, const MatFactorInfo *)
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  if (m.no_analysis && !m.fallen) PetscFunctionReturn(0);
-  if (m.no_analysis) m.left = 0; /* double precision had no room for another matrix; single precision may do for this one */
+  if (m.analysis_failed && !m.in_double) PetscFunctionReturn(0);
+  if (m.analysis_failed) m.until_retry = 0; /* memory did not suffice for double precision of an earlier matrix; single precision may do for this one */
   PetscCall(PetscObjectReference((PetscObject)A));
   PetscCall(MatDestroy(&m.A));
   m.A = A;
   PetscCall(PetscObjectStateGet((PetscObject)A, &m.state));
-  if (m.fallen && m.left-- <= 0) { /* what was in the way may have been one wild iterate: half the memory is worth another analysis now and then */
-    m.fallen = false;
+  if (m.in_double && m.until_retry-- <= 0) { /* the cause of the fall back may have been a single matrix: half the memory is worth another analysis now and then */
+    m.in_double = false;
     PetscCall(MakeFactor(F, A, LINEAR_SMUMPSND));
     PetscCall(Symbolic(F, A));
     if (F->factorerrortype) PetscFunctionReturn(0);
   }
-  PetscCall((m.fallen ? Numeric : FactorSingle)(F, A));
+  PetscCall((m.in_double ? Numeric : FactorSingle)(F, A));
   F->assembled = PETSC_TRUE;
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given)
+PetscErrorCode FactorSymbolic(Mat F, Mat A, IS given_order)
 {
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectReference((PetscObject)given));
-  PetscCall(ISDestroy(&m.given));
-  m.given = given;
+  PetscCall(PetscObjectReference((PetscObject)given_order));
+  PetscCall(ISDestroy(&m.given_order));
+  m.given_order = given_order;
   PetscCall(Symbolic(F, A));
   F->ops->lufactornumeric = F->ops->choleskyfactornumeric = FactorNumeric;
   F->ops->solve                                           = MatSolve_MumpsMixed;
@@ -295,40 +298,40 @@ PetscErrorCode SaveState(Mat F, Archive *archive)
   Mixed &m = Of(F);
 
   PetscFunctionBegin;
-  archive->plain(m.fallen);
-  archive->plain(m.wait);
-  archive->plain(m.left);
-  archive->plain(m.why);
+  archive->plain(m.in_double);
+  archive->plain(m.retry_after);
+  archive->plain(m.until_retry);
+  archive->plain(m.reason);
   PetscTryMethod(m.F, LINEAR_SAVE_STATE, (Mat, Archive *), (m.F, archive));
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode LoadState(Mat F, Mat A, Archive *archive, PetscBool *same)
 {
-  Mixed &m      = Of(F);
-  bool   fallen = m.fallen;
-  PetscInt wait = 0, left = 0;
-  char   why[sizeof(m.why)] = "";
+  Mixed   &m           = Of(F);
+  bool     in_double   = m.in_double;
+  PetscInt retry_after = 0, until_retry = 0;
+  char     reason[sizeof(m.reason)] = "";
 
   PetscFunctionBegin;
-  archive->plain(fallen);
-  archive->plain(wait);
-  archive->plain(left);
-  archive->plain(why);
-  why[sizeof(why) - 1] = 0;
-  if (!archive->good) fallen = m.fallen;
-  PetscMPIInt change = fallen != m.fallen, all;
+  archive->plain(in_double);
+  archive->plain(retry_after);
+  archive->plain(until_retry);
+  archive->plain(reason);
+  reason[sizeof(reason) - 1] = 0;
+  if (!archive->good) in_double = m.in_double;
+  PetscMPIInt change = in_double != m.in_double, all;
   PetscCallMPI(MPI_Allreduce(&change, &all, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)F)));
-  if (all && !m.fallen) PetscCall(FallBack(F, A, why)); /* single precision where it was double would be another run */
-  m.wait = wait;
-  m.left = left;
+  if (all && !m.in_double) PetscCall(FallBack(F, A, reason)); /* the run had a factor in double precision */
+  m.retry_after = retry_after;
+  m.until_retry = until_retry;
   PetscTryMethod(m.F, LINEAR_LOAD_STATE, (Mat, Mat, Archive *, PetscBool *), (m.F, A, archive, same));
   F->factorerrortype = m.F->factorerrortype;
-  if (!F->factorerrortype && !m.fallen) PetscCall(MeasureRate(m));
+  if (!F->factorerrortype && !m.in_double) PetscCall(MeasureRate(m));
   PetscFunctionReturn(0);
 }
 
-/* ---- what can be asked of the factor ---- */
+/* ---- information and view ---- */
 
 PetscErrorCode SetIcntl(Mat F, PetscInt i, PetscInt value)
 {
@@ -369,7 +372,7 @@ PetscErrorCode View(Mat F, PetscViewer viewer)
   if (!ascii) PetscFunctionReturn(0);
   PetscCall(PetscViewerGetFormat(viewer, &format));
   if (format != PETSC_VIEWER_ASCII_INFO && format != PETSC_VIEWER_ASCII_INFO_DETAIL) PetscFunctionReturn(0);
-  if (m.fallen) PetscCall(PetscViewerASCIIPrintf(viewer, "factors in double precision: in single precision, %s\n", m.why));
+  if (m.in_double) PetscCall(PetscViewerASCIIPrintf(viewer, "factors in double precision: in single precision, %s\n", m.reason));
   else PetscCall(PetscViewerASCIIPrintf(viewer, "factors in single precision; of the error of a solve %.2g is left by the next one\n", (double)m.rate));
   PetscCall(m.F->ops->view(m.F, viewer));
   PetscFunctionReturn(0);
@@ -404,7 +407,7 @@ PetscErrorCode Destroy(Mat F)
   PetscFunctionBegin;
   PetscCall(MatDestroy(&m.F));
   PetscCall(MatDestroy(&m.A));
-  PetscCall(ISDestroy(&m.given));
+  PetscCall(ISDestroy(&m.given_order));
   PetscCall(VecDestroy(&m.r));
   PetscCall(VecDestroy(&m.d));
   delete &m;

@@ -1,9 +1,9 @@
 /*
-  "mumpsnd", and "smumpsnd" in single precision: the factor matrix. Options: -mat_mumps_memory <MB>, the memory that a factor may take on each machine (what is
-  free there; 0: nobody asks); -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps", and
+  "mumpsnd", and "smumpsnd" in single precision: the factor matrix. Options: -mat_mumps_memory <MB>, the memory that a factor may take on each machine (default: what
+  is free there; 0: no check); -mat_mumps_icntl_<i>, -mat_mumps_cntl_<i> as with PETSc's "mumps".
   MatMumpsSetIcntl(), MatMumpsGetInfog() and the like work on the factor. Unless ICNTL(7) or PETSc's ordering is set,
-  the analysis is done for METIS and for MUMPS's automatic choice and the one with fewer operations is kept: an analysis
-  costs a few percent of one factorization, and on long thin bodies PORD is sometimes the better one.
+  the analysis is done with METIS' ordering and with MUMPS' automatic choice, and the one with fewer operations is kept: an analysis
+  costs a few percent of one factorization, and on long thin bodies PORD is sometimes better.
 */
 #include "mumpsnd.h"
 #include <algorithm>
@@ -15,8 +15,8 @@
 #include "memory.h"
 #include "mumpsnd_data.h"
 
-/* MUMPS foresees its workspace without the pivots that are delayed; an indefinite matrix can need several times as much
- */
+/* MUMPS predicts its workspace without delayed pivots, of which an indefinite matrix can need several times as much. Percentage of extra workspace,
+   ICNTL(14), and number of factorizations that are repeated with more of it. MumpsND.SmallWorkspaceGrows. */
 static const int WORKSPACE_PERCENT = 30, WORKSPACE_RETRIES = 5;
 
 template <class P> static MumpsND<P> *Data(Mat F) { return static_cast<MumpsND<P> *>(F->data); }
@@ -57,8 +57,8 @@ template <class P> static PetscErrorCode ReportRange(Mat F, Mat A)
 }
 
 /*
-  Linux grants more memory than there is, and kills a process that takes it: a factor without room is not begun. What the analysis foresees holds in core
-  and without compression.
+  Linux allocates more memory than there is and kills a process that uses it: a factorization for which memory does not suffice is not begun. The
+  prediction of the analysis holds in core (ICNTL(22) = 0) and without compression (ICNTL(35) = 0).
 */
 template <class P> static PetscErrorCode ReportMemory(Mat F, Mat A)
 {
@@ -78,8 +78,7 @@ template <class P> static PetscErrorCode ReportMemory(Mat F, Mat A)
   PetscFunctionReturn(0);
 }
 
-/* MUMPS goes on past a null pivot with one of many solutions; unless the user asked for that, it is a singular matrix
- */
+/* With null pivot detection MUMPS returns one of many solutions; unless the user set ICNTL(24), null pivots are reported as a singular matrix */
 template <class P> static PetscErrorCode ReportNullPivots(Mat F, Mat A)
 {
   MumpsND<P> *m = Data<P>(F);
@@ -95,7 +94,7 @@ template <class P> static PetscErrorCode ReportNullPivots(Mat F, Mat A)
 
 /* ---- the entries ---- */
 
-template <class P> static bool Wanted(const MumpsND<P> *m, PetscInt row, PetscInt col) { return m->id.sym == 0 || col >= row; }
+template <class P> static bool IsStored(const MumpsND<P> *m, PetscInt row, PetscInt col) { return m->id.sym == 0 || col >= row; }
 
 template <class P> static PetscErrorCode CopyPattern(Mat A, MumpsND<P> *m)
 {
@@ -106,11 +105,11 @@ template <class P> static PetscErrorCode CopyPattern(Mat A, MumpsND<P> *m)
   m->row.clear();
   m->col.clear();
   PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  PetscCall(MatGetRowUpperTriangular(A)); /* what MATSBAIJ has; nothing with other types */
+  PetscCall(MatGetRowUpperTriangular(A)); /* allows MatGetRow() for MATSBAIJ; no effect with other types */
   for (PetscInt i = begin; i < end; ++i) {
     PetscCall(MatGetRow(A, i, &count, &cols, NULL));
     for (PetscInt k = 0; k < count; ++k)
-      if (Wanted(m, i, cols[k])) {
+      if (IsStored(m, i, cols[k])) {
         m->row.push_back((MUMPS_INT)(i + 1));
         m->col.push_back((MUMPS_INT)(cols[k] + 1));
       }
@@ -140,7 +139,7 @@ template <class P> static PetscErrorCode CopyValues(Mat A, MumpsND<P> *m)
   for (PetscInt i = begin; i < end; ++i) {
     PetscCall(MatGetRow(A, i, &count, &cols, &vals));
     for (PetscInt k = 0; k < count; ++k)
-      if (Wanted(m, i, cols[k])) {
+      if (IsStored(m, i, cols[k])) {
         PetscCheck(
             next < m->val.size() && m->col[next] == cols[k] + 1, PETSC_COMM_SELF, PETSC_ERR_ARG_INCOMP,
             "Row %" PetscInt_FMT " of the matrix has another pattern than the one analysed; set the operators anew", i);
@@ -158,15 +157,15 @@ template <class P> static PetscErrorCode CopyValues(Mat A, MumpsND<P> *m)
 
 /* ---- analysis and factorization ---- */
 
-/* Controls that describe how the matrix and the vectors are passed belong to this file */
-static bool Owned(PetscInt i) { return i == 5 || i == 9 || i == 18 || i == 19 || i == 20 || i == 21; }
+/* Controls of the way in which matrix and vectors are passed, which users cannot set */
+static bool IsReserved(PetscInt i) { return i == 5 || i == 9 || i == 18 || i == 19 || i == 20 || i == 21; }
 
 template <class P> static PetscErrorCode SetIcntl(Mat F, PetscInt i, PetscInt value)
 {
   MumpsND<P> *m = Data<P>(F);
 
   PetscFunctionBegin;
-  PetscCheck(i >= 1 && i <= 60 && !Owned(i) && !(i == 7 && value == 1), PetscObjectComm((PetscObject)F),
+  PetscCheck(i >= 1 && i <= 60 && !IsReserved(i) && !(i == 7 && value == 1), PetscObjectComm((PetscObject)F),
              PETSC_ERR_ARG_OUTOFRANGE, "ICNTL(%" PetscInt_FMT ")=%" PetscInt_FMT " cannot be set for solver type %s", i,
              value, P::package());
   m->icntl((int)i) = (MUMPS_INT)value;
@@ -252,7 +251,7 @@ template <class P> static PetscErrorCode CholeskyFactorSymbolic(Mat F, Mat A, IS
 
 /* ---- state ---- */
 
-/* Pivots are chosen anew with every matrix, but the analysis has ordered the unknowns by the values of its own one */
+/* Pivots are chosen anew with every matrix, but the ordering depends on the values of the matrix that was analysed */
 template <class P> static PetscErrorCode SaveState(Mat F, Archive *archive)
 {
   MumpsND<P> *m         = Data<P>(F);
@@ -266,7 +265,7 @@ template <class P> static PetscErrorCode SaveState(Mat F, Archive *archive)
   PetscFunctionReturn(0);
 }
 
-/* 1 to n, each once */
+/* Whether `position` has each of 1 to n once */
 static bool IsPermutation(const std::vector<MUMPS_INT> &position, MUMPS_INT n)
 {
   std::vector<bool> seen((size_t)n, false);
@@ -299,7 +298,7 @@ template <class P> static PetscErrorCode LoadState(Mat F, Mat A, Archive *archiv
   PetscFunctionReturn(0);
 }
 
-/* ---- what can be asked of the factor ---- */
+/* ---- information and view ---- */
 
 template <class P> static PetscErrorCode GetIcntl(Mat F, PetscInt i, PetscInt *value) { return *value = Data<P>(F)->icntl((int)i), 0; }
 
@@ -411,14 +410,14 @@ template <class P> static PetscErrorCode CreateInstance(Mat A, int sym, MumpsND<
   MumpsRun(m, MUMPS_INIT);
   PetscCheck(m->infog(1) >= 0, PetscObjectComm((PetscObject)A), PETSC_ERR_LIB, "MUMPS did not start: INFOG(1)=%d",
              m->infog(1));
-  for (int i = 1; i <= 4; ++i) m->icntl(i) = 0; /* silent */
-  m->icntl(13) = 1;                             /* null pivots are not found in a root that ScaLAPACK factors */
+  for (int i = 1; i <= 4; ++i) m->icntl(i) = 0; /* no output */
+  m->icntl(13) = 1;                             /* no ScaLAPACK for the root, where null pivots would not be detected */
   m->icntl(14) = WORKSPACE_PERCENT;
-  m->icntl(18) = 3; /* every process gives its rows */
+  m->icntl(18) = 3; /* distributed matrix: every process passes its rows */
   m->icntl(20) = m->size > 1 ? 10 : 0;
   m->icntl(21) = m->size > 1 ? 1 : 0;
   m->icntl(24) = 1;
-  m->icntl(28) = 1; /* one process orders: there is no parallel METIS here */
+  m->icntl(28) = 1; /* sequential ordering: parallel METIS is not available */
   m->cntl(3)   = (typename P::Real)P::null_pivot;
   *instance    = m;
   PetscFunctionReturn(0);

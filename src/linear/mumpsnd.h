@@ -1,11 +1,11 @@
 /*
-  MUMPS with an ordering of ours, as the factorization package "mumpsnd" for MATSEQAIJ and MATMPIAIJ, LU and LDL^T,
-  and for MATSEQSBAIJ and MATMPISBAIJ, LDL^T.
+  MUMPS with METIS' ordering, as the factorization package "mumpsnd" for LU and LDL^T of MATSEQAIJ and MATMPIAIJ,
+  and for LDL^T of MATSEQSBAIJ and MATMPISBAIJ.
 
-  PETSc's own interface hands MUMPS an ordering for LU on one process only, and there it passes the list of unknowns in
-  the order of elimination where PERM_IN wants each unknown's position in it (seen in 3.18.5); MUMPS as Debian builds it
-  has no METIS inside. Operations for L D L^T of elastic blocks clamped by multipliers (tests/bench/ordering.cpp; MUMPS
-  5.5.1; "METIS" is the ordering of this package, every multiplier right after a coordinate that it holds):
+  PETSc's own interface passes an ordering to MUMPS for LU on one process only, and there it passes the list of unknowns in
+  the order of elimination where PERM_IN wants each unknown's position in it (seen in 3.18.5); Debian builds MUMPS
+  without METIS. Operations for L D L^T of elastic blocks clamped by multipliers (tests/bench/ordering.cpp; MUMPS
+  5.5.1; "METIS" is the ordering of this package, every multiplier directly after a coordinate that it constrains):
 
       bricks          n         AMD       AMF      PORD     METIS   delayed pivots PORD / METIS
       16 x 16 x 16    15606   9.1e9     8.2e9     7.0e9     4.5e9    573 / 0
@@ -14,10 +14,10 @@
       32 x 32 x 32   111078                       3.6e11    2.3e11   (analysis only)
       64 x 12 x 12    33462   2.0e10    1.7e10    9.6e9     1.05e10  297 / 0
 
-  Long thin bodies are the reason why both are tried.
+  METIS and MUMPS' own ordering are both tried because of long thin bodies, for which PORD may be better.
 
-  On several processes results differ from run to run by rounding. Measured: with a factor once made, 19 of 200 solves of 3600 unknowns on
-  two ranks had other bits than the first one.
+  On several processes results differ from run to run by rounding: of 200 solves of 3600 unknowns with the same factor on
+  two ranks 19 differed from the first one in some bits.
 */
 #ifndef HHTDAE_LINEAR_MUMPSND_H
 #define HHTDAE_LINEAR_MUMPSND_H
@@ -26,14 +26,14 @@
 
 #define LINEAR_MUMPSND "mumpsnd"
 
-/* The same in single precision: half the memory and some 0.6 of the time (README.md), and solutions to a few digits, the fewer the worse the
-   matrix is conditioned. A matrix that is singular to single precision, or has entries beyond its range, fails. */
+/* The same in single precision: half the memory, some 0.6 of the time (README.md), and solutions to a few digits, depending on the condition of the
+   matrix. The factorization fails if the matrix is singular to single precision or has entries beyond its range. */
 #define LINEAR_SMUMPSND "smumpsnd"
 
-/* Does nothing where PETSc was built without MUMPS, or not for double precision */
+/* Does nothing if PETSc was built without MUMPS, or not for double precision */
 PetscErrorCode LinearRegisterMumpsND(void);
 
-/* A package for LU of MATAIJ and LDL^T of MATAIJ and MATSBAIJ */
+/* Registers a package for LU of MATAIJ and for LDL^T of MATAIJ and MATSBAIJ */
 PetscErrorCode LinearRegisterForTypes(const char package[], PetscErrorCode (*get)(Mat, MatFactorType, Mat *));
 
 #endif

@@ -1,4 +1,4 @@
-/* The analysis of "mumpsnd": which ordering MUMPS gets */
+/* The analysis of "mumpsnd": finds the ordering for MUMPS */
 #include <petscconf.h>
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
 
@@ -14,7 +14,7 @@ static_assert(sizeof(MUMPS_INT) == sizeof(int), "MUMPS with 64-bit integers thro
 namespace
 {
 
-/* Entries that a row without a value on its diagonal could be eliminated with */
+/* An off-diagonal entry of a row without a value on its diagonal: the row's multiplier can be eliminated right after the unknown `col` */
 struct EliminationPartner {
   PetscInt  col;
   PetscReal size;
@@ -22,7 +22,8 @@ struct EliminationPartner {
 
 } // namespace
 
-/* of[row - begin], empty where the diagonal has a value. Of one triangle columns count as rows, but not other ranks' ones. */
+/* (*of)[row - begin] lists the possible partners, none if the diagonal has a value. If A stores one triangle, the mirrored entries of own rows are
+   included, too, those of other ranks' rows are not. */
 static PetscErrorCode FindEliminationPartners(Mat A, std::vector<std::vector<EliminationPartner>> *of)
 {
   PetscInt           begin, end, count;
@@ -33,7 +34,7 @@ static PetscErrorCode FindEliminationPartners(Mat A, std::vector<std::vector<Eli
   PetscFunctionBegin;
   PetscCall(LinearStoresTriangle(A, &triangle));
   PetscCall(MatGetOwnershipRange(A, &begin, &end));
-  std::vector<char> lacks(end - begin, 1);
+  std::vector<char> no_diagonal(end - begin, 1);
   of->assign(end - begin, {});
   PetscCall(MatGetRowUpperTriangular(A));
   for (int pass = 0; pass < 2; ++pass)
@@ -43,12 +44,12 @@ static PetscErrorCode FindEliminationPartners(Mat A, std::vector<std::vector<Eli
         const PetscInt  j    = cols[k];
         const PetscReal size = PetscAbsScalar(vals[k]);
         if (pass == 0) {
-          if (j == i && size > 0) lacks[i - begin] = 0;
+          if (j == i && size > 0) no_diagonal[i - begin] = 0;
           continue;
         }
         if (j == i || !(size > 0) || (triangle && j < i)) continue;
-        if (lacks[i - begin]) (*of)[i - begin].push_back({j, size});
-        if (triangle && j < end && lacks[j - begin]) (*of)[j - begin].push_back({i, size});
+        if (no_diagonal[i - begin]) (*of)[i - begin].push_back({j, size});
+        if (triangle && j < end && no_diagonal[j - begin]) (*of)[j - begin].push_back({i, size});
       }
       PetscCall(MatRestoreRow(A, i, &count, &cols, &vals));
     }
@@ -96,8 +97,8 @@ static PetscErrorCode GatherToFirst(const MumpsND<P> *m, const std::vector<int> 
   PetscFunctionReturn(0);
 }
 
-/* PERM_IN wants the position of each unknown, an ordering lists the unknowns by position, or blocks of them: PETSc orders the blocks of MATSBAIJ
-   (MatrixTypes.OrderingsOfBlocks) */
+/* Inverts an ordering, which lists unknowns, or blocks of them, by position, to positions of unknowns as PERM_IN wants them. PETSc orders the blocks of MATSBAIJ
+   (MatrixTypes.OrderingsOfBlocks). */
 template <class P> static void SetPositions(const PetscInt order[], PetscInt count, MumpsND<P> *m)
 {
   const PetscInt block = m->id.n / PetscMax(count, 1);
@@ -130,7 +131,7 @@ template <class P> static PetscErrorCode OrderByMetis(Mat A, MumpsND<P> *m)
   PetscCall(GatherToFirst(m, m->row, &row));
   PetscCall(GatherToFirst(m, m->col, &col));
   if (!m->rank) failed = OrderOnFirst(row, col, partners, m);
-  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, m->comm)); /* the others would wait in MUMPS for a rank that has returned */
+  PetscCallMPI(MPI_Bcast(&failed, 1, MPI_INT, 0, m->comm)); /* else the other ranks would wait in MUMPS for rank 0, which returns with an error */
   if (!m->rank) PetscCall((PetscErrorCode)failed);
   PetscCheck(!failed, m->comm, (PetscErrorCode)failed, "METIS could not order the matrix on the first rank");
   PetscFunctionReturn(0);
@@ -153,7 +154,7 @@ template <class P> static void AnalyseBuiltIn(MumpsND<P> *m, MUMPS_INT choice)
   strcpy(m->ordering, used >= 0 && used <= 6 ? names[used] : "MUMPS's own");
 }
 
-/* METIS and MUMPS's own choice compete by the operations that the analysis foresees, RINFOG(1) */
+/* Takes METIS' ordering or MUMPS' own choice, whichever has fewer predicted operations, RINFOG(1) */
 template <class P> static PetscErrorCode AnalyseBest(Mat A, MumpsND<P> *m)
 {
   const MUMPS_INT automatic = 7;

@@ -1,8 +1,8 @@
 /*
-  The solves of "mumpsnd". On one process MUMPS works in the vector or dense matrix of the solution. On several the
-  right-hand sides stay where they are, ICNTL(20)=10, and MUMPS leaves the solution where its pivots are, ICNTL(21)=1:
-  nothing is gathered on one process. Many right-hand sides go through the factors together, ICNTL(27) at a time: the
-  factors are read from memory once for all of them.
+  The solves of "mumpsnd". On one process MUMPS works in the vector or dense matrix of the solution. On several processes the
+  right-hand sides are distributed as in PETSc, ICNTL(20)=10, and MUMPS leaves the solution distributed by its pivots,
+  ICNTL(21)=1: nothing is gathered on one process. Many right-hand sides are solved for together, ICNTL(27) at a time, so
+  that the factors are read from memory once for all of these.
 */
 #include <petsc/private/matimpl.h>
 #if defined(PETSC_HAVE_MUMPS) && defined(PETSC_USE_REAL_DOUBLE) && !defined(PETSC_USE_COMPLEX)
@@ -36,9 +36,8 @@ template <class P> static PetscErrorCode CheckSolved(Mat F)
   PetscFunctionReturn(0);
 }
 
-/* A or its transpose is solved with from here on; what MUMPS decided about places of the solution may not hold any more
- */
-template <class P> static PetscErrorCode Direction(MumpsND<P> *m, bool transposed)
+/* Selects A or its transpose for the next solves; the distribution of the solution by MUMPS may change with it */
+template <class P> static PetscErrorCode SetTransposed(MumpsND<P> *m, bool transposed)
 {
   const MUMPS_INT which = transposed ? 0 : 1;
 
@@ -50,7 +49,7 @@ template <class P> static PetscErrorCode Direction(MumpsND<P> *m, bool transpose
 
 /* ---- one process ---- */
 
-/* x: the right-hand sides, which the solutions replace */
+/* x: the right-hand sides, which are replaced by the solutions */
 template <class P> static PetscErrorCode SolveInPlace(Mat F, typename P::Real *x, PetscInt lda, PetscInt count)
 {
   MumpsND<P> *m = Data<P>(F);
@@ -66,7 +65,7 @@ template <class P> static PetscErrorCode SolveInPlace(Mat F, typename P::Real *x
 
 /* ---- several processes ---- */
 
-/* MUMPS decides anew in every factorization which process returns which part of the solution */
+/* The distribution of the solution by MUMPS changes with every factorization */
 template <class P> static PetscErrorCode CreateScatter(MumpsND<P> *m, Vec x)
 {
   IS                    to;
@@ -80,7 +79,7 @@ template <class P> static PetscErrorCode CreateScatter(MumpsND<P> *m, Vec x)
   PetscFunctionReturn(0);
 }
 
-/* Solutions of `count` right-hand sides to sol_values */
+/* Solves for `count` right-hand sides; the solutions go to sol_values */
 template <class P> static PetscErrorCode SolveDistributed(Mat F, const typename P::Real *b, PetscInt lda, PetscInt count)
 {
   MumpsND<P> *m = Data<P>(F);
@@ -106,7 +105,7 @@ template <class P> static PetscErrorCode SolveDistributed(Mat F, const typename 
   PetscFunctionReturn(0);
 }
 
-/* The k-th of the solutions, times `scale`, to the vector that was asked for */
+/* Copies the k-th solution, times `scale`, to the vector x */
 template <class P> static PetscErrorCode TakeSolution(MumpsND<P> *m, PetscInt k, double scale, Vec x)
 {
   const size_t rows = m->sol_rows.size();
@@ -144,7 +143,7 @@ static PetscErrorCode SolveOne(Mat F, Vec b, Vec x, MumpsND<MumpsDouble> *m)
 }
 
 #if defined(HHTDAE_HAVE_SMUMPS)
-/* With the largest entry of b as the unit, so that no right-hand side is too small or too large for single precision */
+/* b is divided by its largest entry, so that no right-hand side is too small or too large for single precision */
 static PetscErrorCode SolveOne(Mat F, Vec b, Vec x, MumpsND<MumpsSingle> *m)
 {
   PetscReal          unit;
@@ -186,7 +185,7 @@ template <class P> static PetscErrorCode Solve(Mat F, Vec b, Vec x, bool transpo
     PetscCall(VecSet(x, PETSC_INFINITY));
     PetscFunctionReturn(0);
   }
-  PetscCall(Direction(m, transposed));
+  PetscCall(SetTransposed(m, transposed));
   PetscCall(SolveOne(F, b, x, m));
   PetscFunctionReturn(0);
 }
@@ -195,7 +194,7 @@ template <class P> static PetscErrorCode MatSolve_MumpsND(Mat F, Vec b, Vec x) {
 
 template <class P> static PetscErrorCode MatSolveTranspose_MumpsND(Mat F, Vec b, Vec x) { return Solve<P>(F, b, x, Data<P>(F)->id.sym == 0); }
 
-/* ---- many right-hand sides, in double precision; PETSc takes one by one in single precision ---- */
+/* ---- many right-hand sides, in double precision only; in single precision PETSc solves for one after the other ---- */
 
 static PetscErrorCode CheckDense(Mat A)
 {
@@ -236,7 +235,7 @@ static PetscErrorCode SolveAllInPlace(Mat F, Mat B, Mat X)
   PetscFunctionReturn(0);
 }
 
-/* In blocks of the size that MUMPS takes at a time, so that no more than one block of solutions is held twice */
+/* In blocks of the size that MUMPS takes at a time, so that at most one block of solutions is stored twice */
 static PetscErrorCode SolveBlocks(Mat F, Mat B, Mat X)
 {
   MumpsND<MumpsDouble>    *m     = Data<MumpsDouble>(F);
@@ -272,7 +271,7 @@ static PetscErrorCode MatMatSolve_MumpsND(Mat F, Mat B, Mat X)
     PetscCall(FillColumns(X, PETSC_INFINITY));
     PetscFunctionReturn(0);
   }
-  PetscCall(Direction(Data<MumpsDouble>(F), false));
+  PetscCall(SetTransposed(Data<MumpsDouble>(F), false));
   if (Data<MumpsDouble>(F)->size == 1)
     PetscCall(SolveAllInPlace(F, B, X));
   else

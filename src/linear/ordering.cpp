@@ -1,3 +1,4 @@
+/* The ordering "metisnd", and registration of everything in this directory that is selected by name */
 #include "constraint.h"
 #include "graph.h"
 #include "hhtdae/hhtdae.h"
@@ -7,7 +8,7 @@
 #include "mumpsmixed.h"
 #include "mumpsnd.h"
 
-/* PETSc calls this with the diagonal block of a distributed matrix, so the matrix here is always sequential */
+/* A is always sequential: for a distributed matrix PETSc passes its diagonal block */
 static PetscErrorCode MatGetOrdering_MetisND(Mat A, MatOrderingType type, IS *row, IS *col)
 {
   LinearGraph           graph;
@@ -23,11 +24,11 @@ static PetscErrorCode MatGetOrdering_MetisND(Mat A, MatOrderingType type, IS *ro
              mat_type);
   PetscCall(LinearMetisOrder(graph, {}, &order));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, graph.n, order.data(), PETSC_COPY_VALUES, row));
-  PetscCall(ISDuplicate(*row, col)); /* not the same one: of that PCLU would destroy one reference of two */
+  PetscCall(ISDuplicate(*row, col)); /* not *row itself, of which PCLU would destroy only one of two references */
   PetscFunctionReturn(0);
 }
 
-/* Every registration replaces an entry of the same name, so that a second call changes nothing */
+/* May be called repeatedly: a registration replaces an entry of the same name */
 PetscErrorCode LinearRegister(void)
 {
   PetscFunctionBegin;
