@@ -1,3 +1,4 @@
+/* The coarse level of "hhtconstraint", coarse.h */
 #include "coarse.h"
 #include <algorithm>
 #include <cmath>
@@ -6,8 +7,11 @@
 namespace
 {
 
-constexpr PetscInt motions = 6;    /* of an aggregate */
-constexpr double   flat    = 1e-6; /* of an aggregate's size: nodes this near to a line cannot turn about it */
+constexpr PetscInt rigid_motions = 6; /* of an aggregate: three translations, three rotations */
+
+/* Nodes of an aggregate whose distances to a line are at most this part of its size count as collinear: the rotation about the line would be a zero column of R.
+   ConstraintPC.NodesOnALineStandApart. */
+constexpr double collinear_tolerance = 1e-6;
 
 using Node = CoarseLevel::Node;
 
@@ -27,18 +31,18 @@ PetscErrorCode Positions(Vec positions, CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Sort(const CoarseNodes &of, CoarseLevel *c)
+PetscErrorCode ListUnknowns(const CoarseNodes &of, CoarseLevel *c)
 {
   PetscInt begin;
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(of.A, &begin, NULL));
-  for (PetscInt first : of.nodes.alone) c->nodes.push_back({begin + first, {0, 0, 0}});
-  for (PetscInt row : of.nodes.apart) c->apart.push_back(begin + row);
+  for (PetscInt first : of.nodes.node_blocks) c->nodes.push_back({begin + first, {0, 0, 0}});
+  for (PetscInt row : of.nodes.other_rows) c->single_rows.push_back(begin + row);
   PetscFunctionReturn(0);
 }
 
-/* The component in which the nodes [from, to) are spread most */
+/* The coordinate direction in which the nodes [from, to) have the largest extent */
 int LongestSide(const CoarseLevel &c, PetscInt from, PetscInt to)
 {
   int    side    = 0;
@@ -52,10 +56,10 @@ int LongestSide(const CoarseLevel &c, PetscInt from, PetscInt to)
   return side;
 }
 
-/* Halves the nodes [from, to) until no more than `most` are left in a part */
-void Divide(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt most)
+/* Recursively bisects the nodes [from, to) into aggregates of at most max_nodes nodes */
+void Divide(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt max_nodes)
 {
-  if (to - from <= most) {
+  if (to - from <= max_nodes) {
     c->first.push_back(to);
     return;
   }
@@ -63,11 +67,11 @@ void Divide(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt most)
   const PetscInt middle = from + (to - from) / 2;
   std::nth_element(c->nodes.begin() + from, c->nodes.begin() + middle, c->nodes.begin() + to,
                    [side](const Node &a, const Node &b) { return a.x[side] != b.x[side] ? a.x[side] < b.x[side] : a.row < b.row; });
-  Divide(c, from, middle, most);
-  Divide(c, middle, to, most);
+  Divide(c, from, middle, max_nodes);
+  Divide(c, middle, to, max_nodes);
 }
 
-/* Centre of the nodes [from, to), and the largest distance from it in a component */
+/* Centre of the nodes [from, to); returns the largest distance from it in a coordinate direction */
 double Centre(const CoarseLevel &c, PetscInt from, PetscInt to, double centre[3])
 {
   double radius = 0;
@@ -79,10 +83,10 @@ double Centre(const CoarseLevel &c, PetscInt from, PetscInt to, double centre[3]
   return radius;
 }
 
-/* Whether the nodes [from, to) are on a line, of which two points are the centre and the node that is farthest from it */
-bool OnALine(const CoarseLevel &c, PetscInt from, PetscInt to)
+/* Whether the nodes [from, to) are collinear: on the line through their centre and the node that is farthest from it */
+bool IsCollinear(const CoarseLevel &c, PetscInt from, PetscInt to)
 {
-  double       m[3], far[3] = {0, 0, 0}, farthest = 0, off = 0;
+  double       m[3], far[3] = {0, 0, 0}, farthest = 0, off_line = 0;
   const double radius = Centre(c, from, to, m);
   for (PetscInt i = from; i < to; i++) {
     const double *x = c.nodes[(size_t)i].x, d = std::hypot(x[0] - m[0], x[1] - m[1], x[2] - m[2]);
@@ -94,51 +98,51 @@ bool OnALine(const CoarseLevel &c, PetscInt from, PetscInt to)
     for (int k = 0; k < 3; k++) {
       const double *x = c.nodes[(size_t)i].x;
       const int     j = (k + 1) % 3, l = (k + 2) % 3;
-      off = std::max(off, std::abs((x[j] - m[j]) * far[l] - (x[l] - m[l]) * far[j]));
+      off_line = std::max(off_line, std::abs((x[j] - m[j]) * far[l] - (x[l] - m[l]) * far[j]));
     }
-  return off <= flat * radius;
+  return off_line <= collinear_tolerance * radius;
 }
 
-/* The nodes of aggregates that are no rigid bodies stand apart */
-void Dissolve(CoarseLevel *c)
+/* Dissolves aggregates of collinear nodes: the unknowns of these nodes become single rows */
+void DissolveCollinear(CoarseLevel *c)
 {
   std::vector<Node>     nodes;
   std::vector<PetscInt> first{0};
   for (size_t a = 0; a + 1 < c->first.size(); a++) {
     const auto from = c->nodes.begin() + c->first[a], to = c->nodes.begin() + c->first[a + 1];
-    if (OnALine(*c, c->first[a], c->first[a + 1])) {
+    if (IsCollinear(*c, c->first[a], c->first[a + 1])) {
       for (auto n = from; n != to; ++n)
-        for (PetscInt k = 0; k < 3; k++) c->apart.push_back(n->row + k);
+        for (PetscInt k = 0; k < 3; k++) c->single_rows.push_back(n->row + k);
     } else {
       nodes.insert(nodes.end(), from, to);
       first.push_back((PetscInt)nodes.size());
     }
   }
-  std::sort(c->apart.begin(), c->apart.end());
+  std::sort(c->single_rows.begin(), c->single_rows.end());
   c->nodes.swap(nodes);
   c->first.swap(first);
 }
 
-/* What a file has of them: each own row belongs to one node or stands apart, and aggregates are rigid bodies */
-bool IsDivision(const CoarseLevel &c, PetscInt begin, PetscInt end)
+/* Validates a division from a file: each own row belongs to exactly one node or is a single row, and no aggregate is collinear */
+bool IsValidDivision(const CoarseLevel &c, PetscInt begin, PetscInt end)
 {
   std::vector<bool> seen((size_t)(end - begin), false);
   const auto        isNew = [&](PetscInt row) {
     if (row < begin || row >= end || seen[(size_t)(row - begin)]) return false;
     return (bool)(seen[(size_t)(row - begin)] = true);
   };
-  if (c.first.empty() || c.first[0] != 0 || c.first.back() != (PetscInt)c.nodes.size() || 3 * c.nodes.size() + c.apart.size() != seen.size()) return false;
+  if (c.first.empty() || c.first[0] != 0 || c.first.back() != (PetscInt)c.nodes.size() || 3 * c.nodes.size() + c.single_rows.size() != seen.size()) return false;
   for (const Node &n : c.nodes)
     for (PetscInt k = 0; k < 3; k++)
       if (!std::isfinite(n.x[k]) || n.row > end - 3 || !isNew(n.row + k)) return false;
-  for (PetscInt row : c.apart)
+  for (PetscInt row : c.single_rows)
     if (!isNew(row)) return false;
   for (size_t a = 0; a + 1 < c.first.size(); a++) /* ascending from 0 to the number of nodes: in range */
-    if (c.first[a] >= c.first[a + 1] || c.first[a + 1] > (PetscInt)c.nodes.size() || OnALine(c, c.first[a], c.first[a + 1])) return false;
+    if (c.first[a] >= c.first[a + 1] || c.first[a + 1] > (PetscInt)c.nodes.size() || IsCollinear(c, c.first[a], c.first[a + 1])) return false;
   return true;
 }
 
-/* The rows and the places of nodes, without the padding of the struct */
+/* Writes or reads the division; rows and positions of nodes separately, without the padding of the struct */
 void TransferDivision(CoarseLevel *c, Archive *archive)
 {
   std::vector<PetscInt> row;
@@ -150,7 +154,7 @@ void TransferDivision(CoarseLevel *c, Archive *archive)
   archive->list(row);
   archive->list(x);
   archive->list(c->first);
-  archive->list(c->apart);
+  archive->list(c->single_rows);
   if (!archive->reading) return;
   archive->good = archive->good && x.size() == 3 * row.size();
   c->nodes.clear();
@@ -162,7 +166,7 @@ void TransferDivision(CoarseLevel *c, Archive *archive)
 PetscErrorCode CreateR(Mat A, CoarseLevel *c)
 {
   PetscInt       n;
-  const PetscInt columns = (PetscInt)c->apart.size() + motions * ((PetscInt)c->first.size() - 1);
+  const PetscInt columns = (PetscInt)c->single_rows.size() + rigid_motions * ((PetscInt)c->first.size() - 1);
 
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(A, &n, NULL));
@@ -173,7 +177,7 @@ PetscErrorCode CreateR(Mat A, CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-/* Rows of R of an aggregate whose columns begin with `column`: its translations, and its rotations about the centre in units of its size */
+/* Sets the rows of R of an aggregate whose columns begin with `column`: translations, and rotations about the centre divided by the aggregate's size */
 PetscErrorCode FillAggregate(CoarseLevel *c, PetscInt from, PetscInt to, PetscInt column)
 {
   double       m[3];
@@ -199,11 +203,11 @@ PetscErrorCode FillR(CoarseLevel *c)
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRangeColumn(c->R, &column, NULL));
-  for (PetscInt row : c->apart) {
+  for (PetscInt row : c->single_rows) {
     PetscCall(MatSetValues(c->R, 1, &row, 1, &column, &one, INSERT_VALUES));
     column++;
   }
-  for (size_t a = 0; a + 1 < c->first.size(); a++, column += motions) PetscCall(FillAggregate(c, c->first[a], c->first[a + 1], column));
+  for (size_t a = 0; a + 1 < c->first.size(); a++, column += rigid_motions) PetscCall(FillAggregate(c, c->first[a], c->first[a + 1], column));
   PetscCall(MatAssemblyBegin(c->R, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(c->R, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(0);
@@ -223,15 +227,15 @@ PetscErrorCode CoarseDestroy(CoarseLevel *c)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt most, CoarseLevel *c)
+PetscErrorCode CoarseCreate(const CoarseNodes &of, PetscInt max_nodes, CoarseLevel *c)
 {
   PetscFunctionBegin;
   PetscCall(CoarseDestroy(c));
-  PetscCall(Sort(of, c));
+  PetscCall(ListUnknowns(of, c));
   PetscCall(Positions(of.positions, c));
   c->first.push_back(0);
-  if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), most);
-  Dissolve(c);
+  if (!c->nodes.empty()) Divide(c, 0, (PetscInt)c->nodes.size(), max_nodes);
+  DissolveCollinear(c);
   PetscCall(CreateR(of.A, c));
   PetscFunctionReturn(0);
 }
@@ -251,9 +255,9 @@ PetscErrorCode CoarseSaveState(const CoarseLevel &c, Archive *archive)
   CoarseLevel division;
 
   PetscFunctionBegin;
-  division.nodes = c.nodes;
-  division.first = c.first;
-  division.apart = c.apart;
+  division.nodes       = c.nodes;
+  division.first       = c.first;
+  division.single_rows = c.single_rows;
   TransferDivision(&division, archive);
   PetscCall(InnerSaveState(c.inner, archive));
   PetscFunctionReturn(0);
@@ -268,7 +272,7 @@ PetscErrorCode CoarseLoadState(PC pc, CoarseLevel *c, Archive *archive, PetscBoo
   *failed = PETSC_FALSE;
   PetscCall(MatGetOwnershipRange(pc->pmat, &begin, &end));
   TransferDivision(&was, archive);
-  *same = (PetscBool)(archive->good && IsDivision(was, begin, end));
+  *same = (PetscBool)(archive->good && IsValidDivision(was, begin, end));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)pc)));
   if (!*same) PetscFunctionReturn(0);
   PetscCall(CoarseDestroy(c));

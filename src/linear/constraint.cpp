@@ -1,6 +1,6 @@
 /*
-  The preconditioner "hhtconstraint", constraint.h. The solver of its fine level has the prefix "constraint_" after that of the preconditioner's own options,
-  and is chosen as any other direct solver where the user chooses none.
+  The preconditioner "hhtconstraint", constraint.h. The options of the direct solvers of its levels have the preconditioner's prefix followed by "constraint_" (fine level) and
+  "coarse_" (coarse level).
 */
 #include "constraint.h"
 #include "coarse.h"
@@ -12,20 +12,26 @@
 namespace
 {
 
-constexpr PetscInt  in_aggregate = 200;  /* nodes: of 60 to 200 the best at 17,000 and 120,000 unknowns, src/flexible/README.md */
-constexpr PetscInt  in_large = 400, large = 200000; /* of so many nodes: as good as 200 at 100,000, and half the time of coarse solves at 350,000 */
-constexpr PetscReal few_digits   = 1e-4; /* relative tolerances from here on are a matter of single precision */
-constexpr PetscReal a_part       = 0.1;  /* of the residual that a solve leaves: more may not be rounding of single precision */
+/* Largest number of nodes of an aggregate: 200 is the fastest of 60 to 200 with 17,000 and 120,000 unknowns (src/flexible/README.md). For bodies of at least
+   large_body_nodes nodes 400, as fast as 200 at 100,000 nodes, with half the time of coarse solves at 350,000. */
+constexpr PetscInt aggregate_nodes = 200, aggregate_nodes_large = 400, large_body_nodes = 200000;
+
+/* Relative tolerance of the Krylov method from which on its products are computed in single precision */
+constexpr PetscReal single_precision_rtol = 1e-4;
+
+/* Largest part of a solve's final residual that may be rounding of single precision: above it products are computed in double precision from then on.
+   NodeProductTest.RoundingIsMeasured. */
+constexpr PetscReal max_rounding_part = 0.1;
 
 struct ConstraintOptions {
   PetscBool single    = PETSC_TRUE; /* products in single precision */
   PetscInt  aggregate = PETSC_DECIDE;
 };
 
-/* Saved and restored as it is, with what the levels keep */
+/* Stored in checkpoints as it is, together with the state of the levels */
 struct ConstraintState {
-  PetscBool fallen   = PETSC_FALSE; /* back to double precision, for good */
-  PetscBool measured = PETSC_FALSE; /* what products in single precision leave of this matrix' solves */
+  PetscBool keep_double = PETSC_FALSE; /* products stay in double precision for all later matrices */
+  PetscBool measured    = PETSC_FALSE; /* the rounding of products in single precision has been measured for this matrix */
 };
 
 struct Constraint : ConstraintOptions, ConstraintState {
@@ -33,9 +39,9 @@ struct Constraint : ConstraintOptions, ConstraintState {
   FineLevel        fine;
   CoarseLevel      coarse;
   NodeProduct      product;
-  PetscBool        in_range = PETSC_FALSE; /* there is a product in single precision */
-  PetscObjectId    matrix = 0, told = 0; /* the matrix, and the index set of nodes that was composed with it */
-  PetscObjectState pattern   = -1;
+  PetscBool        single_usable = PETSC_FALSE; /* a product in single precision exists, and the entries are within its range */
+  PetscObjectId    matrix = 0, node_set = 0;    /* the matrix, and the index set LINEAR_NODES composed with it */
+  PetscObjectState pattern = -1;
 };
 
 Constraint &Of(PC pc) { return *static_cast<Constraint *>(pc->data); }
@@ -52,10 +58,10 @@ PetscErrorCode CheckType(PC pc)
   PetscFunctionReturn(0);
 }
 
-/* *fresh: another matrix, another pattern or other nodes than before */
+/* Finds the nodes if matrix, pattern or index set of nodes are others than before, and sets *fresh in that case */
 PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
 {
-  PetscObjectId    id, told = 0;
+  PetscObjectId    id, node_set = 0;
   PetscObjectState pattern;
   PetscObject      is;
 
@@ -63,12 +69,12 @@ PetscErrorCode FindNodes(PC pc, Constraint &c, PetscBool *fresh)
   PetscCall(PetscObjectGetId((PetscObject)pc->pmat, &id));
   PetscCall(MatGetNonzeroState(pc->pmat, &pattern));
   PetscCall(PetscObjectQuery((PetscObject)pc->pmat, LINEAR_NODES, &is));
-  if (is) PetscCall(PetscObjectGetId(is, &told));
-  *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern || told != c.told);
+  if (is) PetscCall(PetscObjectGetId(is, &node_set));
+  *fresh = (PetscBool)(id != c.matrix || pattern != c.pattern || node_set != c.node_set);
   if (*fresh) PetscCall(FindMatrixNodes(pc->pmat, &c.nodes));
-  c.matrix  = id;
-  c.pattern = pattern;
-  c.told    = told;
+  c.matrix   = id;
+  c.pattern  = pattern;
+  c.node_set = node_set;
   PetscFunctionReturn(0);
 }
 
@@ -96,7 +102,7 @@ PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *fai
     if (fresh || !c.coarse.R) {
       nodes = c.nodes.count;
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
-      PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate > 0 ? c.aggregate : nodes < large ? in_aggregate : in_large, &c.coarse));
+      PetscCall(CoarseCreate({c.nodes, pc->pmat, positions}, c.aggregate > 0 ? c.aggregate : nodes < large_body_nodes ? aggregate_nodes : aggregate_nodes_large, &c.coarse));
     }
     PetscCall(CoarseFill(pc, positions, &c.coarse, failed));
   }
@@ -106,13 +112,13 @@ PetscErrorCode SetUpCoarse(PC pc, Constraint &c, PetscBool fresh, PetscBool *fai
 PetscErrorCode SetUpProduct(PC pc, Constraint &c, PetscBool fresh)
 {
   PetscFunctionBegin;
-  c.in_range = c.measured = PETSC_FALSE;
-  if (!c.single || c.fallen || !c.nodes.threes || pc->mat != pc->pmat) {
+  c.single_usable = c.measured = PETSC_FALSE;
+  if (!c.single || c.keep_double || !c.nodes.three_unknowns || pc->mat != pc->pmat) {
     PetscCall(NodeProductDestroy(&c.product));
     PetscFunctionReturn(0);
   }
-  PetscCall(NodeProductFill(pc->pmat, c.nodes.node, !fresh, &c.product, &c.in_range));
-  if (!c.in_range) PetscCall(PetscInfo(pc, "products in double precision: single precision has no room for the entries of this matrix\n"));
+  PetscCall(NodeProductFill(pc->pmat, c.nodes.node, !fresh, &c.product, &c.single_usable));
+  if (!c.single_usable) PetscCall(PetscInfo(pc, "products in double precision: single precision has no room for the entries of this matrix\n"));
   PetscFunctionReturn(0);
 }
 
@@ -144,7 +150,7 @@ PetscErrorCode Apply(PC pc, Vec x, Vec y)
   PetscFunctionReturn(0);
 }
 
-/* Conjugate gradients need a first iterate on the constraints: P^-1 b. A few digits take products of single precision. */
+/* Conjugate gradients need a first iterate that satisfies the constraints: P^-1 b. At loose tolerances the operator becomes the product in single precision. */
 PetscErrorCode PreSolve(PC pc, KSP ksp, Vec, Vec)
 {
   Constraint &c = Of(pc);
@@ -152,15 +158,16 @@ PetscErrorCode PreSolve(PC pc, KSP ksp, Vec, Vec)
   PetscBool   cg;
 
   PetscFunctionBegin;
-  PetscCall(PCSetUp(pc)); /* KSPSetUp() leaves it to the first PCApply() where nobody has set the operators again */
+  PetscCall(PCSetUp(pc)); /* if the operators were not set again, KSPSetUp() would leave it to the first PCApply(), which is too late to exchange the operator */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &cg, KSPCG, KSPFCG, KSPPIPECG, ""));
   if (cg) PetscCall(KSPSetInitialGuessKnoll(ksp, PETSC_TRUE));
   PetscCall(KSPGetTolerances(ksp, &rtol, NULL, NULL, NULL));
-  if (c.in_range && pc->mat == pc->pmat && rtol >= few_digits) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
+  if (c.single_usable && pc->mat == pc->pmat && rtol >= single_precision_rtol) PetscCall(PCSetOperators(pc, c.product.shell, pc->pmat));
   PetscFunctionReturn(0);
 }
 
-/* After the first solve with a matrix, and one that failed: where rounding of the products in single precision is what is left, double precision from now on */
+/* Called after the first solve with a matrix, and after failed ones: if the final residual is mainly rounding of products in single precision, or the solve failed, products are
+   computed in double precision from then on */
 PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
 {
   Vec                in_single, in_double;
@@ -181,9 +188,9 @@ PetscErrorCode Measure(PC pc, KSP ksp, Constraint &c, Vec b, Vec x)
   PetscCall(VecNorm(in_single, NORM_2, &left));
   PetscCall(VecDestroy(&in_single));
   PetscCall(VecDestroy(&in_double));
-  if (reason > 0 && rounding <= a_part * left) PetscFunctionReturn(0);
-  c.fallen   = PETSC_TRUE;
-  c.in_range = PETSC_FALSE;
+  if (reason > 0 && rounding <= max_rounding_part * left) PetscFunctionReturn(0);
+  c.keep_double   = PETSC_TRUE;
+  c.single_usable = PETSC_FALSE;
   PetscCall(PetscInfo(pc, "products in double precision from now on: rounding of single precision is %g of the residual that a solve has left, %s\n", (double)(left > 0 ? rounding / left : 1),
                       KSPConvergedReasons[reason]));
   PetscFunctionReturn(0);
@@ -203,7 +210,7 @@ PetscErrorCode PostSolve(PC pc, KSP ksp, Vec b, Vec x)
 
 /* ---- state ---- */
 
-/* Nodes and positions are in P^-1 as they were when the matrix was made, aggregates as with the first one of its pattern */
+/* P^-1 depends on nodes and positions at the time when the matrix was computed, and on aggregates formed with the first matrix of its pattern */
 PetscErrorCode SaveState(PC pc, Archive *archive)
 {
   Constraint           &c       = Of(pc);
@@ -222,7 +229,7 @@ PetscErrorCode SaveState(PC pc, Archive *archive)
   PetscFunctionReturn(0);
 }
 
-/* Where the user wishes otherwise now, or nodes are others, the preconditioner stays as it was set up. */
+/* If options or nodes are others than those of the saved state, the preconditioner stays as it was set up, and *same = PETSC_FALSE */
 PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
 {
   Constraint           &c = Of(pc);
@@ -243,7 +250,7 @@ PetscErrorCode LoadState(PC pc, Archive *archive, PetscBool *same)
   if (coarse) PetscCall(CoarseLoadState(pc, &c.coarse, archive, same, &failed));
   else PetscCall(FineLoadState(pc, &c.fine, archive, same, &failed));
   if (failed) pc->failedreason = PC_SUBPC_ERROR;
-  c.fallen = was.fallen;
+  c.keep_double = was.keep_double;
   PetscCall(SetUpProduct(pc, c, PETSC_FALSE));
   c.measured = was.measured;
   PetscFunctionReturn(0);
@@ -253,20 +260,20 @@ PetscErrorCode View(PC pc, PetscViewer viewer)
 {
   const Constraint &c = Of(pc);
   PetscBool         ascii;
-  PetscInt          nodes = c.nodes.count, alone = (PetscInt)c.nodes.alone.size();
-  MatInfo           all, kept = {};
+  PetscInt          nodes = c.nodes.count, node_blocks = (PetscInt)c.nodes.node_blocks.size();
+  MatInfo           all, kept                          = {};
 
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)viewer, PETSCVIEWERASCII, &ascii));
   if (!ascii || !pc->setupcalled) PetscFunctionReturn(0);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nodes, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &alone, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &node_blocks, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)pc)));
   PetscCall(MatGetInfo(pc->pmat, MAT_GLOBAL_SUM, &all));
-  if (c.fine.apart) PetscCall(MatGetInfo(c.fine.apart, MAT_GLOBAL_SUM, &kept));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g\n", nodes, (double)kept.nz_used + 9. * (double)alone, (double)all.nz_used));
-  PetscCall(PetscViewerASCIIPrintf(viewer, c.in_range ? "  products with nodes in single precision, at relative tolerances from %g on\n" : "  products in double precision\n", (double)few_digits));
-  if (c.fine.apart) PetscCall(PetscViewerASCIIPrintf(viewer, "  inverses of %" PetscInt_FMT " nodes; all else: %s\n", alone, c.fine.inner.choice.text));
-  if (c.fine.apart) PetscCall(InnerView(c.fine.inner, viewer));
+  if (c.fine.rest) PetscCall(MatGetInfo(c.fine.rest, MAT_GLOBAL_SUM, &kept));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %" PetscInt_FMT " nodes without couplings among them, %g entries of %g\n", nodes, (double)kept.nz_used + 9. * (double)node_blocks, (double)all.nz_used));
+  PetscCall(PetscViewerASCIIPrintf(viewer, c.single_usable ? "  products with nodes in single precision, at relative tolerances from %g on\n" : "  products in double precision\n", (double)single_precision_rtol));
+  if (c.fine.rest) PetscCall(PetscViewerASCIIPrintf(viewer, "  inverses of %" PetscInt_FMT " nodes; all else: %s\n", node_blocks, c.fine.inner.choice.text));
+  if (c.fine.rest) PetscCall(InnerView(c.fine.inner, viewer));
   if (c.coarse.A) PetscCall(CoarseView(c.coarse, viewer));
   PetscFunctionReturn(0);
 }

@@ -3,14 +3,14 @@
 
     P = [D B^T; B 0],    D = A without the couplings between different nodes of finite-element bodies
 
-  What is not a node, as rigid bodies, modes and multipliers, stays whole, with everything that couples it to nodes, and is factored (fine.h). Each solve with P satisfies the
-  constraints exactly, so that conjugate gradients, which begin at P^-1 b, move along them from then on and do not meet the indefiniteness of the whole matrix (Gould,
+  Unknowns that do not belong to nodes, as those of rigid bodies, modes and multipliers, keep all their couplings, also to nodes, and are factored together (fine.h). Each solve with P satisfies the
+  constraints exactly, so that the iterates of conjugate gradients, which begin at P^-1 b, stay on the constraints, where the matrix is definite (Gould,
   Hribar, Nocedal, SIAM J. Sci. Comput. 23, 2001, 1376-1395, algorithm 6.2). Without multipliers D alone is block Jacobi.
 
-  Where positions of nodes are known, a coarse level (coarse.h) is added, which has all that is no node, too: iterations no longer grow with the size of a body in elements.
-  -pc_hhtconstraint_aggregate says how many nodes it takes together, 0: no such level.
+  If positions of nodes are known, a coarse level (coarse.h) is added, which includes all unknowns that do not belong to nodes: the number of iterations then no longer grows with the number of
+  elements. -pc_hhtconstraint_aggregate sets the largest number of nodes of an aggregate; 0: no coarse level.
 
-  Where a few digits are asked for, the Krylov method's products are made in single precision (node_product.h), unless -pc_hhtconstraint_single 0.
+  At relative tolerances from 1e-4 on the Krylov method's matrix products are computed in single precision (node_product.h), unless -pc_hhtconstraint_single 0.
 */
 #ifndef HHTDAE_LINEAR_CONSTRAINT_H
 #define HHTDAE_LINEAR_CONSTRAINT_H
@@ -19,11 +19,11 @@
 
 #define PCHHTCONSTRAINT "hhtconstraint"
 
-/* On a matrix, by PetscObjectCompose(): an IS of its rank's unknowns that belong to nodes, of as many at a time as the block size of the IS.
-   Where there is none, consecutive rows with a diagonal entry and the same pattern are a node. */
+/* Name of an IS composed with the matrix (PetscObjectCompose()): this rank's unknowns that belong to nodes; the block size of the IS is the number of unknowns of a node.
+   Without it, consecutive rows with a diagonal entry and the same pattern are taken for a node. */
 #define LINEAR_NODES "hhtdae_nodes"
 
-/* Likewise what the coarse level needs: a Vec with positions of nodes of three unknowns in the rows of these */
+/* Name of a Vec composed likewise, which the coarse level needs: positions of nodes of three unknowns, in the rows of these unknowns */
 #define LINEAR_POSITIONS "hhtdae_positions"
 
 PetscErrorCode LinearRegisterConstraint(void);

@@ -1,12 +1,12 @@
 /*
-  Which constraints depend on each other, by inverse iteration. P = [K B^T; B 0] is singular if B^T lambda = 0 for some
+  Finds linearly dependent constraints by inverse iteration. P = [K B^T; B 0] is singular if B^T lambda = 0 for some
   lambda != 0. With -E in place of the zero block, E small and diagonal, a solve with right-hand side (0, -E lambda)
   gives
 
       lambda <- (S + E)^{-1} E lambda,   S = B K^{-1} B^T,
 
   which keeps the part of lambda in the null space of B^T and shrinks the rest by about E/S. All null directions are
-  kept alike, so a vector without small entries ends as its projection on the null space, and that is nonzero in exactly
+  kept equally, so a vector without small entries converges to its projection on the null space. That is nonzero in exactly
   the rows that take part in some dependence (unless the vector is orthogonal to one by chance).
 */
 #include "linear.h"
@@ -14,21 +14,21 @@
 #include <algorithm>
 #include <vector>
 
-/* E relative to an estimate of the diagonal of S: small against S where that is regular, large against rounding */
+/* E relative to an estimate of the diagonal of S: small compared with the nonzero eigenvalues of S, large compared with rounding */
 static const PetscReal REGULARIZATION = 1e-9;
 
 /* |B^T lambda| relative to |B| |lambda| below which lambda counts as a null vector; all three norms scaled as S is */
 static const PetscReal NULL_RESIDUAL = 1e-9;
 
-/* Size of an entry of the null vector, relative to the largest, from which on its row takes part */
-static const PetscReal TAKES_PART = 1e-6;
+/* A row takes part in a dependence if its entry of the null vector, relative to the largest one, is larger than this */
+static const PetscReal MIN_COMPONENT = 1e-6;
 
-static const PetscInt ITERATIONS = 12;
+static const PetscInt NULL_VECTOR_ITERATIONS = 12;
 
 namespace
 {
 
-/* Vectors over all rows; s, lambda and the mask vanish on rows that are no multipliers */
+/* Vectors have all rows of P; s, lambda and mask vanish on rows of coordinates */
 struct Dependence {
   Mat P, regularized;
   IS  multipliers;
@@ -42,7 +42,7 @@ struct Dependence {
 
 } // namespace
 
-/* Where a coordinate has no diagonal entry, the mean of |k| stands in */
+/* d_j = 1/sqrt|k_jj|; for a zero diagonal entry the mean of |k_jj| is taken */
 static PetscErrorCode FillD(Dependence *t)
 {
   PetscReal    sum;
@@ -61,7 +61,7 @@ static PetscErrorCode FillD(Dependence *t)
   PetscFunctionReturn(0);
 }
 
-/* The multipliers' entries of s, the mask and the first lambda, which has entries of one size in the scale of S */
+/* Sets the multipliers' entries of s, of the mask and of the first lambda, whose entries have similar sizes when scaled by sqrt(s) */
 static PetscErrorCode FillMultipliers(Dependence *t)
 {
   Mat             scaled;
@@ -84,7 +84,7 @@ static PetscErrorCode FillMultipliers(Dependence *t)
     PetscCall(MatGetRow(scaled, rows[i], &count, NULL, &vals));
     for (PetscInt k = 0; k < count; ++k) s += PetscAbsScalar(vals[k]) * PetscAbsScalar(vals[k]);
     PetscCall(MatRestoreRow(scaled, rows[i], &count, NULL, &vals));
-    if (s <= 0) s = 1; /* an empty row is a dependence by itself */
+    if (s <= 0) s = 1; /* an empty row is linearly dependent by itself */
     PetscCall(VecSetValue(t->s, rows[i], s, INSERT_VALUES));
     PetscCall(VecSetValue(t->mask, rows[i], 1.0, INSERT_VALUES));
     PetscCall(VecSetValue(t->lambda, rows[i], LinearPseudoRandomValue((uint64_t)rows[i], 3) / PetscSqrtReal(s),
@@ -99,7 +99,7 @@ static PetscErrorCode FillMultipliers(Dependence *t)
   PetscFunctionReturn(0);
 }
 
-/* P - E; the multipliers' rows may have no diagonal entry to subtract from, so the sum gets a pattern of its own */
+/* P - E, in a new pattern because rows of multipliers may have no diagonal entry */
 static PetscErrorCode Regularize(Dependence *t)
 {
   Mat      E;
@@ -149,7 +149,7 @@ static PetscErrorCode Destroy(Dependence *t)
   PetscFunctionReturn(0);
 }
 
-/* The iteration; *residual is relative to |B| |lambda|, and infinite if the regularized matrix cannot be factored */
+/* Iterates; *residual is |B^T lambda| relative to |B| |lambda|, and infinite if the regularized matrix cannot be factored */
 static PetscErrorCode Iterate(Dependence *t, PetscReal *residual)
 {
   PetscReal   largest, norm;
@@ -157,7 +157,7 @@ static PetscErrorCode Iterate(Dependence *t, PetscReal *residual)
 
   PetscFunctionBegin;
   *residual = PETSC_INFINITY;
-  for (PetscInt k = 0; k<ITERATIONS && * residual> PETSC_MACHINE_EPSILON; ++k) {
+  for (PetscInt k = 0; k<NULL_VECTOR_ITERATIONS && * residual> PETSC_MACHINE_EPSILON; ++k) {
     KSPConvergedReason reason;
     PetscCall(VecPointwiseMult(t->lambda, t->lambda, t->s));
     PetscCall(VecScale(t->lambda, -REGULARIZATION));
@@ -179,7 +179,7 @@ static PetscErrorCode Iterate(Dependence *t, PetscReal *residual)
   PetscFunctionReturn(0);
 }
 
-/* The rows with entries of note in the scale of S, ascending; the same list everywhere */
+/* Collects the rows with significant entries of lambda, scaled by sqrt(s), ascending; the same list on all ranks */
 static PetscErrorCode Collect(Dependence *t, PetscInt max, PetscInt *n, PetscInt rows[])
 {
   PetscReal                largest;
@@ -197,7 +197,7 @@ static PetscErrorCode Collect(Dependence *t, PetscInt max, PetscInt *n, PetscInt
   PetscCall(VecGetOwnershipRange(t->work, &begin, &end));
   PetscCall(VecGetArrayRead(t->work, &lambda));
   for (PetscInt i = 0; i < end - begin && (PetscInt)local.size() < max; ++i)
-    if (PetscAbsScalar(lambda[i]) > TAKES_PART * largest) local.push_back(begin + i);
+    if (PetscAbsScalar(lambda[i]) > MIN_COMPONENT * largest) local.push_back(begin + i);
   PetscCall(VecRestoreArrayRead(t->work, &lambda));
 
   PetscCallMPI(MPI_Comm_size(comm, &size));
@@ -224,7 +224,7 @@ PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt
   *n = 0;
   PetscCall(ISGetSize(multipliers, &count));
   if (!count) PetscFunctionReturn(0);
-  PetscCall(LinearStoresTriangle(P, &triangle)); /* whole rows are read here */
+  PetscCall(LinearStoresTriangle(P, &triangle)); /* complete rows are needed */
   if (triangle) PetscCall(MatConvert(P, MATAIJ, MAT_INITIAL_MATRIX, &t.P));
   else t.P = P;
   t.multipliers = multipliers;

@@ -1,3 +1,4 @@
+/* The fine level of "hhtconstraint", fine.h */
 #include "fine.h"
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@ namespace
 
 /* ---- nodes ---- */
 
-/* Inverse of a 3 x 3 matrix by rows, by cofactors; false where it has none */
+/* Inverts a 3 x 3 matrix, stored by rows, by cofactors; false if it is singular or the inverse overflows single precision */
 bool Invert(const double a[9], float inverse[9])
 {
   double c[9];
@@ -30,9 +31,9 @@ PetscErrorCode FillInverses(const LocalRows &A, const MatrixNodes &nodes, FineLe
 {
   PetscFunctionBegin;
   *failed = PETSC_FALSE;
-  f->inverse.resize(9 * nodes.alone.size());
-  for (size_t n = 0; n < nodes.alone.size(); n++) {
-    const PetscInt first = nodes.alone[n];
+  f->inverse.resize(9 * nodes.node_blocks.size());
+  for (size_t n = 0; n < nodes.node_blocks.size(); n++) {
+    const PetscInt first    = nodes.node_blocks[n];
     double         block[9] = {};
     for (PetscInt r = 0; r < 3; r++)
       PetscCall(A.forRow(first + r, [&](PetscInt c, PetscScalar v) {
@@ -43,33 +44,33 @@ PetscErrorCode FillInverses(const LocalRows &A, const MatrixNodes &nodes, FineLe
   PetscFunctionReturn(0);
 }
 
-/* ---- all else ---- */
+/* ---- the other rows ---- */
 
-PetscErrorCode Number(Mat A, const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
+PetscErrorCode NumberRest(Mat A, const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
 {
-  const PetscInt n = (PetscInt)nodes.apart.size();
+  const PetscInt n = (PetscInt)nodes.other_rows.size();
   PetscInt       end;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Scan(&n, &end, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)A)));
   f->number.assign((size_t)rows.own, -1);
-  for (PetscInt k = 0; k < n; k++) f->number[(size_t)nodes.apart[(size_t)k]] = end - n + k;
+  for (PetscInt k = 0; k < n; k++) f->number[(size_t)nodes.other_rows[(size_t)k]] = end - n + k;
   PetscCall(LinearFetchColumns(A, rows, &f->number));
   PetscFunctionReturn(0);
 }
 
-/* use(row, its columns and values) for every row of the matrix `apart`, by its numbers */
+/* Calls use(row, columns, values) for every row of the matrix `rest`, with its row and column numbers */
 template <class Use> PetscErrorCode ForRows(const LocalRows &A, const MatrixNodes &nodes, const FineLevel &f, Use use)
 {
   std::vector<PetscInt>    cols;
   std::vector<PetscScalar> values;
 
   PetscFunctionBegin;
-  for (PetscInt i : nodes.apart) {
+  for (PetscInt i : nodes.other_rows) {
     cols.clear();
     values.clear();
     PetscCall(A.forRow(i, [&](PetscInt c, PetscScalar v) {
-      if (!EntryStays(nodes.node[(size_t)i], nodes.node[(size_t)c])) return;
+      if (!IsKept(nodes.node[(size_t)i], nodes.node[(size_t)c])) return;
       cols.push_back(f.number[(size_t)c]);
       values.push_back(v);
     }));
@@ -78,28 +79,28 @@ template <class Use> PetscErrorCode ForRows(const LocalRows &A, const MatrixNode
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode DestroyApart(FineLevel *f)
+PetscErrorCode DestroyRest(FineLevel *f)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&f->apart));
+  PetscCall(MatDestroy(&f->rest));
   PetscCall(VecDestroy(&f->b));
   PetscCall(VecDestroy(&f->x));
   PetscCall(InnerDestroy(&f->inner));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode CreateApart(Mat A, const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
+PetscErrorCode CreateRest(Mat A, const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
 {
-  const PetscInt        n = (PetscInt)nodes.apart.size();
+  const PetscInt        n = (PetscInt)nodes.other_rows.size();
   PetscInt              all;
   std::vector<PetscInt> diagonal, off;
 
   PetscFunctionBegin;
-  PetscCall(DestroyApart(f));
+  PetscCall(DestroyRest(f));
   PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, PetscObjectComm((PetscObject)A)));
   if (!all) PetscFunctionReturn(0);
-  PetscCall(Number(A, rows, nodes, f));
-  const PetscInt begin = n ? f->number[(size_t)nodes.apart[0]] : 0;
+  PetscCall(NumberRest(A, rows, nodes, f));
+  const PetscInt begin = n ? f->number[(size_t)nodes.other_rows[0]] : 0;
   PetscCall(ForRows(rows, nodes, *f, [&](PetscInt, const std::vector<PetscInt> &col, const std::vector<PetscScalar> &) -> PetscErrorCode {
     PetscInt own = 0;
     for (PetscInt j : col) own += j >= begin && j < begin + n;
@@ -107,22 +108,22 @@ PetscErrorCode CreateApart(Mat A, const LocalRows &rows, const MatrixNodes &node
     off.push_back((PetscInt)col.size() - own);
     return 0;
   }));
-  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)A), n, n, all, all, 0, diagonal.data(), 0, off.data(), &f->apart));
-  PetscCall(MatSetOption(f->apart, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
-  PetscCall(MatCreateVecs(f->apart, &f->x, &f->b));
+  PetscCall(MatCreateAIJ(PetscObjectComm((PetscObject)A), n, n, all, all, 0, diagonal.data(), 0, off.data(), &f->rest));
+  PetscCall(MatSetOption(f->rest, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  PetscCall(MatCreateVecs(f->rest, &f->x, &f->b));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FillApart(const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
+PetscErrorCode FillRest(const LocalRows &rows, const MatrixNodes &nodes, FineLevel *f)
 {
   PetscFunctionBegin;
   PetscCall(ForRows(rows, nodes, *f, [&](PetscInt i, const std::vector<PetscInt> &col, const std::vector<PetscScalar> &value) -> PetscErrorCode {
     PetscFunctionBegin;
-    PetscCall(MatSetValues(f->apart, 1, &i, (PetscInt)col.size(), col.data(), value.data(), INSERT_VALUES));
+    PetscCall(MatSetValues(f->rest, 1, &i, (PetscInt)col.size(), col.data(), value.data(), INSERT_VALUES));
     PetscFunctionReturn(0);
   }));
-  PetscCall(MatAssemblyBegin(f->apart, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(f->apart, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyBegin(f->rest, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(f->rest, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(0);
 }
 
@@ -131,32 +132,32 @@ PetscErrorCode FillApart(const LocalRows &rows, const MatrixNodes &nodes, FineLe
 PetscErrorCode FineDestroy(FineLevel *f)
 {
   PetscFunctionBegin;
-  PetscCall(DestroyApart(f));
+  PetscCall(DestroyRest(f));
   *f = FineLevel();
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, PetscBool fresh, FineLevel *f, PetscBool *failed)
+PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool blocks_only, PetscBool fresh, FineLevel *f, PetscBool *failed)
 {
   LocalRows rows;
-  PetscBool apart_failed = PETSC_FALSE;
+  PetscBool rest_failed = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(LinearLocalRows(pc->pmat, &rows));
   PetscCall(FillInverses(rows, nodes, f, failed));
-  if (nodes_alone) PetscCall(DestroyApart(f));
-  else if (fresh || !f->apart) PetscCall(CreateApart(pc->pmat, rows, nodes, f));
-  if (!f->apart) PetscFunctionReturn(0);
-  PetscCall(FillApart(rows, nodes, f));
-  PetscCall(InnerSetUp(pc, "constraint_", f->apart, &f->inner, &apart_failed));
-  *failed = (PetscBool)(*failed || apart_failed);
+  if (blocks_only) PetscCall(DestroyRest(f));
+  else if (fresh || !f->rest) PetscCall(CreateRest(pc->pmat, rows, nodes, f));
+  if (!f->rest) PetscFunctionReturn(0);
+  PetscCall(FillRest(rows, nodes, f));
+  PetscCall(InnerSetUp(pc, "constraint_", f->rest, &f->inner, &rest_failed));
+  *failed = (PetscBool)(*failed || rest_failed);
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode FineSaveState(const FineLevel &f, Archive *archive)
 {
   PetscFunctionBegin;
-  if (f.apart) PetscCall(InnerSaveState(f.inner, archive));
+  if (f.rest) PetscCall(InnerSaveState(f.inner, archive));
   PetscFunctionReturn(0);
 }
 
@@ -165,7 +166,7 @@ PetscErrorCode FineLoadState(PC pc, FineLevel *f, Archive *archive, PetscBool *s
   PetscFunctionBegin;
   *same   = PETSC_TRUE;
   *failed = PETSC_FALSE;
-  if (f->apart) PetscCall(InnerLoadState(pc, "constraint_", f->apart, &f->inner, archive, same, failed));
+  if (f->rest) PetscCall(InnerLoadState(pc, "constraint_", f->rest, &f->inner, archive, same, failed));
   PetscFunctionReturn(0);
 }
 
@@ -177,24 +178,24 @@ PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, P
   PetscFunctionBegin;
   *failed = PETSC_FALSE;
   PetscCall(VecGetArrayRead(x, &from));
-  if (f->apart) {
+  if (f->rest) {
     PetscCall(VecGetArrayWrite(f->b, &b));
-    for (size_t k = 0; k < nodes.apart.size(); k++) b[k] = from[nodes.apart[k]];
+    for (size_t k = 0; k < nodes.other_rows.size(); k++) b[k] = from[nodes.other_rows[k]];
     PetscCall(VecRestoreArrayWrite(f->b, &b));
     PetscCall(InnerSolve(&f->inner, f->b, f->x, failed));
   }
   PetscCall(VecGetArrayWrite(y, &to));
-  for (size_t n = 0; n < nodes.alone.size(); n++) {
+  for (size_t n = 0; n < nodes.node_blocks.size(); n++) {
     const float       *a = &f->inverse[9 * n];
-    const PetscScalar *r = from + nodes.alone[n];
-    for (int i = 0; i < 3; i++) to[nodes.alone[n] + i] = a[3 * i] * r[0] + a[3 * i + 1] * r[1] + a[3 * i + 2] * r[2];
+    const PetscScalar *r = from + nodes.node_blocks[n];
+    for (int i = 0; i < 3; i++) to[nodes.node_blocks[n] + i] = a[3 * i] * r[0] + a[3 * i + 1] * r[1] + a[3 * i + 2] * r[2];
   }
-  if (f->apart) {
+  if (f->rest) {
     PetscCall(VecGetArrayRead(f->x, &solved));
-    for (size_t k = 0; k < nodes.apart.size(); k++) to[nodes.apart[k]] = solved[k];
+    for (size_t k = 0; k < nodes.other_rows.size(); k++) to[nodes.other_rows[k]] = solved[k];
     PetscCall(VecRestoreArrayRead(f->x, &solved));
   } else
-    for (PetscInt row : nodes.apart) to[row] = 0;
+    for (PetscInt row : nodes.other_rows) to[row] = 0;
   PetscCall(VecRestoreArrayWrite(y, &to));
   PetscCall(VecRestoreArrayRead(x, &from));
   PetscFunctionReturn(0);

@@ -1,6 +1,6 @@
 /*
-  The fine level of the preconditioner "hhtconstraint": [A B^T; B 0] without the couplings between different nodes. Nodes that are coupled to nothing but nodes are blocks of three,
-  which are inverted, in single precision; all else is a matrix of its own, which is factored.
+  The fine level of the preconditioner "hhtconstraint": [A B^T; B 0] without the couplings between different nodes. For nodes that are coupled to nodes only this leaves 3 x 3 blocks,
+  whose inverses are stored in single precision; the remaining rows and columns are a separate matrix, which is factored.
 */
 #ifndef HHTDAE_LINEAR_FINE_H
 #define HHTDAE_LINEAR_FINE_H
@@ -9,17 +9,18 @@
 #include "matrix_nodes.h"
 
 struct FineLevel {
-  std::vector<float>    inverse;      /* of each node of MatrixNodes::alone, 3 x 3 by rows */
-  Mat                   apart = nullptr; /* of the unknowns MatrixNodes::apart; NULL where there are none on any rank, or another level has them */
-  std::vector<PetscInt> number;       /* of columns (local_rows.h): their row of `apart`, or -1 */
-  Vec                   b = nullptr, x = nullptr;
+  std::vector<float>    inverse;                  /* inverse 3 x 3 block of each node of MatrixNodes::node_blocks, by rows */
+  Mat                   rest = nullptr;           /* matrix of the unknowns MatrixNodes::other_rows; NULL if no rank has any, or the coarse level solves for them */
+  std::vector<PetscInt> number;                   /* for each local column (local_rows.h): its global row in `rest`, or -1 */
+  Vec                   b = nullptr, x = nullptr; /* right-hand side and solution of `rest` */
   InnerSolver           inner;
 };
 
-/* After each change of the values of pc->pmat. fresh: or of its pattern. nodes_alone: another level answers all else. *failed: it is singular, of this rank or all. Collective. */
-PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool nodes_alone, PetscBool fresh, FineLevel *f, PetscBool *failed);
+/* To be called after each change of the values of pc->pmat; fresh: its pattern has changed, too. blocks_only: the coarse level solves for all other rows. *failed if a block of this
+   rank, or the matrix of the other rows, is singular. Collective. */
+PetscErrorCode FineFill(PC pc, const MatrixNodes &nodes, PetscBool blocks_only, PetscBool fresh, FineLevel *f, PetscBool *failed);
 PetscErrorCode FineSolve(FineLevel *f, const MatrixNodes &nodes, Vec x, Vec y, PetscBool *failed);
-/* After FineFill(); each rank its own answers, collective all the same */
+/* To be called after FineFill(); results are those of this rank only. Collective. */
 PetscErrorCode FineSaveState(const FineLevel &f, Archive *archive);
 PetscErrorCode FineLoadState(PC pc, FineLevel *f, Archive *archive, PetscBool *same, PetscBool *failed);
 PetscErrorCode FineDestroy(FineLevel *f);

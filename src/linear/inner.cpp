@@ -5,14 +5,14 @@
 namespace
 {
 
-constexpr PetscInt small = 30000; /* rows of a matrix that each rank factors by itself: some 5e6 entries of its factor */
+constexpr PetscInt max_gathered_rows = 30000; /* largest matrix that each rank factors by itself: some 5e6 entries of its factor */
 
 PetscErrorCode Create(PC pc, const char name[], InnerSolver *s)
 {
   const char *prefix;
 
   PetscFunctionBegin;
-  PetscCall(KSPCreate(s->whole ? PETSC_COMM_SELF : PetscObjectComm((PetscObject)pc), &s->ksp));
+  PetscCall(KSPCreate(s->gathered ? PETSC_COMM_SELF : PetscObjectComm((PetscObject)pc), &s->ksp));
   PetscCall(PetscObjectIncrementTabLevel((PetscObject)s->ksp, (PetscObject)pc, 1));
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
   PetscCall(KSPSetOptionsPrefix(s->ksp, prefix));
@@ -24,7 +24,7 @@ PetscErrorCode Create(PC pc, const char name[], InnerSolver *s)
   PetscFunctionReturn(0);
 }
 
-/* A on each rank, if it is small and distributed */
+/* Gathers A on each rank, if it is small and distributed */
 PetscErrorCode GatherMatrix(Mat A, InnerSolver *s)
 {
   PetscInt    rows;
@@ -35,17 +35,17 @@ PetscErrorCode GatherMatrix(Mat A, InnerSolver *s)
   PetscFunctionBegin;
   PetscCall(MatGetSize(A, &rows, NULL));
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)A), &size));
-  if (size == 1 || rows > small) PetscFunctionReturn(0);
-  if (!s->whole) {
+  if (size == 1 || rows > max_gathered_rows) PetscFunctionReturn(0);
+  if (!s->gathered) {
     PetscCall(MatCreateVecs(A, NULL, &b));
     PetscCall(VecScatterCreateToAll(b, &s->gather, &s->b));
     PetscCall(VecDuplicate(s->b, &s->x));
     PetscCall(VecDestroy(&b));
   }
   PetscCall(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, &all));
-  PetscCall(MatCreateSubMatrices(A, 1, &all, &all, s->whole ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &s->whole));
+  PetscCall(MatCreateSubMatrices(A, 1, &all, &all, s->gathered ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &s->gathered));
   PetscCall(ISDestroy(&all));
-  PetscCall(PetscObjectStateIncrease((PetscObject)s->whole[0])); /* PETSc 3.18 copies new values without a word */
+  PetscCall(PetscObjectStateIncrease((PetscObject)s->gathered[0])); /* PETSc 3.18 does not do so when it copies new values */
   PetscFunctionReturn(0);
 }
 
@@ -80,7 +80,7 @@ PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, InnerSolver *s, Petsc
 
   PetscFunctionBegin;
   PetscCall(GatherMatrix(A, s));
-  if (s->whole) A = s->whole[0];
+  if (s->gathered) A = s->gathered[0];
   PetscCall(LinearSolveOften(A));
   if (first) PetscCall(Create(pc, name, s));
   PetscCall(KSPSetOperators(s->ksp, A, A));
@@ -111,7 +111,7 @@ PetscErrorCode InnerLoadState(PC pc, const char name[], Mat A, InnerSolver *s, A
     PetscCall(GatherMatrix(A, s));
     PetscCall(Create(pc, name, s));
   }
-  if (s->whole) A = s->whole[0];
+  if (s->gathered) A = s->gathered[0];
   PetscCall(LinearSolveOften(A));
   PetscCall(KSPSetOperators(s->ksp, A, A));
   PetscCall(LinearLoadState(s->ksp, A, &s->choice, archive, same, &usable));
@@ -124,7 +124,7 @@ PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed)
   KSPConvergedReason reason;
 
   PetscFunctionBegin;
-  if (s->whole) PetscCall(SolveGathered(s, b, x));
+  if (s->gathered) PetscCall(SolveGathered(s, b, x));
   else PetscCall(KSPSolve(s->ksp, b, x));
   PetscCall(KSPGetConvergedReason(s->ksp, &reason));
   *failed = (PetscBool)(reason < 0);
@@ -137,14 +137,14 @@ PetscErrorCode InnerView(const InnerSolver &s, PetscViewer viewer)
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPushTab(viewer));
-  if (s.whole) {
+  if (s.gathered) {
     PetscCall(PetscViewerASCIIPrintf(viewer, "each rank by itself, rank 0:\n"));
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &one));
   }
   PetscMPIInt rank;
   PetscCallMPI(MPI_Comm_rank(PetscObjectComm((PetscObject)viewer), &rank));
-  if (!s.whole || !rank) PetscCall(KSPView(s.ksp, one));
-  if (s.whole) PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &one));
+  if (!s.gathered || !rank) PetscCall(KSPView(s.ksp, one));
+  if (s.gathered) PetscCall(PetscViewerRestoreSubViewer(viewer, PETSC_COMM_SELF, &one));
   PetscCall(PetscViewerASCIIPopTab(viewer));
   PetscFunctionReturn(0);
 }
@@ -153,7 +153,7 @@ PetscErrorCode InnerDestroy(InnerSolver *s)
 {
   PetscFunctionBegin;
   PetscCall(KSPDestroy(&s->ksp));
-  if (s->whole) PetscCall(MatDestroySubMatrices(1, &s->whole));
+  if (s->gathered) PetscCall(MatDestroySubMatrices(1, &s->gathered));
   PetscCall(VecScatterDestroy(&s->gather));
   PetscCall(VecDestroy(&s->b));
   PetscCall(VecDestroy(&s->x));

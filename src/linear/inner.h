@@ -1,6 +1,6 @@
 /*
-  A direct solver inside a preconditioner, chosen as any other where the user chooses none: its options have the prefix of the preconditioner's own, and a name.
-  On several ranks each factors a small matrix by itself: to gather its right-hand side takes less time than messages at each level of an elimination.
+  A direct solver within a preconditioner, chosen as the direct solver of a Newton matrix (choose.cpp) unless options with the prefix of the preconditioner, followed by the name of
+  the level, say otherwise. On several ranks a small matrix is factored by each rank: gathering its right-hand side takes less time than messages at each level of an elimination.
 */
 #ifndef HHTDAE_LINEAR_INNER_H
 #define HHTDAE_LINEAR_INNER_H
@@ -8,17 +8,17 @@
 #include "linear.h"
 
 struct InnerSolver {
-  KSP          ksp = nullptr;
-  Mat         *whole = nullptr; /* one, on each rank; NULL where the matrix stays distributed */
-  VecScatter   gather = nullptr;
-  Vec          b = nullptr, x = nullptr; /* of `whole` */
+  KSP          ksp      = nullptr;
+  Mat         *gathered = nullptr; /* the whole matrix on each rank, an array of one; NULL if the matrix stays distributed */
+  VecScatter   gather   = nullptr;
+  Vec          b = nullptr, x = nullptr; /* gathered right-hand side and solution */
   LinearChoice choice;
 };
 
-/* After each change of A's values; where its pattern changes InnerDestroy() comes before. *failed where A is singular. Collective on the preconditioner. */
+/* Factors A; to be called after each change of its values, and after InnerDestroy() if its pattern has changed. *failed if A is singular. Collective on the preconditioner. */
 PetscErrorCode InnerSetUp(PC pc, const char name[], Mat A, InnerSolver *s, PetscBool *failed);
 PetscErrorCode InnerSolve(InnerSolver *s, Vec b, Vec x, PetscBool *failed);
-/* linear.h; A, whose values are set, is the matrix that the state belongs to. *same: of this rank alone. */
+/* LinearSaveState() and LinearLoadState() (linear.h). A must have the values that the state belongs to; *same is the result of this rank only. */
 PetscErrorCode InnerSaveState(const InnerSolver &s, Archive *archive);
 PetscErrorCode InnerLoadState(PC pc, const char name[], Mat A, InnerSolver *s, Archive *archive, PetscBool *same, PetscBool *failed);
 PetscErrorCode InnerView(const InnerSolver &s, PetscViewer viewer);

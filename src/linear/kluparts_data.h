@@ -79,7 +79,7 @@ struct KluParts : KluPartsState {
   /* U^-T Q B and L^-1 P C^T / Rs (kluparts_schur.cpp): one row per column in `reach`, one column per unknown of `local` */
   std::vector<PetscScalar> right_part, below_part;
 
-  std::vector<PetscScalar>  schur, sums; /* the interface's matrix and its factors; room for sums over ranks */
+  std::vector<PetscScalar>  schur, sums; /* the Schur complement, then its LU; scratch for sums over ranks */
   std::vector<PetscReal>    row_scale, col_scale;
   std::vector<PetscBLASInt> pivots;
   std::vector<PetscScalar>  work, at_interface, at_local; /* vectors during a solve: interior, interface, and its part `local` */

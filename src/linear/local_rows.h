@@ -1,5 +1,5 @@
 /*
-  The rows of a rank of a MATAIJ with local columns: its own are 0 to own - 1, those of other ranks follow, in the order of their global numbers.
+  The rows of a rank of a MATAIJ by local columns: those of own unknowns are 0 to own - 1, those of other ranks' unknowns follow in the order of their global numbers.
 */
 #ifndef HHTDAE_LINEAR_LOCAL_ROWS_H
 #define HHTDAE_LINEAR_LOCAL_ROWS_H
@@ -7,13 +7,13 @@
 #include <petscmat.h>
 
 struct LocalRows {
-  Mat             diagonal = nullptr, off = nullptr; /* of own columns, of the others; not referenced */
-  const PetscInt *garray = nullptr;                  /* global numbers of the others */
-  PetscInt        begin = 0, own = 0, others = 0;    /* first row, columns */
+  Mat             diagonal = nullptr, off = nullptr; /* blocks of own columns and of other columns; borrowed references */
+  const PetscInt *garray = nullptr;                  /* global numbers of the other columns */
+  PetscInt        begin = 0, own = 0, others = 0;    /* first global row; numbers of own and of other columns */
 
   PetscInt global(PetscInt column) const { return column < own ? begin + column : garray[column - own]; }
 
-  /* use(column, value) for each entry of the own row i, from 0 */
+  /* Calls use(column, value) for each entry of own row i, counted from 0 */
   template <class Use> PetscErrorCode forRow(PetscInt i, Use use) const
   {
     const Mat part[2] = {diagonal, off};

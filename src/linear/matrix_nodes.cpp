@@ -5,7 +5,7 @@
 namespace
 {
 
-PetscErrorCode NodesGiven(const LocalRows &A, IS is, MatrixNodes *c)
+PetscErrorCode ReadNodes(const LocalRows &A, IS is, MatrixNodes *c)
 {
   PetscInt        n, size, least, most;
   const PetscInt  begin = A.begin, end = A.begin + A.own;
@@ -15,12 +15,12 @@ PetscErrorCode NodesGiven(const LocalRows &A, IS is, MatrixNodes *c)
   PetscCall(ISGetLocalSize(is, &n));
   PetscCall(ISGetBlockSize(is, &size));
   PetscCall(ISGetIndices(is, &row));
-  least = n ? *std::min_element(row, row + n) : begin;
-  most  = n ? *std::max_element(row, row + n) : begin;
-  c->threes = size == 3;
+  least             = n ? *std::min_element(row, row + n) : begin;
+  most              = n ? *std::max_element(row, row + n) : begin;
+  c->three_unknowns = size == 3;
   for (PetscInt k = 0; k < n && least >= begin && most < end; k++) {
     c->node[(size_t)(row[k] - begin)] = row[k - k % size];
-    if (row[k] != row[k - k % size] + k % size) c->threes = false;
+    if (row[k] != row[k - k % size] + k % size) c->three_unknowns = false;
   }
   c->count = n / size;
   PetscCall(ISRestoreIndices(is, &row));
@@ -30,7 +30,7 @@ PetscErrorCode NodesGiven(const LocalRows &A, IS is, MatrixNodes *c)
   PetscFunctionReturn(0);
 }
 
-/* Unknowns of a node are coupled to the same others; multipliers have no diagonal entry */
+/* Consecutive rows with the same pattern and nonzero diagonal entries are a node; multipliers have no diagonal entry */
 PetscErrorCode NodesByPattern(const LocalRows &A, MatrixNodes *c)
 {
   std::vector<PetscInt> last, now;
@@ -55,7 +55,7 @@ PetscErrorCode NodesByPattern(const LocalRows &A, MatrixNodes *c)
   PetscFunctionReturn(0);
 }
 
-/* 1 in the columns that unknowns which are no nodes are coupled to */
+/* Sets `mark` to 1 in the columns in which rows of non-nodal unknowns have entries */
 PetscErrorCode MarkCoupled(const LocalRows &rows, const MatrixNodes &c, Vec mark)
 {
   std::vector<PetscInt> columns;
@@ -72,7 +72,7 @@ PetscErrorCode MarkCoupled(const LocalRows &rows, const MatrixNodes &c, Vec mark
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Sort(Mat A, const LocalRows &rows, MatrixNodes *c)
+PetscErrorCode ClassifyRows(Mat A, const LocalRows &rows, MatrixNodes *c)
 {
   Vec                mark;
   const PetscScalar *coupled;
@@ -82,17 +82,17 @@ PetscErrorCode Sort(Mat A, const LocalRows &rows, MatrixNodes *c)
   PetscCall(MarkCoupled(rows, *c, mark));
   PetscCall(VecGetArrayRead(mark, &coupled));
   for (PetscInt i = 0, last; i < rows.own; i = last) {
-    const PetscInt first = c->node[(size_t)i];
-    bool           alone = first == rows.begin + i;
-    for (last = i + 1; alone && last < rows.own && c->node[(size_t)last] == first;) last++;
-    alone = alone && last == i + 3;
-    for (PetscInt k = i; alone && k < last; k++) {
-      alone = coupled[k] == 0;
-      PetscCall(rows.forRow(k, [&](PetscInt col, PetscScalar) { alone = alone && c->node[(size_t)col] >= 0; }));
+    const PetscInt first      = c->node[(size_t)i];
+    bool           only_nodes = first == rows.begin + i;
+    for (last = i + 1; only_nodes && last < rows.own && c->node[(size_t)last] == first;) last++;
+    only_nodes = only_nodes && last == i + 3;
+    for (PetscInt k = i; only_nodes && k < last; k++) {
+      only_nodes = coupled[k] == 0;
+      PetscCall(rows.forRow(k, [&](PetscInt col, PetscScalar) { only_nodes = only_nodes && c->node[(size_t)col] >= 0; }));
     }
-    if (alone) c->alone.push_back(i);
+    if (only_nodes) c->node_blocks.push_back(i);
     else
-      for (PetscInt k = i; k < last; k++) c->apart.push_back(k);
+      for (PetscInt k = i; k < last; k++) c->other_rows.push_back(k);
   }
   PetscCall(VecRestoreArrayRead(mark, &coupled));
   PetscCall(VecDestroy(&mark));
@@ -135,19 +135,19 @@ PetscErrorCode FindMatrixNodes(Mat A, MatrixNodes *c)
 {
   LocalRows   rows;
   IS          is;
-  PetscMPIInt threes;
+  PetscMPIInt three_unknowns;
 
   PetscFunctionBegin;
   *c = MatrixNodes();
   PetscCall(LinearLocalRows(A, &rows));
   c->node.assign((size_t)rows.own, -1);
   PetscCall(PetscObjectQuery((PetscObject)A, LINEAR_NODES, (PetscObject *)&is));
-  if (is) PetscCall(NodesGiven(rows, is, c));
+  if (is) PetscCall(ReadNodes(rows, is, c));
   else PetscCall(NodesByPattern(rows, c));
-  threes = c->threes;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &threes, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)A)));
-  c->threes = threes;
+  three_unknowns = c->three_unknowns;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &three_unknowns, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)A)));
+  c->three_unknowns = three_unknowns;
   PetscCall(LinearFetchColumns(A, rows, &c->node));
-  PetscCall(Sort(A, rows, c));
+  PetscCall(ClassifyRows(A, rows, c));
   PetscFunctionReturn(0);
 }

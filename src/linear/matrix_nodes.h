@@ -1,4 +1,4 @@
-/* Which unknowns of a matrix are nodes of finite elements, and which of these are coupled to nothing but nodes */
+/* Finds the unknowns of a matrix that belong to nodes of finite elements, and the nodes that are coupled to other nodes only */
 #ifndef HHTDAE_LINEAR_MATRIX_NODES_H
 #define HHTDAE_LINEAR_MATRIX_NODES_H
 
@@ -6,20 +6,20 @@
 #include <vector>
 
 struct MatrixNodes {
-  std::vector<PetscInt> node;  /* of columns (local_rows.h): the global number of the first row of their node, or -1 */
-  PetscInt              count = 0;      /* of this rank */
-  bool                  threes = false; /* the matrix names them, and all have three unknowns */
-  std::vector<PetscInt> alone; /* first own rows, from 0, of nodes of three unknowns that nothing but nodes is coupled to */
-  std::vector<PetscInt> apart; /* all other own rows, from 0, ascending */
+  std::vector<PetscInt> node;                   /* for each local column (local_rows.h): global number of the first row of its node, or -1 */
+  PetscInt              count          = 0;     /* of this rank */
+  bool                  three_unknowns = false; /* the nodes were named by LINEAR_NODES, and all have three unknowns */
+  std::vector<PetscInt> node_blocks;            /* first rows, counted from this rank's first row, of nodes of three unknowns that are coupled to nodes only */
+  std::vector<PetscInt> other_rows;             /* all other rows of this rank, likewise, ascending */
 };
 
-/* Of A by what is composed with it (constraint.h), or by its pattern. Collective. */
+/* Finds the nodes of A by the index set LINEAR_NODES (constraint.h) or, without it, by the pattern. Collective. */
 PetscErrorCode FindMatrixNodes(Mat A, MatrixNodes *nodes);
 
-/* Values of own columns, to which those of the other columns are added, from their owners. Collective. */
+/* On input *value has one value for each own column; appends the values of the other local columns, fetched from their owners. Collective. */
 PetscErrorCode LinearFetchColumns(Mat A, const LocalRows &rows, std::vector<PetscInt> *value);
 
-/* Whether an entry stays where couplings between different nodes are left out; of_row, of_column: their nodes, or -1 */
-inline bool EntryStays(PetscInt of_row, PetscInt of_column) { return of_row < 0 || of_column < 0 || of_row == of_column; }
+/* False for couplings between different nodes, which the fine level leaves out; of_row, of_column: nodes of row and column, or -1 */
+inline bool IsKept(PetscInt of_row, PetscInt of_column) { return of_row < 0 || of_column < 0 || of_row == of_column; }
 
 #endif

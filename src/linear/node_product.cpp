@@ -1,3 +1,4 @@
+/* The product in single precision of "hhtconstraint", node_product.h */
 #include "node_product.h"
 #include "vectors.h"
 #include <algorithm>
@@ -6,15 +7,19 @@
 namespace
 {
 
-constexpr float  smallest = 1e-20f, largest = 1e20f; /* of single precision's 1e-38 to 1e38: products with vectors have room, too */
-constexpr double rounding = 1e-10; /* of the Frobenius norm: what differs by less from its transpose is symmetric */
+/* Limits of the largest entry of the matrix: single precision ranges from 1e-38 to 1e38, and products of entries and vectors must not overflow or underflow.
+   NodeProductTest.OutOfRange. */
+constexpr float min_entry = 1e-20f, max_entry = 1e20f;
+
+/* Largest unsymmetric part, relative to the Frobenius norm, that counts as rounding. NodeProduct.OneUnsymmetricEntry. */
+constexpr double symmetry_tolerance = 1e-10;
 
 /* ---- the pattern ---- */
 
-/* Where columns of the matrix stand in the product: nodes by number, others among `rest` */
-struct Places {
-  std::vector<PetscInt> of_column; /* node of this column, own ones before those of other ranks, or -1 */
-  std::vector<PetscInt> rest;      /* column in rest_column, if of_column is -1 */
+/* For each local column of the matrix its place in the product */
+struct ColumnPlaces {
+  std::vector<PetscInt> of_column; /* number of its node, own nodes before those of other ranks, or -1 */
+  std::vector<PetscInt> rest;      /* its number in NodeProduct::rest_column, if of_column is -1 */
 };
 
 void FindOwnNodes(const LocalRows &A, const std::vector<PetscInt> &node, NodeProduct *p)
@@ -24,23 +29,23 @@ void FindOwnNodes(const LocalRows &A, const std::vector<PetscInt> &node, NodePro
     if (node[(size_t)i] == A.begin + i) p->row.push_back(i);
 }
 
-/* Columns of a node of another rank are next to one another */
-Places FindPlaces(const LocalRows &A, const std::vector<PetscInt> &node, const NodeProduct &p)
+/* Relies on the columns of a node of another rank being consecutive */
+ColumnPlaces FindPlaces(const LocalRows &A, const std::vector<PetscInt> &node, const NodeProduct &p)
 {
-  Places   to;
-  PetscInt k = -1, others = 0;
-  to.of_column.assign((size_t)(A.own + A.others), -1);
-  to.rest.assign((size_t)(A.own + A.others), -1);
+  ColumnPlaces places;
+  PetscInt     k = -1, others = 0;
+  places.of_column.assign((size_t)(A.own + A.others), -1);
+  places.rest.assign((size_t)(A.own + A.others), -1);
   for (PetscInt i = 0; i < A.own + A.others; i++) {
     if (i == A.own) k = (PetscInt)p.row.size() - 1;
     const PetscInt first = node[(size_t)i];
-    if (first < 0) to.rest[(size_t)i] = i < A.own ? i : A.own + 3 * p.other_nodes + others++;
+    if (first < 0) places.rest[(size_t)i] = i < A.own ? i : A.own + 3 * p.other_nodes + others++;
     else {
       if (i == A.own || i == 0 || node[(size_t)i - 1] != first) k++;
-      to.of_column[(size_t)i] = k;
+      places.of_column[(size_t)i] = k;
     }
   }
-  return to;
+  return places;
 }
 
 PetscErrorCode CreateScatter(Mat A, const LocalRows &rows, const std::vector<PetscInt> &node, NodeProduct *p)
@@ -69,36 +74,36 @@ PetscErrorCode CreateScatter(Mat A, const LocalRows &rows, const std::vector<Pet
 
 /* ---- the values ---- */
 
-/* Adds blocks of one node after the other */
-class Filler
+/* Fills NodeBlocks entry by entry, one row of blocks after the other */
+class BlockFiller
 {
 public:
-  NodeBlocks           &to;
-  std::vector<PetscInt> at; /* the last block that has been added with a column's node */
+  NodeBlocks           &blocks;
+  std::vector<PetscInt> at; /* for each node: the last block in its column */
 
-  Filler(NodeBlocks &blocks, PetscInt columns, size_t expected) : to(blocks), at((size_t)columns, -1)
+  BlockFiller(NodeBlocks &to_fill, PetscInt columns, size_t expected) : blocks(to_fill), at((size_t)columns, -1)
   {
-    to.first.assign(1, 0);
-    to.column.clear();
-    to.value.clear();
-    to.column.reserve(expected);
-    to.value.reserve(9 * expected + 1);
+    blocks.first.assign(1, 0);
+    blocks.column.clear();
+    blocks.value.clear();
+    blocks.column.reserve(expected);
+    blocks.value.reserve(9 * expected + 1);
   }
   void add(PetscInt node, PetscInt row, PetscInt column, PetscScalar v)
   {
     PetscInt &k = at[(size_t)node];
-    if (k < to.first.back()) {
-      k = (PetscInt)to.column.size();
-      to.column.push_back(node);
-      to.value.resize(to.value.size() + 9, 0);
+    if (k < blocks.first.back()) {
+      k = (PetscInt)blocks.column.size();
+      blocks.column.push_back(node);
+      blocks.value.resize(blocks.value.size() + 9, 0);
     }
-    to.value[9 * (size_t)k + 3 * (size_t)column + (size_t)row] = (float)PetscRealPart(v);
+    blocks.value[9 * (size_t)k + 3 * (size_t)column + (size_t)row] = (float)PetscRealPart(v);
   }
-  void next() { to.first.push_back((PetscInt)to.column.size()); }
-  void end() { to.value.push_back(0); /* a column is read as four values */ }
+  void next() { blocks.first.push_back((PetscInt)blocks.column.size()); }
+  void end() { blocks.value.push_back(0); /* a column is read as four values */ }
 };
 
-PetscErrorCode FillBlocks(const LocalRows &A, const std::vector<PetscInt> &node, const Places &to, NodeProduct *p)
+PetscErrorCode FillBlocks(const LocalRows &A, const std::vector<PetscInt> &node, const ColumnPlaces &places, NodeProduct *p)
 {
   const PetscInt nodes = (PetscInt)p->row.size();
   MatInfo        entries;
@@ -106,11 +111,11 @@ PetscErrorCode FillBlocks(const LocalRows &A, const std::vector<PetscInt> &node,
   PetscFunctionBegin;
   PetscCall(MatGetInfo(A.diagonal, MAT_LOCAL, &entries));
   const size_t blocks = (size_t)entries.nz_used / 9;
-  Filler       own(p->own, nodes, p->symmetric ? (blocks + (size_t)nodes) / 2 : blocks), other(p->other, p->other_nodes, 0);
+  BlockFiller  own(p->own, nodes, p->symmetric ? (blocks + (size_t)nodes) / 2 : blocks), other(p->other, p->other_nodes, 0);
   for (PetscInt n = 0; n < nodes; n++, own.next(), other.next())
     for (PetscInt r = 0; r < 3; r++)
       PetscCall(A.forRow(p->row[(size_t)n] + r, [&](PetscInt c, PetscScalar v) {
-        const PetscInt m = to.of_column[(size_t)c];
+        const PetscInt m = places.of_column[(size_t)c];
         if (m < 0 || (p->symmetric && m < n)) return;
         const PetscInt component = A.global(c) - node[(size_t)c];
         if (m < nodes) own.add(m, r, component, v);
@@ -121,7 +126,7 @@ PetscErrorCode FillBlocks(const LocalRows &A, const std::vector<PetscInt> &node,
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FillRest(const LocalRows &A, const std::vector<PetscInt> &node, const Places &to, NodeProduct *p)
+PetscErrorCode FillRest(const LocalRows &A, const std::vector<PetscInt> &node, const ColumnPlaces &places, NodeProduct *p)
 {
   PetscFunctionBegin;
   p->rest_row.clear();
@@ -131,9 +136,9 @@ PetscErrorCode FillRest(const LocalRows &A, const std::vector<PetscInt> &node, c
   for (PetscInt i = 0; i < A.own; i++) {
     PetscCall(A.forRow(i, [&](PetscInt c, PetscScalar v) {
       if (node[(size_t)i] >= 0 && node[(size_t)c] >= 0) return;
-      PetscInt at = to.rest[(size_t)c];
+      PetscInt at = places.rest[(size_t)c];
       if (at < 0) { /* of a node */
-        const PetscInt m = to.of_column[(size_t)c], nodes = (PetscInt)p->row.size();
+        const PetscInt m = places.of_column[(size_t)c], nodes = (PetscInt)p->row.size();
         at               = m < nodes ? c : A.own + 3 * (m - nodes) + A.global(c) - node[(size_t)c];
       }
       p->rest_column.push_back(at);
@@ -146,21 +151,21 @@ PetscErrorCode FillRest(const LocalRows &A, const std::vector<PetscInt> &node, c
   PetscFunctionReturn(0);
 }
 
-/* Whether single precision has room for all of them, on any rank */
+/* Whether the largest entry is within the limits on all ranks */
 PetscErrorCode InRange(Mat A, const NodeProduct &p, PetscBool *yes)
 {
   float most = 0;
 
   PetscFunctionBegin;
   for (const NodeBlocks *b : {&p.own, &p.other})
-    for (float v : b->value) most = std::max(most, std::abs(v)); /* of the sum with a few hundred others */
-  *yes = (PetscBool)(most == 0 || (most > smallest && most < largest));
+    for (float v : b->value) most = std::max(most, std::abs(v));
+  *yes = (PetscBool)(most == 0 || (most > min_entry && most < max_entry));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, yes, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)A)));
   PetscFunctionReturn(0);
 }
 
-/* Whether couplings between own nodes are symmetric: z^T A w = w^T A z for pseudo-random z and w. The difference of the two has about the size of the
-   Frobenius norm of what is not symmetric; the sum of all entries would hide a part that is far above the rounding of single precision. */
+/* Whether couplings between own nodes are symmetric: z^T A w = w^T A z for pseudo-random z and w. The difference of the two is about the Frobenius norm of the
+   unsymmetric part. It is compared with the Frobenius norm of A: comparison with the sum of all entries would hide a part far above the rounding of single precision. */
 PetscErrorCode NodesAreSymmetric(const LocalRows &A, const std::vector<PetscInt> &node, bool *yes)
 {
   double              one = 0, other = 0, squares = 0;
@@ -184,7 +189,7 @@ PetscErrorCode NodesAreSymmetric(const LocalRows &A, const std::vector<PetscInt>
     one += z[(size_t)i] * zA;
     other += w[(size_t)i] * wA;
   }
-  *yes = std::abs(one - other) <= rounding * std::sqrt(squares);
+  *yes = std::abs(one - other) <= symmetry_tolerance * std::sqrt(squares);
   PetscFunctionReturn(0);
 }
 
@@ -202,7 +207,7 @@ typedef int I4 __attribute__((vector_size(16)));
 inline const F4 &Load(const float *p) { return *reinterpret_cast<const F4 *>(p); }
 inline F4       &At(float *p) { return *reinterpret_cast<F4 *>(p); }
 
-/* Sums of the first three entries of a, b, c, whose fourth is zero */
+/* (sum of a, sum of b, sum of c, 0); the fourth entries of a, b and c are zero */
 inline F4 Sums(const F4 &a, const F4 &b, const F4 &c)
 {
   const F4 zero = {0, 0, 0, 0};
@@ -210,7 +215,7 @@ inline F4 Sums(const F4 &a, const F4 &b, const F4 &c)
   return PICK(ab, c0, 0, 1, 4, 5) + PICK(ab, c0, 2, 3, 6, 7);
 }
 
-/* y += B x; transposed: of the blocks behind the diagonal, which comes first, B^T as well */
+/* y += B x. transposed: B is the upper triangle of a symmetric matrix, and y += B^T x is added for its off-diagonal blocks; xi is x then. */
 template <bool transposed> void Multiply(const NodeBlocks &B, const float *x, const float *xi, float *y)
 {
   const size_t nodes = B.first.size() - 1;
@@ -220,7 +225,7 @@ template <bool transposed> void Multiply(const NodeBlocks &B, const float *x, co
     for (PetscInt k = B.first[i]; k < B.first[i + 1]; k++) {
       const float *value = &B.value[9 * (size_t)k];
       const size_t j     = (size_t)B.column[(size_t)k];
-      const F4     a = Load(value), b = Load(value + 3), c = Load(value + 6); /* fourth entries: of the next column, multiplied by the zero of x and left out of y */
+      const F4     a = Load(value), b = Load(value + 3), c = Load(value + 6); /* fourth entries belong to the next column: the zero in x and the fourth component of y discard them */
       sum += a * x[4 * j] + b * x[4 * j + 1] + c * x[4 * j + 2];
       if (transposed && j != i) At(y + 4 * j) += Sums(a * mine, b * mine, c * mine);
     }
@@ -228,7 +233,7 @@ template <bool transposed> void Multiply(const NodeBlocks &B, const float *x, co
   }
 }
 
-void Take(const PetscScalar *from, const std::vector<PetscInt> &row, std::vector<float> &to)
+void ToSingle(const PetscScalar *from, const std::vector<PetscInt> &row, std::vector<float> &to)
 {
   for (size_t n = 0; n < row.size(); n++)
     for (size_t c = 0; c < 3; c++) to[4 * n + c] = (float)PetscRealPart(from[row[n] + (PetscInt)c]);
@@ -258,7 +263,7 @@ PetscErrorCode Product(Mat shell, Vec X, Vec Y)
   PetscCall(VecScatterBegin(p->scatter, X, p->fetched, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGetLocalSize(X, &n));
   PetscCall(VecGetArrayRead(X, &x));
-  Take(x, p->row, p->x);
+  ToSingle(x, p->row, p->x);
   std::fill(p->y.begin(), p->y.end(), 0.f);
   if (p->symmetric) Multiply<true>(p->own, p->x.data(), p->x.data(), p->y.data());
   else Multiply<false>(p->own, p->x.data(), nullptr, p->y.data());
@@ -311,10 +316,10 @@ PetscErrorCode NodeProductFill(Mat A, const std::vector<PetscInt> &node, bool sa
     p->other_x.assign(4 * (size_t)p->other_nodes, 0);
   }
   PetscCall(MatShellSetContext(p->shell, p));
-  const Places to = FindPlaces(rows, node, *p);
+  const ColumnPlaces places = FindPlaces(rows, node, *p);
   PetscCall(NodesAreSymmetric(rows, node, &p->symmetric));
-  PetscCall(FillBlocks(rows, node, to, p));
-  PetscCall(FillRest(rows, node, to, p));
+  PetscCall(FillBlocks(rows, node, places, p));
+  PetscCall(FillRest(rows, node, places, p));
   PetscCall(InRange(A, *p, usable));
   PetscFunctionReturn(0);
 }

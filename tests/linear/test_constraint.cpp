@@ -158,7 +158,7 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
   PetscObject    positions;
   bar(size[0], size[1], size[2], false);
   MatrixNodes nodes; /* nothing but nodes */
-  for (PetscInt i = 0; i < n; i += 3) nodes.alone.push_back(i);
+  for (PetscInt i = 0; i < n; i += 3) nodes.node_blocks.push_back(i);
   solver(KSPCG, 1e-6);
   OK(KSPGetPC(ksp, &pc));
   OK(PetscObjectQuery((PetscObject)A, LINEAR_POSITIONS, &positions));

@@ -99,7 +99,7 @@ TEST_F(ConstraintRanks, ProductAgreesWithTheMatrix)
   PetscBool   usable;
   PetscReal   size, difference;
   must(FindMatrixNodes(A, &of));
-  EXPECT_TRUE(of.threes);
+  EXPECT_TRUE(of.three_unknowns);
   must(NodeProductFill(A, of.node, false, &p, &usable));
   EXPECT_TRUE(usable);
   must(MatMult(p.shell, x, y));
