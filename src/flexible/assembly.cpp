@@ -1,4 +1,4 @@
-/* Assembly of K and M: the pattern of blocks first, so that nothing is allocated twice, then element by element. */
+/* Assembly of K and M: first the pattern of blocks, for exact preallocation, then the elements. */
 #include "flexible/assembly.h"
 #include "flexible/element.h"
 #include "flexible/exchange.h"
@@ -33,8 +33,8 @@ PetscErrorCode ElementNodes::setUp(const FeModel &model, const std::vector<FeEle
   PetscFunctionReturn(0);
 }
 
-/* Rows of numbers; PETSc cannot sum rows of one, which have to be plain numbers */
-static PetscErrorCode RowOf(int width, MPI_Datatype *type)
+/* MPI type of `width` reals per node; PETSc cannot sum a contiguous type of one real, so that width 1 is MPIU_REAL itself */
+static PetscErrorCode VectorType(int width, MPI_Datatype *type)
 {
   PetscFunctionBegin;
   *type = MPIU_REAL;
@@ -48,7 +48,7 @@ PetscErrorCode ElementNodes::bring(int width, const double *own, double *here) c
 {
   MPI_Datatype type;
   PetscFunctionBegin;
-  PetscCall(RowOf(width, &type));
+  PetscCall(VectorType(width, &type));
   PetscCall(PetscSFBcastBegin(sf, type, own, here, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(sf, type, own, here, MPI_REPLACE));
   if (width > 1) PetscCallMPI(MPI_Type_free(&type));
@@ -59,7 +59,7 @@ PetscErrorCode ElementNodes::add(int width, const double *here, double *own) con
 {
   MPI_Datatype type;
   PetscFunctionBegin;
-  PetscCall(RowOf(width, &type));
+  PetscCall(VectorType(width, &type));
   PetscCall(PetscSFReduceBegin(sf, type, here, own, MPI_SUM));
   PetscCall(PetscSFReduceEnd(sf, type, here, own, MPI_SUM));
   if (width > 1) PetscCallMPI(MPI_Type_free(&type));
@@ -71,14 +71,14 @@ namespace
 
 /* ---- pattern ---- */
 
-/* Elements around each of the rank's nodes */
-struct Around {
+/* The elements of this rank at each of its nodes: those of node n are element[start[n]] to element[start[n + 1] - 1] */
+struct NodeElements {
   std::vector<PetscInt> start, element;
 };
 
-Around ElementsAround(const FeModel &model, const ElementNodes &nodes)
+NodeElements ElementsAround(const FeModel &model, const ElementNodes &nodes)
 {
-  Around a;
+  NodeElements a;
   a.start.assign(nodes.global.size() + 1, 0);
   for (const FeElement &e : model.elements)
     for (int i = 0; i < FeNodes(e.type); i++) a.start[nodes.place(e.node[i]) + 1]++;
@@ -92,11 +92,11 @@ Around ElementsAround(const FeModel &model, const ElementNodes &nodes)
 }
 
 /* Nodes that share an element of this rank with node n, sorted */
-void Neighbours(const FeModel &model, const Around &around, std::size_t n, std::vector<PetscInt> *list)
+void Neighbours(const FeModel &model, const NodeElements &node_elements, std::size_t n, std::vector<PetscInt> *list)
 {
   list->clear();
-  for (PetscInt k = around.start[n]; k < around.start[n + 1]; k++) {
-    const FeElement &e = model.elements[around.element[k]];
+  for (PetscInt k = node_elements.start[n]; k < node_elements.start[n + 1]; k++) {
+    const FeElement &e = model.elements[node_elements.element[k]];
     list->insert(list->end(), e.node, e.node + FeNodes(e.type));
   }
   std::sort(list->begin(), list->end());
@@ -108,7 +108,7 @@ struct NodePair {
   bool     operator<(const NodePair &o) const { return row != o.row ? row < o.row : column < o.column; }
 };
 
-/* Numbers of neighbours of own nodes, among own and among others' nodes: blocks of a row of K */
+/* Number of neighbours of each own node, itself included, among own nodes and among nodes of other ranks: blocks in its rows of K */
 PetscErrorCode CountBlocks(const FeModel &model, const ElementNodes &nodes, std::vector<PetscInt> *own,
                            std::vector<PetscInt> *others)
 {
@@ -120,12 +120,12 @@ PetscErrorCode CountBlocks(const FeModel &model, const ElementNodes &nodes, std:
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
   PetscCall(GatherAll(model.comm, std::vector<PetscInt>{last}, &firsts)); /* ends of the ranks' nodes */
-  const Around                       around = ElementsAround(model, nodes);
+  const NodeElements                 node_elements = ElementsAround(model, nodes);
   std::vector<std::vector<NodePair>> out(size);
   for (std::size_t n = 0; n < nodes.global.size(); n++) {
     const PetscInt row = nodes.global[n];
     if (row >= first && row < last) continue;
-    Neighbours(model, around, n, &list);
+    Neighbours(model, node_elements, n, &list);
     std::vector<NodePair> &to = out[std::upper_bound(firsts.begin(), firsts.end(), row) - firsts.begin()];
     for (PetscInt column : list) to.push_back({row, column});
   }
@@ -139,7 +139,7 @@ PetscErrorCode CountBlocks(const FeModel &model, const ElementNodes &nodes, std:
     const PetscInt    row = first + k;
     const std::size_t n   = nodes.place(row);
     list.clear();
-    if (n < nodes.global.size() && nodes.global[n] == row) Neighbours(model, around, n, &list);
+    if (n < nodes.global.size() && nodes.global[n] == row) Neighbours(model, node_elements, n, &list);
     for (; extra != from_others.end() && extra->row == row; ++extra) list.push_back(extra->column);
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
@@ -185,7 +185,7 @@ PetscErrorCode AddElement(const FeModel &model, const FeElement &e, const fe::No
   *least = fe::ElementStiffness<Shape>(X, fe::Lame(material), K);
   fe::Lower(*least, fe::ElementMass<Shape>(X, material.density, m, mass_as_stiffness ? fe::MassPoints::Stiffness : fe::MassPoints::Own));
   if (!(*least > fe::degenerate)) PetscFunctionReturn(0);
-  /* both are symmetric: the order of storage does not matter */
+  /* both matrices are symmetric, so that storage by columns or rows makes no difference */
   PetscCall(MatSetValuesBlocked(model.K, n, e.node, n, e.node, K.data(), ADD_VALUES));
   for (int d = 0; d < 3; d++) {
     for (int i = 0; i < n; i++) row[i] = 3 * e.node[i] + d;
@@ -234,7 +234,7 @@ PetscErrorCode AddElements(FeModel *model, const ElementNodes &nodes, const std:
   PetscFunctionReturn(0);
 }
 
-/* Rigid-body motions, for multigrid */
+/* Attaches the rigid-body motions to K, for multigrid */
 PetscErrorCode AttachNearNullSpace(FeModel *model)
 {
   Vec          coordinates;

@@ -1,4 +1,4 @@
-/* K and M of a model from its elements, and values of nodes on other ranks. */
+/* Assembly of K and M from the elements of a model, and exchange of nodal values with other ranks. */
 #ifndef HHTDAE_FLEXIBLE_ASSEMBLY_H
 #define HHTDAE_FLEXIBLE_ASSEMBLY_H
 
@@ -9,8 +9,8 @@ namespace hhtdae
 {
 
 /*
-  The nodes of a rank's elements, by a number of their own: sorted by global number, whoever owns them. The star forest
-  has a model's own nodes as roots and these as leaves.
+  The nodes of a rank's elements, owned by any rank, with local numbers in the order of their global numbers. In the star forest the
+  model's nodes on their owners are the roots, these the leaves.
 */
 class ElementNodes
 {
@@ -22,17 +22,16 @@ public:
   ~ElementNodes();
   ElementNodes(const ElementNodes &) = delete;
   PetscErrorCode setUp(const FeModel &model) { return setUp(model, model.elements); }
-  PetscErrorCode setUp(const FeModel &model, const std::vector<FeElement> &elements); /* of these alone */
-  PetscInt       place(PetscInt number) const; /* among global */
-  /* width values per node, from the owners to all who need them, and summed back to the owners */
+  PetscErrorCode setUp(const FeModel &model, const std::vector<FeElement> &elements); /* only the nodes of these elements */
+  PetscInt       place(PetscInt number) const;                                        /* local number of a global one */
+  /* `width` values per node: bring() copies them from the owners to the ranks that need them, add() sums them on the owners */
   PetscErrorCode bring(int width, const double *own, double *here) const;
   PetscErrorCode add(int width, const double *here, double *own) const;
 };
 
 /*
-  Makes model->K and model->M from elements, materials and coordinates. tags: the elements' numbers in the mesh, for
-  messages. -fe_mass_points stiffness takes the mass at the stiffness' points instead of integrating it exactly, as
-  CalculiX does.
+  Assembles model->K and model->M from elements, materials and coordinates. tags: the elements' numbers in the mesh, for
+  messages. -fe_mass_points stiffness integrates the mass at the points of the stiffness, as CalculiX does, instead of exactly.
 */
 PetscErrorCode AssembleElements(FeModel *model, const std::vector<PetscInt> &tags);
 

@@ -1,4 +1,4 @@
-/* Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom. */
+/* Attachments of a body to be reduced: checks of node sets and weights, and the rows of averages. */
 #include "attachments.h"
 #include "body_check.h"
 #include "exchange.h"
@@ -10,10 +10,11 @@
 namespace hhtdae
 {
 
-/* Nodes on a line: the least moment of their weights relative to the greatest */
-constexpr double on_a_line = 1e-8;
-/* Averages that depend on each other: the least eigenvalue of their rows' products relative to the greatest */
-constexpr double dependent_rows = 1e-10;
+/* Nodes count as collinear if the least principal moment of their weights is below this part of the largest one: the rotation about the line would be undefined */
+constexpr double collinear_moments = 1e-8;
+/* Averages count as linearly dependent if the least eigenvalue of the Gram matrix of their normalized rows is below this part of the largest one: the interior
+   stiffness would be singular */
+constexpr double dependent_averages = 1e-10;
 
 static PetscErrorCode Sum(MPI_Comm comm, double *values, int n)
 {
@@ -117,7 +118,7 @@ static PetscErrorCode GetWeights(const FeModel &model, const Attachment &a, cons
   PetscFunctionReturn(0);
 }
 
-/* Centroid and moments sum w (r^2 I - r r^T) about it */
+/* Sum of the weights w, centroid, and moments sum w (r^2 I - r r^T) about the centroid */
 static PetscErrorCode Moments(const FeModel &model, const Tied &t, const std::vector<double> &weight, double *sum,
                               Vector3 *centroid, Matrix3 *J)
 {
@@ -150,7 +151,7 @@ static PetscErrorCode CheckRotation(const FeModel &model, const Tied &t, const M
              "Attachment %s: a single node has no rotation to follow; take its neighbours into the set, three nodes at "
              "least that are not on a line",
              t.name.c_str());
-  PetscCheck(moments[0] > on_a_line * moments[2], model.comm, PETSC_ERR_ARG_WRONG,
+  PetscCheck(moments[0] > collinear_moments * moments[2], model.comm, PETSC_ERR_ARG_WRONG,
              "Attachment %s: its %" PetscInt_FMT
              " nodes are on a line (or have no weight off it), so the rotation about that line is %s; "
              "take in a node off the line",
@@ -158,7 +159,7 @@ static PetscErrorCode CheckRotation(const FeModel &model, const Tied &t, const M
   PetscFunctionReturn(0);
 }
 
-/* t = mean u + theta x (point - centroid), theta = J^-1 sum w r x u: the rigid motion nearest to the displacements */
+/* Rows of the rigid motion nearest to the displacements u: rotation theta = J^-1 sum w r x u, translation mean u + theta x (point - centroid) */
 static void SetRows(const FeModel &model, const std::vector<double> &weight, double sum, const Vector3 &centroid,
                     const Matrix3 &J, Tied *t)
 {
@@ -193,7 +194,7 @@ static PetscErrorCode ResolveOne(const FeModel &model, const Attachment &a, Tied
   PetscFunctionReturn(0);
 }
 
-/* A node follows one rigid attachment alone, and then is not averaged by another one */
+/* Refuses nodes in two rigid attachments and, with `averages`, nodes in a rigid and an averaging attachment */
 static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied> &tied, bool averages)
 {
   std::vector<int> holder(model.own, -1);
@@ -224,10 +225,10 @@ static PetscErrorCode CheckOverlap(const FeModel &model, const std::vector<Tied>
           x.name.c_str(), y.name.c_str(), label, averages ? "" : "rigid ");
 }
 
-/* Rows of averages, each of length one, times each other: singular if one average says what others say */
+/* Gram matrix of the rows of averages, normalized: singular if averages are linearly dependent */
 static PetscErrorCode GramOfAverages(const FeModel &model, const std::vector<Tied> &tied, MatrixXd *G)
 {
-  std::vector<std::vector<std::pair<int, int>>> uses(model.own); /* averages of a node, and the row's place there */
+  std::vector<std::vector<std::pair<int, int>>> uses(model.own); /* for each own node: averages that contain it, and its index there */
 
   PetscFunctionBegin;
   for (std::size_t a = 0; a < tied.size(); a++)
@@ -254,7 +255,7 @@ static PetscErrorCode CheckIndependent(const FeModel &model, const std::vector<T
   if (tied.empty()) PetscFunctionReturn(0);
   PetscCall(GramOfAverages(model, tied, &G));
   const SymmetricEigen gram(0.5 * (G + G.transpose()));
-  if (gram.values[0] > dependent_rows * gram.values.tail<1>()[0]) PetscFunctionReturn(0);
+  if (gram.values[0] > dependent_averages * gram.values.tail<1>()[0]) PetscFunctionReturn(0);
   std::string names;
   for (std::size_t a = 0; a < tied.size(); a++)
     if (gram.vectors.block<6, 1>(6 * a, 0).norm() > 1e-3) names += (names.empty() ? "" : ", ") + tied[a].name;

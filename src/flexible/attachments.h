@@ -1,7 +1,7 @@
 /*
-  Attachments of a body under reduction: node sets with the rows or columns that tie them to six degrees of freedom.
+  Attachments of a body to be reduced: node sets tied to a point with six degrees of freedom, rigidly (RBE2) or on average (RBE3).
 
-  Both ties need nodes that are not on one line: else the rotation about it would be without stiffness (rigid) or
+  Both ties need nodes that are not collinear: otherwise the rotation about the line would have no stiffness (rigid) or be
   undefined (average).
 */
 #ifndef HHTDAE_FLEXIBLE_ATTACHMENTS_H
@@ -19,11 +19,11 @@ struct Tied {
   std::string           name;
   Tie                   tie;
   Vector3               position; /* axes and origin of the FE model */
-  PetscInt              count;    /* nodes of all ranks */
+  PetscInt              count;    /* number of nodes on all ranks */
   PetscMPIInt           owner;    /* a rank with most of the nodes */
-  std::vector<PetscInt> node;     /* own ones, counted from the first own node */
+  std::vector<PetscInt> node;     /* own nodes, counted from the first own node */
   std::vector<Eigen::Matrix<double, 6, 3>>
-      row; /* of an average, for each own node: motion of the point per displacement of the node */
+      row; /* average only, for each own node: motion of the point per displacement of the node */
 };
 
 inline Vector3 NodePosition(const FeModel &model, PetscInt i)
@@ -42,7 +42,7 @@ inline Matrix3 Cross(const Vector3 &v)
   return (Matrix3() << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0).finished();
 }
 
-/* Displacement at X for the six motions of a rigid body about `point` */
+/* Displacements at X of the three translations and the three rotations about `point` of a rigid body */
 inline Eigen::Matrix<double, 3, 6> RigidMotion(const Vector3 &X, const Vector3 &point)
 {
   Eigen::Matrix<double, 3, 6> u;
@@ -50,14 +50,13 @@ inline Eigen::Matrix<double, 3, 6> RigidMotion(const Vector3 &X, const Vector3 &
   return u;
 }
 
-/* Own nodes of a set, from 0; who: "Attachment hub", for errors. Collective */
+/* Own nodes of a set, counted from the first own node; who: the user of the set in error messages, as "Attachment hub". Collective */
 PetscErrorCode OwnNodesOf(const FeModel &model, const std::string &set, const std::string &who, std::vector<PetscInt> *node);
 
 PetscErrorCode ResolveAttachments(const FeModel &model, const std::vector<Attachment> &attachments,
                                   std::vector<Tied> *tied);
 
-/* Motion of all averages for displacements u at own dofs: six rows for each attachment, rigid ones zero; on all ranks
- */
+/* Motions of the averaging attachments for displacements u at own dofs, on all ranks: six rows for each attachment, zero for rigid ones */
 PetscErrorCode AverageMotions(const FeModel &model, const std::vector<Tied> &tied, const Eigen::MatrixXd &u,
                               Eigen::MatrixXd *motion);
 

@@ -1,12 +1,11 @@
 /*
-  Krylov-Schur with blocks of vectors, as a type of SLEPc's EPS: thick-restart Lanczos on (K - sigma M)^-1 M, everything
-  orthogonal in M.
+  Block Krylov-Schur as a type of SLEPc's EPS: thick-restart Lanczos on OP = (K - sigma M)^-1 M with M-orthonormal vectors.
 
   SLEPc's own type solves for one vector at a time, and each solve reads the factors from memory once. Here a block of
-  vectors goes through them together. Blocks also find copies of eigenvalues, which a single vector cannot.
+  vectors is solved for together. Blocks also find multiple eigenvalues, which a single vector cannot.
 
-  The projected matrix is T = V^T M OP V as it was computed, without any use of recurrences, so that a restart is a mere
-  change of the basis. Options: -eps_ncv, -eps_tol, -eps_max_it (restarts), monitors; -eps_krylov_block <vectors>.
+  The projected matrix T = V^T M OP V is computed in full, without the Lanczos recurrence, so that a restart is a
+  change of the basis only. Options: -eps_ncv, -eps_tol, -eps_max_it (restarts), monitors; -eps_krylov_block <vectors>.
 */
 #include "modes.h"
 #include "scene/symmetric.h"
@@ -20,22 +19,21 @@ namespace hhtdae
 
 using Columns = Eigen::Ref<const MatrixXd>;
 
-constexpr PetscInt usual_block = 6;
-constexpr PetscInt look_after  = 24; /* vectors: the projected problem is solved so often */
+constexpr PetscInt default_block       = 6;
+constexpr PetscInt projection_interval = 24; /* vectors added between two solutions of the projected problem */
 
 struct BlockKrylov {
-  PetscInt block = usual_block, size = 0; /* size: vectors before a restart */
+  PetscInt block = default_block, size = 0; /* vectors of a block, and of the basis before a restart */
   Mat      M = nullptr;
-  MatrixXd V; /* first the deflated vectors, then the basis */
-  MatrixXd T; /* of the basis */
-  PetscInt deflated = 0, k = 0, looked = 0;
-  MatrixXd W, MW; /* the next block, orthonormal to V in M, and M times it */
+  MatrixXd V;                                     /* the deflated vectors, then the basis */
+  MatrixXd T;                                     /* projected matrix of the basis */
+  PetscInt deflated = 0, k = 0, projected_at = 0; /* deflated vectors; vectors of the basis, now and when the projected problem was last solved */
+  MatrixXd W, MW;                                 /* the next block, M-orthonormal and M-orthogonal to V, and M times it */
 
-  /* of the last block of V: OP V = V T + (what follows), its Gram matrix as U^T D G D U = diag(s) */
-  MatrixXd remainder;
-  VectorXd theta;
-  MatrixXd Y;
-  VectorXd error; /* of theta */
+  MatrixXd remainder; /* factor R of OP V_last = V T_last + Q R with M-orthonormal Q, for the last block of V */
+  VectorXd theta;     /* Ritz values, */
+  MatrixXd Y;         /* Ritz vectors in the basis, */
+  VectorXd error;     /* and error bounds of theta */
 };
 
 /* ---- the operator and orthogonality ---- */
@@ -70,8 +68,8 @@ static PetscErrorCode Gram(EPS eps, const Columns &A, const MatrixXd &B, MatrixX
   PetscFunctionReturn(0);
 }
 
-/* W without what it has in V, by H = V^T M W */
-static PetscErrorCode TakeOut(const MatrixXd &H, BlockKrylov *b)
+/* Subtracts from W its projection on V, where H = V^T M W; updates MW */
+static PetscErrorCode SubtractProjection(const MatrixXd &H, BlockKrylov *b)
 {
   MatrixXd part;
 
@@ -82,11 +80,11 @@ static PetscErrorCode TakeOut(const MatrixXd &H, BlockKrylov *b)
   PetscFunctionReturn(0);
 }
 
-/* W and MW orthonormal in M. Directions whose squared size is below `least`, relative to columns of unit size if
-   scaled, go; found: the least. back: W before = W after * back + the rest; all: the same with all directions, which
-   tells the size of W */
-static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov *b, double *found, MatrixXd *back,
-                                MatrixXd *all)
+/* M-orthonormalizes W and updates MW. Directions whose squared norm is below `least` are discarded; with `scaled`, columns are first scaled to
+   unit norm. Outputs: *smallest, the smallest eigenvalue of the Gram matrix; *back, so that W_old ~ W_new back; *full_back, the same with all
+   directions, which measures the size of W_old. */
+static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov *b, double *smallest, MatrixXd *back,
+                                MatrixXd *full_back)
 {
   MatrixXd G;
 
@@ -95,18 +93,18 @@ static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov 
   const PetscInt n     = (PetscInt)G.cols();
   VectorXd       scale = G.diagonal().cwiseMax(0.).cwiseSqrt();
   if (!scaled) scale.setOnes();
-  /* W has the size of 1/frequency^2, so that no size is small in itself (SmallBodies.ManyModes) */
+  /* norms of W are of the order of 1/frequency^2, so that only exact zeros count as zero (SmallBodies.ManyModes) */
   const VectorXd       inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 1; });
   const SymmetricEigen gram(inverse.asDiagonal() * (0.5 * (G + G.transpose())) * inverse.asDiagonal());
   PetscInt             from = 0;
-  *found                    = n ? gram.values[0] : 0;
+  *smallest                 = n ? gram.values[0] : 0;
   while (from < n && !(gram.values[from] > least)) from++;
   const MatrixXd U = gram.vectors.rightCols(n - from);
   const VectorXd s = gram.values.tail(n - from).cwiseSqrt();
   const MatrixXd S = inverse.asDiagonal() * U * s.cwiseInverse().asDiagonal();
   *back            = s.asDiagonal() * U.transpose() * scale.asDiagonal();
-  *all             = gram.values.cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.vectors.transpose() *
-         scale.asDiagonal();
+  *full_back       = gram.values.cwiseMax(1e-15).cwiseSqrt().asDiagonal() * gram.vectors.transpose() *
+               scale.asDiagonal();
   G = b->W * S;
   b->W.swap(G);
   G = b->MW * S;
@@ -114,30 +112,30 @@ static PetscErrorCode Normalize(EPS eps, bool scaled, double least, BlockKrylov 
   PetscFunctionReturn(0);
 }
 
-/* W becomes the next block, which may have fewer columns, or none if W is in the space already; H: V^T M W before */
+/* Orthonormalizes W against V and in itself to the next block, which has fewer columns, or none, if W lies partly or wholly in the space of V. H = V^T M W_old. */
 static PetscErrorCode NextBlock(EPS eps, BlockKrylov *b, MatrixXd *H)
 {
-  MatrixXd       second, back, all;
+  MatrixXd       second, back, full_back;
   double         least;
   const PetscInt n = b->deflated + b->k;
 
   PetscFunctionBegin;
   PetscCall(Multiply(b->M, b->W, &b->MW));
   PetscCall(Gram(eps, b->V.leftCols(n), b->MW, H));
-  PetscCall(TakeOut(*H, b));
+  PetscCall(SubtractProjection(*H, b));
   PetscCall(Normalize(eps, true, 1e-15, b, &least, &back, &b->remainder));
   PetscCall(Gram(eps, b->V.leftCols(n), b->MW, &second));
   if (least > 1e-4 && (!second.size() || second.cwiseAbs().maxCoeff() < 1e-13)) PetscFunctionReturn(0);
-  /* of unit vectors before: what is mostly in the space was nothing but rounding */
-  PetscCall(TakeOut(second, b));
+  /* second orthogonalization; columns were normalized before, so that those which lose most of their norm now were rounding */
+  PetscCall(SubtractProjection(second, b));
   *H += second * back;
-  PetscCall(Normalize(eps, false, 0.25, b, &least, &back, &all));
+  PetscCall(Normalize(eps, false, 0.25, b, &least, &back, &full_back));
   PetscFunctionReturn(0);
 }
 
 /* ---- the projected problem ---- */
 
-/* T with the products of the last block of `count` vectors */
+/* Extends T by the products of the last block of `count` vectors */
 static void Extend(PetscInt count, const MatrixXd &H, BlockKrylov *b)
 {
   const PetscInt before = b->k - count;
@@ -148,7 +146,7 @@ static void Extend(PetscInt count, const MatrixXd &H, BlockKrylov *b)
   b->T.bottomRightCorner(count, count) = 0.5 * (corner + corner.transpose());
 }
 
-/* Ritz values in descending size, and their errors: those of all but the last block are exact to rounding */
+/* Ritz values, by decreasing absolute value, and error bounds from the remainder of the last block; that of the earlier blocks is rounding */
 static PetscErrorCode Ritz(EPS eps, PetscInt count, BlockKrylov *b)
 {
   const SymmetricEigen  solver(b->T);
@@ -171,26 +169,26 @@ static PetscErrorCode Ritz(EPS eps, PetscInt count, BlockKrylov *b)
   PetscFunctionReturn(0);
 }
 
-/* eps->nconv: how many of the leading ones are good enough */
+/* eps->nconv: number of leading Ritz values that have converged */
 static PetscErrorCode CountConverged(EPS eps, const BlockKrylov &b)
 {
-  const PetscInt known = std::min(b.k, eps->ncv);
+  const PetscInt count = std::min(b.k, eps->ncv);
 
   PetscFunctionBegin;
   bool good  = true;
   eps->nconv = 0;
-  for (PetscInt i = 0; i < known; i++) {
+  for (PetscInt i = 0; i < count; i++) {
     eps->eigr[i] = b.theta[i];
     eps->eigi[i] = 0;
     PetscCall((*eps->converged)(eps, eps->eigr[i], 0, b.error[i], &eps->errest[i], eps->convergedctx));
     good = good && eps->errest[i] < eps->tol;
     if (good) eps->nconv++;
   }
-  PetscCall(EPSMonitor(eps, eps->its, eps->nconv, eps->eigr, eps->eigi, eps->errest, known));
+  PetscCall(EPSMonitor(eps, eps->its, eps->nconv, eps->eigr, eps->eigi, eps->errest, count));
   PetscFunctionReturn(0);
 }
 
-/* The basis becomes the leading `keep` Ritz vectors */
+/* Replaces the basis by the leading `keep` Ritz vectors */
 static PetscErrorCode Restart(PetscInt keep, BlockKrylov *b)
 {
   MatrixXd X;
@@ -198,8 +196,8 @@ static PetscErrorCode Restart(PetscInt keep, BlockKrylov *b)
   PetscFunctionBegin;
   X = b->V.middleCols(b->deflated, b->k) * b->Y.leftCols(keep);
   b->V.middleCols(b->deflated, keep) = X;
-  b->k = b->looked = keep;
-  b->T             = b->theta.head(keep).asDiagonal();
+  b->k = b->projected_at = keep;
+  b->T                   = b->theta.head(keep).asDiagonal();
   PetscFunctionReturn(0);
 }
 
@@ -227,7 +225,7 @@ static PetscErrorCode SetUp(EPS eps)
   b->size = eps->ncv > 0 ? eps->ncv : 2 * eps->nev;
   b->size = std::max(b->size, eps->nev + 2 * b->block);
   if (eps->max_it == PETSC_DEFAULT) eps->max_it = 100;
-  /* SLEPc keeps the results alone */
+  /* SLEPc's own basis stores the results only */
   eps->ncv = eps->mpd = std::min(n, eps->nev + b->block);
   PetscCall(EPSAllocateSolution(eps, 0));
   PetscFunctionReturn(0);
@@ -244,11 +242,11 @@ static PetscErrorCode SetUpSort(EPS eps)
   PetscFunctionReturn(0);
 }
 
-/* The vectors that SLEPc holds as constraints; columns of V from the left, orthonormal in M */
-static PetscErrorCode TakeDeflated(EPS eps, PetscInt rows, BlockKrylov *b)
+/* Copies SLEPc's deflation space to the first columns of V, M-orthonormalized */
+static PetscErrorCode LoadDeflated(EPS eps, PetscInt rows, BlockKrylov *b)
 {
   const PetscInt n = std::max<PetscInt>(0, eps->nds);
-  MatrixXd       back, all;
+  MatrixXd       back, full_back;
   double         least;
 
   PetscFunctionBegin;
@@ -265,14 +263,14 @@ static PetscErrorCode TakeDeflated(EPS eps, PetscInt rows, BlockKrylov *b)
   }
   for (int pass = 0; pass < 2; pass++) {
     PetscCall(Multiply(b->M, b->W, &b->MW));
-    PetscCall(Normalize(eps, true, 1e-14, b, &least, &back, &all));
+    PetscCall(Normalize(eps, true, 1e-14, b, &least, &back, &full_back));
   }
   b->deflated                = (PetscInt)b->W.cols();
   b->V.leftCols(b->deflated) = b->W;
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode Start(EPS eps, BlockKrylov *b)
+static PetscErrorCode StartBlock(EPS eps, BlockKrylov *b)
 {
   PetscMPIInt                            rank;
   PetscInt                               rows;
@@ -283,13 +281,13 @@ static PetscErrorCode Start(EPS eps, BlockKrylov *b)
   PetscCall(MatGetLocalSize(b->M, &rows, nullptr));
   std::mt19937 random(17 + (unsigned)rank);
   b->deflated = 0;
-  b->k = b->looked = 0;
+  b->k = b->projected_at = 0;
   b->V.setZero(rows, std::max<PetscInt>(0, eps->nds) + b->size + b->block);
   b->T.resize(0, 0);
-  PetscCall(TakeDeflated(eps, rows, b));
+  PetscCall(LoadDeflated(eps, rows, b));
   b->MW.resize(rows, b->block);
   for (PetscInt i = 0; i < b->MW.size(); i++) b->MW.data()[i] = number(random);
-  /* into the range of the operator, where M is regular even with multipliers */
+  /* maps the start vectors to the range of OP, on which M is definite even with multipliers */
   PetscCall(Multiply(b->M, MatrixXd(b->MW), &b->MW));
   PetscCall(SolveShifted(eps, b->MW, &b->W));
   MatrixXd H;
@@ -297,7 +295,7 @@ static PetscErrorCode Start(EPS eps, BlockKrylov *b)
   PetscFunctionReturn(0);
 }
 
-/* Once more through the operator where M is singular; columns of V have unit length in M then, as they had */
+/* If M is singular, applies OP once more, divided by theta, so that components in the null space of M vanish and M-norms stay one */
 static PetscErrorCode Purify(EPS eps, BlockKrylov *b)
 {
   PetscFunctionBegin;
@@ -310,7 +308,7 @@ static PetscErrorCode Purify(EPS eps, BlockKrylov *b)
   PetscFunctionReturn(0);
 }
 
-static PetscErrorCode Deliver(EPS eps, BlockKrylov *b)
+static PetscErrorCode StoreResults(EPS eps, BlockKrylov *b)
 {
   PetscFunctionBegin;
   PetscCall(Restart(eps->nconv, b));
@@ -330,8 +328,8 @@ static PetscErrorCode Deliver(EPS eps, BlockKrylov *b)
   PetscFunctionReturn(0);
 }
 
-/* One block further, and eigenvalues of the projected matrix where there are enough of them */
-static PetscErrorCode Step(EPS eps, BlockKrylov *b)
+/* Adds a block to the basis, and solves the projected problem if enough vectors were added since the last time */
+static PetscErrorCode ExtendSpace(EPS eps, BlockKrylov *b)
 {
   const PetscInt count = (PetscInt)b->W.cols();
   MatrixXd       H;
@@ -343,8 +341,8 @@ static PetscErrorCode Step(EPS eps, BlockKrylov *b)
   PetscCall(NextBlock(eps, b, &H));
   Extend(count, H, b);
   const bool full = b->k + b->W.cols() > b->size + b->block;
-  if (b->W.cols() && !full && (b->k < eps->nev || b->k - b->looked < look_after)) PetscFunctionReturn(0);
-  b->looked = b->k;
+  if (b->W.cols() && !full && (b->k < eps->nev || b->k - b->projected_at < projection_interval)) PetscFunctionReturn(0);
+  b->projected_at = b->k;
   PetscCall(Ritz(eps, count, b));
   PetscCall(CountConverged(eps, *b));
   PetscFunctionReturn(0);
@@ -355,19 +353,19 @@ static PetscErrorCode Solve(EPS eps)
   BlockKrylov *b = static_cast<BlockKrylov *>(eps->data);
 
   PetscFunctionBegin;
-  PetscCall(Start(eps, b));
+  PetscCall(StartBlock(eps, b));
   eps->its   = 1;
   eps->nconv = 0;
   while (eps->reason == EPS_CONVERGED_ITERATING) {
     if (!b->W.cols()) {
-      eps->reason = EPS_DIVERGED_BREAKDOWN; /* M is null on all that is not deflated */
+      eps->reason = EPS_DIVERGED_BREAKDOWN; /* M vanishes on the complement of the deflated vectors */
       break;
     }
-    PetscCall(Step(eps, b));
+    PetscCall(ExtendSpace(eps, b));
     if (eps->nconv >= eps->nev)
       eps->reason = EPS_CONVERGED_TOL;
     else if (!b->W.cols())
-      eps->reason = EPS_DIVERGED_BREAKDOWN; /* the space holds all that it can reach */
+      eps->reason = EPS_DIVERGED_BREAKDOWN; /* the Krylov space is invariant and cannot grow */
     else if (b->k + b->W.cols() > b->size + b->block) {
       if (eps->its >= eps->max_it)
         eps->reason = EPS_DIVERGED_ITS;
@@ -377,7 +375,7 @@ static PetscErrorCode Solve(EPS eps)
       }
     }
   }
-  PetscCall(Deliver(eps, b));
+  PetscCall(StoreResults(eps, b));
   PetscFunctionReturn(0);
 }
 

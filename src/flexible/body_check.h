@@ -1,4 +1,4 @@
-/* What is wrong with a model that a body is made of, whole or reduced. All functions are collective. */
+/* Checks of a finite-element model for a whole or a reduced body. All functions are collective. */
 #ifndef HHTDAE_FLEXIBLE_BODY_CHECK_H
 #define HHTDAE_FLEXIBLE_BODY_CHECK_H
 
@@ -7,14 +7,14 @@
 namespace hhtdae
 {
 
-/* attachments.cpp: of a whole body, whose averages are frames of their own and may share nodes */
+/* attachments.cpp: for a whole body, in which averaging attachments may share nodes with others, because each is a frame of its own */
 PetscErrorCode CheckAttachments(const FeModel &model, const std::vector<Attachment> &attachments);
 
-/* attachments.cpp: weights of own nodes of an average, counted from the first own node, 1 if none are given. They are given in the order of the labels of
-   all nodes of the set: global numbers depend on how the mesh is divided among the ranks. Their number has been checked. */
+/* attachments.cpp: weights of an average for own nodes, which are counted from the first own node; 1 if none are given. a.weights follows the order of the labels of
+   all nodes of the set, because global numbers depend on the distribution of the mesh over the ranks; its length must have been checked. */
 PetscErrorCode WeightsOfNodes(const FeModel &model, const Attachment &a, const std::vector<PetscInt> &node, std::vector<double> *weight);
 
-/* diagnose_elements.cpp: do the elements make M, and K if it is there? `who` needs them to: "geometric stiffening" */
+/* diagnose_elements.cpp: checks that the elements yield M, and K if it exists. who: the feature that needs this, as "geometric stiffening", for messages */
 PetscErrorCode CheckElements(const FeModel &model, const std::string &who);
 
 } // namespace hhtdae

@@ -1,4 +1,4 @@
-/* How messages call a reduced body: one in memory has a name only where it was given one. */
+/* The name of a reduced body in messages; a body in memory may have none. */
 #ifndef HHTDAE_FLEXIBLE_BODY_NAME_H
 #define HHTDAE_FLEXIBLE_BODY_NAME_H
 

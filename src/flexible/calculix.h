@@ -1,5 +1,4 @@
-/* CalculiX, as rank 0 reads it: what of an input deck is needed, and the model that it makes with the rows of the
- * stored matrices. */
+/* CalculiX input on rank 0: the deck's nodes, sets, elements and materials, and the model that they form with the rows of the stored matrices. */
 #ifndef HHTDAE_FLEXIBLE_CALCULIX_H
 #define HHTDAE_FLEXIBLE_CALCULIX_H
 
@@ -16,32 +15,32 @@ namespace calculix
 
 using Label = long long;
 
-std::string Trim(const std::string &text); /* without blanks and quotation marks at the ends */
+std::string Trim(const std::string &text); /* removes blanks and quotation marks at both ends */
 bool        IsLabel(const std::string &text);
 
-/* Numbers of nodes of CalculiX' solid elements, and ours among them */
+/* A solid element of CalculiX */
 struct Kind {
   int         nodes;
-  bool        kept;
+  bool        kept; /* false for wedges, which are read but not part of the model */
   ElementType type;
 };
 
 struct DeckElement {
   FeElement          element;
-  std::vector<Label> node; /* CalculiX' order */
+  std::vector<Label> node; /* in CalculiX' order */
 };
 
-/* first, first + step .. last, of which only those labels count that the deck has */
+/* The labels first, first + step .. last; those that do not exist in the deck are ignored */
 struct DeckRange {
   Label first, last, step;
 };
 
-/* A set of labels, with its name as it was written first */
+/* A set of labels, with its name as first written in the deck */
 struct DeckSet {
   std::string            name;
   std::vector<DeckRange> member;
 
-  void add(Label l) /* labels that follow one another take one place */
+  void add(Label l) /* consecutive labels are stored as one range */
   {
     if (!member.empty() && member.back().step == 1 && member.back().last == l - 1)
       member.back().last = l;
@@ -50,8 +49,8 @@ struct DeckSet {
   }
 };
 
-/* Elements and nodes that sets may name, all together: a small file can ask for more than memory holds, by ranges, sets of
-   sets and files that are included again and again. */
+/* Bound on the number of set members for a deck of `bytes` bytes: by ranges, sets of sets and repeated inclusion a small file can define more
+   members than memory holds. */
 class Budget
 {
 public:
@@ -66,7 +65,7 @@ private:
   PetscInt64 left_;
 };
 
-/* Those of the sorted labels that are in the set; false: more than the budget allows */
+/* The labels, of a sorted list, that belong to the set; false if the budget is exceeded */
 bool Expand(const DeckSet &set, const std::vector<Label> &labels, Budget *budget, std::vector<Label> *found);
 
 struct DeckMaterial {
@@ -75,7 +74,7 @@ struct DeckMaterial {
   bool                isotropic = true;
 };
 
-/* What of an input deck is needed here; keywords that are not known are passed over */
+/* The parts of an input deck that a model needs; unknown keywords are skipped */
 class Deck
 {
 public:
@@ -85,8 +84,8 @@ public:
   std::unordered_map<Label, DeckElement> element;
   std::set<Label>                        used; /* nodes of elements */
   std::vector<Material>                  materials;
-  PetscInt64  bytes    = 0; /* of all files, each as often as it is included */
-  std::size_t left_out = 0; /* elements of kinds that are not kept, or of other materials than isotropic ones */
+  PetscInt64                             bytes    = 0; /* size of all files, counted each time they are included */
+  std::size_t                            left_out = 0; /* elements that are not part of the model: wedges, and those without isotropic material */
 
   void read(const std::string &file);
 
@@ -95,17 +94,17 @@ private:
   std::string                                      keyword_, type_, into_nset_, into_elset_;
   bool                                             generate_ = false, known_type_ = false;
   Kind                                             kind_{};
-  std::vector<Label>                               pending_; /* an element that goes on in the next line */
+  std::vector<Label>                               pending_; /* numbers of an element that continues on the next line */
   std::string                                      material_;
   std::map<std::string, DeckMaterial>              material_data_;
   std::vector<std::pair<std::string, std::string>> sections_; /* set of elements, material */
   std::map<std::string, std::string>               parameter_;
-  std::map<std::pair<dev_t, ino_t>, int>           times_;      /* how often each file has been read */
-  std::size_t                                      ranges_ = 0; /* of sets that are part of others */
+  std::map<std::pair<dev_t, ino_t>, int>           inclusions_; /* number of times each file has been read */
+  std::size_t                                      ranges_ = 0; /* ranges copied from sets to others that include them */
 
   void               fail(const std::string &file, long number, const std::string &why);
   void               fail(const std::string &why);
-  std::string        whyNot(const std::string &file, int depth);
+  std::string        inclusionProblem(const std::string &file, int depth);
   void               readFile(const std::string &file, const std::string &from, int depth);
   void               include(const std::string &file, long number, int depth);
   void               keyword(const std::string &file, long number, const std::string &line);
@@ -122,8 +121,7 @@ private:
   void               assignMaterials();
 };
 
-/* Nodes, sets and elements of stem.inp and stem.dof, and the model's row for each row of the matrices; says what is
- * wrong, or nothing */
+/* Reads nodes, sets and elements from stem.inp and stem.dof; row: the model's row for each row of the stored matrices. Returns an error message, or "" */
 std::string ReadJob(const std::string &stem, ReadModel *read, std::vector<PetscInt> *row, PetscInt64 *left_out);
 
 } // namespace calculix

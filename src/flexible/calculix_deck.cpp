@@ -1,4 +1,4 @@
-/* Reads an input deck of CalculiX: keywords with their parameters, lines of data, at the end materials by sections. */
+/* Reads an input deck of CalculiX: keywords with their parameters, data lines, and finally the materials of elements by *SOLID SECTION. */
 #include "flexible/calculix.h"
 #include "flexible/read_text.h"
 #include <algorithm>
@@ -78,28 +78,28 @@ void Deck::fail(const std::string &why)
   if (error.empty()) error = deck_ + ": " + why;
 }
 
-/* Files that include others several times each multiply, level by level. */
-constexpr int most_times = 16, most_deep = 20;
+/* Bounds on *INCLUDE: files that include others several times multiply with each level */
+constexpr int max_inclusions = 16, max_include_depth = 20;
 
-std::string Deck::whyNot(const std::string &file, int depth)
+std::string Deck::inclusionProblem(const std::string &file, int depth)
 {
   struct stat       about;
   const std::string why = WhyUnreadable(file);
   if (!why.empty()) return why;
-  if (depth > most_deep)
-    return "files are included in one another more than " + std::to_string(most_deep) +
+  if (depth > max_include_depth)
+    return "files are included in one another more than " + std::to_string(max_include_depth) +
            " deep (one includes itself?)";
   if (stat(file.c_str(), &about)) return "there is no such file";
   bytes += (PetscInt64)about.st_size;
-  if (++times_[{about.st_dev, about.st_ino}] > most_times)
-    return "it is included more than " + std::to_string(most_times) + " times (it includes itself?)";
+  if (++inclusions_[{about.st_dev, about.st_ino}] > max_inclusions)
+    return "it is included more than " + std::to_string(max_inclusions) + " times (it includes itself?)";
   return "";
 }
 
 void Deck::readFile(const std::string &file, const std::string &from, int depth)
 {
   std::ifstream in;
-  std::string   line, more, why = whyNot(file, depth);
+  std::string   line, more, why = inclusionProblem(file, depth);
   long          number = 0;
   if (why.empty()) in.open(file);
   if (why.empty() && !in) why = "it cannot be opened";
@@ -125,7 +125,7 @@ void Deck::readFile(const std::string &file, const std::string &from, int depth)
   if (error.empty() && in.bad()) error = "reading " + file + " failed";
 }
 
-/* beside the deck, else where the program runs */
+/* Includes a file relative to the including one or, if there is none, relative to the working directory */
 void Deck::include(const std::string &file, long number, int depth)
 {
   const std::string name   = parameter_["INPUT"],
@@ -217,7 +217,7 @@ void Deck::elementLine(const std::string &file, long number, const std::vector<s
   if (known_type_ && (int)pending_.size() > kind_.nodes) endElement();
 }
 
-/* The element whose numbers have been gathered is complete */
+/* Stores the element whose numbers are in pending_ */
 void Deck::endElement()
 {
   if (pending_.empty()) return;
@@ -236,7 +236,7 @@ void Deck::endElement()
   pending_.clear();
 }
 
-/* "first, last, step" */
+/* A line "first, last, step" of *NSET or *ELSET with GENERATE */
 bool Deck::rangeLine(const std::vector<std::string> &part, DeckSet *set)
 {
   Label number[3] = {0, 0, 1};
@@ -285,7 +285,7 @@ void Deck::materialLine(const std::string &file, long number, const std::vector<
   }
   if (keyword_ == "DENSITY" && !value.empty()) m.material.density = value[0];
   if (keyword_ == "ELASTIC") m.elastic.insert(m.elastic.end(), value.begin(), value.end());
-  /* a second line: it depends on the temperature, or on directions */
+  /* more than two constants and a temperature: a temperature-dependent or anisotropic material */
   if (keyword_ == "ELASTIC" && (m.elastic.size() > 3 || m.elastic.size() < 2)) m.isotropic = false;
   if (keyword_ == "ELASTIC" && m.isotropic) {
     m.material.young   = m.elastic[0];

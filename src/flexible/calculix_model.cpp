@@ -1,4 +1,4 @@
-/* Nodes, sets and elements of a deck of CalculiX in the order that the model has them, and the rows of its matrices. */
+/* Converts nodes, sets and elements of a CalculiX deck to the numbering of the model, and finds the rows of its matrices. */
 #include "flexible/calculix.h"
 #include "flexible/node_order.h"
 #include "flexible/read_text.h"
@@ -13,7 +13,7 @@ namespace calculix
 namespace
 {
 
-/* Rows of the stored matrices: node and direction, in the order of the file */
+/* Node and direction of each row of the stored matrices, in the order of the file */
 std::string ReadUnknowns(const std::string &file, std::vector<std::pair<Label, int>> *unknown)
 {
   std::string   line, why = WhyUnreadable(file);
@@ -38,9 +38,9 @@ constexpr const char *no_supports = " Supports and constraints (*BOUNDARY, *EQUA
                                     "be left out of the deck whose matrices are "
                                     "stored; attachments take their place";
 
-/* Places of nodes in the model, in the order of their labels, and rows of the unknowns; says what does not fit */
-std::string Number(const Deck &deck, const std::vector<std::pair<Label, int>> &unknown, ReadModel *read,
-                   std::unordered_map<Label, PetscInt> *place, std::vector<PetscInt> *row)
+/* Numbers the nodes by ascending label and finds the model's row of each unknown; returns an error message, or "" */
+std::string NumberNodes(const Deck &deck, const std::vector<std::pair<Label, int>> &unknown, ReadModel *read,
+                        std::unordered_map<Label, PetscInt> *place, std::vector<PetscInt> *row)
 {
   std::map<Label, int> directions;
   for (const auto &u : unknown) {
@@ -77,7 +77,7 @@ template <class Map> std::vector<Label> SortedLabels(const Map &map)
   return labels;
 }
 
-/* Sets of nodes, and sets of elements as sets of their nodes where no set of nodes has the name; says what is wrong */
+/* Adds node sets, and element sets as sets of their nodes unless a node set has the same name; returns an error message, or "" */
 std::string CollectSets(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
 {
   const std::vector<Label> nodes = SortedLabels(place), elements = SortedLabels(deck.element);
@@ -104,7 +104,7 @@ std::string CollectSets(const Deck &deck, const std::unordered_map<Label, PetscI
   return "";
 }
 
-/* In the order of their labels */
+/* Adds the elements in the order of their labels */
 void CollectElements(const Deck &deck, const std::unordered_map<Label, PetscInt> &place, ReadModel *read)
 {
   for (Label l : SortedLabels(deck.element)) {
@@ -127,7 +127,7 @@ std::string ReadJob(const std::string &stem, ReadModel *read, std::vector<PetscI
   deck.read(stem + ".inp");
   if (!deck.error.empty()) return deck.error;
   std::string error = ReadUnknowns(stem + ".dof", &unknown);
-  if (error.empty() && (error = Number(deck, unknown, read, &place, row)).size()) error = stem + ".dof: " + error;
+  if (error.empty() && (error = NumberNodes(deck, unknown, read, &place, row)).size()) error = stem + ".dof: " + error;
   if (!error.empty()) return error;
   error = CollectSets(deck, place, read);
   if (!error.empty()) return stem + ".inp: " + error;

@@ -1,5 +1,5 @@
-/* The interior stiffness factored, and the constraint modes which it gives: one attachment moves by a unit, the others
-   are held. */
+/* Factorization of the interior stiffness, and constraint modes: static displacements for a unit motion of one attachment, the others being
+   held. */
 #include "interior.h"
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace hhtdae
 
 /* ---- a singular interior ---- */
 
-/* Inverse iteration on K + tau M: it turns to what K does not resist */
+/* A null vector of the interior stiffness, by inverse iteration on K + tau M with small tau */
 static PetscErrorCode NullVector(const FeModel &model, const Interior &in, const BodyScales &scales, VectorXd *u)
 {
   ScopedSolver solver;
@@ -70,7 +70,7 @@ PetscErrorCode FactorInterior(const FeModel &model, const Interior &in, const Bo
 
 /* ---- constraint modes ---- */
 
-/* Displacements of the nodes of rigid attachments, units of dofs [from, from + count) */
+/* Displacements of the nodes of rigid attachments for unit motions of the attachments' dofs [from, from + count) */
 static void UnitMotions(const FeModel &model, const std::vector<Tied> &tied, PetscInt from, PetscInt count, MatrixXd *u)
 {
   u->setZero(3 * model.own, count);

@@ -1,4 +1,4 @@
-/* The Craig-Bampton space put together: constraint modes and, behind them, fixed-interface normal modes. */
+/* The Craig-Bampton subspace: constraint modes followed by fixed-interface normal modes. */
 #include "craig_bampton.h"
 
 namespace hhtdae
@@ -83,7 +83,7 @@ PetscErrorCode CraigBamptonSpace(const FeModel &model, const std::vector<Tied> &
           return (PetscErrorCode)0;
         },
         space));
-    /* they are in `modes` too, and the factorization that comes next needs the room */
+    /* frees the copies of the normal modes, which `modes` holds as well: the next factorization needs the memory */
     space->x.conservativeResize(Eigen::NoChange, constraints);
     space->motion.conservativeResize(Eigen::NoChange, constraints);
     PetscFunctionReturn(0);

@@ -1,6 +1,6 @@
 /*
-  Whether a model's elements make its matrices, node by node: the mass that goes with each node, and the forces of a uniform strain. A deck of CalculiX has more in
-  its matrices than the elements that are kept: springs, point masses, wedges, materials that are not isotropic.
+  Checks node by node whether a model's elements yield its matrices: by the mass of each node, and its force for a uniform strain. The matrices of a CalculiX deck may contain
+  more than the elements that are read: springs, point masses, wedges, materials that are not isotropic.
 */
 #include "body_check.h"
 #include "diagnose_nodes.h"
@@ -13,18 +13,18 @@
 namespace hhtdae
 {
 
-/* Part of the sizes of the elements' contributions to a node. Points of integration other than ours, as of reduced elements, differ on elements that are bent or
-   far from parallelepipeds (Calculix.ElementsThatAreNotAllOfTheModel) */
-constexpr double other_points = 0.1;
+/* Tolerance relative to the sum of the absolute values of the elements' contributions to a node: with other integration points, as those of reduced elements, mass and force
+   differ on elements with curved edges or far from parallelepipeds (Calculix.ElementsThatAreNotAllOfTheModel) */
+constexpr double integration_tolerance = 0.1;
 
 namespace
 {
 
-/* Any strain: displacements are strain X */
+/* An arbitrary uniform strain; displacements are Strain() X */
 Matrix3 Strain() { return (Matrix3() << 1, .3, -.2, .3, -.7, .5, -.2, .5, .4).finished(); }
 
-/* Of a node: mass, force, and the sums of the absolute values of what they are made of */
-constexpr int width = 8;
+/* mass, |mass|, force (3), |force| (3), where |.| is the sum of the absolute values of the elements' contributions */
+constexpr int values_per_node = 8;
 
 template <class Shape> void AddElement(const FeModel &model, const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, std::vector<double> *sum)
 {
@@ -42,7 +42,7 @@ template <class Shape> void AddElement(const FeModel &model, const FeElement &e,
     f += points.weight[q] * det * stress * G;
   }
   for (int i = 0; i < Shape::nodes; i++) {
-    double *to = &(*sum)[width * nodes.place(e.node[i])];
+    double *to = &(*sum)[values_per_node * nodes.place(e.node[i])];
     to[0] += m.row(i).sum();
     to[1] += std::abs(m.row(i).sum());
     for (int c = 0; c < 3; c++) to[2 + c] += f(c, i);
@@ -50,19 +50,19 @@ template <class Shape> void AddElement(const FeModel &model, const FeElement &e,
   }
 }
 
-/* The same of the matrices: M 1 in the first column, K strain X in the second */
-PetscErrorCode OfMatrices(const FeModel &model, MatrixXd *of)
+/* Mass and force from the matrices: M 1 in the first column, K Strain() X in the second */
+PetscErrorCode SumsOfMatrices(const FeModel &model, MatrixXd *of_matrices)
 {
   MatrixXd field(3 * model.own, 1), product;
   PetscFunctionBegin;
-  of->setZero(3 * model.own, 2);
+  of_matrices->setZero(3 * model.own, 2);
   field.setOnes();
   PetscCall(Multiply(model.M, field, &product));
-  of->col(0) = product;
+  of_matrices->col(0) = product;
   for (PetscInt i = 0; i < model.own; i++) field.block<3, 1>(3 * i, 0) = Strain() * NodePosition(model, i);
   if (model.K) {
     PetscCall(Multiply(model.K, field, &product));
-    of->col(1) = product;
+    of_matrices->col(1) = product;
   }
   PetscFunctionReturn(0);
 }
@@ -72,9 +72,9 @@ PetscErrorCode OfMatrices(const FeModel &model, MatrixXd *of)
 PetscErrorCode CheckElements(const FeModel &model, const std::string &who)
 {
   ElementNodes          nodes;
-  std::vector<double>   X, here, own(width * model.own + 1, 0.);
+  std::vector<double>   X, here, own(values_per_node * model.own + 1, 0.);
   std::vector<PetscInt> bad;
-  MatrixXd              of;
+  MatrixXd              of_matrices;
   std::string           problem, labels;
   PetscInt              count;
   PetscFunctionBegin;
@@ -84,19 +84,19 @@ PetscErrorCode CheckElements(const FeModel &model, const std::string &who)
   PetscCall(Agree(model.comm, problem, PETSC_ERR_ARG_WRONG));
   PetscCall(nodes.setUp(model));
   X.resize(3 * nodes.global.size() + 1);
-  here.assign(width * nodes.global.size() + 1, 0.);
+  here.assign(values_per_node * nodes.global.size() + 1, 0.);
   PetscCall(nodes.bring(3, model.coordinates.data(), X.data()));
   for (const FeElement &e : model.elements) fe::WithShape(e.type, [&](auto shape) { AddElement<decltype(shape)>(model, e, nodes, X, &here); });
-  PetscCall(nodes.add(width, here.data(), own.data()));
-  PetscCall(OfMatrices(model, &of));
-  double largest = 0; /* force: what rounding leaves where all cancels */
-  for (PetscInt i = 0; i < 3 * model.own; i++) largest = std::max(largest, own[width * (i / 3) + 5 + i % 3]);
+  PetscCall(nodes.add(values_per_node, here.data(), own.data()));
+  PetscCall(SumsOfMatrices(model, &of_matrices));
+  double largest = 0; /* largest |force|: scale of the rounding that remains where contributions cancel */
+  for (PetscInt i = 0; i < 3 * model.own; i++) largest = std::max(largest, own[values_per_node * (i / 3) + 5 + i % 3]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, model.comm));
   for (PetscInt i = 0; i < model.own; i++) {
-    const double *made = &own[width * i];
-    bool          same = std::abs(of(3 * i, 0) - made[0]) <= other_points * made[1];
-    const double  size = made[5] + made[6] + made[7];
-    for (int c = 0; c < 3 && model.K; c++) same = same && std::abs(of(3 * i + c, 1) - made[2 + c]) <= other_points * size + 1e-8 * largest;
+    const double *of_elements = &own[values_per_node * i];
+    bool          same        = std::abs(of_matrices(3 * i, 0) - of_elements[0]) <= integration_tolerance * of_elements[1];
+    const double  size        = of_elements[5] + of_elements[6] + of_elements[7];
+    for (int c = 0; c < 3 && model.K; c++) same = same && std::abs(of_matrices(3 * i + c, 1) - of_elements[2 + c]) <= integration_tolerance * size + 1e-8 * largest;
     if (!same) bad.push_back(i);
   }
   PetscCall(NameNodes(model, bad, &count, &labels));

@@ -1,4 +1,4 @@
-/* Whether K and M can be those of solid elements: sizes, symmetry, the form of M, diagonals. */
+/* Checks whether K and M can be those of solid elements: sizes, symmetry, block structure of M, definiteness of M, diagonals. */
 #include "attachments.h"
 #include "diagnose_nodes.h"
 #include "modes.h"
@@ -10,7 +10,7 @@
 namespace hhtdae
 {
 
-/* Entries of M that have to vanish or to be equal, relative to its largest */
+/* Tolerance, relative to the largest entry of M, for entries of M that have to vanish or to be equal */
 constexpr double form_tolerance = 1e-8;
 
 static PetscErrorCode CheckLayout(const FeModel &model, Mat A, const char name[])
@@ -41,9 +41,9 @@ static PetscErrorCode CheckLayout(const FeModel &model, Mat A, const char name[]
   PetscFunctionReturn(0);
 }
 
-static double Wave(PetscInt row, double k) { return std::sin(k * (double)row + 0.3 * k); }
+static double TestVector(PetscInt row, double k) { return std::sin(k * (double)row + 0.3 * k); }
 
-/* y^T A x = x^T A y for two fixed vectors; Inf and NaN among the entries are found on the way */
+/* Checks y^T A x = x^T A y for two fixed vectors, and that entries are finite */
 static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char name[])
 {
   MatrixXd  X(3 * model.own, 2), AX;
@@ -51,12 +51,12 @@ static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char nam
   PetscReal norm;
 
   PetscFunctionBegin;
-  PetscCall(MatNorm(A, NORM_FROBENIUS, &norm)); /* of the others, NaN may go unseen */
+  PetscCall(MatNorm(A, NORM_FROBENIUS, &norm)); /* unlike norms by maxima it propagates NaN */
   PetscCheck(std::isfinite(norm), model.comm, PETSC_ERR_FP,
              "The matrix %s of the FE model has entries that are not numbers", name);
   PetscCheck(norm > 0, model.comm, PETSC_ERR_ARG_WRONG, "The matrix %s of the FE model is zero", name);
   for (PetscInt i = 0; i < 3 * model.own; i++)
-    X.row(i) << Wave(3 * model.first + i, 1.1), Wave(3 * model.first + i, 2.3);
+    X.row(i) << TestVector(3 * model.first + i, 1.1), TestVector(3 * model.first + i, 2.3);
   PetscCall(Multiply(A, X, &AX));
   if (X.rows()) {
     s[0] = X.col(0).dot(AX.col(1));
@@ -69,7 +69,7 @@ static PetscErrorCode CheckSymmetric(const FeModel &model, Mat A, const char nam
   PetscFunctionReturn(0);
 }
 
-/* The three rows of a node in M: m_ij by column node, and whether the blocks are m_ij times identity(3) */
+/* The three rows of a node in M: m_ij by the node j of the column; *right: whether the blocks are m_ij times the identity */
 static PetscErrorCode MassRow(Mat M, PetscInt node, double tiny, std::map<PetscInt, double> *mass, bool *right)
 {
   std::map<PetscInt, Vector3> row;
@@ -130,14 +130,14 @@ static PetscErrorCode CheckMass(const FeModel &model)
 }
 
 /*
-  Is M positive definite? The smallest eigenvalue of D^-1/2 M D^-1/2, D the diagonal, by steps of Lanczos's method: a value below zero is a velocity of negative
-  kinetic energy whether it has converged or not. Of solid elements all are above some 0.01 (Wathen), so that one below zero stands apart and comes early; and these are
-  products with M alone, nothing beside the factorization of K. M being m_ij times the identity, x stands for y and z.
+  Checks that M is positive definite, by the smallest Ritz value of D^-1/2 M D^-1/2, D being the diagonal, in a Lanczos iteration: a negative Ritz value, converged or not, belongs to
+  a velocity of negative kinetic energy. For solid elements all eigenvalues are above some 0.01 (Wathen), so that a negative one is isolated and is found early. The cost, products with M only,
+  is small compared with the factorization of K. Since M is m_ij times the identity, the x components stand for all.
 */
 static PetscErrorCode CheckPositive(const FeModel &model)
 {
-  constexpr int    steps  = 60, each = 10;
-  constexpr double beyond = -1e-4; /* files of five digits may move zero as far */
+  constexpr int    steps = 60, check_interval = 10;
+  constexpr double negative_limit = -1e-4; /* files with five digits may shift a zero eigenvalue as far */
   VectorXd         alpha(steps), beta(steps);
   Vec              D, q, last, x, w;
   PetscReal        beta_k = 1, least = 0;
@@ -152,10 +152,10 @@ static PetscErrorCode CheckPositive(const FeModel &model)
   PetscCall(VecSet(last, 0));
   PetscCall(VecSet(q, 0));
   PetscCall(VecGetArray(q, &start));
-  for (PetscInt i = 0; i < model.own; i++) start[3 * i] = Wave(NodeLabel(model, i), 12.9898) + Wave(NodeLabel(model, i), 1.7);
+  for (PetscInt i = 0; i < model.own; i++) start[3 * i] = TestVector(NodeLabel(model, i), 12.9898) + TestVector(NodeLabel(model, i), 1.7);
   PetscCall(VecRestoreArray(q, &start));
   PetscCall(VecNormalize(q, nullptr));
-  for (int k = 0; k < steps && least > beyond && beta_k > 1e-12; k++) {
+  for (int k = 0; k < steps && least > negative_limit && beta_k > 1e-12; k++) {
     PetscCall(VecPointwiseMult(x, D, q));
     PetscCall(MatMult(model.M, x, w));
     PetscCall(VecPointwiseMult(w, D, w));
@@ -166,13 +166,13 @@ static PetscErrorCode CheckPositive(const FeModel &model)
     beta[k] = beta_k;
     PetscCall(VecCopy(q, last));
     PetscCall(VecCopy(w, q));
-    if ((k + 1) % each && k + 1 < steps && beta_k > 1e-12) continue;
+    if ((k + 1) % check_interval && k + 1 < steps && beta_k > 1e-12) continue;
     MatrixXd T = alpha.head(k + 1).asDiagonal();
     for (int i = 0; i < k; i++) T(i + 1, i) = beta[i];
     least = SymmetricEigen(T).values[0];
   }
   for (Vec *v : {&D, &q, &last, &x, &w}) PetscCall(VecDestroy(v));
-  PetscCheck(least > beyond, model.comm, PETSC_ERR_ARG_WRONG,
+  PetscCheck(least > negative_limit, model.comm, PETSC_ERR_ARG_WRONG,
              "M is not positive definite: some velocities have a negative kinetic energy, %.3g of the sum of m_ii v_i^2 / 2. Are entries of it missing or of the wrong sign, or were its parts not "
              "added up?",
              (double)least);
@@ -181,7 +181,7 @@ static PetscErrorCode CheckPositive(const FeModel &model)
 
 static PetscErrorCode CheckStiffness(const FeModel &model)
 {
-  std::vector<PetscInt> loose, negative;
+  std::vector<PetscInt> without_stiffness, negative;
   double                largest;
   PetscInt              count, n;
   const PetscInt       *cols;
@@ -203,12 +203,12 @@ static PetscErrorCode CheckStiffness(const FeModel &model)
       PetscCall(MatRestoreRow(model.K, row, &n, &cols, &v));
       least = std::min(least, diagonal);
     }
-    if (most <= no_coupling * largest)
-      loose.push_back(i);
+    if (most <= coupling_tolerance * largest)
+      without_stiffness.push_back(i);
     else if (least < 0)
       negative.push_back(i);
   }
-  PetscCall(NameNodes(model, loose, &count, &labels));
+  PetscCall(NameNodes(model, without_stiffness, &count, &labels));
   PetscCheck(!count, model.comm, PETSC_ERR_ARG_WRONG,
              "%" PetscInt_FMT " node(s) of the FE model have no stiffness: %s; no element holds them: remove them",
              count, labels.c_str());

@@ -1,4 +1,4 @@
-/* Nodes that stand out among those of all ranks, and the errors that name them. */
+/* Selects nodes of all ranks to be named in messages, and raises errors that name them. */
 #include "diagnose_nodes.h"
 #include <algorithm>
 #include <cmath>
@@ -6,31 +6,31 @@
 namespace hhtdae
 {
 
-static bool Before(const Ranked &a, const Ranked &b)
+static bool IsHigher(const NodeValue &a, const NodeValue &b)
 {
   return a.value > b.value || (a.value == b.value && a.label < b.label);
 }
 
-constexpr int most_named = 5;
+constexpr int max_named_nodes = 5;
 
-PetscErrorCode Highest(MPI_Comm comm, std::vector<Ranked> mine, std::vector<Ranked> *all)
+PetscErrorCode Highest(MPI_Comm comm, std::vector<NodeValue> mine, std::vector<NodeValue> *all)
 {
   PetscMPIInt size;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  std::sort(mine.begin(), mine.end(), Before);
-  mine.resize(most_named, {-1, -1});
-  all->resize(size * most_named);
-  PetscCallMPI(MPI_Allgather(mine.data(), most_named * sizeof(Ranked), MPI_BYTE, all->data(),
-                             most_named * sizeof(Ranked), MPI_BYTE, comm));
-  std::sort(all->begin(), all->end(), Before);
-  all->resize(most_named);
+  std::sort(mine.begin(), mine.end(), IsHigher);
+  mine.resize(max_named_nodes, {-1, -1});
+  all->resize(size * max_named_nodes);
+  PetscCallMPI(MPI_Allgather(mine.data(), max_named_nodes * sizeof(NodeValue), MPI_BYTE, all->data(),
+                             max_named_nodes * sizeof(NodeValue), MPI_BYTE, comm));
+  std::sort(all->begin(), all->end(), IsHigher);
+  all->resize(max_named_nodes);
   while (!all->empty() && all->back().value < 0) all->pop_back();
   PetscFunctionReturn(0);
 }
 
-static std::string List(const std::vector<Ranked> &nodes)
+static std::string List(const std::vector<NodeValue> &nodes)
 {
   std::string text;
   for (std::size_t i = 0; i < nodes.size(); i++) {
@@ -42,8 +42,8 @@ static std::string List(const std::vector<Ranked> &nodes)
 
 PetscErrorCode NameNodes(const FeModel &model, const std::vector<PetscInt> &bad, PetscInt *count, std::string *labels)
 {
-  std::vector<Ranked> mine, all;
-  PetscInt            n = (PetscInt)bad.size();
+  std::vector<NodeValue> mine, all;
+  PetscInt               n = (PetscInt)bad.size();
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(&n, count, 1, MPIU_INT, MPI_SUM, model.comm));
@@ -56,12 +56,12 @@ PetscErrorCode NameNodes(const FeModel &model, const std::vector<PetscInt> &bad,
 
 PetscErrorCode MostMoved(const FeModel &model, const Eigen::VectorXd &u, std::string *labels)
 {
-  std::vector<Ranked> mine, all;
+  std::vector<NodeValue> mine, all;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < model.own; i++) mine.push_back({u.segment<3>(3 * i).norm(), NodeLabel(model, i)});
   PetscCall(Highest(model.comm, mine, &all));
-  /* nodes at rest are not part of it */
+  /* nodes that hardly move do not belong to the mechanism */
   while (!all.empty() && all.back().value < 1e-3 * all.front().value) all.pop_back();
   *labels = List(all);
   PetscFunctionReturn(0);

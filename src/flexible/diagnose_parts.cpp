@@ -1,4 +1,4 @@
-/* Whether a model is in one part: nodes are joined by their couplings in K and by rigid attachments, over all ranks. */
+/* Checks that a model is connected: nodes are joined by couplings in K and by rigid attachments, across all ranks. */
 #include "diagnose_nodes.h"
 #include <algorithm>
 #include <numeric>
@@ -7,7 +7,7 @@
 namespace hhtdae
 {
 
-/* Union-find among own nodes and the nodes of other ranks that own ones couple with */
+/* Union-find structure of own nodes and of the other ranks' nodes that are coupled to them */
 class Parts
 {
 public:
@@ -59,7 +59,7 @@ static PetscErrorCode JoinNeighbours(const FeModel &model, const std::vector<Tie
   for (PetscInt row = 0; row < 3 * model.own; row++) {
     PetscCall(MatGetRow(model.K, 3 * model.first + row, &n, &cols, &v));
     for (PetscInt k = 0; k < n; k++)
-      if (std::abs(v[k]) > no_coupling * largest) parts->join(row / 3, parts->place(cols[k] / 3));
+      if (std::abs(v[k]) > coupling_tolerance * largest) parts->join(row / 3, parts->place(cols[k] / 3));
     PetscCall(MatRestoreRow(model.K, 3 * model.first + row, &n, &cols, &v));
   }
   for (const Tied &t : tied)
@@ -68,9 +68,9 @@ static PetscErrorCode JoinNeighbours(const FeModel &model, const std::vector<Tie
   PetscFunctionReturn(0);
 }
 
-/* The least number of a node in each one's part, by exchange until nothing changes */
-static PetscErrorCode SpreadLeast(const FeModel &model, const std::vector<Tied> &tied, Parts *parts,
-                                  std::vector<double> *least)
+/* Finds for each node the least global number in its part, by exchange between ranks until nothing changes */
+static PetscErrorCode PropagateLeast(const FeModel &model, const std::vector<Tied> &tied, Parts *parts,
+                                     std::vector<double> *least)
 {
   Vec                 x, local;
   PetscScalar        *v;
@@ -103,7 +103,7 @@ static PetscErrorCode SpreadLeast(const FeModel &model, const std::vector<Tied> 
     PetscCall(VecGetArray(local, &v));
     for (PetscInt i = 0; i < parts->size(); i++) v[i] = (*least)[parts->root(i)];
     PetscCall(VecRestoreArray(local, &v));
-    /* what a rank knows of a node of another one, then what that one knows */
+    /* minimum over the ghosts to the owner, then the owner's value to the ghosts */
     PetscCall(VecGhostUpdateBegin(x, MIN_VALUES, SCATTER_REVERSE));
     PetscCall(VecGhostUpdateEnd(x, MIN_VALUES, SCATTER_REVERSE));
     PetscCall(VecGhostUpdateBegin(x, INSERT_VALUES, SCATTER_FORWARD));
@@ -118,9 +118,9 @@ static PetscErrorCode SpreadLeast(const FeModel &model, const std::vector<Tied> 
   PetscFunctionReturn(0);
 }
 
-/* Sizes of the parts that begin with the nodes `start` */
+/* Numbers of nodes of the parts whose least nodes are `start` */
 static PetscErrorCode PartSizes(const FeModel &model, Parts *parts, const std::vector<double> &least,
-                                const std::vector<Ranked> &start, std::vector<PetscInt> *size)
+                                const std::vector<NodeValue> &start, std::vector<PetscInt> *size)
 {
   PetscFunctionBegin;
   size->assign(start.size(), 0);
@@ -133,15 +133,15 @@ static PetscErrorCode PartSizes(const FeModel &model, Parts *parts, const std::v
 
 PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tied)
 {
-  Parts                 parts(model);
-  std::vector<double>   least;
-  std::vector<Ranked>   mine, first;
-  std::vector<PetscInt> size;
-  PetscInt              count;
+  Parts                  parts(model);
+  std::vector<double>    least;
+  std::vector<NodeValue> mine, first;
+  std::vector<PetscInt>  size;
+  PetscInt               count;
 
   PetscFunctionBegin;
   PetscCall(JoinNeighbours(model, tied, &parts));
-  PetscCall(SpreadLeast(model, tied, &parts, &least));
+  PetscCall(PropagateLeast(model, tied, &parts, &least));
   for (PetscInt i = 0; i < model.own; i++)
     if (least[parts.root(i)] == (double)(model.first + i))
       mine.push_back({(double)(model.nodes - model.first - i), NodeLabel(model, i)});

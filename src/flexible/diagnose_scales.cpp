@@ -1,4 +1,4 @@
-/* The scales of a body: mass, extent, rigid motions, stiffness; and what they tell of supports and units. */
+/* The scales of a body: mass, extent, rigid motions, stiffness; and the checks of supports and units based on them. */
 #include "diagnose.h"
 #include "modes.h"
 #include "scene/symmetric.h"
@@ -10,7 +10,7 @@ namespace hhtdae
 
 /* ---- sizes ---- */
 
-/* X_c dm as a block: M times 1, and M times X, three components each */
+/* Mass, centre of mass and second moments, from M times ones and M times the coordinates */
 static PetscErrorCode MassMoments(const FeModel &model, BodyScales *s)
 {
   MatrixXd X(3 * model.own, 2), MX;
@@ -87,7 +87,7 @@ static PetscErrorCode RigidBasis(const FeModel &model, BodyScales *s)
   PetscFunctionReturn(0);
 }
 
-/* Ritz values for displacements which are quadratic in the coordinates */
+/* Lowest elastic Ritz value for displacements that are quadratic in the coordinates */
 static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
 {
   MatrixXd X = MatrixXd::Zero(3 * model.own, 24), Y, K, M;
@@ -100,9 +100,9 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
     int           col      = 0;
     for (int c = 0; c < 3; c++)
       for (int k = 0; k < 9; k++)
-        if (k > 2 || k <= c) X(3 * i + c, col++) = field[k]; /* of the linear ones, rotations apart */
+        if (k > 2 || k <= c) X(3 * i + c, col++) = field[k]; /* linear fields without rotations: one of each symmetric pair */
   }
-  /* rigid motions are taken out in M */
+  /* M-orthogonalize to the rigid motions */
   MatrixXd part;
   PetscCall(Multiply(model.M, s->rigid, &Y));
   part = Y.transpose() * X;
@@ -114,11 +114,11 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
   M = X.transpose() * Y;
   PetscCall(SumOverRanks(model.comm, &K));
   PetscCall(SumOverRanks(model.comm, &M));
-  /* at the two points across an element of reduced integration squares are constants: what is left has no mass (Calculix.OneReducedElementAcross) */
+  /* with the two integration points across one layer of reduced elements squares are constant, so that the remaining field has no mass (Calculix.OneReducedElementAcross) */
   const VectorXd       scale = M.diagonal().cwiseMax(1e-8 * s->mass).cwiseSqrt().cwiseInverse();
   const MatrixXd       Ms    = scale.asDiagonal() * M * scale.asDiagonal();
   const SymmetricEigen mass(0.5 * (Ms + Ms.transpose()));
-  PetscInt             from = 0; /* fields that few or flat nodes do not tell apart */
+  PetscInt             from = 0; /* skips combinations of fields that vanish at few or coplanar nodes */
   while (from < 23 && mass.values[from] < 1e-8) from++;
   const PetscInt n = 24 - from;
   const MatrixXd W = scale.asDiagonal() * mass.vectors.rightCols(n) *
@@ -126,7 +126,7 @@ static PetscErrorCode QuadraticRitz(const FeModel &model, BodyScales *s)
   const MatrixXd       Kw = W.transpose() * K * W;
   const SymmetricEigen ritz(0.5 * (Kw + Kw.transpose()));
   s->soft = ritz.values[n - 1];
-  for (PetscInt k = n; k-- > 0;) /* a mechanism among them is not the scale */
+  for (PetscInt k = n; k-- > 0;) /* the least Ritz value that is not zero, as that of a mechanism */
     if (ritz.values[k] > 1e-9 * ritz.values[n - 1]) s->soft = ritz.values[k];
   PetscFunctionReturn(0);
 }
@@ -161,7 +161,7 @@ PetscErrorCode CheckUnsupported(const FeModel &model, const BodyScales &s)
   for (int k = 0; k < 6; k++) energy[k] = model.own ? s.rigid.col(k).dot(Kr.col(k)) : 0.;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy.data(), 6, MPI_DOUBLE, MPI_SUM, model.comm));
   for (int k = 0; k < 6; k++) {
-    /* coordinates have fewer digits than K: a rotation then strains elements a little */
+    /* coordinates may have fewer digits than K, so that a rotation strains elements a little */
     const double allowed = k < 3 ? 1e-6 * s.soft + 1e-14 * s.stiff : 1e-4 * s.soft + 1e-13 * s.stiff;
     if (std::abs(energy[k]) <= allowed) continue;
     std::string labels;
@@ -181,10 +181,9 @@ PetscErrorCode CheckUnsupported(const FeModel &model, const BodyScales &s)
 std::string SuspectUnits(const FeModel &model, const BodyScales &s)
 {
   char text[512];
-  /* waves run at some 1000 m/s in solids: sqrt(K_ii / M_ii) times the distance of nodes is of that size, in m/s or mm/s
-   * or in/s */
+  /* sqrt(K_ii / M_ii) times the distance of nodes is about the speed of elastic waves, some 1000 m/s in solids, in m/s, mm/s or in/s */
   const double distance  = std::cbrt(std::max(s.volume, 1e-9 * s.length * s.length * s.length) / (double)model.nodes);
-  const double speed     = distance * std::sqrt(s.stiff) / 6; /* for bricks, and nearly for tetrahedra */
+  const double speed     = distance * std::sqrt(s.stiff) / 6; /* factor for bricks, nearly right for tetrahedra */
   const double frequency = std::sqrt(s.soft) / (2 * PETSC_PI);
   if (speed > 10 && speed < 5e7) return "";
   snprintf(text, sizeof text,

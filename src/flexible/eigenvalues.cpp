@@ -1,4 +1,4 @@
-/* The lowest modes of a body by SLEPc, none of several equal ones left out. */
+/* The lowest modes of a body by SLEPc, with a check by inertia that no mode, as one of a multiple eigenvalue, is missing. */
 #include "modes.h"
 #include "hhtdae/hhtdae.h"
 #include <algorithm>
@@ -8,7 +8,7 @@
 namespace hhtdae
 {
 
-/* Searched in the complement of the rigid modes and of those found before */
+/* Deflates the rigid modes and the modes found before */
 static PetscErrorCode Deflate(const Pencil &pencil, const MatrixXd &found, EPS eps)
 {
   const PetscInt   n = (PetscInt)pencil.rigid.cols(), m = (PetscInt)found.cols();
@@ -31,11 +31,11 @@ static PetscErrorCode Deflate(const Pencil &pencil, const MatrixXd &found, EPS e
   PetscFunctionReturn(0);
 }
 
-/* Above this number of modes with a bound on the frequency the spectrum is divided among several shifts */
-constexpr PetscInt slice_from = 400;
+/* From this number of modes on, if their frequency is bounded, the spectrum is divided among several shifts (spectrum slicing); option -reduce_slices_from */
+constexpr PetscInt default_slices_from = 400;
 
-/* Vectors before a restart, unless options say how many: the block type needs more of them than SLEPc's own */
-static PetscErrorCode SetSize(PetscInt count, PetscInt most, EPS eps)
+/* Sets the number of basis vectors before a restart, unless options do; the block method needs more of them than SLEPc's own */
+static PetscErrorCode SetBasisSize(PetscInt count, PetscInt most, EPS eps)
 {
   PetscInt  size;
   PetscBool blocks;
@@ -60,7 +60,7 @@ static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, 
   PetscCall(EPSSetOptionsPrefix(*eps, REDUCE_PREFIX));
   PetscCall(EPSSetOperators(*eps, pencil.K, pencil.M));
   PetscCall(EPSSetProblemType(*eps, EPS_GHEP));
-  /* one more solve for each mode, which cleans vectors of the null space of M: there is none but for multipliers */
+  /* purification, one more solve for each mode, removes components in the null space of M, which is nonzero with multipliers only */
   PetscCall(EPSSetPurify(*eps, pencil.multipliers ? PETSC_TRUE : PETSC_FALSE));
   PetscCall(RegisterBlockKrylov());
   PetscCall(EPSSetType(*eps, slices ? EPSKRYLOVSCHUR : EPS_BLOCK_KRYLOV));
@@ -86,12 +86,12 @@ static PetscErrorCode SetUpEps(const Pencil &pencil, const WantedModes &wanted, 
     PetscCall(Deflate(pencil, found, *eps));
   }
   PetscCall(EPSSetFromOptions(*eps));
-  if (!slices) PetscCall(SetSize(count, pencil.modes - (PetscInt)(pencil.rigid.cols() + found.cols()), *eps));
+  if (!slices) PetscCall(SetBasisSize(count, pencil.modes - (PetscInt)(pencil.rigid.cols() + found.cols()), *eps));
   PetscFunctionReturn(0);
 }
 
-/* All eigenpairs that converged; SLEPc returns them orthonormal in M */
-static PetscErrorCode Collect(EPS eps, Mat K, NormalModes *modes)
+/* Copies all converged eigenpairs, which SLEPc returns M-orthonormal */
+static PetscErrorCode CollectModes(EPS eps, Mat K, NormalModes *modes)
 {
   PetscInt    n, rows;
   Vec         x;
@@ -137,7 +137,7 @@ static void Merge(const NormalModes &more, NormalModes *modes)
   modes->x.swap(all.x);
 }
 
-/* EPSDestroy() resets the solver which it has; ours is to keep its factors */
+/* Takes the solver out of the EPS, because EPSDestroy() would reset it and lose its factors */
 static PetscErrorCode ReleaseSolver(EPS eps)
 {
   ST  st;
@@ -151,7 +151,7 @@ static PetscErrorCode ReleaseSolver(EPS eps)
   PetscFunctionReturn(0);
 }
 
-/* One run of the eigensolver for the `count` lowest besides those in modes, which are added to it in ascending order */
+/* Runs the eigensolver for the `count` lowest modes other than those in *modes, and merges them into it in ascending order */
 static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, PetscInt count, bool slices, KSP *ksp,
                              NormalModes *modes)
 {
@@ -167,7 +167,7 @@ static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, Pe
   PetscCall(EPSGetConverged(eps, &converged));
   PetscCall(EPSGetIterationNumber(eps, &iterations));
   const bool good = reason > 0 || converged >= count;
-  if (good) PetscCall(Collect(eps, pencil.K, &more));
+  if (good) PetscCall(CollectModes(eps, pencil.K, &more));
   if (!slices) PetscCall(ReleaseSolver(eps));
   PetscCall(EPSDestroy(&eps));
   PetscCheck(good, PetscObjectComm((PetscObject)pencil.K), PETSC_ERR_CONV_FAILED,
@@ -180,8 +180,8 @@ static PetscErrorCode RunEps(const Pencil &pencil, const WantedModes &wanted, Pe
   PetscFunctionReturn(0);
 }
 
-/* A value between two eigenvalues, as high as they reach; *below: how many are below it */
-static double InGap(const VectorXd &lambda, PetscInt *below)
+/* A value in the highest gap between two distinct eigenvalues; *below: the number of eigenvalues below it */
+static double ValueInGap(const VectorXd &lambda, PetscInt *below)
 {
   for (PetscInt p = (PetscInt)lambda.size(); p-- > 1;)
     if (lambda[p] > lambda[p - 1] * (1 + 1e-3)) {
@@ -192,7 +192,7 @@ static double InGap(const VectorXd &lambda, PetscInt *below)
   return lambda[*below - 1] * (1 + 1e-5);
 }
 
-/* Krylov spaces may leave out copies of eigenvalues that are there several times, as symmetric bodies have them */
+/* Number of modes missing below the highest gap, by inertia: Krylov methods may miss copies of multiple eigenvalues, as symmetric bodies have them */
 static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &modes, PetscInt *missing)
 {
   PetscBool verify = PETSC_TRUE;
@@ -202,7 +202,7 @@ static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &mode
   *missing = 0;
   PetscCall(PetscOptionsGetBool(nullptr, REDUCE_PREFIX, "-verify", &verify, nullptr));
   if (!verify || !modes.lambda.size()) PetscFunctionReturn(0);
-  const double sigma = InGap(modes.lambda, &below);
+  const double sigma = ValueInGap(modes.lambda, &below);
   PetscCall(CountBelow(pencil, sigma, &count));
   if (count >= 0) *missing = count - below;
   PetscCall(PetscInfo(pencil.K, "%" PetscInt_FMT " modes below %g by inertia, %" PetscInt_FMT " found\n", count, sigma,
@@ -210,11 +210,11 @@ static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &mode
   PetscFunctionReturn(0);
 }
 
-constexpr int      most_searches = 6;
-constexpr PetscInt beyond =
-    2; /* modes that are looked for above those wanted, to see whether frequencies are equal there */
+constexpr int      max_searches = 6;
+constexpr PetscInt extra_modes =
+    2; /* modes computed beyond the wanted ones, to detect equal frequencies at the limit */
 
-/* Slices have solvers of their own, which are gone after them */
+/* Factors K - shift M again after spectrum slicing, whose own solvers have been destroyed */
 static PetscErrorCode FactorAgain(const Pencil &pencil, double shift, KSP *ksp)
 {
   Mat       S = pencil.K;
@@ -234,7 +234,7 @@ static PetscErrorCode FactorAgain(const Pencil &pencil, double shift, KSP *ksp)
   PetscFunctionReturn(0);
 }
 
-/* The lowest `count` of modes are used while the factorization is there, then it goes */
+/* Calls `use` for the lowest `count` modes while the factorization exists, then destroys it */
 static PetscErrorCode Use(const WhileFactored &use, PetscInt count, KSP *ksp, NormalModes *modes)
 {
   PetscFunctionBegin;
@@ -249,7 +249,7 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, const 
 {
   MPI_Comm       comm = PetscObjectComm((PetscObject)pencil.K);
   const PetscInt most = pencil.modes - (PetscInt)pencil.rigid.cols(), count = std::min(wanted.count, most);
-  PetscInt       missing = 0, from = slice_from, rows;
+  PetscInt       missing = 0, from = default_slices_from, rows;
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsGetInt(nullptr, REDUCE_PREFIX, "-slices_from", &from, nullptr));
@@ -258,14 +258,14 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, const 
   modes->x.resize(rows, 0);
   if (count <= 0) PetscFunctionReturn(Use(use, 0, ksp, modes));
   const bool slices = wanted.below > 0 && count >= from;
-  if (slices) PetscCall(KSPDestroy(ksp)); /* it has its own, and counts by inertia itself */
-  const PetscInt ask = slices ? count : std::min(count + beyond, most);
+  if (slices) PetscCall(KSPDestroy(ksp)); /* spectrum slicing has its own solvers and counts by inertia itself */
+  const PetscInt ask = slices ? count : std::min(count + extra_modes, most);
   PetscCall(RunEps(pencil, wanted, ask, slices, ksp, modes));
   if (slices) PetscCall(FactorAgain(pencil, wanted.shift, ksp));
   PetscCall(Use(use, count, ksp, modes));
   for (int search = 0; !slices; search++) {
     PetscCall(CountMissing(pencil, *modes, &missing));
-    if (missing <= 0 || search == most_searches) break;
+    if (missing <= 0 || search == max_searches) break;
     PetscCall(RunEps(pencil, wanted, std::min(missing, most - (PetscInt)modes->lambda.size()), slices, ksp, modes));
     PetscCall(Use(use, count, ksp, modes));
   }
