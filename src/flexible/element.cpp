@@ -13,17 +13,17 @@ namespace fe
 namespace
 {
 
-constexpr int most_nodes = 20, most_points = 64;
+constexpr int max_nodes = 20, max_points = 64;
 
-/* A shape at the points of a rule, its sizes known at run time: so the kernels are compiled once for all shapes */
+/* A shape at the points of a rule, with sizes known at run time, so that the kernels are compiled once for all shapes */
 struct Sampled {
   int           nodes, points;
-  const double *weight, *N, *d; /* of point q; of node i at N[nodes q + i], and its derivatives at d[3 (nodes q + i)] */
+  const double *weight, *N, *d; /* weight[q] of point q; N[nodes q + i]: shape function of node i there; d[3 (nodes q + i)]: its three derivatives */
 };
 
 template <class Shape, class Rule> Sampled SampledBy()
 {
-  static_assert(Shape::nodes <= most_nodes && Rule::count <= most_points, "larger than the kernels' arrays");
+  static_assert(Shape::nodes <= max_nodes && Rule::count <= max_points, "larger than the kernels' arrays");
   const auto &t = Table<Shape, Rule>::get();
   return {Shape::nodes, Rule::count, t.points.weight.data(), t.N[0].data(), t.d[0].data()};
 }
@@ -37,7 +37,7 @@ void OuterProduct(const double *A, int n, int columns, double *out) { product::O
 /* sum of a_i b_i^T over vectors of three components */
 Eigen::Matrix3d SumOfProducts(int n, const double *a, const double *b)
 {
-  double s[9] = {0}; /* column after column */
+  double s[9] = {0}; /* by columns */
   for (int i = 0; i < 3 * n; i += 3)
     for (int k = 0; k < 3; k++)
       for (int c = 0; c < 3; c++) s[3 * k + c] += a[i + c] * b[i + k];
@@ -65,7 +65,7 @@ double InverseExtent(int n, const double *X)
   return l > 0 ? 1 / (l * l * l) : std::numeric_limits<double>::infinity();
 }
 
-/* Determinant of the Jacobian at point q and derivatives with respect to X */
+/* Returns the determinant of the Jacobian at point q; G: derivatives of the shape functions with respect to X */
 double GradientsAt(const Sampled &s, const double *X, int q, double *G)
 {
   const double         *d = s.d + 3 * s.nodes * q;
@@ -81,8 +81,8 @@ double GradientsAt(const Sampled &s, const double *X, int q, double *G)
 using NodeBlock = Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<>>;
 NodeBlock BlockOf(double *K, int n, int i, int j) { return NodeBlock(K + 3 * i + 9 * n * j, Eigen::OuterStride<>(3 * n)); }
 
-/* lambda H + mu H^T of the blocks H of K, and what add(i, j, B) adds to them; symmetric to the last digit */
-template <class Add> void FromProducts(int n, const Lame &lame, double *K, const Add &add)
+/* Replaces the blocks H of K by B = lambda H + mu H^T plus what add(i, j, H, B) adds to B; exactly symmetric */
+template <class Add> void BlocksFromProducts(int n, const Lame &lame, double *K, const Add &add)
 {
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
@@ -102,28 +102,28 @@ template <class Add> void FromProducts(int n, const Lame &lame, double *K, const
 double StiffnessOf(const Sampled &s, const double *X, const Lame &lame, double *K)
 {
   const int rows = 3 * s.nodes;
-  double    all[3 * most_nodes * most_points], least = std::numeric_limits<double>::infinity();
+  double    scaled[3 * max_nodes * max_points], least = std::numeric_limits<double>::infinity();
   for (int q = 0; q < s.points; q++) {
-    double      *G   = all + rows * q;
+    double      *G   = scaled + rows * q;
     const double det = GradientsAt(s, X, q, G), root = std::sqrt(std::max(det, 0.) * s.weight[q]);
     Lower(least, det);
     for (int i = 0; i < rows; i++) G[i] *= root;
   }
-  OuterProduct(all, rows, s.points, K);
-  FromProducts(s.nodes, lame, K, [&](int, int, const Eigen::Matrix3d &H, Eigen::Matrix3d &B) { B.diagonal().array() += lame.mu * H.trace(); });
+  OuterProduct(scaled, rows, s.points, K);
+  BlocksFromProducts(s.nodes, lame, K, [&](int, int, const Eigen::Matrix3d &H, Eigen::Matrix3d &B) { B.diagonal().array() += lame.mu * H.trace(); });
   return least * InverseExtent(s.nodes, X);
 }
 
 double MassOf(const Sampled &s, const double *X, double density, double *m)
 {
   const int n = s.nodes;
-  double    all[most_nodes * most_points], least = std::numeric_limits<double>::infinity();
+  double    scaled[max_nodes * max_points], least = std::numeric_limits<double>::infinity();
   for (int q = 0; q < s.points; q++) {
     const double det = SumOfProducts(n, X, s.d + 3 * n * q).determinant(), root = std::sqrt(std::max(det, 0.) * s.weight[q] * density);
     Lower(least, det);
-    for (int i = 0; i < n; i++) all[n * q + i] = s.N[n * q + i] * root;
+    for (int i = 0; i < n; i++) scaled[n * q + i] = s.N[n * q + i] * root;
   }
-  OuterProduct(all, n, s.points, m);
+  OuterProduct(scaled, n, s.points, m);
   for (int j = 0; j < n; j++) /* symmetric to the last digit */
     for (int i = 0; i < j; i++) m[j + n * i] = m[i + n * j];
   return least * InverseExtent(n, X);
@@ -150,7 +150,7 @@ template <class Shape> double ElementMass(const NodeVectors<Shape> &X, double de
 
 /* ---- stress ---- */
 
-/* From the points where stress is sampled to the nodes */
+/* The matrix that extrapolates stress from the points of StressRule to the nodes */
 template <class Shape> static const Eigen::Matrix<double, Shape::StressRule::count, Shape::nodes> &Extrapolation()
 {
   constexpr int                                n = Shape::nodes, count = Shape::StressRule::count;
@@ -163,7 +163,7 @@ template <class Shape> static const Eigen::Matrix<double, Shape::StressRule::cou
         if (count == 1)
           E(q, i) = 1;
         else if (Shape::corners == 4) {
-          /* the rule's points are a tetrahedron in the order of the element's corners, about the centre, shrunk */
+          /* the rule's points are the corners of the element, in the same order, shrunk towards its centre */
           const double shrunk = 1 - 4 * TetrahedronRule4::points().at[0][0];
           const Point  y      = Point::Constant(.25) + (x - Point::Constant(.25)) / shrunk;
           const double L[4]   = {1 - y.sum(), y[0], y[1], y[2]};
@@ -202,7 +202,7 @@ static Components CauchyStress(const Eigen::Matrix3d &D, const Lame &lame)
   return c;
 }
 
-/* The stress of the gradients du / dX at the points, extrapolated to the nodes */
+/* Stress by `law` from the gradients du / dX at the points, extrapolated to the nodes */
 template <class Shape, class Law> static void ExtrapolatedStress(const Gradients<Shape::nodes> *G, const NodeVectors<Shape> &u, const Lame &lame, const Law &law, NodeStress<Shape> &stress)
 {
   const auto &to_nodes = Extrapolation<Shape>();
@@ -227,15 +227,15 @@ template <class Shape> void StressAtNodes<Shape>::large(const NodeVectors<Shape>
 
 /*
   Block ij of the tangent is the integral of (g_i S g_j) 1 + lambda h_i h_j^T + mu h_j h_i^T + mu (g_i g_j) F F^T with h
-  = F g: the products of h come from one product of matrices, as in StiffnessOf, the others are six matrices of
-  nodes by nodes, of which the upper triangle is needed.
+  = F g: the products of h are one matrix product, as in StiffnessOf(); the other terms are six matrices of
+  nodes by nodes, computed in the upper triangle.
 */
 static double ForceAndTangent(const Sampled &s, const double *X, const double *u, const Lame &lame, double *force, double *tangent, double *energy)
 {
   const int n = s.nodes, rows = 3 * n;
-  double    all[3 * most_nodes * most_points], G[3 * most_nodes], moved[3 * most_nodes];
-  double    axis[6][most_nodes];                   /* components of g_i, then of w S g_i */
-  double    symmetric[6][most_nodes * most_nodes]; /* xx, yy, zz, xy, yz, zx */
+  double    scaled[3 * max_nodes * max_points], G[3 * max_nodes], moved[3 * max_nodes];
+  double    axis[6][max_nodes];                  /* components of g_i, then of w S g_i */
+  double    symmetric[6][max_nodes * max_nodes]; /* xx, yy, zz, xy, yz, zx */
   double    least = std::numeric_limits<double>::infinity();
   std::fill(force, force + rows, 0.);
   for (double *C : symmetric) std::fill(C, C + n * n, 0.);
@@ -244,13 +244,13 @@ static double ForceAndTangent(const Sampled &s, const double *X, const double *u
     const double det = GradientsAt(s, X, q, G), w = std::max(det, 0.) * s.weight[q];
     Lower(least, det);
     const Eigen::Matrix3d D = SumOfProducts(n, u, G), F = Eigen::Matrix3d::Identity() + D;
-    /* not the difference of F^T F and 1, which would lose the digits of small strains */
+    /* equals (F^T F - 1) / 2, whose difference would lose the digits of small strains */
     const Eigen::Matrix3d E = (D + D.transpose() + D.transpose() * D) / 2;
     const Eigen::Matrix3d S = lame.lambda * E.trace() * Eigen::Matrix3d::Identity() + 2 * lame.mu * E, FF = w * lame.mu * F * F.transpose();
     *energy += w * (lame.lambda / 2 * E.trace() * E.trace() + lame.mu * E.squaredNorm());
     TransformEach(n, w * F * S, G, moved);
     for (int i = 0; i < rows; i++) force[i] += moved[i];
-    TransformEach(n, std::sqrt(w) * F, G, all + rows * q);
+    TransformEach(n, std::sqrt(w) * F, G, scaled + rows * q);
     TransformEach(n, w * S, G, moved);
     for (int i = 0; i < n; i++)
       for (int c = 0; c < 3; c++) {
@@ -267,8 +267,8 @@ static double ForceAndTangent(const Sampled &s, const double *X, const double *u
         }
       }
   }
-  OuterProduct(all, rows, s.points, tangent);
-  FromProducts(n, lame, tangent, [&](int i, int j, const Eigen::Matrix3d &, Eigen::Matrix3d &B) {
+  OuterProduct(scaled, rows, s.points, tangent);
+  BlocksFromProducts(n, lame, tangent, [&](int i, int j, const Eigen::Matrix3d &, Eigen::Matrix3d &B) {
     for (int d = 0; d < 3; d++) {
       const int e = (d + 1) % 3;
       B(d, d) += symmetric[d][i + n * j];

@@ -1,8 +1,8 @@
 /*
-  The internal force of a St. Venant-Kirchhoff element, four integration points at a time: what every residual of a whole finite-element body is made of.
+  The internal force of a St. Venant-Kirchhoff element, four integration points at a time. It dominates the residual of a whole finite-element body.
 
-  With J = X d^T, H = u d^T (d: natural derivatives of the shape functions) D = H J^-1 is du/dX, F = 1 + D, P = w F S the first Piola-Kirchhoff stress times weight and det J,
-  and (P J^-T) d the point's part of the force. Each quantity is a vector of four points; a rule is filled up with points without weight.
+  With J = X d^T and H = u d^T (d: derivatives of the shape functions by natural coordinates), D = H J^-1 is du/dX, F = 1 + D, P = w F S the first Piola-Kirchhoff stress times weight and
+  det J, and (P J^-T) d the point's contribution to the force. Each quantity is a vector over four points; a rule is padded with points of weight zero.
 */
 #ifndef HHTDAE_FLEXIBLE_ELEMENT_POINTS_H
 #define HHTDAE_FLEXIBLE_ELEMENT_POINTS_H
@@ -45,7 +45,7 @@ private:
   }
 };
 
-/* Inverse of J by cofactors, zero where the determinant is */
+/* Inverse of J by cofactors; zero where the determinant is zero */
 HHTDAE_INLINE void Invert(const Four (&J)[3][3], Four (&inverse)[3][3], Four *det)
 {
   Four c[3][3];
@@ -60,7 +60,7 @@ HHTDAE_INLINE void Invert(const Four (&J)[3][3], Four (&inverse)[3][3], Four *de
     for (int j = 0; j < 3; j++) inverse[i][j] = c[i][j] * over;
 }
 
-/* P = w F S of the displacements' gradient D; energy: w times its density */
+/* P = w F S for the displacement gradient D; energy: w times the energy density */
 HHTDAE_INLINE void Stress(const Four (&D)[3][3], double lambda, double mu, const Four &w, Four (&P)[3][3], Four *energy)
 {
   Four E[3][3], S[3][3], trace, square;
@@ -101,7 +101,7 @@ HHTDAE_INLINE double ForceOfPoints(const double *X, const double *u, double lamb
         for (int k = 0; k < 3; k++) H[c][k] += table.d[g][i][k] * u[3 * i + c];
     Invert(J, inverse, &det);
     for (int q = 0; q < 4; q++)
-      if (!(det[q] >= least)) least = det[q]; /* or no number */
+      if (!(det[q] >= least)) least = det[q]; /* keeps NaN, too */
     for (int c = 0; c < 3; c++)
       for (int k = 0; k < 3; k++) D[c][k] = H[c][0] * inverse[0][k] + H[c][1] * inverse[1][k] + H[c][2] * inverse[2][k];
     Stress(D, lambda, mu, (det > 0 ? det : zero) * table.weight[g], P, &e);
@@ -119,8 +119,8 @@ HHTDAE_INLINE double ForceOfPoints(const double *X, const double *u, double lamb
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
-/* The same digits, since there are no fused multiplications */
-template <class Shape> __attribute__((target("avx2"))) double ForceOfPointsNewer(const double *X, const double *u, double lambda, double mu, double *force, double *energy)
+/* Compiled for AVX2; without fused multiplications results are the same to the last digit */
+template <class Shape> __attribute__((target("avx2"))) double ForceOfPointsAVX2(const double *X, const double *u, double lambda, double mu, double *force, double *energy)
 {
   return ForceOfPoints<Shape>(X, u, lambda, mu, force, energy);
 }
@@ -130,8 +130,8 @@ template <class Shape> __attribute__((target("avx2"))) double ForceOfPointsNewer
 template <class Shape> double InternalForce(const double *X, const double *u, double lambda, double mu, double *force, double *energy)
 {
 #if defined(__x86_64__) && defined(__GNUC__)
-  static const bool newer = __builtin_cpu_supports("avx2");
-  if (newer) return ForceOfPointsNewer<Shape>(X, u, lambda, mu, force, energy);
+  static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx2) return ForceOfPointsAVX2<Shape>(X, u, lambda, mu, force, energy);
 #endif
   return ForceOfPoints<Shape>(X, u, lambda, mu, force, energy);
 }

@@ -1,16 +1,17 @@
 /*
   Shape functions and integration points of the four solid elements. A shape is a struct of constants and functions:
 
-    nodes, corners      their numbers
-    shape, gradient     functions and their derivatives at natural coordinates
+    nodes, corners      numbers of nodes and corners
+    shape, gradient     shape functions and their derivatives at natural coordinates
     place(i)            natural coordinates of node i
-    StiffnessRule       points at which the strains are taken: one for a linear tetrahedron, four for a quadratic one, 2
-  x 2 x 2 and 3 x 3 x 3 for bricks (full integration, as CalculiX has them for C3D4, C3D10, C3D8, C3D20) MassRule points
-  that integrate the mass of every element with straight edges exactly; of tetrahedra with curved edges total mass and
-  first moments are exact as well StressRule          where stress is sampled before it goes to the nodes; see element.h
+    StiffnessRule       integration points of the stiffness: one for a linear tetrahedron, four for a quadratic one,
+                        2 x 2 x 2 and 3 x 3 x 3 for bricks (full integration, as CalculiX' C3D4, C3D10, C3D8, C3D20)
+    MassRule            points that integrate the mass of every element with straight edges exactly; for tetrahedra with
+                        curved edges total mass and first moments are exact as well
+    StressRule          points from which stress is extrapolated to the nodes; see element.h
 
-  Nodes are in the order of Gmsh. Abaqus and CalculiX have the last two nodes of the quadratic tetrahedron the other way
-  round, and the twelve middle nodes of the quadratic brick in the order round the bottom, round the top, uprights.
+  Nodes are in the order of Gmsh. Abaqus and CalculiX exchange the last two nodes of the quadratic tetrahedron, and order
+  the twelve middle nodes of the quadratic brick as: around the bottom, around the top, vertical edges.
 */
 #ifndef HHTDAE_FLEXIBLE_ELEMENT_SHAPES_H
 #define HHTDAE_FLEXIBLE_ELEMENT_SHAPES_H
@@ -57,7 +58,7 @@ inline void Orbit6(double a, double w, Point *at, double *weight)
 }
 } // namespace detail
 
-struct TetrahedronRule4 { /* degree 2; corners of the rule in the order of the element's */
+struct TetrahedronRule4 { /* degree 2; point i is nearest to corner i of the element */
   static constexpr int count = 4;
   static Points<count> points()
   {
@@ -82,7 +83,7 @@ struct TetrahedronRule15 { /* degree 5, all weights positive (Keast 1986, in clo
   }
 };
 
-template <int n> struct BrickRule { /* Gauss, n in every direction */
+template <int n> struct BrickRule { /* Gauss, n points in every direction */
   static constexpr int count = n * n * n;
   static Points<count> points()
   {
@@ -209,7 +210,7 @@ struct Brick20 : Brick { /* serendipity */
   using MassRule                     = BrickRule<4>;
   using StressRule                   = BrickRule<2>;
   static Point place(int i) { return i < 8 ? corner(i) : Point((corner(edge[i - 8][0]) + corner(edge[i - 8][1])) / 2); }
-  /* The middle of an edge along k: (1 - x_k^2) times linear in the two others */
+  /* The direction k of an edge with middle node c; its shape function is (1 - x_k^2) times linear in the two others */
   static int  along(const Point &c) { return c[0] == 0 ? 0 : c[1] == 0 ? 1 : 2; }
   static void shape(const Point &x, Values<nodes> &N)
   {

@@ -1,5 +1,4 @@
-/* Messages between ranks as vectors of plain structs, parts of distributed things, and errors that all ranks raise
- * together. */
+/* Exchange of vectors of plain structs between ranks, division of distributed data, and errors that all ranks raise together. */
 #ifndef HHTDAE_FLEXIBLE_EXCHANGE_H
 #define HHTDAE_FLEXIBLE_EXCHANGE_H
 
@@ -11,7 +10,7 @@
 namespace hhtdae
 {
 
-/* If a rank has a problem, all ranks raise the error with the text of the first such rank. Collective */
+/* If `problem` is not empty on a rank, all ranks raise the error with the text of the first such rank. Collective */
 inline PetscErrorCode Agree(MPI_Comm comm, const std::string &problem, PetscErrorCode code = PETSC_ERR_FILE_UNEXPECTED)
 {
   PetscMPIInt rank, size, mine, first;
@@ -29,7 +28,7 @@ inline PetscErrorCode Agree(MPI_Comm comm, const std::string &problem, PetscErro
   SETERRQ(comm, code, "%s", text.c_str());
 }
 
-/* Pieces of a distributed thing, one after the other: this rank's first and the number of all. Collective */
+/* For data distributed in rank order, `own` items on this rank: number of its first item and of all items. Collective */
 inline PetscErrorCode RangeOnRank(MPI_Comm comm, PetscInt64 own, PetscInt64 *first, PetscInt64 *all)
 {
   PetscMPIInt rank;
@@ -42,7 +41,7 @@ inline PetscErrorCode RangeOnRank(MPI_Comm comm, PetscInt64 own, PetscInt64 *fir
   PetscFunctionReturn(0);
 }
 
-/* Begin of part r of n things divided among `parts` as evenly as possible */
+/* First item of part r when n items are divided among `parts` as evenly as possible */
 inline PetscInt64 PartBegin(PetscInt64 n, PetscMPIInt parts, PetscMPIInt r)
 {
   return n / parts * r + (n % parts < r ? n % parts : r);
@@ -50,7 +49,7 @@ inline PetscInt64 PartBegin(PetscInt64 n, PetscMPIInt parts, PetscMPIInt r)
 
 namespace detail
 {
-/* A type of T's size, so that counts are of entries and not of bytes */
+/* An MPI type of T's size, so that counts are numbers of entries, not of bytes */
 template <class T> struct Type {
   MPI_Datatype type;
   Type()
@@ -64,7 +63,7 @@ template <class T> struct Type {
 };
 } // namespace detail
 
-/* out[r] goes to rank r; what came from rank r is at in[from[r]] .. in[from[r + 1]] */
+/* Sends out[r] to rank r; the data from rank r are in[from[r]] to in[from[r + 1] - 1] */
 template <class T>
 PetscErrorCode Exchange(MPI_Comm comm, const std::vector<std::vector<T>> &out, std::vector<T> *in,
                         std::vector<std::size_t> *from)
@@ -92,8 +91,7 @@ PetscErrorCode Exchange(MPI_Comm comm, const std::vector<std::vector<T>> &out, s
   PetscFunctionReturn(0);
 }
 
-/* Answers to an Exchange: answer[k] belongs to in[k]; what comes back from rank r is in the order of out[r], put end to
- * end */
+/* Returns answers to an Exchange(): answer[k] belongs to in[k]; *back has the answers in the order of out[0], out[1], ..., those of rank r from place[r] on */
 template <class T>
 PetscErrorCode Answer(MPI_Comm comm, const std::vector<T> &answer, const std::vector<std::size_t> &from,
                       std::vector<T> *back, std::vector<std::size_t> *place)
@@ -106,7 +104,7 @@ PetscErrorCode Answer(MPI_Comm comm, const std::vector<T> &answer, const std::ve
   PetscFunctionReturn(0);
 }
 
-/* All of every rank's, in the order of ranks, on rank 0; of[r] is where rank r's begin */
+/* Gathers the data of all ranks, in rank order, on rank 0; those of rank r begin at of[r] */
 template <class T>
 PetscErrorCode GatherTo0(MPI_Comm comm, const T *mine, std::size_t n, std::vector<T> *all, std::vector<std::size_t> *of)
 {
@@ -126,7 +124,7 @@ PetscErrorCode GatherTo0(MPI_Comm comm, const T *mine, std::size_t n, std::vecto
   PetscFunctionReturn(0);
 }
 
-/* The way back of GatherTo0 */
+/* The reverse of GatherTo0() */
 template <class T>
 PetscErrorCode ScatterFrom0(MPI_Comm comm, const std::vector<T> &all, const std::vector<std::size_t> &of, std::size_t n,
                             std::vector<T> *mine)
@@ -146,7 +144,7 @@ PetscErrorCode ScatterFrom0(MPI_Comm comm, const std::vector<T> &all, const std:
   PetscFunctionReturn(0);
 }
 
-/* All of every rank's on every rank */
+/* Gathers the data of all ranks, in rank order, on every rank */
 template <class T> PetscErrorCode GatherAll(MPI_Comm comm, const std::vector<T> &mine, std::vector<T> *all)
 {
   PetscMPIInt size;

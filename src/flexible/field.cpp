@@ -1,7 +1,7 @@
 /*
-  The deformed field as a file for ParaView: VTK's XML unstructured grid with raw appended data. One file, written by
-  rank 0 from the parts that the others send one after the other: pieces of a .pvtu would repeat or tear the nodes
-  between them, and a .vtu is one file whatever the number of ranks was; its bytes do not depend on it. Rank 0 holds one
+  The deformed body as a file for ParaView: VTK's XML unstructured grid with raw appended data. Rank 0 writes a single file
+  from the parts that the other ranks send one after the other: the pieces of a .pvtu would duplicate or separate the nodes
+  between them, and the bytes of a .vtu do not depend on the number of ranks. Rank 0 holds one
   rank's part of one array at a time.
 */
 #include "flexible/body_name.h"
@@ -21,7 +21,7 @@ namespace hhtdae
 namespace
 {
 
-/* One array of the file: its description, and this rank's part of its bytes */
+/* One array of the file: its description, and this rank's part of the bytes */
 struct Array {
   std::string       name;
   const char       *type;
@@ -47,7 +47,7 @@ Array MakePoints(const ReducedBody &b, const Vector3 &origin, const Matrix3 &axe
   return a;
 }
 
-/* Sums over modes node by node in one order: the same on any number of ranks */
+/* Sums over modes in a fixed order, so that results are the same on any number of ranks */
 Array MakeDisplacement(const ReducedBody &b, const Eigen::VectorXd &eta, const Matrix3 &axes)
 {
   Array           a{"displacement", "Float64", 3, {}};
@@ -61,7 +61,7 @@ Array MakeDisplacement(const ReducedBody &b, const Eigen::VectorXd &eta, const M
   return a;
 }
 
-/* Not a number where a node has no stress modes: ParaView shows such places in a colour of their own */
+/* NaN at nodes without stress modes, which ParaView shows in a separate colour */
 Array MakeStress(const ReducedBody &b, const Eigen::VectorXd &eta, const Matrix3 &axes)
 {
   Array               a{"stress", "Float64", 6, {}};
@@ -100,7 +100,7 @@ Array MakeLabels(const ReducedBody &b)
   return a;
 }
 
-/* Connectivity, ends and types of the elements; without elements every node is a cell of its own. Collective */
+/* Connectivity, offsets and types of the elements; without elements every node is a cell. Collective */
 PetscErrorCode MakeCells(const ReducedBody &b, bool elements, Array cells[3])
 {
   constexpr uint8_t vtk_type[] = {10, 24, 12, 25};
@@ -157,9 +157,9 @@ std::string Header(const std::vector<Array> &points, const Array cells[3], Petsc
   return text + "      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n_";
 }
 
-constexpr std::size_t message_bytes = 1 << 28; /* longer parts are sent in several messages */
+constexpr std::size_t message_bytes = 1 << 28; /* longest MPI message: counts are ints */
 
-/* An array's bytes, rank after rank, into the file of rank 0. Collective */
+/* Appends an array's bytes, rank after rank, to the file on rank 0. Collective */
 PetscErrorCode Append(MPI_Comm comm, FILE *out, const Array &a, bool *good)
 {
   PetscMPIInt       rank, size;
@@ -190,7 +190,7 @@ PetscErrorCode Append(MPI_Comm comm, FILE *out, const Array &a, bool *good)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Total(MPI_Comm comm, Array *a)
+PetscErrorCode SumBytes(MPI_Comm comm, Array *a)
 {
   PetscInt64 mine = (PetscInt64)a->bytes.size();
   PetscFunctionBegin;
@@ -198,8 +198,8 @@ PetscErrorCode Total(MPI_Comm comm, Array *a)
   PetscFunctionReturn(0);
 }
 
-/* What the body lacks for a field; "" if nothing */
-std::string Missing(const ReducedBody &b, const Eigen::VectorXd &eta, const Vector3 &origin, const Matrix3 &axes)
+/* Why no field of the body can be written, or "" */
+std::string ProblemOf(const ReducedBody &b, const Eigen::VectorXd &eta, const Vector3 &origin, const Matrix3 &axes)
 {
   const std::string body = BodyName(b);
   if (eta.size() != b.modal.omega.size())
@@ -224,7 +224,7 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
   PetscInt64  count[3] = {body.own, (PetscInt64)body.elements.size(), (PetscInt64)body.stress.node.size()};
   FILE       *out      = nullptr;
   bool        good     = true;
-  std::string error    = Missing(body, eta, origin, axes);
+  std::string error    = ProblemOf(body, eta, origin, axes);
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(body.comm, &rank));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT64, MPI_SUM, body.comm));
@@ -240,8 +240,8 @@ PetscErrorCode WriteField(const ReducedBody &body, const Eigen::VectorXd &eta, c
     points.push_back(MakeStress(body, eta, axes));
   }
   PetscCall(MakeCells(body, count[1] > 0, cells));
-  for (Array &a : points) PetscCall(Total(body.comm, &a));
-  for (Array &a : cells) PetscCall(Total(body.comm, &a));
+  for (Array &a : points) PetscCall(SumBytes(body.comm, &a));
+  for (Array &a : cells) PetscCall(SumBytes(body.comm, &a));
   if (!rank && !(out = std::fopen(file.c_str(), "wb")))
     error = "cannot write the field into " + file + ": " + std::strerror(errno);
   PetscCall(Agree(body.comm, error, PETSC_ERR_FILE_OPEN));

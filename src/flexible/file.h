@@ -1,17 +1,17 @@
 /*
-  The file of a reduced body, HDF5. All numbers are little-endian; n modes, a attachments, N nodes, S nodes with stress,
-  E elements.
+  The HDF5 file of a reduced body. All numbers are little-endian. There are n modes, a attachments, N nodes, S nodes with
+  stress, E elements.
 
     attributes of /
       format         text "hhtdae reduced body"
-      version        int64, 4; a reader refuses a newer one. Version 1 had residuals of forces, |K x - omega^2 M x| / |K x|, version 2 no stiffening,
+      version        int64, 4; a reader refuses newer ones. Version 1 had force residuals, |K x - omega^2 M x| / |K x|, version 2 no stiffening,
                      version 3 neither kept nodes nor loads
-      program        text: what wrote the file
+      program        text: name and version of the program that wrote the file
       source, method, units, name   text: provenance; name is the body's
       fe_nodes       int64: nodes of the finite-element model
       elastic_scale  float64: largest elastic eigenvalue kept
       checksum       uint64, over the attributes above and the checksums of all datasets
-    /modal           what a scene takes, ModalBody of hhtdae/modal.h
+    /modal           ModalBody of hhtdae/modal.h, the part that a scene needs
       mass           float64 {1}
       center         float64 {3}
       moments        float64 {3, 3}
@@ -60,13 +60,13 @@
   Every dataset has an attribute checksum (uint64): the sum, modulo 2^64, over all entries of Mix(bits ^ Mix(key + index
   * odd)), where index is the entry's place in the dataset in C order, bits its 64 bits (uint8 widened), key the 64-bit
   FNV-1a hash of the dataset's path, odd = 0x9e3779b97f4a7c15 and Mix the finalizer of splitmix64; the dimensions are
-  added as if they were entries before the first. A sum does not ask in which order, and so on how many ranks, it is
-  taken; one changed entry always changes it. The file's own structures have HDF5's checksums (superblock 2, object
+  added as if they were entries before the first. A sum does not depend on the order of summation, and so not on the number of
+  ranks; one changed entry always changes it. The file's own structures have HDF5's checksums (superblock 2, object
   headers 2).
 
-  Rank 0 writes; the others send it their parts of a few modes at a time, so that no rank ever holds more of the shape
-  than its own and one such part, any build of HDF5 serves, and a full disk is an error on all ranks instead of ranks
-  that wait. The file appears under its name when it is complete. All ranks read, each its own part. The bytes of the
+  Rank 0 writes; the others send it their parts of a few modes at a time. So no rank holds more of the shape
+  than its own part and one of these, no parallel build of HDF5 is needed, and a full disk is an error on all ranks instead of a
+  deadlock. The file appears under its name when it is complete. All ranks read, each its own part. The bytes of the
   file do not depend on the number of ranks.
 */
 #ifndef HHTDAE_FLEXIBLE_FILE_H
@@ -84,14 +84,14 @@
 namespace hhtdae
 {
 
-/* What writing (file_write.cpp) and reading (file_read.cpp) share */
+/* Declarations shared by file_write.cpp and file_read.cpp */
 namespace bodyfile
 {
 
 constexpr const char *format_name    = "hhtdae reduced body";
 constexpr int64_t     format_version = 4;
 constexpr const char *program_name   = "hhtdae 0.1.0";
-constexpr hsize_t     block_entries  = 1 << 22; /* of one part that is sent to be written */
+constexpr hsize_t     block_entries  = 1 << 22; /* entries of one message to rank 0 */
 
 using Dims = std::vector<hsize_t>;
 
@@ -149,7 +149,7 @@ inline MPI_Datatype MpiType(double) { return MPI_DOUBLE; }
 inline MPI_Datatype MpiType(int64_t) { return MPI_INT64_T; }
 inline MPI_Datatype MpiType(uint8_t) { return MPI_UINT8_T; }
 
-/* HDF5 says nothing of its own while it lives */
+/* Suppresses HDF5's error messages during its lifetime */
 class Quiet
 {
 public:
@@ -167,7 +167,7 @@ private:
   void       *data_  = nullptr;
 };
 
-/* An HDF5 identifier that is closed with its scope */
+/* An HDF5 identifier that is closed at the end of its scope */
 class Handle
 {
 public:
@@ -216,7 +216,7 @@ inline bool WriteText(hid_t object, const char *name, const std::string &value)
   return attribute.good() && H5Awrite(attribute, type, value.c_str()) >= 0;
 }
 
-/* A scalar of the class and size that is asked for */
+/* Reads a scalar attribute; false if it is missing or of another class */
 inline bool ReadScalar(hid_t object, const char *name, H5T_class_t kind, hid_t memory, void *value)
 {
   if (H5Aexists(object, name) <= 0) return false;
@@ -243,7 +243,7 @@ inline bool ReadText(hid_t object, const char *name, std::string *value)
   return true;
 }
 
-/* What belongs to the file as a whole; its hash goes into the file's checksum */
+/* Attributes of the whole file; their hash is part of the file's checksum */
 struct Head {
   std::string program = program_name, source, method, units, name;
   int64_t     version = format_version, fe_nodes = 0;
@@ -259,7 +259,7 @@ struct Head {
 
 inline uint64_t DatasetShare(const std::string &path, uint64_t checksum) { return EntryHash(checksum, Fnv(path), 0); }
 
-/* All datasets that there may be */
+/* All datasets that a file may have */
 const char *const every_dataset[] = {"/modal/mass",           "/modal/center",         "/modal/moments",
                                      "/modal/omega",          "/modal/first",          "/modal/moment",
                                      "/modal/quadratic",      "/modes/frequency",      "/modes/residual",
@@ -274,7 +274,8 @@ const char *const every_dataset[] = {"/modal/mass",           "/modal/center",  
                                      "/loads/moment_gradient", "/loads/follows",      "/loads/force_gradient",
                                      "/loads/modal_gradient"};
 
-/* A dataset cut along one dimension: all of the first (1 if there is none), own of the middle one, all of the last */
+/* A rank's part of a dataset that is divided along one dimension: `rows` entries of the first dimension (1 if there is none), own of `all`, from `first` on, of the middle one,
+   and `width` of the last */
 struct Cut {
   hsize_t rows, own, first, all, width;
 };
@@ -288,7 +289,7 @@ inline bool Finite(const std::vector<double> &v)
   return true;
 }
 
-/* Numbers of the modal body that are not finite */
+/* The first part of the modal body with numbers that are not finite, or "" */
 inline std::string NotFinite(const ModalBody &m)
 {
   if (!std::isfinite(m.mass)) return "mass";

@@ -1,4 +1,4 @@
-/* A reduced body is read from its file (file_reader.h); the layout is in file.h. */
+/* Reads a reduced body from its file, with file_reader.h; the layout is described in file.h. */
 #include "hhtdae/flexible.h"
 
 #if defined(HHTDAE_HDF5)
@@ -19,7 +19,7 @@ Modes3 ThreeRows(const std::vector<double> &v, hsize_t begin, hsize_t n)
   return Eigen::Map<const Modes3>(v.data() + begin * 3 * n, 3, (Eigen::Index)n);
 }
 
-/* Names that end with a zero each; an error if they are not `count` */
+/* Reads names that end with a zero each; an error if there are not `count` of them */
 std::vector<std::string> GetNames(Reader *in, const std::string &path, hsize_t count, const std::string &of)
 {
   std::vector<std::string> all;
@@ -119,7 +119,7 @@ void GetAttachments(Reader *in, hsize_t n, ModalBody *m)
   }
 }
 
-/* Symmetric, so that the order of rows and columns does not matter */
+/* The matrices are symmetric, so that storage by rows or columns makes no difference */
 void GetStiffening(Reader *in, hsize_t n, ModalBody *m)
 {
   if (!in->has("/modal/stiffening") || !in->error.empty()) return;
@@ -172,7 +172,7 @@ void GetModes(Reader *in, hsize_t n, ReducedBody *b)
   if (!Finite(frequency) || !Finite(residual)) return in->fail("a mode's frequency or residual is not finite");
   for (double f : frequency)
     if (f < 0) return in->fail("a mode's frequency is negative");
-  const bool known = in->head.version >= 2; /* before, residuals were those of forces, which say another thing */
+  const bool known = in->head.version >= 2; /* version 1 had residuals of forces, a different quantity */
   for (hsize_t k = 0; k < n; k++) b->mode.push_back({frequency[k], known ? residual[k] : -1.});
 }
 
@@ -204,7 +204,7 @@ void GetNodes(Reader *in, PetscMPIInt rank, PetscMPIInt size, hsize_t n, hsize_t
   if (!Finite(b->coordinates) || !b->shape.allFinite()) in->fail("numbers that are not finite: nodes");
 }
 
-/* Elements of this rank, and where their nodes are. Collective */
+/* Reads this rank's elements and their nodes. Collective */
 PetscErrorCode GetElements(Reader *in, MPI_Comm comm, PetscMPIInt rank, PetscMPIInt size, hsize_t N, ReducedBody *b)
 {
   std::vector<uint8_t> type;
@@ -245,7 +245,7 @@ PetscErrorCode GetElements(Reader *in, MPI_Comm comm, PetscMPIInt rank, PetscMPI
   PetscFunctionReturn(0);
 }
 
-/* First of the nodes with stress that is not before node `from` */
+/* Index of the first node with stress whose number is at least `from`, by bisection */
 hsize_t FirstStressed(Reader *in, hsize_t S, int64_t from)
 {
   hsize_t low = 0, high = S;
@@ -290,7 +290,7 @@ PetscErrorCode GetStress(Reader *in, MPI_Comm comm, hsize_t n, ReducedBody *b)
   PetscFunctionReturn(0);
 }
 
-/* Damage that HDF5 or the allocation of memory meets must not end the program */
+/* Reads the whole body */
 PetscErrorCode LoadBody(MPI_Comm comm, const std::string &file, ReducedBody *b)
 {
   Quiet       quiet;

@@ -1,4 +1,4 @@
-/* Datasets of a reduced body's file (file.h) are read and their checksums compared */
+/* Reads datasets of a reduced body's file (file.h) and compares their checksums */
 #ifndef HHTDAE_FLEXIBLE_FILE_READER_H
 #define HHTDAE_FLEXIBLE_FILE_READER_H
 
@@ -14,7 +14,7 @@ namespace hhtdae
 namespace bodyfile
 {
 
-/* Every rank reads for itself; errors are kept, what follows the first one does nothing, and all ranks come together at the end */
+/* Every rank reads by itself. The first error is kept, and later calls do nothing; agree() makes it an error of all ranks. */
 class Reader
 {
 public:
@@ -39,7 +39,7 @@ public:
     const std::size_t got = std::fread(start, 1, sizeof start, in);
     std::fclose(in);
     size_ = (hsize_t)status.st_size;
-    /* H5Fis_hdf5() of HDF5 1.10 leaves something open in a damaged file, which its end then complains of */
+    /* the signature is compared here, because H5Fis_hdf5() of HDF5 1.10 leaves objects of a damaged file open, which causes errors when HDF5 closes */
     if (got < sizeof start || std::memcmp(start, "\x89HDF\r\n\x1a\n", sizeof start))
       return fail("it is not an HDF5 file, or its beginning is damaged");
     file_ = H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -55,7 +55,7 @@ public:
            H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0;
   }
 
-  /* The dataset's dimensions; none if there is no such dataset of this type that the file can hold */
+  /* The dataset's dimensions; empty, with an error, if there is no such dataset of this type or its size exceeds the file's */
   template <class T> Dims dims(const std::string &path)
   {
     Dims none;
@@ -71,7 +71,7 @@ public:
     H5Sget_simple_extent_dims(space, d.data(), nullptr);
     for (hsize_t e : d)
       if (e > (hsize_t)PETSC_MAX_INT) return fail(path + " is larger than this build of PETSc can count"), none;
-    /* No memory is asked for entries that the file does not have. One dimension of none leaves the others free. */
+    /* prevents allocations for entries that the file does not have; with one dimension zero the product does not bound the others */
     for (hsize_t e : d)
       if (e > size_) return fail(path + " has " + Text(d) + " entries, which the file does not hold"), none;
     if (Product(d) && (H5Dget_storage_size(set) != Product(d) * sizeof(T) || Product(d) > size_))
@@ -79,7 +79,7 @@ public:
     return d;
   }
 
-  /* All of a dataset with these dimensions */
+  /* Reads a whole dataset of these dimensions */
   template <class T> std::vector<T> get(const std::string &path, const Dims &expected)
   {
     std::vector<T> data;
@@ -95,7 +95,7 @@ public:
     return data;
   }
 
-  /* This rank's part; its share of the checksum waits for those of the others */
+  /* Reads this rank's part; agree() adds up the checksums of all parts */
   template <class T> void part(const std::string &path, const Dims &expected, const Cut &cut, T *data)
   {
     const Dims found = dims<T>(path);
@@ -111,11 +111,11 @@ public:
     for (hsize_t r = 0; r < cut.rows; r++)
       sum +=
           HashEntries(data + r * cut.own * cut.width, cut.own * cut.width, key, (r * cut.all + cut.first) * cut.width);
-    pending_.push_back({path, stored(path) - HashDims(expected, key)});
+    expected_sums_.push_back({path, stored(path) - HashDims(expected, key)});
     sums_.push_back(sum);
   }
 
-  /* Single entries of a dataset of one dimension */
+  /* A single entry of a dataset of one dimension */
   int64_t entry(const std::string &path, hsize_t i)
   {
     int64_t value = 0;
@@ -128,7 +128,7 @@ public:
     if (error.empty()) error = "cannot read the reduced body from " + name_ + ": " + why;
   }
 
-  /* Errors of one rank become those of all, checksums of parts are completed. Collective */
+  /* Compares the checksums of parts, and makes an error of one rank an error of all. Collective */
   PetscErrorCode agree(MPI_Comm comm)
   {
     PetscFunctionBegin;
@@ -136,9 +136,9 @@ public:
     if (!sums_.empty())
       PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums_.data(), (PetscMPIInt)sums_.size(), MPI_UINT64_T, MPI_SUM, comm));
     for (std::size_t i = 0; i < sums_.size(); i++)
-      if (sums_[i] != pending_[i].second) fail(pending_[i].first + " is damaged: its checksum does not agree");
+      if (sums_[i] != expected_sums_[i].second) fail(expected_sums_[i].first + " is damaged: its checksum does not agree");
     sums_.clear();
-    pending_.clear();
+    expected_sums_.clear();
     PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));
     PetscFunctionReturn(0);
   }
@@ -195,7 +195,7 @@ private:
   std::string                                   name_;
   hid_t                                         file_ = -1;
   hsize_t                                       size_ = 0;
-  std::vector<std::pair<std::string, uint64_t>> pending_;
+  std::vector<std::pair<std::string, uint64_t>> expected_sums_;
   std::vector<uint64_t>                         sums_;
 };
 

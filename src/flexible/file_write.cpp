@@ -1,4 +1,4 @@
-/* A reduced body is written to its file (file_writer.h); the layout is in file.h. */
+/* Writes a reduced body to its file, with file_writer.h; the layout is described in file.h. */
 #include "hhtdae/flexible.h"
 
 #if defined(HHTDAE_HDF5)
@@ -23,8 +23,8 @@ std::vector<double> Flat(const Eigen::Ref<const Eigen::MatrixXd> &m)
   return v;
 }
 
-/* What is wrong with the sizes of a modal body; "" if nothing is */
-std::string Inconsistent(const ModalBody &m)
+/* A description of inconsistent sizes in a modal body, or "" */
+std::string SizeProblem(const ModalBody &m)
 {
   const Eigen::Index n = m.omega.size();
   if (m.first.cols() != n)
@@ -149,14 +149,14 @@ void PutModal(Writer *out, const ModalBody &m)
   PutLoads(out, m);
 }
 
-/* How many nodes there are on all ranks, and what of them is kept */
-struct Kept {
+/* Numbers of nodes, nodes with stress and elements on all ranks, and this rank's first ones; whether coordinates and shapes are stored */
+struct StoredParts {
   PetscInt64 nodes = 0, first = 0, stressed = 0, first_stressed = 0, elements = 0, first_element = 0;
   bool       coordinates = false, shape = false;
 };
 
-/* A body that can be written: sizes agree, numbers are finite. Collective */
-PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
+/* Checks that sizes agree and numbers are finite. Collective */
+PetscErrorCode CheckBody(const ReducedBody &b, StoredParts *kept)
 {
   const Eigen::Index n = b.modal.omega.size();
   std::string        error;
@@ -171,7 +171,7 @@ PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
   const auto wrong  = [&error](bool is, const std::string &why) {
     if (is && error.empty()) error = "the reduced body cannot be written: " + why;
   };
-  const std::string sizes = Inconsistent(b.modal), numbers = NotFinite(b.modal);
+  const std::string sizes = SizeProblem(b.modal), numbers = NotFinite(b.modal);
   wrong(!sizes.empty(), sizes);
   wrong(!numbers.empty(), "numbers that are not finite: " + numbers);
   const std::string impossible = sizes.empty() && numbers.empty() ? Impossible(b.modal) : "";
@@ -213,7 +213,7 @@ PetscErrorCode CheckBody(const ReducedBody &b, Kept *kept)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode PutNodes(Writer *out, const ReducedBody &b, const Kept &kept)
+PetscErrorCode PutNodes(Writer *out, const ReducedBody &b, const StoredParts &kept)
 {
   const hsize_t N = (hsize_t)kept.nodes, n = (hsize_t)b.modal.omega.size(), own = (hsize_t)b.own,
                 first = (hsize_t)kept.first;
@@ -234,7 +234,7 @@ PetscErrorCode PutNodes(Writer *out, const ReducedBody &b, const Kept &kept)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode PutElements(Writer *out, const ReducedBody &b, const Kept &kept)
+PetscErrorCode PutElements(Writer *out, const ReducedBody &b, const StoredParts &kept)
 {
   const hsize_t        E = (hsize_t)kept.elements, own = b.elements.size(), first = (hsize_t)kept.first_element;
   std::vector<int64_t> node;
@@ -256,7 +256,7 @@ PetscErrorCode PutElements(Writer *out, const ReducedBody &b, const Kept &kept)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode PutStress(Writer *out, const ReducedBody &b, const Kept &kept)
+PetscErrorCode PutStress(Writer *out, const ReducedBody &b, const StoredParts &kept)
 {
   const hsize_t S = (hsize_t)kept.stressed, n = (hsize_t)b.modal.omega.size(), own = b.stress.node.size(),
                 first = (hsize_t)kept.first_stressed;
@@ -276,10 +276,10 @@ PetscErrorCode PutStress(Writer *out, const ReducedBody &b, const Kept &kept)
 
 PetscErrorCode ReducedBody::save(const std::string &file) const
 {
-  Quiet  quiet;
-  Writer out(comm, file);
-  Kept   kept;
-  Head   head;
+  Quiet       quiet;
+  Writer      out(comm, file);
+  StoredParts kept;
+  Head        head;
   PetscFunctionBegin;
   PetscCall(CheckBody(*this, &kept));
   out.open();

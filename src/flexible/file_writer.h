@@ -1,4 +1,4 @@
-/* Datasets of a reduced body's file (file.h) are written with their checksums */
+/* Writes datasets of a reduced body's file (file.h) with their checksums */
 #ifndef HHTDAE_FLEXIBLE_FILE_WRITER_H
 #define HHTDAE_FLEXIBLE_FILE_WRITER_H
 
@@ -16,8 +16,8 @@ namespace hhtdae
 namespace bodyfile
 {
 
-/* Before it takes the place of another file */
-inline bool OnDisk(const std::string &name)
+/* Flushes a file to disk, before it replaces another one */
+inline bool Flush(const std::string &name)
 {
   const int  file = open(name.c_str(), O_RDONLY);
   const bool good = file >= 0 && fsync(file) == 0;
@@ -25,7 +25,7 @@ inline bool OnDisk(const std::string &name)
   return good;
 }
 
-/* Rank 0 writes, under another name until the file is complete; errors are kept, what follows the first one does nothing */
+/* Rank 0 writes, under a temporary name until the file is complete. The first error is kept, and later calls do nothing. */
 class Writer
 {
 public:
@@ -34,12 +34,12 @@ public:
     struct stat info;
     MPI_Comm_rank(comm, &rank_);
     MPI_Comm_size(comm, &size_);
-    if (!rank_ && !stat(name.c_str(), &info) && !S_ISREG(info.st_mode)) part_ = name; /* a device is written to, not replaced */
+    if (!rank_ && !stat(name.c_str(), &info) && !S_ISREG(info.st_mode)) part_ = name; /* a device is written directly */
   }
   ~Writer()
   {
     if (file_ >= 0) H5Fclose(file_);
-    if (!rank_ && !complete_ && made_ && part_ != name_) std::remove(part_.c_str());
+    if (!rank_ && !complete_ && created_ && part_ != name_) std::remove(part_.c_str());
   }
   Writer(const Writer &) = delete;
 
@@ -48,15 +48,15 @@ public:
     if (rank_) return;
     Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose), creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
     H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_LATEST); /* structures with checksums */
-    H5Pset_obj_track_times(creation, 0);                             /* the same body, the same bytes */
-    file_ = H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, access);
-    made_ = file_ >= 0;
-    if (!made_)
+    H5Pset_obj_track_times(creation, 0);                             /* equal bodies give equal bytes */
+    file_    = H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, access);
+    created_ = file_ >= 0;
+    if (!created_)
       error_ = "cannot write the reduced body to " + name_ +
                ": the file cannot be made (folder missing, or no right to write)";
   }
 
-  /* The same on all ranks, written as rank 0 has it */
+  /* Writes data that are the same on all ranks */
   template <class T> void put(const std::string &path, const Dims &dims, const std::vector<T> &data)
   {
     if (rank_ || !error_.empty()) return;
@@ -69,7 +69,7 @@ public:
     seal(path, set, sum);
   }
 
-  /* Every rank has a part, get(row, out) copies rows [row, row + count) of it */
+  /* Writes data of which every rank has a part; get(row, count, out) copies rows [row, row + count) of it */
   template <class T, class Get>
   PetscErrorCode putParts(const std::string &path, const Dims &dims, const Cut &cut, Get get)
   {
@@ -90,14 +90,14 @@ public:
       for (hsize_t r = 0; r < count; r++)
         mine += HashEntries(part.data() + r * cut.own * cut.width, cut.own * cut.width, key,
                             ((row + r) * cut.all + cut.first) * cut.width);
-      PetscCall(pass(path, set, space, dims.size(), row, count, cut, &part));
+      PetscCall(sendRows(path, set, space, dims.size(), row, count, cut, &part));
     }
     PetscCallMPI(MPI_Reduce(&mine, &sum, 1, MPI_UINT64_T, MPI_SUM, 0, comm_));
     if (!rank_ && error_.empty()) seal(path, set, sum + HashDims(dims, key));
     PetscFunctionReturn(0);
   }
 
-  /* Attributes, and the file under its own name. Collective */
+  /* Writes the attributes and renames the file to its final name. Collective */
   PetscErrorCode finish(const Head &head)
   {
     PetscFunctionBegin;
@@ -112,7 +112,7 @@ public:
       file_             = -1;
       if (!good || !closed)
         fail("/");
-      else if (part_ != name_ && (!OnDisk(part_) || std::rename(part_.c_str(), name_.c_str())))
+      else if (part_ != name_ && (!Flush(part_) || std::rename(part_.c_str(), name_.c_str())))
         error_ = "cannot write the reduced body to " + name_ + ": " + std::strerror(errno);
       complete_ = error_.empty();
     }
@@ -138,10 +138,10 @@ private:
     return H5Dcreate2(file_, path.c_str(), FileType(T()), space, link, layout, H5P_DEFAULT);
   }
 
-  /* Rows [row, row + count) of all ranks' parts go to rank 0, one rank after the other */
+  /* Sends rows [row, row + count) of all ranks' parts to rank 0, which writes them one rank after the other */
   template <class T>
-  PetscErrorCode pass(const std::string &path, hid_t set, hid_t space, std::size_t rank, hsize_t row, hsize_t count,
-                      const Cut &cut, std::vector<T> *part)
+  PetscErrorCode sendRows(const std::string &path, hid_t set, hid_t space, std::size_t rank, hsize_t row, hsize_t count,
+                          const Cut &cut, std::vector<T> *part)
   {
     PetscInt64 where[2] = {(PetscInt64)cut.first, (PetscInt64)cut.own};
     PetscFunctionBegin;
@@ -188,8 +188,8 @@ private:
   MPI_Comm    comm_;
   PetscMPIInt rank_, size_;
   std::string name_, part_, error_;
-  hid_t       file_ = -1;
-  bool        made_ = false, complete_ = false;
+  hid_t       file_    = -1;
+  bool        created_ = false, complete_ = false;
   uint64_t    total_ = 0;
 };
 

@@ -1,4 +1,4 @@
-/* Modes of the free body, whose rigid attachments are tied to their points by P^T K P and P^T M P. */
+/* Modes of the free body; the nodes of rigid attachments are eliminated by P^T K P and P^T M P. */
 #include "craig_bampton.h"
 #include "interior.h"
 #include <algorithm>
@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-/* P: displacements of all nodes by free dofs and, at the end of the owner's part, the motions of rigid attachments */
+/* P maps free dofs and motions of rigid attachments, which are last on their owner, to displacements of all nodes. (*master)[a]: first column of attachment a, or -1 */
 static PetscErrorCode CreateTies(const FeModel &model, const std::vector<Tied> &tied, const std::vector<PetscInt> &dof,
                                  std::vector<PetscInt> *master, Mat *P)
 {
@@ -47,7 +47,7 @@ static PetscErrorCode CreateTies(const FeModel &model, const std::vector<Tied> &
   PetscFunctionReturn(0);
 }
 
-/* The rigid motions in dofs of the tied model */
+/* The rigid motions of the body in the columns' dofs of P */
 static void TiedRigid(const std::vector<Tied> &tied, const std::vector<PetscInt> &dof, const BodyScales &scales,
                       PetscMPIInt rank, MatrixXd *r)
 {
@@ -69,7 +69,7 @@ static bool AnyRigid(const std::vector<Tied> &tied)
   return std::any_of(tied.begin(), tied.end(), [](const Tied &t) { return t.tie == Tie::Rigid; });
 }
 
-/* Modes of the tied model to those of all nodes, and the motions of rigid attachments, which the owners have */
+/* Expands modes to all nodes, and extracts the motions of rigid attachments, on all ranks */
 static PetscErrorCode Expand(const FeModel &model, const std::vector<Tied> &tied, Mat P,
                              const std::vector<PetscInt> &master, const NormalModes &modes, ReductionSpace *space)
 {
@@ -90,7 +90,7 @@ static PetscErrorCode Expand(const FeModel &model, const std::vector<Tied> &tied
   PetscFunctionReturn(0);
 }
 
-/* The pencil of the free body: that of the model, or of its nodes and rigid attachments by P; Pt is P^T */
+/* The pencil of the free body: K and M of the model or, with rigid attachments, P^T K P and P^T M P; Pt is P^T */
 struct FreePencil {
   Pencil                pencil;
   Mat                   P = nullptr, Pt = nullptr;
@@ -159,7 +159,7 @@ PetscErrorCode FreeFreeSpace(const FeModel &model, const std::vector<Tied> &tied
     PetscCall(FillSpace(model, tied, scales, f, *modes, space));
     PetscCall(SolveSpace(model, reduction, scales, space));
     PetscCall(ModeResiduals(model, reduction, wanted.shift, factored, rows, space));
-    space->x.resize(0, 0); /* the factorization that comes next needs the room */
+    space->x.resize(0, 0); /* frees memory for the next factorization */
     PetscFunctionReturn(0);
   };
   PetscCall(FindNormalModes(model, f.pencil, reduction, wanted, use, &solver.ksp, &normal));

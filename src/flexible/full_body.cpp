@@ -1,3 +1,4 @@
+/* FullFeBody: adds a finite-element model to a scene, and reads its positions from a run */
 #include "flexible/full_body.h"
 #include "flexible/assembly.h"
 #include "flexible/body_check.h"
@@ -52,13 +53,13 @@ void FullExtension::localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &
 namespace
 {
 
-/* What one rank knows of a node of a set */
+/* A node of an attachment, with its weight */
 struct SetNode {
   PetscInt node;
   double   X[3], weight;
 };
 
-std::string Fault(const FeModel &m, const FullBody &b)
+std::string ProblemOf(const FeModel &m, const FullBody &b)
 {
   if (!m.M || (b.law == FeLaw::Small && !m.K)) return "the FE model has no matrices; read or set them first";
   if (!(b.rotation.transpose() * b.rotation - Matrix3::Identity()).isZero(1e-8) || b.rotation.determinant() < 0)
@@ -70,8 +71,8 @@ std::string Fault(const FeModel &m, const FullBody &b)
   return "";
 }
 
-/* Elements go to every rank that owns one of their nodes */
-PetscErrorCode BringElements(FullExtension &x)
+/* Sends each element to every rank that owns one of its nodes */
+PetscErrorCode DistributeElements(FullExtension &x)
 {
   const FeModel                      &m = *x.model;
   std::vector<std::vector<FeElement>> out(x.node_first.size() - 1);
@@ -85,7 +86,7 @@ PetscErrorCode BringElements(FullExtension &x)
     for (PetscMPIInt r : to) out[r].push_back(e);
   }
   PetscCall(Exchange(m.comm, out, &x.elements, &from));
-  FeModel here(m.comm); /* for the exchange of their nodes alone */
+  FeModel here(m.comm); /* only for the exchange of nodal values */
   here.elements = x.elements;
   here.own      = m.own;
   ElementNodes nodes;
@@ -100,7 +101,7 @@ PetscErrorCode BringElements(FullExtension &x)
   PetscFunctionReturn(0);
 }
 
-/* All nodes of an attachment on every rank, in the order of their numbers */
+/* Gathers the nodes of an attachment on every rank, in the order of their global numbers */
 PetscErrorCode Gather(const FeModel &m, const Attachment &a, std::vector<SetNode> *all)
 {
   std::vector<PetscInt> own;
@@ -118,7 +119,7 @@ PetscErrorCode Gather(const FeModel &m, const Attachment &a, std::vector<SetNode
   PetscFunctionReturn(0);
 }
 
-/* The attachment has been checked, CheckAttachments() */
+/* Sets up the tie of an attachment, which CheckAttachments() must have accepted; *point: its position in the axes of the FE model */
 PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
 {
   const FeModel       &m = *x.model;
@@ -145,7 +146,7 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
   if (t.tie == Tie::Rigid) {
     std::vector<PetscInt> next(x.node_first.size(), 0);
     next[rank] = x.own_multipliers;
-    /* every rank counts its own; the others' numbers come from them */
+    /* numbers of multipliers count up on each owner, and every rank counts for all owners */
     PetscCallMPI(MPI_Allgather(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, next.data(), 1, MPIU_INT, m.comm));
     for (PetscInt n : t.node) {
       PetscInt &i = next[x.ownerOf(n)];
@@ -163,7 +164,7 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
   PetscFunctionReturn(0);
 }
 
-/* The frame of an attachment, moving with the undeformed body */
+/* Adds the frame of an attachment as a massless body, with the velocity of the undeformed body */
 Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, const Vector3 &point, double mass, double size)
 {
   BodyData f;
@@ -182,7 +183,7 @@ Body AddFrame(Scene &scene, const FullExtension &x, const std::string &name, con
   return Body{(PetscInt)DataOf(scene).bodies.size() - 1, DataOf(scene).number};
 }
 
-/* Mass, and two opposite corners of the box around the body, for what has to be small or large beside them */
+/* Mass and bounding box of the body, as scales for light masses and the size of the scene */
 PetscErrorCode MassAndBox(const FeModel &m, double *mass, Vector3 corner[2])
 {
   Vec    one, M1;
@@ -206,7 +207,7 @@ PetscErrorCode MassAndBox(const FeModel &m, double *mass, Vector3 corner[2])
   PetscFunctionReturn(0);
 }
 
-/* Nodes and unknowns are numbered by the ranks of one communicator for both */
+/* Scene and model must have the same ranks, because nodes and unknowns are numbered by rank */
 PetscErrorCode CheckRanks(const Scene &scene, const std::string &name, const FeModel &model)
 {
   const MPI_Comm comm = DataOf(scene).comm;
@@ -228,10 +229,10 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeM
   double      mass;
   Vector3     corner[2];
   PetscFunctionBegin;
-  const std::string name  = given.empty() ? "fe body " + std::to_string(DataOf(scene).extensions.size()) : given,
-                    fault = DataOf(scene).planar ? "it needs a scene in space" : Fault(model, body);
+  const std::string name    = given.empty() ? "fe body " + std::to_string(DataOf(scene).extensions.size()) : given,
+                    problem = DataOf(scene).planar ? "it needs a scene in space" : ProblemOf(model, body);
   PetscCall(CheckRanks(scene, name, model));
-  PetscCall(Agree(model.comm, fault.empty() ? "" : "finite-element body " + name + ": " + fault, PETSC_ERR_ARG_WRONG));
+  PetscCall(Agree(model.comm, problem.empty() ? "" : "finite-element body " + name + ": " + problem, PETSC_ERR_ARG_WRONG));
   PetscCall(CheckAttachments(model, body.attachments));
   PetscCallMPI(MPI_Comm_rank(model.comm, &rank));
   PetscCallMPI(MPI_Comm_size(model.comm, &size));
@@ -252,20 +253,20 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeM
     PetscCheck(all > 0, model.comm, PETSC_ERR_ARG_WRONG, "finite-element body %s: large displacements need elements, which this model does not have",
                name.c_str());
     PetscCall(CheckElements(model, "finite-element body " + name + ": FeLaw::Large"));
-    PetscCall(BringElements(*x));
+    PetscCall(DistributeElements(*x));
   } else {
     PetscCall(ExtractBlocks(*x));
   }
   PetscCall(MassAndBox(model, &mass, corner));
   std::vector<Vector3> point(body.attachments.size());
   for (std::size_t i = 0; i < point.size(); i++) PetscCall(MakeTie(*x, body.attachments[i], &point[i]));
-  /* nothing fails from here on: what is described anew with other parameters was right, and what was wrong has left nothing in the scene */
+  /* nothing fails from here on: a faulty description has left nothing in the scene, and one that is recorded can be repeated with other parameters */
   SceneAccess::record(scene, [=, &model](Scene &s) {
     if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
   });
   DataOf(scene).refuseLate("finite-element body " + name);
   const double extent = (corner[1] - corner[0]).norm();
-  /* a scene takes its size from bodies and markers, and has none of this body else but its attachments */
+  /* corners of the bounding box as markers: a scene takes its size from bodies and markers, and would know only the attachments of this body */
   for (const Vector3 &c : corner) DataOf(scene).markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
   for (std::size_t i = 0; i < point.size(); i++) {
     const std::string &attachment = body.attachments[i].name;
@@ -297,7 +298,7 @@ Body FullFeBody::attachment(const std::string &name) const
 namespace
 {
 
-/* The body in the run of a TS */
+/* Finds the run of a TS, and this body in it */
 PetscErrorCode Find(TS ts, PetscInt scene, PetscInt extension, const Runtime **R, const FullExtension **x)
 {
   PetscFunctionBegin;
@@ -319,12 +320,12 @@ PetscErrorCode FullFeBody::positions(TS ts, PetscReal t, std::vector<double> *x)
   const FullExtension *e;
   PetscErrorCode (*read)(TS);
   PetscFunctionBegin;
-  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3ReadCheckpoint_C", &read)); /* a file that waits for the set-up */
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3ReadCheckpoint_C", &read)); /* reads a checkpoint that was to be read at set-up */
   if (read) PetscCall(read(ts));
   PetscCall(Find(ts, scene_, extension_, &R, &e));
   PetscCall(TSGetSolution(ts, &now));
   PetscCall(TSGetTime(ts, &present));
-  if (t != present) { /* where the run is, there need not be a step: before the first one, in equilibrium, after a restart */
+  if (t != present) { /* at the present time there may be no step to interpolate in: before the first one, in equilibrium, after a restart */
     PetscCall(VecDuplicate(now, &U));
     const PetscErrorCode failed = TSHHT3Interpolate(ts, t, U, nullptr, nullptr);
     if (failed) PetscCall(VecDestroy(&U));
@@ -344,7 +345,7 @@ PetscErrorCode FullFeBody::writeField(TS ts, PetscReal t, const std::string &fil
   const Runtime       *R;
   const FullExtension *e;
   std::vector<double>  x;
-  ReducedBody          b; /* whose one mode is the displacement */
+  ReducedBody          b; /* the displacement as its only mode */
   PetscFunctionBegin;
   PetscCall(Find(ts, scene_, extension_, &R, &e));
   const FeModel &m = *e->model;

@@ -1,7 +1,7 @@
 /*
-  A finite-element model as it is, in a scene: three absolute coordinates a node, in parallel. Rows of own nodes are computed from
-  K and M (small displacements) or from the elements that touch own nodes (large ones), those of other ranks' among them, as joints
-  are in scenes; attachments are rigid frames without mass, tied to their nodes by multipliers.
+  An unreduced finite-element model in a scene, distributed over ranks, with three absolute coordinates per node. Rows of own nodes are computed from
+  K and M (small displacements) or from all elements with own nodes (large displacements); elements with nodes of several ranks are computed on each of these, as joints
+  are. Attachments are massless rigid frames, tied to their nodes by multipliers.
 */
 #ifndef HHTDAE_FLEXIBLE_FULL_BODY_H
 #define HHTDAE_FLEXIBLE_FULL_BODY_H
@@ -13,16 +13,16 @@
 namespace hhtdae
 {
 
-/* Nodes tied to the frame of an attachment; the same on every rank */
+/* The nodes tied to the frame of an attachment; the same on every rank */
 struct TieNodes {
   Tie                   tie;
-  Marker                frame;  /* marker of the frame, at its origin */
-  std::vector<PetscInt> node;   /* global numbers, sorted */
-  std::vector<Vector3>  arm;    /* from the attachment's point, axes of the FE model */
-  std::vector<double>   weight; /* sum 1 */
-  std::vector<PetscInt> lambda; /* rigid: number of the node's first multiplier among its owner's */
-  PetscMPIInt           owner = 0;  /* average: the rank whose node comes first has the six multipliers */
-  PetscInt              first = 0;  /* average: number of the first among its owner's multipliers */
+  Marker                frame;     /* marker of the frame, at its origin */
+  std::vector<PetscInt> node;      /* global numbers, sorted */
+  std::vector<Vector3>  arm;       /* from the attachment's point, axes of the FE model */
+  std::vector<double>   weight;    /* sum 1 */
+  std::vector<PetscInt> lambda;    /* rigid: for each node, number of its first multiplier among those of its owner */
+  PetscMPIInt           owner = 0; /* average: the owner of the first node, which has the six multipliers */
+  PetscInt              first = 0; /* average: number of the first one among the owner's multipliers */
 };
 
 class FullExtension : public Extension
@@ -31,15 +31,15 @@ public:
   std::string           name;
   FullBody              spec;
   const FeModel        *model = nullptr;
-  std::vector<PetscInt> node_first; /* first node of each rank, and the number of nodes */
-  std::vector<double>   u, v;       /* own coordinates at the start */
+  std::vector<PetscInt> node_first; /* first node of each rank; at the end the number of nodes */
+  std::vector<double>   u, v;       /* initial coordinates and velocities of own nodes */
   std::vector<TieNodes> ties;
   PetscInt              own_multipliers = 0;
 
-  std::vector<PetscInt>  near;      /* global numbers of own nodes and those that they are coupled with, sorted */
-  std::vector<double>    near_x;    /* their places at the start, undeformed */
-  std::vector<FeElement> elements;  /* that touch own nodes; FeLaw::Large */
-  /* rows of own nodes, block by block, in space axes; FeLaw::Small */
+  std::vector<PetscInt>  near;     /* global numbers of own nodes and of nodes coupled to them, sorted */
+  std::vector<double>    near_x;   /* their undeformed initial positions, in space axes */
+  std::vector<FeElement> elements; /* FeLaw::Large: elements with own nodes */
+  /* FeLaw::Small: the 3 x 3 blocks of the rows of own nodes in K and M, in space axes; block_near: index in `near` of the column's node */
   std::vector<PetscInt>  block_first, block_near;
   std::vector<Matrix3>   block_K, block_M;
 

@@ -1,4 +1,4 @@
-/* A finite-element body by its elements, displacements at large: M (x'' - g + a x') + internal force of the elements that touch own nodes. */
+/* A finite-element body with large displacements: M (x'' - g + a x') + internal force, summed over the elements with own nodes. */
 #include "flexible/element.h"
 #include "flexible/full_nodes.h"
 #include "scene/runtime.h"
@@ -17,10 +17,10 @@ template <class Shape> class ElementBatch : public Batch
 public:
   struct Instance {
     NodePlace              node[n];
-    fe::NodeVectors<Shape> X; /* undeformed, where the body is placed at the start */
+    fe::NodeVectors<Shape> X; /* undeformed initial positions in space axes */
     fe::Mass<Shape>        mass;
     fe::Lame               lame;
-    bool                   first; /* of the ranks that have this element, this one counts its energy */
+    bool                   first; /* this is the first of the ranks with this element, which adds its energy */
   };
   std::vector<Instance> all;
   const FullExtension  &x;

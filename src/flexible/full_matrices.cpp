@@ -1,4 +1,4 @@
-/* A finite-element body by its matrices: M (x'' - g) + (a M + b K) x' + K (x - X), rows of own nodes. */
+/* A finite-element body with small displacements: M (x'' - g) + (a M + b K) x' + K (x - X), rows of own nodes. */
 #include "flexible/full_nodes.h"
 #include "scene/symmetric.h"
 #include <algorithm>
@@ -9,9 +9,9 @@ namespace hhtdae
 namespace
 {
 
-constexpr double much = 0.1; /* rad: strains are wrong by half of its square */
+constexpr double max_rotation = 0.1; /* rad; the user is warned beyond it: strains are then wrong by half of its square */
 
-/* The mean rotation of a body from its displacements, sum r x d = J w, as long as it is small */
+/* The mean rotation w of a body for displacements d, J w = sum r x d, valid for small rotations */
 class MeanRotation
 {
 public:
@@ -42,13 +42,13 @@ class MatrixBatch : public Batch
 public:
   const FullExtension   &x;
   std::vector<NodePlace> near;
-  PetscInt               own; /* place of the first own node in near */
+  PetscInt               own; /* index of the first own node in near */
 
   MatrixBatch(const FullExtension &e, Localizer &l) : x(e)
   {
     for (PetscInt n : x.near) near.push_back(PlaceNode(x, l, n));
     own = (PetscInt)(std::lower_bound(x.near.begin(), x.near.end(), x.model->first) - x.near.begin());
-    if (looks()) mean_.setUp(&x.near_x[3 * own], (std::size_t)x.model->own);
+    if (monitorsRotation()) mean_rotation_.setUp(&x.near_x[3 * own], (std::size_t)x.model->own);
   }
 
   void pattern(Pattern &p) override
@@ -77,19 +77,19 @@ public:
     for (std::size_t k = 0; k < slot_.size(); k++) ev.sink.add(slot_[k], Matrix3(m * x.block_M[k] + s * x.block_K[k]), 3, 3);
   }
 
-  /* Steps are as long as they may be, but a body that has turned too far for its law is told, once (FullBody.TurnsTooFarForSmallDisplacements) */
-  bool   limitsSteps() const override { return looks(); }
+  /* Does not limit the step, but warns once if the body has rotated too far for small displacements (FullBody.TurnsTooFarForSmallDisplacements) */
+  bool   limitsSteps() const override { return monitorsRotation(); }
   double longestStep(const Evaluation &ev) const override
   {
     Vector3 moment = Vector3::Zero();
-    if (told_) return std::numeric_limits<double>::infinity();
-    for (PetscInt n = 0; n < x.model->own; n++) moment += mean_.moment(&x.near_x[3 * own], (std::size_t)n, displacement(ev, own + n));
-    told_ = mean_.angle(moment) > much;
-    if (told_)
+    if (warned_) return std::numeric_limits<double>::infinity();
+    for (PetscInt n = 0; n < x.model->own; n++) moment += mean_rotation_.moment(&x.near_x[3 * own], (std::size_t)n, displacement(ev, own + n));
+    warned_ = mean_rotation_.angle(moment) > max_rotation;
+    if (warned_)
       PetscCallAbort(PETSC_COMM_SELF, PetscPrintf(PETSC_COMM_SELF,
                                                   "scene: at t = %g full body %s has turned by more than %g rad since the start: with law small its strains are those of a body that does not turn, and wrong by %g; "
                                                   "use law large\n",
-                                                  ev.t, x.name.c_str(), much, 0.5 * much * much));
+                                                  ev.t, x.name.c_str(), max_rotation, 0.5 * max_rotation * max_rotation));
     return std::numeric_limits<double>::infinity();
   }
 
@@ -112,14 +112,14 @@ public:
   }
 
 private:
-  MeanRotation mean_; /* of the first rank's part */
-  mutable bool told_ = false;
+  MeanRotation mean_rotation_; /* of the first rank's nodes, as an estimate for the body */
+  mutable bool warned_ = false;
 
-  bool    looks() const { return x.model->first == 0 && x.model->own > 2; }
+  bool    monitorsRotation() const { return x.model->first == 0 && x.model->own > 2; }
   Vector3 displacement(const Evaluation &ev, PetscInt k) const { return At(ev.u, near[k]) - Eigen::Map<const Vector3>(&x.near_x[3 * k]); }
 };
 
-/* Blocks of one node's rows, by the global number of the column's node */
+/* Blocks of K and M in one node's rows, by the global number of the column's node */
 using Row = std::map<PetscInt, std::pair<Matrix3, Matrix3>>;
 
 PetscErrorCode AddRow(Mat A, PetscInt row, bool mass, Row *blocks)
@@ -138,8 +138,8 @@ PetscErrorCode AddRow(Mat A, PetscInt row, bool mass, Row *blocks)
   PetscFunctionReturn(0);
 }
 
-/* Places of the nodes in x.near, from their owners */
-PetscErrorCode BringPlaces(FullExtension &x)
+/* Fetches the initial positions of the nodes in x.near from their owners */
+PetscErrorCode FetchPositions(FullExtension &x)
 {
   const FeModel        &m = *x.model;
   std::vector<PetscInt> index;
@@ -190,7 +190,7 @@ PetscErrorCode ExtractBlocks(FullExtension &x)
   std::sort(x.near.begin(), x.near.end());
   x.near.erase(std::unique(x.near.begin(), x.near.end()), x.near.end());
   for (PetscInt &n : x.block_near) n = (PetscInt)(std::lower_bound(x.near.begin(), x.near.end(), n) - x.near.begin());
-  PetscCall(BringPlaces(x));
+  PetscCall(FetchPositions(x));
   PetscFunctionReturn(0);
 }
 

@@ -1,4 +1,4 @@
-/* Nodes of a finite-element body among the unknowns of a rank. */
+/* Access to the unknowns of a node of a finite-element body in a rank's vectors. */
 #ifndef HHTDAE_FLEXIBLE_FULL_NODES_H
 #define HHTDAE_FLEXIBLE_FULL_NODES_H
 
@@ -22,7 +22,7 @@ inline NodePlace PlaceNode(const FullExtension &x, Localizer &l, PetscInt node)
 
 inline Eigen::Map<const Vector3> At(const double *u, const NodePlace &n) { return Eigen::Map<const Vector3>(u + n.local); }
 
-/* adds a vector to the rows of a node, if they are this rank's */
+/* Adds a vector to the rows of a node, if this rank owns them */
 inline void AddRows(Evaluation &ev, const NodePlace &n, const Vector3 &f)
 {
   if (n.local >= ev.n) return;

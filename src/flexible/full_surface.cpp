@@ -1,4 +1,4 @@
-/* The surface of a whole finite-element body in a page: places of its nodes, and von Mises stress there. */
+/* The surface of a whole finite-element body for the page of a run: positions of its nodes and von Mises stress there. */
 #include "flexible/element.h"
 #include "flexible/exchange.h"
 #include "flexible/full_body.h"
@@ -24,10 +24,10 @@ public:
 
 private:
   const FullExtension  &x;
-  std::vector<PetscInt> own;  /* this rank's nodes of the surface, by place from 0 among its nodes */
+  std::vector<PetscInt> own;  /* this rank's nodes of the surface, counted from its first node */
   FeModel               part; /* this rank's elements at these nodes, with the body's materials */
   ElementNodes          near; /* the nodes of these elements */
-  std::vector<double>   X;    /* their places without deformation, in space axes */
+  std::vector<double>   X;    /* their undeformed positions in space axes */
   Sides                 sides;
 
   PetscErrorCode setUpStress(const std::vector<PetscInt> &node);
@@ -35,8 +35,8 @@ private:
   template <class Shape> void addStress(const FeElement &e, const std::vector<double> &now, std::vector<double> &sum) const;
 };
 
-/* Stress wants materials */
-bool KnowsMaterials(const FeModel &m)
+/* Whether all elements have a material, as stress needs it */
+bool HasMaterials(const FeModel &m)
 {
   return !m.materials.empty() &&
          std::all_of(m.elements.begin(), m.elements.end(), [&](const FeElement &e) { return e.material >= 0 && e.material < (PetscInt)m.materials.size(); });
@@ -57,30 +57,30 @@ PetscErrorCode FullMesh::setUp(std::size_t most)
   for (const TieNodes &t : x.ties) frames.push_back(t.frame);
   PetscCall(GatherTo0(m.comm, m.elements.data(), m.elements.size(), &elements, &of));
   if (!rank) OuterTriangles(elements, &node, &surface.triangle);
-  const auto share = [&]() { /* the nodes, from the first rank, and their places back to it */
-    PetscInt count = (PetscInt)node.size();
-    PetscFunctionBegin;
-    PetscCallMPI(MPI_Bcast(&count, 1, MPIU_INT, 0, m.comm));
-    node.resize(count);
-    PetscCallMPI(MPI_Bcast(node.data(), (PetscMPIInt)count, MPIU_INT, 0, m.comm));
-    own.clear();
-    mine.clear();
-    for (auto n = std::lower_bound(node.begin(), node.end(), m.first); n != node.end() && *n < m.first + m.own; ++n) {
-      const Vector3 p = x.placed(&m.coordinates[3 * (*n - m.first)]);
-      own.push_back(*n - m.first);
-      mine.insert(mine.end(), p.data(), p.data() + 3);
-    }
-    PetscCall(GatherTo0(m.comm, mine.data(), mine.size(), &surface.point, &of));
-    PetscFunctionReturn(0);
+  const auto exchangeNodes = [&]() { /* sends the nodes from the first rank to all, and their positions back to it */
+                                     PetscInt count = (PetscInt)node.size();
+                                     PetscFunctionBegin;
+                                     PetscCallMPI(MPI_Bcast(&count, 1, MPIU_INT, 0, m.comm));
+                                     node.resize(count);
+                                     PetscCallMPI(MPI_Bcast(node.data(), (PetscMPIInt)count, MPIU_INT, 0, m.comm));
+                                     own.clear();
+                                     mine.clear();
+                                     for (auto n = std::lower_bound(node.begin(), node.end(), m.first); n != node.end() && *n < m.first + m.own; ++n) {
+                                       const Vector3 p = x.placed(&m.coordinates[3 * (*n - m.first)]);
+                                       own.push_back(*n - m.first);
+                                       mine.insert(mine.end(), p.data(), p.data() + 3);
+                                     }
+                                     PetscCall(GatherTo0(m.comm, mine.data(), mine.size(), &surface.point, &of));
+                                     PetscFunctionReturn(0);
   };
-  PetscCall(share());
+  PetscCall(exchangeNodes());
   const PetscInt all = (PetscInt)node.size();
   if (!rank) {
     ThinSurface(surface.point, most, &kept, &surface.triangle);
-    for (std::size_t k = 0; k < kept.size(); k++) node[k] = node[kept[k]]; /* kept is sorted */
+    for (std::size_t k = 0; k < kept.size(); k++) node[k] = node[kept[k]]; /* in place, because kept is sorted */
     node.resize(kept.size());
   }
-  PetscCall(share());
+  PetscCall(exchangeNodes());
   if ((PetscInt)node.size() < all)
     PetscCall(PetscInfo((PetscObject)nullptr, "scene: the page shows %" PetscInt_FMT " of the %" PetscInt_FMT " nodes on the surface of %s; -scene_page_nodes\n", (PetscInt)node.size(), all, name.c_str()));
   nodes.resize((std::size_t)size);
@@ -92,11 +92,11 @@ PetscErrorCode FullMesh::setUp(std::size_t most)
 
 PetscErrorCode FullMesh::setUpStress(const std::vector<PetscInt> &node)
 {
-  const FeModel &m    = *x.model;
-  PetscMPIInt    know = KnowsMaterials(m);
+  const FeModel &m             = *x.model;
+  PetscMPIInt    has_materials = HasMaterials(m);
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &know, 1, MPI_INT, MPI_LAND, m.comm));
-  stress = know;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &has_materials, 1, MPI_INT, MPI_LAND, m.comm));
+  stress = has_materials;
   if (!stress) PetscFunctionReturn(0);
   for (const FeElement &e : m.elements)
     if (std::any_of(e.node, e.node + FeNodes(e.type), [&](PetscInt n) { return std::binary_search(node.begin(), node.end(), n); })) part.elements.push_back(e);
@@ -161,7 +161,7 @@ PetscErrorCode FullExtension::pageMesh(std::size_t most_nodes, std::unique_ptr<P
   PetscInt64 count = (PetscInt64)model->elements.size();
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT64, MPI_SUM, model->comm));
-  if (!count) PetscFunctionReturn(0); /* matrices alone */
+  if (!count) PetscFunctionReturn(0); /* a model of matrices only has no surface */
   auto made = std::make_unique<FullMesh>(*this);
   PetscCall(made->setUp(most_nodes));
   *mesh = std::move(made);

@@ -1,9 +1,9 @@
 /*
-  Nodes of a finite-element body tied to frames, with y_n = x_n - r and arms A a_n of a frame at r with axes A:
+  Constraints between nodes of a finite-element body and frames, for a frame at r with axes A, y_n = x_n - r and arms A a_n:
 
-    rigidly:   x_n - r - A a_n = 0 of every node; with FeLaw::Small x_n - r - a_n - s x a_n = 0, s the frame's turn from its start: exact turns would strain
-               a face by half their square, and K, which is linear, would hold that against bending
-    averaged:  sum w_n (y_n - A a_n) = 0,  sum w_n A d_n x y_n = 0,  d_n = a_n - c from the mean c = sum w_n a_n
+    rigid:     x_n - r - A a_n = 0 for every node; with FeLaw::Small x_n - r - a_n - s x a_n = 0, where s is the linearized rotation of the frame since its start:
+               an exact rotation would strain a face by half of its square, which the linear K resists
+    average:   sum w_n (y_n - A a_n) = 0,  sum w_n A d_n x y_n = 0,  d_n = a_n - c with the mean arm c = sum w_n a_n
 */
 #include "flexible/full_nodes.h"
 #include "scene/runtime.h"
@@ -14,10 +14,10 @@ namespace hhtdae
 namespace
 {
 
-/* [a] */
-Matrix3 X(const Vector3 &a) { return Cross<double>(a); }
+/* [a], the matrix of the cross product a x */
+Matrix3 Skew(const Vector3 &a) { return Cross<double>(a); }
 
-/* A batch of ties at frames; its frames' blocks come the same way */
+/* Base of the batches of ties: access to the frames */
 class TieBatch : public Batch
 {
 protected:
@@ -28,11 +28,11 @@ protected:
   static BodyMotion &loaded(Bodies &B, PetscInt marker) { return B.now[B.marker[marker].body]; }
 };
 
-/* What is left of a turn B if its second order is left out: a vector of the axis' direction and the sine's length; by a further turn w it changes by D w */
-struct LinearTurn {
+/* Linearized rotation: s has the direction of the axis of the rotation matrix B and the length of the sine of its angle; a further small rotation w changes s by D w */
+struct LinearizedRotation {
   Matrix3 B, D;
   Vector3 s;
-  explicit LinearTurn(const Matrix3 &b) : B(b), D((b.trace() * Matrix3::Identity() - b) / 2), s(b(2, 1) - b(1, 2), b(0, 2) - b(2, 0), b(1, 0) - b(0, 1)) { s /= 2; }
+  explicit LinearizedRotation(const Matrix3 &b) : B(b), D((b.trace() * Matrix3::Identity() - b) / 2), s(b(2, 1) - b(1, 2), b(0, 2) - b(2, 0), b(1, 0) - b(0, 1)) { s /= 2; }
 };
 
 class RigidTies : public TieBatch
@@ -90,24 +90,24 @@ public:
   }
 
 private:
-  /* From the frame's origin to the node, and its derivative by a turn of the frame; a force l there has the moment by_turn^T l */
+  /* The arm from the frame's origin to the node, and its derivative by a small rotation of the frame; a force l at the node has the moment by_turn^T l */
   struct Arm {
-    Vector3 at, start;
-    Matrix3 by_turn;
-    bool    linear;
-    LinearTurn turn;
+    Vector3            at, start;
+    Matrix3            by_turn;
+    bool               linear;
+    LinearizedRotation turn;
 
     Arm(const Instance &e, const BodyMotion &b)
       : start(e.body->rotation * e.arm), linear(e.body->law == FeLaw::Small), turn(linear ? Matrix3(b.A * e.body->rotation.transpose()) : Matrix3(Matrix3::Identity()))
     {
       at      = linear ? Vector3(start + turn.s.cross(start)) : Vector3(b.A * e.arm);
-      by_turn = linear ? Matrix3(-X(start) * turn.D) : Matrix3(-X(at));
+      by_turn = linear ? Matrix3(-Skew(start) * turn.D) : Matrix3(-Skew(at));
     }
     Matrix3 momentByTurn(const Vector3 &l) const
     {
-      if (!linear) return X(l) * X(at);
+      if (!linear) return Skew(l) * Skew(at);
       const Vector3 c = start.cross(l);
-      return -c * turn.s.transpose() - turn.B.transpose() * X(c) / 2;
+      return -c * turn.s.transpose() - turn.B.transpose() * Skew(c) / 2;
     }
   };
 
@@ -127,7 +127,7 @@ public:
   struct Instance {
     std::vector<NodePlace> node;
     std::vector<double>    w;
-    std::vector<Vector3>   d; /* from the mean arm */
+    std::vector<Vector3>   d; /* arms relative to the mean arm */
     Vector3                c; /* the mean arm */
     PetscInt               lambda, group, marker;
   };
@@ -184,22 +184,22 @@ public:
       const BodyMotion &b = frame(ev.bodies, e.marker);
       const Vector3     l = force(ev, e), m = moment(ev, e), c = b.A * e.c;
       const Matrix3     G = b.G;
-      Matrix3           turn = Matrix3::Zero(), second = -X(l) * X(c);
+      Matrix3           turn = Matrix3::Zero(), second = -Skew(l) * Skew(c);
       Six               B;
       load(ev, e);
       for (std::size_t i = 0; i < e.node.size(); i++) {
         const Vector3 d = b.A * e.d[i], y = At(ev.u, e.node[i]) - b.r;
-        turn += e.w[i] * X(y) * X(d);
-        second += e.w[i] * X(y.cross(m)) * X(d);
-        B << e.w[i] * Matrix3::Identity(), e.w[i] * X(d);
+        turn += e.w[i] * Skew(y) * Skew(d);
+        second += e.w[i] * Skew(y.cross(m)) * Skew(d);
+        B << e.w[i] * Matrix3::Identity(), e.w[i] * Skew(d);
         both(B, 6, 3);
-        const Matrix3 by_node = -e.w[i] * G.transpose() * X(d) * X(m);
+        const Matrix3 by_node = -e.w[i] * G.transpose() * Skew(d) * Skew(m);
         ev.sink.add(*slot++, by_node, 3, 3);
         ev.sink.add(*slot++, Matrix3(by_node.transpose() * ev.bodies.inStep(b)), 3, 3);
       }
       B << -Matrix3::Identity(), Matrix3::Zero();
       both(B, 6, 3);
-      B << X(c) * G, turn * G;
+      B << Skew(c) * G, turn * G;
       ev.sink.add(*slot++, Six(B * ev.bodies.inStep(b)), 6, 3);
       ev.sink.add(*slot++, B.transpose(), 3, 6);
       ev.sink.add(*slot++, Matrix3(G.transpose() * second * G * ev.bodies.inStep(b)), 3, 3);
@@ -220,17 +220,17 @@ private:
   }
 };
 
-bool OnThisRank(const FullExtension &x, const Localizer &l, Marker frame, PetscMPIInt owner)
+bool IsNeededHere(const FullExtension &x, const Localizer &l, Marker frame, PetscMPIInt owner)
 {
   const Runtime &R = *l.run;
   return owner == R.rank || R.number.owner.empty() || R.number.owner[R.scene.markers[frame.id].body] == R.rank || x.node_first.size() == 2;
 }
 
-void Rigid(const FullExtension &x, const TieNodes &t, Localizer &l, RigidTies &batch)
+void AddRigidTies(const FullExtension &x, const TieNodes &t, Localizer &l, RigidTies &batch)
 {
   for (std::size_t i = 0; i < t.node.size(); i++) {
     const PetscMPIInt owner = x.ownerOf(t.node[i]);
-    if (!OnThisRank(x, l, t.frame, owner)) continue;
+    if (!IsNeededHere(x, l, t.frame, owner)) continue;
     RigidTies::Instance e;
     const PetscInt      number = x.multiplier(owner, t.lambda[i]);
     e.node   = PlaceNode(x, l, t.node[i]);
@@ -243,9 +243,9 @@ void Rigid(const FullExtension &x, const TieNodes &t, Localizer &l, RigidTies &b
   }
 }
 
-void Average(const FullExtension &x, const TieNodes &t, Localizer &l, AverageTies &batch)
+void AddAverageTie(const FullExtension &x, const TieNodes &t, Localizer &l, AverageTies &batch)
 {
-  bool here = OnThisRank(x, l, t.frame, t.owner);
+  bool here = IsNeededHere(x, l, t.frame, t.owner);
   for (PetscInt n : t.node) here = here || x.ownerOf(n) == l.run->rank;
   if (!here) return;
   AverageTies::Instance e;
@@ -270,8 +270,8 @@ void LocalizeTies(const FullExtension &x, Localizer &l, std::vector<std::unique_
   auto rigid   = std::make_unique<RigidTies>(l.bodies);
   auto average = std::make_unique<AverageTies>(l.bodies);
   for (const TieNodes &t : x.ties) {
-    if (t.tie == Tie::Rigid) Rigid(x, t, l, *rigid);
-    else Average(x, t, l, *average);
+    if (t.tie == Tie::Rigid) AddRigidTies(x, t, l, *rigid);
+    else AddAverageTie(x, t, l, *average);
   }
   if (!rigid->all.empty()) batches.push_back(std::move(rigid));
   if (!average->all.empty()) batches.push_back(std::move(average));
