@@ -1,9 +1,9 @@
 /*
-  Where things stand in a Gmsh file: sections, and the blocks of nodes and elements in them.
+  Finds the sections of a Gmsh file, and the blocks of nodes and elements in them.
 
-  In a text file the lines have to be found first: each rank counts the ends of lines in its share of blocks of 64 KiB,
-  so that any line can be found afterwards by reading one block. Blocks of nodes and elements then follow from their
-  headers alone.
+  In a text file the lines are indexed first: each rank counts the line ends in its share of chunks of 64 KiB,
+  so that any line can be found afterwards by scanning one chunk. The positions of blocks of nodes and elements then follow from their
+  headers.
 */
 #include "flexible/exchange.h"
 #include "flexible/gmsh_file.h"
@@ -56,13 +56,13 @@ Size GmshFile::lineOf(Size offset) const
   return lines_[c] + std::count(file_.begin + c * chunk, file_.begin + offset, '\n');
 }
 
-/* ---- sections of binary files: '$' may be anything, so that those with data are walked through ---- */
+/* ---- sections of binary files: a '$' may be data, so that sections with binary data are traversed ---- */
 
 void GmshFile::findSections()
 {
   const char *p = file_.begin;
   while (p < end_) {
-    while (p < end_ && *p != '$') p++; /* the end of a line, or the one of $MeshFormat */
+    while (p < end_ && *p != '$') p++; /* line ends, or the binary number of $MeshFormat */
     if (p >= end_) return;
     const std::string name = lineAt(p), stop = "$End" + name.substr(1);
     p = nextLine(p);
@@ -77,14 +77,14 @@ void GmshFile::findSections()
 
 const char *GmshFile::walkNodes(const char *p)
 {
-  if (!four_) {
+  if (!msh4_) {
     Words words(p, end_);
     Block block;
     block.count = words.integer();
     block.place = nextLine(words.at()) - file_.begin;
     nodes_.push_back(block);
     Bytes bytes(file_.begin + block.place, end_);
-    bytes.skip(Checked(block.count), 28);
+    bytes.skip(NonNegative(block.count), 28);
     return bytes.at();
   }
   Bytes          bytes(p, end_);
@@ -107,7 +107,7 @@ const char *GmshFile::walkNodes(const char *p)
 
 const char *GmshFile::walkElements(const char *p)
 {
-  if (four_) {
+  if (msh4_) {
     Bytes          bytes(p, end_);
     const PetscInt count = bytes.integer8();
     bytes.skip(3, 8);
@@ -150,8 +150,8 @@ void GmshFile::blocks()
     textBlocks("$Nodes", nodes_, true);
     textBlocks("$Elements", elements_, false);
   }
-  /* the same regions on all ranks, in the same order */
-  if (four_)
+  /* all ranks create regions in the same order */
+  if (msh4_)
     for (const Block &b : elements_) regionOf(b.dim, b.entity);
 }
 
@@ -162,8 +162,8 @@ void GmshFile::textBlocks(const char *name, std::vector<Block> &list, bool nodes
   Block block;
   block.count = words.integer();
   block.place = at + 1;
-  if (!four_) {
-    at = block.place + Checked(block.count);
+  if (!msh4_) {
+    at = block.place + NonNegative(block.count);
     list.push_back(block);
   } else {
     const PetscInt count = block.count;
@@ -175,7 +175,7 @@ void GmshFile::textBlocks(const char *name, std::vector<Block> &list, bool nodes
       block.type   = header.small();
       block.count  = header.integer();
       block.place  = at + 1;
-      at += 1 + Checked(block.count) * (nodes ? 2 : 1);
+      at += 1 + NonNegative(block.count) * (nodes ? 2 : 1);
       list.push_back(block);
     }
   }

@@ -1,4 +1,4 @@
-/* One Gmsh file while it is read: where its sections, blocks and lines stand, and what goes from them to the MeshFile. */
+/* The parallel reader of one Gmsh file: positions of its sections, blocks and lines, and the conversion to a MeshFile. */
 #ifndef HHTDAE_FLEXIBLE_GMSH_FILE_H
 #define HHTDAE_FLEXIBLE_GMSH_FILE_H
 
@@ -20,18 +20,18 @@ struct Kind {
 };
 
 Kind KindOfType(int type);
-/* A number of entries, which must not be negative */
-Size Checked(PetscInt count);
-/* Fails for solids that bodies are not made of */
+/* Converts a number of entries; fails if it is negative */
+Size NonNegative(PetscInt count);
+/* The element type for a type of Gmsh; fails for unsupported solids */
 ElementType TypeOf(int type, PetscInt element);
 
 /* ---- the file ---- */
 
-/* Nodes or elements that follow one header */
+/* The nodes or elements that follow one header */
 struct Block {
-  int dim = 0, entity = 0, type = 0, extra = 0; /* extra: parametric coordinates of nodes, tags of elements of msh 2 */
+  int      dim = 0, entity = 0, type = 0, extra = 0; /* extra: number of parametric coordinates of a node, or of tags of an element in msh 2 */
   PetscInt count = 0;
-  Size     place = 0; /* line or offset of the first */
+  Size     place = 0; /* of the first: number of its line in text files, offset in binary ones */
 };
 
 class GmshFile
@@ -49,12 +49,12 @@ private:
   PetscMPIInt                        rank_, size_;
   Mapping                            file_;
   const char                        *end_    = nullptr;
-  bool                               binary_ = false, four_ = false;
-  std::vector<Size>                  lines_;   /* ends of lines before each chunk */
-  std::map<std::string, Size>        section_; /* offset of its first byte, after the line with the name */
+  bool                               binary_ = false, msh4_ = false;
+  std::vector<Size>                  lines_;   /* number of line ends before each chunk */
+  std::map<std::string, Size>        section_; /* offset of the first byte after the line with the name */
   std::vector<Block>                 nodes_, elements_;
-  std::map<std::pair<int, int>, int> group_, region_; /* by dimension and tag */
-  std::map<std::pair<int, int>, int> physical_;       /* msh 2: number of each group in this rank's share */
+  std::map<std::pair<int, int>, int> group_, region_; /* indices by dimension and tag */
+  std::map<std::pair<int, int>, int> physical_;       /* msh 2: provisional number of each group of this rank's share */
 
   const char *nextLine(const char *p) const
   {
@@ -68,7 +68,7 @@ private:
     return s;
   }
 
-  /* the whole: mesh_file.cpp */
+  /* header and error handling: mesh_file.cpp */
   template <class F> PetscErrorCode attempt(F &&f);
   void                              header();
 
@@ -97,14 +97,14 @@ private:
   PetscErrorCode regionsOfGroups();
 
   /* this rank's share of nodes and elements: gmsh_share.cpp */
-  template <class F> void ofMine(const std::vector<Block> &list, F &&f);
-  void                    share();
-  void                    addPoint(PetscInt tag, double x, double y, double z);
-  void                    textNodes(const Block &b, Size from, Size to);
-  void                    binaryNodes(const Block &b, Size from, Size to);
+  template <class F> void    forOwnShare(const std::vector<Block> &list, F &&f);
+  void                       share();
+  void                       addPoint(PetscInt tag, double x, double y, double z);
+  void                       textNodes(const Block &b, Size from, Size to);
+  void                       binaryNodes(const Block &b, Size from, Size to);
   template <class Next> void addElement(int type, PetscInt tag, PetscInt region, bool grouped, Next &&next);
   bool                       grouped(int region) const { return !mesh_.regions[region].groups.empty(); }
-  PetscInt                   provisional(int dim, PetscInt physical);
+  PetscInt                   provisionalRegion(int dim, PetscInt physical);
   void                       textElements(const Block &b, Size from, Size to);
   void                       binaryElements(const Block &b, Size from, Size to);
 };

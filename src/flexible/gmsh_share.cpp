@@ -1,4 +1,4 @@
-/* A rank's share of the nodes and elements of a Gmsh file, parsed; Gmsh's types of elements. */
+/* Parses a rank's share of the nodes and elements of a Gmsh file; Gmsh's element types. */
 #include "flexible/gmsh_file.h"
 
 namespace hhtdae
@@ -43,7 +43,7 @@ ElementType TypeOf(int type, PetscInt element)
        type == 12 ? ": let Gmsh make them with Mesh.SecondOrderIncomplete = 1" : "");
 }
 
-Size Checked(PetscInt count)
+Size NonNegative(PetscInt count)
 {
   if (count < 0) Fail("it announces %lld entries", (long long)count);
   return (Size)count;
@@ -51,7 +51,7 @@ Size Checked(PetscInt count)
 
 /* ---- shares ---- */
 
-template <class F> void GmshFile::ofMine(const std::vector<Block> &list, F &&f)
+template <class F> void GmshFile::forOwnShare(const std::vector<Block> &list, F &&f)
 {
   Size total = 0, before = 0;
   for (const Block &b : list) total += b.count;
@@ -70,9 +70,9 @@ void GmshFile::share()
       Fail("it has more elements than this build of PETSc can count");
     mesh_.elements += b.count;
   }
-  ofMine(nodes_,
-         [&](const Block &b, Size from, Size to) { binary_ ? binaryNodes(b, from, to) : textNodes(b, from, to); });
-  ofMine(elements_, [&](const Block &b, Size from, Size to) {
+  forOwnShare(nodes_,
+              [&](const Block &b, Size from, Size to) { binary_ ? binaryNodes(b, from, to) : textNodes(b, from, to); });
+  forOwnShare(elements_, [&](const Block &b, Size from, Size to) {
     binary_ ? binaryElements(b, from, to) : textElements(b, from, to);
   });
 }
@@ -87,14 +87,14 @@ void GmshFile::addPoint(PetscInt tag, double x, double y, double z)
 
 void GmshFile::textNodes(const Block &b, Size from, Size to)
 {
-  const char *at = line(b.place + (four_ ? b.count : 0) + from);
-  Words       tags(line(b.place + from), four_ ? line(b.place + b.count) : end_);
+  const char *at = line(b.place + (msh4_ ? b.count : 0) + from);
+  Words       tags(line(b.place + from), msh4_ ? line(b.place + b.count) : end_);
   for (Size k = from; k < to; k++) {
     const char *const stop = nextLine(at);
     Words             w(at, stop);
-    const PetscInt    tag = four_ ? tags.integer() : w.integer();
+    const PetscInt    tag = msh4_ ? tags.integer() : w.integer();
     const double      x = w.real(), y = w.real(), z = w.real();
-    for (int i = 0; i < 3 && four_ && b.type && !w.ended(); i++) w.real(); /* parametric coordinates */
+    for (int i = 0; i < 3 && msh4_ && b.type && !w.ended(); i++) w.real(); /* parametric coordinates */
     w.finish();
     addPoint(tag, x, y, z);
     at = stop;
@@ -105,9 +105,9 @@ void GmshFile::binaryNodes(const Block &b, Size from, Size to)
 {
   const char *p = file_.begin + b.place;
   for (Size k = from; k < to; k++) {
-    Bytes    coordinates(four_ ? p + 8 * (Size)b.count + 8 * (3 + b.extra) * k : p + 28 * k + 4, end_);
+    Bytes    coordinates(msh4_ ? p + 8 * (Size)b.count + 8 * (3 + b.extra) * k : p + 28 * k + 4, end_);
     PetscInt tag;
-    if (four_)
+    if (msh4_)
       tag = Bytes(p + 8 * k, end_).integer8();
     else
       tag = Bytes(p + 28 * k, end_).get<int>();
@@ -116,7 +116,7 @@ void GmshFile::binaryNodes(const Block &b, Size from, Size to)
   }
 }
 
-/* region: of msh 2 the physical group, until all ranks know all of them */
+/* region: in msh 2 the provisional number of the physical group, until the groups of all ranks are known */
 template <class Next>
 void GmshFile::addElement(int type, PetscInt tag, PetscInt region, bool grouped, Next &&next)
 {
@@ -138,8 +138,8 @@ void GmshFile::addElement(int type, PetscInt tag, PetscInt region, bool grouped,
   }
 }
 
-/* msh 2: regions are numbered as this rank meets them for the time being */
-PetscInt GmshFile::provisional(int dim, PetscInt physical)
+/* msh 2: numbers physical groups in the order in which this rank finds them; regionsOfGroups() replaces the numbers */
+PetscInt GmshFile::provisionalRegion(int dim, PetscInt physical)
 {
   if (std::abs((PetscInt64)physical) > std::numeric_limits<int>::max())
     Fail("there is a physical group %lld, which is no number of 32 bits", (long long)physical);
@@ -150,13 +150,13 @@ PetscInt GmshFile::provisional(int dim, PetscInt physical)
 void GmshFile::textElements(const Block &b, Size from, Size to)
 {
   const char *at     = line(b.place + from);
-  const int   region = four_ ? regionOf(b.dim, b.entity) : -1;
+  const int   region = msh4_ ? regionOf(b.dim, b.entity) : -1;
   for (Size k = from; k < to; k++) {
     const char *const stop = nextLine(at);
     Words             w(at, stop);
     const PetscInt    tag  = w.integer();
     const auto        next = [&] { return w.integer(); };
-    if (four_)
+    if (msh4_)
       addElement(b.type, tag, region, grouped(region), next);
     else {
       const int type = w.small();
@@ -165,7 +165,7 @@ void GmshFile::textElements(const Block &b, Size from, Size to)
         const PetscInt value = w.integer();
         if (t == 0) physical = value;
       }
-      addElement(type, tag, provisional(KindOfType(type).dim, physical), physical != 0, next);
+      addElement(type, tag, provisionalRegion(KindOfType(type).dim, physical), physical != 0, next);
     }
     w.finish();
     at = stop;
@@ -175,11 +175,11 @@ void GmshFile::textElements(const Block &b, Size from, Size to)
 void GmshFile::binaryElements(const Block &b, Size from, Size to)
 {
   const Kind kind = KindOfType(b.type);
-  const Size size = four_ ? 8 * (1 + kind.nodes) : 4 * (1 + b.extra + kind.nodes);
+  const Size size = msh4_ ? 8 * (1 + kind.nodes) : 4 * (1 + b.extra + kind.nodes);
   Bytes      w(file_.begin + b.place + size * from, end_);
-  const int  region = four_ ? regionOf(b.dim, b.entity) : -1;
+  const int  region = msh4_ ? regionOf(b.dim, b.entity) : -1;
   for (Size k = from; k < to; k++) {
-    if (four_) {
+    if (msh4_) {
       const PetscInt tag = w.integer8();
       addElement(b.type, tag, region, grouped(region), [&] { return w.integer8(); });
       continue;
@@ -190,7 +190,7 @@ void GmshFile::binaryElements(const Block &b, Size from, Size to)
       const int value = w.get<int>();
       if (t == 0) physical = value;
     }
-    addElement(b.type, tag, provisional(kind.dim, physical), physical != 0, [&] { return (PetscInt)w.get<int>(); });
+    addElement(b.type, tag, provisionalRegion(kind.dim, physical), physical != 0, [&] { return (PetscInt)w.get<int>(); });
   }
 }
 

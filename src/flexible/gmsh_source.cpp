@@ -1,4 +1,4 @@
-/* Mapping a file into memory, and the message when it cannot be read. */
+/* Maps a file into memory; errors. */
 #include "flexible/gmsh_source.h"
 #include <cerrno>
 #include <cstdarg>

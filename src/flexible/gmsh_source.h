@@ -1,4 +1,4 @@
-/* What is read from: a file mapped into memory, words of a text, bytes of binary data; and how reading fails. */
+/* Sources of the Gmsh reader: a file mapped into memory, words of a text, bytes of binary data; errors are exceptions. */
 #ifndef HHTDAE_FLEXIBLE_GMSH_SOURCE_H
 #define HHTDAE_FLEXIBLE_GMSH_SOURCE_H
 
@@ -50,7 +50,7 @@ public:
       Fail("the number %lld does not fit PetscInt; configure PETSc with 64-bit indices", (long long)value);
     return (PetscInt)value;
   }
-  /* Numbers of dimensions, types and physical groups, which Gmsh keeps as int. The least one has no absolute value. */
+  /* Dimensions, types and numbers of physical groups, which Gmsh stores as int. INT_MIN is refused, because it has no absolute value. */
   int small()
   {
     const char *const word = next();
@@ -66,7 +66,7 @@ public:
     if (!ParseReal(word, at_, &value)) Fail("a finite number is expected at '%s'", shown(word).c_str());
     return value;
   }
-  /* Nothing may follow. */
+  /* Fails if more words follow */
   void finish()
   {
     const char *const word = next();
@@ -78,7 +78,7 @@ public:
     const char *const w = next();
     return std::string(w, at_);
   }
-  /* A name in quotes in the line */
+  /* The next name in quotes on this line */
   std::string quoted()
   {
     const char *line = static_cast<const char *>(std::memchr(at_, '\n', end_ - at_));
@@ -97,7 +97,7 @@ private:
     while (at_ < end_ && std::isspace((unsigned char)*at_)) at_++;
     return at_;
   }
-  /* Begin of the next word, whose end is at_ */
+  /* Beginning of the next word; at_ moves to its end */
   const char *next()
   {
     const char *const word = skip();

@@ -1,5 +1,4 @@
-/* Stress out of modal coordinates: von Mises at the nodes, and the highest places of a run without keeping its history.
- */
+/* Stress from modal coordinates: von Mises stress at the nodes, and the hot spots of a run without storing its history. */
 #include "flexible/body_name.h"
 #include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
@@ -13,24 +12,24 @@ namespace hhtdae
 namespace
 {
 
-/* Nodes whose stress is summed at a time, for so many states together: all sums stay in the second cache while the modes, which do not
-   fit into any, go by once. 500 states of 134 modes at 16,000 nodes: 1.5 s for 5.8 s one by one. */
-constexpr Eigen::Index chunk = 64, together = 16;
+/* Number of nodes, and of states, whose stress is summed in one block: the sums stay in the second-level cache, while the stress modes, which do not fit into any cache,
+   are read once for all states. 500 states of 134 modes at 16,000 nodes take 1.5 s, one state at a time 5.8 s. */
+constexpr Eigen::Index node_block = 64, state_block = 16;
 
-double OfMises(const double *s)
+double VonMisesOf(const double *s)
 {
   const double a = s[0] - s[1], b = s[1] - s[2], c = s[2] - s[0];
   return std::sqrt(0.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
 }
 
-/* each(node, state, von Mises stress) for the states that are the columns of eta, at most `together`. Mode after mode, so that a node's stress is the
-   same to the last digit wherever it stands among the nodes: ranks agree. */
+/* Calls each(node, state, von Mises stress) for the states in the columns of eta, at most state_block. Sums over modes have a fixed order, so that a node's stress is the
+   same to the last digit whatever its index on a rank. */
 template <class Each> void ForEachStress(const StressModes &modes, const Eigen::Ref<const Eigen::MatrixXd> &eta, Each each)
 {
   const Eigen::Index nodes = (Eigen::Index)modes.node.size(), states = eta.cols();
-  double             sum[together][6 * chunk];
-  for (Eigen::Index begin = 0; begin < nodes; begin += chunk) {
-    const Eigen::Index count = 6 * std::min(chunk, nodes - begin);
+  double             sum[state_block][6 * node_block];
+  for (Eigen::Index begin = 0; begin < nodes; begin += node_block) {
+    const Eigen::Index count = 6 * std::min(node_block, nodes - begin);
     for (Eigen::Index s = 0; s < states; s++) std::fill_n(sum[s], count, 0.0);
     for (Eigen::Index k = 0; k < eta.rows(); k++) {
       const double *column = modes.values.data() + k * modes.values.rows() + 6 * begin;
@@ -40,7 +39,7 @@ template <class Each> void ForEachStress(const StressModes &modes, const Eigen::
       }
     }
     for (Eigen::Index s = 0; s < states; s++)
-      for (Eigen::Index i = 0; i < count; i += 6) each(begin + i / 6, s, OfMises(sum[s] + i));
+      for (Eigen::Index i = 0; i < count; i += 6) each(begin + i / 6, s, VonMisesOf(sum[s] + i));
   }
 }
 
@@ -59,13 +58,13 @@ PetscErrorCode CheckCoordinates(const ReducedBody &body, const Eigen::VectorXd &
   PetscFunctionReturn(0);
 }
 
-/* Ahead of another: higher, or as high with a smaller label */
+/* A candidate for a hot spot. It is ahead of another one with lower stress, or with equal stress and a larger label. */
 struct Candidate {
   double     stress, time, x[3];
-  PetscInt64 label, place; /* place: among the nodes of all ranks, should labels be the same */
+  PetscInt64 label, place; /* place: global number of the node, which decides if labels are equal */
 };
 
-bool Ahead(const Candidate &a, const Candidate &b)
+bool IsAhead(const Candidate &a, const Candidate &b)
 {
   if (a.stress != b.stress) return a.stress > b.stress;
   return a.label != b.label ? a.label < b.label : a.place < b.place;
@@ -82,7 +81,7 @@ PetscErrorCode VonMises(const ReducedBody &body, const Eigen::VectorXd &eta, std
   PetscFunctionReturn(0);
 }
 
-/* -1: not followed yet */
+/* A stress of -1 means that no state has been evaluated yet */
 HotSpots::HotSpots(const ReducedBody &body)
     : body_(body), stress_(body.stress.node.size(), -1.0), time_(body.stress.node.size(), 0.0)
 {
@@ -95,12 +94,12 @@ PetscErrorCode HotSpots::add(double time, const Eigen::VectorXd &eta)
   PetscCheck(stress_.size() == body_.stress.node.size(), PETSC_COMM_SELF, PETSC_ERR_ARG_WRONGSTATE,
              "stress modes of %s were changed after its hot spots were begun", BodyName(body_).c_str());
   if (!waiting_) {
-    state_.resize(eta.size(), together);
-    when_.resize(together);
+    state_.resize(eta.size(), state_block);
+    when_.resize(state_block);
   }
   state_.col(waiting_) = eta;
   when_[waiting_++]    = time;
-  if (waiting_ == together) follow();
+  if (waiting_ == state_block) follow();
   PetscFunctionReturn(0);
 }
 
@@ -114,11 +113,11 @@ void HotSpots::follow() const
   waiting_ = 0;
 }
 
-/* One after the other: the highest of the nodes left is found among the ranks' best, and its neighbourhood leaves. */
+/* Repeatedly finds the highest remaining node among the best ones of all ranks, and removes its neighbourhood */
 PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<HotSpot> *spots) const
 {
   const std::size_t      n = stress_.size();
-  std::vector<Candidate> left;
+  std::vector<Candidate> remaining;
   std::vector<Candidate> best;
   PetscMPIInt            size;
   std::string            error;
@@ -141,24 +140,24 @@ PetscErrorCode HotSpots::highest(PetscInt count, double distance, std::vector<Ho
     const PetscInt node = body_.stress.node[i];
     const double  *x    = &body_.coordinates[3 * (std::size_t)node];
     if (stress_[i] >= 0)
-      left.push_back({stress_[i], time_[i], {x[0], x[1], x[2]}, body_.label[(std::size_t)node], body_.first + node});
+      remaining.push_back({stress_[i], time_[i], {x[0], x[1], x[2]}, body_.label[(std::size_t)node], body_.first + node});
   }
   spots->clear();
   best.resize((std::size_t)size);
   for (PetscInt k = 0; k < count; k++) {
     Candidate own{-1, 0, {0, 0, 0}, std::numeric_limits<PetscInt64>::max(), 0};
-    for (const Candidate &c : left)
-      if (Ahead(c, own)) own = c;
+    for (const Candidate &c : remaining)
+      if (IsAhead(c, own)) own = c;
     PetscCallMPI(MPI_Allgather(&own, sizeof own, MPI_BYTE, best.data(), sizeof own, MPI_BYTE, body_.comm));
-    const Candidate top = *std::min_element(best.begin(), best.end(), Ahead);
+    const Candidate top = *std::min_element(best.begin(), best.end(), IsAhead);
     if (top.stress < 0) break;
     spots->push_back({(PetscInt)top.label, Vector3(top.x[0], top.x[1], top.x[2]), top.stress, top.time});
-    left.erase(std::remove_if(left.begin(), left.end(),
-                              [&](const Candidate &c) {
-                                return c.place == top.place ||
-                                       std::hypot(c.x[0] - top.x[0], c.x[1] - top.x[1], c.x[2] - top.x[2]) < distance;
-                              }),
-               left.end());
+    remaining.erase(std::remove_if(remaining.begin(), remaining.end(),
+                                   [&](const Candidate &c) {
+                                     return c.place == top.place ||
+                                            std::hypot(c.x[0] - top.x[0], c.x[1] - top.x[1], c.x[2] - top.x[2]) < distance;
+                                   }),
+                    remaining.end());
   }
   PetscFunctionReturn(0);
 }

@@ -1,5 +1,4 @@
-/* What the doors for matrices of other programs share: a model on rank 0 that is handed out, and matrices in text read
- * by all ranks. */
+/* Functions shared by the import of matrices of other programs: distribution of a model from rank 0, and parallel reading of matrices in text. */
 #ifndef HHTDAE_FLEXIBLE_IMPORT_H
 #define HHTDAE_FLEXIBLE_IMPORT_H
 
@@ -8,29 +7,29 @@
 namespace hhtdae
 {
 
-/* Nodes, sets and elements as rank 0 has read them; empty on the others */
+/* Nodes, sets and elements read on rank 0; empty on other ranks */
 struct ReadModel {
   std::vector<PetscInt>                        label;
   std::vector<double>                          coordinates; /* empty: not known */
-  std::map<std::string, std::vector<PetscInt>> sets;        /* places among the nodes, in any order */
+  std::map<std::string, std::vector<PetscInt>> sets;        /* indices of nodes, in any order */
   std::vector<Material>                        materials;
   std::vector<FeElement>                       elements;
 };
 
-/* A model may be read once. Collective */
+/* Fails if the model has been filled already. Collective */
 PetscErrorCode CheckUnread(const FeModel &model);
 
-/* Contiguous ranges of nodes to the ranks; an element goes to the owner of its first node. Collective */
+/* Distributes nodes in contiguous ranges; an element goes to the owner of its first node. Collective */
 PetscErrorCode HandOut(const ReadModel &read, FeModel *model);
 
-/* Rows of a matrix that is to have them; -1: as the file says */
+/* The expected number of rows, -1 to take that of the file, and their order in the model */
 struct MatrixShape {
   PetscInt                     rows = -1;
   const std::vector<PetscInt> *row =
-      nullptr; /* the row that number i of the file has in the model, on all ranks; null: i */
+      nullptr; /* the model's row for row i of the file, on all ranks; null: i */
 };
 
-/* What the beginning of a file of a matrix tells, the same on all ranks */
+/* Contents of the header of a matrix file, the same on all ranks */
 struct MatrixFile {
   std::string file;
   enum Kind { Text, Market, Binary } kind = Text;
@@ -40,25 +39,24 @@ struct MatrixFile {
 
 PetscErrorCode OpenMatrix(MPI_Comm comm, const std::string &file, MatrixFile *matrix);
 
-/* Numbers of entries, columns and values of this rank's rows in a file of PETSc's, which MatLoad() takes as they are: columns
-   have to be in the matrix and ascending, values finite. Collective */
+/* Checks a binary file of PETSc, which MatLoad() does not: numbers of entries, and of this rank's rows that columns are in range and ascending
+   and values finite. Collective */
 PetscErrorCode CheckBinary(const FeModel &model, const MatrixFile &matrix);
 
-/* Rows "i j value" in Matrix Market's, Abaqus' or CalculiX' way; the largest number of a row, if the shape is not known
- */
+/* Entries of a matrix in text; largest: the largest row or column number, which is the number of rows if the header does not tell it */
 struct Triplets {
   std::vector<PetscInt> i, j;
   std::vector<double>   value;
   PetscInt              largest = -1;
   PetscInt64            entries = 0;
 };
-/* Lines "i j value" in Matrix Market's, Abaqus' or CalculiX' way; one triangle in the file becomes two. Collective */
+/* Reads lines "i j value" of Matrix Market, Abaqus or CalculiX files; one stored triangle is mirrored. Collective */
 PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &matrix, const MatrixShape &shape, Triplets *triplets);
 
-/* The matrix with both triangles, rank's rows as the model has its nodes; the triplets are used up. Collective */
+/* Assembles the matrix, distributed as the model's nodes; clears the triplets. Collective */
 PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets *triplets, Mat *A);
 
-/* A symmetric matrix whose triangles were both given. Collective */
+/* Fails if a matrix of which both triangles were given is not symmetric. Collective */
 PetscErrorCode CheckSymmetric(MPI_Comm comm, const std::string &name, Mat A);
 
 } // namespace hhtdae

@@ -1,9 +1,9 @@
 /*
-  What MatLoad() does not look at in a binary file of PETSc's: with a column that is not there it writes past the ends of
+  Checks of a binary matrix file of PETSc that MatLoad() does not make: with a column out of range it writes beyond the ends of
   arrays, or the first product reads there.
 
-  The file has, big-endian: identifier, rows, columns, entries; entries of each row; columns of all entries, row after row;
-  their values. Every rank reads the lengths of all rows, a few at a time, and the columns and values of its own.
+  The file contains, big-endian: identifier, rows, columns, entries; entries of each row; columns of all entries, row after row;
+  their values. Every rank reads the lengths of all rows, in blocks, and the columns and values of its own rows.
 */
 #include "flexible/exchange.h"
 #include "flexible/import.h"
@@ -18,9 +18,9 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t at_once = 1 << 16; /* entries in memory */
+constexpr std::size_t buffer_entries = 1 << 16; /* entries read at a time */
 
-/* Consecutive numbers of a file */
+/* Reads consecutive numbers of a file through a buffer */
 template <class T> class Numbers
 {
 public:
@@ -29,34 +29,34 @@ public:
   {
     good_ = in_ && !std::fseek(in_.get(), (long)offset, SEEK_SET);
   }
-  /* false: the file has no more */
+  /* false at the end of the file */
   bool next(T *value)
   {
-    if (at_ == held_.size() && !refill()) return false;
-    *value = held_[at_++];
+    if (at_ == buffer_.size() && !refill()) return false;
+    *value = buffer_[at_++];
     return true;
   }
 
 private:
   bool refill()
   {
-    held_.resize(at_once);
-    held_.resize(good_ ? std::fread(held_.data(), sizeof(T), at_once, in_.get()) : 0);
+    buffer_.resize(buffer_entries);
+    buffer_.resize(good_ ? std::fread(buffer_.data(), sizeof(T), buffer_entries, in_.get()) : 0);
     at_ = 0;
 #if !defined(PETSC_WORDS_BIGENDIAN)
-    good_ = good_ && !PetscByteSwap(held_.data(), type_, (PetscInt)held_.size());
+    good_ = good_ && !PetscByteSwap(buffer_.data(), type_, (PetscInt)buffer_.size());
 #endif
-    return good_ && !held_.empty();
+    return good_ && !buffer_.empty();
   }
 
   std::unique_ptr<FILE, int (*)(FILE *)> in_;
   PetscDataType                          type_;
   bool                                   good_;
-  std::vector<T>                         held_;
+  std::vector<T>                         buffer_;
   std::size_t                            at_ = 0;
 };
 
-/* Lengths of this rank's rows, and the place of its first entry among all */
+/* Lengths of this rank's rows, and the number of entries before them */
 std::string ReadLengths(const FeModel &model, const MatrixFile &m, std::vector<PetscInt> *own, PetscInt64 *first)
 {
   Numbers<PetscInt> lengths(m.file, 4 + 3 * (PetscInt64)sizeof(PetscInt), PETSC_INT);

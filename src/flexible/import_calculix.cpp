@@ -1,5 +1,5 @@
 /*
-  The door for CalculiX. A deck without supports whose step is
+  Import of CalculiX' matrices. A deck without supports whose step is
 
     *STEP
     *FREQUENCY, SOLVER=MATRIXSTORAGE
@@ -8,11 +8,11 @@
   makes ccx 2.20 write, for a job "stem",
     stem.dof   a line "node.direction" for each row of the matrices; supports and dependent unknowns of constraints are
                left out
-    stem.sti   lines "i j value" of the stiffness matrix, upper triangle by columns, 14 digits, zeros of the pattern too
-    stem.mas   the same of the mass matrix
-  Nodes, sets, elements and materials come from the deck stem.inp. Rank 0 reads it with stem.dof and hands out ranges of
-  nodes; the matrices, which are most of the bytes, are read by all ranks, a part of the file each. Elements serve
-  stress and pictures, so those of other kinds than tetrahedra and bricks of linear or quadratic shape are not kept.
+    stem.sti   lines "i j value" of the stiffness matrix, upper triangle by columns, 14 digits, including zeros of the pattern
+    stem.mas   the same for the mass matrix
+  Nodes, sets, elements and materials come from the deck stem.inp. Rank 0 reads it and stem.dof and distributes ranges of
+  nodes; the matrices, which are most of the bytes, are read by all ranks, a part of the file each. Elements are used for
+  stress and pictures only, so that those other than linear and quadratic tetrahedra and bricks are dropped.
 */
 #include "flexible/calculix.h"
 #include "flexible/exchange.h"
@@ -25,7 +25,7 @@ namespace hhtdae
 namespace
 {
 
-/* An exception that ends rank 0 alone, as of a deck that memory has no room for, would leave the others waiting. */
+/* Converts exceptions, as that of a deck too large for the memory, to an error message: ending rank 0 alone would leave the others waiting */
 std::string ReadSafely(const std::string &stem, ReadModel *read, std::vector<PetscInt> *row, PetscInt64 *left_out)
 {
   try {
@@ -35,7 +35,7 @@ std::string ReadSafely(const std::string &stem, ReadModel *read, std::vector<Pet
   }
 }
 
-/* A file that was cut within its last line has a number there with fewer digits, or a smaller exponent. */
+/* Refuses a file that does not end with a line end: if it was truncated within the last line, a number there has lost digits */
 std::string CheckEnd(const std::string &file)
 {
   std::ifstream in(file, std::ios::binary);
@@ -43,7 +43,7 @@ std::string CheckEnd(const std::string &file)
   return in.get() == '\n' ? "" : file + " ends within a line (truncated?): ccx ends each line";
 }
 
-/* Both matrices have all rows; a file that ends early has not */
+/* Reads a matrix, and checks that it has entries up to the last row: a truncated file has not */
 PetscErrorCode ReadMatrix(const FeModel &model, const std::string &file, const std::vector<PetscInt> &row, Mat *A)
 {
   MatrixFile  head;
@@ -85,7 +85,7 @@ PetscErrorCode FeModel::readCalculix(const std::string &given)
     error     = ReadSafely(stem, &read, &row, &head[1]);
     bool same = true;
     for (std::size_t i = 0; i < row.size(); i++) same = same && row[i] == (PetscInt)i;
-    if (same) row.clear(); /* as a rule */
+    if (same) row.clear(); /* the usual case: no renumbering */
     head[0] = (PetscInt64)row.size();
   }
   PetscCall(Agree(comm, error, PETSC_ERR_FILE_UNEXPECTED));

@@ -1,4 +1,4 @@
-/* Matrices in memory or in files of Matrix Market, Abaqus or PETSc, with nodes and sets in plain lists. */
+/* Models from matrices in memory or in files of Matrix Market, Abaqus or PETSc, with nodes and sets in text files. */
 #include "flexible/exchange.h"
 #include "flexible/import.h"
 #include "flexible/read_text.h"
@@ -13,7 +13,7 @@ namespace hhtdae
 namespace
 {
 
-/* Consecutive parts of rank 0's data to the ranks, counts[r] of `width` entries each. Collective */
+/* Distributes consecutive parts of rank 0's data, counts[r] entries to rank r. Collective */
 template <class T>
 PetscErrorCode Scatter(MPI_Comm comm, const std::vector<T> &data, const std::vector<PetscMPIInt> &counts,
                        PetscMPIInt own, std::vector<T> *part)
@@ -34,7 +34,7 @@ struct Node3 {
   double x[3];
 };
 
-/* Members of one set to the owners of the nodes */
+/* Sends the members of one set to the owners of the nodes */
 PetscErrorCode HandOutSet(MPI_Comm comm, PetscInt nodes, std::string name, std::vector<PetscInt> member, FeModel *model)
 {
   PetscMPIInt              rank, size, length = (PetscMPIInt)name.size(), own = 0;
@@ -57,7 +57,7 @@ PetscErrorCode HandOutSet(MPI_Comm comm, PetscInt nodes, std::string name, std::
   PetscFunctionReturn(0);
 }
 
-/* Rank 0 sorts the elements by the owner of their first node */
+/* Sends each element to the owner of its first node */
 PetscErrorCode HandOutElements(MPI_Comm comm, const ReadModel &read, FeModel *model)
 {
   PetscMPIInt              rank, size, own = 0;
@@ -97,7 +97,7 @@ bool Blank(const std::string &line)
   return words.empty() || words[0][0] == '#' || words[0][0] == '%';
 }
 
-/* "label x y z" a line */
+/* Reads lines "label x y z" */
 std::string ReadNodes(const std::string &file, ReadModel *read)
 {
   std::string   line, why = WhyUnreadable(file);
@@ -124,7 +124,7 @@ std::string ReadNodes(const std::string &file, ReadModel *read)
   return twice == sorted.end() ? "" : file + ": two nodes have the label " + std::to_string(*twice);
 }
 
-/* "name label label ..." a line; several lines of one name are one set */
+/* Reads lines "name label label ..."; several lines with one name are one set */
 std::string ReadSets(const std::string &file, ReadModel *read)
 {
   std::string                            line, why = WhyUnreadable(file);
@@ -171,7 +171,7 @@ PetscErrorCode LoadBinary(const FeModel &model, const std::string &file, const M
   PetscFunctionReturn(0);
 }
 
-/* Is a matrix one that a model can have; collective */
+/* Checks type, size and distribution of a matrix, and its symmetry. Collective */
 PetscErrorCode CheckMatrix(MPI_Comm comm, const char *name, Mat A)
 {
   PetscInt  rows, cols, own, own_cols;
@@ -196,7 +196,7 @@ PetscErrorCode CheckMatrix(MPI_Comm comm, const char *name, Mat A)
   PetscFunctionReturn(0);
 }
 
-/* Sizes of both files, and nodes and sets; rank 0 reads, all hear of errors */
+/* Reads nodes and sets on rank 0 and compares their number with the rows; errors are raised on all ranks */
 PetscErrorCode ReadLists(MPI_Comm comm, PetscInt rows, const std::string &nodes, const std::string &sets,
                          const std::string &stiffness, ReadModel *read)
 {
@@ -281,7 +281,7 @@ PetscErrorCode FeModel::readMatrices(const std::string &stiffness, const std::st
     if (files[k].kind != MatrixFile::Binary) PetscCall(ReadTriplets(comm, files[k], MatrixShape(), &triplets[k]));
     rows[k] = files[k].rows < 0 ? triplets[k].largest + 1 : (PetscInt)files[k].rows;
   }
-  /* a file without a head may end with rows of zeros, as M does where nodes have no mass */
+  /* without a header the last rows of M may be missing in the file, if nodes have no mass */
   if (files[1].rows < 0) rows[1] = std::max(rows[0], rows[1]);
   PetscCheck(rows[0] == rows[1], comm, PETSC_ERR_ARG_SIZ, "%s has %" PetscInt_FMT " rows, but %s has %" PetscInt_FMT,
              stiffness.c_str(), rows[0], mass.c_str(), rows[1]);

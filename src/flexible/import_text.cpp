@@ -1,7 +1,7 @@
 /*
-  Matrices in text, one entry a line. Every rank reads its own range of the file's bytes, and PETSc brings the entries
-  to the owners of their rows: no rank sees more than its share, and the conversion of numbers, which takes the time, is
-  divided.
+  Reads matrices in text with one entry per line. Every rank reads its own range of the file's bytes, and PETSc sends the entries
+  to the owners of their rows: no rank reads more than its share, and the conversion of numbers, which dominates the time, is
+  divided among the ranks.
 */
 #include "flexible/exchange.h"
 #include "flexible/import.h"
@@ -20,7 +20,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int64_t binary_id = 1211216; /* PETSc's, of a matrix */
+constexpr int64_t binary_id = 1211216; /* PETSc's MAT_FILE_CLASSID */
 
 using File = std::unique_ptr<FILE, int (*)(FILE *)>;
 
@@ -33,7 +33,7 @@ int64_t BigEndian(const unsigned char *b, int bytes)
   return bytes == 4 ? (int64_t)(int32_t)(uint32_t)v : (int64_t)v;
 }
 
-/* A line without its end; false at the end of the file */
+/* Reads a line, without its line end; false at the end of the file */
 bool Line(FILE *in, std::string *line)
 {
   int c;
@@ -54,7 +54,7 @@ std::string ReadBinaryHead(FILE *in, MatrixFile *m)
   if (m->rows < 0 || cols < 0) return "its sizes are not possible (written by a PETSc with other integers?)";
   if (cols != m->rows) return "it has " + std::to_string(m->rows) + " rows and " + std::to_string(cols) + " columns";
   if (m->entries < 0) return "it is stored as a dense matrix, a sparse one is asked for";
-  const int64_t most = m->bytes / word; /* of rows and entries, before their bytes are added up */
+  const int64_t most = m->bytes / word; /* bounds rows and entries, so that the sum of their bytes below cannot overflow */
   if (m->rows > most || m->entries > most ||
       m->bytes < (int64_t)sizeof head + word * (m->rows + m->entries) + (int64_t)sizeof(PetscScalar) * m->entries)
     return "it is truncated, or written by a PETSc with other integers or numbers";
@@ -112,7 +112,7 @@ std::string ReadHead(MatrixFile *m)
 
 bool IsSpace(char c) { return std::isspace((unsigned char)c); }
 
-/* The next word of [*at, end), past one comma before it if there are words already */
+/* The next word of [*at, end), after an optional comma unless it is the first word; *at moves to its end */
 const char *Word(const char **at, const char *end, bool first)
 {
   while (*at < end && IsSpace(**at)) ++*at;
@@ -123,8 +123,8 @@ const char *Word(const char **at, const char *end, bool first)
   return word;
 }
 
-/* Reads lines, keeps entries, remembers the first thing that is wrong */
-struct Collector {
+/* Parses lines, collects their entries, and keeps the first error */
+struct EntryCollector {
   const MatrixShape &shape;
   Triplets          *to;
   std::string        error;
@@ -157,7 +157,7 @@ private:
   {
     to->entries++;
     to->largest = std::max({to->largest, i, j});
-    if (value == 0.0) return; /* CalculiX writes all of the pattern, zeros too */
+    if (value == 0.0) return; /* CalculiX also writes the zeros of the pattern */
     (i > j ? lower : upper) |= i != j;
     if (shape.row) {
       i = (*shape.row)[(std::size_t)i];
@@ -174,13 +174,13 @@ private:
   }
 };
 
-/* Lines that begin in bytes [begin, end) of the file */
-std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end, bool first, Collector *to)
+/* Parses the lines that begin in bytes [begin, end) of the file */
+std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end, bool first, EntryCollector *to)
 {
   File              in = Open(name);
   std::vector<char> buffer(1 << 22);
   std::string       carry;
-  bool              inside = first; /* past the end of the line that another rank reads */
+  bool              inside = first; /* false until the end of the line that the rank before reads */
   PetscInt64        at     = first ? begin : begin - 1;
   if (begin >= end) return "";
   if (!in || std::fseek(in.get(), (long)at, SEEK_SET)) return "this rank cannot open it";
@@ -206,7 +206,7 @@ std::string ReadLines(const std::string &name, PetscInt64 begin, PetscInt64 end,
   return to->error;
 }
 
-/* One triangle becomes two */
+/* Adds the transposed off-diagonal entries */
 void Mirror(Triplets *t)
 {
   const std::size_t n = t->i.size();
@@ -254,7 +254,7 @@ PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShap
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   if (known.rows < 0) known.rows = (PetscInt)m.rows;
-  Collector        to{known, triplets, "", 0, 0};
+  EntryCollector   to{known, triplets, "", 0, 0};
   const PetscInt64 begin = m.begin + PartBegin(m.bytes - m.begin, size, rank),
                    end   = m.begin + PartBegin(m.bytes - m.begin, size, rank + 1);
   error                  = ReadLines(m.file, begin, end, rank == 0, &to);
@@ -282,8 +282,7 @@ PetscErrorCode ReadTriplets(MPI_Comm comm, const MatrixFile &m, const MatrixShap
   PetscFunctionReturn(0);
 }
 
-/* Entries of all ranks off the diagonal; `twice`: of the diagonal, where Assemble() adds one of its own to each row, one is
-   given more than once */
+/* Number of off-diagonal entries of all ranks; *twice: some diagonal entry was given more than once, Assemble() having added one zero to each row */
 static PetscErrorCode CountEntries(const FeModel &model, const Triplets &t, PetscInt64 *off, PetscBool *twice)
 {
   Vec        count;
@@ -312,7 +311,7 @@ PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets 
   MatInfo    info;
   PetscFunctionBegin;
   for (PetscInt row = 3 * model.first; row < 3 * (model.first + model.own);
-       row++) { /* solvers ask for a whole diagonal */
+       row++) { /* solvers need all diagonal entries in the pattern */
     t->i.push_back(row);
     t->j.push_back(row);
     t->value.push_back(0);
@@ -322,10 +321,10 @@ PetscErrorCode Assemble(const FeModel &model, const std::string &name, Triplets 
   PetscCall(MatSetSizes(*A, 3 * model.own, 3 * model.own, 3 * model.nodes, 3 * model.nodes));
   PetscCall(MatSetBlockSize(*A, 3));
   PetscCall(MatSetType(*A, MATAIJ));
-  PetscCall(CountEntries(model, *t, &off, &twice)); /* PETSc may change the numbers */
+  PetscCall(CountEntries(model, *t, &off, &twice)); /* before MatSetPreallocationCOO(), which may change the index arrays */
   PetscCall(MatSetPreallocationCOO(*A, (PetscInt)t->i.size(), t->i.data(), t->j.data()));
   PetscCall(MatGetInfo(*A, MAT_GLOBAL_SUM, &info));
-  /* PETSc would add up what stands there twice. */
+  /* PETSc would add up repeated entries */
   PetscCheck(!twice && info.nz_used == (double)(off + 3 * (PetscInt64)model.nodes), model.comm,
              PETSC_ERR_FILE_UNEXPECTED, "cannot read the matrix %s: an entry stands in it twice", name.c_str());
   PetscCall(MatSetValuesCOO(*A, t->value.data(), INSERT_VALUES));

@@ -1,4 +1,4 @@
-/* The interior of a body whose attachments are held: K and M of the free dofs, bordered by the averages. */
+/* The interior problem: K and M of the free dofs, bordered by the rows of averages. */
 #include "interior.h"
 #include <algorithm>
 #include <cmath>
@@ -40,7 +40,7 @@ PetscErrorCode CreateEmpty(MPI_Comm comm, PetscInt rows, PetscInt cols, Mat *A)
   PetscFunctionReturn(0);
 }
 
-/* Multipliers stand on the rank with most of their nodes */
+/* Places the multipliers of an average on the rank with most of its nodes */
 static PetscErrorCode PlaceMultipliers(const FeModel &model, const std::vector<Tied> &tied, Interior *in,
                                        PetscInt *mine, std::vector<PetscInt> *global)
 {
@@ -63,7 +63,7 @@ static PetscErrorCode PlaceMultipliers(const FeModel &model, const std::vector<T
   PetscFunctionReturn(0);
 }
 
-/* Rows of averages get the size of entries of K, so that pivots can be compared */
+/* Scales rows of averages to the size of entries of K, so that pivots are comparable */
 static PetscErrorCode ScaleRows(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales,
                                 VectorXd *scale)
 {
@@ -83,7 +83,7 @@ static PetscErrorCode ScaleRows(const FeModel &model, const std::vector<Tied> &t
   PetscFunctionReturn(0);
 }
 
-/* C^T for free dofs, scaled: six columns for each average */
+/* The scaled C^T in the free dofs, with six columns for each average */
 static PetscErrorCode CreateCt(const FeModel &model, const std::vector<Tied> &tied, const Interior &in, PetscInt mine,
                                const std::vector<PetscInt> &global, Mat *Ct)
 {
@@ -96,7 +96,7 @@ static PetscErrorCode CreateCt(const FeModel &model, const std::vector<Tied> &ti
     for (PetscInt n : t.node)
       for (int c = 0; c < 3 && t.tie == Tie::Average; c++) entries[place[3 * n + c]] += 6;
   PetscCall(CreateEmpty(model.comm, (PetscInt)in.dof.size(), mine, Ct));
-  for (std::size_t i = 0; i < entries.size(); i++) { /* PETSc refuses more than there are columns */
+  for (std::size_t i = 0; i < entries.size(); i++) { /* PETSc refuses to preallocate more entries than there are columns */
     off[i]     = std::min(entries[i], (PetscInt)global.size() - mine);
     entries[i] = std::min(entries[i], mine);
   }

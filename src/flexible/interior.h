@@ -1,13 +1,13 @@
 /*
   The interior problem of a body whose attachments are held.
 
-  Rigid attachments eliminate their nodes. Averages bring multipliers: with C u the motions of all averages,
+  The nodes of rigid attachments are eliminated. Averages add multipliers: with C u the motions of all averages,
 
       [ K_II  C^T ] [ u ]   [ f ]
       [ C      0  ] [ l ] = [ q ]
 
-  gives constraint modes (q one unit, f from the nodes of rigid attachments) and, with f = omega^2 M_II u and q = 0,
-  normal modes. One factorization of this matrix serves both, and the residuals of the modes in the end.
+  gives constraint modes (q a unit vector or zero, f from the nodes of rigid attachments) and, with f = omega^2 M_II u and q = 0,
+  normal modes. One factorization of this matrix is used for both, and for the residuals of the modes.
 */
 #ifndef HHTDAE_FLEXIBLE_INTERIOR_H
 #define HHTDAE_FLEXIBLE_INTERIOR_H
@@ -18,13 +18,13 @@
 namespace hhtdae
 {
 
-/* K and M of the dofs which no rigid attachment holds, with the multipliers of averages */
+/* K and M of the dofs that belong to no rigid attachment, with the multipliers of averages */
 struct Interior {
-  std::vector<PetscInt> dof; /* own ones, counted from the first own dof; the first rows of the pencil on this rank */
+  std::vector<PetscInt> dof; /* own free dofs, counted from the first own dof; the first rows of the pencil on this rank */
   Pencil                pencil;
-  PetscInt              rows = 0; /* of this rank, multipliers included */
-  VectorXd              scale;    /* of the rows of averages, 6 each; on all ranks */
-  std::vector<PetscInt> row;      /* of the multiplier in this rank's part, -1: on another rank; 6 for each average */
+  PetscInt              rows = 0; /* rows of this rank, multipliers included */
+  VectorXd              scale;    /* scale factors of the rows of C, 6 for each average; on all ranks */
+  std::vector<PetscInt> row;      /* local rows of the multipliers, 6 for each average; -1: on another rank */
 
   ~Interior()
   {
@@ -33,16 +33,16 @@ struct Interior {
   }
 };
 
-/* Own dofs, counted from the first own one, that no rigid attachment holds */
+/* Own dofs, counted from the first own one, that belong to no rigid attachment */
 std::vector<PetscInt> FreeDofs(const FeModel &model, const std::vector<Tied> &tied);
-/* A sparse matrix of these own rows and columns, nothing allocated */
+/* An AIJ matrix with these numbers of own rows and columns, not preallocated */
 PetscErrorCode CreateEmpty(MPI_Comm comm, PetscInt rows, PetscInt cols, Mat *A);
 
 PetscErrorCode CreateInterior(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales,
                               Interior *in);
-/* An error names the mechanism if the interior stiffness is singular */
+/* Factors the interior stiffness; if it is singular, the error names the nodes of the mechanism */
 PetscErrorCode FactorInterior(const FeModel &model, const Interior &in, const BodyScales &scales, KSP *ksp);
-/* The first 6 columns of *modes for each attachment */
+/* Sets the first columns of *modes, 6 for each attachment */
 PetscErrorCode ConstraintModes(const FeModel &model, const std::vector<Tied> &tied, const Interior &in, KSP ksp,
                                MatrixXd *modes);
 

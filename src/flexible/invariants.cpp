@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-constexpr PetscInt nodes_at_a_time = 4096; /* whose components are taken apart */
+constexpr PetscInt nodes_at_a_time = 4096; /* nodes of a block whose components are copied to separate matrices */
 
 static constexpr int first_component[6] = {0, 1, 2, 0, 1, 2}, second_component[6] = {0, 1, 2, 1, 2, 0};
 
@@ -19,7 +19,7 @@ static MatrixXd Component(const MatrixXd &x, PetscInt from, PetscInt count, int 
   return part;
 }
 
-/* Sums over own nodes: rows 0-2 first, 3-11 moment, then six blocks quadratic, one column a mode */
+/* Sums over own nodes, one column per mode: rows 0-2 first, 3-11 moment, then the six blocks of quadratic */
 static PetscErrorCode LocalSums(const FeModel &model, const BodyScales &scales, const MatrixXd &x, const MatrixXd &Mx,
                                 MatrixXd *sums)
 {

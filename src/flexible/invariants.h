@@ -1,6 +1,5 @@
 /*
-  Inertia invariants in nodal form: M = m_ij times identity(3), the modes and the coordinates of the nodes are all they
-  need.
+  Inertia invariants in nodal form, from M = m_ij times identity(3), the modes and the coordinates of the nodes.
 
       int phi dm            = sum_ij m_ij phi_j
       int X_c phi_d dm      = sum_ij X_i,c m_ij phi_j,d
@@ -15,7 +14,7 @@
 namespace hhtdae
 {
 
-/* Fills first, moment and quadratic of the body for modes x (own dofs), one reduction over the ranks */
+/* Sets mass, center, moments, first, moment and quadratic of the body for modes x (own dofs), with one reduction over the ranks */
 PetscErrorCode ComputeInvariants(const FeModel &model, const BodyScales &scales, const Eigen::MatrixXd &x,
                                  ModalBody *body);
 

@@ -1,5 +1,5 @@
 /*
-  Nodes that a reduction keeps. The rotation of a node is that of the rigid motion nearest to the displacements of the nodes around it, those that K couples it to:
+  Nodes that a reduction keeps. The rotation of a node is that of the rigid motion nearest to the displacements of the nodes that K couples it to:
   theta = J^-1 sum r x u, with r from their centroid and J = sum (r^2 1 - r r^T).
 */
 #include "kept_nodes.h"
@@ -16,31 +16,31 @@ namespace hhtdae
 namespace
 {
 
-/* The least moment of a node's neighbours relative to the greatest: below it they are on a line, as far as rotations are concerned */
-constexpr double on_a_line = 1e-8;
+/* Neighbours count as collinear, so that the node has no rotation, if their least principal moment is below this part of the largest one */
+constexpr double collinear_neighbours = 1e-8;
 
 struct Neighbour {
-  PetscInt kept, node; /* place among the kept nodes, global number */
+  PetscInt kept, node; /* index of the kept node, global number of the neighbour */
 };
 
-/* Nodes that K couples the kept ones to, themselves included; on all ranks */
+/* The nodes that K couples to the kept ones, themselves included; on all ranks */
 PetscErrorCode Neighbours(const FeModel &model, const KeptNodes &kept, std::vector<Neighbour> *all)
 {
   std::vector<Neighbour> mine;
 
   PetscFunctionBegin;
   for (std::size_t k = 0; k < kept.label.size(); k++) {
-    std::set<PetscInt> around;
+    std::set<PetscInt> coupled;
     if (kept.own[k] < 0) continue;
     for (PetscInt c = 0; c < 3; c++) {
       const PetscInt  row = 3 * (model.first + kept.own[k]) + c;
       const PetscInt *column;
       PetscInt        n;
       PetscCall(MatGetRow(model.K, row, &n, &column, nullptr));
-      for (PetscInt i = 0; i < n; i++) around.insert(column[i] / 3);
+      for (PetscInt i = 0; i < n; i++) coupled.insert(column[i] / 3);
       PetscCall(MatRestoreRow(model.K, row, &n, &column, nullptr));
     }
-    for (PetscInt node : around) mine.push_back({(PetscInt)k, node});
+    for (PetscInt node : coupled) mine.push_back({(PetscInt)k, node});
   }
   PetscCall(GatherAll(model.comm, mine, all));
   PetscFunctionReturn(0);
@@ -50,15 +50,15 @@ PetscErrorCode Neighbours(const FeModel &model, const KeptNodes &kept, std::vect
 
 PetscErrorCode FindLabels(const FeModel &model, const std::vector<PetscInt> &label, const std::string &who, std::vector<PetscInt> *own)
 {
-  std::map<PetscInt, PetscInt> of;
+  std::map<PetscInt, PetscInt> node_of_label;
   std::vector<int>             found(label.size() + 1, 0);
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < model.own; i++) of[NodeLabel(model, i)] = i;
+  for (PetscInt i = 0; i < model.own; i++) node_of_label[NodeLabel(model, i)] = i;
   own->assign(label.size(), -1);
   for (std::size_t k = 0; k < label.size(); k++) {
-    const auto at = of.find(label[k]);
-    if (at == of.end()) continue;
+    const auto at = node_of_label.find(label[k]);
+    if (at == node_of_label.end()) continue;
     (*own)[k] = at->second;
     found[k]  = 1;
   }
@@ -112,7 +112,7 @@ PetscErrorCode FillNodes(const FeModel &model, const KeptNodes &kept, const Matr
     const Vector3 values  = SymmetricEigen(moments).values;
     ModalNode    &node    = body->nodes[k];
     node.label            = kept.label[k];
-    node.turns            = values[0] > on_a_line * values[2];
+    node.turns            = values[0] > collinear_neighbours * values[2];
     if (node.turns) inverse[k] = moments.inverse();
     if (kept.own[k] < 0) continue;
     place.col(k)                 = NodePosition(model, kept.own[k]);

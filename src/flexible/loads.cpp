@@ -21,18 +21,18 @@ namespace hhtdae
 namespace
 {
 
-using Key = std::array<PetscInt, 4>; /* corners of a face, ascending */
+using FaceKey = std::array<PetscInt, 4>; /* corners of a face, ascending */
 
-template <class Shape> Key KeyOf(const FeElement &e, int f)
+template <class Shape> FaceKey FaceKeyOf(const FeElement &e, int f)
 {
-  Key key{-1, -1, -1, -1};
+  FaceKey key{-1, -1, -1, -1};
   for (int i = 0; i < Shape::perface; i++) key[i] = e.node[Shape::face[f][i]];
   std::sort(key.begin(), key.end());
   return key;
 }
 
-/* Own elements' faces whose nodes are all in the set; `inside` says so of the elements' nodes */
-template <class Shape> void FacesInside(const FeElement &e, std::size_t number, const std::vector<char> &inside, std::vector<ResolvedLoad::ElementFace> *faces, std::vector<Key> *keys)
+/* Collects an element's faces whose nodes are all in the set; inside[a]: node a of the element is in it */
+template <class Shape> void FacesInside(const FeElement &e, std::size_t number, const std::vector<char> &inside, std::vector<ResolvedLoad::ElementFace> *faces, std::vector<FaceKey> *keys)
 {
   for (int f = 0; f < Shape::faces; f++) {
     bool corner[8] = {}, all = true;
@@ -43,17 +43,17 @@ template <class Shape> void FacesInside(const FeElement &e, std::size_t number, 
     }
     if (!all) continue;
     faces->push_back({number, f});
-    keys->push_back(KeyOf<Shape>(e, f));
+    keys->push_back(FaceKeyOf<Shape>(e, f));
   }
 }
 
-/* A face that two elements share is inside of the body */
+/* The outer faces with all nodes in the set: faces shared by two elements are inside the body */
 PetscErrorCode FindFaces(const FeModel &model, const ElementNodes &nodes, const LoadCase &load, std::vector<ResolvedLoad::ElementFace> *faces)
 {
   std::vector<double>                    own(model.own + 1, 0.), here(nodes.global.size() + 1);
   std::vector<PetscInt>                  member;
   std::vector<ResolvedLoad::ElementFace> found;
-  std::vector<Key>                       keys, all;
+  std::vector<FaceKey>                   keys, all;
   int                                    count;
 
   PetscFunctionBegin;
@@ -94,17 +94,17 @@ PetscErrorCode FindForces(const FeModel &model, const LoadCase &load, std::vecto
 
 /* ---- sums over nodes and faces ---- */
 
-struct Sums {
+struct LoadSums {
   MatrixXd rigid; /* columns: force, moment */
   MatrixXd modal, moment_gradient, force_gradient, modal_gradient;
 
-  Sums(PetscInt m, bool follows) : rigid(MatrixXd::Zero(3, 2)), modal(MatrixXd::Zero(m, 1)), moment_gradient(MatrixXd::Zero(3, m))
+  LoadSums(PetscInt m, bool follows) : rigid(MatrixXd::Zero(3, 2)), modal(MatrixXd::Zero(m, 1)), moment_gradient(MatrixXd::Zero(3, m))
   {
     if (!follows) return;
     force_gradient.setZero(3, m);
     modal_gradient.setZero(m, m);
   }
-  /* force f at y from the centre of mass, where the modes move the body by phi */
+  /* Adds a force f at the position y relative to the centre of mass, where the modes have the displacements phi */
   template <class Phi> void add(const Vector3 &f, const Vector3 &y, const Phi &phi)
   {
     rigid.col(0) += f;
@@ -114,13 +114,13 @@ struct Sums {
   }
 };
 
-/* A point of a face: the shape functions of the element, their derivatives along the face, weight */
+/* An integration point of a face: the element's shape functions, their derivatives along the face, weight */
 struct FacePoint {
   VectorXd N, s, t;
   double   weight;
 };
 
-/* Three by three points of Gauss; of triangles in coordinates that collapse one side of the square (Duffy), so that polynomials of degree four are exact */
+/* 3 x 3 Gauss points; for triangles in coordinates that collapse one side of the square (Duffy), which is exact for polynomials of degree four */
 template <class Shape> std::vector<FacePoint> PointsOf(int f)
 {
   const double           x[3] = {-std::sqrt(.6), 0, std::sqrt(.6)}, w[3] = {5. / 9, 8. / 9, 5. / 9};
@@ -141,10 +141,10 @@ template <class Shape> std::vector<FacePoint> PointsOf(int f)
 }
 
 void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const ElementNodes &nodes, const std::vector<double> &X, const std::vector<double> &modes, Eigen::Index m,
-             const Vector3 &center, Sums *sum)
+             const Vector3 &center, LoadSums *sum)
 {
   const PetscInt n = (PetscInt)points[0].N.size();
-  MatrixXd       x(3, n), U(3, n * m), moved, changed; /* modes of node a in columns a m .. */
+  MatrixXd       x(3, n), U(3, n * m), moved, changed; /* U: modes at node a in columns a m to (a + 1) m - 1 */
   for (PetscInt a = 0; a < n; a++) {
     const PetscInt place   = nodes.place(e.node[a]);
     x.col(a)               = Eigen::Map<const Vector3>(&X[3 * place]);
@@ -175,10 +175,10 @@ void AddFace(const FeElement &e, const std::vector<FacePoint> &points, const Ele
   if (follows) sum->modal_gradient.noalias() += moved.transpose() * changed;
 }
 
-/* Modes at the nodes of the loaded faces' elements, whoever owns them: three numbers for each mode, mode after mode */
-PetscErrorCode AddFaces(const FeModel &model, const ResolvedLoad &load, const BodyScales &scales, const MatrixXd &x, Sums *sum)
+/* Adds the pressure on all faces. The modes are fetched for all nodes of the elements, three components for each mode of a node. */
+PetscErrorCode AddFaces(const FeModel &model, const ResolvedLoad &load, const BodyScales &scales, const MatrixXd &x, LoadSums *sum)
 {
-  const Eigen::Index     m = x.cols(); /* whose products with nodes an int need not hold */
+  const Eigen::Index     m = x.cols(); /* 64 bits: products with numbers of nodes may overflow an int */
   ElementNodes           nodes;
   std::vector<FeElement> elements;
   std::vector<double>    X, own(3 * m * model.own + 1), modes;
@@ -231,7 +231,7 @@ PetscErrorCode FillLoads(const FeModel &model, const std::vector<LoadCase> &load
   PetscFunctionBegin;
   body->loads.clear();
   for (std::size_t k = 0; k < loads.size(); k++) {
-    Sums          sum(m, !loads[k].surface.empty() && loads[k].follows);
+    LoadSums      sum(m, !loads[k].surface.empty() && loads[k].follows);
     ModalLoadCase l;
     for (const auto &f : resolved[k].forces) sum.add(f.force, NodePosition(model, f.node) - scales.center, x.middleRows<3>(3 * f.node));
     if (!loads[k].surface.empty()) PetscCall(AddFaces(model, resolved[k], scales, x, &sum));

@@ -1,4 +1,4 @@
-/* Load cases of a reduction: nodal forces and pressure on a surface, as the modes see them; ModalLoadCase of hhtdae/modal.h. */
+/* Load cases of a reduction: nodal forces and pressure on a surface, projected on the modes (ModalLoadCase of hhtdae/modal.h). */
 #ifndef HHTDAE_FLEXIBLE_LOADS_H
 #define HHTDAE_FLEXIBLE_LOADS_H
 
@@ -9,10 +9,10 @@
 namespace hhtdae
 {
 
-/* What of a load case is on this rank */
+/* This rank's part of a load case */
 struct ResolvedLoad {
   struct NodeForce {
-    PetscInt node; /* own, from 0 */
+    PetscInt node; /* own node, counted from the first own node */
     Vector3  force;
   };
   struct ElementFace {
@@ -23,10 +23,10 @@ struct ResolvedLoad {
   std::vector<ElementFace> faces;
 };
 
-/* Finds nodes and faces, and what is wrong with the load cases, before any work is done */
+/* Finds nodes and faces, and checks the load cases, before any work is done */
 PetscErrorCode ResolveLoads(const FeModel &model, const std::vector<LoadCase> &loads, std::vector<ResolvedLoad> *resolved);
 
-/* Fills body->loads from the modes x at own dofs */
+/* Sets body->loads from the modes x at own dofs */
 PetscErrorCode FillLoads(const FeModel &model, const std::vector<LoadCase> &loads, const std::vector<ResolvedLoad> &resolved, const BodyScales &scales,
                          const MatrixXd &x, ModalBody *body);
 

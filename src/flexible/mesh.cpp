@@ -1,13 +1,13 @@
 /*
   FeModel::readMesh: from a Gmsh file to distributed nodes, elements, sets, K and M.
 
-  Each rank parses its share of the file (mesh_file.cpp). Cells that share a face make a graph, which a PetscPartitioner
-  divides (partitioner.cpp); a DMPlex with the cells and all their nodes, middle ones as well, is distributed
-  accordingly. A PetscSection with one entry on each node numbers the nodes and says who owns them. No rank ever holds
+  Each rank parses its share of the file (mesh_file.cpp). The graph of cells that share a face is divided by a
+  PetscPartitioner (partitioner.cpp), and a DMPlex with the cells and all their nodes, including middle ones, is distributed
+  accordingly. A PetscSection with one dof on each node numbers the nodes and determines their owners. No rank ever holds
   the whole mesh.
 
-  The DMPlex has no faces and edges: PETSc can divide such a mesh on one rank only, so that the graph is made here. In
-  return tetrahedra and bricks, linear and quadratic, may stand in one mesh, and nodes are what the file says they are.
+  The DMPlex has no faces and edges, and PETSc can partition such a mesh on one rank only, so that the graph is built here. In
+  return one mesh may contain tetrahedra and bricks, linear and quadratic, and the nodes are exactly those of the file.
 */
 #include "flexible/assembly.h"
 #include "flexible/element_shapes.h"
@@ -46,7 +46,7 @@ template <class Shape> void AddFaces(const MeshCell &cell, PetscInt number, std:
     FaceRecord record{{-1, -1, -1, -1}, number, cell.tag};
     for (int i = 0; i < Shape::perface; i++) record.corner[i] = cell.node[Shape::face[f][i]];
     std::sort(record.corner, record.corner + Shape::perface);
-    if (std::unique(record.corner, record.corner + Shape::perface) - record.corner < 3) continue; /* an edge, or a point */
+    if (std::unique(record.corner, record.corner + Shape::perface) - record.corner < 3) continue; /* degenerated to an edge or a point */
     out[record.corner[0] % out.size()].push_back(record);
   }
 }
@@ -63,7 +63,7 @@ std::vector<FaceLink> LinksOf(const FaceRecord *from, const FaceRecord *to)
 const char *const overlapping =
     ", so that they overlap (msh 2.2 writes an element of two physical groups twice; msh 4.1 does not)";
 
-/* Neighbours of this rank's cells, by global number; first: of this rank's first cell */
+/* Global numbers of the neighbours of this rank's cells */
 PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vector<MeshCell> &cells,
                          std::vector<PetscInt> &start, std::vector<PetscInt> &adjacent)
 {
@@ -96,7 +96,7 @@ PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vect
         problem = "mesh " + file + ": elements " + std::to_string(faces[a].tag) + ", " +
                   std::to_string(faces[a + 1].tag) + " and " + std::to_string(faces[a + 2].tag) +
                   " share one face" + overlapping;
-      if (b - a > 2) continue; /* links would be as many as the square of the elements */
+      if (b - a > 2) continue; /* the number of links would grow with the square of that of the elements */
       for (const FaceLink &l : LinksOf(&faces[a], &faces[a] + (b - a)))
         out[std::upper_bound(offset.begin(), offset.end(), l.cell) - offset.begin() - 1].push_back(l);
     }
@@ -123,11 +123,11 @@ PetscErrorCode CellGraph(MPI_Comm comm, const std::string &file, const std::vect
 
 /* ---- the distributed mesh ---- */
 
-struct PointData { /* of a cell: tag, region, type; of a node: its index */
+struct PointData { /* a, b, c of a cell: tag, region, type; a of a node: its index in the directory */
   PetscInt a, b, c;
 };
 
-/* Cells and their nodes as points of a DMPlex; nodes that cells of several ranks have are joined by the point SF */
+/* Builds a DMPlex with cells and their nodes as points; the point SF identifies nodes shared by cells of several ranks */
 PetscErrorCode BuildPlex(MPI_Comm comm, const MeshFile &mesh, PetscInt nodes, DM *dm, std::vector<PointData> *data)
 {
   const PetscInt        cells = (PetscInt)mesh.cells.size();
@@ -158,7 +158,7 @@ PetscErrorCode BuildPlex(MPI_Comm comm, const MeshFile &mesh, PetscInt nodes, DM
   for (PetscInt v = 0; v < count; v++) (*data)[cells + v] = {used[v], 0, 0};
   PetscCall(DMPlexSymmetrize(*dm));
   PetscCall(DMPlexStratify(*dm));
-  /* a cone of ten nodes tells PETSc nothing */
+  /* PETSc cannot infer the cell type from the number of nodes, as ten, and would fail: set it */
   PetscCall(DMCreateLabel(*dm, "celltype"));
   for (PetscInt c = 0; c < cells; c++) {
     const ElementType t = mesh.cells[c].type;
@@ -181,7 +181,7 @@ PetscErrorCode BuildPlex(MPI_Comm comm, const MeshFile &mesh, PetscInt nodes, DM
   PetscFunctionReturn(0);
 }
 
-/* Moves every cell to its rank, with its nodes and the data of both */
+/* Moves every cell to the rank of its part, with its nodes and the data of both */
 PetscErrorCode DistributePlex(MPI_Comm comm, const std::vector<PetscInt> &rank_of, DM *dm, std::vector<PointData> *data)
 {
   const PetscInt   cells = (PetscInt)rank_of.size();
@@ -217,7 +217,7 @@ PetscErrorCode DistributePlex(MPI_Comm comm, const std::vector<PetscInt> &rank_o
   PetscFunctionReturn(0);
 }
 
-/* Global numbers of all points that are nodes of this rank's cells; own nodes have first .. first + own - 1 */
+/* Global numbers of the points that are nodes of this rank's cells; own nodes are model->first to model->first + model->own - 1 */
 PetscErrorCode NumberNodes(DM dm, FeModel *model, std::vector<PetscInt> *number, std::vector<bool> *own)
 {
   PetscInt     start, end, first, last;
@@ -276,7 +276,7 @@ std::string VolumeNames(const MeshFile &mesh)
   return names.empty() ? "none" : names;
 }
 
-/* The material of every region of volumes; -1: none is given */
+/* Index of the material of every region of volumes, or -1 if none is given */
 PetscErrorCode MaterialsOfRegions(MPI_Comm comm, const std::string &file, const MeshFile &mesh,
                                   const std::map<std::string, Material> &materials, std::vector<PetscInt> *of)
 {
@@ -331,9 +331,9 @@ PetscErrorCode CheckCells(MPI_Comm comm, const std::string &file, const MeshFile
   PetscFunctionReturn(0);
 }
 
-/* ---- what the model gets ---- */
+/* ---- filling the model ---- */
 
-PetscErrorCode TakeElements(DM dm, const std::vector<PointData> &data, const std::vector<PetscInt> &number,
+PetscErrorCode FillElements(DM dm, const std::vector<PointData> &data, const std::vector<PetscInt> &number,
                             const std::vector<PetscInt> &material, FeModel *model, std::vector<PetscInt> *tags)
 {
   PetscInt        start, end;
@@ -344,7 +344,7 @@ PetscErrorCode TakeElements(DM dm, const std::vector<PointData> &data, const std
   for (PetscInt c = start; c < end; c++) {
     PetscInt cone_size;
     PetscCall(DMPlexGetConeSize(dm, c, &cone_size));
-    if (!cone_size) continue; /* a rank without cells may take its nodes for cells */
+    if (!cone_size) continue; /* on a rank without cells the stratum of height 0 contains nodes */
     FeElement e{};
     e.type     = (ElementType)data[c].c;
     e.material = material[data[c].b];
@@ -356,8 +356,8 @@ PetscErrorCode TakeElements(DM dm, const std::vector<PointData> &data, const std
   PetscFunctionReturn(0);
 }
 
-/* Names of the sets of groups. Gmsh numbers and names the groups of each dimension by themselves, so that a surface and a volume may share a name: one set of
-   both would tie an attachment to the whole body where its end was meant */
+/* Names of the node sets of groups. In Gmsh numbers and names of groups are unique for each dimension only, so that a surface and a volume may share a name. A common set
+   would tie an attachment to the whole body instead of its surface; shared names get the dimension as a prefix. */
 std::vector<std::string> SetNames(const MeshFile &mesh)
 {
   static const char *const kind[] = {"point ", "curve ", "surface ", "volume "};
@@ -370,8 +370,8 @@ std::vector<std::string> SetNames(const MeshFile &mesh)
   return names;
 }
 
-PetscErrorCode TakeNodes(const MeshFile &mesh, const MeshNodes &nodes, const std::vector<PointData> &data,
-                         const std::vector<PetscInt> &number, const std::vector<bool> &own, FeModel *model)
+PetscErrorCode FillNodesAndSets(const MeshFile &mesh, const MeshNodes &nodes, const std::vector<PointData> &data,
+                                const std::vector<PetscInt> &number, const std::vector<bool> &own, FeModel *model)
 {
   std::vector<PetscInt>          index(model->own);
   std::vector<MeshPoint>         points;
@@ -424,9 +424,9 @@ PetscErrorCode FeModel::readMesh(const std::string &file, const std::map<std::st
   materials.clear();
   for (const auto &m : materials_by_name) materials.push_back(m.second);
   PetscCall(NumberNodes(dm, this, &number, &mine));
-  PetscCall(TakeElements(dm, data, number, material, this, &tags));
+  PetscCall(FillElements(dm, data, number, material, this, &tags));
   PetscCall(DMDestroy(&dm));
-  PetscCall(TakeNodes(mesh, mesh_nodes, data, number, mine, this));
+  PetscCall(FillNodesAndSets(mesh, mesh_nodes, data, number, mine, this));
   PetscCall(AssembleElements(this, tags));
   PetscFunctionReturn(0);
 }

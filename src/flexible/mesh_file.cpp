@@ -1,9 +1,9 @@
 /*
-  Reads Gmsh files in parallel: every rank maps the file (gmsh_source.cpp), finds where nodes and elements stand
+  Reads Gmsh files in parallel: every rank maps the file (gmsh_source.cpp), finds the positions of nodes and elements
   (gmsh_blocks.cpp), and parses its own share of them (gmsh_share.cpp).
 
-  PETSc's own reader keeps the whole mesh on the first rank, drops the numbers of nodes, and hands over the middle nodes
-  as coordinates of cells only; that is why the file is read here.
+  PETSc's own reader is not used because it keeps the whole mesh on the first rank, drops the numbers of nodes, and returns the middle nodes
+  as coordinates of cells only.
 */
 #include "flexible/mesh_file.h"
 #include "flexible/exchange.h"
@@ -22,7 +22,7 @@ GmshFile::GmshFile(MPI_Comm comm, const std::string &name, MeshFile &mesh) : com
   MPI_Comm_size(comm, &size_);
 }
 
-/* What a rank does by itself; its failure becomes everyone's */
+/* Calls f(); an exception on one rank becomes an error on all ranks */
 template <class F> PetscErrorCode GmshFile::attempt(F &&f)
 {
   std::string problem;
@@ -46,7 +46,7 @@ void GmshFile::header()
   if (kind != 0 && kind != 1) Fail("its kind of file is %lld: 0 is text, 1 binary", (long long)kind);
   if (std::abs(version - 4.1) > 1e-6 && std::abs(version - 2.2) > 1e-6)
     Fail("its format is %g; 4.1 and 2.2 are read (gmsh -format msh41)", version);
-  four_   = version > 4;
+  msh4_   = version > 4;
   binary_ = kind == 1;
   if (size != 8) Fail("its size of data is %d, not 8", (int)size);
   if (!binary_) return;
@@ -70,13 +70,13 @@ PetscErrorCode GmshFile::read()
     blocks();
     share();
   }));
-  if (!four_) PetscCall(regionsOfGroups());
+  if (!msh4_) PetscCall(regionsOfGroups());
   std::sort(mesh_.members.begin(), mesh_.members.end());
   mesh_.members.erase(std::unique(mesh_.members.begin(), mesh_.members.end()), mesh_.members.end());
   PetscFunctionReturn(0);
 }
 
-/* ---- groups and regions: few, and read by all ranks ---- */
+/* ---- groups and regions, read by all ranks, as they are few ---- */
 
 int GmshFile::addGroup(int dim, int tag)
 {
@@ -110,45 +110,45 @@ void GmshFile::addRegion(int dim, int tag, const std::vector<int> &physical)
 {
   MeshRegion region{dim, tag, {}};
   for (int p : physical)
-    if (p) region.groups.push_back(addGroup(dim, std::abs(p))); /* a sign is one of orientation */
+    if (p) region.groups.push_back(addGroup(dim, std::abs(p))); /* the sign is an orientation */
   region_[{dim, tag}] = (int)mesh_.regions.size();
   mesh_.regions.push_back(region);
 }
 
 template <class Source, class Int, class Count, class Real>
-Source GmshFile::entitiesFrom(Source s, bool partitioned, Int integer, Count many, Real real)
+Source GmshFile::entitiesFrom(Source s, bool partitioned, Int integer, Count count_of, Real real)
 {
   PetscInt count[4];
   if (partitioned) {
-    many(s); /* partitions */
-    for (Size i = Checked(many(s)); i > 0; i--) { /* entities of ghosts and their partitions */
+    count_of(s);                                          /* partitions */
+    for (Size i = NonNegative(count_of(s)); i > 0; i--) { /* ghost entities and their partitions */
       integer(s);
       integer(s);
     }
   }
-  for (PetscInt &c : count) Checked(c = many(s));
+  for (PetscInt &c : count) NonNegative(c = count_of(s));
   for (int dim = 0; dim < 4; dim++)
     for (PetscInt k = 0; k < count[dim]; k++) {
       const int tag = integer(s);
       if (partitioned) {
-        integer(s); /* dimension and tag of the entity that it is a part of */
+        integer(s); /* dimension and tag of the parent entity */
         integer(s);
-        for (Size i = Checked(many(s)); i > 0; i--) integer(s);
+        for (Size i = NonNegative(count_of(s)); i > 0; i--) integer(s);
       }
       for (int i = 0; i < (dim ? 6 : 3); i++) real(s);
       std::vector<int> physical;
-      for (Size i = Checked(many(s)); i > 0; i--) physical.push_back(integer(s));
+      for (Size i = NonNegative(count_of(s)); i > 0; i--) physical.push_back(integer(s));
       if (dim)
-        for (Size i = Checked(many(s)); i > 0; i--) integer(s);
+        for (Size i = NonNegative(count_of(s)); i > 0; i--) integer(s);
       addRegion(dim, tag, physical);
     }
   return s;
 }
 
-/* Elements of a partitioned mesh are those of entities of the partitions, which have the groups of what they are parts of */
+/* In a partitioned mesh elements belong to entities of the partitions, which have the groups of their parent entities */
 void GmshFile::entities()
 {
-  if (!four_) return;
+  if (!msh4_) return;
   entitiesOf("$Entities", false);
   entitiesOf("$PartitionedEntities", true);
 }
@@ -177,7 +177,7 @@ int GmshFile::regionOf(int dim, int tag)
   return (int)mesh_.regions.size() - 1;
 }
 
-/* msh 2: which physical groups there are shows in the elements only */
+/* msh 2: only the elements show which physical groups exist; collects them and renumbers the provisional regions */
 PetscErrorCode GmshFile::regionsOfGroups()
 {
   struct Physical {

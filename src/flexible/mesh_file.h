@@ -1,4 +1,4 @@
-/* A Gmsh file as it stands on disk, each rank with a share of its nodes and elements. */
+/* The contents of a Gmsh file, each rank with a share of its nodes and elements. */
 #ifndef HHTDAE_FLEXIBLE_MESH_FILE_H
 #define HHTDAE_FLEXIBLE_MESH_FILE_H
 
@@ -11,12 +11,12 @@ namespace hhtdae
 
 struct MeshGroup { /* physical group */
   int         dim, tag;
-  std::string name; /* its number if the file has no name */
+  std::string name; /* its number if the file does not name it */
 };
 
-struct MeshRegion { /* the elements of one entity of the geometry (msh 4), or of one physical group (msh 2) */
+struct MeshRegion { /* the elements of one geometric entity (msh 4), or of one physical group (msh 2) */
   int              dim, tag;
-  std::vector<int> groups; /* among MeshFile::groups */
+  std::vector<int> groups; /* indices in MeshFile::groups */
 };
 
 struct MeshPoint {
@@ -30,7 +30,7 @@ struct MeshCell {
   PetscInt    node[20]; /* tags */
 };
 
-struct MeshMember { /* a node of an element of a region with groups */
+struct MeshMember { /* a node of an element in a region that belongs to groups */
   PetscInt node, region;
   bool     operator<(const MeshMember &o) const { return node != o.node ? node < o.node : region < o.region; }
   bool     operator==(const MeshMember &o) const { return node == o.node && region == o.region; }
@@ -42,10 +42,10 @@ struct MeshFile {
   std::vector<MeshPoint>  points;  /* this rank's share, as are the following */
   std::vector<MeshCell>   cells;
   std::vector<MeshMember> members;
-  PetscInt                elements = 0; /* of any dimension, in the file */
+  PetscInt                elements = 0; /* number of elements of any dimension in the whole file */
 };
 
-/* msh 4.1 and 2.2, text and binary. Collective */
+/* Reads msh 4.1 and 2.2, text and binary. Collective */
 PetscErrorCode ReadGmsh(MPI_Comm comm, const std::string &file, MeshFile *mesh);
 
 } // namespace hhtdae

@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-int MeshNodes::home(PetscInt index) const
+int MeshNodes::rankOf(PetscInt index) const
 {
   return (int)(std::upper_bound(offset_.begin(), offset_.end(), index) - offset_.begin()) - 1;
 }
@@ -19,7 +19,7 @@ PetscErrorCode MeshNodes::build(const std::string &file, MeshFile *mesh)
   PetscCallMPI(MPI_Comm_size(comm_, &size));
   for (const MeshPoint &p : mesh->points) largest = std::max(largest, p.tag);
   PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_INT, MPI_MAX, comm_));
-  const PetscInt64 range = all / size + (PetscInt64)1; /* rank r keeps numbers from r range on */
+  const PetscInt64 range = all / size + (PetscInt64)1; /* rank r stores the numbers from r range to (r + 1) range - 1 */
   PetscCall(collect(file, mesh, range));
   PetscCall(resolve(file, mesh, range));
   PetscCall(keepMembers(mesh));
@@ -71,7 +71,7 @@ PetscErrorCode MeshNodes::resolve(const std::string &file, MeshFile *mesh, Petsc
     const bool known = t >= 1 && t / range < size;
     if (!known)
       problem = "mesh " + file + ": an element has the node " + std::to_string(t) + ", which is not among $Nodes";
-    out[known ? t / range : 0].push_back(t); /* sorted by rank, as the tags are */
+    out[known ? t / range : 0].push_back(t); /* tags are sorted, so that answers in rank order are in the order of the tags */
   }
   PetscCall(Agree(comm_, problem));
   PetscCall(Exchange(comm_, out, &asked, &from));
@@ -100,7 +100,7 @@ PetscErrorCode MeshNodes::keepMembers(MeshFile *mesh)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm_, &size));
   std::vector<std::vector<MeshMember>> out(size);
-  for (const MeshMember &m : mesh->members) out[home(m.node)].push_back(m);
+  for (const MeshMember &m : mesh->members) out[rankOf(m.node)].push_back(m);
   std::vector<MeshMember>().swap(mesh->members);
   PetscCall(Exchange(comm_, out, &members_, &from));
   std::sort(members_.begin(), members_.end());
@@ -118,9 +118,9 @@ PetscErrorCode MeshNodes::ask(const std::vector<PetscInt> &index, std::vector<Me
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm_, &size));
   PetscCallMPI(MPI_Comm_rank(comm_, &rank));
-  std::vector<std::vector<PetscInt>> out(size), slot(size); /* slot: places among the nodes asked for */
+  std::vector<std::vector<PetscInt>> out(size), slot(size); /* slot: positions in `index` */
   for (std::size_t k = 0; k < index.size(); k++) {
-    const int r = home(index[k]);
+    const int r = rankOf(index[k]);
     out[r].push_back(index[k]);
     slot[r].push_back((PetscInt)k);
   }

@@ -1,4 +1,4 @@
-/* Mass, inertia, frequencies and invariants that no body has; see modal_check.h. */
+/* Checks of mass, inertia, frequencies and invariants; see modal_check.h. */
 #include "flexible/modal_check.h"
 #include "scene/symmetric.h"
 #include <set>
@@ -9,12 +9,12 @@ namespace hhtdae
 namespace
 {
 
-/* Rounding of symmetric matrices and of their eigenvalues, relative to their size */
-constexpr double rounding = 1e-9;
-/* Modes come from an iterative eigensolver: their products in the mass matrix differ from the identity by about its tolerance. */
-constexpr double orthonormal = 1e-3;
+/* Relative tolerance for rounding in symmetric matrices and their eigenvalues */
+constexpr double symmetry_tolerance = 1e-9;
+/* Tolerance of the M-orthonormality of modes, which come from an iterative eigensolver */
+constexpr double orthonormality_tolerance = 1e-3;
 
-bool Symmetric(const Eigen::MatrixXd &A) { return (A - A.transpose()).norm() <= rounding * A.norm(); }
+bool Symmetric(const Eigen::MatrixXd &A) { return (A - A.transpose()).norm() <= symmetry_tolerance * A.norm(); }
 
 std::string ImpossibleInvariants(const ModalBody &m)
 {
@@ -22,7 +22,7 @@ std::string ImpossibleInvariants(const ModalBody &m)
   for (std::size_t p = 0; p < 3; p++)
     if (!Symmetric(m.quadratic[p])) return "invariants quadratic in the modes that are not symmetric";
   const Eigen::MatrixXd sum = m.quadratic[0] + m.quadratic[1] + m.quadratic[2];
-  if (!((sum - Eigen::MatrixXd::Identity(m.modes(), m.modes())).cwiseAbs().maxCoeff() < orthonormal))
+  if (!((sum - Eigen::MatrixXd::Identity(m.modes(), m.modes())).cwiseAbs().maxCoeff() < orthonormality_tolerance))
     return "modes that are not orthonormal in the mass matrix (xx + yy + zz of the invariants quadratic in them is not the "
            "identity)";
   return "";
@@ -36,7 +36,7 @@ std::string Impossible(const ModalBody &m)
   for (Eigen::Index k = 0; k < m.omega.size(); k++)
     if (!(m.omega[k] > 0))
       return "a frequency that is not positive, of mode " + std::to_string(k) + " (rigid-body modes are left out)";
-  if (!Symmetric(m.moments) || SymmetricEigen(m.moments).values[0] < -rounding * m.moments.norm())
+  if (!Symmetric(m.moments) || SymmetricEigen(m.moments).values[0] < -symmetry_tolerance * m.moments.norm())
     return "moments of inertia that no distribution of mass has (not symmetric, or with a negative eigenvalue)";
   std::set<std::string> names;
   for (const ModalAttachment &a : m.attachments)

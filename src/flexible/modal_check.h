@@ -1,4 +1,4 @@
-/* Whether the numbers of a modal body can be those of a body: what is not is neither written to a file nor read from one. */
+/* Physical plausibility of a modal body; implausible bodies are neither written to a file nor read from one. */
 #ifndef HHTDAE_FLEXIBLE_MODAL_CHECK_H
 #define HHTDAE_FLEXIBLE_MODAL_CHECK_H
 
@@ -7,7 +7,7 @@
 namespace hhtdae
 {
 
-/* What no body has, of finite numbers: "" if nothing is wrong */
+/* Describes a property, of finite numbers, that no body can have, or returns "" */
 std::string Impossible(const ModalBody &body);
 
 } // namespace hhtdae

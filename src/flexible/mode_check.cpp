@@ -1,4 +1,4 @@
-/* The balanced operators of slowest_modes.cpp, and the modes held against them: refined where they leave too much */
+/* The balanced operators of slowest_modes.cpp, residuals of modes, and refinement of modes with large residuals */
 #include "flexible/mode_check.h"
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@ namespace hhtdae
 namespace
 {
 
-constexpr PetscReal at_rest     = 1e-2; /* of the fastest mode, or of the shift: slower ones are taken for rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
-constexpr int       refinements = 5;    /* of a shape, at most */
-constexpr PetscInt  workspace   = 100;  /* percent more than MUMPS estimates, ICNTL(14): pivots change places where constraints are (FullBodyRanks.SlowestModes) */
-constexpr int       sweeps      = 6;    /* of balancing: each takes the root of how far rows are from a size of 1 */
+constexpr PetscReal rigid_motion_limit = 1e-2; /* modes slower than this part of the fastest mode's value, or of the shift, count as rigid motions (SmallBodies.SlowestModesOfAFreeBody) */
+constexpr int       max_refinements    = 5;    /* steps of refinement of a shape */
+constexpr PetscInt  workspace_percent  = 100;  /* ICNTL(14): workspace above MUMPS' estimate, which does not include the pivots delayed by constraints (FullBodyRanks.SlowestModes) */
+constexpr int       balancing_sweeps   = 6;    /* each sweep takes the square root of the rows' deviation from size 1 */
 
 } // namespace
 
@@ -26,7 +26,7 @@ PetscErrorCode BalanceOperators(const Mat given[3], PetscReal shift, Balanced *b
   PetscCall(MatAXPY(T, shift * shift, given[2], DIFFERENT_NONZERO_PATTERN));
   PetscCall(MatCreateVecs(T, &row, &b->D));
   PetscCall(VecSet(b->D, 1));
-  for (int k = 0; k < sweeps; k++) {
+  for (int k = 0; k < balancing_sweeps; k++) {
     PetscScalar *x;
     PetscInt     n;
     PetscCall(MatGetRowMaxAbs(T, row, nullptr));
@@ -54,7 +54,7 @@ PetscErrorCode DestroyBalanced(Balanced *b)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode GiveFactorRoom(KSP ksp, Mat A)
+PetscErrorCode GiveFactorWorkspace(KSP ksp, Mat A)
 {
   PC            pc;
   MatSolverType package = nullptr;
@@ -71,7 +71,7 @@ PetscErrorCode GiveFactorRoom(KSP ksp, Mat A)
   PetscCall(PCFactorSetUpMatSolverType(pc));
   PetscCall(PCFactorGetMatrix(pc, &F));
 #if defined(PETSC_HAVE_MUMPS)
-  PetscCall(MatMumpsSetIcntl(F, 14, workspace));
+  PetscCall(MatMumpsSetIcntl(F, 14, workspace_percent));
 #endif
   PetscFunctionReturn(0);
 }
@@ -79,13 +79,13 @@ PetscErrorCode GiveFactorRoom(KSP ksp, Mat A)
 namespace
 {
 
-/* (value^2 M + value C + K) x of the balanced operators, real and imaginary part, and its norm relative to the forces of rates: of inertia and damping, and
-   the rates of states */
-PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, Vec sum[2], PetscReal *part)
+/* sum: real and imaginary part of the residual (value^2 M + value C + K) x with the balanced operators; *part: its norm relative to that of the terms with M and C,
+   inertia and damping forces and the rates of first-order states */
+PetscErrorCode ResidualOf(const Balanced &by, const Mode &m, Vec sum[2], PetscReal *part)
 {
   const std::complex<double> power[3] = {1, m.value, m.value * m.value};
   Vec                        x, product;
-  PetscReal                  norm, left = 0, rates = 0;
+  PetscReal                  norm, residual = 0, rates = 0;
   PetscFunctionBegin;
   PetscCall(VecDuplicate(by.D, &x));
   PetscCall(VecDuplicate(by.D, &product));
@@ -106,15 +106,15 @@ PetscErrorCode Unbalanced(const Balanced &by, const Mode &m, Vec sum[2], PetscRe
   }
   for (int imaginary = 0; imaginary < 2; imaginary++) {
     PetscCall(VecNorm(sum[imaginary], NORM_2, &norm));
-    left += norm * norm;
+    residual += norm * norm;
   }
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&product));
-  *part = PetscSqrtReal(left / rates);
+  *part = PetscSqrtReal(residual / rates);
   PetscFunctionReturn(0);
 }
 
-/* A factor of shift^2 M + shift C + K, balanced */
+/* Factors shift^2 M + shift C + K with the balanced operators */
 PetscErrorCode Factor(const Balanced &by, PetscReal shift, KSP *ksp)
 {
   Mat T;
@@ -132,22 +132,22 @@ PetscErrorCode Factor(const Balanced &by, PetscReal shift, KSP *ksp)
   PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 #endif
   PetscCall(KSPSetFromOptions(*ksp));
-  PetscCall(GiveFactorRoom(*ksp, T));
+  PetscCall(GiveFactorWorkspace(*ksp, T));
   PetscCall(KSPSetOperators(*ksp, T, T));
   PetscCall(MatDestroy(&T));
   PetscFunctionReturn(0);
 }
 
-/* Residual inverse iteration (Neumaier, SIAM J. Numer. Anal. 22, 1985) at the value as it is: takes from a slow shape what the search has left of fast ones,
-   1e-10 of whose stiffness exceeds the inertia of a stiff body on a soft spring. A value that is none keeps its residual. */
+/* Residual inverse iteration (Neumaier, SIAM J. Numer. Anal. 22, 1985) with a fixed value: removes from a slow shape components of fast modes that the search has left,
+   because 1e-10 of their stiffness exceeds the inertia of a stiff body on a soft spring. The residual of a wrong value does not decrease. */
 PetscErrorCode Refine(const Balanced &by, KSP factor, Vec sum[2], Mode *m, PetscReal *part)
 {
-  Mode      better = *m;
-  PetscReal left   = *part;
+  Mode      better   = *m;
+  PetscReal residual = *part;
   PetscFunctionBegin;
-  for (int k = 0; k < refinements && left <= *part && left > balanced; k++) {
+  for (int k = 0; k < max_refinements && residual <= *part && residual > max_residual; k++) {
     *m    = better;
-    *part = left;
+    *part = residual;
     for (int imaginary = 0; imaginary < 2; imaginary++) {
       const PetscScalar *d;
       PetscCall(KSPSolve(factor, sum[imaginary], sum[imaginary]));
@@ -156,44 +156,44 @@ PetscErrorCode Refine(const Balanced &by, KSP factor, Vec sum[2], Mode *m, Petsc
       for (std::size_t i = 0; i < m->shape.size(); i++) better.shape[i] -= imaginary ? std::complex<double>(0, d[i]) : std::complex<double>(d[i], 0);
       PetscCall(VecRestoreArrayRead(sum[imaginary], &d));
     }
-    PetscCall(Unbalanced(by, better, sum, &left));
+    PetscCall(ResidualOf(by, better, sum, &residual));
   }
-  if (left < *part) {
+  if (residual < *part) {
     *m    = better;
-    *part = left;
+    *part = residual;
   }
   PetscFunctionReturn(0);
 }
 
 } // namespace
 
-bool IsAtRest(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { return std::abs(m.value) < at_rest * std::max(std::abs(modes.back().value), std::abs(shift)); }
+bool IsRigidMotion(const Mode &m, const std::vector<Mode> &modes, PetscReal shift) { return std::abs(m.value) < rigid_motion_limit * std::max(std::abs(modes.back().value), std::abs(shift)); }
 
 PetscErrorCode CheckModes(const Mat given[3], PetscReal shift, std::vector<Mode> *modes, PetscReal *worst, PetscReal *frequency)
 {
   Balanced  by;
   KSP       factor = nullptr;
   Vec       sum[2];
-  PetscReal at = 0, left = 0;
+  PetscReal at = 0, residual = 0;
   PetscFunctionBegin;
   *worst = *frequency = 0;
   for (Vec &v : sum) PetscCall(MatCreateVecs(given[0], nullptr, &v));
   for (Mode &m : *modes) {
     const PetscReal here = std::abs(m.value);
-    if (IsAtRest(m, *modes, shift)) continue;
-    if (!(here <= beside * at)) {
+    if (IsRigidMotion(m, *modes, shift)) continue;
+    if (!(here <= max_value_per_shift * at)) {
       PetscCall(KSPDestroy(&factor));
       PetscCall(DestroyBalanced(&by));
       PetscCall(BalanceOperators(given, here, &by));
       at = here;
     }
-    PetscCall(Unbalanced(by, m, sum, &left));
-    if (left > balanced) {
+    PetscCall(ResidualOf(by, m, sum, &residual));
+    if (residual > max_residual) {
       if (!factor) PetscCall(Factor(by, at, &factor));
-      PetscCall(Refine(by, factor, sum, &m, &left));
+      PetscCall(Refine(by, factor, sum, &m, &residual));
     }
-    if (left <= *worst) continue;
-    *worst     = left;
+    if (residual <= *worst) continue;
+    *worst     = residual;
     *frequency = m.frequency();
   }
   for (Vec &v : sum) PetscCall(VecDestroy(&v));

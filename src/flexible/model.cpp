@@ -1,4 +1,4 @@
-/* A finite-element model: what all its sources share. */
+/* FeModel: construction, destruction and node sets, common to all its origins. */
 #include "hhtdae/flexible.h"
 #include "flexible/exchange.h"
 #include <algorithm>
@@ -11,7 +11,7 @@ FeModel::FeModel(MPI_Comm c) : comm(c) {}
 FeModel::~FeModel()
 {
   PetscBool gone = PETSC_FALSE;
-  if (PetscFinalized(&gone) || gone) return; /* PETSc has taken everything with it */
+  if (PetscFinalized(&gone) || gone) return; /* PETSc has been finalized: its objects no longer exist */
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&K));
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&M));
 }

@@ -138,7 +138,7 @@ PetscErrorCode CreateSolver(MPI_Comm comm, KSP *ksp)
   PetscFunctionReturn(0);
 }
 
-/* PETSc's own interface to MUMPS counts inertia and null pivots only if told so, "mumpsnd" always */
+/* Enables the detection of null pivots in PETSc's own interface to MUMPS; "mumpsnd" always detects them */
 static PetscErrorCode PrepareMumps(PC pc)
 {
   MatSolverType package = nullptr;
@@ -159,7 +159,7 @@ static PetscErrorCode PrepareMumps(PC pc)
   PetscFunctionReturn(0);
 }
 
-/* Negative and null pivots; -1 and 0 where the package does not tell */
+/* Numbers of negative and of null pivots; -1 and 0 if the package does not count them */
 static PetscErrorCode GetNegative(PC pc, PetscInt *negative, PetscInt *zero)
 {
   PetscBool factored;
@@ -253,7 +253,7 @@ PetscErrorCode CountBelow(const Pencil &pencil, double lambda, PetscInt *count)
     PetscCall(Factor(ksp, S, &singular, &negative));
     PetscCall(MatDestroy(&S));
     if (!singular) break;
-    lambda *= 1 + 1e-6; /* an eigenvalue was hit */
+    lambda *= 1 + 1e-6; /* lambda was an eigenvalue */
   }
   PetscCall(KSPDestroy(&ksp));
   if (!singular && negative >= 0) *count = negative - pencil.multipliers - (PetscInt)pencil.rigid.cols();

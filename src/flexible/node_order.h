@@ -1,5 +1,4 @@
-/* Orders of an element's nodes: ours is Gmsh's, corners and then middles of edges; VTK, Abaqus and CalculiX have
- * another one of the middles. */
+/* Orders of an element's nodes: Gmsh's order is used here, corners first, then middle nodes of edges; VTK, Abaqus and CalculiX order the middle nodes differently. */
 #ifndef HHTDAE_FLEXIBLE_NODE_ORDER_H
 #define HHTDAE_FLEXIBLE_NODE_ORDER_H
 
@@ -8,7 +7,7 @@
 namespace hhtdae
 {
 
-/* Place k of the order that VTK, Abaqus and CalculiX share has node GmshPlace(type, k) of Gmsh's order */
+/* Node k in the order of VTK, Abaqus and CalculiX is node GmshPlace(type, k) in Gmsh's order */
 constexpr int GmshPlace(ElementType type, int k)
 {
   constexpr int tetrahedron[] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};

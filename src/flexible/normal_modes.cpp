@@ -1,4 +1,4 @@
-/* Normal modes for the space of a reduction: how many, found, and cut off above those wanted. */
+/* Normal modes for the subspace of a reduction: their number, the search, and the removal of those beyond the wanted ones. */
 #include "craig_bampton.h"
 #include <cmath>
 
@@ -23,15 +23,14 @@ PetscErrorCode Want(const Pencil &pencil, const Reduction &reduction, MPI_Comm c
   PetscFunctionReturn(0);
 }
 
-/* Those above the bound are not wanted */
+/* Reduces modes->wanted to the modes below the bound */
 static void CutAbove(double max_frequency, NormalModes *modes)
 {
   while (max_frequency > 0 && modes->wanted > 0 && modes->lambda[modes->wanted - 1] > Eigenvalue(max_frequency))
     modes->wanted--;
 }
 
-/* Where the cut goes through equal frequencies,
-   which of their combinations stay must not depend on the ranks. */
+/* If the cut separates equal frequencies, the combinations that are kept are made independent of the number of ranks */
 PetscErrorCode CutModes(const FeModel &model, const BodyScales &scales, const NormalModes &modes,
                         ReductionSpace *space)
 {

@@ -1,6 +1,6 @@
 /*
-  METIS divides a graph of cells among the ranks: a type of PetscPartitioner, since PETSc has ParMETIS at best. METIS is
-  serial: the first rank gathers the graph, which holds a few integers per cell; coordinates and elements stay
+  METIS as a type of PetscPartitioner, because PETSc offers ParMETIS at best. METIS is
+  serial: the first rank gathers the graph of cells, a few integers per cell; coordinates and elements stay
   distributed.
 */
 #include "flexible/partitioner.h"
@@ -22,7 +22,7 @@ PetscErrorCode CallMetis(std::vector<idx_t> &xadj, std::vector<idx_t> &adjacent,
   PetscFunctionBegin;
   part.assign(vertices, 0);
   if (nparts == 1 || vertices == 0) PetscFunctionReturn(0);
-  if (vertices <= nparts) { /* METIS does not care for parts of less than one vertex */
+  if (vertices <= nparts) { /* METIS does not support more parts than vertices */
     for (idx_t v = 0; v < vertices; v++) part[v] = (PetscMPIInt)v;
     PetscFunctionReturn(0);
   }
@@ -41,7 +41,7 @@ PetscErrorCode CallMetis(std::vector<idx_t> &xadj, std::vector<idx_t> &adjacent,
   PetscFunctionReturn(0);
 }
 
-/* The graph on the first rank, divided there, and its parts sent back. METIS' integers need not be PETSc's. */
+/* Gathers the graph on the first rank, divides it there and returns the parts. METIS' integers may differ from PETSc's. */
 PetscErrorCode Divide(MPI_Comm comm, PetscInt nparts, PetscInt vertices, const PetscInt start[],
                       const PetscInt adjacent[], std::vector<PetscMPIInt> &part)
 {
@@ -70,7 +70,7 @@ PetscErrorCode Divide(MPI_Comm comm, PetscInt nparts, PetscInt vertices, const P
   PetscFunctionReturn(0);
 }
 
-/* Local vertices sorted by part, as a section and an IS */
+/* Returns the local vertices, sorted by part, as a section and an IS */
 PetscErrorCode PutParts(PetscInt nparts, const std::vector<PetscMPIInt> &part, PetscSection section, IS *partition)
 {
   const PetscInt vertices = (PetscInt)part.size();
@@ -126,7 +126,7 @@ PetscErrorCode Create(PetscPartitioner p)
 
 PetscErrorCode RegisterMetisPartitioner()
 {
-  static bool registered = false; /* PETSc's list of types lives as long */
+  static bool registered = false; /* PETSc's list of types exists as long as the process */
   PetscFunctionBegin;
   if (!registered) PetscCall(PetscPartitionerRegister(PETSCPARTITIONERMETISHHTDAE, Create));
   registered = true;
@@ -152,7 +152,7 @@ PetscErrorCode PartitionCells(MPI_Comm comm, std::vector<PetscInt> &start, std::
   PetscCall(PetscPartitionerSetFromOptions(partitioner));
   PetscCall(PetscPartitionerSetUp(partitioner));
   PetscCall(PetscSectionCreate(comm, &section));
-  adjacent.reserve(1); /* an address for a graph without edges */
+  adjacent.reserve(1); /* a valid address for a graph without edges */
 #if PETSC_VERSION_LT(3, 21, 0)
   PetscCall(PetscPartitionerPartition(partitioner, size, cells, start.data(), adjacent.data(), nullptr, nullptr,
                                       section, &partition));

@@ -1,4 +1,4 @@
-/* METIS as a PetscPartitioner, and helpers for graphs of cells. */
+/* METIS as a PetscPartitioner, and the partition of a mesh by its graph of cells. */
 #ifndef HHTDAE_FLEXIBLE_PARTITIONER_H
 #define HHTDAE_FLEXIBLE_PARTITIONER_H
 
@@ -8,14 +8,14 @@
 namespace hhtdae
 {
 
-/* The type's name: METIS inside PETSc, where it has one, is "parmetis" */
+/* Name of the type; PETSc's own interface, if installed, is "parmetis" */
 #define PETSCPARTITIONERMETISHHTDAE "metis_hhtdae"
 
 PetscErrorCode RegisterMetisPartitioner();
 
 /*
-  The rank of each of this rank's cells. The graph has the neighbours of cell c (by global number) at adjacent[start[c]]
-  .. adjacent[start[c + 1]]; cells are numbered through the ranks. METIS unless -petscpartitioner_type says otherwise.
+  Computes the new rank of each of this rank's cells. The neighbours of cell c, by global number, are adjacent[start[c]]
+  to adjacent[start[c + 1] - 1]; cells are numbered in rank order. Uses METIS unless -petscpartitioner_type selects another type.
 */
 PetscErrorCode PartitionCells(MPI_Comm comm, std::vector<PetscInt> &start, std::vector<PetscInt> &adjacent,
                               std::vector<PetscInt> *rank);

@@ -1,4 +1,4 @@
-/* Strict numbers; see read_text.h. */
+/* Strict parsing of numbers; see read_text.h. */
 #include "flexible/read_text.h"
 #include <algorithm>
 #include <cerrno>
@@ -15,14 +15,14 @@ namespace hhtdae
 namespace
 {
 
-/* Without a plus sign, which from_chars() does not take; null if a second sign follows */
+/* Skips a plus sign, which from_chars() does not accept; null if a second sign follows */
 const char *SkipPlus(const char *begin, const char *end)
 {
   if (begin == end || *begin != '+') return begin;
   return begin + 1 < end && begin[1] != '-' && begin[1] != '+' ? begin + 1 : nullptr;
 }
 
-/* begin .. end is a decimal number that from_chars() found to be outside of the range of doubles. */
+/* For a decimal number outside the range of doubles by from_chars(): true if it underflows, with *value near 0 */
 bool Underflow(const char *begin, const char *end, double *value)
 {
   *value = std::strtod(std::string(begin, end).c_str(), nullptr);

@@ -1,7 +1,7 @@
 /*
   Reduction of a finite-element model to a body in modal coordinates.
 
-  The model is checked, a space and its modes are found (craig_bampton.h), and the body gets the modes at its nodes, the
+  The model is checked, a subspace and its modes are computed (craig_bampton.h), and the body receives the modes at its nodes, the
   motions of its attachments and its invariants.
 */
 #include "craig_bampton.h"
@@ -16,7 +16,7 @@
 namespace hhtdae
 {
 
-/* ---- what is asked for ---- */
+/* ---- checks ---- */
 
 static PetscErrorCode CheckReduction(const FeModel &model, const Reduction &r)
 {
@@ -34,7 +34,7 @@ static PetscErrorCode CheckReduction(const FeModel &model, const Reduction &r)
     PetscCheck(k >= 0, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
                "Reduction::keep lists mode %" PetscInt_FMT "; modes have numbers from 0", k);
   if (r.method != Method::Static && r.modes == PETSC_DEFAULT) PetscFunctionReturn(0);
-  const PetscInt most = (r.method == Method::Static ? 0 : r.modes) + 6 * std::max<PetscInt>((PetscInt)r.attachments.size() - 1, 0); /* rigid motions are none of them */
+  const PetscInt most = (r.method == Method::Static ? 0 : r.modes) + 6 * std::max<PetscInt>((PetscInt)r.attachments.size() - 1, 0); /* six rigid motions are not elastic modes */
   for (PetscInt k : r.keep)
     PetscCheck(k < most, model.comm, PETSC_ERR_ARG_OUTOFRANGE,
                "Reduction::keep lists mode %" PetscInt_FMT ", but there are %" PetscInt_FMT " elastic modes at most (numbers from 0)", k, most);
@@ -66,9 +66,9 @@ static PetscErrorCode CheckModel(const FeModel &model, const Reduction &reductio
 
 /* ---- the modes in the full model ---- */
 
-/* What rounding left of rigid motions goes; motion: of the rigid attachments */
-static PetscErrorCode TakeOutRigid(const FeModel &model, const BodyScales &scales, const std::vector<Tied> &tied,
-                                   MatrixXd *X, MatrixXd *motion)
+/* Removes the rigid motions that rounding has left in the modes X, and in the motions of rigid attachments */
+static PetscErrorCode SubtractRigidMotions(const FeModel &model, const BodyScales &scales, const std::vector<Tied> &tied,
+                                           MatrixXd *X, MatrixXd *motion)
 {
   MatrixXd Mr, part;
 
@@ -104,8 +104,7 @@ static PetscErrorCode FillAttachments(const FeModel &model, const std::vector<Ti
   PetscFunctionReturn(0);
 }
 
-/* Mean-axis conditions: neither momentum nor moment of momentum comes with a mode. |int phi dm| can be sqrt(mass) at
- * most. */
+/* Checks the mean-axis conditions: a mode carries no momentum and no moment of momentum. |int phi dm| is at most sqrt(mass). */
 static PetscErrorCode CheckMeanAxes(const FeModel &model, const BodyScales &scales, const ModalBody &body)
 {
   const double limit = 1e-8;
@@ -125,15 +124,14 @@ static PetscErrorCode CheckMeanAxes(const FeModel &model, const BodyScales &scal
   PetscFunctionReturn(0);
 }
 
-/* ---- all together ---- */
+/* ---- reduction ---- */
 
 static const char *MethodName(Method method)
 {
   return method == Method::CraigBampton ? "Craig-Bampton" : method == Method::FreeFree ? "free-free" : "static";
 }
 
-/* Without attachments there is nothing to hold: modes of the free body. The modes of one attachment are rigid motions.
- */
+/* Without attachments Craig-Bampton becomes the free-free method. The constraint modes of a single attachment are rigid motions, so that there is no static space. */
 static PetscErrorCode FindSpace(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                                 const BodyScales &scales, Method *method, ReductionSpace *space)
 {
@@ -151,7 +149,7 @@ static PetscErrorCode FindSpace(const FeModel &model, const std::vector<Tied> &t
   PetscFunctionReturn(0);
 }
 
-/* x Y in place of x, a few rows at a time: no second block of the space's size */
+/* Replaces x by x Y, a few rows at a time, without a second block of the size of x */
 static PetscErrorCode CombineInPlace(const MatrixXd &Y, MatrixXd *x)
 {
   const PetscInt rows = (PetscInt)x->rows(), step = 4096;
@@ -167,7 +165,7 @@ static PetscErrorCode CombineInPlace(const MatrixXd &Y, MatrixXd *x)
   PetscFunctionReturn(0);
 }
 
-/* Modes of the reduced pair in place of the space's vectors */
+/* Replaces the vectors of the space by the modes of the reduced pair */
 static PetscErrorCode ToModes(const FeModel &model, const std::vector<Tied> &tied, const Reduction &reduction,
                               const BodyScales &scales, ReductionSpace *space)
 {
@@ -184,7 +182,7 @@ static PetscErrorCode ToModes(const FeModel &model, const std::vector<Tied> &tie
   PetscCall(phase.begin("shapes"));
   PetscCall(CombineInPlace(space->Y, &space->x));
   space->motion = (space->motion * space->Y).eval();
-  PetscCall(TakeOutRigid(model, scales, tied, &space->x, &space->motion));
+  PetscCall(SubtractRigidMotions(model, scales, tied, &space->x, &space->motion));
   PetscCall(FixSigns(model, &space->x, &space->motion));
   PetscCall(phase.end(std::to_string(space->lambda.size()) + " modes"));
   PetscFunctionReturn(0);

@@ -1,8 +1,8 @@
 /*
-  K and M projected on the space of a reduction, and the modes of that pair.
+  K and M projected on the subspace of a reduction, and the modes of that pair.
 
-  The six rigid-body motions, known from the nodes' coordinates, are taken out of the space before the eigenvalue problem
-  is solved, so no threshold tells them from soft modes and all modes are orthogonal to them in M to rounding
+  The six rigid-body motions, known from the nodes' coordinates, are removed from the subspace before the eigenvalue problem
+  is solved. So no threshold is needed to distinguish them from soft modes, and all modes are M-orthogonal to them up to rounding
   (mean-axis conditions).
 */
 #include "craig_bampton.h"
@@ -15,13 +15,13 @@
 namespace hhtdae
 {
 
-/* Directions of the space with less mass, relative to unit vectors in M, are combinations of the others */
+/* Vectors of the space are linearly dependent if the Gram matrix in M, scaled to a unit diagonal, has smaller eigenvalues; such directions are dropped */
 constexpr double dependent_modes = 1e-13;
 
 /* ---- the pair ---- */
 
 struct ReducedPair {
-  MatrixXd K, M, rigid; /* of the space; rigid: its vectors times M times the six rigid motions */
+  MatrixXd K, M, rigid; /* T^T K T, T^T M T and T^T M r for the vectors T of the space and the six rigid motions r */
 };
 
 static PetscErrorCode Project(const FeModel &model, const BodyScales &scales, const MatrixXd &T, ReducedPair *pair)
@@ -35,10 +35,10 @@ static PetscErrorCode Project(const FeModel &model, const BodyScales &scales, co
   for (PetscInt from = 0; from < n; from += block_columns) {
     const PetscInt count = std::min(block_columns, n - from);
     PetscCall(MultiplyColumns(model.K, T, from, count, &AT));
-    part = T.transpose() * AT;
+    part                            = T.transpose() * AT;
     pair->K.middleCols(from, count) = part;
     PetscCall(MultiplyColumns(model.M, T, from, count, &AT));
-    part = T.transpose() * AT;
+    part                            = T.transpose() * AT;
     pair->M.middleCols(from, count) = part;
   }
   PetscCall(Multiply(model.M, scales.rigid, &AT));
@@ -51,7 +51,7 @@ static PetscErrorCode Project(const FeModel &model, const BodyScales &scales, co
   PetscFunctionReturn(0);
 }
 
-/* Combinations of the space that are orthonormal in M and, where it holds them, orthogonal to the rigid motions */
+/* An M-orthonormal basis of the space or, if it contains the rigid motions, of their M-orthogonal complement in it */
 static PetscErrorCode ElasticBasis(const FeModel &model, const ReducedPair &pair, bool holds_rigid, MatrixXd *S)
 {
   const VectorXd       scale = pair.M.diagonal().cwiseSqrt().cwiseInverse();
@@ -103,8 +103,8 @@ static PetscErrorCode SolvePair(const FeModel &model, const BodyScales &scales, 
 
 /* ---- which modes ---- */
 
-/* Numbers of the modes that are kept. Those of the list which are not there are reported when none can be missing */
-static std::vector<PetscInt> Select(const Reduction &reduction, const VectorXd &lambda)
+/* Numbers of the modes to be kept. Modes of reduction.keep that do not exist are reported later, when no mode can be missing */
+static std::vector<PetscInt> SelectKept(const Reduction &reduction, const VectorXd &lambda)
 {
   const std::set<PetscInt> wanted(reduction.keep.begin(), reduction.keep.end());
   std::vector<PetscInt>    kept;
@@ -118,9 +118,9 @@ static std::vector<PetscInt> Select(const Reduction &reduction, const VectorXd &
   return kept;
 }
 
-/* Modes of equal frequencies, some of which are kept, are turned together */
-static PetscErrorCode TurnKept(const FeModel &model, const BodyScales &scales, const ReductionSpace &space,
-                               const VectorXd &lambda, const std::vector<PetscInt> &kept, MatrixXd *Y)
+/* Makes the combination of modes of equal frequencies unique, if some of them are kept */
+static PetscErrorCode FixEqualFrequencies(const FeModel &model, const BodyScales &scales, const ReductionSpace &space,
+                                          const VectorXd &lambda, const std::vector<PetscInt> &kept, MatrixXd *Y)
 {
   MatrixXd X, some;
 
@@ -152,8 +152,8 @@ PetscErrorCode SolveSpace(const FeModel &model, const Reduction &reduction, cons
     PetscCall(Project(model, scales, space->x, &pair));
     PetscCall(SolvePair(model, scales, pair, *space, &lambda, &Y));
   }
-  const std::vector<PetscInt> kept = Select(reduction, lambda);
-  PetscCall(TurnKept(model, scales, *space, lambda, kept, &Y));
+  const std::vector<PetscInt> kept = SelectKept(reduction, lambda);
+  PetscCall(FixEqualFrequencies(model, scales, *space, lambda, kept, &Y));
   const PetscInt n = (PetscInt)kept.size();
   space->elastic   = (PetscInt)lambda.size();
   space->lambda.resize(n);

@@ -1,4 +1,4 @@
-/* Where materials meet, the one that a node's stress is taken in; see stress_modes.cpp. */
+/* Choice of the material in which a node's stress is evaluated where materials meet; see stress_modes.cpp. */
 #ifndef HHTDAE_FLEXIBLE_SIDES_H
 #define HHTDAE_FLEXIBLE_SIDES_H
 
@@ -7,13 +7,13 @@
 namespace hhtdae
 {
 
-/* The material that each node's stress is taken in, and the number of its elements around the node */
+/* The material in which each node's stress is evaluated, and the number of elements of this material at the node */
 struct Sides {
-  std::vector<PetscInt> material; /* of the nodes of this rank's elements */
-  std::vector<double>   count;    /* of own nodes */
+  std::vector<PetscInt> material; /* for the nodes of this rank's elements */
+  std::vector<double>   count;    /* for own nodes */
 };
 
-/* The stiffest around each node. Collective */
+/* Chooses the material with the largest Young's modulus at each node. Collective */
 PetscErrorCode ChooseSides(const FeModel &model, const ElementNodes &nodes, Sides *sides);
 
 } // namespace hhtdae

@@ -1,10 +1,11 @@
 /*
-  Slowest modes of a linearization: SLEPc's quadratic eigenvalue problem (value^2 M + value C + K) x = 0 over all unknowns, by TOAR (Lu, Su and
-  Bai, SIAM J. Matrix Anal. Appl. 37, 2016) with shift and invert. Constraints and definitions have no rates, so that M is singular: their
+  Slowest modes of a linearization: the quadratic eigenvalue problem (value^2 M + value C + K) x = 0 in all unknowns, solved by SLEPc's TOAR (Lu, Su and
+  Bai, SIAM J. Matrix Anal. Appl. 37, 2016) with shift and invert. Constraints and definitions contain no rates, so that M is singular: their
   eigenvalues are infinite, farthest from any shift.
 
-  Time is taken in a unit in which stiffness and masses are of one size, and the shift has to be of the size of the values: next to a shift far below them
-  slow modes and infinite ones look alike. So the search is repeated about the fastest that it has found, and the modes are held against the equations (mode_check.cpp).
+  SLEPc scales time so that stiffness and masses are of the same size, and the shift has to be of the size of the eigenvalues: for a much smaller shift
+  slow modes and infinite ones cannot be distinguished. So the search is repeated about the fastest mode that was found, and the residuals of the modes are checked
+  (mode_check.cpp). "value" is an eigenvalue in 1/s.
 */
 #include "flexible/mode_check.h"
 #include "flexible/modes.h"
@@ -20,12 +21,22 @@ namespace hhtdae
 namespace
 {
 
-constexpr PetscReal accuracy = 1e-10;
-constexpr PetscReal below    = 100;  /* the shift, of a value: beyond it, too */
-constexpr PetscReal as_fast  = 1e-2; /* part of the value: modes that close may be of one value, of which each combination is one, found with less digits */
-constexpr PetscReal apart    = 0.1;  /* part of its norm that a shape has beside those of modes as fast, or it is none of its own (SmallBodies.SlowestModesOfAFreeBody) */
-constexpr PetscReal accurate = 1e-6; /* values differ by less than this part are not told apart */
-constexpr int       searches = 20, failures = 3; /* at most, from other random vectors (SmallBodies.SlowestModesOfEqualParts); without a Schur form */
+constexpr PetscReal pep_tolerance = 1e-10; /* tolerance of SLEPc's residuals */
+
+/* Largest ratio |shift| / |value| for which a search gives accurate eigenvalues; the counterpart is max_value_per_shift (mode_check.h) */
+constexpr PetscReal max_shift_per_value = 100;
+
+/* Modes whose values differ by less than this part may belong to one multiple eigenvalue, which is found with fewer digits and of which any combination of shapes is a shape */
+constexpr PetscReal close_values = 1e-2;
+
+/* A shape is a new one only if at least this part of its norm is orthogonal to the shapes of modes with close values (SmallBodies.SlowestModesOfAFreeBody) */
+constexpr PetscReal min_new_part = 0.1;
+
+/* Differences of values, and remainders of orthogonalized shapes, below this part are rounding */
+constexpr PetscReal rounding_part = 1e-6;
+
+/* Largest number of searches from different random vectors (SmallBodies.SlowestModesOfEqualParts), and of those that may fail in SLEPc's Schur form */
+constexpr int random_starts = 20, max_schur_failures = 3;
 
 PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
 {
@@ -42,8 +53,8 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscCall(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
   PetscCall(PEPSetTarget(pep, shift));
   PetscCall(PEPSetScale(pep, PEP_SCALE_SCALAR, PETSC_DEFAULT, nullptr, nullptr, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscCall(PEPSetTolerances(pep, accuracy, PETSC_DEFAULT));
-  const PetscInt wanted = 2 * count; /* pairs count twice */
+  PetscCall(PEPSetTolerances(pep, pep_tolerance, PETSC_DEFAULT));
+  const PetscInt wanted = 2 * count; /* conjugate pairs count twice */
   PetscCall(PEPSetDimensions(pep, PetscMin(wanted, n), PetscMin(2 * wanted + 20, n), PETSC_DEFAULT));
   PetscCall(PEPGetST(pep, &st));
   PetscCall(STSetType(st, STSINVERT));
@@ -56,18 +67,18 @@ PetscErrorCode SetUp(PEP pep, Mat operators[3], PetscInt count, PetscReal shift)
   PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 #endif
   PetscCall(PEPSetFromOptions(pep));
-  PetscCall(GiveFactorRoom(ksp, operators[0]));
+  PetscCall(GiveFactorWorkspace(ksp, operators[0]));
   PetscFunctionReturn(0);
 }
 
-void Sort(PetscInt count, std::vector<Mode> *modes)
+void SortAndTruncate(PetscInt count, std::vector<Mode> *modes)
 {
   std::stable_sort(modes->begin(), modes->end(), [](const Mode &a, const Mode &b) { return std::abs(a.value) < std::abs(b.value); });
   if ((PetscInt)modes->size() > count) modes->resize(count);
 }
 
-/* Of pairs the one with a positive imaginary part; the `count` slowest of all */
-PetscErrorCode Collect(PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
+/* Copies the `count` slowest modes, of conjugate pairs the one with positive imaginary part */
+PetscErrorCode CollectSlowest(PEP pep, const Balanced &by, PetscInt count, std::vector<Mode> *modes)
 {
   const Vec D = by.D;
   Vec       re, im;
@@ -97,11 +108,11 @@ PetscErrorCode Collect(PEP pep, const Balanced &by, PetscInt count, std::vector<
   }
   PetscCall(VecDestroy(&re));
   PetscCall(VecDestroy(&im));
-  Sort(count, modes);
+  SortAndTruncate(count, modes);
   PetscFunctionReturn(0);
 }
 
-/* Takes from a shape its parts along unit vectors, and leaves its norm */
+/* Orthogonalizes a shape to unit vectors; *norm: norm of the remainder */
 PetscErrorCode Orthogonalize(MPI_Comm comm, const std::vector<Eigen::VectorXcd> &units, Eigen::VectorXcd *x, PetscReal *norm)
 {
   PetscFunctionBegin;
@@ -117,7 +128,7 @@ PetscErrorCode Orthogonalize(MPI_Comm comm, const std::vector<Eigen::VectorXcd> 
   PetscFunctionReturn(0);
 }
 
-/* The shape in the balanced unknowns: beside multipliers and rigid motions, in units of their own, others would not be seen */
+/* The shape in the balanced unknowns; in the original ones, multipliers and rigid motions have other units and would dominate the norm */
 PetscErrorCode BalancedShape(const Mode &m, const Balanced &by, Eigen::VectorXcd *x)
 {
   const PetscScalar *d;
@@ -129,7 +140,7 @@ PetscErrorCode BalancedShape(const Mode &m, const Balanced &by, Eigen::VectorXcd
   PetscFunctionReturn(0);
 }
 
-/* Adds the mode if its shape is no combination of those that are there and as fast */
+/* Adds the mode unless its shape is a combination of the shapes of modes with close values */
 PetscErrorCode AddNew(const Mode &m, const Balanced &by, PetscReal shift, std::vector<Mode> *modes, bool *added)
 {
   const MPI_Comm                comm = PetscObjectComm((PetscObject)by.D);
@@ -138,23 +149,23 @@ PetscErrorCode AddNew(const Mode &m, const Balanced &by, PetscReal shift, std::v
   PetscReal                     norm, whole;
   PetscFunctionBegin;
   for (const Mode &k : *modes) {
-    const bool rest = IsAtRest(m, *modes, shift) && IsAtRest(k, *modes, shift);
-    if (!rest && std::abs(k.value - m.value) > as_fast * std::abs(m.value)) continue;
+    const bool rest = IsRigidMotion(m, *modes, shift) && IsRigidMotion(k, *modes, shift);
+    if (!rest && std::abs(k.value - m.value) > close_values * std::abs(m.value)) continue;
     PetscCall(BalancedShape(k, by, &x));
     PetscCall(Orthogonalize(comm, {}, &x, &whole));
     PetscCall(Orthogonalize(comm, units, &x, &norm));
-    if (norm > accurate * whole) units.push_back(x / norm);
+    if (norm > rounding_part * whole) units.push_back(x / norm);
   }
   PetscCall(BalancedShape(m, by, &x));
   PetscCall(Orthogonalize(comm, {}, &x, &whole));
   PetscCall(Orthogonalize(comm, units, &x, &norm));
-  *added = norm > apart * whole;
+  *added = norm > min_new_part * whole;
   if (*added) modes->push_back(m);
   PetscFunctionReturn(0);
 }
 
-/* PEPSolve(); SLEPc's Schur form does not always come to an end beside many values 0, from other vectors it does */
-PetscErrorCode Solved(PEP pep, bool *solved)
+/* PEPSolve(), errors ignored: with many zero eigenvalues SLEPc's Schur form does not always converge, but does so from other start vectors */
+PetscErrorCode TrySolve(PEP pep, bool *solved)
 {
   PetscFunctionBegin;
   PetscCall(PetscPushErrorHandler(PetscIgnoreErrorHandler, nullptr));
@@ -163,7 +174,7 @@ PetscErrorCode Solved(PEP pep, bool *solved)
   PetscFunctionReturn(0);
 }
 
-/* Adds what is new among the slowest */
+/* Adds those of the solver's modes that are new and among the `count` slowest; *news: their number */
 PetscErrorCode Merge(const Mat given[3], PEP pep, const Balanced &b, PetscReal shift, PetscInt count, std::vector<Mode> *modes, int *news)
 {
   std::vector<Mode> found;
@@ -171,18 +182,18 @@ PetscErrorCode Merge(const Mat given[3], PEP pep, const Balanced &b, PetscReal s
   PetscReal         at = 0;
   PetscFunctionBegin;
   *news = 0;
-  PetscCall(Collect(pep, b, count, &found));
+  PetscCall(CollectSlowest(pep, b, count, &found));
   if (modes->empty()) {
     *modes = found;
     *news  = (int)found.size();
     PetscFunctionReturn(0);
   }
-  const PetscReal slow = (PetscInt)modes->size() < count ? PETSC_MAX_REAL : (1 - accurate) * std::abs(modes->back().value);
+  const PetscReal slow = (PetscInt)modes->size() < count ? PETSC_MAX_REAL : (1 - rounding_part) * std::abs(modes->back().value);
   for (const Mode &m : found) {
-    const PetscReal where = IsAtRest(m, *modes, shift) ? std::abs(shift) : std::abs(m.value);
+    const PetscReal where = IsRigidMotion(m, *modes, shift) ? std::abs(shift) : std::abs(m.value);
     bool            added = false;
     if (std::abs(m.value) >= slow) continue;
-    if (!(where <= beside * at && at <= beside * where)) {
+    if (!(where <= max_value_per_shift * at && at <= max_value_per_shift * where)) {
       PetscCall(DestroyBalanced(&here));
       PetscCall(BalanceOperators(given, where, &here));
       at = where;
@@ -191,12 +202,12 @@ PetscErrorCode Merge(const Mat given[3], PEP pep, const Balanced &b, PetscReal s
     *news += added;
   }
   PetscCall(DestroyBalanced(&here));
-  Sort(count, modes);
+  SortAndTruncate(count, modes);
   PetscFunctionReturn(0);
 }
 
-/* A Krylov space from one vector has one vector of each value, and others of a multiple one by rounding alone: so it is searched from other ones until
-   there is nothing new among the slowest */
+/* A Krylov space from one vector contains one shape of each eigenvalue, and further ones of a multiple eigenvalue by rounding only: the search is repeated from other random
+   vectors until no new mode is found among the slowest */
 PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::vector<Mode> *modes)
 {
   Balanced    b;
@@ -209,7 +220,7 @@ PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::
   PetscCall(BalanceOperators(given, shift, &b));
   PetscCall(VecDuplicate(b.D, &begin));
   PetscCall(PetscRandomCreate(PetscObjectComm((PetscObject)given[0]), &numbers));
-  for (int k = 0, news = 1, failed = 0; k < searches && news > 0; k++) {
+  for (int k = 0, news = 1, failed = 0; k < random_starts && news > 0; k++) {
     if (!pep) {
       PetscCall(PEPCreate(PetscObjectComm((PetscObject)given[0]), &pep));
       PetscCall(SetUp(pep, b.operators, count, shift));
@@ -218,14 +229,14 @@ PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::
       PetscCall(VecSetRandom(begin, numbers));
       PetscCall(PEPSetInitialSpace(pep, 1, &begin));
     }
-    if (modes->empty() && failed == failures) {
-      PetscCall(PEPSolve(pep)); /* the error for the user */
+    if (modes->empty() && failed == max_schur_failures) {
+      PetscCall(PEPSolve(pep)); /* raises SLEPc's error */
       solved = true;
-    } else PetscCall(Solved(pep, &solved));
+    } else PetscCall(TrySolve(pep, &solved));
     if (solved) PetscCall(Merge(given, pep, b, shift, count, modes, &news));
     else {
       PetscCall(PEPDestroy(&pep));
-      if (failed++ == failures) break;
+      if (failed++ == max_schur_failures) break;
     }
     PetscCall(PetscInfo(given[0], "search %d about %g 1/s: %s, %d modes more\n", k + 1, (double)shift, solved ? "done" : "no Schur form", news));
   }
@@ -236,21 +247,21 @@ PetscErrorCode Search(const Mat given[3], PetscReal shift, PetscInt count, std::
   PetscFunctionReturn(0);
 }
 
-/* What a search has found, and its last shift; the largest part of inertia and damping without balance, and the frequency of that mode */
-struct Found {
+/* The modes found, the last shift, the largest residual relative to inertia and damping forces, and the frequency of that mode in Hz */
+struct SearchResult {
   std::vector<Mode> modes; /* not normalized */
-  PetscReal         shift = 0, left = 0, frequency = 0;
+  PetscReal         shift = 0, residual = 0, frequency = 0;
 };
 
-/* Where values of both are far apart, from `from` on: none is within a hundredth */
-PetscReal Gap(PetscReal from, const std::vector<Mode> &a, const std::vector<Mode> &b)
+/* The first value from `from` on that differs from all values of both lists by more than the part close_values */
+PetscReal SplitValue(PetscReal from, const std::vector<Mode> &a, const std::vector<Mode> &b)
 {
   for (bool clear = false; !clear;) {
     clear = true;
     for (const std::vector<Mode> *modes : {&a, &b})
       for (const Mode &m : *modes)
-        if (std::abs(std::abs(m.value) / from - 1) < as_fast) {
-          from *= 1 + 2 * as_fast;
+        if (std::abs(std::abs(m.value) / from - 1) < close_values) {
+          from *= 1 + 2 * close_values;
           clear = false;
         }
   }
@@ -262,22 +273,22 @@ void EraseFrom(PetscReal value, std::vector<Mode> *modes)
   modes->erase(std::remove_if(modes->begin(), modes->end(), [&](const Mode &m) { return std::abs(m.value) >= value; }), modes->end());
 }
 
-/* A search has the digits of values that are at most `beside` times as fast as the shift. Where it has found faster ones, there is another one about a shift that is so near
-   to the fastest. Those too slow for it remain as they were, or are looked at in the same way, unless the searches do not agree on how many there are: rounding of fast
-   ones makes more out of rigid motions the farther they are from the shift, and nothing of the search before is believed (SmallBodies.SlowestModesOfAFreeBody). */
-PetscErrorCode SearchOften(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+/* A search is accurate for values up to max_value_per_shift times the shift. If it has found faster ones, another search follows about a shift that near
+   to the fastest. Modes too slow for the new shift are kept from the search before, and treated in the same way, if both searches agree on their number. If not, all results of the search
+   before are discarded: rounding of fast modes creates spurious rigid motions, the more the farther these are from the shift (SmallBodies.SlowestModesOfAFreeBody). */
+PetscErrorCode SearchRepeatedly(const Mat given[3], PetscReal shift, PetscInt count, SearchResult *found)
 {
   std::vector<Mode> slow, &all = found->modes;
   PetscReal         limit = PETSC_MAX_REAL;
   PetscFunctionBegin;
   found->shift = shift;
   PetscCall(Search(given, shift, count, &slow));
-  while (!slow.empty() && std::abs(slow.back().value) > beside * std::abs(shift)) {
+  while (!slow.empty() && std::abs(slow.back().value) > max_value_per_shift * std::abs(shift)) {
     std::vector<Mode> again;
-    const PetscReal   about = std::copysign(std::abs(slow.back().value) / beside, shift);
+    const PetscReal   about = std::copysign(std::abs(slow.back().value) / max_value_per_shift, shift);
     if (all.empty()) found->shift = about;
     PetscCall(Search(given, about, (PetscInt)slow.size(), &again));
-    const PetscReal split  = Gap(std::abs(about) / below, slow, again);
+    const PetscReal split  = SplitValue(std::abs(about) / max_shift_per_value, slow, again);
     const auto      slower = [&](const Mode &m) { return std::abs(m.value) < split; };
     const bool      agree  = std::count_if(slow.begin(), slow.end(), slower) == std::count_if(again.begin(), again.end(), slower);
     EraseFrom(limit, &again);
@@ -286,22 +297,22 @@ PetscErrorCode SearchOften(const Mat given[3], PetscReal shift, PetscInt count, 
     limit = split;
   }
   all.insert(all.end(), slow.begin(), slow.end());
-  Sort(count, &all);
+  SortAndTruncate(count, &all);
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Find(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+PetscErrorCode Find(const Mat given[3], PetscReal shift, PetscInt count, SearchResult *found)
 {
   PetscFunctionBegin;
-  PetscCall(SearchOften(given, shift, count, found));
-  PetscCall(CheckModes(given, found->shift, &found->modes, &found->left, &found->frequency));
+  PetscCall(SearchRepeatedly(given, shift, count, found));
+  PetscCall(CheckModes(given, found->shift, &found->modes, &found->residual, &found->frequency));
   PetscCall(PetscInfo(given[0], "modes about %g 1/s: slowest %g 1/s, at most %g of inertia and damping without balance\n", (double)found->shift,
-                      found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->left));
+                      found->modes.empty() ? 0. : std::abs(found->modes.front().value), (double)found->residual));
   PetscFunctionReturn(0);
 }
 
-/* On the ranks that have unknowns, the rows of which are those of their rank as before */
-PetscErrorCode FindOn(MPI_Comm some, const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+/* Searches on the communicator of the ranks that have unknowns, with the same rows on each */
+PetscErrorCode FindOnRanks(MPI_Comm nonempty, const Mat given[3], PetscReal shift, PetscInt count, SearchResult *found)
 {
   Mat      operators[3];
   PetscInt n;
@@ -310,7 +321,7 @@ PetscErrorCode FindOn(MPI_Comm some, const Mat given[3], PetscReal shift, PetscI
   for (int k = 0; k < 3; k++) {
     Mat rows;
     PetscCall(MatMPIAIJGetLocalMat(given[k], MAT_INITIAL_MATRIX, &rows));
-    PetscCall(MatCreateMPIMatConcatenateSeqMat(some, rows, n, MAT_INITIAL_MATRIX, &operators[k]));
+    PetscCall(MatCreateMPIMatConcatenateSeqMat(nonempty, rows, n, MAT_INITIAL_MATRIX, &operators[k]));
     PetscCall(MatDestroy(&rows));
   }
   PetscCall(Find(operators, shift, count, found));
@@ -318,28 +329,28 @@ PetscErrorCode FindOn(MPI_Comm some, const Mat given[3], PetscReal shift, PetscI
   PetscFunctionReturn(0);
 }
 
-/* The others are told what was found; their shapes have no unknowns */
-PetscErrorCode Tell(MPI_Comm comm, PetscMPIInt from, Found *found)
+/* Broadcasts the result to ranks without unknowns, whose parts of the shapes are empty */
+PetscErrorCode BroadcastResult(MPI_Comm comm, PetscMPIInt from, SearchResult *found)
 {
-  PetscMPIInt count = (PetscMPIInt)found->modes.size();
-  PetscReal   left[3] = {found->shift, found->left, found->frequency};
+  PetscMPIInt count      = (PetscMPIInt)found->modes.size();
+  PetscReal   numbers[3] = {found->shift, found->residual, found->frequency};
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&count, 1, MPI_INT, from, comm));
-  PetscCallMPI(MPI_Bcast(left, 3, MPIU_REAL, from, comm));
-  found->shift     = left[0];
-  found->left      = left[1];
-  found->frequency = left[2];
+  PetscCallMPI(MPI_Bcast(numbers, 3, MPIU_REAL, from, comm));
+  found->shift     = numbers[0];
+  found->residual  = numbers[1];
+  found->frequency = numbers[2];
   found->modes.resize(count);
   for (Mode &m : found->modes) PetscCallMPI(MPI_Bcast(&m.value, 1, MPI_CXX_DOUBLE_COMPLEX, from, comm));
   PetscFunctionReturn(0);
 }
 
-/* SLEPc 3.18 waits for ever where ranks without unknowns take part: not all of what its ranks find out each by itself is the same on these
-   (LinearizeRanks.SlowestModesWhereRanksHaveNoUnknowns). A scene of few bodies has such ranks. */
-PetscErrorCode FindWithoutEmptyRanks(const Mat given[3], PetscReal shift, PetscInt count, Found *found)
+/* Excludes ranks without unknowns, as a scene of few bodies has them: SLEPc 3.18 deadlocks with these, because not all decisions that each rank takes by itself agree there
+   (LinearizeRanks.SlowestModesWhereRanksHaveNoUnknowns). */
+PetscErrorCode FindWithoutEmptyRanks(const Mat given[3], PetscReal shift, PetscInt count, SearchResult *found)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
-  MPI_Comm       some;
+  MPI_Comm       nonempty;
   PetscMPIInt    rank, size, first, failed = 0;
   PetscInt       n, least;
   PetscFunctionBegin;
@@ -353,14 +364,14 @@ PetscErrorCode FindWithoutEmptyRanks(const Mat given[3], PetscReal shift, PetscI
   PetscCallMPI(MPI_Comm_size(comm, &size));
   first = n ? rank : size;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, comm));
-  PetscCallMPI(MPI_Comm_split(comm, n ? 0 : MPI_UNDEFINED, rank, &some));
-  const PetscErrorCode own = n ? FindOn(some, given, shift, count, found) : 0;
+  PetscCallMPI(MPI_Comm_split(comm, n ? 0 : MPI_UNDEFINED, rank, &nonempty));
+  const PetscErrorCode own = n ? FindOnRanks(nonempty, given, shift, count, found) : 0;
   failed                   = own;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm));
-  if (n) PetscCallMPI(MPI_Comm_free(&some));
+  if (n) PetscCallMPI(MPI_Comm_free(&nonempty));
   PetscCall(own);
   PetscCheck(!failed, PETSC_COMM_SELF, (PetscErrorCode)failed, "SlowestModes(): the search has failed on ranks that have unknowns");
-  PetscCall(Tell(comm, first, found));
+  PetscCall(BroadcastResult(comm, first, found));
   PetscFunctionReturn(0);
 }
 
@@ -368,9 +379,9 @@ PetscErrorCode FindWithoutEmptyRanks(const Mat given[3], PetscReal shift, PetscI
 
 PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector<Mode> *modes, PetscReal shift)
 {
-  Mat      given[3];
-  PetscInt unknowns;
-  Found    found;
+  Mat          given[3];
+  PetscInt     unknowns;
+  SearchResult found;
   PetscFunctionBegin;
   PetscCall(of.operators(&given[2], &given[1], &given[0]));
   const MPI_Comm comm = PetscObjectComm((PetscObject)given[0]);
@@ -384,9 +395,9 @@ PetscErrorCode SlowestModes(const Linearization &of, PetscInt count, std::vector
   PetscCheck((PetscInt)found.modes.size() >= count, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): %d of %" PetscInt_FMT " modes about %g 1/s were found; a scene of few unknowns has all of them by Linearization::modes(), else try another shift or -scene_modes_pep_ncv",
              (int)found.modes.size(), count, (double)found.shift);
-  PetscCheck(found.left <= balanced, comm, PETSC_ERR_NOT_CONVERGED,
+  PetscCheck(found.residual <= max_residual, comm, PETSC_ERR_NOT_CONVERGED,
              "SlowestModes(): the mode of %g Hz leaves %g of its inertia and damping without balance: it is none; try another shift than %g 1/s, or Linearization::modes() if there are few unknowns",
-             (double)found.frequency, (double)found.left, (double)found.shift);
+             (double)found.frequency, (double)found.residual, (double)found.shift);
   for (Mode &m : found.modes) PetscCall(of.normalize(&m));
   *modes = std::move(found.modes);
   PetscFunctionReturn(0);

@@ -13,8 +13,8 @@ namespace hhtdae
 namespace
 {
 
-constexpr PetscInt together   = 12; /* loads at a time */
-constexpr int      velocities = 6;  /* products of angular velocities: xx, yy, zz, xy, yz, zx */
+constexpr PetscInt loads_at_once     = 12; /* loads processed together: the geometry of an element is evaluated once for all of them */
+constexpr int      velocity_products = 6;  /* loads by products of angular velocities: xx, yy, zz, xy, yz, zx */
 
 PetscErrorCode CheckInput(const FeModel &model, const std::vector<Tied> &tied)
 {
@@ -31,10 +31,10 @@ PetscErrorCode CheckInput(const FeModel &model, const std::vector<Tied> &tied)
 /* Centrifugal forces at own dofs, M (tr(S) - S) X with S = (e_c e_d^T + e_d e_c^T)/2 */
 PetscErrorCode CentrifugalForces(const FeModel &model, const BodyScales &scales, MatrixXd *f)
 {
-  MatrixXd field(3 * model.own, velocities);
+  MatrixXd field(3 * model.own, velocity_products);
 
   PetscFunctionBegin;
-  for (int p = 0; p < velocities; p++) {
+  for (int p = 0; p < velocity_products; p++) {
     const int c = p % 3, d = p < 3 ? c : (c + 1) % 3;
     Matrix3   S = Matrix3::Zero();
     S(c, d) += 0.5;
@@ -46,7 +46,7 @@ PetscErrorCode CentrifugalForces(const FeModel &model, const BodyScales &scales,
   PetscFunctionReturn(0);
 }
 
-/* Rigid motions of the attachments, orthonormal in M as scales.rigid is */
+/* Motions of the attachments in the rigid motions scales.rigid */
 MatrixXd RigidOfAttachments(const std::vector<Tied> &tied, const BodyScales &scales)
 {
   MatrixXd motion(6 * tied.size(), 6);
@@ -55,10 +55,10 @@ MatrixXd RigidOfAttachments(const std::vector<Tied> &tied, const BodyScales &sca
   return motion;
 }
 
-/* u with K u = f for the stiffness of the attachments, singular by six rigid motions */
+/* A solution of K u = f for the stiffness of the attachments, which is singular for six rigid motions */
 MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
 {
-  VectorXd unit(K.rows()); /* translations and rotations alike */
+  VectorXd unit(K.rows()); /* scales rotations by 1 / length, so that they are comparable with translations */
   for (Eigen::Index i = 0; i < K.rows(); i++) unit(i) = i % 6 < 3 ? 1 : 1 / length;
   const MatrixXd       A = unit.asDiagonal() * (0.5 * (K + K.transpose())) * unit.asDiagonal();
   const SymmetricEigen modes(A);
@@ -68,9 +68,9 @@ MatrixXd SolveFree(const MatrixXd &K, const MatrixXd &f, double length)
   return unit.asDiagonal() * (V * (V.transpose() * (unit.asDiagonal() * f)).cwiseQuotient(modes.values.tail(n).replicate(1, f.cols())));
 }
 
-/* T of Sum t (phi x (phi x d))/2 = phi^T T phi/2 for forces that nodes at d from the point of an attachment get from it: of a rigid one, whose nodes are in no
-   other, all that they get, t; of an average, which has no mass, what passes the loads `held` on it on to its nodes */
-PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, const MatrixXd &t, const MatrixXd &held, MatrixXd *ties)
+/* T of sum t (phi x (phi x d))/2 = phi^T T phi/2 for the forces t of an attachment on its nodes at d from its point. The nodes of a rigid attachment are in no
+   other one, so that t is the total reaction there; an average distributes the loads attachment_loads to its nodes. */
+PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, const MatrixXd &t, const MatrixXd &attachment_loads, MatrixXd *ties)
 {
   PetscFunctionBegin;
   ties->setZero(3 * (Eigen::Index)tied.size(), 3 * t.cols());
@@ -81,7 +81,7 @@ PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, co
       for (Eigen::Index l = 0; l < t.cols(); l++) {
         Vector3 force;
         if (tied[a].tie == Tie::Rigid) force = t.col(l).segment<3>(3 * node);
-        else force = tied[a].row[i].transpose() * held.col(l).segment<6>(6 * (Eigen::Index)a);
+        else force = tied[a].row[i].transpose() * attachment_loads.col(l).segment<6>(6 * (Eigen::Index)a);
         ties->block<3, 3>(3 * (Eigen::Index)a, 3 * l) += 0.5 * (force * d.transpose() + d * force.transpose()) - force.dot(d) * Matrix3::Identity();
       }
     }
@@ -89,15 +89,15 @@ PetscErrorCode TieForces(const FeModel &model, const std::vector<Tied> &tied, co
   PetscFunctionReturn(0);
 }
 
-/* Displacements at own dofs, one column a load: products of angular velocities, then six of each attachment; and what the ties' forces make of rotations:
-   rows 3 a .. 3 a + 2 and columns 3 l .. 3 l + 2 of `ties` have T of attachment a under load l */
+/* Displacements at own dofs, one column per load: six products of angular velocities, then six loads of each attachment. ties: rows 3 a to 3 a + 2, columns
+   3 l to 3 l + 2 are T of attachment a for load l. */
 PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, MatrixXd *u, MatrixXd *ties)
 {
   const PetscInt n = 6 * (PetscInt)tied.size();
   Interior       in;
   ScopedSolver   solver;
   MatrixXd       centrifugal, modes(3 * model.own, n), product, K, rigid, part, x;
-  MatrixXd       f = MatrixXd::Zero(3 * model.own, velocities + n), held = MatrixXd::Zero(n, velocities + n);
+  MatrixXd       f = MatrixXd::Zero(3 * model.own, velocity_products + n), attachment_loads = MatrixXd::Zero(n, velocity_products + n);
 
   PetscFunctionBegin;
   PetscCall(CreateInterior(model, tied, scales, &in));
@@ -108,28 +108,28 @@ PetscErrorCode Displacements(const FeModel &model, const std::vector<Tied> &tied
   PetscCall(SumOverRanks(model.comm, &K));
 
   PetscCall(CentrifugalForces(model, scales, &centrifugal));
-  f.leftCols(velocities) = centrifugal;
-  held.rightCols(n).setIdentity();
-  part = scales.rigid.transpose() * f; /* what rigid accelerations balance */
+  f.leftCols(velocity_products) = centrifugal;
+  attachment_loads.rightCols(n).setIdentity();
+  part = scales.rigid.transpose() * f; /* resultants, balanced by rigid accelerations */
   PetscCall(SumOverRanks(model.comm, &part));
-  part += RigidOfAttachments(tied, scales).transpose() * held;
+  part += RigidOfAttachments(tied, scales).transpose() * attachment_loads;
   PetscCall(Multiply(model.M, scales.rigid, &rigid));
   f -= rigid * part;
 
   part = modes.transpose() * f;
   PetscCall(SumOverRanks(model.comm, &part));
-  *u = modes * SolveFree(K, held + part, scales.length);
+  *u = modes * SolveFree(K, attachment_loads + part, scales.length);
   PetscCall(SolveBlock(solver.ksp, InteriorRows(in, f), &x));
   for (std::size_t i = 0; i < in.dof.size(); i++) u->row(in.dof[i]) += x.row((Eigen::Index)i);
   PetscCall(Multiply(model.K, *u, &product));
-  PetscCall(TieForces(model, tied, product - f, held, ties));
+  PetscCall(TieForces(model, tied, product - f, attachment_loads, ties));
   PetscFunctionReturn(0);
 }
 
-/* Values at the nodes of this rank's elements, whoever owns them: `width` columns of x for each node */
-PetscErrorCode Bring(const FeModel &model, const ElementNodes &nodes, const Eigen::Ref<const MatrixXd> &x, std::vector<double> *here)
+/* Fetches the columns of x for all nodes of this rank's elements; three components for each column of a node */
+PetscErrorCode FetchAtElements(const FeModel &model, const ElementNodes &nodes, const Eigen::Ref<const MatrixXd> &x, std::vector<double> *here)
 {
-  const Eigen::Index  width = x.cols(); /* whose products with nodes an int need not hold */
+  const Eigen::Index  width = x.cols(); /* 64 bits: products with numbers of nodes may overflow an int */
   std::vector<double> own(3 * width * model.own + 1);
 
   PetscFunctionBegin;
@@ -141,13 +141,13 @@ PetscErrorCode Bring(const FeModel &model, const ElementNodes &nodes, const Eige
   PetscFunctionReturn(0);
 }
 
-/* Derivatives of the shape functions with respect to positions, and weights, at the points of an element's stiffness */
-struct Sampled {
+/* Derivatives of the shape functions with respect to positions, and weights, at the integration points of an element's stiffness */
+struct ElementSamples {
   std::vector<MatrixXd> G; /* 3 x nodes */
   std::vector<double>   weight;
   double                least = std::numeric_limits<double>::infinity();
 
-  template <class Shape> Sampled(Shape, const fe::NodeVectors<Shape> &x)
+  template <class Shape> ElementSamples(Shape, const fe::NodeVectors<Shape> &x)
   {
     using Rule           = typename Shape::StiffnessRule;
     const auto   &points = fe::Table<Shape, Rule>::get().points;
@@ -162,8 +162,8 @@ struct Sampled {
   }
 };
 
-/* sigma grad phi_k : grad phi_l over the element at the points of its stiffness, for each load */
-void AddElement(const Sampled &s, const fe::Lame &lame, const std::vector<PetscInt> &place, const std::vector<double> &modes, Eigen::Index m, const std::vector<double> &u,
+/* Adds the integral of grad phi_k^T : (sigma grad phi_l^T) over the element, for each load */
+void AddElement(const ElementSamples &s, const fe::Lame &lame, const std::vector<PetscInt> &place, const std::vector<double> &modes, Eigen::Index m, const std::vector<double> &u,
                 Eigen::Index loads, std::vector<MatrixXd> *sum)
 {
   const Eigen::Index n = (Eigen::Index)place.size();
@@ -186,8 +186,8 @@ void AddElement(const Sampled &s, const fe::Lame &lame, const std::vector<PetscI
   }
 }
 
-/* place: of the nodes of the element */
-Sampled SampleElement(const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, std::vector<PetscInt> *place)
+/* *place: local numbers of the element's nodes */
+ElementSamples SampleElement(const FeElement &e, const ElementNodes &nodes, const std::vector<double> &X, std::vector<PetscInt> *place)
 {
   return fe::WithShape(e.type, [&](auto shape) {
     fe::NodeVectors<decltype(shape)> x;
@@ -196,7 +196,7 @@ Sampled SampleElement(const FeElement &e, const ElementNodes &nodes, const std::
       (*place)[i] = nodes.place(e.node[i]);
       x.col(i)    = Eigen::Map<const Vector3>(&X[3 * (*place)[i]]);
     }
-    return Sampled(shape, x);
+    return ElementSamples(shape, x);
   });
 }
 
@@ -205,10 +205,10 @@ Sampled SampleElement(const FeElement &e, const ElementNodes &nodes, const std::
 PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &tied, const BodyScales &scales, const Reduction &reduction,
                                  const MatrixXd &x, ModalBody *body)
 {
-  const PetscInt      m = (PetscInt)x.cols(), loads = velocities + 6 * (PetscInt)tied.size();
+  const PetscInt      m = (PetscInt)x.cols(), loads = velocity_products + 6 * (PetscInt)tied.size();
   ElementNodes        nodes;
   MatrixXd            u, ties, all(m, m * loads);
-  std::vector<double> X, modes, some;
+  std::vector<double> X, modes, displacements;
   std::string         problem;
   Phase               phase(model.comm, reduction.progress);
 
@@ -219,15 +219,15 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
   PetscCall(nodes.setUp(model));
   X.resize(3 * nodes.global.size() + 1);
   PetscCall(nodes.bring(3, model.coordinates.data(), X.data()));
-  PetscCall(Bring(model, nodes, x, &modes));
-  for (PetscInt from = 0; from < loads; from += together) {
-    const PetscInt        count = std::min(together, loads - from);
+  PetscCall(FetchAtElements(model, nodes, x, &modes));
+  for (PetscInt from = 0; from < loads; from += loads_at_once) {
+    const PetscInt        count = std::min(loads_at_once, loads - from);
     std::vector<MatrixXd> sum(count, MatrixXd::Zero(m, m));
-    PetscCall(Bring(model, nodes, u.middleCols(from, count), &some));
+    PetscCall(FetchAtElements(model, nodes, u.middleCols(from, count), &displacements));
     for (const FeElement &e : model.elements) {
       std::vector<PetscInt> place;
-      const Sampled         sampled = SampleElement(e, nodes, X, &place);
-      AddElement(sampled, fe::Lame(model.materials[e.material]), place, modes, m, some, count, &sum);
+      const ElementSamples  sampled = SampleElement(e, nodes, X, &place);
+      AddElement(sampled, fe::Lame(model.materials[e.material]), place, modes, m, displacements, count, &sum);
       if (!(sampled.least > fe::degenerate)) problem = "geometric stiffening: an element has no volume or is turned inside out";
     }
     for (PetscInt l = 0; l < count; l++) all.middleCols(m * (from + l), m) = 0.5 * (sum[l] + sum[l].transpose());
@@ -241,7 +241,7 @@ PetscErrorCode ComputeStiffening(const FeModel &model, const std::vector<Tied> &
     }
   for (int p = 0; p < 6; p++) body->stiffening[p] = all.middleCols(m * p, m);
   for (std::size_t a = 0; a < tied.size(); a++)
-    for (int c = 0; c < 6; c++) body->attachments[a].stiffening[c] = all.middleCols(m * (velocities + 6 * (PetscInt)a + c), m);
+    for (int c = 0; c < 6; c++) body->attachments[a].stiffening[c] = all.middleCols(m * (velocity_products + 6 * (PetscInt)a + c), m);
   PetscCall(phase.end(std::to_string(loads) + " loads"));
   PetscFunctionReturn(0);
 }

@@ -1,10 +1,10 @@
 /*
   Stress modes: the stress at nodes for each mode of a reduced body.
 
-  Stress comes from the elements' points of best accuracy (element.h) and is averaged over the elements of one material
-  around a node. Where materials meet, stress jumps; the node then has the average over the elements of the stiffest
-  material, which carries the higher stress as a rule. The choice must not depend on the modal coordinates, or stress
-  were not linear in them.
+  Stress is extrapolated from the elements' points of best accuracy (element.h) and averaged over the elements of one material
+  at a node. Where materials meet, stress is discontinuous; the node then has the average over the elements of the stiffest
+  material, which usually carries the higher stress. The choice must not depend on the modal coordinates, because stress
+  has to be linear in them.
 */
 #include "flexible/assembly.h"
 #include "flexible/element.h"
@@ -19,7 +19,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr PetscInt modes_at_once = 16; /* modes at a time: the geometry of an element serves them all */
+constexpr PetscInt modes_at_once = 16; /* modes processed together: the geometry of an element is evaluated once for all of them */
 
 PetscErrorCode CheckInput(const FeModel &model, const ReducedBody &body)
 {
@@ -59,7 +59,7 @@ PetscErrorCode ChooseSides(const FeModel &model, const ElementNodes &nodes, Side
   const PetscInt        count = (PetscInt)model.materials.size();
   std::vector<PetscInt> order(count), place(count);
   PetscFunctionBegin;
-  /* from the softest to the stiffest */
+  /* materials by ascending Young's modulus */
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
                    [&](PetscInt a, PetscInt b) { return model.materials[a].young < model.materials[b].young; });
@@ -158,7 +158,7 @@ PetscErrorCode AddStressModes(const FeModel &model, ReducedBody *body)
   PetscCall(nodes.bring(3, model.coordinates.data(), X.data()));
   PetscCall(ChooseSides(model, nodes, &sides));
   body->stress.node.clear();
-  for (PetscInt n = 0; n < model.own; n++) /* a node of a spring alone has no stress */
+  for (PetscInt n = 0; n < model.own; n++) /* nodes without elements, as those of springs, have no stress */
     if (sides.count[n] > 0) body->stress.node.push_back(n);
   const PetscInt modes = body->modal.modes();
   body->stress.values.resize(6 * body->stress.node.size(), modes);

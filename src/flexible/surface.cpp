@@ -1,6 +1,6 @@
 /*
-  The surface of a reduced body's mesh, for the page of a scene: faces that belong to one element alone, as triangles between their corners. The
-  first rank has it whole; the others send it their elements and their nodes' rows.
+  The surface of a reduced body's mesh, for the page of a scene: faces that belong to one element only, as triangles between their corners. It is
+  assembled on the first rank, to which the others send their elements and their nodes' rows.
 */
 #include "flexible/surface.h"
 #include "flexible/body_name.h"
@@ -16,7 +16,7 @@ namespace
 {
 
 struct Face {
-  std::array<PetscInt, 4> key, corner; /* key: the same for both elements at it; corners counter-clockwise from outside, the first again where there are three */
+  std::array<PetscInt, 4> key, corner; /* key: sorted corners, equal for both elements at the face; corner: counter-clockwise from outside, the first one repeated for triangles */
   bool                    operator<(const Face &f) const { return key < f.key; }
 };
 
@@ -44,7 +44,7 @@ std::vector<Face> OuterFaces(const std::vector<FeElement> &elements)
   return outer;
 }
 
-/* Triangles by places in `node`, the sorted nodes of the surface */
+/* Triangles by indices in `node`, the sorted nodes of the surface */
 void Triangulate(const std::vector<Face> &faces, std::vector<PetscInt> *node, std::vector<int> *triangle)
 {
   for (const Face &f : faces) node->insert(node->end(), f.corner.begin(), f.corner.end());
@@ -68,16 +68,16 @@ void OuterTriangles(const std::vector<FeElement> &elements, std::vector<PetscInt
 namespace
 {
 
-/* What the surface takes of this rank's nodes */
-struct Rows {
+/* Positions, modes and stress modes of this rank's nodes on the surface */
+struct SurfaceRows {
   std::vector<double> point;
   std::vector<float>  shape, stress;
 };
 
-Rows OwnRows(const ReducedBody &b, const std::vector<PetscInt> &node)
+SurfaceRows OwnRows(const ReducedBody &b, const std::vector<PetscInt> &node)
 {
-  Rows       r;
-  const auto begin = std::lower_bound(node.begin(), node.end(), b.first), end = std::lower_bound(node.begin(), node.end(), b.first + b.own);
+  SurfaceRows r;
+  const auto  begin = std::lower_bound(node.begin(), node.end(), b.first), end = std::lower_bound(node.begin(), node.end(), b.first + b.own);
   for (auto n = begin; n != end; ++n) {
     const PetscInt own = *n - b.first;
     r.point.insert(r.point.end(), &b.coordinates[3 * (std::size_t)own], &b.coordinates[3 * (std::size_t)own] + 3);
@@ -119,7 +119,7 @@ PetscErrorCode MakeSurface(const ReducedBody &body, Surface *surface)
   PetscCallMPI(MPI_Bcast(&nodes, 1, MPIU_INT, 0, body.comm));
   node.resize(nodes);
   PetscCallMPI(MPI_Bcast(node.data(), (PetscMPIInt)nodes, MPIU_INT, 0, body.comm));
-  const Rows own = OwnRows(body, node);
+  const SurfaceRows own = OwnRows(body, node);
   PetscCall(GatherTo0(body.comm, own.point.data(), own.point.size(), &surface->point, &of));
   PetscCall(GatherTo0(body.comm, own.shape.data(), own.shape.size(), &shape, &of));
   PetscCall(GatherTo0(body.comm, own.stress.data(), own.stress.size(), &stress, &of));

@@ -1,4 +1,4 @@
-/* Surfaces of large meshes with fewer nodes, for pictures. */
+/* Reduces the number of nodes of surfaces of large meshes, for pictures. */
 #include "flexible/surface.h"
 #include <Eigen/Core>
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace hhtdae
 namespace
 {
 
-/* The axis that the surface looks along at each node, 0 to 5 for x, -x, y, -y, z, -z */
+/* The coordinate direction nearest to the outward normal at each node, 0 to 5 for x, -x, y, -y, z, -z */
 std::vector<int> TriangleSides(const std::vector<double> &point, const std::vector<int> &triangle)
 {
   Eigen::Matrix3Xd normal = Eigen::Matrix3Xd::Zero(3, (Eigen::Index)point.size() / 3);
@@ -31,7 +31,7 @@ std::vector<int> TriangleSides(const std::vector<double> &point, const std::vect
   return side;
 }
 
-/* The cluster of each node where cells have edges of this length from a corner */
+/* Assigns each node to a cluster: nodes of one side in one cell of a cubic grid that starts at `corner`; returns the number of clusters */
 std::size_t Cluster(const std::vector<double> &point, const Vector3 &corner, const std::vector<int> &side, double edge, std::vector<std::size_t> *cluster)
 {
   std::map<std::array<long, 4>, std::size_t> known;
@@ -46,22 +46,22 @@ std::size_t Cluster(const std::vector<double> &point, const Vector3 &corner, con
 
 } // namespace
 
-void ThinSurface(const std::vector<double> &point, std::size_t most, std::vector<std::size_t> *kept, std::vector<int> *triangle)
+void ThinSurface(const std::vector<double> &point, std::size_t max_nodes, std::vector<std::size_t> *kept, std::vector<int> *triangle)
 {
   const std::size_t nodes = point.size() / 3;
   kept->resize(nodes);
   for (std::size_t n = 0; n < nodes; n++) (*kept)[n] = n;
-  if (nodes <= most) return;
+  if (nodes <= max_nodes) return;
   const Eigen::Map<const Eigen::Matrix3Xd> x(point.data(), 3, (Eigen::Index)nodes);
   const std::vector<int>                   side = TriangleSides(point, *triangle);
   std::vector<std::size_t>                 of;
   const Vector3                            corner = x.rowwise().minCoeff();
   const double                             extent = (x.rowwise().maxCoeff() - corner).norm();
-  double                                   edge   = extent / std::sqrt((double)most) / 8; /* too short, for long bodies as well */
-  /* in one cell there are still up to six clusters, one for each side */
-  while (Cluster(point, corner, side, edge, &of) > most && edge < 2 * extent) edge *= 1.1;
+  double                                   edge   = extent / std::sqrt((double)max_nodes) / 8; /* shorter than needed, also for slender bodies */
+  /* a single cell still has up to six clusters, one for each side: the edge is bounded */
+  while (Cluster(point, corner, side, edge, &of) > max_nodes && edge < 2 * extent) edge *= 1.1;
 
-  /* of each cluster the node nearest to the mean */
+  /* represent each cluster by the node nearest to its mean */
   const std::size_t        clusters = *std::max_element(of.begin(), of.end()) + 1;
   Eigen::Matrix3Xd         mean     = Eigen::Matrix3Xd::Zero(3, (Eigen::Index)clusters);
   std::vector<double>      count(clusters, 0), least(clusters, std::numeric_limits<double>::infinity());

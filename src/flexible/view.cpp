@@ -1,4 +1,4 @@
-/* What a finite-element model and a reduced body print of themselves. */
+/* FeModel::view() and ReducedBody::view(). */
 #include "flexible/exchange.h"
 #include "hhtdae/flexible.h"
 
@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-/* The viewer, that of standard output if there is none, and whether it prints text. Collective */
+/* Replaces a null viewer by that of standard output; *text: it is an ASCII viewer. Collective */
 PetscErrorCode TextViewer(MPI_Comm comm, PetscViewer *viewer, PetscBool *text)
 {
   PetscFunctionBegin;

@@ -1,5 +1,4 @@
-/* hhtreduce: finite-element models to files of flexible bodies, and what is in such files. hhtreduce -help explains it.
- */
+/* hhtreduce: reduces finite-element models to files of flexible bodies, and shows such files; see hhtreduce -help. */
 #include "options.h"
 #include <cmath>
 #include <slepcsys.h>
@@ -12,13 +11,13 @@ using namespace hhtreduce;
 namespace
 {
 
-/* PETSc's first message, in place of its trace of calls */
+/* Error handler data: PETSc's first message, printed in place of its traceback */
 struct Failure {
   std::string message;
 };
 
-PetscErrorCode Keep(MPI_Comm, int line, const char *function, const char *file, PetscErrorCode code,
-                    PetscErrorType type, const char *message, void *ctx)
+PetscErrorCode KeepFirstMessage(MPI_Comm, int line, const char *function, const char *file, PetscErrorCode code,
+                                PetscErrorType type, const char *message, void *ctx)
 {
   Failure *failure = static_cast<Failure *>(ctx);
   if (type != PETSC_ERROR_INITIAL || !failure->message.empty()) return code;
@@ -28,7 +27,7 @@ PetscErrorCode Keep(MPI_Comm, int line, const char *function, const char *file, 
   return code;
 }
 
-/* Do all ranks come here in time? One that failed alone must not leave the others waiting. */
+/* Whether all ranks arrive here within five seconds: a rank that failed alone must not leave the others waiting */
 bool AllArrive()
 {
   MPI_Request request;
@@ -41,7 +40,7 @@ bool AllArrive()
   return done;
 }
 
-/* The message once, and the end of all ranks */
+/* Prints the message once, and ends all ranks */
 void Report(PetscErrorCode code, const std::string &message)
 {
   PetscMPIInt rank, size, mine, first;
@@ -69,7 +68,7 @@ PetscErrorCode ReadTheModel(const Task &task, FeModel *model)
   PetscFunctionReturn(0);
 }
 
-/* An hour of work must not end in a folder that is not there. */
+/* Checks before the reduction that the output can be written */
 PetscErrorCode CheckOutput(const std::string &file)
 {
   PetscMPIInt rank;
@@ -124,7 +123,7 @@ PetscErrorCode ShowInfo(const Task &task)
   PetscFunctionReturn(0);
 }
 
-/* Modal coordinate with which the largest displacement is a twentieth of the body's size */
+/* The modal coordinate for which the largest displacement is a twentieth of the body's size */
 PetscErrorCode VisibleScale(const ReducedBody &body, PetscInt mode, double *scale)
 {
   double largest = 0, bounds[6] = {-1e300, -1e300, -1e300, -1e300, -1e300, -1e300};
@@ -194,7 +193,7 @@ int main(int argc, char **argv)
   int    count = (int)words.size() - 1;
   char **list  = words.data();
   if (SlepcInitialize(&count, &list, nullptr, help)) return 2;
-  if (!trace) PetscPushErrorHandler(Keep, &failure);
+  if (!trace) PetscPushErrorHandler(KeepFirstMessage, &failure);
   const PetscErrorCode code = Run(arguments);
   if (!trace) PetscPopErrorHandler();
   if (code) Report(code, failure.message);

@@ -1,4 +1,4 @@
-/* The command line of hhtreduce: what is asked for, and what is wrong with it, before any work is done. */
+/* Parses and checks the command line of hhtreduce, before any work is done. */
 #include "options.h"
 #include <algorithm>
 #include <cmath>
@@ -138,7 +138,7 @@ std::size_t Distance(const std::string &a, const std::string &b)
   return row.back();
 }
 
-/* Is it one of ours with a letter wrong? */
+/* The option of hhtreduce that a word resembles, by edit distance; "" if it is an option or resembles none */
 std::string Meant(const std::string &word)
 {
   for (const auto &list : {with_value, without_value})
@@ -295,7 +295,7 @@ PetscErrorCode ReadModelOptions(Task *t)
   PetscFunctionReturn(0);
 }
 
-/* Before any work: what looks like an option of ours, but is not */
+/* Refuses words that look like misspelled options of hhtreduce */
 PetscErrorCode CheckSpelling()
 {
   PetscInt    n;

@@ -1,4 +1,4 @@
-/* What the user of hhtreduce asks for. */
+/* The command line of hhtreduce. */
 #ifndef HHTDAE_HHTREDUCE_OPTIONS_H
 #define HHTDAE_HHTREDUCE_OPTIONS_H
 
@@ -12,20 +12,20 @@ extern const char *const help;
 struct Task {
   enum Kind { None, ReduceModel, Info, Picture } kind = None;
 
-  /* a model to be reduced */
+  /* for a reduction */
   std::string                             mesh, calculix, stiffness, mass, nodes, sets, output, units, name;
   std::map<std::string, hhtdae::Material> materials;
   hhtdae::Reduction                       reduction;
   bool                                    stress = false, quiet = false;
 
-  /* a body to be shown */
+  /* for -info and -vtu */
   std::string body, vtu;
   PetscInt    mode        = -1;
   double      scale       = 0;
   bool        scale_given = false;
 };
 
-/* Words that PETSc must not see: -info of a body's file is ours, alone -help is answered by us */
+/* Splits off the words that PETSc must not see: -info with a body's file, and -help without other options, are handled here */
 struct Arguments {
   std::vector<std::string> words;      /* for PETSc */
   std::string              positional; /* the last word that is neither an option nor its value */
@@ -34,17 +34,17 @@ struct Arguments {
   Arguments(int argc, char **argv);
 };
 
-/* Options to a task; what is wrong with them is an error on all ranks */
+/* Converts the options to a task; errors are raised on all ranks */
 PetscErrorCode ReadTask(const Arguments &arguments, Task *task);
 
-/* Options that nobody has asked for are named on standard error */
+/* Lists unused options on standard error */
 PetscErrorCode WarnOfUnused();
 
 /* values.cpp */
 std::vector<std::string> Split(const std::string &text, char separator);
 bool                     Number(const std::string &text, double *value);
 
-/* Lists in the words of the command line; the text says what is wrong */
+/* Parse values of options; return an error message, or "" */
 std::string ParseMaterials(const std::string &text, std::map<std::string, hhtdae::Material> *materials);
 std::string ParseAttachments(const std::string &text, std::vector<hhtdae::Attachment> *attachments);
 std::string ParsePressures(const std::string &text, std::vector<hhtdae::LoadCase> *loads);

@@ -1,4 +1,4 @@
-/* The values of hhtreduce's options: what they say, or, returned, what is wrong with them */
+/* Parses the values of hhtreduce's options; functions return an error message, or "" */
 #include "options.h"
 #include <cctype>
 #include <cmath>
@@ -49,7 +49,7 @@ std::string ParseMaterials(const std::string &text, std::map<std::string, Materi
   return materials->empty() ? "-material is empty" : "";
 }
 
-/* Commas divide attachments, and coordinates behind an @ */
+/* Commas separate attachments, and also coordinates after an @ */
 std::string ParseAttachments(const std::string &text, std::vector<Attachment> *attachments)
 {
   std::vector<std::string> part = Split(text, ',');
@@ -105,7 +105,7 @@ std::string ParsePressures(const std::string &text, std::vector<LoadCase> *loads
   return "";
 }
 
-/* Lines "label fx fy fz", empty ones and what comes behind a # left out */
+/* Reads lines "label fx fy fz"; empty lines and comments after a # are skipped */
 std::string ReadLoads(const std::string &text, std::vector<LoadCase> *loads)
 {
   for (const std::string &part : Split(text, ',')) {
