@@ -146,7 +146,7 @@ PetscErrorCode MakeTie(FullExtension &x, const Attachment &a, Vector3 *point)
   if (t.tie == Tie::Rigid) {
     std::vector<PetscInt> next(x.node_first.size(), 0);
     next[rank] = x.own_multipliers;
-    /* numbers of multipliers count up on each owner, and every rank counts for all owners */
+    /* numbers continue from the count of each owner, and every rank continues them for all owners */
     PetscCallMPI(MPI_Allgather(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, next.data(), 1, MPIU_INT, m.comm));
     for (PetscInt n : t.node) {
       PetscInt &i = next[x.ownerOf(n)];

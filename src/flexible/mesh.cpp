@@ -158,7 +158,7 @@ PetscErrorCode BuildPlex(MPI_Comm comm, const MeshFile &mesh, PetscInt nodes, DM
   for (PetscInt v = 0; v < count; v++) (*data)[cells + v] = {used[v], 0, 0};
   PetscCall(DMPlexSymmetrize(*dm));
   PetscCall(DMPlexStratify(*dm));
-  /* PETSc cannot infer the cell type from the number of nodes, as ten, and would fail: set it */
+  /* PETSc cannot infer the cell type from ten or twenty vertices; set it */
   PetscCall(DMCreateLabel(*dm, "celltype"));
   for (PetscInt c = 0; c < cells; c++) {
     const ElementType t = mesh.cells[c].type;
@@ -344,7 +344,7 @@ PetscErrorCode FillElements(DM dm, const std::vector<PointData> &data, const std
   for (PetscInt c = start; c < end; c++) {
     PetscInt cone_size;
     PetscCall(DMPlexGetConeSize(dm, c, &cone_size));
-    if (!cone_size) continue; /* on a rank without cells the stratum of height 0 contains nodes */
+    if (!cone_size) continue; /* on a rank without cells the stratum of height 0 may contain nodes */
     FeElement e{};
     e.type     = (ElementType)data[c].c;
     e.material = material[data[c].b];

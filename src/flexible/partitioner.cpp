@@ -22,7 +22,7 @@ PetscErrorCode CallMetis(std::vector<idx_t> &xadj, std::vector<idx_t> &adjacent,
   PetscFunctionBegin;
   part.assign(vertices, 0);
   if (nparts == 1 || vertices == 0) PetscFunctionReturn(0);
-  if (vertices <= nparts) { /* METIS does not support more parts than vertices */
+  if (vertices <= nparts) { /* METIS is not meant for parts of less than one vertex */
     for (idx_t v = 0; v < vertices; v++) part[v] = (PetscMPIInt)v;
     PetscFunctionReturn(0);
   }

@@ -179,8 +179,7 @@ static PetscErrorCode ChooseLastResort(KSP ksp, Mat P, PC pc, LinearChoice *choi
   PetscFunctionReturn(0);
 }
 
-/* Takes "mumpsmixed" in place of "mumpsnd" with preonly. As a preconditioner single precision does not pay: a Krylov method needs more iterations with
-   its rough solves. */
+/* Takes "mumpsmixed" in place of "mumpsnd", only with preonly: in a Krylov method every iteration would make a rough solve */
 static PetscErrorCode PreferSingle(KSP ksp, Mat P, MatFactorType type, const char **package)
 {
   PetscBool is_mumpsnd, preonly;

@@ -1,6 +1,6 @@
 /*
-  A direct solver within a preconditioner, chosen as the direct solver of a Newton matrix (choose.cpp) unless options with the prefix of the preconditioner, followed by the name of
-  the level, say otherwise. On several ranks a small matrix is factored by each rank: gathering its right-hand side takes less time than messages at each level of an elimination.
+  A direct solver within a preconditioner. It is chosen like the solver of a Newton matrix (choose.cpp) unless the user chooses one; its options have the prefix of the preconditioner
+  followed by the name of the level. On several ranks a small matrix is factored by each rank: gathering its right-hand side takes less time than messages at each level of an elimination.
 */
 #ifndef HHTDAE_LINEAR_INNER_H
 #define HHTDAE_LINEAR_INNER_H
