@@ -19,7 +19,7 @@ namespace hhtdae
 
 using Columns = Eigen::Ref<const MatrixXd>;
 
-constexpr PetscInt default_block       = 6;
+constexpr PetscInt default_block       = 6;  /* vectors of a block, -eps_krylov_block */
 constexpr PetscInt projection_interval = 24; /* vectors added between two solutions of the projected problem */
 
 struct BlockKrylov {

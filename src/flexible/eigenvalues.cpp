@@ -210,7 +210,7 @@ static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &mode
   PetscFunctionReturn(0);
 }
 
-constexpr int      max_searches = 6;
+constexpr int      max_searches = 6; /* repeated searches for modes that are missing by inertia */
 constexpr PetscInt extra_modes =
     2; /* modes computed beyond the wanted ones, to detect equal frequencies at the limit */
 

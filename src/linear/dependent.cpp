@@ -23,6 +23,7 @@ static const PetscReal NULL_RESIDUAL = 1e-9;
 /* A row takes part in a dependence if its entry of the null vector, relative to the largest one, is larger than this */
 static const PetscReal MIN_COMPONENT = 1e-6;
 
+/* Upper limit of the iterations, each of which shrinks the other components by about E/S */
 static const PetscInt NULL_VECTOR_ITERATIONS = 12;
 
 namespace
