@@ -68,7 +68,7 @@ PetscErrorCode PartsResidual(KluParts *p, PetscReal *residual)
   const PartsSplit            &s = p->split;
   const PetscInt               n = (PetscInt)s.inner_row.size(), N = (PetscInt)s.interface.size();
   const std::vector<PetscReal> size = RowSizes(s);
-  std::vector<PetscScalar>     b(s.number.size(), 0), x(s.number.size(), 0), remainder(N);
+  std::vector<PetscScalar>     b(s.number.size(), 0), x(s.number.size(), 0);
   RowResiduals                 inner{{}, std::vector<PetscReal>(n, 0)}, at_interface{std::vector<PetscScalar>(N, 0), std::vector<PetscReal>(N, 0)};
 
   PetscFunctionBegin;

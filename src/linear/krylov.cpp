@@ -208,6 +208,7 @@ PetscErrorCode LinearGiveUpKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBoo
   PCFailedReason     failed;
   PetscInt           its;
   PC                 pc;
+  KSPType            type;
 
   PetscFunctionBegin;
   *changed = PETSC_FALSE;
@@ -220,7 +221,8 @@ PetscErrorCode LinearGiveUpKrylov(KSP ksp, Mat P, LinearChoice *choice, PetscBoo
   *changed       = (PetscBool)(!nan && (reason < 0 || failed || its > GIVE_UP_ITERATIONS));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, changed, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ksp)));
   if (!*changed) PetscFunctionReturn(0);
-  PetscCall(PetscInfo(ksp, "Linear solver: conjugate gradients took %" PetscInt_FMT " iterations (%s), a factor from now on\n", its, failed ? PCFailedReasons[failed] : KSPConvergedReasons[reason]));
+  PetscCall(KSPGetType(ksp, &type));
+  PetscCall(PetscInfo(ksp, "Linear solver: %s took %" PetscInt_FMT " iterations (%s), a factor from now on\n", type, its, failed ? PCFailedReasons[failed] : KSPConvergedReasons[reason]));
   choice->krylov_given_up   = PETSC_TRUE;
   const PetscBool symmetric = choice->cholesky;
   PetscCall(LinearTakeFactor(ksp, choice));

@@ -261,6 +261,7 @@ template <class P> static PetscErrorCode SaveState(Mat F, Archive *archive)
   archive->plain(ordering);
   archive->plain(workspace);
   archive->plain(m->ordering);
+  m->ordering[sizeof(m->ordering) - 1] = 0;
   archive->list(m->position);
   PetscFunctionReturn(0);
 }
