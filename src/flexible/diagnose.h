@@ -27,6 +27,7 @@ struct BodyScales {
 /* diagnose_matrices.cpp: sizes, symmetry, finite entries; M = m_ij times identity(3) with positive diagonal; nodes without stiffness */
 PetscErrorCode CheckMatrices(const FeModel &model);
 /* diagnose_parts.cpp: the model is connected, rigid attachments being counted as connections */
+PetscErrorCode DescribeParts(const FeModel &model, const std::vector<Tied> &tied, std::string *text); /* "2 parts ...", "" if it is connected; on all ranks */
 PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tied);
 
 /* diagnose_scales.cpp */

@@ -131,7 +131,7 @@ static PetscErrorCode PartSizes(const FeModel &model, Parts *parts, const std::v
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tied)
+PetscErrorCode DescribeParts(const FeModel &model, const std::vector<Tied> &tied, std::string *text)
 {
   Parts                  parts(model);
   std::vector<double>    least;
@@ -140,6 +140,7 @@ PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tie
   PetscInt               count;
 
   PetscFunctionBegin;
+  text->clear();
   PetscCall(JoinNeighbours(model, tied, &parts));
   PetscCall(PropagateLeast(model, tied, &parts, &least));
   for (PetscInt i = 0; i < model.own; i++)
@@ -150,15 +151,21 @@ PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tie
   if (count == 1) PetscFunctionReturn(0);
   PetscCall(Highest(model.comm, mine, &first));
   PetscCall(PartSizes(model, &parts, least, first, &size));
-  std::string text;
+  *text = std::to_string(count) + " parts that nothing holds together: ";
   for (std::size_t k = 0; k < first.size(); k++)
-    text += (k ? "; " : "") + std::to_string(size[k]) + " nodes with node " + std::to_string(first[k].label);
-  SETERRQ(
-      model.comm, PETSC_ERR_ARG_WRONG,
-      "The FE model falls into %" PetscInt_FMT
-      " parts that nothing holds together: %s%s; join them (coincident nodes that were not merged?), or reduce them as "
-      "separate bodies",
-      count, text.c_str(), count > (PetscInt)first.size() ? "; ..." : "");
+    *text += (k ? "; " : "") + std::to_string(size[k]) + " nodes with node " + std::to_string(first[k].label);
+  if (count > (PetscInt)first.size()) *text += "; ...";
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode CheckConnected(const FeModel &model, const std::vector<Tied> &tied)
+{
+  std::string parts;
+  PetscFunctionBegin;
+  PetscCall(DescribeParts(model, tied, &parts));
+  PetscCheck(parts.empty(), model.comm, PETSC_ERR_ARG_WRONG,
+             "The FE model falls into %s; join them (coincident nodes that were not merged?), or reduce them as separate bodies", parts.c_str());
+  PetscFunctionReturn(0);
 }
 
 } // namespace hhtdae

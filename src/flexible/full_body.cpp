@@ -1,7 +1,9 @@
 /* FullFeBody: adds a finite-element model to a scene, and reads its positions from a run */
 #include "flexible/full_body.h"
 #include "flexible/assembly.h"
+#include "flexible/attachments.h"
 #include "flexible/body_check.h"
+#include "flexible/diagnose.h"
 #include "flexible/exchange.h"
 #include "scene/runtime.h"
 #include <algorithm>
@@ -220,6 +222,26 @@ PetscErrorCode CheckRanks(const Scene &scene, const std::string &name, const FeM
   PetscFunctionReturn(0);
 }
 
+/* A mesh of several parts may be meant; coincident nodes that were not merged are not, and a part that falls away would be seen in pictures alone */
+PetscErrorCode TellParts(const FullExtension &x)
+{
+  const FeModel    &m = *x.model;
+  std::vector<Tied> tied;
+  std::string       parts;
+  PetscFunctionBegin;
+  if (!m.K) PetscFunctionReturn(0);
+  for (const TieNodes &t : x.ties) { /* whether rigid or on average, an attachment holds its nodes */
+    tied.emplace_back();
+    tied.back().tie = Tie::Rigid;
+    for (PetscInt n : t.node)
+      if (n >= m.first && n < m.first + m.own) tied.back().node.push_back(n - m.first);
+  }
+  PetscCall(DescribeParts(m, tied, &parts));
+  if (!parts.empty())
+    PetscCall(PetscPrintf(m.comm, "finite-element body %s: its mesh falls into %s (are coincident nodes not merged?)\n", x.name.c_str(), parts.c_str()));
+  PetscFunctionReturn(0);
+}
+
 } // namespace
 
 PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeModel &model, const FullBody &body)
@@ -260,6 +282,7 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeM
   PetscCall(MassAndBox(model, &mass, corner));
   std::vector<Vector3> point(body.attachments.size());
   for (std::size_t i = 0; i < point.size(); i++) PetscCall(MakeTie(*x, body.attachments[i], &point[i]));
+  PetscCall(TellParts(*x));
   /* nothing fails from here on: a faulty description has left nothing in the scene, and one that is recorded can be repeated with other parameters */
   SceneAccess::record(scene, [=, &model](Scene &s) {
     if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");

@@ -257,6 +257,27 @@ TEST(FullBody, UnknownAttachment)
   EXPECT_TRUE(trap.says("finite-element body beam: it has no attachment middle, but left, right")) << trap.message;
 }
 
+/* Nodes that were not merged: the part that nothing holds falls away, and is told. Attachments of any kind hold what their nodes belong to. */
+TEST(FullBody, PartsAreTold)
+{
+  FeModel model{PETSC_COMM_WORLD};
+  Box     box = {{5, 1, 1}, {0.5, 0.1, 0.1}};
+  box.present = [](int i, int, int) { return i != 2; };
+  BoxBuilder builder(box, &model);
+  builder.addSet("all ends", [](const Vector3 &x) { return x[0] < 1e-9 || x[0] > 0.5 - 1e-9; });
+  for (const char *nodes : {"left", "all ends"}) {
+    Scene      scene(PETSC_COMM_WORLD);
+    FullFeBody fe;
+    FullBody   b;
+    b.attachments        = {{nodes}};
+    b.attachments[0].tie = Tie::Average;
+    Printed printed;
+    must(fe.add(scene, "bar", model, b));
+    const bool told = printed.says("finite-element body bar: its mesh falls into 2 parts that nothing holds together");
+    EXPECT_EQ(told, std::string(nodes) == "left") << printed.text();
+  }
+}
+
 /* What was refused is not described again with other parameters, and leaves nothing in the scene */
 TEST(FullBody, ARefusedBodyIsForgotten)
 {
