@@ -466,6 +466,31 @@ TEST(JointRuns, ADiscThatFallsFlat)
   }
 }
 
+/* A bob on a link of 1 m that is drawn along x to where the link does not reach, beside another one that swings: the error names the one that is stuck */
+TEST(JointRuns, AMotionBeyondReach)
+{
+  Scene      s(PETSC_COMM_SELF, Space::Planar);
+  const auto hung = [&](const std::string &name, double x) {
+    RigidBody b;
+    b.position   = {x, -std::sqrt(1 - x * x), 0};
+    const Body   bob = s.add(name, b);
+    const Marker end = s.marker(bob), pin = s.marker(s.ground());
+    s.add("link of " + name, PointDistance{end, pin, 1});
+    return end;
+  };
+  hung("free", .5);
+  s.add("draw", TranslationalMotion{hung("drawn", .8), s.marker(s.ground()), TimeFunction::polynomial({.8, .5, .7}), MotionOf::Displacement, 0});
+  s.start().assembly = Assembly::Project;
+  s.gravity({0, -9.81, 0});
+  SceneRun  run(s, 1, "-ts_rtol 1e-6 -ts_atol 1e-6");
+  ErrorTrap trap;
+  EXPECT_NE(run.solve(), 0);
+  PetscReal t;
+  must(TSGetTime(run.ts, &t));
+  EXPECT_NEAR(t, (std::sqrt(.25 + 4 * .7 * .2) - .5) / 1.4, 1e-3);
+  EXPECT_TRUE(trap.says("most of it in unknown") && trap.says("of body drawn")) << trap.message;
+}
+
 TEST(JointRuns, PlanarJointsKeepMomentumAndEnergy)
 {
   const Matrix3 none = Matrix3::Identity(), turn = About(Vector3::UnitZ(), 1);

@@ -22,7 +22,9 @@
 */
 #include "corrector.h"
 #include "estimate.h"
+#include "integrator/equations/rows.h"
 #include "integrator/proofs/proofs.h"
+#include "integrator/work_vec.h"
 
 namespace hht3
 {
@@ -73,15 +75,37 @@ PetscErrorCode FreshMatrixNextIteration(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where the last correction is largest in units of the tolerance, which tells where a mechanism is stuck: JointRuns.AMotionBeyondReach */
+PetscErrorCode LabelLargestCorrection(TS ts, RowLabel *label)
+{
+  Integrator &I = Get(ts);
+  Vec         Y;
+  WorkVec     size;
+  PetscInt    at;
+  PetscReal   largest;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
+  if (!Y) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(size.like(Y));
+  PetscCall(VecPointwiseMult(size, Y, I.weight));
+  PetscCall(VecAbs(size));
+  PetscCall(VecMax(size, &at, &largest));
+  if (largest > 0) PetscCall(LabelRow(ts, at, label));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode EndDiverged(TS ts, const char *why)
 {
   Integrator &I = Get(ts);
   Corrector  &c = I.corrector;
+  RowLabel    where;
 
   PetscFunctionBegin;
   c.reason = SNES_DIVERGED_DTOL;
-  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance)",
-                          why, (double)I.t1, (double)I.h, c.it, (double)c.e));
+  if (!PetscIsInfOrNanReal(c.e)) PetscCall(LabelLargestCorrection(ts, &where));
+  PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the corrector %s at t = %g, h = %g (iteration %" PetscInt_FMT ", correction %g of the tolerance%s%s)",
+                          why, (double)I.t1, (double)I.h, c.it, (double)c.e, where.text[0] ? ", most of it in unknown " : "", where.text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
