@@ -149,7 +149,8 @@ class ModalLoad(Spec):
 
     body : flexible Body
     load : name of the load case
-    scale : formula"""
+    scale : formula
+    state : bool, the scale is an unknown of the equations, a force state"""
     body: Any
     load: str
     scale: Formula

@@ -1,7 +1,7 @@
 """The integrator on petsc4py's TS: settings and results of ``ts.setType("hhtdae")``.
 
 After ``import hhtdae`` the type is known to petsc4py. The problem is given by ``ts.setI2Function`` and ``ts.setI2Jacobian``; initial values by
-``ts.setSolution2(u, v)``. What a function here sets, options of the command line set as well (`-ts_hhtdae_...`), and win.
+``ts.setSolution2(u, v)``. Most functions here have an option of the command line (`-ts_hhtdae_...`), which ``ts.setFromOptions()`` reads and which replaces what was set before it.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,8 @@ class Statistics:
 
 
 def set_form(ts, form):
-    """How the inertia forces are averaged over a step: "second_order" (the default), second order always, or "paper", equation (9a) of Negrut et al."""
+    """How the inertia forces are averaged over a step: "second_order" (the default), of second order always, or "paper", equation (9a) of Negrut et al., of first order
+    where the mass matrix varies and alpha is not 0."""
     _core.set_form(ts, form)
 
 
@@ -58,7 +59,7 @@ def get_alpha(ts):
 
 
 def set_radius(ts, radius):
-    """The generalized-alpha method of a spectral radius at infinity, 0 to 1, in place of HHT."""
+    """Spectral radius at infinite frequency, 0 (most damping) to 1 (none), with the generalized-alpha parameters of Chung and Hulbert in place of those of HHT."""
     _core.set_radius(ts, radius)
 
 
@@ -76,7 +77,7 @@ def get_order(ts):
 
 
 def set_corrector_tolerance(ts, factor):
-    """The corrector's error as a part of the tolerance of a step, default 0.001 and less for constrained systems with little damping."""
+    """Error that the Newton iteration may leave, in units of the tolerance of a step, in (0, 1); default 0.001, and less for constrained systems with little damping."""
     _core.set_corrector_tolerance(ts, factor)
 
 
@@ -86,8 +87,8 @@ def set_predictor_degree(ts, degree):
 
 
 def set_reuse(ts, ratio, rate, hold):
-    """When the Newton matrix is made anew: factor by which h may differ (default 1.4), rate of convergence (0.25; 0.1 with the preconditioner hhtconstraint), growth of h
-    that is not taken (1.2)."""
+    """When the Newton matrix is made anew: `ratio`, the factor by which h may differ from the h of the matrix (default 1.4); `rate` of convergence beyond which the next step gets
+    a new one (0.25; 0.1 with the preconditioner hhtconstraint); `hold`, the factor below which a growth of h is not taken, so that the matrix lives on (1.2)."""
     _core.set_reuse(ts, ratio, rate, hold)
 
 
@@ -108,7 +109,8 @@ def set_role(ts, role, unknowns):
 
 
 def get_role(ts, role):
-    """The index set of a role."""
+    """The unknowns of a role, an index set of global numbers, as set (then it may be empty)
+    or, after the set-up, as detected; None where none was set or detected."""
     return _core.get_is(ts, role)
 
 
@@ -135,7 +137,8 @@ def set_nodes(ts, nodes, reference=None):
 
 
 def set_start(ts, start):
-    """About initial values that violate the constraints: "off", "report" (the default), or "project" to the nearest consistent ones."""
+    """About initial values that violate the constraints: "off" takes them as they are, "report" (the default) prints by how much they do, "project" moves them to the nearest
+    consistent ones."""
     _core.set_start(ts, start)
 
 
@@ -150,8 +153,8 @@ def set_row_name(ts, function):
 
 
 def set_coordinate_change(ts, test, map, commit=None):
-    """New generalized coordinates in the course of a run: test(ts, t, u, v) returns whether, map(ts, t, u, v, a) changes the vectors in place, commit(ts)
-    is told that it is done."""
+    """New generalized coordinates in the course of a run: test(ts, t, u, v) returns whether they are due, map(ts, t, u, v, a) changes the vectors in place, commit(ts)
+    is called when all vectors have been changed."""
     _core.set_coordinate_change(ts, test, map, commit)
 
 
@@ -176,7 +179,8 @@ def set_rotations(ts, rotations, refer, back):
 
 
 def get_rotation_factor(ts):
-    """(factor, begin): h^2 / 12 and the velocities at the beginning of the step whose matrix is asked for, 0 and None where there is none."""
+    """(factor, begin) of the step whose matrix is asked for: h^2 / 12 in a step of order two, gamma h (h - gamma h) / 2 above it, and the velocities at its beginning; 0 and None
+    where the matrix is not that of a step."""
     return _core.get_rotation_factor(ts)
 
 
@@ -203,7 +207,7 @@ def move_back(ts, t):
 
 
 def evaluate_at(ts, t):
-    """(u, v, a) at a time of the last step, accelerations and multipliers those of the equations there: new vectors."""
+    """(u, v, a) at a time of the last step: positions and velocities as of `interpolate`, accelerations and multipliers solved for from the equations there. New vectors."""
     return _core.evaluate_at(ts, t)
 
 
@@ -213,15 +217,15 @@ def statistics(ts):
 
 
 def checkpoint_save(ts, file):
-    """Writes all that a run is into a file. Collective."""
+    """Writes the state of a run into a file, from which `checkpoint_load` goes on with the same bits. Collective."""
     _core.checkpoint_save(ts, str(file))
 
 
 def checkpoint_load(ts, file):
-    """Goes on from such a file. Collective."""
+    """Takes the TS to the state in a file of `checkpoint_save`. Collective."""
     _core.checkpoint_load(ts, str(file))
 
 
 def set_checkpoint_vec(ts, vec):
-    """A vector of the application's that belongs to checkpoints, or None."""
+    """A vector of the application's that checkpoints save and restore, or None."""
     _core.set_checkpoint_vec(ts, vec)

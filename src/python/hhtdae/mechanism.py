@@ -89,7 +89,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
     constraint_jacobian : callable, optional
         constraint_jacobian(t, q, *args) returns Phi_q, (m, n), an array or a sparse matrix of SciPy. Default: central differences, with which a given one is compared at the begin.
     rtol, atol : float
-        Tolerance of the positions' error in every step. The global error is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3);
+        Relative and absolute tolerance of the error of positions in every step, max(atol, rtol times the largest value so far). The error of the whole solution is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3);
         where forces jump at unknown times, as tol^(1/2).
     t_eval : sequence of float, optional
         Times of the output, increasing; default: the ends of steps. Accelerations and multipliers solve the equations of motion between the ends of steps;
@@ -109,7 +109,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         that cannot be traced raise TypeError.
     start : {"project", "report", "off"}
         About initial values that violate the constraints: "project" moves them to the nearest consistent ones; "report" prints how far away these are, and
-        begins with those given, as "off" does without a word. Rows in what is printed are those of the residual, behind them those of the constraints. A run
+        begins with those given; "off" begins with those given and prints nothing. Rows in what is printed are those of the residual, behind them those of the constraints. A run
         from positions that violate them fails as a rule.
     options : dict, optional
         PETSc's options without the dash; those of the command line win.

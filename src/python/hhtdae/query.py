@@ -1,4 +1,4 @@
-"""What a run is doing: snapshots, and small motions about its state."""
+"""Snapshots of a run, and small motions about its state."""
 
 from dataclasses import dataclass
 from typing import Tuple
@@ -19,11 +19,11 @@ Mode = _core.Mode
 
 @dataclass(eq=False)
 class Motion:
-    """Of a marker or body, everything in the axes asked for.
+    """Motion of a marker or body, all vectors in the axes asked for.
 
-    position, velocity, acceleration : (3,)
+    position, velocity, acceleration : (3,), of the marker's origin or the body's centre of mass
     axes : (3, 3), its axes as columns
-    angular_velocity, angular_acceleration : (3,), radians
+    angular_velocity, angular_acceleration : (3,), radians per unit of time, and per unit of time squared
     """
     position: np.ndarray
     velocity: np.ndarray
@@ -102,7 +102,7 @@ class Snapshot:
         return self._core.modes(body)
 
     def value(self, formula):
-        """A measure, or a formula of measures."""
+        """Value of a measure, or of a formula of measures."""
         x = _expression(formula)
         leaves = {}
         for n in ordered([x]):
@@ -153,7 +153,7 @@ class StateSpace:
 
 @dataclass(eq=False)
 class Excitation:
-    """What an input of 1 is: made by `force`, `torque`, `motion` or `ground_acceleration`."""
+    """An input of a linearization, by what the value 1 of it is: made by `force`, `torque`, `motion` or `ground_acceleration`."""
     at: object = None
     load: Tuple[float, float, float] = (0., 0., 0.)
     moment: Tuple[float, float, float] = (0., 0., 0.)
@@ -172,7 +172,7 @@ class Excitation:
 
     @classmethod
     def motion(cls, element):
-        """What is added to the function of a motion: a shaken base."""
+        """An addition of 1 to the function of a motion element, in its units: a shaken base."""
         return cls(driven=element)
 
     @classmethod
@@ -221,7 +221,7 @@ class Linearization:
         return BodyPart(*self._core.part(mode, body))
 
     def value(self, mode, measure):
-        """What a measure does in a mode, complex, with the scale of the mode's shape."""
+        """Complex amplitude of a measure in a mode, with the scale of the mode's shape."""
         return self._core.value(mode, _measure(measure))
 
     def response(self, excitation, measure, omega):

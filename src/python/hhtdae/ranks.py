@@ -1,4 +1,4 @@
-"""What one rank raises ends the work of all ranks: where they meet, as an error on all of them; else by MPI_Abort."""
+"""An exception on one rank ends the work of all ranks: at the next point where they meet, as an error on all of them; else by MPI_Abort."""
 
 import os
 import sys

@@ -194,8 +194,8 @@ class Run(Channels):
                 return
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
-        """What is done where a formula passes through zero, from one step to the next: of two passages within a step none is seen, for which the option
-        -ts_adapt_dt_max keeps steps short. The step ends there, and the integrator's history begins anew; velocities that joints
+        """Calls `action` where a formula passes through zero. Passages are found by the signs at both ends of each step: of two passages within one step none is found, so keep steps
+        short by the option -ts_adapt_dt_max. The step ends at the passage, and the integrator's history begins anew; velocities that joints
         forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise. Channels, files and `on_step` see the step end there, before
         the action; that an action makes a velocity jump through zero is no passage.
 
@@ -293,7 +293,7 @@ class Run(Channels):
             integrator.set_start(self._open(), "project")
 
     def restart(self) -> None:
-        """Begins the integrator's history anew: after a jump of what a callback or a parameter does."""
+        """Begins the integrator's history anew. To be called after a callback or a parameter has made a force or motion jump."""
         self._numbers = None
         self._open().restartStep()
         if self.steps:
@@ -335,7 +335,7 @@ class Run(Channels):
 
     @one_thread
     def kinematics(self, time: Any = None) -> "Run":
-        """The same where motions and joints leave no freedom; loads of a snapshot are those of inverse dynamics. Returns the run.
+        """As `assemble`, for scenes whose motions and joints leave no freedom: loads of a snapshot are those of inverse dynamics. Returns the run.
 
         >>> scene.start(assembly="project")  # velocities that motions ask for need not be given
         >>> scene.run().kinematics(0.5).snapshot().load(drive, marker)
@@ -347,7 +347,7 @@ class Run(Channels):
 
     @property
     def time(self) -> float:
-        """Where the run is."""
+        """The time that the run has reached."""
         return self._open().getTime()
 
     @property
@@ -404,7 +404,7 @@ class Run(Channels):
         return Page(text, height)
 
     def snapshot(self, time: Any = None) -> Snapshot:
-        """What the run is doing at a time of its last step, see `Snapshot`. Collective."""
+        """The state of the run at a time of its last step (default: its end), see `Snapshot`. Collective."""
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None, axes: Any = None) -> Linearization:

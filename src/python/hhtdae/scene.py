@@ -120,7 +120,7 @@ class Scene:
         Acceleration of gravity, space axes; formulas of parameters have to be given by `set_gravity`.
     planar : bool
         Bodies move in the xy plane: 3 coordinates, position and angle about z. Forces along z and moments about x and y are none: constants of a `UserForce` that say
-        otherwise are an error, gravity along z is told.
+        otherwise are an error, about gravity along z a notice is printed.
     comm : petsc4py or mpi4py communicator
         Default: the world's.
 
@@ -363,7 +363,7 @@ class Scene:
         return [self.state(*each) for each in zip(names, formulas, initial)]
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
-        """A result that runs record: a measure, or a formula of some."""
+        """A result that runs record under a name: a measure, or a formula of measures and parameters, with the unit for tables."""
         text(name, "Scene.channel()")
         self._describe("channel " + name)
         self._core.channel(name, self._formula(value, "channel " + name), unit)
