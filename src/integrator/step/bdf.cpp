@@ -262,15 +262,14 @@ PetscErrorCode MapPast(TS ts)
 
 /* Steps of order two after a higher one has failed, doubled each time: where the corrector goes on to fail they would hide it, and where an oscillation comes back each
    attempt at a higher order lets it grow */
-static constexpr PetscInt first_wait = 4, last_wait = 1 << 20;
+static constexpr PetscInt first_wait = 4;
 
-/* After so many times as many steps above order two it begins anew */
+/* After so many times as many steps above order two as the last wait it begins anew */
 static constexpr PetscInt steps_to_forgive = 10;
 
 void LowerToTwo(Order &o)
 {
-  if (o.above > steps_to_forgive * o.penalty) o.penalty = 0;
-  o.wait = o.penalty = PetscClipInterval(2 * o.penalty, first_wait, last_wait);
+  o.wait = o.penalty = o.above >= steps_to_forgive * o.penalty ? first_wait : 2 * o.penalty;
   o.next             = 2;
 }
 
