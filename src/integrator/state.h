@@ -273,8 +273,6 @@ struct Integrator : StepState {
   Vec       work = nullptr;  /* second evaluation of (9a) where definitions use q'', products in the start */
   Vec       gamma = nullptr; /* right-hand side of the differentiated constraints (6b), (6c) */
   Vec       excitation = nullptr; /* time within which each row follows loads and motions that depend on time alone, excitation.cpp; none: no row does */
-  std::vector<signed char> levels[2]; /* of differences in time that were the best ones of each row, differentiate.cpp */
-  PetscBool levels_known = PETSC_FALSE;
 
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;

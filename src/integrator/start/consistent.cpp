@@ -143,7 +143,7 @@ PetscErrorCode ConsistentResidual(TS ts, Consistent &c)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  if (c.T > 0 && c.its) PetscCall(ConstraintDerivatives(ts, c.t, c.U, c.V, c.T, true, NULL, c.gamma));
+  if (c.T > 0 && c.its) PetscCall(ConstraintDerivatives(ts, c.t, c.U, c.V, c.T, c.levels, NULL, c.gamma));
   PetscCall(EvaluateResidual(ts, c.t, c.U, c.V, c.A, c.F));
   if (c.gamma) PetscCall(ConstraintRows(I, c));
   PetscFunctionReturn(PETSC_SUCCESS);

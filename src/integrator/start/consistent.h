@@ -8,6 +8,12 @@
 namespace hht3
 {
 
+/* The times over which a row's first and second differences were the best ones, as levels of differentiate.cpp: where they are known, those near by take the same */
+struct Levels {
+  std::vector<signed char> of[2];
+  bool                     known = false;
+};
+
 /* Where they are solved for: in the vectors, matrix and solver of the run, or in those of samples between steps */
 struct Consistent {
   Mat P   = nullptr; /* [M Phi_q^T; Phi_q 0] */
@@ -23,6 +29,7 @@ struct Consistent {
   Vec begin[2] = {};
   LinearState *linear = nullptr; /* of P and ksp */
   PetscReal    T      = 0;       /* gamma is to be made again, for this time scale, once s' is known; 0: it need not */
+  Levels      *levels = nullptr; /* of gamma */
   PetscReal    enough = 0;       /* part of the first correction below which no other one is needed; 0: to rounding */
   bool         near   = false;   /* the factors at hand, of a matrix near by, serve as well */
   PetscInt     its = 0, ksp_its = 0;
@@ -50,9 +57,8 @@ PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
 PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why);
 
-/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: TimeScaleOfConstraints().
-   again: with the differences that were the best ones at the last call, near by. */
-PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second);
+/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: TimeScaleOfConstraints() */
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Levels *levels, Vec first, Vec second);
 
 /* Whether neither velocities nor time move what stands still */
 PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);

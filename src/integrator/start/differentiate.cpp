@@ -76,7 +76,7 @@ PetscErrorCode LargestCoordinate(const Integrator &I, Vec U, PetscReal *largest)
 }
 
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
-PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, bool (&used)[longer_levels + max_levels])
+PetscErrorCode LevelsInUse(TS ts, const Integrator &I, const Levels &levels, bool first, bool second, bool (&used)[longer_levels + max_levels])
 {
   PetscBool any[longer_levels + max_levels] = {};
 
@@ -84,7 +84,7 @@ PetscErrorCode LevelsInUse(TS ts, const Integrator &I, bool first, bool second, 
   for (size_t i = 0; i < I.role.size(); i++) {
     if (!IsConstraint(I, (PetscInt)i)) continue;
     const bool holonomic = I.role[i] == TSHHT3_HOLONOMIC;
-    const int  one = first && holonomic ? I.levels[0][i] : no_level, two = second ? I.levels[holonomic ? 1 : 0][i] : no_level;
+    const int  one = first && holonomic ? levels.of[0][i] : no_level, two = second ? levels.of[holonomic ? 1 : 0][i] : no_level;
     for (int level : {one, two})
       if (level != no_level) any[longer_levels + level] = PETSC_TRUE;
   }
@@ -112,7 +112,6 @@ PetscErrorCode DerivativesAtRest(TS ts, PetscReal t, Vec U, Vec V, Vec first, Ve
   WorkVec     F;
 
   PetscFunctionBegin;
-  I.levels_known = PETSC_FALSE;
   if (second) PetscCall(VecZeroEntries(second));
   if (!first) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecZeroEntries(first));
@@ -257,9 +256,8 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
 }
 
 /* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of
-   holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. T: the time scale of the motion.
-   again: with the differences that were the best ones at the last call, near by. */
-PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, bool again, Vec first, Vec second)
+   holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. T: the time scale of the motion */
+PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Levels *levels, Vec first, Vec second)
 {
   Integrator              &I = Get(ts);
   Path                     along(ts, t, U, V);
@@ -270,16 +268,16 @@ PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal
   PetscFunctionBegin;
   PetscCall(IsAtRest(I, V, &rest));
   if (rest) {
+    levels->known = false;
     PetscCall(DerivativesAtRest(ts, t, U, V, first, second));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  again = again && I.levels_known;
-  if (again) PetscCall(LevelsInUse(ts, I, first, second, used));
+  if (levels->known) PetscCall(LevelsInUse(ts, I, *levels, first, second, used));
   else PetscCall(LevelsToTry(I, T, from, used));
   PetscCall(along.create());
-  Best d1(I.levels[0], from, (PetscInt)along.now.size(), again), d2(I.levels[1], from, (PetscInt)along.now.size(), again);
+  Best d1(levels->of[0], from, (PetscInt)along.now.size(), levels->known), d2(levels->of[1], from, (PetscInt)along.now.size(), levels->known);
   PetscCall(FindBest(along, T, used, d1, d2));
-  I.levels_known = PETSC_TRUE;
+  levels->known = true;
   for (int order = 1; order <= 2; order++) {
     Vec out = order == 1 ? first : second;
     if (!out) continue;

@@ -253,27 +253,25 @@ PetscErrorCode SolveAsStart(TS ts, Sampler &S, PetscBool *ok, const char **why)
 {
   Integrator            &I     = Get(ts);
   const TSHHT3Statistics saved = I.stat;
+  PetscReal              T;
+  Levels                 levels;
   WorkVec                before;
 
   PetscFunctionBegin;
-  std::vector<signed char> levels[2] = {I.levels[0], I.levels[1]};
-  const PetscBool          known     = I.levels_known;
-  PetscReal                T;
   PetscCall(TimeScaleOfConstraints(ts, S.at.V, &T));
   S.at.t    = ts->ptime;
   S.at.tiny = vanishing_step * PetscMin(T, 1);
   S.at.T    = I.constraints() && I.count[TSHHT3_STATE] ? T : 0;
+  S.at.levels = &levels;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
   PetscCall(ReferTo(ts, S.at.U, before));
-  PetscErrorCode failed = S.at.gamma ? ConstraintDerivatives(ts, S.at.t, S.at.U, S.at.V, T, false, NULL, S.at.gamma) : PETSC_SUCCESS;
+  PetscErrorCode failed = S.at.gamma ? ConstraintDerivatives(ts, S.at.t, S.at.U, S.at.V, T, &levels, NULL, S.at.gamma) : PETSC_SUCCESS;
   if (!failed) failed = SolveConsistent(ts, S.at, false, ok, why);
   PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
   S.at.T = 0;
-  for (int k = 0; k < 2; k++) I.levels[k].swap(levels[k]);
-  I.levels_known = known;
-  I.stat         = saved;
+  I.stat   = saved;
   PetscCall(failed);
   if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,7 +7,6 @@
 
   which has the units of q and so can be held against the tolerances. Time derivatives: differentiate.cpp.
 */
-#include "consistent.h"
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "integrator/equations/rows.h"
@@ -131,8 +130,8 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
           (double)value);
 }
 
-/* Leaves gamma of the given velocities */
-PetscErrorCode CheckVelocities(TS ts, bool project, PetscReal *e, PetscInt *row, PetscReal *value)
+/* Leaves gamma of the given velocities, and the matrix */
+PetscErrorCode CheckVelocities(TS ts, bool project, Prepared *prepared, PetscReal *e, PetscInt *row, PetscReal *value)
 {
   Integrator &I = Get(ts);
   PetscReal   T, along;
@@ -140,18 +139,14 @@ PetscErrorCode CheckVelocities(TS ts, bool project, PetscReal *e, PetscInt *row,
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
   PetscCall(TimeScaleOfConstraints(ts, &along));
-  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, along, false, I.work, I.gamma));
+  PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, along, &prepared->levels, I.work, I.gamma));
   PetscCall(SolveStart(ts, I.work, I.X));
   PetscCall(CoordinateNorm(ts, I.X, T, e));
   PetscCall(WorstRow(ts, I.work, row, value));
   if (project) PetscCall(SubtractCoordinates(I, I.V0, I.X));
+  prepared->matrix = !I.count[TSHHT3_NONHOLONOMIC] || !project; /* rows of velocity-level constraints may depend on the velocities */
+  prepared->gamma  = !project;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* After CheckVelocities(), which may have moved V0. The rows of velocity-level constraints may depend on it. */
-Prepared PreparedBy(const Integrator &I, bool moved)
-{
-  return {!I.count[TSHHT3_NONHOLONOMIC] || !moved, moved ? Gamma::Near : Gamma::Made};
 }
 
 /* The length of a run says little of one that goes on until something stops it: it is no more than this times what loads and motions take (Units.MotionsInLongRuns) */
@@ -258,9 +253,8 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
   if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckPositions(ts, &matrix));
   if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
-  PetscCall(CheckVelocities(ts, project, &e, &row, &value));
+  PetscCall(CheckVelocities(ts, project, prepared, &e, &row, &value));
   PetscCall(ReportInconsistency(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
-  *prepared = PreparedBy(I, project);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,9 +270,8 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared)
   PetscFunctionBegin;
   PetscCall(MissOfPositions(ts, &e));
   if (e < 1) PetscCall(SubtractCoordinates(I, I.U0, I.X));
-  PetscCall(CheckVelocities(ts, true, &e, &row, &value));
+  PetscCall(CheckVelocities(ts, true, prepared, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
-  *prepared = PreparedBy(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 /* Steps so short that the corrector could not make them from where the last one ended, or not at all. */
-#include "consistent.h"
 #include "integrator/step/corrector.h"
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
@@ -115,6 +114,7 @@ PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes)
 PetscErrorCode TinyStep(TS ts, PetscBool *ok)
 {
   Integrator &I = Get(ts);
+  Prepared    have;
   WorkVec     U, V;
 
   PetscFunctionBegin;
@@ -124,7 +124,7 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
   PetscCall(V.like(I.U0));
   PetscCall(Advance(I, I.h, U, V));
   PetscCall(VecCopy(I.predictor.D[0], I.X));
-  PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, {}, ok));
+  PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, have, ok));
   if (*ok) {
     /* the start has differentiated the constraints at times around t1: it need not have seen their values there */
     PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, U));

@@ -6,7 +6,6 @@
   the multipliers and an error of second order in q' (Arnold, Bruels 2007).
 */
 #include "integrator/coordinates/change.h"
-#include "consistent.h"
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "integrator/step/estimate.h"
@@ -61,7 +60,7 @@ constexpr std::initializer_list<TSHHT3Role> algebraic_roles = {TSHHT3_HOLONOMIC,
 
 /* The rates of all unknowns (q''', s'', lambda', ...) by a second consistent solve, d later; zero where it cannot be had.
    Leaves X as it was. */
-PetscErrorCode RatesOfStart(TS ts, Vec rate)
+PetscErrorCode RatesOfStart(TS ts, Prepared have, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscReal   T, Ta, rate_of_motion;
@@ -81,7 +80,9 @@ PetscErrorCode RatesOfStart(TS ts, Vec rate)
   PetscCall(VecCopy(I.X, X0));
   PetscCall(Advance(I, d, U, V));
   /* from rest gamma and the matrix change with d^2, so that they have no part in the rates */
-  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, {(bool)rest, rest ? Gamma::Made : Gamma::Near, true}, &ok));
+  have.matrix = have.gamma = rest;
+  have.near                = true;
+  PetscCall(ConsistentAccelerations(ts, ts->ptime + d, 0, U, V, have, &ok));
   PetscCall(VecZeroEntries(rate));
   if (ok) {
     PetscCall(VecWAXPY(rate, -1, X0, I.X));
@@ -183,7 +184,7 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
 namespace
 {
 
-PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, Consistent &c, PetscBool *ok, const char **why)
+PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &have, Consistent &c, PetscBool *ok, const char **why)
 {
   Integrator &I = Get(ts);
   WorkVec     F, d;
@@ -195,9 +196,10 @@ PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared h
   if (h > 0) PetscCall(VecWAXPY(c.begin[0], h, V, U));
   if (h > 0) PetscCall(VecCopy(V, c.begin[1]));
   if (I.constraints()) {
-    c.gamma = I.gamma;
+    c.gamma  = I.gamma;
+    c.levels = &have.levels;
     PetscCall(TimeScaleOfConstraints(ts, &c.T));
-    if (have.gamma != Gamma::Made) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, have.gamma == Gamma::Near, NULL, c.gamma));
+    if (!have.gamma) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, c.levels, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
   PetscCall(F.like(I.X));
@@ -212,7 +214,7 @@ PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared h
 
 /* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V. Reference and factors are
    left as they were after an error of the application too, which may go on. */
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok)
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &have, PetscBool *ok)
 {
   Integrator &I = Get(ts);
   Consistent  c;
@@ -247,8 +249,8 @@ namespace
 
 constexpr int max_transients = 30; /* one within the other; each time a tenth of one is left */
 
-/* Accelerations, multipliers and their rates from U0, V0 */
-PetscErrorCode ConsistentWithRates(TS ts, Prepared have, Vec rate)
+/* Accelerations, multipliers and their rates from U0, V0. What was prepared is used up, and the differences of gamma are known. */
+PetscErrorCode ConsistentWithRates(TS ts, Prepared &have, Vec rate)
 {
   Integrator &I = Get(ts);
   PetscBool   ok;
@@ -264,13 +266,14 @@ PetscErrorCode ConsistentWithRates(TS ts, Prepared have, Vec rate)
   PetscCall(TakeStartValues(I));
   PetscCall(VecCopy(I.X, I.X0));
   PetscCall(VecCopy(I.X, I.predictor.D[0]));
-  PetscCall(RatesOfStart(ts, rate));
+  have.matrix = have.gamma = false;
+  PetscCall(RatesOfStart(ts, have, rate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A consistent start from U0, V0, and the first step. Transients that are over long before its end are taken out of V0, one after the other, as
    long as that takes their accelerations away. */
-PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
+PetscErrorCode ConsistentStart(TS ts, Prepared &have, Vec rate)
 {
   Integrator     &I      = Get(ts);
   const PetscReal given  = ts->time_step;
@@ -286,18 +289,18 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
   for (int k = 0; gone && k < max_transients; k++) {
     PetscCall(VecCopy(I.V0, V));
     PetscCall(VecNorm(I.A0, NORM_2, &before));
-    PetscCall(RemoveTransient(ts, ts->time_step, rate, &tau, &gone));
+    PetscCall(RemoveTransient(ts, ts->time_step, rate, have, &tau, &gone));
     if (tau <= 0) break;
     if (gone) {
       ts->time_step = given;
       I.auto_h      = auto_h;
-      PetscCall(ConsistentWithRates(ts, {false, Gamma::Near}, rate));
+      PetscCall(ConsistentWithRates(ts, have, rate));
       PetscCall(VecNorm(I.A0, NORM_2, &after));
       gone = (PetscBool)(after < 0.5 * before);
       if (gone) PetscCall(PetscInfo(ts, "start: what moves is held within %g, far less than the step, and starts with the velocities that this leaves\n", (double)tau));
       else {
         PetscCall(VecCopy(V, I.V0));
-        PetscCall(ConsistentWithRates(ts, {false, Gamma::Near}, rate));
+        PetscCall(ConsistentWithRates(ts, have, rate));
       }
       PetscCall(ChooseFirstStep(ts, rate));
     }
@@ -309,7 +312,7 @@ PetscErrorCode ConsistentStart(TS ts, Prepared have, Vec rate)
 } // namespace
 
 /* Everything of t_n from U0, V0: the common part of a start and of a consistent restart */
-PetscErrorCode StartFromState(TS ts, Prepared have)
+PetscErrorCode StartFromState(TS ts, Prepared &have)
 {
   Integrator &I = Get(ts);
   WorkVec     rate;

@@ -3,7 +3,7 @@
 #ifndef HHTDAE_START_H
 #define HHTDAE_START_H
 
-#include "integrator/state.h"
+#include "consistent.h"
 
 namespace hht3
 {
@@ -12,14 +12,11 @@ namespace hht3
 constexpr PetscReal petsc_default_step = 0.1;
 constexpr PetscReal unset_step         = petsc_default_step * (1 - PETSC_MACHINE_EPSILON);
 
-/* Second derivatives of the constraints in time, gamma of (6c): to be made; to be made where they were a moment ago, by the same differences; made */
-enum class Gamma { New, Near, Made };
-
-/* What a consistent solve finds: its matrix, and gamma; or the factors of a matrix near by, and a need of four digits alone */
+/* What a consistent solve finds: its matrix, and gamma of (6c), or how it was differenced near by; or the factors of a matrix near by, and a need of four digits alone */
 struct Prepared {
-  bool  matrix = false;
-  Gamma gamma  = Gamma::New;
-  bool  near   = false;
+  bool   matrix = false, gamma = false;
+  Levels levels;
+  bool   near = false;
 };
 
 /* From vec_sol and vec_dot at ptime; history is forgotten */
@@ -68,14 +65,14 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared);
 PetscErrorCode LimitStepByEvents(TS ts);
 
 /* Everything of t_n from U0, V0: the common part of a start and of a consistent restart */
-PetscErrorCode StartFromState(TS ts, Prepared have);
+PetscErrorCode StartFromState(TS ts, Prepared &have);
 
 /* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V */
-PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared have, PetscBool *ok);
+PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &have, PetscBool *ok);
 
 /* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where a transient of time constant *tau is over long before the
    step ends, V0 is what it `leaves`, and the rest is to be made anew. */
-PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, PetscReal *tau, PetscBool *leaves);
+PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, Prepared &have, PetscReal *tau, PetscBool *leaves);
 
 /* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
 PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V);
