@@ -35,27 +35,14 @@ constexpr PetscReal shortest_span = 1e-4;
 /* A part of the step within which t is one of its ends: sums of steps and multiples of an interval differ by their rounding (EvaluateAt.OnAGridOfSteps) */
 constexpr PetscReal end_fraction = 1e-8;
 
-/* Preconditioners of functions or parts that the program has given cannot be had twice */
-PetscErrorCode HasParts(PC pc, PetscBool *yes)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, yes, PCSHELL, PCFIELDSPLIT, PCCOMPOSITE, ""));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The KSP takes what the user has set for the run's, by options or by program. */
+/* With the options of the run's KSP. What the program has set there is not taken over: preconditioners of functions or parts cannot be had twice, those that options name are
+   replaced by a factor. */
 PetscErrorCode CreateSolver(TS ts, Sampler &S)
 {
-  const Integrator &I = Get(ts);
-  KSP               run;
-  PC                from, to;
-  KSPType           type;
-  PCType            pctype;
-  MatSolverType     package;
-  PetscBool         parts;
-  const char       *prefix;
-  PetscReal         rtol, atol, dtol;
-  PetscInt          its;
+  KSP         run;
+  PC          pc;
+  PetscBool   parts;
+  const char *prefix;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &run));
@@ -63,35 +50,16 @@ PetscErrorCode CreateSolver(TS ts, Sampler &S)
   PetscCall(PetscObjectSetOptions((PetscObject)S.at.ksp, ((PetscObject)run)->options));
   PetscCall(KSPGetOptionsPrefix(run, &prefix));
   PetscCall(KSPSetOptionsPrefix(S.at.ksp, prefix));
-  PetscCall(KSPGetType(run, &type));
-  if (type && !I.linear.iterative) PetscCall(KSPSetType(S.at.ksp, type)); /* conjugate gradients of our choice are chosen again */
-  PetscCall(KSPGetTolerances(run, &rtol, &atol, &dtol, &its));
-  PetscCall(KSPSetTolerances(S.at.ksp, rtol, atol, dtol, its));
   PetscCall(KSPSetOperators(S.at.ksp, S.at.P, S.at.P));
-  PetscCall(KSPGetPC(run, &from));
-  PetscCall(KSPGetPC(S.at.ksp, &to));
-  PetscCall(PCGetType(from, &pctype));
-  PetscCall(HasParts(from, &parts));
-  if (I.linear.user_pc && pctype && !parts) {
-    PetscCall(PCSetType(to, pctype));
-    if (I.linear.user_package) {
-      PetscCall(PCFactorGetMatSolverType(from, &package));
-      if (package) PetscCall(PCFactorSetMatSolverType(to, package));
-    }
-  }
   PetscCall(LinearDefaults(S.at.ksp, &S.linear));
-  if (!I.linear.user_pc && I.linear.user_package && !S.linear.user_package) { /* a package that the program has named, and no factorization */
-    PetscCall(PCFactorGetMatSolverType(from, &package));
-    PetscCall(PCFactorSetMatSolverType(to, package));
-    S.linear.user_package = PETSC_TRUE;
-  }
   PetscCall(KSPSetFromOptions(S.at.ksp));
-  PetscCall(HasParts(to, &parts));
-  if (parts) { /* by an option */
-    PetscCall(PCSetType(to, PCLU));
+  PetscCall(KSPGetPC(S.at.ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &parts, PCSHELL, PCFIELDSPLIT, PCCOMPOSITE, ""));
+  if (parts) {
+    PetscCall(PCSetType(pc, PCLU));
     S.linear.user_pc = S.linear.user_package = PETSC_FALSE;
   }
-  S.linear.may_be_rough = I.linear.iterative; /* where the run has no factor its samples make none */
+  S.linear.may_be_rough = Get(ts).linear.iterative; /* where the run has no factor its samples make none */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,7 +317,7 @@ PetscErrorCode SamplerDestroy(Integrator &I)
   positions and velocities: one Jacobian, one factorization and
   two residuals as a rule, five more with constraints, where `TSHHT3Interpolate()` costs none.
   They are then as accurate as the positions, in long steps, too. Its matrix and factors are made at the first call and kept. The
-  solver is the one chosen for the run, by the same options.
+  solver is chosen as for the run, by the same options; what the program has set in the `KSP` of the run is the run's alone.
 
   At both ends of the step, and within 1e-8 of its length beside them, the values of the step itself are returned, at the ends to the last bit. The run is not changed, and nothing is
   added to its counters; -log_view shows the samples as HHT3Sample. Where a step was rolled back, or ended by an error, only the
