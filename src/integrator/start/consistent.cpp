@@ -24,7 +24,7 @@ namespace hht3
 namespace
 {
 
-/* Corrections relative to the unknowns, or what forces leave relative to these: converged; and the largest that may be rounding where they no longer fall */
+/* Corrections relative to the unknowns: converged; and the largest that may be rounding where they no longer fall, also of what forces and constraints leave of their terms */
 constexpr PetscReal converged_correction = 1e-13, rounding_correction = 1e-8;
 constexpr PetscReal slow_rate            = 0.3; /* rate beyond which the matrix is made again at the iterate */
 constexpr PetscInt  max_iterations       = 30;  /* at a rate of `slow_rate` 13 digits take 25 */
@@ -68,40 +68,18 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual in the equations of motion, in parts of the forces there: where accelerations are nothing but rounding of these, corrections are as large as the
-   unknowns (SmallBodies.StartFromEquilibrium) */
-PetscErrorCode ForcesLeft(const Integrator &I, Consistent &c, PetscReal *part)
-{
-  PetscReal sum[2] = {0, 0};
-  WorkVec   forces;
-
-  PetscFunctionBegin;
-  PetscCall(forces.like(c.X));
-  PetscCall(MatMult(c.P, c.X, forces));
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar f, PetscScalar of) {
-      if (!IsCoordinate(I, i)) return;
-      sum[0] += PetscRealPart(f * f);
-      sum[1] += PetscRealPart(of * of);
-    },
-    Read(c.F), Read(forces)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
-  *part = sum[1] > 0 ? PetscSqrtReal(sum[0] / sum[1]) : 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the residual in the equations of motion is what rounding of the coordinates makes there, and constraints hold and carry no more than that: loads
-   that balance each other without them leave no other measure (SceneEquilibrium.OfBodiesOnSprings) */
-PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
+/* Whether constraints hold and the residual in the equations of motion is nothing beside the forces there, or no more than rounding of coordinates makes: where accelerations
+   are rounding of forces that balance each other, corrections are as large as the unknowns (SmallBodies.StartFromEquilibrium; without multipliers
+   SceneEquilibrium.OfBodiesOnSprings) */
+PetscErrorCode IsBalanced(TS ts, Consistent &c, PetscBool *yes)
 {
   const Integrator &I = Get(ts);
-  PetscReal         sum[5] = {0, 0, 0, 0, 0}; /* squares of: forces left, what rounding makes of them, forces of constraints; constraints left, their terms */
-  WorkVec           U, F, held;
+  PetscReal         sum[5] = {0, 0, 0, 0, 0}; /* squares of: forces left, their terms, what rounding makes of them; constraints left, their terms */
+  WorkVec           U, F, forces;
 
   PetscFunctionBegin;
-  for (WorkVec *v : {&U, &F, &held}) PetscCall(v->like(c.X));
-  PetscCall(TakeRoles(I, c.X, {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC}, U));
-  PetscCall(MatMult(c.P, U, held));
+  for (WorkVec *v : {&U, &F, &forces}) PetscCall(v->like(c.X));
+  PetscCall(MatMult(c.P, c.X, forces));
   PetscCall(VecCopy(c.U, U));
   PetscCall(Shake(U, PETSC_MACHINE_EPSILON, 0, [&](PetscInt i) { return IsCoordinate(I, i); }));
   PetscCall(EvaluateResidual(ts, c.t, U, c.V, c.A, F));
@@ -109,12 +87,12 @@ PetscErrorCode LeftByRounding(TS ts, Consistent &c, PetscBool *yes)
     [&](PetscInt i, PetscScalar f, PetscScalar other, PetscScalar force, PetscScalar a, PetscScalar g) {
       const auto square = [](PetscScalar x) { return PetscRealPart(x * x); };
       if (IsConstraint(I, i)) sum[3] += square(f), sum[4] += square(g);
-      else if (IsCoordinate(I, i)) sum[0] += square(f), sum[1] += square(other - f), sum[2] += square(force), sum[4] += square(a);
+      else if (IsCoordinate(I, i)) sum[0] += square(f), sum[1] += square(force), sum[2] += square(other - f), sum[4] += square(a);
     },
-    Read(c.F), Read(F), Read(held), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
+    Read(c.F), Read(F), Read(forces), Read(c.X), Read(c.gamma ? c.gamma : c.X)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 5, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)c.P)));
   for (PetscReal &x : sum) x = PetscSqrtReal(x);
-  *yes = (PetscBool)(PetscMax(sum[0], sum[2]) < rounding_factor * sum[1] && sum[3] <= rounding_correction * sum[4]);
+  *yes = (PetscBool)(sum[0] <= PetscMax(rounding_correction * sum[1], rounding_factor * sum[2]) && sum[3] <= rounding_correction * sum[4]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,7 +187,7 @@ static PetscErrorCode WithOwnFactors(Consistent &c)
 /* X, which enters as the guess, and with it U, V, A; *why: what was in the way if not *ok. c.linear->failed, where that was the linear solver. */
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why)
 {
-  PetscReal e = 0, last, first = 0, forces = 0;
+  PetscReal e = 0, last, first = 0;
   PetscBool renew = (PetscBool)!have_matrix, other, balanced;
   WorkVec   none;
 
@@ -241,9 +219,7 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     const bool known = c.its > 1 && !fresh, falls = e <= slow_rate * last;
     if (!*ok || e <= converged_correction || (known && (falls ? CorrectorError(e / last, e) <= converged_correction : e <= rounding_correction))) PetscFunctionReturn(PETSC_SUCCESS);
     if (known && !falls && c.h == 0) {
-      PetscCall(ForcesLeft(Get(ts), c, &forces));
-      if (forces <= rounding_correction) PetscFunctionReturn(PETSC_SUCCESS);
-      PetscCall(LeftByRounding(ts, c, &balanced));
+      PetscCall(IsBalanced(ts, c, &balanced));
       if (balanced) PetscFunctionReturn(PETSC_SUCCESS);
     }
     renew = (PetscBool)(c.its > 1 && !falls);
