@@ -26,8 +26,9 @@ constexpr int       min_samples       = 9, max_samples = 60; /* samples */
 constexpr int       quiet_samples     = 3;       /* samples in a row in which nothing changes any more: one of them may meet a whole period */
 constexpr PetscReal falling_ratio     = 0.5;     /* and each of them less than this times the one before: several may, in a run of 10^9 periods (Units.MotionsInLongRuns) */
 constexpr int       changes_of_swing  = 4;     /* noticeable changes of what swings all along the run; of a ramp there are fewer (Excitation.UnfollowedIsTold) */
-/* Changes within the first samples alone, longer than this part of what is left of the run, are those of a ramp, which tell of no time but that: at least so much of it */
-constexpr PetscReal ramp_spread    = 0.03, ramp_time = 10;
+/* Changes within the first samples alone, longer than this part of what is left of the run, are those of a ramp, which tell of no time but that: at least so much of it, or what was known before a restart
+   shortly before the end (Events.ShortlyBeforeTheEnd) */
+constexpr PetscReal ramp_spread    = 0.03, ramp_time = 1000;
 constexpr PetscReal steps_of_swing = 30;    /* steps in units of what is found of a swing, 0.08/w to 0.6/w: fewer than three a period */
 
 /* Of the largest change of any row of its kind: less may be what rounding leaves of loads that cancel, with lever arms of up to 1e6 (Excitation.OfLoadsThatCancel) */
@@ -86,7 +87,7 @@ PetscErrorCode FindExcitation(TS ts)
   Integrator     &I    = Get(ts);
   PetscReal       stop = ts->max_time - ts->ptime;
   const PetscReal step = ts->time_step != unset_step && ts->time_step > 0 ? ts->time_step : PETSC_MAX_REAL; /* of the user's, and those later: what it may follow is looked for */
-  WorkVec         zero, F[2];
+  WorkVec         zero, F[2], before;
   Changes         c;
   PetscReal       swing = PETSC_MAX_REAL, part = 1, last;
 
@@ -94,6 +95,9 @@ PetscErrorCode FindExcitation(TS ts)
   I.ahead = Ahead::Unknown;
   if (!(ts->max_time < PETSC_MAX_REAL / 2 && stop > 0)) PetscCall(TimeScale(ts, &stop)); /* of a run without end */
   for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
+  PetscCall(before.like(I.U0));
+  PetscCall(VecZeroEntries(before));
+  if (I.excitation && ts->ptime > I.t_begin) PetscCall(VecCopy(I.excitation, before));
   if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
   c.shortest = I.excitation;
   for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
@@ -107,7 +111,12 @@ PetscErrorCode FindExcitation(TS ts)
     PetscCall(NoteChanges(I, tau, F[0], F[1], c, &part));
     still = part > noticeable_change || (part > falling_ratio * last && part > PETSC_SQRT_MACHINE_EPSILON) ? 0 : still + 1;
   }
-  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar &T) { if (PetscRealPart(number) > 0 && PetscRealPart(T) >= ramp_spread * stop) T = ramp_time * stop; }, Read(c.number), Write(I.excitation)));
+  PetscCall(ForEntries(
+    [&](PetscInt, PetscScalar number, PetscScalar of_old, PetscScalar &T) {
+      const PetscReal known = PetscRealPart(of_old) < PETSC_MAX_REAL ? PetscRealPart(of_old) : 0;
+      if (PetscRealPart(number) > 0 && PetscRealPart(T) >= ramp_spread * stop) T = PetscMax(ramp_time * stop, known);
+    },
+    Read(c.number), Read(before), Write(I.excitation)));
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
   PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= changes_of_swing) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
   PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));

@@ -154,7 +154,7 @@ constexpr PetscReal longest_time_scale = 1e3;
 
 /* Constraints of what moves are differentiated over what it takes, though the run were so many times shorter: differences over parts of a run of next to nothing are
    rounding (BetweenRuns.ShortRunsHaveTheirMultipliers). What would take more does not move. */
-constexpr PetscReal longest_in_runs = 1e6;
+constexpr PetscReal longest_in_runs = 1e9;
 
 /* 1/rate, in place of one beyond so many runs the whole run where it has an end. Where it has none: what rounding leaves of velocities is no time scale
    (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be a millionth of what things take (Query.Units) */
@@ -250,6 +250,10 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
 
   PetscFunctionBegin;
   *prepared = {};
+  if (I.constraints() && I.own_start && I.start_policy != TSHHT3_START_PROJECT && IsFarShorter(I, ts->time_step)) { /* Events.ShortlyBeforeTheEnd */
+    PetscCall(ProjectState(ts, prepared));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckPositions(ts, &matrix));
   if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));

@@ -40,6 +40,9 @@ PetscErrorCode RestartConsistently(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the step to come is far shorter than those of late, by which the corrector has measured what it leaves of the constraints */
+PetscBool IsFarShorter(const Integrator &I, PetscReal h) { return (PetscBool)(h < restart_ratio * I.h_regular); }
+
 /* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are */
 static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
 {
@@ -48,7 +51,7 @@ static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *par
 
   PetscFunctionBegin;
   PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
-  PetscCall(TimeScale(ts, &T));
+  PetscCall(TimeScaleOfConstraints(ts, &T));
   const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
   *part               = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h) / a;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -79,13 +82,14 @@ static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
 */
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 {
-  const Integrator &I = Get(ts);
-  PetscReal         part, missed;
+  Integrator &I = Get(ts);
+  PetscReal   part, missed;
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
-  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > tiny_ratio * I.h_regular)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > tiny_ratio * I.h_regular && h > 10 * I.h_rounded)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
+  I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations);
   if (part <= rounded_accelerations) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaylorError(ts, h, &missed));
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));

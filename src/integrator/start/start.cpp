@@ -366,7 +366,7 @@ PetscErrorCode StartFromSolution(TS ts)
   if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were, nor its steps (Excitation.WhatSetsInLaterInANewRun) */
     I.t_begin   = ts->ptime;
     I.norm_size = 0;
-    I.h_regular = I.h_limit = 0;
+    I.h_regular = I.h_rounded = I.h_limit = 0;
     I.corrector.jacobian_faults = 0;
     I.told             = PETSC_FALSE;
     for (Vec v : {I.ymax, I.weight}) PetscCall(VecZeroEntries(v));

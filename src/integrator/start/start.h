@@ -31,6 +31,7 @@ PetscErrorCode WarnOfUnfollowedLoads(TS ts);
 /* U0 and V0 projected on the constraints and a consistent start from there, before a step of another length than the last one, and when that is called for */
 PetscErrorCode RestartConsistently(TS ts);
 PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes);
+PetscBool      IsFarShorter(const Integrator &I, PetscReal h);
 
 /* Whether a step of length h is so short that rounding would drown its accelerations; such a step by Taylor series: U1, V1, A1 and X as a corrected one would
    leave them */
