@@ -187,6 +187,7 @@ struct Hooks {
   PetscReal abstol       = 0;           /* of the KSP; 0: none has been taken out */
   PetscBool abstol_told  = PETSC_FALSE;
   PetscObjectId matrices[2] = {}; /* J and P of the SNES, as they are between steps */
+  PetscObjectState                      values[2] = {}; /* the states of J and P, as the last correction has left them */
 };
 
 /* What normal_jerk holds: nothing, q''' as it is known (d of drift.cpp), or its part normal to the constraints */

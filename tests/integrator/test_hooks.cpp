@@ -376,3 +376,35 @@ TEST(Hooks, UsersTestStays)
   }
   EXPECT_EQ(destroyed, 1);
 }
+
+/* A monitor may ask for the mass matrix in the matrices of the TS: what it leaves there is not the Newton matrix */
+TEST(Hooks, MonitorsThatEvaluateTheJacobian)
+{
+  const Pendulum p(-90., 0., 1.);
+  const auto     options = tolerance(1e-7), file = "hooks_" + std::to_string(getpid()) + ".cp";
+  const auto     look = [](Simulation &r, PetscInt, double t) {
+    Mat J, P;
+    Vec A;
+    must(VecDuplicate(r.U, &A));
+    must(VecZeroEntries(A));
+    must(TSGetI2Jacobian(r.ts, &J, &P, nullptr, nullptr));
+    must(TSComputeI2Jacobian(r.ts, t, r.U, r.V, A, 0., 1., J, P));
+    must(VecDestroy(&A));
+  };
+  Simulation plain(p, options), run(p, options);
+  run.watch = look;
+  must(plain.solve());
+  must(run.solve());
+  EXPECT_LE(run.statistics().retries, plain.statistics().retries);
+  EXPECT_LT(run.errors().q, 4. * plain.errors().q);
+  Simulation first(p, options + "-ts_max_time .5 -ts_hhtdae_checkpoint " + file), through(p, options), rest(p, options + "-ts_hhtdae_resume " + file); /* nor is it in a checkpoint */
+  for (Simulation *r : {&first, &through, &rest}) r->watch = look;
+  must(first.solve());
+  must(TSSetMaxTime(through.ts, .5));
+  must(through.solve());
+  must(TSSetMaxTime(through.ts, 1.));
+  must(through.solve());
+  must(rest.solve());
+  std::remove(file.c_str());
+  EXPECT_EQ(rest.u(), through.u());
+}

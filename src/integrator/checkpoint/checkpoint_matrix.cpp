@@ -128,12 +128,14 @@ PetscErrorCode SaveNewton(TS ts, Archive &a)
   MatrixState m;
   Mat         J, P;
   KSP         ksp;
-  PetscBool   rows;
+  PetscBool   rows, foreign;
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(P, &m.there));
+  PetscCall(HasForeignValues(ts, &foreign));
+  if (foreign && I.corrector.matrix.have) m.there = PETSC_FALSE;
   m.chosen = I.linear.chosen;
   a.plain(m);
   if (!m.there) PetscFunctionReturn(PETSC_SUCCESS);
@@ -172,6 +174,7 @@ PetscErrorCode LoadNewton(TS ts, Archive &a)
     if (good) PetscCall(LoadSolver(ksp, J, P, &I.linear, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();
+  PetscCall(NoteMatrices(ts));
   if (!same)
     PetscCall(PetscInfo(ts, "resumed with %s: the run agrees with the uninterrupted one to the tolerance, maybe not bit for bit\n",
                         good ? "a linear solver that does not promise the same bits" : "a new Newton matrix, as the last one cannot be restored"));

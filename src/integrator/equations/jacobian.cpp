@@ -191,13 +191,57 @@ PetscErrorCode IdsOfMatrices(TS ts, PetscObjectId id[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 0 of what has no values of its own: the application's product may change as it likes */
+PetscErrorCode StatesOfMatrices(TS ts, PetscObjectState state[2])
+{
+  Mat       A[2];
+  PetscBool rows;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetJacobian(ts->snes, &A[0], &A[1], NULL, NULL));
+  for (int k = 0; k < 2; k++) {
+    state[k] = 0;
+    if (!A[k]) continue;
+    PetscCall(GivesRows(A[k], &rows));
+    if (rows) PetscCall(PetscObjectStateGet((PetscObject)A[k], &state[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
-/* At the end of a step, too: -snes_mf_operator has SNES exchange the operator in the first one */
+/* After a correction, too: -snes_mf_operator has SNES exchange the operator in the first one */
 PetscErrorCode NoteMatrices(TS ts)
 {
   PetscFunctionBegin;
   PetscCall(IdsOfMatrices(ts, Get(ts).hooks.matrices));
+  PetscCall(StatesOfMatrices(ts, Get(ts).hooks.values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A monitor has evaluated the Jacobian, or another TS has the same matrix (Hooks.MonitorsThatEvaluateTheJacobian) */
+PetscErrorCode HasForeignValues(TS ts, PetscBool *yes)
+{
+  const Hooks     &H = Get(ts).hooks;
+  PetscObjectState state[2];
+
+  PetscFunctionBegin;
+  PetscCall(StatesOfMatrices(ts, state));
+  *yes = (PetscBool)(H.values[1] && (state[0] != H.values[0] || state[1] != H.values[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode ForgetForeignMatrix(TS ts)
+{
+  Integrator &I = Get(ts);
+  PetscBool   foreign;
+
+  PetscFunctionBegin;
+  if (!I.corrector.matrix.have) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HasForeignValues(ts, &foreign));
+  if (!foreign) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "someone else has put values into the Newton matrix: it is made anew\n"));
+  I.corrector.matrix.forget();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,6 +15,10 @@ PetscErrorCode NoteMatrices(TS ts);
 PetscErrorCode IsAnotherSNES(TS ts, bool *yes);
 PetscErrorCode TakeSNES(TS ts);
 
+/* Whether someone else has put values into the matrices since a correction has left them there; then the matrix of the last steps is none */
+PetscErrorCode HasForeignValues(TS ts, PetscBool *yes);
+PetscErrorCode ForgetForeignMatrix(TS ts);
+
 /* Refuses matrices without rows and operators that cannot be scaled */
 PetscErrorCode CheckMatrices(TS ts);
 PetscErrorCode GivesRows(Mat A, PetscBool *yes);

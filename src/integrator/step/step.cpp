@@ -183,6 +183,7 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscBool   stage, restart = PETSC_FALSE;
 
   PetscFunctionBegin;
+  PetscCall(ForgetForeignMatrix(ts));
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
   if (!*tiny) PetscCall(NeedsRestart(ts, ts->time_step, &restart));
@@ -201,6 +202,7 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
     PetscCall(PrepareStage(ts));
     PetscCall(Predict(ts, I.X));
     PetscCall(RunCorrector(ts, ok));
+    PetscCall(NoteMatrices(ts));
   }
   PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
   /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
@@ -348,7 +350,6 @@ PetscErrorCode TSStep_HHT(TS ts)
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
   }
-  PetscCall(NoteMatrices(ts));
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
