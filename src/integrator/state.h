@@ -187,6 +187,12 @@ struct Hooks {
   PetscReal abstol       = 0;           /* of the KSP; 0: none has been taken out */
   PetscBool abstol_told  = PETSC_FALSE;
   PetscObjectId matrices[2] = {}; /* J and P of the SNES, as they are between steps */
+  decltype(_DMSNESOps::computejacobian) dm_jacobian     = nullptr; /* in the DM at the set-up, with its context */
+  void                                 *dm_jacobian_ctx = nullptr;
+  decltype(_DMSNESOps::computefunction) their_function  = nullptr; /* of another solver on the DM, while a step has its own there */
+  decltype(_DMSNESOps::computejacobian) their_jacobian  = nullptr;
+  PetscContainer                        their_ctx[2]    = {};
+  PetscBool                             borrowed = PETSC_FALSE, borrowed_told = PETSC_FALSE;
   PetscObjectState                      values[2] = {}; /* the states of J and P, as the last correction has left them */
 };
 

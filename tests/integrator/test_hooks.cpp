@@ -2,6 +2,7 @@
 #include "integrator/step/corrector.h"
 #include "support.h"
 #include <cstdio>
+#include <petscdmda.h>
 #include <unistd.h>
 
 using namespace hhtest;
@@ -407,4 +408,117 @@ TEST(Hooks, MonitorsThatEvaluateTheJacobian)
   must(rest.solve());
   std::remove(file.c_str());
   EXPECT_EQ(rest.u(), through.u());
+}
+
+namespace
+{
+
+/* q'' + q^3 = 0 from 2, on a given DM */
+struct OnDM {
+  TS  ts;
+  Vec U, V;
+  explicit OnDM(DM dm)
+  {
+    must(DMCreateGlobalVector(dm, &U));
+    must(VecDuplicate(U, &V));
+    must(VecSet(U, 2.));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetType(ts, TSHHT3));
+    must(TSSetDM(ts, dm));
+    must(TSSetI2Function(
+        ts, nullptr,
+        [](TS, PetscReal, Vec U, Vec, Vec A, Vec F, void *) -> PetscErrorCode {
+          PetscFunctionBegin;
+          PetscCall(VecPointwiseMult(F, U, U));
+          PetscCall(VecPointwiseMult(F, F, U));
+          PetscCall(VecAXPY(F, 1., A));
+          PetscFunctionReturn(0);
+        },
+        nullptr));
+    must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+    must(TSSetFromOptions(ts));
+    must(TS2SetSolution(ts, U, V));
+  }
+  ~OnDM()
+  {
+    TSDestroy(&ts);
+    VecDestroy(&U);
+    VecDestroy(&V);
+  }
+  OnDM(const OnDM &) = delete;
+  void to(double end)
+  {
+    must(TSSetMaxTime(ts, end));
+    must(TSSolve(ts, U));
+  }
+};
+
+/* x + x^3 = 10 */
+void solveStatic(SNES snes, Vec x)
+{
+  must(SNESSolve(snes, nullptr, x));
+  EXPECT_NEAR(whole(x)[0], 2., 1e-6);
+}
+
+} // namespace
+
+/* PETSc keeps the functions of a solver in its DM: the steps of two that share one have their own all the same */
+TEST(Hooks, TwoSolversOnOneDM)
+{
+  DM   dm;
+  SNES snes;
+  Vec  x, r;
+  must(DMDACreate1d(PETSC_COMM_SELF, DM_BOUNDARY_NONE, 4, 1, 1, nullptr, &dm));
+  must(DMSetUp(dm));
+  Options in(tolerance(1e-5));
+  OnDM    alone(dm);
+  alone.to(.5);
+  alone.to(1.);
+  {
+    OnDM a(dm), b(dm);
+    for (double t : {.5, 1.})
+      for (OnDM *run : {&a, &b}) run->to(t);
+    EXPECT_EQ(whole(a.U), whole(alone.U));
+    EXPECT_EQ(whole(b.U), whole(alone.U));
+  }
+  OnDM c(dm);
+  c.to(.5);
+  {
+    OnDM gone(dm);
+    gone.to(.5);
+  }
+  c.to(1.);
+  EXPECT_EQ(whole(c.U), whole(alone.U));
+  OnDM d(dm);
+  d.to(.5);
+  must(DMCreateGlobalVector(dm, &x));
+  must(VecDuplicate(x, &r));
+  must(SNESCreate(PETSC_COMM_SELF, &snes));
+  must(SNESSetDM(snes, dm));
+  must(SNESSetFunction(
+      snes, r,
+      [](SNES, Vec X, Vec F, void *) -> PetscErrorCode {
+        PetscFunctionBegin;
+        PetscCall(VecPointwiseMult(F, X, X));
+        PetscCall(VecPointwiseMult(F, F, X));
+        PetscCall(VecAXPY(F, 1., X));
+        PetscCall(VecShift(F, -10.));
+        PetscFunctionReturn(0);
+      },
+      nullptr));
+  solveStatic(snes, x);
+  {
+    Printed said;
+    d.to(.8);
+    d.to(1.);
+    EXPECT_TRUE(said.says("DMClone()")) << said.text();
+    EXPECT_EQ(said.text().find("DMClone()"), said.text().rfind("DMClone()"));
+  }
+  EXPECT_LT(relativeDifference(whole(d.U), whole(alone.U)), 1e-2);
+  must(VecSet(x, 0.));
+  solveStatic(snes, x);
+  must(SNESDestroy(&snes));
+  must(VecDestroy(&x));
+  must(VecDestroy(&r));
+  must(DMDestroy(&dm));
 }

@@ -16,6 +16,7 @@
 #include "order.h"
 #include "predictor.h"
 #include "integrator/coordinates/rotations.h"
+#include "integrator/type/settings.h"
 #include "stage.h"
 #include "integrator/start/start.h"
 #include "step.h"
@@ -325,6 +326,7 @@ PetscErrorCode TSStep_HHT(TS ts)
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
   I.failure[0] = 0;
   bool another;
+  PetscCall(HooksBorrowDM(ts));
   PetscCall(IsAnotherSNES(ts, &another));
   if (another) PetscCall(TakeSNES(ts));
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &I.fixed_h));
@@ -350,6 +352,7 @@ PetscErrorCode TSStep_HHT(TS ts)
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
   }
+  PetscCall(HooksReturnDM(ts));
   if (ts->reason || ts->ptime >= ts->max_time || ts->steps + 1 >= ts->max_steps) StopClocks(I, true);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -245,9 +245,78 @@ PetscErrorCode HooksInstall(TS ts)
     if (snes->lagjacobian != 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
     if (!I.corrector.user_lag) PetscCall(SNESSetLagJacobian(snes, -2));
   }
+  DM dm;
+  PetscCall(SNESGetDM(snes, &dm));
+  PetscCall(DMSNESGetJacobian(dm, &H.dm_jacobian, &H.dm_jacobian_ctx));
   if (!TestIsOurs(ts, snes)) PetscCall(InstallTest(ts, snes));
   PetscCall(OptionGiven((PetscObject)snes, "-snes_check_jacobian_domain_error", &given));
   if (!given) PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* FormJacobian() says so of a singular matrix */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+namespace
+{
+
+PetscErrorCode ForgetTheirs(Hooks &H)
+{
+  PetscFunctionBegin;
+  H.borrowed = PETSC_FALSE;
+  for (PetscContainer &c : H.their_ctx) PetscCall(PetscContainerDestroy(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* SNES asks the DM for its functions: where two solvers have one DM, those that were set last serve both (Hooks.TwoSolversOnOneDM) */
+PetscErrorCode HooksBorrowDM(TS ts)
+{
+  Hooks                                &H = Get(ts).hooks;
+  DM                                    dm;
+  DMSNES                                sdm;
+  void                                 *ctx;
+  decltype(_DMSNESOps::computefunction) f;
+
+  PetscFunctionBegin;
+  if (ts->snes != H.snes) PetscFunctionReturn(PETSC_SUCCESS); /* functions of ours are put into another one */
+  PetscCall(SNESGetDM(ts->snes, &dm));
+  PetscCall(DMSNESGetFunction(dm, &f, &ctx));
+  if (f == SNESTSFormFunction && ctx == ts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscInfo(ts, "another solver has put its functions into the DM of the TS: those of the TS stand there during its steps\n"));
+  if (f != SNESTSFormFunction && !H.borrowed_told) {
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts),
+                          "%s: steps do not call the function that another SNES on the DM of the TS, or the program in its SNES, has set (SNESSetFunction()): give every solver a DM of its own (DMClone()), and all forces in TSSetI2Function().\n", TSHHT3));
+    H.borrowed_told = PETSC_TRUE;
+  }
+  PetscCall(ForgetTheirs(H)); /* of a step that has ended in an error */
+  PetscCall(DMGetDMSNESWrite(dm, &sdm));
+  H.borrowed       = PETSC_TRUE;
+  H.their_function = sdm->ops->computefunction;
+  H.their_jacobian = sdm->ops->computejacobian;
+  H.their_ctx[0]   = sdm->functionctxcontainer;
+  H.their_ctx[1]   = sdm->jacobianctxcontainer;
+  for (PetscContainer c : H.their_ctx) PetscCall(PetscObjectReference((PetscObject)c));
+  PetscCall(DMSNESSetFunction(dm, SNESTSFormFunction, ts));
+  if (H.dm_jacobian) PetscCall(DMSNESSetJacobian(dm, H.dm_jacobian, H.dm_jacobian_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HooksReturnDM(TS ts)
+{
+  Hooks &H = Get(ts).hooks;
+  DM     dm;
+  DMSNES sdm;
+
+  PetscFunctionBegin;
+  if (!H.borrowed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetDM(ts->snes, &dm));
+  PetscCall(DMGetDMSNESWrite(dm, &sdm));
+  sdm->ops->computefunction = H.their_function;
+  sdm->ops->computejacobian = H.their_jacobian;
+  sdm->functionctxcontainer = H.their_ctx[0];
+  sdm->jacobianctxcontainer = H.their_ctx[1];
+  PetscCall(PetscObjectCompose((PetscObject)sdm, "function ctx", (PetscObject)H.their_ctx[0]));
+  PetscCall(PetscObjectCompose((PetscObject)sdm, "jacobian ctx", (PetscObject)H.their_ctx[1]));
+  PetscCall(ForgetTheirs(H));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -260,6 +329,7 @@ PetscErrorCode HooksRemove(TS ts)
 
   PetscFunctionBegin;
   PetscCall(RemoveJacobian(ts));
+  PetscCall(ForgetTheirs(H));
   if (H.line_search && !H.snes && ts->snes) PetscCall(RemoveLineSearch(ts, ts->snes)); /* options were read, nothing set up */
   if (!H.snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RemoveTest(ts, H.snes));

@@ -32,6 +32,10 @@ PetscErrorCode HooksTakeOver(TS ts, SNES snes);
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 
+/* The functions of this TS in the DM of its SNES for a step, where another solver on it has put its own, and those back at the end */
+PetscErrorCode HooksBorrowDM(TS ts);
+PetscErrorCode HooksReturnDM(TS ts);
+
 /* Whether the test of the SNES is the user's, who may have set it at any time */
 PetscBool HooksUserTest(TS ts);
 
