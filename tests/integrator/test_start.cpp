@@ -484,3 +484,42 @@ TEST(Start, RatesThatMeanNothingAtFirst)
     EXPECT_LT(run.statistics().steps, 400);
   }
 }
+
+namespace
+{
+
+/* x = sin 3 t is prescribed, of which nothing is known beyond the end of the run */
+struct Tabulated : Problem {
+  explicit Tabulated(double begin)
+  {
+    name = "tabulated";
+    n    = 2;
+    t0   = begin;
+    role = {TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
+  }
+  void initial(double *u, double *v) const override { u[0] = std::sin(3. * t0), v[0] = 3. * std::cos(3. * t0), u[1] = v[1] = 0.; }
+  void residual(double t, const double *u, const double *, const double *a, double *f) const override
+  {
+    f[0] = a[0] + u[1];
+    f[1] = u[0] - (t <= t1 ? std::sin(3. * t) : NAN);
+  }
+  void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+  {
+    J.add(0, 0, sa);
+    J.add(0, 1, 1.);
+    J.add(1, 0, 1.);
+  }
+};
+
+} // namespace
+
+/* Constraints that are no numbers ahead are differenced backwards */
+TEST(Start, WhereATableEnds)
+{
+  for (double left : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    const Tabulated p(1. - left);
+    const double    exact = -9. * std::sin(3. * p.t0), a = startValues(p, tolerance(1e-5)).a[0];
+    MEASURED("%g before the end: acceleration off by %.1e of %.1f", left, std::abs(a - exact), exact);
+    EXPECT_NEAR(a, exact, 1e-2) << left; /* with the lag of the first step */
+  }
+}

@@ -4,6 +4,7 @@
   where its derivative changes least from one tau to the next. A row that depends on time itself begins with a tau that resolves this (excitation.cpp).
   Where the longest tau is the best one of a row, rounding decides, as where coordinates are large numbers and one of them happens to be near 0: longer
   ones are tried, as far as they move nothing by more than the largest coordinate.
+  A row that is no number ahead, as beyond the end of a table, is differenced backwards; one that is none there either has no derivative (NaN).
 */
 #include "consistent.h"
 #include "integrator/entries.h"
@@ -43,7 +44,7 @@ struct Best {
   const std::vector<signed char> &from; /* first levels; empty: all rows begin with 0 */
   bool                      known; /* the levels are those of an earlier call */
   Best(std::vector<signed char> &at, const std::vector<signed char> &begin, PetscInt n, bool again)
-    : last(n, 0), value(n, 0), change(n, PETSC_MAX_REAL), level(at), from(begin), known(again)
+    : last(n, 0), value(n, NAN), change(n, PETSC_MAX_REAL), level(at), from(begin), known(again)
   {
     if (!known) level.assign((size_t)n, no_level);
   }
@@ -174,6 +175,28 @@ struct Path {
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
+  /* Over -tau for those constraints that are no numbers over tau; sign: of each row's tau (Start.WhereATableEnds) */
+  PetscErrorCode differencesWhereNumbers(PetscReal tau, std::vector<PetscReal> &first, std::vector<PetscReal> &second, std::vector<PetscReal> &sign)
+  {
+    std::vector<PetscReal> s1, s2;
+    PetscBool              any, some = PETSC_FALSE;
+    PetscFunctionBegin;
+    PetscCall(differences(tau, first, second));
+    sign.assign(now.size(), 1);
+    for (size_t i = 0; i < now.size(); i++)
+      if (IsConstraint(Get(ts), (PetscInt)i) && PetscIsInfOrNanReal(first[i])) some = PETSC_TRUE;
+    PetscCallMPI(MPI_Allreduce(&some, &any, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+    if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(differences(-tau, s1, s2));
+    for (size_t i = 0; i < now.size(); i++) {
+      if (!PetscIsInfOrNanReal(first[i])) continue;
+      first[i]  = s1[i];
+      second[i] = s2[i];
+      sign[i]   = -1;
+    }
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
   /* What rounding makes of each row: of the coordinates, the larger one of two samples, since in one of them it may cancel; at least that of the largest
      coordinate: what is 0, as a rotation within the step, turns lengths that are rounded */
   PetscErrorCode roundingOfRows(std::vector<PetscReal> &rounding)
@@ -214,17 +237,17 @@ PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer_leve
 {
   const Integrator      &I = Get(along.ts);
   PetscBool              more;
-  std::vector<PetscReal> s1, s2, rounding(along.now.size(), 0);
+  std::vector<PetscReal> s1, s2, sign, rounding(along.now.size(), 0);
 
   PetscFunctionBegin;
   if (!d1.known) PetscCall(along.roundingOfRows(rounding));
   const auto attempt = [&](int level) -> PetscErrorCode {
     const PetscReal tau = SpanFrom(along.t, LevelTime(T, level));
     PetscFunctionBegin;
-    PetscCall(along.differences(tau, s1, s2));
+    PetscCall(along.differencesWhereNumbers(tau, s1, s2, sign));
     for (PetscInt i = 0; i < (PetscInt)s1.size(); i++) {
       if (!IsConstraint(I, i)) continue;
-      d1.take(i, level, s1[i] / tau, first_sum * rounding[i] / tau);
+      d1.take(i, level, s1[i] / (sign[i] * tau), first_sum * rounding[i] / tau);
       d2.take(i, level, s2[i] / (tau * tau), second_sum * rounding[i] / (tau * tau));
     }
     PetscFunctionReturn(PETSC_SUCCESS);
