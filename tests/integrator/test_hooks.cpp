@@ -522,3 +522,15 @@ TEST(Hooks, TwoSolversOnOneDM)
   must(VecDestroy(&r));
   must(DMDestroy(&dm));
 }
+
+/* A function around ours would add forces to the steps of which starts know nothing */
+TEST(Hooks, FunctionAroundOurs)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     run(p, tolerance(1e-5));
+  must(SNESSetFunction(
+      snesOf(run.ts), nullptr, [](SNES snes, Vec X, Vec F, void *ts) -> PetscErrorCode { return SNESTSFormFunction(snes, X, F, ts); }, run.ts));
+  ErrorTrap trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_SUP);
+  EXPECT_TRUE(trap.says("TSSetI2Function()")) << trap.message;
+}

@@ -155,16 +155,19 @@ PetscErrorCode RemoveJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES that has served another TS evaluates that one's functions */
+/* A SNES that has served another TS evaluates that one's functions. One of the program's own around ours would not be called in starts and proofs; what another solver on
+   the DM has left there comes without a vector for its values. */
 PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
 {
   DM     dm;
   DMSNES sdm;
 
   PetscFunctionBegin;
-  PetscCall(SNESSetFunction(snes, NULL, SNESTSFormFunction, ts));
   PetscCall(SNESGetDM(snes, &dm));
   PetscCall(DMGetDMSNES(dm, &sdm));
+  PetscCheck(!sdm->ops->computefunction || sdm->ops->computefunction == SNESTSFormFunction || !snes->vec_func || snes->setupcalled, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
+             "The SNES of the TS has a function of the program's own (SNESSetFunction()), which TSHHT3 cannot call: starts evaluate the I2Function of TSSetI2Function() alone, where what that function adds belongs. If it is that of another SNES on the DM of the TS, give both a DM of their own (DMClone())");
+  PetscCall(SNESSetFunction(snes, NULL, SNESTSFormFunction, ts));
   if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
