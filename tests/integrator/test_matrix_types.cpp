@@ -103,6 +103,23 @@ TEST(MatrixTypes, Refusals)
     }
 }
 
+/* A matrix of another size, as one of another distribution */
+TEST(MatrixTypes, OfAnotherSize)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     run(p, tight);
+  TSI2Jacobian   f;
+  void          *ctx;
+  Mat            P;
+  must(TSGetI2Jacobian(run.ts, nullptr, nullptr, &f, &ctx));
+  must(MatCreateSeqAIJ(PETSC_COMM_SELF, p.n + 1, p.n + 1, p.n + 1, nullptr, &P));
+  must(TSSetI2Jacobian(run.ts, P, P, f, ctx));
+  ErrorTrap trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_SIZ);
+  EXPECT_TRUE(trap.says("4 rows and 4 columns of 4, and the solution 3 entries of 3")) << trap.message;
+  must(MatDestroy(&P));
+}
+
 /* One triangle of a matrix that is not symmetric: the user's choice stands, and is said to be a poor one */
 TEST(MatrixTypes, CholeskyOfAnUnsymmetricMatrix)
 {

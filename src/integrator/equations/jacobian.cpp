@@ -136,6 +136,29 @@ PetscErrorCode SetLocalValues(Mat P, const std::vector<PetscScalar> &val, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A row of the matrix is that of the unknown on the same rank. Of the first rank where it is not the message tells. */
+static PetscErrorCode CheckLayout(TS ts, Mat A, const char *what)
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)ts);
+  PetscInt       n[5];
+  PetscMPIInt    rank, size, first;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(ts->vec_sol, &n[0]));
+  PetscCall(VecGetSize(ts->vec_sol, &n[1]));
+  PetscCall(MatGetLocalSize(A, &n[2], &n[3]));
+  PetscCall(MatGetSize(A, &n[4], NULL));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  const PetscMPIInt other = n[0] != n[2] || n[0] != n[3] ? rank : size;
+  PetscCallMPI(MPI_Allreduce(&other, &first, 1, MPI_INT, MPI_MIN, comm));
+  if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Bcast(n, 5, MPIU_INT, first, comm));
+  SETERRQ(comm, PETSC_ERR_ARG_SIZ,
+          "The %s of TSSetI2Jacobian() is distributed otherwise than the solution: on rank %d it has %" PetscInt_FMT " rows and %" PetscInt_FMT " columns of %" PetscInt_FMT ", and the solution %" PetscInt_FMT " entries of %" PetscInt_FMT ". Make it with the local sizes of the solution (VecGetLocalSize(), MatSetSizes())",
+          what, (int)first, n[2], n[3], n[4], n[0], n[1]);
+}
+
 /* The rows of P tell roles, symmetry and what a factorization costs; an operator has to take the scalings of rows and columns */
 PetscErrorCode CheckMatrices(TS ts)
 {
@@ -151,7 +174,9 @@ PetscErrorCode CheckMatrices(TS ts)
   PetscCheck(rows, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
              "The matrix (Pmat of TSSetI2Jacobian()) is of type %s, which gives no rows: TSHHT3 needs an assembled one there, of type %s, %s, %s or, on one rank, %s. A matrix-free product may be the operator (Amat) beside it",
              type, MATAIJ, MATBAIJ, MATSBAIJ, MATDENSE);
+  PetscCall(CheckLayout(ts, P, "matrix (Pmat)"));
   if (!J || J == P) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CheckLayout(ts, J, "operator (Amat)"));
   PetscCall(MatGetType(J, &type));
   PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
   PetscCall(MatHasOperation(J, MATOP_DIAGONAL_SCALE, &scales));
