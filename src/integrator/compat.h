@@ -18,6 +18,7 @@
 
 #if PETSC_VERSION_LT(3, 21, 0)
   #define SNESLineSearchShellSetApply SNESLineSearchShellSetUserFunc
+  #define SNESLineSearchShellGetApply SNESLineSearchShellGetUserFunc
 #endif
 
 /* setfromoptions() takes the options object by pointer until 3.22, by value since */

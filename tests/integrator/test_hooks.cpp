@@ -534,3 +534,29 @@ TEST(Hooks, FunctionAroundOurs)
   EXPECT_EQ(run.solve(), PETSC_ERR_SUP);
   EXPECT_TRUE(trap.says("TSSetI2Function()")) << trap.message;
 }
+
+/* A clone shares the SNES of a TS that has read its options */
+TEST(Hooks, CloneBeforeTheFirstSolve)
+{
+  const Pendulum p(-90., 0., .5);
+  Simulation     run(p, tolerance(1e-5)), plain(p, tolerance(1e-5));
+  TS             clone;
+  Vec            U, V;
+  must(VecDuplicate(run.U, &U));
+  must(VecDuplicate(run.U, &V));
+  must(VecCopy(run.U, U));
+  must(VecCopy(run.V, V));
+  must(TSClone(run.ts, &clone));
+  must(TS2SetSolution(clone, U, V));
+  must(TSSetExactFinalTime(clone, TS_EXACTFINALTIME_MATCHSTEP));
+  must(TSSetMaxTime(clone, p.t1));
+  must(TSSetTolerances(clone, 1e-5, nullptr, 1e-5, nullptr));
+  must(TSSolve(clone, U));
+  must(plain.solve());
+  EXPECT_LT(relativeDifference(whole(U), plain.u()), 1e-3);
+  must(TSDestroy(&clone));
+  must(run.solve());
+  EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-6);
+  must(VecDestroy(&U));
+  must(VecDestroy(&V));
+}

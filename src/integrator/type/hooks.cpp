@@ -78,16 +78,21 @@ PetscErrorCode LeaveBacktracking(SNESLineSearch ls)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a type has been chosen: not so where backtracking is still what has been left behind */
+/* Whether a type has been chosen: not so where backtracking is still what has been left behind, or a shell has no function yet, which a TS that has read its options has put into a SNES
+   that it shares with its clone (Hooks.CloneBeforeTheFirstSolve) */
 PetscErrorCode LineSearchChosen(SNESLineSearch ls, PetscBool *chosen)
 {
   PetscObject mark;
-  PetscBool   bt;
+  PetscBool   bt, shell;
+  void       *ctx;
+  PetscErrorCode (*apply)(SNESLineSearch, void *) = NULL;
 
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)ls, left_behind, &mark));
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHBT, &bt));
-  *chosen = (PetscBool)(((PetscObject)ls)->type_name && !(mark && bt));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
+  if (shell) PetscCall(SNESLineSearchShellGetApply(ls, &apply, &ctx));
+  *chosen = (PetscBool)(((PetscObject)ls)->type_name && !(mark && bt) && !(shell && !apply));
   PetscCall(PetscObjectCompose((PetscObject)ls, left_behind, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
