@@ -133,6 +133,27 @@ TEST(BetweenRuns, FixedStepsInParts)
   }
 }
 
+/* A part goes on as the run would have: without another start, a step of what rounding has left until the end of the last one, or looking ahead as far as in the whole run again */
+TEST(BetweenRuns, SolvedInParts)
+{
+  for (int parts : {7, 50, 300}) {
+    const Pendulum p(-90., 0., 1.);
+    Simulation     run(p, tolerance(1e-4));
+    must(TSSetTimeStep(run.ts, hht3::unset_step));
+    for (int k = 1; k <= parts; k++) {
+      PetscReal h;
+      must(TSSetMaxTime(run.ts, k / (double)parts));
+      must(run.solve());
+      must(TSGetTimeStep(run.ts, &h));
+      EXPECT_GT(h, 1e-6) << parts << " " << k;
+    }
+    const TSHHT3Statistics s = run.statistics();
+    MEASURED("%d parts: %d steps, %d of them tiny, %d residuals", parts, (int)s.steps, (int)s.tiny_steps, (int)s.residuals);
+    EXPECT_EQ(s.tiny_steps, 0) << parts;
+    EXPECT_LT(s.residuals, 400 + 15 * s.steps) << parts;
+  }
+}
+
 /* The first part is shorter than a step, which counts for those that follow */
 TEST(BetweenRuns, FixedStepsAfterAShortPart)
 {

@@ -126,12 +126,15 @@ PetscErrorCode FindExcitation(TS ts)
 }
 
 /* I.ahead: whether the rest of the run, from U and V at t, has loads or motions that set in, of which the start has seen nothing. Samples at multiples of the
-   golden section, nowhere further apart than coasting of the rest */
+   golden section, nowhere further apart than coasting of the run: of one that goes on, as many as what is new takes of it (BetweenRuns.SolvedInParts) */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 {
-  constexpr int samples_ahead = 89;
+  constexpr int   most_samples  = 89;
   Integrator     &I       = Get(ts);
-  const PetscReal rest    = ts->max_time - t;
+  const PetscReal from          = I.ahead == Ahead::Nothing ? PetscMax(t, I.ahead_to) : t;
+  const PetscReal rest          = ts->max_time - from;
+  const PetscReal run           = ts->max_time - (from > t ? I.t_begin : t);
+  const int       samples_ahead = (int)PetscMin(PetscCeilReal(most_samples * rest / run), most_samples);
   PetscReal       part = 0, change = 0;
   WorkVec         zero, now, then;
 
@@ -144,7 +147,7 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
   for (int sample = 0; sample < samples_ahead && !(change > 0); sample++) {
     part = part + first_sample < 1 ? part + first_sample : part + first_sample - 1;
-    PetscCall(EvaluateResidual(ts, t + part * rest, U, V, zero, then));
+    PetscCall(EvaluateResidual(ts, samples_ahead > 1 ? from + part * rest : ts->max_time, U, V, zero, then));
     PetscCall(VecAXPY(then, -1, now));
     PetscCall(VecNorm(then, NORM_INFINITY, &change));
   }

@@ -45,7 +45,7 @@ PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
 
   PetscFunctionBegin;
   if (*next <= furthest) PetscFunctionReturn(PETSC_SUCCESS);
-  if (I.fastest >= PETSC_MAX_REAL && I.ahead == Ahead::Unknown) PetscCall(LookAhead(ts, I.t1, I.U1, I.V1));
+  if (I.fastest >= PETSC_MAX_REAL && (I.ahead == Ahead::Unknown || (I.ahead == Ahead::Nothing && ts->max_time > I.ahead_to))) PetscCall(LookAhead(ts, I.t1, I.U1, I.V1));
   if (I.fastest < PETSC_MAX_REAL || I.ahead == Ahead::Loads) *next = furthest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -91,7 +91,7 @@ PetscErrorCode TSAdaptDestroy_HHT(TSAdapt adapt)
 
 } // namespace
 
-/* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn */
+/* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn. Where the step does not coast that is soon enough when one is to grow. */
 PetscErrorCode LookAheadAgain(TS ts)
 {
   Integrator &I = Get(ts);
@@ -99,6 +99,7 @@ PetscErrorCode LookAheadAgain(TS ts)
 
   PetscFunctionBegin;
   if (I.ahead != Ahead::Nothing || !(ts->max_time > I.ahead_to)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (ts->time_step <= coasting_fraction * (ts->max_time - I.t_begin) || I.corrector.wlte >= negligible_error) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSHHT3, &ours));
   if (!ours) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(LookAhead(ts, ts->ptime, I.U0, I.V0));

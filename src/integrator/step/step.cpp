@@ -133,6 +133,9 @@ PetscErrorCode BeginStep(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
+bool EndsAt(const Integrator &I, PetscReal t, PetscReal stop) { return PetscAbsReal(t - stop) < PetscMax(1e-10 * I.h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)); }
+
 PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
 {
   Integrator     &I    = Get(ts);
@@ -144,9 +147,7 @@ PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
   if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
   PetscCall(UpdateWeights(ts, I.U1));
   ts->ptime = I.t1;
-  /* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
-  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && PetscAbsReal(ts->ptime - stop) < PetscMax(1e-10 * h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)))
-    ts->ptime = stop;
+  if (ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP && EndsAt(I, ts->ptime, stop)) ts->ptime = stop;
   ts->time_step = I.h_next = next;
   if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_default_step, I.h_after_event}, next);
   if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
@@ -221,9 +222,15 @@ PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
   PetscInt    scheme = 0;
   PetscReal   wlte[3];
 
+  /* what TSAdaptChoose() cuts for the end of the run would be what rounding has left until there, where the step ends there (BetweenRuns.SolvedInParts) */
+  const TSExactFinalTimeOption exact = ts->exact_final_time;
+  const bool                   last  = exact == TS_EXACTFINALTIME_MATCHSTEP && EndsAt(I, I.t1, ts->max_time);
+
   PetscFunctionBegin;
+  if (last) ts->exact_final_time = TS_EXACTFINALTIME_STEPOVER;
   if (HHT3EventActive(ts) && !I.fixed_h) PetscUseTypeMethod(ts->adapt, choose, ts, I.h, &scheme, next, accept, &wlte[0], &wlte[1], &wlte[2]);
   else PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
+  ts->exact_final_time = exact;
   if (*next <= 0 || (HHT3EventActive(ts) && *accept)) *next = I.h;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
