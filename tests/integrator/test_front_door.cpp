@@ -83,3 +83,27 @@ TEST(FrontDoor, CheckpointsThatCannotBeWritten)
     EXPECT_EQ(run.statistics().steps, 0);
   }
 }
+
+/* Of less than rounding of the time, or of which 1/h^2 is no number */
+TEST(FrontDoor, RunsOfNoLength)
+{
+  const Pendulum p(-90., 0., 1.);
+  for (bool late : {false, true}) {
+    Simulation run(p, tolerance(1e-5));
+    must(TSSetTime(run.ts, late ? 1e15 : 0.));
+    must(TSSetMaxTime(run.ts, late ? 1e15 + 1. : 1e-300));
+    ErrorTrap trap;
+    EXPECT_EQ(run.solve(), PETSC_ERR_ARG_OUTOFRANGE) << late;
+    EXPECT_TRUE(trap.says(late ? "leaves no room for steps" : "choose a smaller unit of time")) << trap.message;
+  }
+}
+
+TEST(FrontDoor, OneVectorForBoth)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     run(p, tolerance(1e-5));
+  must(TS2SetSolution(run.ts, run.U, run.U));
+  ErrorTrap trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_IDN);
+  EXPECT_TRUE(trap.says("one vector for both")) << trap.message;
+}

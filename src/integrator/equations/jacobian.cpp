@@ -164,7 +164,7 @@ PetscErrorCode CheckMatrices(TS ts)
 {
   Mat       J, P;
   MatType   type;
-  PetscBool rows, mffd, scales, scales_all;
+  PetscBool rows, mffd, shell, scales, scales_all;
 
   PetscFunctionBegin;
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
@@ -179,11 +179,12 @@ PetscErrorCode CheckMatrices(TS ts)
   PetscCall(CheckLayout(ts, J, "operator (Amat)"));
   PetscCall(MatGetType(J, &type));
   PetscCall(PetscObjectTypeCompare((PetscObject)J, MATMFFD, &mffd));
+  PetscCall(PetscObjectTypeCompare((PetscObject)J, MATSHELL, &shell));
   PetscCall(MatHasOperation(J, MATOP_DIAGONAL_SCALE, &scales));
   PetscCall(MatHasOperation(J, MATOP_SCALE, &scales_all));
   PetscCheck(mffd || (scales && scales_all), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_INCOMP,
-             "The operator (Amat of TSSetI2Jacobian()) is of type %s without MatScale() and MatDiagonalScale(), by which TSHHT3 scales the Newton matrix: leave out MatShellSetManageScalingShifts(), or give the assembled matrix twice",
-             type);
+             "The operator (Amat of TSSetI2Jacobian()) is of type %s without MatScale() and MatDiagonalScale(), by which TSHHT3 scales the Newton matrix: %s, or give the assembled matrix twice",
+             type, shell ? "leave out MatShellSetManageScalingShifts()" : "give it both operations (of a MATPYTHON the methods scale and diagonalScale)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,6 +27,7 @@ namespace
 {
 
 constexpr PetscReal rate_accuracy = 1e-4; /* of the rates */
+constexpr PetscReal least_run     = 16;   /* rounding errors of the time that a run takes: AcceptStep() takes half of that for nothing (FrontDoor.RunsOfNoLength) */
 
 /* In the vectors, the matrix and the solver of the run. A matrix-free operator has nothing to differentiate before SNESSolve(): P alone. */
 PetscErrorCode ConsistentOfRun(TS ts, PetscReal t, Vec U, Vec V, Consistent *c)
@@ -364,6 +365,8 @@ PetscErrorCode StartFromSolution(TS ts)
   if (I.change.test) PetscCall(ChangeCoordinates(ts, true));
   PetscCall(ReferToState(ts));
   if (!ts->steps || ts->ptime <= I.t_begin) { /* a new run does not remember how large its coordinates once were, nor its steps (Excitation.WhatSetsInLaterInANewRun) */
+    PetscCheck(ts->max_time - ts->ptime >= least_run * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE,
+               "The run from t = %.16g to %.16g is so short that rounding of the time leaves no room for steps: let the time begin nearer to zero (TSSetTime())", (double)ts->ptime, (double)ts->max_time);
     I.t_begin   = ts->ptime;
     I.norm_size = 0;
     I.h_regular = I.h_rounded = I.h_limit = 0;

@@ -32,6 +32,9 @@ namespace
 /* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten */
 constexpr PetscReal regular_decay = 0.9, limit_growth = 1.02, limit_forgotten = 4;
 
+/* (1e-28 times as much)^2 is a number, too, see vanishing_step (FrontDoor.RunsOfNoLength) */
+constexpr PetscReal shortest_step = 1e-120;
+
 /* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
    has them again and again */
 constexpr PetscReal max_jacobian_faults = 3, fault_decay = 0.01; /* forgiven: with every accepted step */
@@ -331,6 +334,7 @@ PetscErrorCode TSStep_HHT(TS ts)
   PetscCall(PassStops(ts));
   next = ts->time_step;
   PetscCheck(ts->time_step > 0 && !PetscIsInfReal(ts->time_step), PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g must be positive and finite: TSHHT3 integrates forward in time (-ts_dt, TSSetTimeStep())", (double)ts->time_step);
+  PetscCheck(ts->time_step > shortest_step, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "The time step %g (the run ends at %g) is so short that 1/h^2, by which constraints are scaled, is no number: choose a smaller unit of time", (double)ts->time_step, (double)ts->max_time);
   I.failure[0] = 0;
   bool another;
   PetscCall(HooksBorrowDM(ts));

@@ -81,6 +81,7 @@ PetscErrorCode CheckProblem(TS ts)
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors%s",
              tdm->ops->i2function ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
+  PetscCheck(ts->vec_sol != ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_IDN, "TS2SetSolution() was given one vector for both the solution and its time derivative: give two (VecDuplicate())");
   for (Vec x : {ts->vec_sol, ts->vec_dot}) { /* its entries are not in one array */
     PetscBool nest;
     PetscCall(PetscObjectTypeCompare((PetscObject)x, VECNEST, &nest));
