@@ -230,10 +230,16 @@ PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
   const bool                   last  = exact == TS_EXACTFINALTIME_MATCHSTEP && EndsAt(I, I.t1, ts->max_time);
 
   PetscFunctionBegin;
+  const auto ask = [&]() -> PetscErrorCode {
+    PetscFunctionBegin;
+    if (HHT3EventActive(ts) && !I.fixed_h) PetscUseTypeMethod(ts->adapt, choose, ts, I.h, &scheme, next, accept, &wlte[0], &wlte[1], &wlte[2]);
+    else PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  };
   if (last) ts->exact_final_time = TS_EXACTFINALTIME_STEPOVER;
-  if (HHT3EventActive(ts) && !I.fixed_h) PetscUseTypeMethod(ts->adapt, choose, ts, I.h, &scheme, next, accept, &wlte[0], &wlte[1], &wlte[2]);
-  else PetscCall(TSAdaptChoose(ts->adapt, ts, I.h, NULL, next, accept));
-  ts->exact_final_time = exact;
+  const PetscErrorCode failed = ask();
+  ts->exact_final_time        = exact;
+  PetscCall(failed);
   if (*next <= 0 || (HHT3EventActive(ts) && *accept)) *next = I.h;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
