@@ -517,6 +517,15 @@ TEST(Hooks, TwoSolversOnOneDM)
   EXPECT_LT(relativeDifference(whole(d.U), whole(alone.U)), 1e-2);
   must(VecSet(x, 0.));
   solveStatic(snes, x);
+  {
+    OnDM other(dm); /* beside one that is alive, with differences of its own */
+    must(TSSetType(other.ts, TSALPHA2));
+    must(TSSetTimeStep(other.ts, .01));
+    other.to(.5);
+    OnDM again(dm);
+    again.to(.5);
+    EXPECT_LT(relativeDifference(whole(other.U), whole(again.U)), 1e-2);
+  }
   must(SNESDestroy(&snes));
   must(VecDestroy(&x));
   must(VecDestroy(&r));

@@ -127,6 +127,15 @@ PetscErrorCode RestoreTolerance(TS ts, SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SetDMJacobian(DMSNES sdm, decltype(_DMSNESOps::computejacobian) f, PetscContainer ctx)
+{
+  PetscFunctionBegin;
+  sdm->ops->computejacobian = f;
+  sdm->jacobianctxcontainer = ctx;
+  PetscCall(PetscObjectCompose((PetscObject)sdm, "jacobian ctx", (PetscObject)ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode RemoveJacobian(TS ts)
 {
   Hooks        &H = Get(ts).hooks;
@@ -137,11 +146,7 @@ PetscErrorCode RemoveJacobian(TS ts)
   PetscFunctionBegin;
   if (H.jacobian && ts->dm) {
     PetscCall(DMGetDMSNESWrite(ts->dm, &sdm));
-    if (sdm->ops->computejacobian == SNESTSFormJacobian) {
-      sdm->ops->computejacobian = H.computejacobian;
-      sdm->jacobianctxcontainer = H.jacobianctx;
-      PetscCall(PetscObjectCompose((PetscObject)sdm, "jacobian ctx", (PetscObject)H.jacobianctx));
-    }
+    if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(SetDMJacobian(sdm, H.computejacobian, H.jacobianctx));
     if (ts->snes) PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
     if (P) PetscCall(PetscObjectGetId((PetscObject)P, &id));
     if (ts->snes && H.J && id == H.matrices[1]) PetscCall(SNESSetJacobian(ts->snes, H.J, H.P, NULL, NULL)); /* unless the user has given others since */
@@ -288,6 +293,8 @@ PetscErrorCode HooksBorrowDM(TS ts)
   if (ts->snes != H.snes) PetscFunctionReturn(PETSC_SUCCESS); /* functions of ours are put into another one */
   PetscCall(SNESGetDM(ts->snes, &dm));
   PetscCall(DMSNESGetFunction(dm, &f, &ctx));
+  PetscCall(DMGetDMSNES(dm, &sdm));
+  if (f == SNESTSFormFunction && ctx == ts && H.jacobian && sdm->ops->computejacobian == H.computejacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
   if (f == SNESTSFormFunction && ctx == ts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscInfo(ts, "another solver has put its functions into the DM of the TS: those of the TS stand there during its steps\n"));
   if (f != SNESTSFormFunction && !H.borrowed_told) {
@@ -315,15 +322,17 @@ PetscErrorCode HooksReturnDM(TS ts)
   DMSNES sdm;
 
   PetscFunctionBegin;
-  if (!H.borrowed) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!H.borrowed && !H.jacobian) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetDM(ts->snes, &dm));
   PetscCall(DMGetDMSNESWrite(dm, &sdm));
+  if (!H.borrowed) { /* another solver on the DM that has no Jacobian would ask ours for its own */
+    if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(SetDMJacobian(sdm, H.computejacobian, H.jacobianctx));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   sdm->ops->computefunction = H.their_function;
-  sdm->ops->computejacobian = H.their_jacobian;
   sdm->functionctxcontainer = H.their_ctx[0];
-  sdm->jacobianctxcontainer = H.their_ctx[1];
   PetscCall(PetscObjectCompose((PetscObject)sdm, "function ctx", (PetscObject)H.their_ctx[0]));
-  PetscCall(PetscObjectCompose((PetscObject)sdm, "jacobian ctx", (PetscObject)H.their_ctx[1]));
+  PetscCall(SetDMJacobian(sdm, H.their_jacobian, H.their_ctx[1]));
   PetscCall(ForgetTheirs(H));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
