@@ -38,3 +38,25 @@ TEST(MatrixTypesRanks, SameRunAsWithAIJ)
     expectSameRun(MatrixRun(PETSC_COMM_WORLD, p, {MATSBAIJ, block}, options), self, "triangle in blocks of " + std::to_string((int)block));
   }
 }
+
+/* Rows of the matrix on other ranks than those of the solution */
+TEST(MatrixTypesRanks, DistributedOtherwise)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     run(p, tolerance(1e-5), PETSC_COMM_WORLD);
+  TSI2Jacobian   f;
+  void          *ctx;
+  Mat            P;
+  PetscMPIInt    rank, size;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size == 1) GTEST_SKIP() << "one rank has all rows";
+  const PetscInt n = rank == size - 1 ? p.n : 0;
+  must(TSGetI2Jacobian(run.ts, nullptr, nullptr, &f, &ctx));
+  must(MatCreateAIJ(PETSC_COMM_WORLD, n, n, p.n, p.n, p.n, nullptr, p.n, nullptr, &P));
+  must(TSSetI2Jacobian(run.ts, P, P, f, ctx));
+  ErrorTrap trap;
+  EXPECT_EQ(run.solve(), PETSC_ERR_ARG_SIZ);
+  EXPECT_TRUE(trap.says("on rank 0 it has 0 rows")) << trap.message;
+  must(MatDestroy(&P));
+}
