@@ -147,8 +147,6 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *c
   bool                late   = false;
   PetscFunctionBegin;
   if (step <= 0) PetscFunctionReturn(0);
-  if (step == w.settings.save_at && !w.settings.save.empty())
-    PetscCall(TSHHT3CheckpointSave(ts, w.settings.save.c_str()));
   while ((int)w.result.x.size() < samples && SampleTime(w.end, (int)w.result.x.size() + 1) <= t * (1 + 1e-12)) {
     const double at = std::fmin(t, SampleTime(w.end, (int)w.result.x.size() + 1));
     PetscCall(w.scene.sample(ts, at, values));
@@ -159,6 +157,8 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *c
   }
   if (w.laws && (w.result.x.size() > before || step < 20)) PetscCall(JudgeLaws(w, ts, t));
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
+  if (step == w.settings.save_at && !w.settings.save.empty()) /* after the samples of the step, whose solver the file has, as the run that goes on does not take them */
+    PetscCall(TSHHT3CheckpointSave(ts, w.settings.save.c_str()));
   if (step % 16 == 0) {
     PetscInt         unknowns;
     TSHHT3Statistics cost;
