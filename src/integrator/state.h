@@ -86,14 +86,14 @@ struct PredictorOptions {
 
 struct PredictorState {
   PetscInt  degree    = 0; /* in use */
-  PetscInt  available = 0; /* differences that exist */
+  PetscInt  available = 0; /* values before t_n */
   PetscReal t[max_degree + 2] = {}; /* t_n, t_{n-1}, ... */
 };
 
-/* Divided differences over the accepted steps. Of states those of the true s': the error test uses them, and w_n belongs to a
-   time that shifts with h. a_n does too, but is smoother than q'' and predicts better. */
+/* Unknowns at the ends of the accepted steps. Of states the true s': the error test uses them, and w_n belongs to a time that shifts with h. a_n does
+   too, but is smoother than q'' and predicts better. */
 struct Predictor : PredictorOptions, PredictorState {
-  Vec D[max_degree + 2] = {}; /* D[0]: a_n, s'_n, lambda_n, V_n, F_n; D[k] the k-th divided difference, allocated when first used. One beyond them is work space. */
+  Vec X[max_degree + 2] = {}; /* a, s', lambda, V, F at t[k], allocated when first used */
 };
 
 /* What the choice of the order knows of the steps before */
@@ -106,7 +106,7 @@ struct OrderMemory {
 struct OrderState {
   PetscInt  now = 2, next = 2;          /* of the step from t_n, and of the one after it when it is accepted */
   PetscInt  made = 0, accepted = 0;     /* of the step that led to t_n, and of the accepted one that leads away from it; 0: neither */
-  PetscInt  ready = 2;                  /* for which X0, D_0 and the drift of the velocities stand */
+  PetscInt  ready = 2;                  /* for which X0, the predictor and the drift of the velocities stand */
   PetscInt  past = 0;                   /* states before t_n that are kept */
   PetscInt  since = 0, above = 0;       /* steps since the order has changed, and since it is above two */
   OrderMemory memory, after;            /* at t_n, and when the step is accepted */

@@ -1,7 +1,7 @@
 /*
   Sweeps over the entries of vectors that pay more than 2 % of a step of a chain of 1,000 rods against plain loops (entries.h): the stage of every
-  iteration (stage.cpp), 10 % of the instructions, the predictor's differences (predictor.cpp), 3 % of the time, and scaled differences of orders above
-  two (order.cpp), about 20 % of the instructions.
+  iteration (stage.cpp), 10 % of the instructions, and scaled differences (predictor.cpp), 3 % of the time for the predictor and about 20 % of the instructions for orders
+  above two.
 
   The body of a sweep is an object with pointers and factors that is called for four entries at a time. The compiler uses
   the instructions that it is told to, which are those of the oldest processor where a library is made for many: bodies

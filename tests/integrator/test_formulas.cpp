@@ -154,10 +154,12 @@ TEST(Formulas, BackwardDifferentiation)
       double product = b.gh;
       for (int j = 0; j < k; j++) product *= uneven[j];
       EXPECT_NEAR(missed * b.gh, product, 1e-12 * product) << k;
-      double weight[7], sum = 0.;
-      hht3::DifferenceWeights(k + 1, uneven, weight);
-      for (int j = 0; j <= k + 1; j++) sum += weight[j] * std::pow(j ? -uneven[j - 1] : 0., m);
-      EXPECT_NEAR(hht3::ErrorFactor(k, uneven) * sum, product, 1e-11 * product) << k;
+      double t[7] = {}, d[7];
+      for (int j = 0; j <= k; j++) t[j + 1] = -uneven[j];
+      for (int j = 0; j <= k + 1; j++) d[j] = std::pow(t[j], m);
+      for (int n = 1; n <= k + 1; n++)
+        for (int j = 0; j + n <= k + 1; j++) d[j] = (d[j] - d[j + 1]) * hht3::DifferenceFactor(t, n, j);
+      EXPECT_NEAR(hht3::ErrorFactor(k, uneven) * d[0], product, 1e-11 * product) << k;
     }
     const hht3::Parameters p = hht3::BDFParameters(k, uneven[0], uneven);
     EXPECT_DOUBLE_EQ(p.beta, p.gamma * p.gamma);

@@ -80,7 +80,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
 
   PetscFunctionBegin;
   if (I.F0) all.push_back(&I.F0);
-  for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.D[k]);
+  for (PetscInt k = 0; k <= I.predictor.available; k++) all.push_back(&I.predictor.X[k]);
   for (PetscInt k = 0; k < I.order.past; k++) all.push_back(&I.order.U[k]), all.push_back(&I.order.V[k]);
   if (I.checkpoint_vec) all.push_back(&I.checkpoint_vec);
   for (Vec *x : all) PetscCall(TransferVec(ts, a, x));

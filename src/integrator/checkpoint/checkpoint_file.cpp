@@ -21,7 +21,7 @@ struct Header {
 };
 
 constexpr char         magic[8] = {'h', 'h', 't', 'd', 'a', 'e', 'c', 'p'};
-constexpr std::int32_t version  = 14;
+constexpr std::int32_t version  = 15;
 
 /* Files of versions 1 to 3 began with this number and their version, big-endian */
 constexpr unsigned char old_magic[4] = {0x00, 0x12, 0x7b, 0xaa};

@@ -5,17 +5,17 @@
   accelerations alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at
   which neither q nor q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the
   a_{n-k} at x_k, q' and q as its integrals from the state at t_n. The integrals are as smooth in time as the
-  polynomial, and so are the mapped accelerations: their divided differences predict as well as the old ones did.
+  polynomial, and so are the mapped accelerations: they predict as well as the old ones did.
   (Newmark's formulas backwards would give the stored q, q', but with the jumps that changes of h leave in them, which
   divided differences magnify.)
 
-  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep. The nodes
-  may end in a double one, at a start, where the second value is a slope.
+  All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep.
 
   Entries that the map leaves alone keep their bits.
 */
 #include "change.h"
 #include "integrator/entries.h"
+#include "integrator/step/predictor.h"
 #include "integrator/work_vec.h"
 #include <algorithm>
 #include <petscblaslapack.h>
@@ -30,25 +30,12 @@ constexpr PetscInt max_basis = max_degree + 1;
 
 /* The motion about t_n in old coordinates, by stored vectors */
 struct Motion {
-  PetscInt  nodes = 0;                            /* of the predictor */
-  PetscInt  n     = 0;                            /* stored vectors in use */
-  Vec       stored[max_basis];                    /* D_0, D_1, ..., or D_0 and A0 */
-  PetscReal x[max_basis];                         /* times of the nodes, from t_n */
-  bool      slope[max_basis]                = {}; /* second of a double node */
-  PetscReal to_values[max_basis][max_basis] = {}; /* node values (slopes) by stored vectors */
-  PetscReal unit                            = 1;
+  PetscInt  nodes = 0;            /* of the predictor */
+  PetscInt  n     = 0;            /* stored vectors in use */
+  Vec       stored[max_basis];    /* of the predictor, or its only one and A0 */
+  PetscReal x[max_basis];         /* their times, from t_n */
+  PetscReal unit = 1;
 };
-
-/* Newton's polynomial of degree j at node k, or its slope there */
-PetscReal NewtonBasis(const PetscReal t[], PetscInt k, PetscInt j, bool slope)
-{
-  PetscReal value = 1, derivative = 0;
-  for (PetscInt i = 0; i < j; i++) {
-    derivative = derivative * (t[k] - t[i]) + value;
-    value *= t[k] - t[i];
-  }
-  return slope ? derivative : value;
-}
 
 Motion Recall(const Integrator &I)
 {
@@ -58,18 +45,16 @@ Motion Recall(const Integrator &I)
   m.nodes = m.n = p.available + 1;
   m.unit        = I.h_last > 0 ? I.h_last : 1;
   for (PetscInt k = 0; k < m.nodes; k++) {
-    /* the step that ended at t_{n-k}; of the last node it is not known */
-    if (k > 0 && k < m.nodes - 1 && p.t[k] > p.t[k + 1]) lag = I.p.lag() * (p.t[k] - p.t[k + 1]);
-    m.slope[k]  = k > 0 && p.t[k] == p.t[k - 1];
-    m.x[k]      = m.slope[k] ? m.x[k - 1] : p.t[k] - p.t[0] + lag;
-    m.stored[k] = p.D[k];
-    for (PetscInt j = 0; j <= k; j++) m.to_values[k][j] = NewtonBasis(p.t, k, j, m.slope[k]);
+    /* the step that ended at t_{n-k}; of the last node it is not known, nor of the one before where that tells the slope of a start */
+    const PetscReal h = k > 0 && k < m.nodes - 1 ? p.t[k] - p.t[k + 1] : 0;
+    if (k > 0 && h > 20 * slope_fraction * (p.t[k - 1] - p.t[k])) lag = I.p.lag() * h;
+    m.x[k]      = p.t[k] - p.t[0] + lag;
+    m.stored[k] = p.X[k];
   }
   if (m.nodes == 1 && m.x[0] != 0) { /* a history of one: q'' at t_n tells the slope */
-    m.n               = 2;
-    m.x[1]            = 0;
-    m.stored[1]       = I.A0;
-    m.to_values[1][1] = 1;
+    m.n         = 2;
+    m.x[1]      = 0;
+    m.stored[1] = I.A0;
   }
   return m;
 }
@@ -77,31 +62,20 @@ Motion Recall(const Integrator &I)
 /* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
 PetscErrorCode MotionWeights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
 {
-  PetscReal       L[max_basis][max_basis] = {}, y[3][max_basis], power = 1;
+  PetscReal       L[max_basis][max_basis] = {}, power = 1;
   const PetscReal z = x / m.unit, u = m.unit;
   PetscBLASInt    n, sides = 3, stride = max_basis, pivots[max_basis], failed;
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < m.n; j++, power *= z) {
-    y[0][j] = power;
-    y[1][j] = u * power * z / (j + 1);
-    y[2][j] = u * u * power * z * z / ((j + 1) * (j + 2));
-    for (PetscInt k = 0; k < m.n; k++) {
-      const PetscReal zk = m.x[k] / u;
-      if (!m.slope[k])
-        L[k][j] = PetscPowRealInt(zk, j);
-      else
-        L[k][j] = j ? j * PetscPowRealInt(zk, j - 1) / u : 0;
-    }
+    w[0][j] = power;
+    w[1][j] = u * power * z / (j + 1);
+    w[2][j] = u * u * power * z * z / ((j + 1) * (j + 2));
+    for (PetscInt k = 0; k < m.n; k++) L[k][j] = PetscPowRealInt(m.x[k] / u, j);
   }
   PetscCall(PetscBLASIntCast(m.n, &n));
-  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &y[0][0], &stride, &failed)); /* of L^T, as it reads columns */
+  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &w[0][0], &stride, &failed)); /* of L^T, as it reads columns */
   PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_LIB, "The polynomial through the last steps cannot be evaluated: LAPACK's gesv returns %d", (int)failed);
-  for (int s = 0; s < 3; s++)
-    for (PetscInt i = 0; i < m.n; i++) {
-      w[s][i] = 0;
-      for (PetscInt k = 0; k < m.n; k++) w[s][i] += y[s][k] * m.to_values[k][i];
-    }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,22 +139,14 @@ PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkV
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* New values of q'' (slopes at the second of a double node) at the nodes */
+/* New values of q'' at the nodes */
 PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec value[])
 {
-  Integrator     &I = Get(ts);
-  const PetscReal d = 0.01 * m.unit;
-
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m.nodes; k++) {
-    PetscCall(At(I, m, m.x[k] + (m.slope[k] ? d : 0), map.old));
-    PetscCall(MapAt(ts, map, m.x[k] + (m.slope[k] ? d : 0)));
+    PetscCall(At(Get(ts), m, m.x[k], map.old));
+    PetscCall(MapAt(ts, map, m.x[k]));
     PetscCall(VecCopy(map.now[2], value[k]));
-    if (!m.slope[k]) continue;
-    PetscCall(At(I, m, m.x[k] - d, map.old));
-    PetscCall(MapAt(ts, map, m.x[k] - d));
-    PetscCall(VecAXPY(value[k], -1, map.now[2]));
-    PetscCall(VecScale(value[k], 1 / (2 * d)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -244,15 +210,12 @@ PetscErrorCode CheckRoles(TS ts, const Mapping &map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes over what has changed: D_0, D_1, ... from the values at the nodes by forward substitution, and the state; in the paper's form q''_n is a_n but for a start */
+/* Takes over what has changed: the values at the nodes, and the state; in the paper's form q''_n is a_n but for a start */
 PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const WorkVec value[])
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m.nodes; k++) {
-    for (PetscInt j = 0; j < k; j++) PetscCall(VecAXPY(value[k], -m.to_values[k][j], value[j]));
-    PetscCall(VecScale(value[k], 1 / m.to_values[k][k]));
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &d) { if (map.changed[i] & Mapping::Acceleration) d = x; }, Read(value[k]), Write(I.predictor.D[k])));
-  }
+  for (PetscInt k = 0; k < m.nodes; k++)
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar now, PetscScalar &x) { if (map.changed[i] & Mapping::Acceleration) x = now; }, Read(value[k]), Write(I.predictor.X[k])));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar d0, PetscScalar &u0, PetscScalar &v0, PetscScalar &a0, PetscScalar &x0) {
       if (!map.changed[i]) return;
@@ -284,7 +247,7 @@ PetscErrorCode MapStart(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U0, V0, A0, X0, the predictor's differences, and what drift.cpp needs to know */
+/* U0, V0, A0, X0, the predictor's values, and what drift.cpp needs to know */
 PetscErrorCode MapHistory(TS ts)
 {
   Integrator  &I = Get(ts);

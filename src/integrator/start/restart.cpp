@@ -4,6 +4,7 @@
 #include "integrator/equations/equations.h"
 #include "integrator/step/estimate.h"
 #include "integrator/step/order.h"
+#include "integrator/step/predictor.h"
 #include "start.h"
 #include "integrator/work_vec.h"
 
@@ -62,13 +63,16 @@ static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
 {
   const Integrator &I     = Get(ts);
   PetscReal         local = 0, sum;
+  WorkVec           slope;
 
   PetscFunctionBegin;
   *e = 0;
   if (I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(slope.like(I.X));
+  PetscCall(SlopeOfUnknowns(I, slope));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar rate, PetscScalar w) { local += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
-    Read(I.predictor.D[1]), Read(I.weight)));
+    Read(slope), Read(I.weight)));
   PetscCallMPI(MPI_Allreduce(&local, &sum, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   *e = PetscSqrtReal(sum / PetscMax(I.norm_size, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -127,7 +131,7 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
   PetscCall(U.like(I.U0));
   PetscCall(V.like(I.U0));
   PetscCall(Advance(I, I.h, U, V));
-  PetscCall(VecCopy(I.predictor.D[0], I.X));
+  PetscCall(VecCopy(I.predictor.X[0], I.X));
   PetscCall(ConsistentAccelerations(ts, I.t1, 0, U, V, have, ok));
   if (*ok) {
     /* the start has differentiated the constraints at times around t1: it need not have seen their values there */

@@ -93,8 +93,7 @@ PetscErrorCode RatesOfStart(TS ts, Prepared have, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The history that a step of length h would have left: a_0 and w_0 with their lag, and the rates as the first divided difference of the predictor (at a double
-   node). Rates that are too wild to be believed are left out, but for those of states: without them the error of the first step would not know these
+/* The history that a step of length h would have left: a_0 and w_0 with their lag, and what the rates tell of values a little earlier. Rates that are too wild to be believed are left out, but for those of states: without them the error of the first step would not know these
    (FirstStep.StatesAfterARestart). */
 PetscErrorCode MakeHistory(TS ts, Vec rate)
 {
@@ -120,16 +119,16 @@ PetscErrorCode MakeHistory(TS ts, Vec rate)
         if (IsDifferential(r)) x += (r == TSHHT3_STATE ? I.p.lagState() : I.p.lag()) * h * j;
         if (r == TSHHT3_COORDINATE) d = x;
       },
-      Read(rate), Write(I.X0), Write(p.D[0])));
+      Read(rate), Write(I.X0), Write(p.X[0])));
     if (e > 0) PetscCall(SetDriftOfStart(ts, rate));
   } else PetscCall(PetscInfo(ts, "start: q''' h exceeds the tolerance %g times, a_0 = q''_0\n", (double)e));
   const bool follows = believed && e > 0 && p.degree_max > 0;
   if (follows || I.count[TSHHT3_STATE]) {
-    if (!p.D[1]) PetscCall(VecDuplicate(rate, &p.D[1]));
-    PetscCall(VecCopy(rate, p.D[1]));
+    if (!p.X[1]) PetscCall(VecDuplicate(rate, &p.X[1]));
     p.available = 1;
     p.degree    = follows ? 1 : 0;
-    p.t[1]      = p.t[0];
+    p.t[1]      = p.t[0] - SpanFrom(p.t[0], slope_fraction * h);
+    PetscCall(VecWAXPY(p.X[1], p.t[1] - p.t[0], rate, p.X[0]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -266,7 +265,7 @@ PetscErrorCode ConsistentWithRates(TS ts, Prepared &have, Vec rate)
   PetscCall(NoteDriven(ts));
   PetscCall(TakeStartValues(I));
   PetscCall(VecCopy(I.X, I.X0));
-  PetscCall(VecCopy(I.X, I.predictor.D[0]));
+  PetscCall(VecCopy(I.X, I.predictor.X[0]));
   have.matrix = have.gamma = false;
   PetscCall(RatesOfStart(ts, have, rate));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -10,6 +10,7 @@
 */
 #include "integrator/entries.h"
 #include "order.h"
+#include "predictor.h"
 #include "stage.h"
 #include "integrator/work_vec.h"
 #include <algorithm>
@@ -34,11 +35,16 @@ PetscReal DriftOfHistory(const Order &o, const BDF &b)
   return sum;
 }
 
-/* x_i = y_i of coordinates */
-PetscErrorCode CopyCoordinates(const Integrator &I, Vec y, Vec x)
+/* The predictor goes on from other accelerations at t_n, and with the slopes that it has */
+PetscErrorCode MovePredictor(Integrator &I, Vec a)
 {
+  Predictor &p = I.predictor;
+  WorkVec    change;
+
   PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar from, PetscScalar &to) { if (IsCoordinate(I, i)) to = from; }, Read(y), Write(x)));
+  PetscCall(change.like(a, I.spare));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar from, PetscScalar to, PetscScalar &d) { d = IsCoordinate(I, i) ? to - from : 0; }, Read(p.X[0]), Read(a), Write(change)));
+  for (PetscInt k = 0; k <= p.available; k++) PetscCall(VecAXPY(p.X[k], 1, change));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,7 +56,7 @@ PetscErrorCode EnterBDF(TS ts)
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "order %" PetscInt_FMT " from t = %g\n", o.now, (double)ts->ptime));
-  PetscCall(CopyCoordinates(I, I.A0, I.predictor.D[0]));
+  PetscCall(MovePredictor(I, I.A0));
   I.drift_removed = 0;
   if (o.hht[0] > 0 && I.count[TSHHT3_HOLONOMIC] && I.corrector.matrix.have) {
     if (!I.have_drift) PetscCall(MeasureDrift(ts));
@@ -63,22 +69,24 @@ PetscErrorCode EnterBDF(TS ts)
 PetscErrorCode LeaveBDF(TS ts)
 {
   Integrator &I = Get(ts);
-  Predictor  &p = I.predictor;
+  WorkVec     slope;
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "order 2 from t = %g\n", (double)ts->ptime));
-  if (I.order.made > 2 && p.available > 0) {
+  if (I.order.made > 2 && I.predictor.available > 0) {
+    PetscCall(slope.like(I.X0, I.spare));
+    PetscCall(SlopeOfUnknowns(I, slope));
     PetscCall(ForEntries(
-      [&](PetscInt i, PetscScalar a, PetscScalar v, PetscScalar slope, PetscScalar &x) {
+      [&](PetscInt i, PetscScalar a, PetscScalar v, PetscScalar s, PetscScalar &x) {
         const TSHHT3Role r = RoleOf(I, i);
-        if (r == TSHHT3_COORDINATE) x = a + I.hht.lag() * I.h_last * slope;
-        if (r == TSHHT3_STATE) x = v + I.hht.lagState() * I.h_last * slope;
+        if (r == TSHHT3_COORDINATE) x = a + I.hht.lag() * I.h_last * s;
+        if (r == TSHHT3_STATE) x = v + I.hht.lagState() * I.h_last * s;
       },
-      Read(I.A0), Read(I.V0), Read(p.D[1]), Write(I.X0)));
+      Read(I.A0), Read(I.V0), Read(slope), Write(I.X0)));
     I.jerk = Jerk::None;
-    if (I.corrector.matrix.have) PetscCall(SetDriftOfStart(ts, p.D[1]));
+    if (I.corrector.matrix.have) PetscCall(SetDriftOfStart(ts, slope));
   }
-  PetscCall(CopyCoordinates(I, I.X0, p.D[0]));
+  PetscCall(MovePredictor(I, I.X0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

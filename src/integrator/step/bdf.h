@@ -61,18 +61,9 @@ inline Parameters BDFParameters(PetscInt k, PetscReal h, const PetscReal tau[])
   return p;
 }
 
-/* Weights of the values at t, x_0 ... x_k for the k-th divided difference times tau_1 ... tau_k, which is the k-th backward difference where
-   steps are constant; x_0 = 0 and x_j = -tau_j. weight[0] is that of the value at t_{n+1}. */
-inline void DifferenceWeights(PetscInt k, const PetscReal tau[], PetscReal weight[])
-{
-  for (PetscInt j = 0; j <= k; j++) {
-    const PetscReal x = j ? -tau[j - 1] : 0;
-    weight[j]         = 1;
-    for (PetscInt i = 0; i <= k; i++)
-      if (i != j) weight[j] /= x + (i ? tau[i - 1] : 0);
-    for (PetscInt i = 0; i < k; i++) weight[j] *= tau[i];
-  }
-}
+/* Scaled differences come from values d_j at times t_0 > t_1 > ... by d_j = (d_j - d_{j+1}) times this for m = 1, 2, ...: then d_0 is the m-th divided difference times tau_1 ... tau_m,
+   tau_j = t_0 - t_j, which is the m-th backward difference where steps are constant */
+inline PetscReal DifferenceFactor(const PetscReal t[], PetscInt m, PetscInt j) { return (t[0] - t[m]) / (t[j] - t[j + m]); }
 
 /* The error of order k is this times the (k+1)-th scaled difference */
 inline PetscReal ErrorFactor(PetscInt k, const PetscReal tau[]) { return BDFOf(k, tau).gh / tau[k]; }

@@ -12,6 +12,7 @@
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "integrator/coordinates/rotations.h"
+#include <algorithm>
 
 namespace hht3
 {
@@ -40,39 +41,25 @@ struct WeightedSum {
   }
 };
 
-/* Through the values at t_{n+1}, t_n, ... of U or U' */
-WeightedSum ThroughStates(const Integrator &I, PetscReal t, Vec end, Vec begin, const Vec past[])
+/* Through `end` at t_{n+1} and k values before it */
+WeightedSum Through(const Integrator &I, PetscReal at, Vec end, PetscInt k, const PetscReal t[], const Vec x[])
 {
-  const Order   &o = I.order;
-  const PetscInt k = o.now;
-  PetscReal      node[max_order + 1] = {}, weight[max_order + 1];
-  WeightedSum    sum;
+  PetscReal   node[max_order + 1] = {I.t1}, weight[max_order + 1];
+  WeightedSum sum;
 
-  node[0] = I.t1;
-  for (PetscInt j = 1; j <= k; j++) node[j] = o.t[j - 1];
-  LagrangeWeights(k, node, t, weight);
-  for (PetscInt j = 0; j <= k; j++) sum.add(weight[j], j == 0 ? end : j == 1 ? begin : past[j - 2]);
+  std::copy_n(t, k, node + 1);
+  LagrangeWeights(k, node, at, weight);
+  for (PetscInt j = 0; j <= k; j++) sum.add(weight[j], j ? x[j - 1] : end);
   return sum;
 }
 
-/* Through `end` at t_{n+1} and the values whose divided differences the predictor keeps:
-   N(t) + (end - N(t_{n+1})) pi(t)/pi(t_{n+1}) with Newton's polynomial N and the product pi of all (t - t_j) */
-WeightedSum ThroughUnknowns(const Integrator &I, PetscReal t, Vec end)
+/* Of U or U' */
+WeightedSum ThroughStates(const Integrator &I, PetscReal at, Vec end, Vec begin, const Vec past[])
 {
-  const Predictor &p = I.predictor;
-  const PetscInt   n = PetscMin(p.available + 1, I.order.now);
-  PetscReal        pi = 1, pi1 = 1, here[max_order + 1], there[max_order + 1];
-  WeightedSum      sum;
+  Vec x[max_order] = {begin};
 
-  for (PetscInt j = 0; j < n; j++) {
-    here[j]  = pi;
-    there[j] = pi1;
-    pi *= t - p.t[j];
-    pi1 *= I.t1 - p.t[j];
-  }
-  sum.add(pi / pi1, end);
-  for (PetscInt j = 0; j < n; j++) sum.add(here[j] - pi / pi1 * there[j], p.D[j]);
-  return sum;
+  std::copy_n(past, I.order.now - 1, x + 1);
+  return Through(I, at, end, I.order.now, I.order.t, x);
 }
 
 /* The second half of the basis of cubic Hermite polynomials on [0, 1], which grows from 0 to 1 */
@@ -109,7 +96,7 @@ Polynomials OfStep(const Integrator &I, PetscReal t)
   const PetscReal x = StepFraction(I, t), inside = PetscClipInterval(t, I.t0, I.t1);
 
   if (I.order.accepted <= 2) return {Hermite(I, x, I.U0, I.V0, I.U1, I.V1), Hermite(I, x, I.V0, I.A0, I.V1, I.A1), Linear(x, I.A0, I.A1), Linear(x, I.V0, I.V1), Linear(x, I.U0, I.U1)};
-  const WeightedSum unknowns = ThroughUnknowns(I, inside, I.X);
+  const WeightedSum unknowns = Through(I, inside, I.X, PetscMin(I.predictor.available + 1, I.order.now), I.predictor.t, I.predictor.X);
   return {ThroughStates(I, inside, I.U1, I.U0, I.order.U), ThroughStates(I, inside, I.V1, I.V0, I.order.V), unknowns, unknowns, unknowns};
 }
 

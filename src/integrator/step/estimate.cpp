@@ -186,14 +186,14 @@ static PetscErrorCode AddStateErrors(const Integrator &I, NormType type, PetscRe
 
   PetscFunctionBegin;
   if (!I.count[TSHHT3_STATE] || I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal span = I.predictor.t[0] + h - I.predictor.t[1], k = I.p.k_s * h * h * h * 2 / span;
+  const PetscReal last = I.predictor.t[0] - I.predictor.t[1], k = I.p.k_s * h * h * h * 2 / (last + h);
   PetscCall(ForSome(
     I.states,
-    [&](PetscInt, PetscScalar w, PetscScalar v0, PetscScalar v1, PetscScalar d1) {
-      const PetscReal delta = PetscAbsReal(w * k * ((v1 - v0) / h - d1));
+    [&](PetscInt, PetscScalar w, PetscScalar before, PetscScalar v0, PetscScalar v1) {
+      const PetscReal delta = PetscAbsReal(w * k * ((v1 - v0) / h - (v0 - before) / last));
       *result               = type == NORM_2 ? *result + delta * delta : PetscMax(*result, delta);
     },
-    Read(I.weight), Read(I.V0), Read(I.V1), Read(I.predictor.D[1])));
+    Read(I.weight), Read(I.predictor.X[1]), Read(I.V0), Read(I.V1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -14,8 +14,8 @@
   step is longer. Orders 3 and 4, whose limits are lower, are mostly ways to 5.
 */
 #include "order.h"
+#include "predictor.h"
 #include "integrator/coordinates/rotations.h"
-#include "integrator/sweeps.h"
 #include <algorithm>
 
 namespace hht3
@@ -39,77 +39,23 @@ constexpr PetscReal least_difference = 0.5;
 /* Of h from one step to the next above order two: coefficients of variable steps grow with it */
 constexpr PetscReal max_growth = 2;
 
-constexpr int lowest_difference = 2, num_differences = max_order; /* of the differences in use: S_2 ... S_6 */
-
-constexpr int most_points = max_order + 2; /* of the highest one; those that the history does not have yet weigh nothing */
-
-/* Scaled differences as sums of squares or largest entries */
-template <bool largest>
-struct Differences {
-  PetscReal          weight[num_differences][most_points] = {};
-  const PetscScalar *u[most_points], *w;
-  Four               result[num_differences] = {};
-
-  template <class At>
-  HHT3_INLINE void operator()(const At &at)
-  {
-    const Four scale = at.get(w);
-    Four       d[num_differences] = {};
-    for (int j = 0; j < most_points; j++) {
-      const Four x = at.get(u[j]);
-      for (int s = 0; s < num_differences; s++) d[s] += weight[s][j] * x;
-    }
-    for (int s = 0; s < num_differences; s++) {
-      const Four x = d[s] * scale;
-      if (largest) result[s] = Larger(Absolute(x), result[s]);
-      else result[s] += x * x;
-    }
-  }
-  PetscReal total(int s) const { return largest ? PetscMax(PetscMax(result[s][0], result[s][1]), PetscMax(result[s][2], result[s][3])) : Total(result[s]); }
-};
-
-/* Of U1, U0 and the past up to S_top, on this rank */
-template <bool largest>
-PetscErrorCode SweepDifferences(const Integrator &I, PetscInt top, PetscReal result[num_differences])
+/* S_m of U1, U0 and the past as far as that goes; those beyond are -1 */
+PetscErrorCode DifferencesOfStates(TS ts, NormType type, PetscReal S[])
 {
-  Differences<largest> d;
-  Vec                  vec[most_points] = {I.U1, I.U0};
-  PetscReal            tau[most_points];
-  PetscInt             n;
+  Integrator &I   = Get(ts);
+  Order      &o   = I.order;
+  Vec         x[] = {I.U1, I.U0, o.U[0], o.U[1], o.U[2], o.U[3], o.U[4]};
+  PetscReal   t[max_order + 2] = {I.t1};
 
   PetscFunctionBegin;
-  Spans(I.order, I.t1, tau);
-  for (PetscInt m = lowest_difference; m <= top; m++) DifferenceWeights(m, tau, d.weight[m - lowest_difference]);
-  for (PetscInt j = 2; j < most_points; j++) vec[j] = j <= top ? I.order.U[j - 2] : I.U1;
-  PetscCall(VecGetLocalSize(I.U1, &n));
-  PetscCall(VecGetArrayRead(I.weight, &d.w));
-  for (int j = 0; j < most_points; j++) PetscCall(VecGetArrayRead(vec[j], &d.u[j]));
-  d = Sweep(n, d);
-  for (int s = 0; s < num_differences; s++) result[s] = d.total(s);
-  for (int j = 0; j < most_points; j++) PetscCall(VecRestoreArrayRead(vec[j], &d.u[j]));
-  PetscCall(VecRestoreArrayRead(I.weight, &d.w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* S_m as far as the history goes, S[m]; those beyond are -1 */
-PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscReal S[])
-{
-  Integrator    &I   = Get(ts);
-  Order         &o   = I.order;
-  const PetscInt top = o.past + 1;
-  PetscReal      local[num_differences], all[num_differences];
-
-  PetscFunctionBegin;
-  if (o.measured && type == o.norm) { /* by the estimate */
-    std::copy_n(o.S, max_order + 2, S);
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (!o.measured || type != o.norm) { /* by the estimate */
+    std::copy_n(o.t, max_order + 1, t + 1);
+    std::fill_n(o.S, max_order + 2, -1);
+    PetscCall(ScaledDifferences(ts, type, o.past + 2, x, t, o.S));
+    o.measured = PETSC_TRUE;
+    o.norm     = type;
   }
-  PetscCall(type == NORM_2 ? SweepDifferences<false>(I, top, local) : SweepDifferences<true>(I, top, local));
-  PetscCallMPI(MPI_Allreduce(local, all, num_differences, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt m = lowest_difference; m < lowest_difference + num_differences; m++) S[m] = m > top ? -1 : type == NORM_2 ? PetscSqrtReal(all[m - lowest_difference] / PetscMax(I.norm_size, 1)) : all[m - lowest_difference];
-  o.measured = PETSC_TRUE;
-  o.norm     = type;
-  std::copy_n(S, max_order + 2, o.S);
+  std::copy_n(o.S, max_order + 2, S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,8 +77,8 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   for (PetscReal &s : c->S) s = -1;
   for (PetscReal &e : c->E) e = -1;
   Spans(I.order, I.t1, tau);
-  PetscCall(ScaledDifferences(ts, ts->adapt->wnormtype, c->S));
-  for (PetscInt m = lowest_difference; m < lowest_difference + num_differences; m++)
+  PetscCall(DifferencesOfStates(ts, ts->adapt->wnormtype, c->S));
+  for (PetscInt m = 2; m <= max_order + 1; m++)
     if (c->S[m] >= 0) c->S[m] = o.after.S[m] = PetscMax(c->S[m], amplitude_decay * o.memory.S[m] * PetscPowRealInt(I.h / I.h_last, m));
   for (PetscInt m = 3; m <= max_order; m++) {
     c->ratio[m] = 0;
@@ -197,7 +143,7 @@ PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
 
   PetscFunctionBegin;
   Spans(I.order, I.t1, tau);
-  PetscCall(ScaledDifferences(ts, type, S));
+  PetscCall(DifferencesOfStates(ts, type, S));
   *wlte = ErrorFactor(k, tau) * S[k + 1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

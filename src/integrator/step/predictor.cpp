@@ -1,16 +1,14 @@
 /*
-  The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by a polynomial of degree 0 to 3 (up to 5 above order two) through the
-  accepted steps, in Newton's form
+  The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by the polynomial of degree 0 to 3 (up to 5 above order two) through their
+  values at the ends of the accepted steps.
 
-    P_d(t) = D_0 + (t - t_n) D_1 + (t - t_n)(t - t_{n-1}) D_2 + ...
-
-  with divided differences D_k. A polynomial of degree d missed the new value by exactly (t - t_n)...(t - t_{n-d}) D_{d+1}
-  with the new difference, so that one sweep over the differences both updates them and tells which degree would have
-  served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
+  The polynomial of degree d through the values before it missed a new one by its scaled difference of order d + 1, so that one sweep tells
+  which degree would have served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
 */
 #include "integrator/entries.h"
 #include "predictor.h"
 #include "integrator/sweeps.h"
+#include <algorithm>
 
 namespace hht3
 {
@@ -33,72 +31,74 @@ PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* New differences D_0 ... D_{have+1} from the new values x and the old ones, D_0 ... D_have, in place, and sums of squares of the misses by the weights.
-   The number of differences is the template's, for a loop without inner branches. */
-template <int have>
-struct NewDifferences {
-  const PetscScalar *x, *w;
-  PetscScalar       *D[have + 2];
-  PetscReal          inverse[have + 1]; /* of the times that the differences span */
-  Four               squares[have + 1] = {};
+/* The squares of scaled differences by the weights, or the largest. Room for more points than there are costs zero factors, and saves loops with inner branches. */
+template <int room, bool largest>
+struct DifferenceSweep {
+  const PetscScalar *x[room], *w;
+  PetscReal          factor[room][room];
+  Four               result[room] = {};
 
   template <class At>
   HHT3_INLINE void operator()(const At &at)
   {
     const Four weight = at.get(w);
-    Four       now    = at.get(x);
-    for (int k = 0; k <= have; k++) {
-      const Four old = at.get(D[k]);
-      at.put(D[k], now);
-      now               = (now - old) * inverse[k];
-      const Four missed = now * weight;
-      squares[k] += missed * missed;
+    Four       d[room];
+    for (int j = 0; j < room; j++) d[j] = at.get(x[j]);
+    for (int m = 1; m < room; m++) {
+      for (int j = 0; j + m < room; j++) d[j] = (d[j] - d[j + 1]) * factor[m][j];
+      const Four weighted = d[0] * weight;
+      if (largest) result[m] = Larger(Absolute(weighted), result[m]);
+      else result[m] += weighted * weighted;
     }
-    at.put(D[have + 1], now);
   }
+  PetscReal total(int m) const { return largest ? PetscMax(PetscMax(result[m][0], result[m][1]), PetscMax(result[m][2], result[m][3])) : Total(result[m]); }
 };
 
-/* The step at t1 is accepted. miss[k]: of degree k at t1, over the product of the times that its differences span; weights of unknowns that do not
-   count are zero. */
-template <int have>
-PetscErrorCode RenewTo(const Integrator &I, Predictor &p, PetscReal miss[])
+template <int room, bool largest>
+PetscErrorCode SweepDifferences(const Integrator &I, PetscInt points, const Vec x[], const PetscReal t[], PetscReal result[])
 {
-  NewDifferences<have> sweep;
-  const bool           states = I.count[TSHHT3_STATE]; /* for which s' counts: a copy of X has them */
-  const Vec            x      = states ? p.D[have + 1] : I.X;
-  PetscInt             n;
+  DifferenceSweep<room, largest> d;
+  PetscInt                       n;
 
   PetscFunctionBegin;
-  if (states) {
-    PetscCall(VecCopy(I.X, x));
-    PetscCall(ForSome(I.states, [](PetscInt, PetscScalar rate, PetscScalar &now) { now = rate; }, Read(I.V1), Write(x)));
-  }
-  PetscCall(VecGetLocalSize(x, &n));
-  PetscCall(VecGetArrayRead(x, &sweep.x));
-  PetscCall(VecGetArrayRead(I.weight, &sweep.w));
-  for (int k = 0; k <= have + 1; k++) PetscCall(VecGetArray(p.D[k], &sweep.D[k]));
-  for (int k = 0; k <= have; k++) sweep.inverse[k] = 1 / (I.t1 - p.t[k]);
-  sweep = Sweep(n, sweep);
-  for (int k = 0; k <= have; k++) miss[k] = Total(sweep.squares[k]);
-  for (int k = 0; k <= have + 1; k++) PetscCall(VecRestoreArray(p.D[k], &sweep.D[k]));
-  PetscCall(VecRestoreArrayRead(I.weight, &sweep.w));
-  PetscCall(VecRestoreArrayRead(x, &sweep.x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode RenewDifferences(const Integrator &I, Predictor &p, PetscInt have, PetscReal miss[])
-{
-  static constexpr PetscErrorCode (*of[])(const Integrator &, Predictor &, PetscReal[]) = {RenewTo<0>, RenewTo<1>, RenewTo<2>, RenewTo<3>, RenewTo<4>, RenewTo<5>};
-  static_assert(sizeof(of) / sizeof(of[0]) == max_degree + 1, "one for each number of differences");
-
-  PetscFunctionBegin;
-  PetscCall(of[have](I, p, miss));
+  for (int m = 1; m < room; m++)
+    for (int j = 0; j + m < room; j++) d.factor[m][j] = j + m < points ? DifferenceFactor(t, m, j) : 0;
+  PetscCall(VecGetLocalSize(I.weight, &n));
+  PetscCall(VecGetArrayRead(I.weight, &d.w));
+  for (int j = 0; j < room; j++) PetscCall(VecGetArrayRead(x[j < points ? j : 0], &d.x[j]));
+  d = Sweep(n, d);
+  for (int m = 1; m < points; m++) result[m] = d.total(m);
+  for (int j = 0; j < room; j++) PetscCall(VecRestoreArrayRead(x[j < points ? j : 0], &d.x[j]));
+  PetscCall(VecRestoreArrayRead(I.weight, &d.w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
 
-/* Forgets the history; D_0 stands as the only point */
+PetscErrorCode ScaledDifferences(TS ts, NormType type, PetscInt points, const Vec x[], const PetscReal t[], PetscReal S[])
+{
+  const Integrator &I = Get(ts);
+  constexpr int     few = default_degree + 2, most = max_degree + 2;
+  const auto        sweep = type == NORM_2 ? points > few ? SweepDifferences<most, false> : SweepDifferences<few, false> : points > few ? SweepDifferences<most, true> : SweepDifferences<few, true>;
+
+  PetscFunctionBegin;
+  PetscCall(sweep(I, points, x, t, S));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, S + 1, (PetscMPIInt)(points - 1), MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  for (PetscInt m = 1; m < points && type == NORM_2; m++) S[m] = PetscSqrtReal(S[m] / PetscMax(I.norm_size, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SlopeOfUnknowns(const Integrator &I, Vec slope)
+{
+  const Predictor &p = I.predictor;
+
+  PetscFunctionBegin;
+  PetscCall(VecWAXPY(slope, -1, p.X[1], p.X[0]));
+  PetscCall(VecScale(slope, 1 / (p.t[0] - p.t[1])));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forgets the history; X[0] stands as the only point */
 PetscErrorCode PredictorReset(TS ts)
 {
   Predictor &p = Get(ts).predictor;
@@ -112,17 +112,15 @@ PetscErrorCode PredictorReset(TS ts)
 
 PetscErrorCode Predict(TS ts, Vec X)
 {
-  Integrator      &I = Get(ts);
-  const Predictor &p = I.predictor;
-  PetscReal        factor = 1;
+  Integrator &I = Get(ts);
+  Predictor  &p = I.predictor;
+  PetscScalar weight[max_degree + 1];
 
   PetscFunctionBegin;
   PetscCall(PetscLogEventBegin(events.predict, ts, 0, 0, 0));
-  PetscCall(VecCopy(p.D[0], X));
-  for (int k = 1; k <= p.degree; k++) {
-    factor *= I.t1 - p.t[k - 1];
-    PetscCall(ForEntries([=](PetscInt, PetscScalar d, PetscScalar &x) { x += factor * d; }, Read(p.D[k]), Write(X)));
-  }
+  LagrangeWeights(p.degree, p.t, I.t1, weight);
+  PetscCall(VecZeroEntries(X));
+  PetscCall(VecMAXPY(X, p.degree + 1, weight, p.X));
   if (I.count[TSHHT3_STATE]) PetscCall(StatesToUnknowns(I, X));
   PetscCall(PetscLogEventEnd(events.predict, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -139,30 +137,30 @@ PetscErrorCode PredictRest(const Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The step at t1 is accepted: it becomes D_0, and the degree for the next step is chosen */
+/* The step at t1 is accepted: it becomes X[0], and the degree for the next step is chosen */
 PetscErrorCode PredictorUpdate(TS ts)
 {
   Integrator    &I = Get(ts);
   Predictor     &p = I.predictor;
-  /* the estimate of states needs D_1, dense output of order k D_{k-1} */
+  /* the estimate of states needs the value before t_n, dense output of order k those of k ends */
   const PetscInt keep = PetscMax(p.degree_max, I.order.max > 2 ? I.order.max - 1 : I.count[TSHHT3_STATE] ? 1 : 0);
-  const PetscInt have = PetscMin(p.available, keep); /* old D_0..D_have exist */
-  PetscReal      miss[max_degree + 1], sum[max_degree + 1], factor = 1, best = PETSC_MAX_REAL;
+  const PetscInt have = PetscMin(p.available, keep) + 1;
+  PetscReal      S[max_degree + 2], best = PETSC_MAX_REAL;
 
   PetscFunctionBegin;
-  if (!p.D[have + 1]) PetscCall(VecDuplicate(I.X, &p.D[have + 1]));
-  PetscCall(RenewDifferences(I, p, have, miss));
-  for (PetscInt k = have; k >= 0; k--) p.t[k + 1] = p.t[k];
-  p.t[0]      = I.t1;
-  p.available = PetscMin(have + 1, keep);
+  if (!p.X[have]) PetscCall(VecDuplicate(I.X, &p.X[have]));
+  std::rotate(p.X, p.X + have, p.X + have + 1);
+  std::copy_backward(p.t, p.t + have, p.t + have + 1);
+  p.t[0] = I.t1;
+  PetscCall(VecCopy(I.X, p.X[0]));
+  if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [](PetscInt, PetscScalar rate, PetscScalar &now) { now = rate; }, Read(I.V1), Write(p.X[0])));
+  p.available = PetscMin(have, keep);
   p.degree    = PetscMin(p.available, p.degree_max);
   if (p.fixed || !p.degree_max) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Allreduce(miss, sum, (PetscMPIInt)(have + 1), MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  for (PetscInt d = 0; d <= PetscMin(have, p.degree_max); d++) {
-    factor *= I.t1 - p.t[d + 1];
-    const PetscReal m = PetscAbsReal(factor) * PetscSqrtReal(sum[d]);
-    if (d > 0 && !(m < higher_degree_margin * best)) break;
-    best     = m;
+  PetscCall(ScaledDifferences(ts, NORM_2, have + 1, p.X, p.t, S));
+  for (PetscInt d = 0; d < PetscMin(have, p.degree_max + 1); d++) {
+    if (d > 0 && !(S[d + 1] < higher_degree_margin * best)) break;
+    best     = S[d + 1];
     p.degree = d;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

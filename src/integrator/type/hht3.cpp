@@ -47,7 +47,7 @@ PetscErrorCode DuplicateAll(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.predictor.D[0]}) {
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.predictor.X[0]}) {
     if (*v) continue;
     PetscCall(VecDuplicate(ts->vec_sol, v));
     PetscCall(VecZeroEntries(*v));
@@ -154,7 +154,7 @@ PetscErrorCode TSReset_HHT(TS ts)
   for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.F0, &I.dV, &I.normal_jerk, &I.X, &I.U1, &I.V1, &I.A1, &I.before, &I.work, &I.gamma, &I.excitation, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.verify.inertia, &I.verify.claim, &I.verify.noise, &I.verify.model, &I.verify.work, &I.verify.where, &I.verify.unproved, &I.verify.driven}) PetscCall(VecDestroy(v));
   for (Vec &v : I.spare) PetscCall(VecDestroy(&v));
   I.spare.clear();
-  for (Vec &d : I.predictor.D) PetscCall(VecDestroy(&d));
+  for (Vec &x : I.predictor.X) PetscCall(VecDestroy(&x));
   for (Vec &u : I.order.U) PetscCall(VecDestroy(&u));
   for (Vec &v : I.order.V) PetscCall(VecDestroy(&v));
   PetscCall(MatDestroy(&I.second));
