@@ -93,24 +93,20 @@ PetscErrorCode GetSampler(TS ts, Sampler **S)
 namespace
 {
 
-/* Weights of values at z_k for the first and second derivative at 0 of the polynomial through them (Fornberg 1988) */
+/* Weights of values at z_k for the value at 0 of the polynomial through them, and for its first and second derivative */
 void DerivativeWeights(const PetscReal z[time_points], PetscReal weight[time_points][3])
 {
-  PetscReal c1 = 1, c4 = z[0];
-  for (int k = 0; k < time_points; k++)
-    for (int m = 0; m < 3; m++) weight[k][m] = k == 0 && m == 0;
-  for (int i = 1; i < time_points; i++) {
-    const PetscReal c5 = c4;
-    PetscReal       c2 = 1;
-    c4                 = z[i];
-    for (int j = 0; j < i; j++) {
-      const PetscReal c3 = z[i] - z[j];
-      c2 *= c3;
-      if (j == i - 1)
-        for (int m = 2; m >= 0; m--) weight[i][m] = c1 * ((m ? m * weight[i - 1][m - 1] : 0) - c5 * weight[i - 1][m]) / c2;
-      for (int m = 2; m >= 0; m--) weight[j][m] = (c4 * weight[j][m] - (m ? m * weight[j][m - 1] : 0)) / c3;
+  for (int k = 0; k < time_points; k++) {
+    PetscReal *w = weight[k];
+    w[0] = 1;
+    w[1] = w[2] = 0;
+    for (int i = 0; i < time_points; i++) { /* times (x - z_i)/(z_k - z_i) */
+      if (i == k) continue;
+      const PetscReal slope = 1 / (z[k] - z[i]), value = -z[i] * slope;
+      w[2] = value * w[2] + 2 * slope * w[1];
+      w[1] = value * w[1] + slope * w[0];
+      w[0] *= value;
     }
-    c1 = c2;
   }
 }
 
@@ -140,28 +136,39 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From U, V, A as they were interpolated, which are the first guess */
-PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
+/* From the sampler's U, V, A, which are the first guess; derivatives() makes gamma. The run is not changed, also not where the application ends it with an error, after which it may go on. */
+template <class Derivatives>
+PetscErrorCode SolveSample(TS ts, Sampler &S, Derivatives derivatives, PetscBool *ok, const char **why)
 {
   Integrator            &I     = Get(ts);
   const TSHHT3Statistics saved = I.stat;
-  const char            *why;
   WorkVec                before;
 
   PetscFunctionBegin;
-  PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
-  S.at.t    = t;
-  S.at.tiny = vanishing_step * I.h;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
     Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
   PetscCall(ReferTo(ts, S.at.U, before));
-  PetscErrorCode failed = S.at.gamma ? ConstraintTerms(ts, S.at) : PETSC_SUCCESS;
-  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, &why);
-  PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
+  PetscErrorCode failed = S.at.gamma ? derivatives() : PETSC_SUCCESS;
+  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, why);
+  PetscCall(ReferBack(ts, S.at.U, before));
   I.stat = saved;
   PetscCall(failed);
   if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Between the ends of the step */
+PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
+{
+  const char *why;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLogEventBegin(events.sample, ts, 0, 0, 0));
+  S.at.t    = t;
+  S.at.tiny = vanishing_step * Get(ts).h;
+  S.at.T    = 0;
+  PetscCall(SolveSample(ts, S, [&] { return ConstraintTerms(ts, S.at); }, ok, &why));
   if (!*ok) PetscCall(PetscInfo(ts, "sample at t = %g: %s; accelerations and multipliers by linear interpolation\n", (double)t, why));
   PetscCall(PetscLogEventEnd(events.sample, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -216,32 +223,20 @@ PetscErrorCode SolutionWasSet(TS ts, PetscBool *set)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Accelerations and multipliers of the sampler's U and V, as a start from there would find them */
+/* At the present time, as a start from there would find them */
 PetscErrorCode SolveAsStart(TS ts, Sampler &S, PetscBool *ok, const char **why)
 {
-  Integrator            &I     = Get(ts);
-  const TSHHT3Statistics saved = I.stat;
-  PetscReal              T;
-  Levels                 levels;
-  WorkVec                before;
+  const Integrator &I = Get(ts);
+  PetscReal         T;
+  Levels            levels;
 
   PetscFunctionBegin;
   PetscCall(TimeScaleOfConstraints(ts, S.at.V, &T));
-  S.at.t    = ts->ptime;
-  S.at.tiny = vanishing_step * PetscMin(T, 1);
-  S.at.T    = I.constraints() && I.count[TSHHT3_STATE] ? T : 0;
+  S.at.t      = ts->ptime;
+  S.at.tiny   = vanishing_step * PetscMin(T, 1);
+  S.at.T      = I.constraints() && I.count[TSHHT3_STATE] ? T : 0;
   S.at.levels = &levels;
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar a, PetscScalar &x) { x = UnknownOf(RoleOf(I, i), u, v, a); },
-    Read(S.at.U), Read(S.at.V), Read(S.at.A), Write(S.at.X)));
-  PetscCall(ReferTo(ts, S.at.U, before));
-  PetscErrorCode failed = S.at.gamma ? ConstraintDerivatives(ts, S.at.t, S.at.U, S.at.V, T, &levels, NULL, S.at.gamma) : PETSC_SUCCESS;
-  if (!failed) failed = SolveConsistent(ts, S.at, false, ok, why);
-  PetscCall(ReferBack(ts, S.at.U, before)); /* also after an error of the application, which may go on */
-  S.at.T = 0;
-  I.stat   = saved;
-  PetscCall(failed);
-  if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
+  PetscCall(SolveSample(ts, S, [&] { return ConstraintDerivatives(ts, S.at.t, S.at.U, S.at.V, T, &levels, NULL, S.at.gamma); }, ok, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,12 +25,11 @@ namespace
 PetscErrorCode CoordinateNorm(TS ts, Vec d, PetscReal s, PetscReal *e)
 {
   Integrator &I   = Get(ts);
-  PetscReal   sum = 0, total;
+  PetscReal   sum = 0;
 
   PetscFunctionBegin;
   PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar w) { if (IsCoordinate(I, i)) sum += PetscSqr(PetscRealPart(x * w) * s); }, Read(d), Read(I.weight)));
-  PetscCallMPI(MPI_Allreduce(&sum, &total, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  *e = PetscSqrtReal(total / PetscMax(I.norm_size, 1));
+  PetscCall(ReduceNorm(ts, NORM_2, sum, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

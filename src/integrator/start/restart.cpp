@@ -62,7 +62,7 @@ static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *par
 static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
 {
   const Integrator &I     = Get(ts);
-  PetscReal         local = 0, sum;
+  PetscReal         sum = 0;
   WorkVec           slope;
 
   PetscFunctionBegin;
@@ -71,10 +71,9 @@ static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
   PetscCall(slope.like(I.X));
   PetscCall(SlopeOfUnknowns(I, slope));
   PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar rate, PetscScalar w) { local += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
+    [&](PetscInt i, PetscScalar rate, PetscScalar w) { sum += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
     Read(slope), Read(I.weight)));
-  PetscCallMPI(MPI_Allreduce(&local, &sum, 1, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
-  *e = PetscSqrtReal(sum / PetscMax(I.norm_size, 1));
+  PetscCall(ReduceNorm(ts, NORM_2, sum, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -32,18 +32,17 @@ struct Tolerances {
   }
 };
 
-/* Root mean square or maximum over all ranks of values accumulated locally */
-PetscErrorCode ReduceNorm(TS ts, NormType type, PetscInt size, PetscReal local, PetscReal *norm)
+} // namespace
+
+PetscErrorCode ReduceNorm(TS ts, NormType type, PetscReal local, PetscReal *norm)
 {
   PetscReal global;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(&local, &global, 1, MPIU_REAL, type == NORM_2 ? MPIU_SUM : MPIU_MAX, PetscObjectComm((PetscObject)ts)));
-  *norm = type == NORM_2 ? PetscSqrtReal(global / PetscMax(size, 1)) : global;
+  *norm = type == NORM_2 ? PetscSqrtReal(global / PetscMax(Get(ts).norm_size, 1)) : global;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-} // namespace
 
 /* The first weights. Also the size below which a correction is rounding of q, and the number of entries that enter the norm
    (p in (27)): what is 0 as yet and has a relative tolerance alone is one of them (Options.RelativeToleranceOfWhatIsZeroAtTheStart). What does not enter has a Y_i that it never exceeds, and so keeps its weight 0. */
@@ -135,7 +134,7 @@ PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, Petsc
 
   PetscFunctionBegin;
   if (I.count[TSHHT3_STATE]) PetscCall(ForSome(I.states, [&](PetscInt, PetscScalar d, PetscScalar w) { states += PetscSqr(d * w); }, Read(dX), Read(I.weight)));
-  PetscCall(ReduceNorm(ts, NORM_2, I.norm_size, PetscMax(sum - states, 0) * q * q + states * s * s, e));
+  PetscCall(ReduceNorm(ts, NORM_2, PetscMax(sum - states, 0) * q * q + states * s * s, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,7 +211,7 @@ PetscErrorCode TSEvaluateWLTE_HHT(TS ts, NormType type, PetscInt *order, PetscRe
     PetscCall(CoordinateErrors(I, type, &acc));
     PetscCall(AddRotationErrors(I, type, &acc));
     PetscCall(AddStateErrors(I, type, &acc));
-    PetscCall(ReduceNorm(ts, type, I.norm_size, acc, wlte));
+    PetscCall(ReduceNorm(ts, type, acc, wlte));
   }
   I.wlte_pending = *wlte;
   PetscCall(PetscLogEventEnd(events.estimate, ts, 0, 0, 0));

@@ -12,6 +12,9 @@ namespace hht3
 PetscErrorCode UpdateWeights(TS ts, Vec U, bool all = false);
 PetscErrorCode FollowTolerances(TS ts, Vec U);
 
+/* Of all ranks, from sums of squares by the weights, or the largest: the root mean square, or the largest */
+PetscErrorCode ReduceNorm(TS ts, NormType type, PetscReal local, PetscReal *norm);
+
 /* A correction in units of the tolerance: the change of the error estimate that it makes in a step of length h, (40); for h = 1 |k| times the weighted norm */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e);
 
