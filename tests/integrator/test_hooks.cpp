@@ -407,7 +407,7 @@ TEST(Hooks, MonitorsThatEvaluateTheJacobian)
   must(through.solve());
   must(rest.solve());
   std::remove(file.c_str());
-  EXPECT_EQ(rest.u(), through.u());
+  for (int k = 0; k < 3; k++) EXPECT_NEAR(rest.u()[k], through.u()[k], 1e-8) << k; /* pivots are chosen anew, so that last digits differ */
 }
 
 namespace
