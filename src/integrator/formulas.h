@@ -43,8 +43,8 @@ inline void StateParameters(PetscReal rho, Parameters &p)
   p.k_s = l * (p.am_s - (PetscReal)0.5) + p.gamma_s * (l + (PetscReal)0.5) - (PetscReal)1 / 6;
 }
 
-/* HHT of parameter alpha in [-1/3, 0]: (5), and k of (26) for the paper's form. In the second-order form a_n lags behind
-   q''_n by alpha h, which makes the leading error of the position beta + alpha/2 - 1/6 times h^2 (a_{n+1} - a_n). */
+/* HHT of parameter alpha in [-1/3, 0]: (5), and k of (26) for the paper's form. In the second-order form a_n is q'' at
+   t_n + alpha h, before t_n, which makes the leading error of the position beta + alpha/2 - 1/6 times h^2 (a_{n+1} - a_n). */
 inline Parameters HHTParameters(PetscReal alpha, bool paper)
 {
   Parameters p;

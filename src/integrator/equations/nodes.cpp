@@ -54,7 +54,7 @@ PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
   The preconditioner's own solver has the prefix `constraint_`. Without this call consecutive unknowns that are coupled to the same others,
   but for multipliers, are taken for a node. Scenes make the call themselves.
 
-  Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, 400 where there are more than 200,000, move together as a rigid body on a coarse level, whose solver has the prefix
+  Where positions are known, neighbouring nodes, `-pc_hhtconstraint_aggregate <200>` of them, 400 where there are 200,000 and more, move together as a rigid body on a coarse level, whose solver has the prefix
   `coarse_`; with 0 there is none.
 
   At relative tolerances (`-ksp_rtol`) from 1e-4 on the Krylov method's products are of single precision in what couples nodes of three unknowns, `-pc_hhtconstraint_single <true>`; where

@@ -20,9 +20,8 @@
   Notes:
   The paper's form (9a) divides M q'' at t_{n+1} by 1+alpha and averages all other forces between both ends of the step. Where
   M depends on q and alpha is not 0 it is of first order. The second-order form satisfies the equations of motion at t_{n+1}
-  and averages an algorithmic acceleration. For constant M and constant steps both have the same positions, but for rows of
-  constraints that read q'', of which the paper's form makes a method of first order. Its accelerations, at other steps its
-  positions, are of first order, too.
+  and averages an algorithmic acceleration. For constant M and constant steps both have the same positions. The accelerations of
+  the paper's form, and at other steps its positions, are of first order.
 
 .seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetRadius()`
 @*/
@@ -336,7 +335,7 @@ PetscErrorCode TSHHT3SetIS(TS ts, TSHHT3Role role, IS is)
 - role - the role
 
   Output Parameter:
-. is - the indices; `NULL` if there are none. Owned by the `TS`
+. is - the indices; `NULL`, or without entries, if there are none. Owned by the `TS`
 
   Level: intermediate
 
