@@ -18,7 +18,7 @@ ElementBuilder Entry(Scene &scene, const std::string &name, const char *type, Ma
 {
   ElementBuilder e(scene, name, type, ElementData::Force, i, j);
   RequireTwoBodies(e, i, j);
-  /* the normal force alone, on a sphere alone, has no moment about the marker's origin */
+  /* without friction, the force on a sphere has no moment about the marker's origin */
   if (law.friction != 0 || round == Round::No) RequireNoPoint(e, i, "i");
   if (law.friction != 0 || round != Round::Both) RequireNoPoint(e, j, "j");
   return e;

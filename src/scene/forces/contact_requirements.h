@@ -1,4 +1,4 @@
-/* What contacts and stops ask of their law */
+/* Checks of the contact law of contacts and stops */
 #ifndef HHTDAE_SCENE_FORCES_CONTACT_REQUIREMENTS_H
 #define HHTDAE_SCENE_FORCES_CONTACT_REQUIREMENTS_H
 

@@ -10,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* Resultant of all nodes about the body's centre of mass, and what the other body gets about its marker */
+/* For measures: resultant of all nodes about the body's centre of mass, and the load on the other body about its marker */
 template <class Shape> class NodeContactProbe : public Probe
 {
 public:
@@ -86,7 +86,7 @@ private:
   }
 };
 
-/* Places among the kept nodes, each once */
+/* Numbers of the nodes among the kept ones, each once */
 std::vector<PetscInt> PlacesOf(ElementBuilder &e, const ModalBody &m, const NodeContact &s)
 {
   std::vector<PetscInt> places;
@@ -118,7 +118,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  if (!flexible) { /* without a marker that it could be at */
+  if (!flexible) { /* there is no marker at which to enter it */
     const Element none = absent(name);
     s.errors.push_back("node contact " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
     return none;
@@ -128,7 +128,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
   if (!e.good()) return e.done();
   const PetscInt other = s.markers[x.j.id].body;
   e.require(other < 0 || s.bodies[other].carrier != x.body.id, "marker j is on the same flexible body " + s.bodyName(x.body.id));
-  if (x.radius_j == 0 || x.law.friction != 0) RequireNoPoint(e, x.j, "j"); /* a sphere without friction alone takes no moment */
+  if (x.radius_j == 0 || x.law.friction != 0) RequireNoPoint(e, x.j, "j"); /* only a sphere without friction has no moment */
   if (x.radius_j == 0) RequireNotNegative(e, "radius", x.radius);
   else RequirePositive(e, "radius", x.radius);
   if (x.radius_j != 0) RequirePositive(e, "radius_j", x.radius_j);

@@ -71,10 +71,10 @@ Points SecondDerivatives(const std::vector<double> &s, const Points &y, bool per
 
 std::string Number(std::size_t k) { return std::to_string(k); }
 
-constexpr int kParts = 4; /* nodes of the normal per piece of the path */
+constexpr int normals_per_piece = 4; /* nodes of the normal's spline per piece of the path */
 
-/* The normal m of the unit tangent a, by the smallest turn that takes a into the unit tangent b; where the path turns back it is one of both */
-Vec3<double> CarryNormal(const Vec3<double> &a, const Vec3<double> &b, const Vec3<double> &m)
+/* Rotates the normal m by the smallest rotation that takes the unit tangent a into b; if b = -a, m is normal to both and is returned unchanged */
+Vec3<double> TransportNormal(const Vec3<double> &a, const Vec3<double> &b, const Vec3<double> &m)
 {
   const double c = 1 + a.dot(b);
   return c > 1e-12 ? Vec3<double>(m - b.dot(m) / c * (a + b)) : m;
@@ -94,7 +94,7 @@ VectorSpline::VectorSpline(std::vector<double> knots, const Points &y, bool peri
     p.start        = knots_[k];
     p.a << y[k], (y[k + 1] - y[k]) / h - h / 6 * (2 * m[k] + m[k + 1]), m[k] / 2, (m[k + 1] - m[k]) / (6 * h);
   }
-  /* straight on at the ends; of a periodic spline they are met by rounding only */
+  /* straight continuation beyond the ends; in a periodic spline parameters get there only by rounding */
   Vec3<double> c, c1, c2;
   for (std::size_t k : {std::size_t(0), n + 1}) {
     const double end = k == 0 ? knots_.front() : knots_.back(), u = k == 0 ? 0 : end - pieces_[n].start;
@@ -148,9 +148,9 @@ bool Curve::checkPoints(Points &points, bool closed)
 }
 
 /*
-  A normal at nodes along the path, carried from node to node by the smallest turn that takes the tangents into each
-  other; a closed curve gets the same normal at its end by an even turn about the tangent. Between the nodes it is a
-  spline, whose part normal to the tangent is used.
+  The normal at nodes along the path, transported from node to node by the smallest rotation that takes one tangent into the
+  next; in a closed curve a rotation about the tangent, proportional to arc length, makes the normals of both ends equal. Between the nodes the normal is a
+  spline, of which the component normal to the tangent is used.
 */
 void Curve::transportNormal(bool closed)
 {
@@ -159,15 +159,15 @@ void Curve::transportNormal(bool closed)
   Vec3<double>        c, c1, c2;
   const auto         &knots = path_.knots();
   for (std::size_t k = 0; k < knots.size(); k++)
-    for (int i = 0; i < (k + 1 < knots.size() ? kParts : 1); i++)
-      s.push_back(k + 1 < knots.size() ? knots[k] + (knots[k + 1] - knots[k]) * i / kParts : knots[k]);
+    for (int i = 0; i < (k + 1 < knots.size() ? normals_per_piece : 1); i++)
+      s.push_back(k + 1 < knots.size() ? knots[k] + (knots[k + 1] - knots[k]) * i / normals_per_piece : knots[k]);
   for (double x : s) {
     path_(closed && x == s.back() ? s.front() : x, c, c1, c2);
     t.push_back(c1.normalized());
     if (m.empty())
       m.push_back(t[0].unitOrthogonal());
     else
-      m.push_back(CarryNormal(t[t.size() - 2], t.back(), m.back()));
+      m.push_back(TransportNormal(t[t.size() - 2], t.back(), m.back()));
   }
   if (closed) {
     const double angle = std::atan2(m.back().cross(m[0]).dot(t[0]), m.back().dot(m[0]));
@@ -177,14 +177,14 @@ void Curve::transportNormal(bool closed)
   normal_ = VectorSpline(s, m, closed);
 }
 
-/* Too few points at a sharp turn make cusps and loops, where there is no tangent or no closest point. */
+/* Too few points at a sharp bend lead to cusps and loops, without a tangent or a unique closest point. */
 void Curve::checkShape()
 {
   Vec3<double> c, c1, c2, m, m1, m2;
   const auto  &knots = path_.knots();
   for (std::size_t k = 0; k + 1 < knots.size(); k++)
-    for (int i = 0; i < 4 * kParts; i++) {
-      const double s = knots[k] + (knots[k + 1] - knots[k]) * i / (4 * kParts);
+    for (int i = 0; i < 4 * normals_per_piece; i++) {
+      const double s = knots[k] + (knots[k + 1] - knots[k]) * i / (4 * normals_per_piece);
       path_(s, c, c1, c2);
       const double       speed = c1.norm();
       const Vec3<double> t     = c1 / speed;
@@ -205,8 +205,8 @@ double Curve::closest(const Vec3<double> &p) const
   const auto  &knots = path_.knots();
   double       best = knots[0], least = -1;
   for (std::size_t k = 0; k + 1 < knots.size(); k++)
-    for (int i = 0; i <= kParts; i++) {
-      const double s = knots[k] + (knots[k + 1] - knots[k]) * i / kParts;
+    for (int i = 0; i <= normals_per_piece; i++) {
+      const double s = knots[k] + (knots[k + 1] - knots[k]) * i / normals_per_piece;
       path_(s, c, c1, c2);
       const double distance = (p - c).squaredNorm();
       if (least >= 0 && distance >= least) continue;
@@ -216,13 +216,13 @@ double Curve::closest(const Vec3<double> &p) const
   return closest(p, best);
 }
 
-/* Minimizes |p - c(s)|^2 / 2: Newton's method, Gauss-Newton where that is not convex, no step longer than a piece or
- * uphill */
+/* Minimizes |p - c(s)|^2 / 2 by Newton's method, or Gauss-Newton steps if it is not convex; steps are at most as long as a piece and must
+ * decrease the distance */
 double Curve::closest(const Vec3<double> &p, double s) const
 {
   Vec3<double> c, c1, c2;
   const double size = longest_ + path_.length() + p.norm();
-  if (!std::isfinite(size)) return s; /* a diverged iteration: no comparison would ever end the search */
+  if (!std::isfinite(size)) return s; /* of a diverged iteration: comparisons with NaN would not end the search */
   path_(s, c, c1, c2);
   for (int k = 0; k < 100; k++) {
     const double distance = (p - c).squaredNorm(), speed = c1.squaredNorm(), bend = speed - (p - c).dot(c2);

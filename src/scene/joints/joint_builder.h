@@ -1,5 +1,5 @@
-/* What the joints between two markers share: an ElementBuilder that knows its markers, and which of them have to have
- * axes. */
+/* Common part of joints between two markers: an ElementBuilder with the markers, which checks that bodies of markers whose axes are used can
+ * rotate. */
 #ifndef HHTDAE_SCENE_JOINT_BUILDER_H
 #define HHTDAE_SCENE_JOINT_BUILDER_H
 
@@ -36,7 +36,7 @@ public:
             std::string(what) + " is " + Show(value) + ", must be positive and finite");
   }
 
-  /* Rows of kernel K. What it takes from the axes of a marker could not react on a body without rotation. */
+  /* Adds the rows of kernel K. If they depend on the axes of a marker, its body must be able to take moments. */
   template <class K> void rows(const typename K::Data &data = {})
   {
     for (int k = 0; k < 2 && good(); k++) {
@@ -47,18 +47,18 @@ public:
     if (good()) constrain<K>({marker_[0], marker_[1]}, data);
   }
 
-  /* Axes that stay parallel: on the branch on which they are described */
+  /* Rows for axes that stay parallel or antiparallel, as they are described */
   template <class K> void branchRows()
   {
     if (good()) rows<K>(K::branch(start(0), start(1)));
   }
-  /* All of them: a description that is nearer to axes that have changed places, as a slip of axes is, is refused (SceneCheck.MarkersWithOtherAxes) */
+  /* Rows for all three axes. Axes that are nearer to a cyclic permutation, as by a mistake in the description, are an error (SceneCheck.MarkersWithOtherAxes) */
   template <class K> void orientationRows()
   {
     if (!good()) return;
-    double     misses;
-    const auto data = K::branch(start(0), start(1), &misses);
-    require(misses > -0.25, "the axes of markers i and j are not parallel at the start: x_i, y_i and z_i must be along x_j, y_j and z_j, or two of them opposite");
+    double     least_cosine;
+    const auto data = K::branch(start(0), start(1), &least_cosine);
+    require(least_cosine > -0.25, "the axes of markers i and j are not parallel at the start: x_i, y_i and z_i must be along x_j, y_j and z_j, or two of them opposite");
     rows<K>(data);
   }
 

@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr double parallel = 1e-6; /* sine of the largest angle between z_i and z_j at the start, as assembly may still mend */
+constexpr double parallel_sine = 1e-6; /* sine of the largest angle between z_i and z_j at the start; assembly can still correct it */
 
 template <class Spec> void CheckBodies(ElementBuilder &e, const Spec &s)
 {
@@ -33,12 +33,12 @@ void CheckWheel(ElementBuilder &e, Marker i, Marker j, const char *which)
   RequirePair(e, i, j, true, std::string(which) + ": ");
   if (!e.good()) return;
   const Vector3 a = e.frame(i).R.col(2), b = e.frame(j).R.col(2);
-  e.require(a.cross(b).norm() < parallel, std::string(which) + ": the z axes of its markers are not parallel, as those of a revolute or cylindrical joint are");
+  e.require(a.cross(b).norm() < parallel_sine, std::string(which) + ": the z axes of its markers are not parallel, as those of a revolute or cylindrical joint are");
 }
 
 template <class K> void CheckLever(ElementBuilder &e, const typename K::Data &d, int k, const char *which)
 {
-  e.require(std::abs(K::perAngle(d, k)) > parallel * d.side[k].bearing.norm(),
+  e.require(std::abs(K::perAngle(d, k)) > parallel_sine * d.side[k].bearing.norm(),
             std::string(which) + ": the force of the teeth has no lever about its axis; z of `mesh` (planar: x) is the direction of that force, its origin the pitch point");
 }
 
@@ -56,7 +56,7 @@ template <bool Rack, class Spec> Element Mesh(ElementBuilder &e, const Spec &s)
   K::begin(d, f, bearing);
   CheckLever<K>(e, d, 0, "wheel 1");
   if (!Rack) CheckLever<K>(e, d, 1, "wheel 2");
-  else e.require(std::abs(K::perAdvance(d, e.planar() ? 0 : 2)) > parallel, "rack: the force of the teeth is across its way, z of j2 (planar: x)");
+  else e.require(std::abs(K::perAdvance(d, e.planar() ? 0 : 2)) > parallel_sine, "rack: the force of the teeth is across its way, z of j2 (planar: x)");
   if (e.good()) e.constrain<K>({s.i1, s.i2, s.mesh}, d);
   return e.done();
 }

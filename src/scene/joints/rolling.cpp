@@ -1,7 +1,7 @@
 /*
-  Rolling without slip and the knife edge: a holonomic row for the contact, velocity-level rows for its tangents. Which
-  side of the plane the body rolls on is taken from the start. Multipliers: force of the contact on i's body along the
-  axes of j as they are named in rolling.h, first along the normal.
+  Rolling without slip and the knife edge: a holonomic row for the contact, velocity-level rows for its tangents. The
+  side of the plane on which the body rolls is that of the start. Multipliers: force of the contact on i's body along the
+  axes of j named in rolling.h, first along the normal.
 */
 #include "scene/kernels/rolling.h"
 #include "joint_builder.h"
@@ -40,7 +40,7 @@ template <> Element Scene::enter(const std::string &name, const RollingDisc &s)
     return e.done();
   }
   if (e.good())
-    e.require(CosineToNormal(e, 2) < std::cos(DiscOnPlane::flat),
+    e.require(CosineToNormal(e, 2) < std::cos(DiscOnPlane::flat_angle),
               "the disc lies flat on the plane at the start, z_i must not be normal to the plane");
   e.rows<DiscOnPlane>(data);
   e.rows<DiscNoSlip>(data);

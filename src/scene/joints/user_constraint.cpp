@@ -11,12 +11,12 @@ namespace hhtdae
 namespace
 {
 
-constexpr int most_markers = 6; /* of the largest kernel below */
+constexpr int max_markers = 6; /* of a row: those of the largest kernel below */
 
 bool OfPositions(Measure::Kind k) { return k == Measure::Displacement || k == Measure::Distance || k == Measure::Angle; }
 bool OfInputs(Measure::Kind k) { return k == Measure::Value || k == Measure::StateValue; }
 
-/* One row of the element: what it reads, where that stands among the arguments of its kernel */
+/* Builds one row of the element: checks its measures and numbers their markers, angles and inputs for the kernel */
 class RowBuilder
 {
 public:
@@ -35,13 +35,13 @@ public:
   {
     if (markers_.size() <= 2) put<2>();
     else if (markers_.size() <= 4) put<4>();
-    else put<most_markers>();
+    else put<max_markers>();
   }
 
 private:
   ElementBuilder          &e_;
   const Expression        &given_;
-  double                   t_; /* of the start */
+  double                   t_; /* time of the start */
   std::string              where_;
   std::shared_ptr<UserRow> row_;
   std::vector<Marker>      markers_;
@@ -69,7 +69,7 @@ private:
     }
   }
 
-  /* The load of a row on what it turns with is a moment */
+  /* A row that depends on rotations of a body puts a moment on it */
   void mayTurn(const Measure &m, const std::string &what)
   {
     const SceneData &s      = e_.scene();
@@ -112,7 +112,7 @@ private:
       angles_ += m.kind == Measure::Angle;
       row_->arguments.push_back(a);
     }
-    require((int)markers_.size() <= most_markers, " names " + std::to_string(markers_.size()) + " markers, at most " + std::to_string(most_markers));
+    require((int)markers_.size() <= max_markers, " names " + std::to_string(markers_.size()) + " markers, at most " + std::to_string(max_markers));
     require(angles_ <= UserRow::angles, " has " + std::to_string(angles_) + " angles, at most " + std::to_string(UserRow::angles));
     require((int)inputs_.size() <= UserRow::inputs, " has " + std::to_string(inputs_.size()) + " variables and states, at most " + std::to_string(UserRow::inputs));
     const SceneData &s = e_.scene();
@@ -120,7 +120,7 @@ private:
     scale();
   }
 
-  /* how far apart its markers are, for lengths; angles and time have units of one */
+  /* Length scale of lengths: the distance of the markers; other measures have scale 1 */
   void scale()
   {
     double size = 0;
@@ -131,9 +131,9 @@ private:
 
   void atTheStart()
   {
-    Frame<double> f[most_markers];
-    Twist<double> w[most_markers];
-    double        z[UserRow::inputs] = {}, x[6 * most_markers] = {}, y[6 * most_markers] = {}, by[UserRow::inputs] = {};
+    Frame<double> f[max_markers];
+    Twist<double> w[max_markers];
+    double        z[UserRow::inputs] = {}, x[6 * max_markers] = {}, y[6 * max_markers] = {}, by[UserRow::inputs] = {};
     for (std::size_t k = 0; k < markers_.size(); k++) {
       f[k] = e_.frame(markers_[k]);
       w[k] = e_.scene().twist(markers_[k]);
@@ -144,7 +144,7 @@ private:
       for (std::size_t i = 0; i < inputs_.size(); i++) z[i] = InitialInput(e_.scene(), inputs_[i], t_);
       value = row_->value(at);
       row_->gradient(at, x, y, by);
-      for (int d = 0; d < 6 * most_markers; d++) sum += std::abs(x[d]) + std::abs(y[d]);
+      for (int d = 0; d < 6 * max_markers; d++) sum += std::abs(x[d]) + std::abs(y[d]);
       require(!velocities_ || row_->linear(at), " is not linear in its velocities, with factors that do not depend on variables and states, as a row of velocities must be");
     } catch (const std::exception &error) {
       e_.require(false, where_ + " has failed at the start: " + error.what());
@@ -169,7 +169,7 @@ private:
 
 } // namespace
 
-/* Multipliers: one a row, the load is that times the derivatives of the row's expression. */
+/* One multiplier per row; the load is the multiplier times the derivatives of the row's expression. */
 template <> Element Scene::enter(const std::string &name, const UserConstraint &s)
 {
   Marker i, j; /* the first marker of a body, and the first of another body */

@@ -7,8 +7,8 @@
     theta = atan2(x_i . y_j, x_i . x_j),    d theta = g . (d theta_i - d theta_j),    g = (z_j - h x_i)/(1 - h^2),  h =
   x_i . z_j,
 
-  exact whether or not the z axes are parallel; g = z_j where they are. It is undefined where x_i is along z_j:
-  derivatives are then not finite, which the integrator takes as a failed step.
+  exact also if the z axes are not parallel; g = z_j if they are. The angle is undefined if x_i is along z_j:
+  derivatives are then not finite, and the step fails.
 */
 #ifndef HHTDAE_SCENE_KERNELS_ANGLE_H
 #define HHTDAE_SCENE_KERNELS_ANGLE_H
@@ -22,13 +22,13 @@ namespace hhtdae
 
 constexpr double kTurn = 6.283185307179586477;
 
-/* theta + 2 pi n, the one nearest to `near` */
+/* theta + 2 pi n, with the n for which it is nearest to `near` */
 template <class T> T Unwind(const T &theta, double near)
 {
   return theta + T(kTurn * std::round((near - Plain(theta)) / kTurn));
 }
 
-/* in (-pi, pi]; half a turn is pi in whatever axes rounding finds it (CountedAngles.HalfATurnAtTheStart) */
+/* In (-pi, pi]; values within rounding of -pi become pi (CountedAngles.HalfATurnAtTheStart) */
 template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
 {
   const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
@@ -37,8 +37,8 @@ template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
   return Plain(theta) < -kTurn / 2 + 1e-12 ? theta + T(kTurn) : theta;
 }
 
-/* counted over full turns, from the unwound angle that was remembered at the last accepted step; less than half a turn
- * from it */
+/* The angle over full turns: the value within half a turn of `remembered`, the angle at the last accepted
+ * step */
 template <class T> T UnwoundAngle(const Frame<T> &i, const Frame<T> &j, double remembered)
 {
   return Unwind<T>(PrincipalAngle<T>(i, j), remembered);
@@ -52,12 +52,12 @@ template <class T> Vec3<T> AngleGradient(const Frame<T> &i, const Frame<T> &j)
   return n * k;
 }
 
-/* In what time an angle of this rate and acceleration turns by two radians: between accepted steps less than half a turn can be
-   told, and both may grow */
+/* Time, s, in which an angle with this rate and acceleration changes by two radians. Unwinding needs less than half a turn between accepted steps; the margin is
+   for rates that grow */
 inline double LongestTurn(double rate, double acceleration)
 {
   const double fast = std::fabs(rate) + std::sqrt(rate * rate + 4 * std::fabs(acceleration));
-  return fast > 0 ? 4 / fast : std::numeric_limits<double>::infinity(); /* also where the rate is not defined */
+  return fast > 0 ? 4 / fast : std::numeric_limits<double>::infinity(); /* also if the rate is NaN */
 }
 
 /* the exact time derivative of the angle */

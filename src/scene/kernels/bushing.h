@@ -43,9 +43,9 @@ template <bool Damped> struct BushingForce : RelativeForce<BushingForce<Damped>,
       c[3 + k] = -e(k) - T(0.5) * once(k) - gamma * twice(k);
     }
     if constexpr (Damped) {
-      const Vec3<T> carried = r.wj.cross(r.d);
+      const Vec3<T> convective = r.wj.cross(r.d);
       for (int k = 0; k < 3; k++) {
-        c[k] -= T(p.damping(k)) * (r.v(k) - carried(k));
+        c[k] -= T(p.damping(k)) * (r.v(k) - convective(k));
         c[3 + k] -= T(p.torsional_damping(k)) * (r.wi(k) - r.wj(k));
       }
     }

@@ -2,7 +2,7 @@
   Contact of two shapes as a force kernel: Contact<Shape>, Shape from contact_shapes.h, force by contact_law.h.
 
   Components: the contact force on i's body along the axes of j (between spheres: along the space axes); it acts at the
-  contact point, and so does its reaction on j's body. Apart bodies cost the evaluation of their gap in plain numbers,
+  contact point, and so does its reaction on j's body. While the bodies do not touch, only the gap is evaluated, in plain numbers,
   in the Jacobian as well.
 */
 #ifndef HHTDAE_SCENE_KERNELS_CONTACT_H
@@ -28,7 +28,7 @@ template <class T> Frame<double> PlainFrame(const Frame<T> &f)
   return p;
 }
 
-/* Derivatives of where two shapes touch by the 12 directions of their frames */
+/* Derivatives of penetration, normal and contact point by the 12 directions of the two frames */
 struct ContactMovement {
   Matrix<1, 12> depth;
   Matrix<3, 12> normal, point;
@@ -57,7 +57,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     return Plain(t.depth) > 0;
   }
 
-  /* velocity of i's material at p against that of j's */
+  /* velocity of i's material at p relative to that of j's */
   template <class T> static Vec3<T> slip(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &p)
   {
     const Vec3<T> ri = p - f[0].x, rj = p - f[1].x;
@@ -90,7 +90,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     place<T>(f, t.p, F, on);
   }
 
-  /* Of balls and boxes */
+  /* Upper bound on the step, for shapes that define through(), the largest penetration at the end of a step */
   template <class S = Shape, class = decltype(S::through(std::declval<const typename S::Data &>()))>
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
@@ -99,7 +99,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     return LongestApproach(Shape::through(d.shape), t.depth, -t.n.dot(slip<double>(f, w, t.p)), acceleration);
   }
 
-  /* of the elastic part of the force */
+  /* potential energy of the elastic part of the force */
   static double energy(const Data &d, const Frame<double> *f)
   {
     Touch<double> t;

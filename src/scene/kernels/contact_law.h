@@ -46,16 +46,16 @@ template <class T> T ElasticForce(const ContactLaw &law, const T &d)
   return T(law.stiffness) * power;
 }
 
-/* the work that it takes to get to d > 0: the integral of ElasticForce() */
+/* elastic energy at d > 0: the integral of ElasticForce() */
 inline double ElasticEnergy(const ContactLaw &law, double d) { return law.stiffness * std::pow(d, law.exponent + 1) / (law.exponent + 1); }
 
-/* How long a step may be until bodies that close in at a speed are as deep in each other as a step may end, `most`, or, being deep, a little deeper: on
-   the other side there is no force, so that the end of a step may lie there as well. Their distance along a straight flight is convex: it never shrinks
+/* Upper bound on the step, s, so that bodies closing in at a speed do not pass through each other, beyond which there is no force: at its end the penetration is at most max_depth, or
+   0.25 max_depth more than now. Along a straight flight the distance is a convex function of time, so that it never decreases
    faster than now. */
-inline double LongestApproach(double most, double depth, double closing, double acceleration)
+inline double LongestApproach(double max_depth, double depth, double closing, double acceleration)
 {
-  const double way = std::max(most - depth, 0.25 * most), speed = closing + std::sqrt(closing * closing + 2 * acceleration * way);
-  return speed > 0 ? 2 * way / speed : std::numeric_limits<double>::infinity();
+  const double distance = std::max(max_depth - depth, 0.25 * max_depth), speed = closing + std::sqrt(closing * closing + 2 * acceleration * distance);
+  return speed > 0 ? 2 * distance / speed : std::numeric_limits<double>::infinity();
 }
 
 /* F for d > 0, in the axes of n and v */

@@ -75,7 +75,7 @@ struct EllipsoidPlaneShape {
 struct TorusPlaneShape {
   static constexpr const char *name      = "torus on plane";
   static constexpr bool        axes_of_j = true;
-  static constexpr double      flat      = 1e-3;
+  static constexpr double      flat_sine = 1e-3; /* sine of the angle between the torus' plane and the plane, below which |u| is replaced */
   struct Data {
     double radius, tube;
   };
@@ -88,13 +88,13 @@ struct TorusPlaneShape {
     const Vec3<T> u  = t.n - axis * c;
     const T       uu = u.squaredNorm();
     T             reach, slope; /* |u| and 1/|u| = 2 d|u|/d(u.u) */
-    if (Plain(uu) >= flat * flat) {
+    if (Plain(uu) >= flat_sine * flat_sine) {
       reach = sqrt(uu);
       slope = T(1) / reach;
     } else {
-      const T y = uu * T(1 / (flat * flat));
-      reach     = T(flat) * (T(0.375) + y * (T(0.75) - T(0.125) * y));
-      slope     = T(1 / flat) * (T(1.5) - T(0.5) * y);
+      const T y = uu * T(1 / (flat_sine * flat_sine));
+      reach     = T(flat_sine) * (T(0.375) + y * (T(0.75) - T(0.125) * y));
+      slope     = T(1 / flat_sine) * (T(1.5) - T(0.5) * y);
     }
     t.depth = reach * T(d.radius) + T(d.tube) - h;
     slope   = slope * T(d.radius);

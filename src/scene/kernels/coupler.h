@@ -1,6 +1,6 @@
 /*
-  Couplers of N joint motions: the sum of factor_k s_k is what it was at the start, where s_k is the angle of marker i_k
-  about the z axis of j_k, counted over full turns, or the advance of i_k along an axis of j_k. The first R terms are
+  Couplers of N joint motions: the sum of factor_k s_k keeps its initial value, where s_k is the angle of marker i_k
+  about the z axis of j_k, over full turns, or the advance of i_k along an axis of j_k. The first R terms are
   angles. Markers: i_1, j_1, i_2, j_2, ...
 
   The sum is separable: gradient and curvature are those of the pairs, factor by factor. The row is "start minus sum",
@@ -88,7 +88,7 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
       least = std::min(least, LongestTurn(AngleRate<double>(f[2 * k], f[2 * k + 1], w[2 * k], w[2 * k + 1]), angular));
     return least;
   }
-  /* the pose at the start as reference */
+  /* takes the pose at the start as reference */
   static void begin(Data &d, const Frame<double> *f)
   {
     for (int k = 0; k < R; k++) d.memory[k] = PrincipalAngle<double>(f[2 * k], f[2 * k + 1]);
@@ -96,8 +96,8 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   }
 };
 
-/* Advance along z_j minus pitch/(2 pi) angle is what it was at the start. Multiplier: force on i's body along z_j,
-   beside which goes the moment -pitch/(2 pi) times that about z_j. */
+/* Advance along z_j minus pitch/(2 pi) angle keeps its initial value. Multiplier: force on i's body along z_j;
+   the moment about z_j is -pitch/(2 pi) times the force. */
 struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   static constexpr const char *name   = "screw";
   static constexpr int         memory = 1, angles = 1;

@@ -1,7 +1,7 @@
 /*
-  The origin of i on a curve that is fixed in j. The curve's parameter is no unknown: it is that of the closest point,
-  found from the one of the last accepted step. The rows are the distances n_r . (c - p), p = (axes of j)^T (x_i - x_j),
-  along the two normals of the curve, in the plane along z x tangent alone. Multipliers: force on i's body along these
+  The origin of i on a curve fixed in j. The curve's parameter is not an unknown, but that of the closest point,
+  searched for from its value at the last accepted step. The rows are the distances n_r . (c - p), p = (axes of j)^T (x_i - x_j),
+  along the two normals of the curve; in a planar scene along z x tangent only. Multipliers: force on i's body along these
   normals.
 */
 #ifndef HHTDAE_SCENE_CURVE_H
@@ -26,10 +26,10 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
 
   template <class T> static void value(const Data &data, const Frame<T> *f, const T &, T *phi)
   {
-    data.curve->misfit(Local<T>(f), data.memory[0], R, phi);
+    data.curve->normalDistances(Local<T>(f), data.memory[0], R, phi);
   }
 
-  /* By the chain rule: what is differentiated automatically is a function of p alone. dp = (axes of j)^T (dx_i - dx_j +
+  /* By the chain rule, with automatic differentiation by p only. dp = (axes of j)^T (dx_i - dx_j +
    * [d] theta_j) */
   static void gradient(const Data &data, const Frame<double> *f, double, typename Base::Gradient &J)
   {
@@ -37,7 +37,7 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
     Dual<3>            phi[R];
     Vec3<Dual<3>>      p;
     for (int i = 0; i < 3; i++) p(i) = Dual<3>(local(i), i);
-    data.curve->misfit(p, data.memory[0], R, phi);
+    data.curve->normalDistances(p, data.memory[0], R, phi);
     Matrix<R, 3> G;
     for (int r = 0; r < R; r++) G.row(r) = DerivativeRow(phi[r]);
     J = G * Motion(f);
@@ -51,7 +51,7 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
     Vec3<double>       g = Vec3<double>::Zero();
     Mat3<double>       K = Mat3<double>::Zero();
     for (int i = 0; i < 3; i++) p(i) = Dual2<3>(Dual<3>(local(i), i), i);
-    data.curve->misfit(p, data.memory[0], R, phi);
+    data.curve->normalDistances(p, data.memory[0], R, phi);
     for (int r = 0; r < R; r++)
       for (int a = 0; a < 3; a++) {
         g(a) += lambda[r] * phi[r].derivatives()(a).value();

@@ -2,8 +2,8 @@
   Space curves: a cubic spline c(s) through points over chord length, twice continuously differentiable, with two unit
   normals that vary as smoothly.
 
-  An open curve has no curvature at its ends (natural spline) and goes on beyond them along its end tangents, still
-  twice continuously differentiable: a point that leaves the curve slides on along a straight line. A closed curve is
+  An open curve has no curvature at its ends (natural spline) and is continued beyond them along its end tangents, still
+  twice continuously differentiable: a point that leaves the curve slides along a straight line. A closed curve is
   periodic.
 */
 #ifndef HHTDAE_SCENE_CURVE_SPLINE_H
@@ -49,7 +49,7 @@ private:
   };
   bool                periodic_ = false;
   std::vector<double> knots_;
-  std::vector<Piece>  pieces_; /* before the first knot, between them, behind the last */
+  std::vector<Piece>  pieces_; /* before the first knot, between the knots, beyond the last */
 
   const Piece &piece(double s) const
   {
@@ -63,11 +63,11 @@ public:
   /* planar: in the xy plane, with one normal z x t */
   Curve(std::vector<Vec3<double>> points, bool closed, bool planar);
 
-  /* What is wrong with the points, empty if nothing; the curve is not to be used otherwise */
+  /* Error of the points as text, empty if there is none; a curve with an error must not be used */
   const std::string  &error() const { return error_; }
   const VectorSpline &path() const { return path_; }
 
-  /* Parameter of the point of the curve closest to p: the nearest of all, or by Newton's method the one near s */
+  /* Parameter of the point of the curve closest to p: the global minimum, or by Newton's method the local one near s */
   double closest(const Vec3<double> &p) const;
   double closest(const Vec3<double> &p, double s) const;
 
@@ -93,10 +93,10 @@ public:
 
   /*
     n_r . (c(s) - p) at the point closest to p, near the parameter `near`: the distances of p from the curve along its
-    normals. s is a function of p by g = (p - c) . c' = 0; two steps of Newton's method in duals from the plain root
-    make it exact to third order.
+    normals. s is a function of p by g = (p - c) . c' = 0; two steps of Newton's method in dual numbers from the plain root
+    make its derivatives exact up to the third order.
   */
-  template <class T> void misfit(const Vec3<T> &p, double near, int rows, T *phi) const
+  template <class T> void normalDistances(const Vec3<T> &p, double near, int rows, T *phi) const
   {
     Vec3<T> c, c1, c2, n1, n2;
     T       s(closest({Plain(p(0)), Plain(p(1)), Plain(p(2))}, near));
@@ -115,7 +115,7 @@ public:
 private:
   bool         planar_ = false;
   VectorSpline path_, normal_;
-  double       longest_ = 0; /* piece of the path: the limit of a Newton step */
+  double       longest_ = 0; /* longest piece of the path: the limit of a Newton step */
   std::string  error_;
 
   template <class T> static Vec3<T> Unit(const Vec3<T> &v)

@@ -17,7 +17,7 @@ template <class T> T TanhRatio(const T &y)
   using std::sqrt;
   using std::tanh;
   const double plain = Plain(y);
-  if (plain < 1e-3) { /* Taylor series, its first term left out is below rounding */
+  if (plain < 1e-3) { /* Taylor series, truncated below rounding */
     T s = T(62. / 2835.) - T(1382. / 155925.) * y;
     s   = s * y - T(17. / 315.);
     s   = s * y + T(2. / 15.);

@@ -1,4 +1,4 @@
-/* Measures of the motion of markers, for numbers of any kind. */
+/* Measures of the motion of markers, for doubles and dual numbers. */
 #ifndef HHTDAE_SCENE_KERNELS_MARKER_MEASURE_H
 #define HHTDAE_SCENE_KERNELS_MARKER_MEASURE_H
 
@@ -37,7 +37,7 @@ template <class T> Vec3<T> Difference(const Vec3<T> &x, const Vec3<T> *y)
   return x - *y;
 }
 
-/* j and frame may be none; remembered: of an angle, see UnwoundAngle() */
+/* j and frame may be null; remembered: angle at the last accepted step, see UnwoundAngle() */
 template <class T>
 T MarkerMeasure(Measure::Kind kind, int component, double remembered, const MarkerMotion<T> &i, const MarkerMotion<T> *j,
                 const MarkerMotion<T> *frame)

@@ -1,14 +1,14 @@
 /*
-  Teeth between two bodies on one carrier: with e the direction of the teeth's force and P the pitch point, both fixed in the carrier,
-  the bodies' points at P have moved alike along e,
+  Meshing teeth of two bodies on one carrier: with e the direction of the tooth force and P the pitch point, both fixed in the carrier,
+  the bodies' points at P have equal displacements along e,
 
     start + s_2 - s_1 = 0,     s = e . d + m . phi,     m = (P - x) x e,
 
-  where d is the displacement of a body's marker against the carrier, phi its rotation, x where the marker is. phi about the axis of a
-  wheel is its angle, counted over full turns; about the other axes, and of a rack, it vanishes by the joint that holds the body,
-  and there are its derivatives alone: they make the load of the row on either body that of a force along e through P, exactly,
-  and leave none on the carrier. So the bearings carry the force. Where a wheel's marker leaves its axis s is no longer what it says,
-  but the joint's rows do not allow that.
+  where d is the displacement of a body's marker relative to the carrier, phi its rotation and x the marker's position. About the axis of a
+  wheel phi is the angle over full turns; about the other axes, and for a rack, it is zero by the joint of the body, and only its
+  derivatives matter: with them the load of the row on either body is exactly a force along e through P, and there is
+  no load on the carrier, so that the bearings carry the force. If a wheel's marker left its axis, s would no longer be the displacement,
+  but the joint's rows exclude that.
 
   Frames: marker of body 1, of body 2, and the one on the carrier, with origin P and e as an axis. Multiplier: force on body 1 along e.
 */
@@ -20,7 +20,7 @@
 namespace hhtdae
 {
 
-/* How a body is held, in the axes of the carrier's marker */
+/* The joint that holds a body, in the axes of the carrier's marker */
 struct MeshSide {
   Vec3<double> bearing = Vec3<double>::Zero();     /* origin of the joint's marker on the carrier */
   Mat3<double> axes    = Mat3<double>::Identity(); /* its axes */
@@ -51,14 +51,14 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
 
   static Vec3<double> lever(const Vec3<double> &x, int axis) { return Vec3<double>::Unit(axis).cross(x); } /* (P - x) x e, P = 0 */
 
-  /* (P - x) x e, component c; x of any kind of number */
+  /* component c of (P - x) x e, for dual numbers, too */
   template <class T> static T leverComponent(const Vec3<T> &x, int axis, int c)
   {
     const int a = (axis + 1) % 3, b = (axis + 2) % 3; /* e x x = -x_b a + x_a b, with (e, a, b) right-handed */
     return c == a ? -x(b) : c == b ? x(a) : T(0);
   }
 
-  /* of a wheel about z of its bearing: z_i on the side of z_j on which it started */
+  /* m . phi of a wheel that rotates about z of its bearing; z_i is parallel or opposite to z_j, as at the start */
   template <class T> static T wheel(const MeshSide &s, const Frame<T> &f, double remembered, int axis)
   {
     const Frame<T> bearing = Constant<T>(Frame<double>{s.bearing, s.axes});
@@ -71,7 +71,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     return tilt + T(lever(s.bearing, axis).dot(s.axes.col(2))) * UnwoundAngle<T>(f, bearing, remembered);
   }
 
-  /* of a body that does not turn: from R start^T = 1 + [phi] */
+  /* m . phi of a body that does not rotate: from R start^T = 1 + [phi] */
   template <class T> static T rack(const MeshSide &s, const Frame<T> &f, int axis)
   {
     T sum(0);
@@ -84,7 +84,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     return sum;
   }
 
-  template <class T> static T moved(const Data &d, const Frame<T> *f, int k)
+  template <class T> static T toothDisplacement(const Data &d, const Frame<T> *f, int k)
   {
     const Frame<T> on   = onCarrier<T>(f[k], f[2]);
     const T        turn = Rack && k == 1 ? rack<T>(d.side[k], on, d.axis) : wheel<T>(d.side[k], on, d.memory[k], d.axis);
@@ -93,7 +93,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
 
   template <class T> static void value(const Data &d, const Frame<T> *f, const T &, T *phi)
   {
-    phi[0] = T(d.start) + moved<T>(d, f, 1) - moved<T>(d, f, 0);
+    phi[0] = T(d.start) + toothDisplacement<T>(d, f, 1) - toothDisplacement<T>(d, f, 0);
   }
 
   static void accept(Data &d, const Frame<double> *f)
@@ -108,7 +108,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     return least;
   }
 
-  /* The pose at the start as reference; bearing: the joints' markers on the carrier */
+  /* Takes the pose at the start as reference; bearing: the joints' markers on the carrier */
   static void begin(Data &d, const Frame<double> *f, const Frame<double> *bearing)
   {
     for (int k = 0; k < 2; k++) {
@@ -116,7 +116,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
       d.side[k]             = {j.x, j.R, i.R};
       if (k < MeshRow::memory) d.memory[k] = PrincipalAngle<double>(i, j);
     }
-    d.start = moved<double>(d, f, 0) - moved<double>(d, f, 1);
+    d.start = toothDisplacement<double>(d, f, 0) - toothDisplacement<double>(d, f, 1);
   }
 
   /* Displacement at P along e per angle of a wheel, per advance of the rack along axis `along` of its bearing */

@@ -1,11 +1,11 @@
 /*
   Kept nodes of a flexible body as balls against one shape on a marker of another body: Contact<Shape> (contact.h) for every node, without a frame for any of them.
 
-  A ball has the motion of its node and turns with the floating frame: x = r + A (s + Phi eta). Nodes that cannot touch are left out by how far the modes can move
-  any node, sum_k |eta_k| max |phi_k|, at the cost of one scalar product; the others cost their part of the modes. With the derivatives X of (x, theta) and V of
-  (v, w) by the body's position, angles and modes, and the derivatives K, C of the wrench by them, the matrix of a node is
+  A ball has the motion of its node and rotates with the floating frame: x = r + A (s + Phi eta). A bound on the displacement of any node by the modes,
+  sum_k |eta_k| max |phi_k|, excludes nodes that cannot touch; only for the others the product with the modes is computed. With the derivatives X of (x, theta) and V of
+  (v, w) by the body's position, angles and modes, and the derivatives K, C of the wrench by (x, theta) and (v, w), the matrix of a node is
 
-    - L^T (K X + C V) - d(L^T (f, m))/dq for fixed (f, m),    L: X without what rates make of a step's angles
+    - L^T (K X + C V) - d(L^T (f, m))/dq for fixed (f, m),    L: X without the factor Bodies::inStep() of rotations
 */
 #ifndef HHTDAE_SCENE_KERNELS_NODE_CONTACT_H
 #define HHTDAE_SCENE_KERNELS_NODE_CONTACT_H
@@ -18,16 +18,16 @@
 namespace hhtdae
 {
 
-/* What does not change: shared by the instances on all runs */
+/* Constant data, shared by the instances of all runs */
 struct ContactNodes {
   std::shared_ptr<const ModalBody> model; /* keeps the modes of the nodes alive */
   std::vector<const ModalNode *>   node;
   Eigen::Matrix3Xd                 place; /* undeformed, from the centre of mass, body axes */
-  Eigen::VectorXd                  reach; /* of any node, per unit of each mode */
+  Eigen::VectorXd                  reach; /* largest displacement of a node per unit of each mode */
 };
 std::shared_ptr<const ContactNodes> MakeContactNodes(std::shared_ptr<const ModalBody> model, const std::vector<PetscInt> &place);
 
-/* One element on this rank. It knows nothing of shapes: those are in NodeContact */
+/* One element on this rank, without the shape, which is in NodeContactBatch */
 class NodesOnBody
 {
 public:
@@ -40,24 +40,24 @@ public:
     Twist<double>                                   w[2];
     Vector3                                         arm, rate; /* from the body's origin; velocity that the modes give; space axes */
   };
-  /* how far the deformation can move any node */
+  /* upper bound on the displacement of any node by the deformation */
   double slack(const Evaluation &ev) const;
   Ball   ball(const Evaluation &ev, std::size_t k, const Frame<double> &fj, const Twist<double> &wj) const;
   void   load(Evaluation &ev, const Ball &b, const Wrench<double> *on) const;
 
-  /* ---- matrix, in this order for each instance ---- */
+  /* ---- matrix; functions in the order of their calls for each instance ---- */
   void pattern(const Bodies &B, Pattern &p, std::vector<PetscInt> &request) const;
   /* sums over the balls that touch */
   struct Matrices {
-    Eigen::MatrixXd left, right;       /* 3 columns a ball, and room for more: of its position in L, and - (K X + C V) of the force on it, both transposed */
-    Eigen::MatrixXd own, by_j, rate_j; /* own: what is left of the body's own block; columns x, theta and v, w of j's body */
+    Eigen::MatrixXd left, right;       /* 3 columns per ball, with reserve: transposed rows of its position in L, and of - (K X + C V) for the force on it */
+    Eigen::MatrixXd own, by_j, rate_j; /* own: rest of the body's own block; by_j, rate_j: columns x, theta and v, w of j's body */
     Eigen::MatrixXd of_j;              /* rows of j's body */
     Six             jj, jj_rate;
     int             count = 0;
   };
   void begin(const Evaluation &ev, Matrices &M) const;
   void add(const Evaluation &ev, const Ball &b, const Bodies::AngularGradient &g, const Wrench<double> *on, const ForceJacobian<2, 0> &J, Matrices &M) const;
-  void deliver(Evaluation &ev, Matrices &M, const Slot *&slot) const; /* none of it if no ball touches */
+  void deliver(Evaluation &ev, Matrices &M, const Slot *&slot) const; /* adds nothing if no ball touches */
 
 private:
   BodyKind kindOfJ(const Bodies &B) const { return B.body[B.marker[j].body].kind; }
@@ -109,7 +109,7 @@ public:
   struct Instance {
     NodesOnBody           on;
     typename Kernel::Data data;
-    bool                  mine; /* for sums over ranks */
+    bool                  mine; /* this rank counts its energy */
   };
   std::vector<Instance> all;
 
@@ -170,7 +170,7 @@ public:
     return sum;
   }
 
-  /* as of one contact, contact.h, but until the middle of both balls: a small one may be deep in a large one */
+  /* as in contact.h, but up to the middle of both balls: a small one may be deep in a large one */
   bool   limitsSteps() const override { return !all.empty() && std::isfinite(Near::through(all[0].data.shape)); }
   double longestStep(const Evaluation &ev) const override
   {

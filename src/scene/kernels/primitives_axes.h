@@ -11,7 +11,7 @@
     dg/dtheta_i = W - tr(W) 1,   dg/dtheta_j = -(W^T - tr(W) 1)
 
   Signs as in primitives.h: multipliers are moments on i's body in the direction that is named, its opposite acts on j's
-  body. An alignment is met by antiparallel axes too, where the same products have the opposite gradient: a joint stays on the branch on which it starts, and
+  body. Antiparallel axes satisfy an alignment, too, but with the opposite gradient of the products: a joint stays on the branch on which it starts, and
   its data have the sign of each row there (JointMultipliers.AxesThatPointAwayFromEachOther).
 */
 #ifndef HHTDAE_SCENE_PRIMITIVES_AXES_H
@@ -99,7 +99,7 @@ struct Orient : AxisProducts<Orient, 3> {
 
   /* The nearest one: z_i, x_i and y_i along those of j, or after half a turn two of them opposite. *misses: cosine of the angle that is missing to it, 1 with
      none; the products vanish after a third of a turn about (1, 1, 1) as well, where it is -1/2 for all of them. */
-  static Data branch(const Frame<double> &i, const Frame<double> &j, double *misses)
+  static Data branch(const Frame<double> &i, const Frame<double> &j, double *least_cosine)
   {
     constexpr double half[4][3] = {{1, 1, 1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, 1}}; /* of rows */
     const double     same[3]    = {i.R.col(2).dot(j.R.col(2)), i.R.col(0).dot(j.R.col(0)), i.R.col(1).dot(j.R.col(1))};
@@ -111,7 +111,7 @@ struct Orient : AxisProducts<Orient, 3> {
       most = trace;
       std::copy(sign, sign + 3, d.sign);
     }
-    *misses = (most - 1) / 2;
+    *least_cosine = (most - 1) / 2;
     return d;
   }
 };

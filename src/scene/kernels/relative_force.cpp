@@ -6,7 +6,7 @@ namespace hhtdae
 namespace
 {
 
-/* from the axes E to space, and from relative to both markers */
+/* Transforms derivatives from the axes E to space, and from relative motion to both markers */
 void ToSpace(const Mat3<double> &E, const Matrix<9, 9> &L, Matrix<12, 12> &J)
 {
   for (int col = 0; col < 3; col++) {
@@ -30,14 +30,14 @@ void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDeri
 
   /* columns theta_x, theta_i, theta_j; rows force on i, moment on i, minus the moment on j */
   Matrix<9, 9> L;
-  Matrix<6, 3> spun = by.frame.leftCols<3>() * D; /* by e */
+  Matrix<6, 3> by_axes = by.frame.leftCols<3>() * D; /* by e */
   if (twists)
-    spun += by.motion.leftCols<3>() * Cross<double>(r.v) + by.motion.middleCols<3>(3) * Cross<double>(r.wi) +
-            by.motion.rightCols<3>() * Cross<double>(r.wj);
+    by_axes += by.motion.leftCols<3>() * Cross<double>(r.v) + by.motion.middleCols<3>(3) * Cross<double>(r.wi) +
+               by.motion.rightCols<3>() * Cross<double>(r.wj);
   const Matrix<6, 3> turned = by.frame.rightCols<3>() * by.turn;
   L.block<6, 3>(0, 0)       = by.frame.leftCols<3>();
-  L.block<6, 3>(0, 3)       = turned + spun * S;
-  L.block<6, 3>(0, 6)       = spun - spun * S - turned;
+  L.block<6, 3>(0, 3)       = turned + by_axes * S;
+  L.block<6, 3>(0, 6)       = by_axes - by_axes * S - turned;
   /* cm + d x cf, of which [cf] acts on dd = theta_x + [d] e */
   L.bottomRows<3>() = L.middleRows<3>(3) + D * L.topRows<3>();
   L.block<3, 3>(6, 0) -= F;
@@ -45,11 +45,11 @@ void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDeri
   L.block<3, 3>(6, 3) -= FD * S;
   L.block<3, 3>(6, 6) -= FD - FD * S;
   /* the turning of the axes */
-  Matrix<9, 3> carried;
-  carried << F, Cross<double>(cm), Cross<double>(cj);
-  const Matrix<9, 3> carried_i = carried * S;
+  Matrix<9, 3> with_axes;
+  with_axes << F, Cross<double>(cm), Cross<double>(cj);
+  const Matrix<9, 3> carried_i = with_axes * S;
   L.middleCols<3>(3) -= carried_i;
-  L.rightCols<3>() -= carried - carried_i;
+  L.rightCols<3>() -= with_axes - carried_i;
   ToSpace(E, L, frames);
   if (!twists) return;
   L.topRows<6>()    = by.motion;

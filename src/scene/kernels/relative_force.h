@@ -1,6 +1,6 @@
 /*
-  Forces between two frames that depend on their relative position, rotation and motion alone, in the axes E of a
-  reference frame that is carried along by both: what bushing and beam share.
+  Forces between two frames that depend only on their relative position, rotation and motion, in the axes E of a
+  reference frame that moves with both: common part of bushing and beam.
 
   In the axes E: d = x_i - x_j; phi, the rotation vector of R_j^T R_i; v = v_i - v_j and the angular velocities. The
   kernel says
@@ -23,11 +23,11 @@ namespace hhtdae
 {
 
 template <class T> struct Relative {
-  Vec3<T> d, phi;    /* x_i - x_j, rotation vector of R_j^T R_i */
+  Vec3<T> d, phi;    /* d = x_i - x_j; phi: rotation vector of R_j^T R_i */
   Vec3<T> v, wi, wj; /* v_i - v_j, angular velocities; undefined where the kernel is not damped */
 };
 
-/* What the matrix needs of a kernel at one state */
+/* Components of a kernel at one state, and the derivatives that the matrix needs */
 struct RelativeDerivatives {
   double       c[6];       /* components */
   Matrix<6, 6> frame;      /* their derivatives by (d, phi) */

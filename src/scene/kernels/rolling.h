@@ -24,7 +24,7 @@ struct RollingData {
   double radius = 1, side = 1;
 };
 
-/* Velocity of i's body at the point of contact, seen from j's body */
+/* Velocity of i's body relative to j's body at the point of contact */
 template <class T> Vec3<T> SlipVelocity(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &arm)
 {
   const Vec3<T> lever = f[0].x - f[1].x + arm;
@@ -43,11 +43,11 @@ template <class T> Vec3<T> Upward(double side, const Frame<T> *f)
 }
 
 /* r |q| - n . d = 0, q = n - (n . z_i) z_i: the lowest point x_i - r q/|q| is in the plane. Multiplier: force on i's body along n, at the lowest point.
-   A disc that lies flat has no lowest point: no step lays it more than half of what is left, and where it lies by `flat` it is no number, so that the run ends with an
+   A disc that lies flat has no lowest point: a step at most halves the angle between disc and plane, and below flat_angle the row is NaN, so that the run ends with an
    error that names the joint (JointRuns.ADiscThatFallsFlat). */
 struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
   static constexpr const char *name = "disc on plane";
-  static constexpr double      flat = 1e-2; /* rad, between the disc and the plane */
+  static constexpr double      flat_angle = 1e-2; /* rad, between the disc and the plane */
   using Data                        = RollingData;
   static constexpr bool curved(int a, int b) { return a == 3 || b == 3 || (a == 1 && b == 1); }
 
@@ -58,15 +58,15 @@ struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
     const T       length = sqrt(q.squaredNorm());
     phi[0]               = length * T(data.radius) - d.dot(f[1].R.col(2)) * T(data.side);
     if constexpr (std::is_same_v<T, double>)
-      if (length < flat) phi[0] = std::numeric_limits<double>::quiet_NaN(); /* the residual names its row, a matrix those that it couples */
+      if (length < flat_angle) phi[0] = std::numeric_limits<double>::quiet_NaN(); /* only in the residual: its error message names this row, that of a NaN in the matrix all coupled rows */
   }
 
-  /* Until the angle between disc and plane is half of what it is */
+  /* Time until the angle between disc and plane is halved */
   static double longestStep(const Data &data, const Frame<double> *f, const Twist<double> *w, double, double angular)
   {
     const Vec3<double> n = f[1].R.col(2) * data.side, z = f[0].R.col(2), turn = w[0].w - w[1].w;
     const double       cosine = n.dot(z), sine = n.cross(z).norm();
-    const double       laying = n.dot(turn.cross(z)) * (cosine < 0 ? -1 : 1) / sine; /* rate at which the angle falls */
+    const double       laying = n.dot(turn.cross(z)) * (cosine < 0 ? -1 : 1) / sine; /* rate at which the angle decreases */
     const double       left   = std::atan2(sine, std::fabs(cosine));
     const double       fast   = laying + std::sqrt(laying * laying + angular * left);
     return fast > 0 ? left / fast : std::numeric_limits<double>::infinity();

@@ -1,8 +1,8 @@
 /*
   Torsional springs and dampers about z_j. The component M is a moment on i, a function of the angle of i's x axis about
   z_j, counted over full turns, and of its rate. The wrench is the one that does the work M d angle: the moment M g on i
-  and -M g on j with the angle's gradient g (angle.h), which is z_j wherever a joint keeps the z axes parallel, and
-  which makes an elastic moment conservative where none does.
+  and -M g on j with the angle's gradient g (angle.h). It is z_j if a joint keeps the z axes parallel; otherwise it
+  keeps an elastic moment conservative.
 */
 #ifndef HHTDAE_SCENE_KERNELS_SPRING_TORSION_H
 #define HHTDAE_SCENE_KERNELS_SPRING_TORSION_H

@@ -1,7 +1,7 @@
 /*
-  Stops of an angle, an advance or a distance s: beyond the end of its travel the force of contact_law.h with penetration lower - s or
-  s - upper, without friction. The component is the force along growing s, or moment, of a distance the tension; it is zero in between, where
-  a stop costs its coordinate in plain numbers.
+  Stops of an angle, an advance or a distance s: beyond its limits the force of contact_law.h with penetration lower - s or
+  s - upper, without friction. The component is the moment or force along increasing s, for a distance the tension; it is zero within the limits, where
+  only s is evaluated, in plain numbers.
 */
 #ifndef HHTDAE_SCENE_KERNELS_STOP_H
 #define HHTDAE_SCENE_KERNELS_STOP_H
@@ -22,7 +22,7 @@ struct StopData {
   double depth(double s) const { return s < lower ? lower - s : s - upper; }
 };
 
-/* along growing s */
+/* force along increasing s */
 template <class T> T StopForce(const StopData &d, const T &s, const T &rate)
 {
   if (d.free(Plain(s))) return T(0);
@@ -35,7 +35,7 @@ template <class T> T StopForce(const StopData &d, const T &s, const T &rate)
 
 inline double StopEnergy(const StopData &d, double s) { return d.free(s) ? 0 : ElasticEnergy(d.law, d.depth(s)); }
 
-/* its value, and its derivatives by s and the rate */
+/* value of the force, and derivatives by s and its rate */
 inline Dual<2> StopDerivatives(const StopData &d, double s, double rate) { return StopForce<Dual<2>>(d, Dual<2>(s, 0), Dual<2>(rate, 1)); }
 
 template <int Z> void NoForce(Wrench<double> *on, ForceJacobian<2, Z> &J)
@@ -108,7 +108,7 @@ struct LengthStop : LineForce<LengthStop> {
   }
   static double energy(const Data &d, const Frame<double> *f) { return StopEnergy(d, Line<double>(f).length); }
 
-  /* A least distance is that of two balls, which must not pass through each other (Stops.NothingFliesThroughALeastDistance). */
+  /* A least distance acts like two balls, which must not pass through each other (Stops.NothingFliesThroughALeastDistance). */
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
     const Line<double> line(f);

@@ -19,7 +19,7 @@ template <class T> T Formula(const Argument &a, const UserRow::At &at, const Mar
   return MarkerMeasure<T>(a.kind, a.component, Remembered(a, at), x[0], a.marker[1] < 0 ? nullptr : &x[1], a.marker[2] < 0 ? nullptr : &x[2]);
 }
 
-/* Its markers, each by seed(number of the marker in the row, number in the measure) */
+/* Motions of a measure's markers, from seed(number of the marker in the row, number in the measure) */
 template <class T, class Seeds> void Markers(const Argument &a, const Seeds &seed, MarkerMotion<T> *x)
 {
   for (int i = 0; i < 3; i++) {
@@ -28,7 +28,7 @@ template <class T, class Seeds> void Markers(const Argument &a, const Seeds &see
   }
 }
 
-/* by the frames of its markers, twists constant */
+/* Derivatives of a measure by the frames of its markers, twists constant */
 Dual<N> ByFrames(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual<N>> x[3];
@@ -39,7 +39,7 @@ Dual<N> ByFrames(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* by their twists */
+/* Derivatives of a measure by the twists of its markers */
 Dual<N> ByTwists(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual<N>> x[3];
@@ -50,7 +50,7 @@ Dual<N> ByTwists(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* twice by the frames; or by twists, the outer directions, and frames */
+/* Second derivatives of a measure by the frames; for velocities by twists (outer directions) and frames */
 Dual2<N> Twice(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual2<N>> x[3];
@@ -71,7 +71,7 @@ Dual2<N> Twice(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* where direction d of a measure's markers is among those of the row's; -1: nowhere */
+/* Direction of the row's markers that is direction d of a measure's markers; -1: none */
 int Direction(const Argument &a, int d) { return a.marker[d / 6] < 0 ? -1 : 6 * a.marker[d / 6] + d % 6; }
 
 void Scatter(const Argument &a, double factor, const Dual<N> &x, double *row)

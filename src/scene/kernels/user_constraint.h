@@ -1,9 +1,9 @@
 /*
   Rows that a user gives as expressions of measures of markers: -f(m) = 0, so that the load of the multiplier is lambda df/dq.
 
-  What the kernels share is in UserRow, in plain numbers for any number of markers: first derivatives of f by its own differentiation, of
-  the measures by duals of the three markers that each of them has; second ones of f by differences of its gradient (user_function.h),
-  which only the Newton matrix reads.
+  UserRow is the common part of the kernels, for any number of markers: first derivatives of f by its automatic differentiation, those of
+  the measures by dual numbers for their up to three markers; second derivatives of f, which only the Newton matrix needs, by differences of its
+  gradient (user_function.h).
 */
 #ifndef HHTDAE_SCENE_KERNELS_USER_CONSTRAINT_H
 #define HHTDAE_SCENE_KERNELS_USER_CONSTRAINT_H
@@ -28,8 +28,8 @@ public:
     Measure::Kind kind      = Measure::Time;
     int           component = 0;
     int           marker[3] = {-1, -1, -1}; /* i, j, frame, among the markers of the row */
-    int           number    = -1;           /* of an angle, among those that are remembered; of a variable or state */
-    double        reach     = 0;            /* over which second derivatives are taken */
+    int           number    = -1;           /* of an angle, among those in the memory; of a variable or state, among the inputs */
+    double        reach     = 0;            /* length scale of the differences for second derivatives */
   };
   struct At {
     const Frame<double> *f;
@@ -48,7 +48,7 @@ public:
   void curvature(const At &at, double factor, Eigen::Ref<Eigen::MatrixXd> H) const;
   /* the partial derivative by time */
   double rate(const At &at) const;
-  /* whether f is linear in velocities, with factors that no input changes, where positions and time are those of `at` */
+  /* whether f is linear in velocities, with factors that do not depend on inputs, at the positions and time of `at` */
   bool linear(const At &at) const;
 
   std::array<int, 2> markersOfAngle(int k) const; /* -1: it has no k-th one */
@@ -66,7 +66,7 @@ struct UserRowData {
   std::shared_ptr<const UserRow> row;
 };
 
-/* Angles: 0, or UserRow::angles. Rows that count none have nothing to remember, so that they may come and go in a run that goes on
+/* Angles: 0, or UserRow::angles. Rows without angles have no memory, so that a continued run can add and remove them
    (Continue.AUserConstraintTakesHold). */
 template <int M, int Angles> struct UserPosition : Constraint<UserPosition<M, Angles>, M, 1> {
   using Base                             = Constraint<UserPosition<M, Angles>, M, 1>;

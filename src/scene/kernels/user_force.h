@@ -11,7 +11,7 @@ namespace hhtdae
 {
 
 /* Force at i's origin and moment on i's body, in the axes of the third marker or of space; the reaction acts on j's
-   body at the same point. A marker that is not used stands for nothing: it may be any. */
+   body at the same point. Markers that are not used can be any. */
 struct UserWrenchData {
   int  force = -1, moment = -1; /* first component of each; -1: none */
   bool reaction = false, framed = false;
@@ -54,7 +54,7 @@ private:
   }
 };
 
-/* Along the line from j to i, repulsive when positive; none where the points meet on the way and the line has no direction */
+/* Along the line from j to i, repulsive if positive; zero if the points coincide and the line has no direction */
 struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   static constexpr const char *name   = "user scalar force";
   static constexpr int         inputs = 1;

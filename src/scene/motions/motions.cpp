@@ -9,7 +9,7 @@ namespace hhtdae
 namespace
 {
 
-/* t: where the run starts */
+/* t: time of the start */
 void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of, double t)
 {
   e.require(f.error().empty(), "its function: " + f.error());
@@ -37,7 +37,7 @@ void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec 
   if (s.of == MotionOf::Displacement) e.constrain<Displacement>({s.i, s.j}, d);
   if (s.of == MotionOf::Velocity) e.constrain<Velocity>({s.i, s.j}, d);
   if (s.of == MotionOf::Acceleration) {
-    std::vector<ExpressionData> &states = DataOf(scene).states; /* Scene::state() would have it described twice where the scene is described anew */
+    std::vector<ExpressionData> &states = DataOf(scene).states; /* not by Scene::state(), which would record the call: the state would be added twice when the scene is described anew */
     const PetscInt               w      = (PetscInt)states.size();
     states.push_back({name.empty() ? "state " + std::to_string(w) : name + " speed", Rate(s.function), speed});
     e.constrain<OfState>({s.i, s.j}, d, {ScalarRef{ScalarRef::State, w, 0}});

@@ -1,4 +1,4 @@
-/* What motions and couplers ask of the two markers whose relative angle or advance they are about. */
+/* Checks of the two markers of motions and couplers. */
 #ifndef HHTDAE_SCENE_MOVING_PAIR_H
 #define HHTDAE_SCENE_MOVING_PAIR_H
 
@@ -15,7 +15,7 @@ inline void RequirePair(ElementBuilder &e, Marker i, Marker j, bool rotation, co
   const SceneData &s       = e.scene();
   const PetscInt   body[2] = {s.markers[i.id].body, s.markers[j.id].body};
   e.require(body[0] != body[1], where + "both markers are on " + s.bodyName(body[0]) + ", must be on two bodies");
-  for (int k = rotation ? 0 : 1; k < 2; k++) /* an advance takes its axis from j */
+  for (int k = rotation ? 0 : 1; k < 2; k++) /* an advance needs axes only of j */
     if (s.turnless(body[k])) e.require(false, where + "marker " + "ij"[k] + " is on " + s.turnlessName(body[k]) + ", must be on a rigid body or the ground");
   if (rotation && e.good())
     e.require(AngleDefined(e.frame(i), e.frame(j)), where + "the x axis of marker i is along the z axis of j, so that "
