@@ -14,7 +14,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int animated_pose = 13; /* r, A by columns, |v| */
+constexpr int animated_pose = 13; /* numbers per body: r, A by columns, |v| */
 
 class Animation : public Task
 {
@@ -60,7 +60,7 @@ public:
     return 0;
   }
 
-  /* Frames that come later are written over; their entries in the index go */
+  /* Later frames are overwritten, their entries in the index removed */
   PetscErrorCode resume(Runtime &R, const double *x) override
   {
     bool there = false;

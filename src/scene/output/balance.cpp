@@ -97,7 +97,7 @@ public:
   }
 
 private:
-  static constexpr std::size_t largest_block = 1 << 16; /* bytes */
+  static constexpr std::size_t max_buffered_bytes = 1 << 16; /* lines are written when they have this many bytes */
 
   bool        writes_ = false, begun_ = false, have_first_ = false; /* begun: the head line is written */
   std::string file_, text_;                                         /* no name: printed; lines that are not yet in the file */
@@ -116,7 +116,7 @@ private:
     }
     text_ += text;
     text_ += '\n';
-    if (text_.size() >= largest_block || !there_) PetscCall(flush()); /* at once: a file that cannot be written is said at the start */
+    if (text_.size() >= max_buffered_bytes || !there_) PetscCall(flush()); /* the first line at once, so that a file that cannot be written is reported at the start */
     PetscFunctionReturn(0);
   }
 

@@ -16,8 +16,8 @@ struct ChannelWork {
 namespace
 {
 
-/* Angles and motions that channels read are counted over full turns like those of elements: the batch takes part in accepted steps
-   and checkpoints, and adds nothing to the equations. */
+/* Updates the memories of channels, as angles over full turns, in accepted steps and checkpoints; adds nothing to the
+   equations. */
 class ChannelBatch : public ReadingBatch<Batch>
 {
 public:

@@ -10,7 +10,7 @@ namespace hhtdae
 /* of all channels, as they were when the scene was set up */
 const std::vector<PetscMPIInt> &ChannelOwners(const Runtime &R);
 /* Values of own channels in the state of e, appended in the order of the channels; collective */
-/* Whether any of them needs accelerations, multipliers or what depends on them: TSHHT3EvaluateAt() in place of TSHHT3Interpolate() */
+/* Whether a channel depends on accelerations or multipliers: TSHHT3EvaluateAt() instead of TSHHT3Interpolate() */
 bool ChannelsFollowFromEquations(const Runtime &R);
 PetscErrorCode ChannelValues(const Runtime &R, const Evaluation &e, std::vector<double> &values);
 

@@ -1,4 +1,4 @@
-/* What the user asks for: channels and shapes of the scene. */
+/* Description of output: channels, shapes and lines of the scene. */
 #include "scene/measures.h"
 
 namespace hhtdae

@@ -1,4 +1,4 @@
-/* Energy and momentum of a scene in the state that its bodies are in */
+/* Energy and momentum of a scene at the present state of its bodies */
 #ifndef HHTDAE_SCENE_OUTPUT_ENERGY_H
 #define HHTDAE_SCENE_OUTPUT_ENERGY_H
 
@@ -10,7 +10,7 @@ namespace hhtdae
 struct Balance {
   double  kinetic = 0;
   double  gravity = 0;                 /* - sum of m g . r: zero at the space origin */
-  double  elastic = 0;                 /* of the forces that have a potential: linear springs, bushings, beams, not their damping */
+  double  elastic = 0;                 /* potential energy of linear springs, bushings, beams and others with HasEnergy */
   Vector3 linear  = Vector3::Zero();   /* momentum */
   Vector3 angular = Vector3::Zero();   /* about the space origin */
   double  potential() const { return gravity + elastic; }

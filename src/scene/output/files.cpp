@@ -128,7 +128,7 @@ namespace
 /* Datasets grow in chunks of this many samples. */
 constexpr hsize_t chunk = 256;
 
-/* A handle of HDF5 that is closed whatever happens */
+/* An HDF5 handle that the destructor closes */
 class Handle
 {
 public:
@@ -137,7 +137,7 @@ public:
   Handle(const Handle &) = delete;
   operator hid_t() const { return id_; }
   bool good() const { return id_ >= 0; }
-  bool close() /* whether that went well: of a file it is what writes */
+  bool close() /* false if it fails: closing a file writes it */
   {
     const bool closed = id_ < 0 || close_(id_) >= 0;
     id_               = -1;
@@ -149,7 +149,7 @@ private:
   herr_t (*close_)(hid_t);
 };
 
-/* A new dataset without samples, its length unlimited; groups in its name are made on the way */
+/* Creates an empty dataset of unlimited length, with the groups in its name */
 hid_t CreateDataset(hid_t file, const std::string &name)
 {
   const hsize_t none = 0, any = H5S_UNLIMITED;
@@ -190,7 +190,7 @@ bool AppendDataset(hid_t file, bool first, const std::string &name, const std::s
   return set.good() && (!first || !unit || SetUnits(set, *unit)) && Append(set, values);
 }
 
-/* HDF5 prints what went wrong in it to the terminal unless it is told not to: the message is ours */
+/* Suppresses HDF5's own error output; the message is given here */
 hid_t OpenFile(const std::string &file, bool first)
 {
   hid_t id;
@@ -204,7 +204,7 @@ hid_t OpenFile(const std::string &file, bool first)
 
 } // namespace
 
-/* The file is open only while a block is written: a run that is killed at another time leaves a file that is whole. */
+/* The file is open only while a block is written: a run that is killed at another time leaves a complete file. */
 PetscErrorCode AppendHDF5(const std::string &file, bool first, const TableHead &head, const Block &block)
 {
   const std::size_t   channels = head.name.size(), samples = block.time.size();

@@ -8,12 +8,12 @@
 namespace hhtdae
 {
 
-/* first: begins the file anew. *end: its length, before (0: not known) and then; another length than that before is an error: somebody else writes into it. */
+/* first: begins a new file. *end: expected length of the file before (0: not known), its length after; an unexpected length is an error, because another process writes into it. */
 PetscErrorCode AppendText(const std::string &file, bool first, const std::string &text, long *end);
-/* Where a run goes on that was recorded up to so many bytes: what was written later is dropped. *there: whether the file is; a run may be resumed
-   with another one, which then begins there. A file that is too short is an error. */
+/* Truncates a file to the length at a checkpoint. *there: whether the file exists; a run may be resumed with another file, which then begins
+   at the checkpoint. A file that is too short is an error. */
 PetscErrorCode ShortenFile(const std::string &file, long end, bool *there);
-/* Written beside, and renamed when it is whole and on the disk: the file that was there before is lost only then. */
+/* Writes a temporary file and renames it when it is complete and on the disk, so that an existing file is replaced only then. */
 PetscErrorCode WriteWhole(const std::string &file, const std::string &text);
 PetscErrorCode SyncFile(const std::string &file);
 

@@ -9,7 +9,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int around = 24, rings = 12; /* facets of cylinders and spheres */
+constexpr int around = 24, rings = 12; /* facets of cylinders and spheres around the axis, and of spheres along it */
 
 /* Adds points of a shape in its own axes, and cells between them */
 class Builder

@@ -21,7 +21,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t page_pose = 7; /* position of the centre of mass, quaternion x, y, z, w */
+constexpr std::size_t page_pose = 7; /* numbers per body: position of the centre of mass, quaternion x, y, z, w */
 
 class Page : public Task
 {
@@ -113,7 +113,7 @@ private:
   bool                                  there_ = false;
   long                                  end_   = 0; /* bytes of the file */
 
-  /* Where the first rank fails, all do: none of them waits for it */
+  /* An error of the first rank is an error on all ranks: none waits for it */
   template <class F> PetscErrorCode onFirst(const Runtime &R, const F &work) const
   {
     PetscFunctionBegin;
@@ -162,7 +162,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Places of nodes become displacements in the axes of a rigid motion, whose pose it writes */
+  /* Converts positions of nodes to displacements relative to the nearest rigid motion, whose pose it writes */
   static void takeRigidMotion(const Eigen::Matrix3Xd &X, double *x, double *pose)
   {
     Eigen::Map<Eigen::Matrix3Xd> now(x, 3, X.cols());
@@ -240,7 +240,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Of the two quaternions of a rotation the one nearer to that of the frame before: tracks without jumps compress better. */
+  /* Chooses of the two quaternions of a rotation the one nearer to that of the previous frame: tracks without jumps compress better. */
   void continueQuaternions(std::vector<double> &frame, std::size_t bodies)
   {
     last_.resize(4 * bodies, 0);

@@ -1,6 +1,6 @@
 /*
-  What a page holds as binary data: little-endian bytes, compressed by zlib and written in base64, each sequence in a script element of
-  its own that no browser runs.
+  Binary data of a page: little-endian bytes, compressed by zlib and written in base64, each sequence in a separate script element of
+  a type that browsers do not execute.
 */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_BYTES_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_BYTES_H
@@ -33,7 +33,7 @@ public:
     std::memcpy(&bits, &x, sizeof bits);
     whole(bits);
   }
-  /* Bytes of equal weight stand together: those of slowly varying numbers compress far better so. */
+  /* Bytes of the same significance are stored together: slowly varying numbers compress far better then. */
   void planes(const std::vector<std::uint16_t> &x) { inPlanes(x); }
   void planes(const std::vector<std::uint32_t> &x) { inPlanes(x); }
 
@@ -52,7 +52,7 @@ private:
 /* The element of the page; kind: "frames" */
 PetscErrorCode PageElement(const PageBytes &bytes, const std::string &kind, std::string *element);
 
-/* A difference as a whole number that is small where it is small in magnitude: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... */
+/* Zigzag coding of a difference as an unsigned number: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... */
 inline std::uint16_t ZigZag(std::uint16_t difference)
 {
   const std::uint16_t negative = difference & 0x8000 ? 0xffff : 0;

@@ -58,7 +58,7 @@ std::string ShapeText(const SceneData &s, const ShapeData &d)
   return ShapeText(kind[d.shape.kind], d.shape.size, d.body, at, d.shape.axes, d.shape.colour);
 }
 
-/* The solid box with the body's mass and moments of inertia, I_1 = m (a_2^2 + a_3^2)/3 for half edges a_k; empty where the inertia tells no shape */
+/* The solid box with the body's mass and moments of inertia, I_1 = m (a_2^2 + a_3^2)/3 for half edges a_k; empty if no box has this inertia */
 std::string BoxOfInertia(const SceneData &s, PetscInt id)
 {
   const BodyData &b = s.bodies[id];

@@ -1,4 +1,4 @@
-/* What of a scene does not move, for its page: JSON. */
+/* The constant data of a scene for its page, as JSON. */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_DESCRIPTION_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_DESCRIPTION_H
 

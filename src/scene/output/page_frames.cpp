@@ -10,11 +10,11 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t   most_frames = 128;     /* of a block: a page that is killed loses no more */
-constexpr std::size_t   most_bytes  = 8 << 20; /* of a block in memory */
-constexpr double        levels      = 65534;   /* codes 0 to 65534 */
-constexpr std::uint16_t missing     = 65535;
-constexpr float         node_levels = 4095; /* of displacements of nodes, to each side of 0 in a block */
+constexpr std::size_t   max_block_frames = 128;     /* frames of a block: a run that is killed loses at most these */
+constexpr std::size_t   max_block_bytes  = 8 << 20; /* memory of a block */
+constexpr double        track_levels     = 65534;   /* values of a track are coded as 0 to 65534 */
+constexpr std::uint16_t missing_code     = 65535;   /* not finite, or beyond 1e300 */
+constexpr float         max_node_level   = 4095;    /* displacements of nodes are coded as -4095 to 4095 in a block */
 
 /* Finite, and far enough from the end of the numbers for differences of two */
 bool Usable(double x) { return std::abs(x) < 1e300; }
@@ -33,13 +33,13 @@ Range RangeOf(const std::vector<double> &x)
       high = std::max(high, v);
     }
   if (!(high >= low)) return {};
-  return {low, (high - low) / levels};
+  return {low, (high - low) / track_levels};
 }
 
 std::uint16_t Code(double x, const Range &r)
 {
-  if (!Usable(x)) return missing;
-  return r.step > 0 ? (std::uint16_t)std::min(levels, std::round((x - r.low) / r.step)) : 0;
+  if (!Usable(x)) return missing_code;
+  return r.step > 0 ? (std::uint16_t)std::min(track_levels, std::round((x - r.low) / r.step)) : 0;
 }
 
 } // namespace
@@ -54,7 +54,7 @@ void PageFrames::add(double time, const double *tracks, const double *channels, 
 
 bool PageFrames::full() const
 {
-  return time_.size() >= most_frames || sizeof(double) * track_.size() + sizeof(float) * (channel_.size() + number_.size()) >= most_bytes;
+  return time_.size() >= max_block_frames || sizeof(double) * track_.size() + sizeof(float) * (channel_.size() + number_.size()) >= max_block_bytes;
 }
 
 void PageFrames::clear()
@@ -159,7 +159,7 @@ void PageFrames::encodeNodes(const PageNodes &m, std::size_t first, PageBytes &o
   };
   for (std::size_t i = 0; i < n; i++)
     for (std::size_t k = 0; k < tracks; k++) largest = std::max(largest, std::abs(at(i, k)));
-  const float step = largest / node_levels;
+  const float step = largest / max_node_level;
   out.f32(step);
   code.reserve(n * tracks);
   for (std::size_t k = 0; k < tracks; k++) {

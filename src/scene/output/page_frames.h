@@ -1,5 +1,5 @@
 /*
-  Frames of a page, gathered in memory until they are worth a block. A block stands for itself: it can be read without those before.
+  Frames of a page, collected in memory and written in blocks. A block can be read without those before it.
 
     u32 frames;  f64 time of each
     for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite, or beyond 1e300
@@ -19,13 +19,13 @@
 namespace hhtdae
 {
 
-/* Stress at the nodes of a surface with modes, which is worked out for a block as a whole */
+/* A surface with modes whose stress at the nodes is computed for a whole block at once */
 struct PageField {
   const Surface *surface;
   std::size_t    first; /* of its modal coordinates among the tracks */
 };
 
-/* A surface whose nodes move by themselves: of each frame 3 displacements a node, then the stress of each */
+/* A surface whose nodes move individually: per frame three displacements of each node, then the stress at each node */
 struct PageNodes {
   std::size_t nodes;
   bool        stress;
@@ -45,7 +45,7 @@ public:
   std::size_t frames() const { return time_.size(); }
   /* tracks: coordinates of bodies and modes; moving: the numbers of all PageNodes */
   void add(double time, const double *tracks, const double *channels, const double *moving = nullptr);
-  /* Whether its memory, or the number of its frames, has reached what a block may have */
+  /* Whether the block has reached its largest memory or number of frames */
   bool      full() const;
   PageBytes encode() const;
   void      clear();

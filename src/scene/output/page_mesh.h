@@ -15,7 +15,7 @@
 namespace hhtdae
 {
 
-/* Of an extension; made for a page, on all ranks */
+/* The mesh of an extension, made for a page on all ranks */
 class PageMesh
 {
 public:
@@ -33,7 +33,7 @@ public:
   std::size_t perNode() const { return stress ? 4 : 3; }
 };
 
-/* The rigid motion nearest to that of points: X_k goes to origin + R X_k, in the mean of squares; X from their mean. Not finite where the points are not. */
+/* The rigid motion X_k -> origin + R X_k nearest to the motion of the points in the mean square; X: relative to their mean. Not finite if the points are not. */
 struct RigidFit {
   Vector3 origin;
   Matrix3 R;

@@ -27,7 +27,7 @@ std::string SurfaceFault(const Surface &s, const ModalBody &m)
 
 PageBytes EncodeSurface(const Surface &s, const ModalBody &m)
 {
-  constexpr double           most = 8191, least = 31; /* levels of a mode to each side */
+  constexpr double           max_levels = 8191, min_levels = 31; /* shapes of a mode are coded as integers of at most this magnitude: slowest mode, and the least for fast ones */
   const Eigen::Index         modes = m.modes();
   PageBytes                  out;
   std::vector<std::uint32_t> words;
@@ -48,7 +48,7 @@ PageBytes EncodeSurface(const Surface &s, const ModalBody &m)
   const double slowest = modes ? m.omega.minCoeff() : 1;
   for (Eigen::Index k = 0; k < modes; k++) {
     const double ratio = slowest / m.omega(k), largest = s.shape.rows() ? s.shape.col(k).cwiseAbs().maxCoeff() : 0;
-    const double levels = std::max(least, std::floor(most * ratio * ratio));
+    const double levels = std::max(min_levels, std::floor(max_levels * ratio * ratio));
     const float  step   = (float)(largest / levels);
     out.f32(step);
     for (int c = 0; c < 3; c++)
@@ -60,12 +60,12 @@ PageBytes EncodeSurface(const Surface &s, const ModalBody &m)
 
 void SurfaceStress(const Surface &s, const Eigen::MatrixXf &eta, Eigen::MatrixXf *von_mises)
 {
-  constexpr Eigen::Index some  = 256; /* nodes at a time, which stay in the cache */
+  constexpr Eigen::Index nodes_at_a_time = 256; /* so few that their data stay in the cache */
   const Eigen::Index     nodes = s.stress.rows() / 6;
   Eigen::MatrixXf        x;
   von_mises->resize(nodes, eta.cols());
-  for (Eigen::Index first = 0; first < nodes; first += some) {
-    const Eigen::Index count = std::min(some, nodes - first);
+  for (Eigen::Index first = 0; first < nodes; first += nodes_at_a_time) {
+    const Eigen::Index count = std::min(nodes_at_a_time, nodes - first);
     x.noalias()              = s.stress.middleRows(6 * first, 6 * count) * eta;
     for (Eigen::Index f = 0; f < eta.cols(); f++)
       for (Eigen::Index i = 0; i < count; i++) {

@@ -1,4 +1,4 @@
-/* Surfaces of flexible bodies in a page: what it holds of the mesh and its modes, and the stress at its nodes. */
+/* Surfaces of flexible bodies in a page: coding of the mesh and its modes, and the stress at its nodes. */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_SURFACE_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_SURFACE_H
 
@@ -9,7 +9,7 @@
 namespace hhtdae
 {
 
-/* What is wrong with it, empty if nothing */
+/* Error of a surface as text, empty if there is none */
 std::string SurfaceFault(const Surface &s, const ModalBody &m);
 
 /*
@@ -17,8 +17,8 @@ std::string SurfaceFault(const Surface &s, const ModalBody &m);
     f32 coordinates from the undeformed centre of mass, in planes;  u32 nodes of the triangles, in planes
     f32 step of every mode;  codes of each mode, its x, y, z one after the other: u16 in zigzag order, in planes; displacement = step * code
 
-  A force of given size deflects the body in mode k in proportion to 1/omega_k^2, so that the codes get coarser by that factor: displacements that
-  matter equally are kept equally well. The slowest mode has 8,191 levels to each side, none has less than 31.
+  A force of given size deflects the body in mode k in proportion to 1/omega_k^2, so the codes are coarser by that factor, which makes the errors of
+  displacements equal for all modes. The largest code is 8,191 for the slowest mode, and at least 31.
 */
 PageBytes EncodeSurface(const Surface &s, const ModalBody &m);
 

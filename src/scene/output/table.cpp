@@ -10,9 +10,9 @@ namespace hhtdae
 namespace
 {
 
-/* A block is written when it has this many samples, or when its first one is this many seconds old. */
-constexpr std::size_t largest_block = 256;
-constexpr double      longest_wait  = 10;
+/* A block is written when it has this many samples, or when its first one is this many seconds of real time old */
+constexpr std::size_t max_block_samples = 256;
+constexpr double      max_block_age     = 10;
 
 class Table : public Task
 {
@@ -34,7 +34,7 @@ public:
     if (time_.empty()) PetscCall(PetscTime(&since_));
     time_.push_back(e.t);
     PetscCall(ChannelValues(R, e, own_));
-    if (time_.size() >= largest_block) PetscCall(write(R)); /* a step may be long, and samples close */
+    if (time_.size() >= max_block_samples) PetscCall(write(R)); /* a step may be long, and samples close */
     PetscFunctionReturn(0);
   }
 
@@ -44,7 +44,7 @@ public:
     PetscFunctionBegin;
     if (time_.empty()) PetscFunctionReturn(0);
     PetscCall(PetscTime(&now));
-    int full = now - since_ > longest_wait; /* as the first rank's clock says */
+    int full = now - since_ > max_block_age; /* as the first rank's clock says */
     if (R.size > 1) PetscCallMPI(MPI_Bcast(&full, 1, MPI_INT, 0, R.scene.comm));
     if (full) PetscCall(write(R));
     PetscFunctionReturn(0);

@@ -1,4 +1,4 @@
-/* Files of sampled channels: blocks of samples are appended, so that a run that breaks off leaves what it had. */
+/* Files of sampled channels. Blocks of samples are appended, so that an aborted run leaves the earlier ones. */
 #ifndef HHTDAE_SCENE_OUTPUT_TABLE_H
 #define HHTDAE_SCENE_OUTPUT_TABLE_H
 
