@@ -1,21 +1,20 @@
 /*
   The equations of small motions about a state of a run.
 
-  The scene's matrix F_u + sv F_v + sa F_a, of the derivatives by u and its velocities and accelerations, has the coordinates of the run,
-  rotations among them. Where a body spins, these change their meaning with time. So x are displacements and rotations in space axes, and
+  The scene's matrix F_u + sv F_v + sa F_a contains derivatives by the coordinates of the run and their velocities and accelerations. The meaning of rotational coordinates
+  changes with time if a body spins. So the unknowns x of small motions are displacements and rotations in space axes, and
 
     du = T_00 x,    dv = T_11 x' + T_10 x,    da = T_22 x'' + T_21 x' + T_20 x
     M = T_00^T F_a T_22,    C = T_00^T (F_v T_11 + F_a T_21),    K = T_00^T (F_u T_00 + F_v T_10 + F_a T_20)
 
-  For Euler angles T_00 = G^-1 =: T, and the others are its derivatives, T_11 = T_22 = T, T_10 = T', T_21 = 2 T', T_20 = T''. Of local
-  rotation vectors v and a are the angular velocity w and acceleration: exp([x]) A turns with w + x' + x cross w, so that T_00 = G^-1,
-  T_11 = T_22 = 1, T_10 = T_21 = -[w], T_20 = -[w'].
+  For Euler angles T_00 = G^-1 =: T, and T_11 = T_22 = T, T_10 = T', T_21 = 2 T', T_20 = T''. For local rotation vectors v and a are the angular velocity w
+  and acceleration: exp([x]) A has the angular velocity w + x' + x cross w, so that T_00 = G^-1, T_11 = T_22 = 1, T_10 = T_21 = -[w], T_20 = -[w'].
 
-  x may be in axes that turn with W and at this moment are those of space: of displacements and rotations T_kl becomes the sum over m of T_km S_ml with
+  x may be in axes that rotate with W and presently coincide with those of space: for displacements and rotations T_kl becomes the sum over m of T_km S_ml with
 
     S_00 = S_11 = S_22 = 1,    S_10 = [W],    S_21 = 2 [W],    S_20 = [W'] + [W][W]
 
-  T_00^T makes moments about space axes of the rows. Since F = 0 all along the motion, this and factors of rows that change with time change nothing.
+  T_00^T turns the rows of rotations into moments about space axes. Since F = 0 along the whole motion, time-dependent factors of rows do not change the result.
 */
 #include "euler.h"
 #include "extension.h"
@@ -28,9 +27,10 @@ namespace hhtdae
 namespace
 {
 
-constexpr double apart = 1099511627776.; /* 2^40: of what the shifts multiply, nothing else is left in the digits */
+/* 2^40, as sv (1/s) or sa (1/s^2): F_u is negligible beside the shifted term, which is isolated to all digits; as a power of two it adds no rounding */
+constexpr double derivative_shift = 1099511627776.;
 
-/* F_u, F_u' or F_u'': the matrix with the shifts, less F_u */
+/* F_u, F_u' or F_u'': the matrix with the shifts minus F_u (`less`), divided by the shift */
 PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv, double sa, Mat less, Mat *out)
 {
   Mat J;
@@ -45,7 +45,7 @@ PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv,
   PetscFunctionReturn(0);
 }
 
-/* T = G^-1, T', T''. G = [z g2 g3] turns about z with phi, and g3 about g2 with theta: d g3/d theta = p, dp/d theta = -g3 */
+/* T_kl of Euler angles. G = [z g2 g3] rotates about z with phi, and g3 about g2 with theta: d g3/d theta = p, dp/d theta = -g3 */
 void AngleRates(const double *angle, const double *rate, const double *second, Matrix3 T[3][3])
 {
   const double phi = rate[0], theta = rate[1];
@@ -71,11 +71,11 @@ void LocalRates(const double *x, const double *w, const double *alpha, Matrix3 T
   T[2][0]           = -Cross<double>(Vector3(alpha[0], alpha[1], alpha[2]));
 }
 
-/* What vectors in axes of a spin are in space, with their rates */
-struct Turning {
+/* S_kl of axes that rotate with `spin`; `axes`: their present orientation */
+struct RotatingAxes {
   Matrix3 S[3][3];
 
-  Turning(const Vector3 &spin, const Vector3 &rate, const Matrix3 &axes)
+  RotatingAxes(const Vector3 &spin, const Vector3 &rate, const Matrix3 &axes)
   {
     const Matrix3 W = Cross<double>(spin);
     for (auto &row : S)
@@ -88,7 +88,7 @@ struct Turning {
       for (Matrix3 &x : row) x = x * axes;
   }
 
-  void before(Matrix3 T[3][3]) const
+  void compose(Matrix3 T[3][3]) const
   {
     for (int k = 2; k >= 0; k--)
       for (int l = 0; l <= k; l++) {
@@ -99,8 +99,8 @@ struct Turning {
   }
 };
 
-/* T_kl of n unknowns from `first` on */
-PetscErrorCode PutTurn(Linearization::Work &w, PetscInt first, int n, const Matrix3 T[3][3])
+/* Sets T_kl of n unknowns from `first` on */
+PetscErrorCode SetTransformation(Linearization::Work &w, PetscInt first, int n, const Matrix3 T[3][3])
 {
   const PetscInt rows[3] = {first, first + 1, first + 2};
   PetscFunctionBegin;
@@ -114,10 +114,10 @@ PetscErrorCode PutTurn(Linearization::Work &w, PetscInt first, int n, const Matr
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode MakeTurns(Linearization::Work &w)
+PetscErrorCode MakeTransformations(Linearization::Work &w)
 {
   Runtime      &R = *w.R;
-  const Turning by(w.spin, w.spin_rate, w.axes);
+  const RotatingAxes by(w.spin, w.spin_rate, w.axes);
   const double *s[3];
   PetscFunctionBegin;
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(w.state[k], &s[k]));
@@ -129,15 +129,15 @@ PetscErrorCode MakeTurns(Linearization::Work &w)
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &body = R.bodies.body[b];
     const PetscInt   at   = body.first + 3;
-    if (Coordinates(body.kind)) PetscCall(PutTurn(w, R.start + body.first, GroupSize(body.kind, 0), by.S));
+    if (Coordinates(body.kind)) PetscCall(SetTransformation(w, R.start + body.first, GroupSize(body.kind, 0), by.S));
     if (!TurnsInSpace(body.kind)) continue;
     Matrix3 T[3][3];
     (R.bodies.local ? LocalRates : AngleRates)(s[0] + at, s[1] + at, s[2] + at, T);
-    by.before(T);
-    PetscCall(PutTurn(w, R.start + at, 3, T));
+    by.compose(T);
+    PetscCall(SetTransformation(w, R.start + at, 3, T));
   }
   for (const auto &e : R.scene.extensions)
-    for (PetscInt i = 0; e->vectors() && i < e->coordinates(); i += 3) PetscCall(PutTurn(w, e->start[R.rank] + i, 3, by.S));
+    for (PetscInt i = 0; e->vectors() && i < e->coordinates(); i += 3) PetscCall(SetTransformation(w, e->start[R.rank] + i, 3, by.S));
   for (int k = 0; k < 3; k++) PetscCall(VecRestoreArrayRead(w.state[k], &s[k]));
   for (int k = 0; k < 3; k++)
     for (int l = 0; l <= k; l++) {
@@ -187,47 +187,47 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
   PetscFunctionReturn(0);
 }
 
-/* Of the body that is asked for; else the mean of flexible bodies, whose modal coordinates turn with them, if all do so alike */
+/* Chooses the spin of the axes: that of the given body, else the mean of all flexible bodies if they spin alike, since modal coordinates are in the bodies' axes */
 PetscErrorCode Linearization::Work::chooseAxes(Body of)
 {
-  constexpr double alike = 1e-2, slow = 1e-4; /* of the fastest spin; of the slowest mode: a spin that is not seen in modes (SmallBodies.AxesOfSeveralBodies) */
+  constexpr double    same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4; /* differences of spins relative to the fastest; spins relative to the lowest eigenfrequency of a flexible body that do not affect modes (SmallBodies.AxesOfSeveralBodies) */
   const SceneData &s     = R->scene;
   Vec              at[3] = {state[0], state[1], state[2]};
-  double           fastest = 0, apart = 0, slowest = INFINITY;
+  double              fastest = 0, angular_difference = 0, slowest = INFINITY;
   std::vector<Motion> all;
   PetscFunctionBegin;
   spin.setZero();
   spin_rate.setZero();
   PetscCheck(of.id < 0 || s.valid(of), comm(), PETSC_ERR_ARG_WRONG, "Linearization::take(): the body whose axes are asked for is not one of this scene");
   if (of.id == -1) PetscFunctionReturn(0); /* the ground */
-  PetscCall(look(at));
+  PetscCall(setState(at));
   for (std::size_t b = 0; b < s.bodies.size(); b++) {
     if (of.id >= 0 ? (PetscInt)b != of.id : !s.bodies[b].flexible) continue;
     all.emplace_back();
-    PetscCall(moved.motion(Body{(PetscInt)b, s.number}, &all.back()));
+    PetscCall(perturbed.motion(Body{(PetscInt)b, s.number}, &all.back()));
     if (s.bodies[b].flexible && s.bodies[b].flexible->model->omega.size()) slowest = std::min(slowest, s.bodies[b].flexible->model->omega.minCoeff());
   }
   for (const Motion &m : all) {
     fastest = std::max(fastest, m.angular_velocity.norm());
-    apart   = std::max(apart, (m.angular_velocity - all[0].angular_velocity).norm());
+    angular_difference = std::max(angular_difference, (m.angular_velocity - all[0].angular_velocity).norm());
   }
-  if (apart <= alike * fastest) {
+  if (angular_difference <= same_spin_tolerance * fastest) {
     for (const Motion &m : all) {
       spin += m.angular_velocity / (double)all.size();
       spin_rate += m.angular_acceleration / (double)all.size();
     }
     if (fastest > 0) PetscCall(PetscInfo(nullptr, "scene: small motions in axes that turn with (%g, %g, %g) rad/s\n", spin(0), spin(1), spin(2)));
-  } else if (fastest > slow * slowest) {
+  } else if (fastest > slow_spin_ratio * slowest) {
     PetscCall(PetscPrintf(comm(), "scene: flexible bodies do not turn alike, and modes at speed are wrong in space axes: Linearization::take() can be given the body from which the motion is steady\n"));
   }
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Linearization::Work::look(Vec at[3]) const
+PetscErrorCode Linearization::Work::setState(Vec at[3]) const
 {
   PetscFunctionBegin;
-  PetscCall(moved.take(*R, t, at));
-  moved.work_->origin = origin;
+  PetscCall(perturbed.take(*R, t, at));
+  perturbed.work_->origin = origin;
   PetscFunctionReturn(0);
 }
 
@@ -237,9 +237,9 @@ PetscErrorCode Linearization::Work::differentiate()
   const CountFrom then(*R, origin);
   PetscFunctionBegin;
   PetscCall(DerivativeMatrix(*R, t, state, 0, 0, nullptr, &F[0]));
-  PetscCall(DerivativeMatrix(*R, t, state, apart, 0, F[0], &F[1]));
-  PetscCall(DerivativeMatrix(*R, t, state, 0, apart, F[0], &F[2]));
-  PetscCall(MakeTurns(*this));
+  PetscCall(DerivativeMatrix(*R, t, state, derivative_shift, 0, F[0], &F[1]));
+  PetscCall(DerivativeMatrix(*R, t, state, 0, derivative_shift, F[0], &F[2]));
+  PetscCall(MakeTransformations(*this));
   PetscCall(MatMatMult(F[2], turn[2][2], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &M));
   PetscCall(MatMatMult(F[1], turn[1][1], MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
   PetscCall(AddProduct(C, 1, F[2], turn[2][1]));
@@ -256,8 +256,7 @@ PetscErrorCode Linearization::Work::differentiate()
   PetscFunctionReturn(0);
 }
 
-/* By the masses, where these are missing by what stands for them in assembly; coordinates without any are those of other libraries, which bring such
-   bodies' masses or have none: the lightest coordinate's unit is theirs */
+/* unit = 1/sqrt(mass) from the diagonal of M, with the substitutes of assembly for missing inertia. Coordinates of extensions may have no diagonal entry: they get the largest unit */
 PetscErrorCode Linearization::Work::chooseUnits()
 {
   Vec           diagonal;

@@ -1,22 +1,22 @@
 /*
-  Small motions in minimal coordinates, by dense algebra, the same on every rank.
+  Small motions in minimal coordinates, by dense linear algebra, replicated on every rank.
 
-  From positions q, velocities v, first-order states s and inputs f, accelerations and whatever is algebraic follow by the differentiated
-  constraints, rates of whose rows along the motion have a dot:
+  Accelerations and algebraic unknowns follow from positions q, velocities v, first-order states s and inputs f by the differentiated
+  constraints; a dot marks rates of their rows along the motion:
 
     W (q'', s', lambda, V, F) = b f - K_q q - C_q v - K_s s,    rows of constraints: Phi_q q'' = -2 Phi_q. v - Phi_q.. q,
                                                                 Psi_v q'' = -(Psi_v. + Psi_q) v - Psi_q. q - Psi_s s' - Psi_s. s
 
-  Variables that rows of velocities read are eliminated from them beforehand: V of positions and states goes into Psi_q and Psi_s.
+  Variables that rows at velocity level read are eliminated beforehand, row_rates.cpp.
 
-  Positions are q = N z, N an orthonormal basis of what Phi_q leaves; velocities v = L y + P q + S s, L of what Phi_q and Psi_v leave, P and S the least
-  ones for which Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q - Psi_s s. Where the rows change, N and L go with them by the least rates, so that their columns are moved
-  parallel to themselves: coordinates of a single freedom are lengths along its path, in units of masses, whatever the speed. So
+  Positions are q = N z, N an orthonormal basis of the null space of Phi_q; velocities v = L y + P q + S s, L an orthonormal basis of the null space of Phi_q and Psi_v, P and S the
+  minimum-norm solutions of Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q - Psi_s s. If the rows change along the motion, N and L change by the smallest rates: their columns are transported in
+  parallel, so that the coordinate of a single degree of freedom is the arc length of its path, in the metric of the masses, at any speed. So
 
     z' = N^T v,    y' = L^T q'' + L.^T (P q + S s),    s' from above.
 
-  All of this is in coordinates for which masses are 1 (Work::unit) and with rows of constraints of length 1: metres, radians and modal coordinates are not
-  of one size, the less so the smaller the bodies are, and what is orthonormal in them loses digits (SmallBodies.StateSpace).
+  All of this is in coordinates for which masses are 1 (Work::unit), with rows of constraints of norm 1: in metres, radians and modal coordinates, whose magnitudes differ the more
+  the smaller the bodies are, orthonormal bases would lose digits (SmallBodies.StateSpace).
 */
 #include "complement.h"
 #include "linearization.h"
@@ -35,9 +35,9 @@ namespace
 using Dense   = Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
-constexpr PetscInt most = 1000; /* unknowns: a minute for all modes */
+constexpr PetscInt max_dense_unknowns = 1000; /* all modes then take about a minute */
 
-/* Own entries of every rank, on every rank */
+/* Gathers the own entries of all ranks on every rank */
 template <class T> PetscErrorCode Gather(const Linearization::Work &w, MPI_Datatype type, const std::vector<T> &own, std::vector<T> &all)
 {
   std::vector<PetscMPIInt> count(w.R->size), first(w.R->size, 0);
@@ -50,7 +50,7 @@ template <class T> PetscErrorCode Gather(const Linearization::Work &w, MPI_Datat
   PetscFunctionReturn(0);
 }
 
-/* Rows of A in another order, or columns */
+/* Submatrix of A */
 Dense Block(const Dense &A, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &columns)
 {
   Dense B(rows.size(), columns.size());
@@ -59,8 +59,8 @@ Dense Block(const Dense &A, const std::vector<PetscInt> &rows, const std::vector
   return B;
 }
 
-/* The least x with A x = b for each column of b, and the rank of A; by LAPACK: Eigen's decompositions take seconds to compile */
-Dense Least(Dense A, const Dense &b, PetscBLASInt *rank)
+/* The x of minimum norm with A x = b for each column of b, and the rank of A. By LAPACK, because Eigen's decompositions take seconds to compile */
+Dense MinimumNormSolution(Dense A, const Dense &b, PetscBLASInt *rank)
 {
   const PetscBLASInt  m = (PetscBLASInt)A.rows(), n = (PetscBLASInt)A.cols(), k = (PetscBLASInt)b.cols(), longer = PetscMax(m, n);
   const PetscBLASInt  size = 64 * (m + n) + k;
@@ -74,13 +74,13 @@ Dense Least(Dense A, const Dense &b, PetscBLASInt *rank)
   return x.topRows(n);
 }
 
-/* Rows of independent constraints, each of length 1: an orthonormal basis of what they leave, and the least x with A x = b */
-struct Subspace {
+/* Rows of constraints, scaled to norm 1, with an orthonormal basis `free` of their null space; least(b): the x of minimum norm with A x = b for the unscaled rows */
+struct ConstraintRows {
   Dense           A, free, inverse;
   Eigen::VectorXd scale;
   PetscBLASInt    rank = 0;
 
-  explicit Subspace(const Dense &rows) : A(rows), scale(rows.rows())
+  explicit ConstraintRows(const Dense &rows) : A(rows), scale(rows.rows())
   {
     const Eigen::Index n = A.cols(), m = A.rows();
     if (!m) {
@@ -89,19 +89,19 @@ struct Subspace {
     }
     for (Eigen::Index i = 0; i < m; i++) {
       const double norm = A.row(i).norm();
-      scale(i)          = 1 / (norm + (double)(norm == 0)); /* no choice, of which both sides might be divided by, and trap */
+      scale(i)          = 1 / (norm + (double)(norm == 0)); /* not a conditional: vectorized code might divide by zero in the branch not taken and trap */
       A.row(i) *= scale(i);
     }
-    if (m <= n) free = OrthogonalComplement(A.transpose()); /* else they are not independent */
-    inverse = Least(A, Dense::Identity(m, m), &rank);
+    if (m <= n) free = OrthogonalComplement(A.transpose()); /* else the rows are dependent */
+    inverse = MinimumNormSolution(A, Dense::Identity(m, m), &rank);
   }
   bool  independent() const { return rank == A.rows(); }
   Dense least(const Dense &b) const { return A.rows() ? Dense(inverse * (scale.asDiagonal() * b)) : Dense::Zero(A.cols(), b.cols()); }
 };
 
 struct Minimal {
-  std::vector<PetscInt> q, holonomic, velocity, s, rest; /* global numbers; rest: what is algebraic, constraints' multipliers first */
-  Eigen::VectorXd      unit; /* of all unknowns: what is below is in these units */
+  std::vector<PetscInt> q, holonomic, velocity, s, algebraic; /* global numbers; algebraic: multipliers of constraints, then variables and force states */
+  Eigen::VectorXd       unit;                                 /* of all unknowns; the matrices below are in these units */
   Dense                N, L, P, S;
   Dense                y; /* (q'', s', rest) from (z, y, s, f) */
   Dense                A, B;
@@ -111,8 +111,8 @@ struct Minimal {
   Eigen::Index          states() const { return dz() + dy() + ds(); }
 };
 
-/* Solves with rows and columns brought to a size of 1; not a number if the matrix is singular */
-Dense Scaled(Dense W, Dense right)
+/* Solves W x = right after scaling the largest entries of rows and columns to 1; NaN if W is singular */
+Dense SolveEquilibrated(Dense W, Dense right)
 {
   Eigen::VectorXd row(W.rows()), column(W.cols());
   for (Eigen::Index i = 0; i < W.rows(); i++) {
@@ -134,7 +134,7 @@ Dense Scaled(Dense W, Dense right)
   return column.asDiagonal() * right;
 }
 
-/* Matrices to units in which masses are 1 and rows of constraints have length 1, with the multipliers that belong to them; and the rates of these rows */
+/* Scales the matrices to units in which masses are 1 and rows of constraints have norm 1, with their multipliers; and the rates of these rows */
 void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscInt> &constraints, RowRates &rates)
 {
   for (Dense *X : {&M, &C, &K}) *X = m.unit.asDiagonal() * *X * m.unit.asDiagonal();
@@ -158,10 +158,10 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   PetscInt                   n;
   PetscFunctionBegin;
   PetscCall(MatGetSize(w.M, &n, nullptr));
-  PetscCheck(n <= most, w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: %" PetscInt_FMT " unknowns are too many for dense algebra (%" PetscInt_FMT "); SlowestModes() and response() are sparse", n, most);
-  PetscCall(Whole(w.M, M));
-  PetscCall(Whole(w.C, C));
-  PetscCall(Whole(w.K, K));
+  PetscCheck(n <= max_dense_unknowns, w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: %" PetscInt_FMT " unknowns are too many for dense algebra (%" PetscInt_FMT "); SlowestModes() and response() are sparse", n, max_dense_unknowns);
+  PetscCall(GatherDense(w.M, M));
+  PetscCall(GatherDense(w.C, C));
+  PetscCall(GatherDense(w.K, K));
   PetscCall(Gather(w, MPI_UNSIGNED_CHAR, w.role, role));
   PetscCall(Gather(w, MPI_DOUBLE, w.unit, unit));
   std::vector<PetscInt> definitions, variables;
@@ -169,9 +169,9 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
     (role[i] == TSHHT3_COORDINATE ? m.q : role[i] == TSHHT3_STATE ? m.s : role[i] == TSHHT3_HOLONOMIC ? m.holonomic : role[i] == TSHHT3_NONHOLONOMIC ? m.velocity : definitions).push_back(i);
   for (PetscInt i : definitions)
     if (role[i] == TSHHT3_VARIABLE) variables.push_back(i);
-  m.rest = m.holonomic;
-  m.rest.insert(m.rest.end(), m.velocity.begin(), m.velocity.end());
-  m.rest.insert(m.rest.end(), definitions.begin(), definitions.end());
+  m.algebraic = m.holonomic;
+  m.algebraic.insert(m.algebraic.end(), m.velocity.begin(), m.velocity.end());
+  m.algebraic.insert(m.algebraic.end(), definitions.begin(), definitions.end());
   m.unit = Eigen::Map<const Eigen::VectorXd>(unit.data(), n);
   std::vector<PetscInt> both = m.holonomic;
   both.insert(both.end(), m.velocity.begin(), m.velocity.end());
@@ -179,11 +179,11 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   PetscCall(w.rates(both, variables, &rates));
   EliminateVariables(m.velocity, variables, C, K);
   for (PetscInt i : m.velocity)
-    PetscCheck(std::all_of(m.rest.begin(), m.rest.end(), [&](PetscInt j) { return K(i, j) == 0; }), w.comm(), PETSC_ERR_SUP,
+    PetscCheck(std::all_of(m.algebraic.begin(), m.algebraic.end(), [&](PetscInt j) { return K(i, j) == 0; }), w.comm(), PETSC_ERR_SUP,
                "Linearization: %s reads a variable that does not follow from positions, velocities, states and time", UnknownName(*w.R->model, i).c_str());
   ToUnits(m, M, C, K, both, rates);
 
-  const Subspace     position(Block(K, m.holonomic, m.q));
+  const ConstraintRows position(Block(K, m.holonomic, m.q));
   const Eigen::Index h = (Eigen::Index)m.holonomic.size(), nr = (Eigen::Index)both.size();
   const auto         rate = [&](const Dense &X, const std::vector<PetscInt> &columns) {
     std::vector<PetscInt> all(nr);
@@ -195,7 +195,7 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   of_v_rate.topRows(h) = rate(rates.K, m.q).topRows(h);
   of_q << of_v_rate.topRows(h), Block(K, m.velocity, m.q);
   of_s.bottomRows(nr - h) = Block(K, m.velocity, m.s);
-  const Subspace motion(of_v);
+  const ConstraintRows motion(of_v);
   PetscCheck(position.independent() && motion.independent(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: the constraints depend on one another in this position, where the number of degrees of freedom is not defined");
   m.N = position.free;
   m.L = motion.free;
@@ -207,7 +207,7 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   std::iota(rows.begin(), rows.end(), 0);
   const Eigen::Index nq = (Eigen::Index)m.q.size(), ns = m.ds(), nf = (Eigen::Index)in.size();
   Dense             W(n, n), right(n, 2 * nq + ns + nf);
-  W << Block(M, rows, m.q), Block(C, rows, m.s), Block(K, rows, m.rest);
+  W << Block(M, rows, m.q), Block(C, rows, m.s), Block(K, rows, m.algebraic);
   right << -Block(K, rows, m.q), -Block(C, rows, m.q), -Block(K, rows, m.s), Dense::Zero(n, nf);
   for (Eigen::Index f = 0; f < nf; f++) {
     std::vector<double> own, all;
@@ -231,19 +231,19 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   expand.block(nq, m.dz(), nq, m.dy())                 = m.L;
   expand.block(nq, m.dz() + m.dy(), nq, ns)            = m.S;
   expand.bottomRightCorner(ns + nf, ns + nf).setIdentity();
-  m.y = Scaled(W, right * expand);
+  m.y = SolveEquilibrated(W, right * expand);
   PetscCheck(m.y.allFinite(), w.comm(), PETSC_ERR_MAT_LU_ZRPVT, "Linearization: accelerations and multipliers do not follow from the state: the constraints are singular there");
 
-  Dense       result(m.states(), m.states() + nf), aside = expand.middleRows(nq, nq);
+  Dense       result(m.states(), m.states() + nf), nonminimal_velocity = expand.middleRows(nq, nq);
   const Dense turn = motion.least(-of_v_rate * m.L);
-  aside.middleCols(m.dz(), m.dy()).setZero();
-  result << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq) + turn.transpose() * aside, m.y.middleRows(nq, ns);
+  nonminimal_velocity.middleCols(m.dz(), m.dy()).setZero();
+  result << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq) + turn.transpose() * nonminimal_velocity, m.y.middleRows(nq, ns);
   m.A = result.leftCols(m.states());
   m.B = result.rightCols(nf);
   PetscFunctionReturn(0);
 }
 
-/* x of own unknowns from (z, y, s) and inputs; second: their rates, and those of the rates */
+/* x, x', x'' of own unknowns from (z, y, s) and inputs */
 template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m, const Eigen::Matrix<T, Eigen::Dynamic, 1> &state, std::array<std::vector<T>, 3> &x)
 {
   using Vector          = Eigen::Matrix<T, Eigen::Dynamic, 1>;
@@ -263,11 +263,11 @@ template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m,
     put(0, m.s[k], s((Eigen::Index)k));
     put(1, m.s[k], other((Eigen::Index)(m.q.size() + k)));
   }
-  for (std::size_t k = 0; k < m.rest.size(); k++) put(0, m.rest[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
+  for (std::size_t k = 0; k < m.algebraic.size(); k++) put(0, m.algebraic[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
 }
 
-/* Eigenvalues whose imaginary parts are not negative, and their vectors. LAPACK balances A: rates of positions have the size of velocities, rates of velocities
-   that of stiffness, 1e15 times as large in a steel part of 1 mm, and slow modes would be lost between the two (SmallBodies.Modes). */
+/* Eigenvalues with non-negative imaginary parts, and their vectors. LAPACK balances A, without which slow modes would be lost: entries of order 1 for rates of positions stand beside
+   entries of the size of stiffness over mass for rates of velocities, up to 1e15 in a steel part of 1 mm (SmallBodies.Modes). */
 PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, Eigen::MatrixXcd *vector)
 {
   const PetscBLASInt n = (PetscBLASInt)A.rows(), one = 1, ask = -1;
@@ -284,7 +284,7 @@ PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, E
   value->clear();
   vector->resize(n, n);
   for (Eigen::Index k = 0; k < n; k++) {
-    if (im(k) < 0) continue; /* of a pair the one before it */
+    if (im(k) < 0) continue; /* the other one of a complex pair */
     vector->col((Eigen::Index)value->size()) = V.col(k);
     if (im(k) > 0) vector->col((Eigen::Index)value->size()) += Complex(0, 1) * V.col(k + 1);
     value->push_back({re(k), im(k)});
@@ -304,7 +304,7 @@ PetscErrorCode Linearization::modes(std::vector<Mode> *all) const
   PetscCall(w.check("Linearization::modes()"));
   PetscCall(Reduce(w, {}, m));
   all->clear();
-  if (!m.states()) PetscFunctionReturn(0); /* all motions are given */
+  if (!m.states()) PetscFunctionReturn(0); /* no degrees of freedom */
   PetscCall(Eigenpairs(w.comm(), m.A, &value, &vector));
   std::vector<int> order(value.size());
   std::iota(order.begin(), order.end(), 0);

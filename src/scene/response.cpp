@@ -1,4 +1,4 @@
-/* Frequency response: (K - w^2 M + i w C) x = b as a real system of twice the unknowns, the real parts before the imaginary ones on each rank. */
+/* Frequency response: (K - w^2 M + i w C) x = b as a real system of twice the size; on each rank the real parts come before the imaginary ones. */
 #include "linearization.h"
 #include "start.h"
 #include <algorithm>
@@ -10,19 +10,20 @@ namespace hhtdae
 namespace
 {
 
-constexpr int    scalings = 3, refinements = 5;
-constexpr double backward = 1e-13; /* error, of the largest terms */
+constexpr int scalings = 3, refinements = 5; /* passes of equilibration; steps of iterative refinement at most */
+/* Residual, relative to the largest terms of the equations, at which refinement ends; 1e3 times as much is an error */
+constexpr double backward_error = 1e-13;
 
-/* One pattern for all frequencies, which is analyzed once */
+/* The pattern is the same for all frequencies, so that the symbolic factorization is done once */
 struct Response {
-  Mat K = nullptr, A = nullptr; /* K with the pattern of M, too; the system, rows and columns times D */
+  Mat K = nullptr, A = nullptr; /* K, with the pattern of M added; the system, scaled by D on both sides */
   Vec b = nullptr, x = nullptr, D = nullptr, residual = nullptr, change = nullptr;
   KSP ksp = nullptr;
 };
 
-/* A <- D A D with largest entries of rows and columns near one (Ruiz 2001): a body's stiffness stands beside the ones of constraints, and pivots are chosen
+/* A <- D A D with largest entries of rows and columns near one (Ruiz 2001): stiffness of bodies and entries 1 of constraints differ by orders of magnitude, and pivots are chosen
    by size (test_response_of_a_stiff_body of tests/python). */
-PetscErrorCode Scale(Response &r)
+PetscErrorCode EquilibrateResponse(Response &r)
 {
   PetscFunctionBegin;
   PetscCall(VecSet(r.D, 1));
@@ -58,11 +59,11 @@ PetscErrorCode DynamicStiffness(const Linearization::Work &w, double omega, Resp
   for (Mat *x : {&S, &up, &down}) PetscCall(MatDestroy(x));
   if (!r.D)
     for (Vec *x : {&r.b, &r.x, &r.D, &r.residual, &r.change}) PetscCall(MatCreateVecs(r.A, x, nullptr));
-  PetscCall(Scale(r));
+  PetscCall(EquilibrateResponse(r));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Begin(const Linearization::Work &w, double omega, const std::vector<double> &load, Response &r)
+PetscErrorCode BeginResponse(const Linearization::Work &w, double omega, const std::vector<double> &load, Response &r)
 {
   PC      pc;
   double *put;
@@ -86,7 +87,7 @@ PetscErrorCode Begin(const Linearization::Work &w, double omega, const std::vect
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode End(Response &r)
+PetscErrorCode EndResponse(Response &r)
 {
   PetscFunctionBegin;
   for (Mat *x : {&r.K, &r.A}) PetscCall(MatDestroy(x));
@@ -95,17 +96,17 @@ PetscErrorCode End(Response &r)
   PetscFunctionReturn(0);
 }
 
-/* x with A x = D b, refined until what is left is rounding */
-PetscErrorCode Refined(const Linearization::Work &w, double omega, Response &r)
+/* Solves A x = D b with iterative refinement; x is then the solution of the unscaled system */
+PetscErrorCode SolveRefined(const Linearization::Work &w, double omega, Response &r)
 {
-  double norm, left, size, most;
+  double norm, left, size, largest_terms;
   PetscFunctionBegin;
   PetscCall(MatNorm(r.A, NORM_INFINITY, &norm));
   PetscCall(VecPointwiseMult(r.residual, r.D, r.b));
-  PetscCall(VecNorm(r.residual, NORM_INFINITY, &most));
+  PetscCall(VecNorm(r.residual, NORM_INFINITY, &largest_terms));
   PetscCall(VecSet(r.x, 0));
-  left = most;
-  for (int k = 0; k <= refinements && left > backward * most; k++) {
+  left = largest_terms;
+  for (int k = 0; k <= refinements && left > backward_error * largest_terms; k++) {
     KSPConvergedReason reason;
     PetscCall(KSPSolve(r.ksp, r.residual, r.change));
     PetscCall(KSPGetConvergedReason(r.ksp, &reason));
@@ -113,25 +114,25 @@ PetscErrorCode Refined(const Linearization::Work &w, double omega, Response &r)
                omega, KSPConvergedReasons[reason]);
     PetscCall(VecAXPY(r.x, 1, r.change));
     PetscCall(VecPointwiseMult(r.residual, r.D, r.b));
-    PetscCall(VecNorm(r.residual, NORM_INFINITY, &most));
+    PetscCall(VecNorm(r.residual, NORM_INFINITY, &largest_terms));
     PetscCall(MatMult(r.A, r.x, r.change));
     PetscCall(VecAXPY(r.residual, -1, r.change));
     PetscCall(VecNorm(r.residual, NORM_INFINITY, &left));
     PetscCall(VecNorm(r.x, NORM_INFINITY, &size));
-    most += norm * size;
+    largest_terms += norm * size;
   }
-  PetscCheck(left <= 1e3 * backward * most, w.comm(), PETSC_ERR_NOT_CONVERGED,
-             "Linearization::response(): the linear solver leaves %g of the load at %g rad/s; take another one, -scene_response_pc_factor_mat_solver_type mumps for example", left / most, omega);
+  PetscCheck(left <= 1e3 * backward_error * largest_terms, w.comm(), PETSC_ERR_NOT_CONVERGED,
+             "Linearization::response(): the linear solver leaves %g of the load at %g rad/s; take another one, -scene_response_pc_factor_mat_solver_type mumps for example", left / largest_terms, omega);
   PetscCall(VecPointwiseMult(r.x, r.x, r.D));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Solve(const Linearization::Work &w, double omega, Response &r, std::vector<std::complex<double>> &x)
+PetscErrorCode SolveResponse(const Linearization::Work &w, double omega, Response &r, std::vector<std::complex<double>> &x)
 {
   const double     *get;
   const std::size_t n = (std::size_t)w.R->n;
   PetscFunctionBegin;
-  PetscCall(Refined(w, omega, r));
+  PetscCall(SolveRefined(w, omega, r));
   x.resize(n);
   PetscCall(VecGetArrayRead(r.x, &get));
   for (std::size_t i = 0; i < n; i++) x[i] = {get[i], get[n + i]};
@@ -153,11 +154,11 @@ PetscErrorCode Linearization::response(const Excitation &in, const Measure &out,
   Response r;
   for (std::size_t k = 0; k < circular.size(); k++) {
     std::vector<std::complex<double>> x;
-    PetscCall(k ? DynamicStiffness(w, circular[k], r) : Begin(w, circular[0], load, r));
-    PetscCall(Solve(w, circular[k], r, x));
+    PetscCall(k ? DynamicStiffness(w, circular[k], r) : BeginResponse(w, circular[0], load, r));
+    PetscCall(SolveResponse(w, circular[k], r, x));
     PetscCall(AmplitudeOf(w, out, x, {0, circular[k]}, &(*amplitude)[k]));
   }
-  PetscCall(End(r));
+  PetscCall(EndResponse(r));
   PetscFunctionReturn(0);
 }
 

@@ -1,13 +1,13 @@
 /*
-  How rows of constraints change along the motion that is linearized, by differences of fourth order on
+  Rates of rows of constraints along the motion that is linearized, by differences of fourth order on
 
     q + q' e + q'' e^2/2,    v + q'' e,
 
-  which has all that first rates of C and second ones of K depend on. Only rows' directions matter: what multiplies a whole row leaves the reduction as it
-  is. Time is taken along where rows depend on it by themselves, as a user's may: how far is then found out, since their time may be any
+  on which first rates of C and second rates of K depend. Factors of whole rows do not matter: they do not change the reduction. Rows of users may
+  depend on time explicitly; then time changes, too, and the step of the differences is searched for, since the time scale of such a row is not known
   (Linearize.RowsThatTurnByThemselves).
 
-  Rows of velocities may read variables, V = -K_VV^-1 (K_Vq q + C_Vq v + K_Vs s + ...) by the variables' own rows: these are taken out of them, here and in
+  Rows at velocity level may read variables, V = -K_VV^-1 (K_Vq q + C_Vq v + K_Vs s + ...) by the variables' own rows: these are eliminated, here and in
   minimal.cpp.
 */
 #include "linearization.h"
@@ -23,23 +23,23 @@ namespace hhtdae
 namespace
 {
 
-/* Angles and parts of the scene's size that the motion covers in a step of the differences; seconds at first, where rows depend on time */
-constexpr double reach = 1e-2;
-/* Where rows depend on time: steps of the differences are by this factor from each other, so many at most either way; two that agree to this part of
-   the rates are as good as differences of fourth order are */
-constexpr double golden        = 1.6180339887498949; /* steps with such factors between them are not all periods of a row, which would count as constant */
-constexpr double apart_in_time = 5 * golden, agreed = 1e-6;
-constexpr int    most_steps = 16;
+/* Step of the differences as a rotation, rad, or displacement, parts of the scene's size, of the fastest body; for rows that depend on time the first step, in s, is at least this */
+constexpr double difference_step = 1e-2;
+/* For rows that depend on time: ratio of successive steps, number of changes at most in either direction, and the relative difference of the rates from two successive steps that ends
+   the search. The ratio is irrational, so that not all steps are multiples of the period of a row, which would then count as constant */
+constexpr double golden     = 1.6180339887498949;
+constexpr double step_ratio = 5 * golden, agreement = 1e-6;
+constexpr int    max_step_changes = 16;
 
-Eigen::MatrixXd Rows(const Eigen::MatrixXd &A, const std::vector<PetscInt> &rows)
+Eigen::MatrixXd RowsOf(const Eigen::MatrixXd &A, const std::vector<PetscInt> &rows)
 {
   Eigen::MatrixXd B(rows.size(), A.cols());
   for (std::size_t i = 0; i < rows.size(); i++) B.row((Eigen::Index)i) = A.row(rows[i]);
   return B;
 }
 
-/* Rates that are no more than rounding of what they are differences of are none: a steady motion has none, and keeps its modes without a frequency
-   (Linearize.SleepingTop) */
+/* Sets rates that are within rounding of their differences to zero: in a steady motion they are zero, and modes of frequency zero then stay exact (Linearize.SleepingTop).
+   `times`: factor of the rounding of the rows `of` in the rates */
 void DropRounding(const Eigen::MatrixXd &of, double times, Eigen::MatrixXd &rate)
 {
   const double relative = 8 * std::numeric_limits<double>::epsilon() * times;
@@ -50,8 +50,8 @@ void DropRounding(const Eigen::MatrixXd &of, double times, Eigen::MatrixXd &rate
   }
 }
 
-/* The local vector of what turns exp([x]) by `turn` in space */
-Vector3 Turned(const Vector3 &turn, const Vector3 &x)
+/* The rotation vector of exp([turn]) exp([x]) */
+Vector3 ComposedRotation(const Vector3 &turn, const Vector3 &x)
 {
   const Eigen::AngleAxisd both(LocalTurn(turn) * LocalTurn(x));
   return both.angle() * both.axis();
@@ -59,7 +59,7 @@ Vector3 Turned(const Vector3 &turn, const Vector3 &x)
 
 } // namespace
 
-PetscErrorCode Whole(Mat A, Eigen::MatrixXd &out)
+PetscErrorCode GatherDense(Mat A, Eigen::MatrixXd &out)
 {
   Mat         one;
   PetscMPIInt size;
@@ -81,23 +81,23 @@ PetscErrorCode Whole(Mat A, Eigen::MatrixXd &out)
   PetscFunctionReturn(0);
 }
 
-/* 1/s */
-PetscErrorCode Linearization::Work::fastest(double *rate) const
+/* Largest rate of a body's motion, 1/s; lengths in units of the scene's size */
+PetscErrorCode Linearization::Work::characteristicRate(double *rate) const
 {
   Vec    at[3] = {state[0], state[1], state[2]};
   Motion m;
   PetscFunctionBegin;
   *rate = 0;
-  PetscCall(look(at));
+  PetscCall(setState(at));
   for (std::size_t b = 0; b < R->scene.bodies.size(); b++) {
-    PetscCall(moved.motion(Body{(PetscInt)b, R->scene.number}, &m));
+    PetscCall(perturbed.motion(Body{(PetscInt)b, R->scene.number}, &m));
     *rate = std::max({*rate, m.angular_velocity.norm(), std::sqrt(m.angular_acceleration.norm()), m.velocity.norm() / size, std::sqrt(m.acceleration.norm() / size)});
   }
   PetscFunctionReturn(0);
 }
 
-/* The linearization `later` on the motion, at a time */
-PetscErrorCode Linearization::Work::nearby(double later, double time, Work *w) const
+/* Linearizes at the state of the motion after `later` seconds; `time`: value of t in the equations */
+PetscErrorCode Linearization::Work::linearizeAt(double later, double time, Work *w) const
 {
   const double *u, *v, *a;
   double       *x;
@@ -123,7 +123,7 @@ PetscErrorCode Linearization::Work::nearby(double later, double time, Work *w) c
     if (TurnsInSpace(R->bodies.body[b].kind)) {
       const PetscInt at = R->bodies.body[b].first + 3;
       using Read        = Eigen::Map<const Vector3>;
-      Eigen::Map<Vector3>(x + at) = Turned(later * Read(v + at) + 0.5 * later * later * Read(a + at), Read(u + at));
+      Eigen::Map<Vector3>(x + at) = ComposedRotation(later * Read(v + at) + 0.5 * later * later * Read(a + at), Read(u + at));
     }
   PetscCall(VecRestoreArray(w->state[0], &x));
   PetscCall(VecRestoreArrayRead(state[2], &a));
@@ -144,38 +144,38 @@ void EliminateVariables(const std::vector<PetscInt> &rows, const std::vector<Pet
   Eigen::MatrixXd           V(nv, nv), right(nv, 2 * n), by(reading.size(), nv);
   std::vector<PetscBLASInt> pivot(nv);
   PetscBLASInt              info = 0;
-  right << Rows(C, variables), Rows(K, variables);
+  right << RowsOf(C, variables), RowsOf(K, variables);
   for (PetscBLASInt k = 0; k < nv; k++) {
     V.col(k)  = right.col(n + variables[k]);
-    by.col(k) = Rows(K, reading).col(variables[k]);
+    by.col(k) = RowsOf(K, reading).col(variables[k]);
   }
   LAPACKgesv_(&nv, &columns, V.data(), &nv, pivot.data(), right.data(), &nv, &info);
   if (info) right.setConstant(NAN);
-  const Eigen::MatrixXd less = by * right;
+  const Eigen::MatrixXd eliminated = by * right;
   for (std::size_t i = 0; i < reading.size(); i++) {
-    C.row(reading[i]) -= less.row((Eigen::Index)i).head(n);
-    K.row(reading[i]) -= less.row((Eigen::Index)i).tail(n);
+    C.row(reading[i]) -= eliminated.row((Eigen::Index)i).head(n);
+    K.row(reading[i]) -= eliminated.row((Eigen::Index)i).tail(n);
     for (PetscInt v : variables) K(reading[i], v) = 0;
   }
 }
 
-/* These rows of C and K `later` on the motion, at a time */
+/* These rows of C and K after `later` seconds of the motion, with t = time */
 PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd *of_C,
                                            Eigen::MatrixXd *of_K) const
 {
   Work            w;
   Eigen::MatrixXd X, Y;
   PetscFunctionBegin;
-  PetscCall(nearby(later, time, &w));
-  PetscCall(Whole(w.C, X));
-  PetscCall(Whole(w.K, Y));
+  PetscCall(linearizeAt(later, time, &w));
+  PetscCall(GatherDense(w.C, X));
+  PetscCall(GatherDense(w.K, Y));
   EliminateVariables(rows, variables, X, Y);
-  *of_C = Rows(X, rows);
-  *of_K = Rows(Y, rows);
+  *of_C = RowsOf(X, rows);
+  *of_K = RowsOf(Y, rows);
   PetscFunctionReturn(0);
 }
 
-/* By differences of steps e */
+/* Rates by differences with step e, s; of_time: t changes, too */
 PetscErrorCode Linearization::Work::ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   constexpr double first[5] = {1. / 12, -8. / 12, 0, 8. / 12, -1. / 12}, second[5] = {-1. / 12, 16. / 12, -30. / 12, 16. / 12, -1. / 12};
@@ -199,40 +199,40 @@ PetscErrorCode Linearization::Work::ratesBy(double e, bool of_time, const std::v
   PetscFunctionReturn(0);
 }
 
-/* Parts of themselves that rows are apart */
-static double Apart(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
+/* Largest difference of entries relative to the largest entry */
+static double RelativeDifference(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
 {
   const double size = std::max(a.size() ? a.cwiseAbs().maxCoeff() : 0, b.size() ? b.cwiseAbs().maxCoeff() : 0);
   return size > 0 ? (a - b).cwiseAbs().maxCoeff() / size : 0;
 }
 
-/* Rows that depend on time: steps from e on downwards, until two agree; else of those that agree best. Where the scene is still e is first made so long that
-   rows change by `reach` of themselves. */
-PetscErrorCode Linearization::Work::ratesInTime(double e, bool still, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
+/* Rates of rows that depend on time: with decreasing steps from e on until two results agree, else those that agree best. At rest e is first increased until the rows have
+   changed by difference_step relatively. */
+PetscErrorCode Linearization::Work::ratesInTime(double e, bool at_rest, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   Eigen::MatrixXd C0, K0, X, Y;
-  RowRates        now, before;
+  RowRates        current, before;
   double          best = INFINITY;
   PetscFunctionBegin;
   PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
-  for (int k = 0; still && k < most_steps; k++) {
+  for (int k = 0; at_rest && k < max_step_changes; k++) {
     double change = 0;
     for (double at : {e, e / golden}) {
       PetscCall(rowsAt(at, t + at, rows, variables, &X, &Y));
-      change = std::max(change, Apart(X, C0) + Apart(Y, K0));
+      change = std::max(change, RelativeDifference(X, C0) + RelativeDifference(Y, K0));
     }
-    if (change >= reach) break;
-    e *= apart_in_time;
+    if (change >= difference_step) break;
+    e *= step_ratio;
   }
-  for (int k = 0; k < most_steps; k++, e /= apart_in_time) {
-    PetscCall(ratesBy(e, true, rows, variables, &now));
-    const double apart = k ? std::max({Apart(now.C, before.C), Apart(now.K, before.K), Apart(now.second_K, before.second_K)}) : INFINITY;
-    if (apart < best || !k) {
-      best = apart;
-      *out = now;
+  for (int k = 0; k < max_step_changes; k++, e /= step_ratio) {
+    PetscCall(ratesBy(e, true, rows, variables, &current));
+    const double difference = k ? std::max({RelativeDifference(current.C, before.C), RelativeDifference(current.K, before.K), RelativeDifference(current.second_K, before.second_K)}) : INFINITY;
+    if (difference < best || !k) {
+      best = difference;
+      *out = current;
     }
-    if (best <= agreed) break;
-    before = now;
+    if (best <= agreement) break;
+    before = current;
   }
   PetscFunctionReturn(0);
 }
@@ -248,14 +248,14 @@ PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, con
   for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero((Eigen::Index)rows.size(), n);
   if (rows.empty()) PetscFunctionReturn(0); /* of any rank */
   PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
-  for (double later : {reach, reach / golden}) {
+  for (double later : {difference_step, difference_step / golden}) {
     if (of_time) break;
     PetscCall(rowsAt(0, t + later, rows, variables, &X, &Y));
     of_time = X != C0 || Y != K0;
   }
-  PetscCall(fastest(&rate));
-  if (of_time) PetscCall(ratesInTime(rate > 0 ? std::max(reach, reach / rate) : reach, !(rate > 0), rows, variables, out));
-  else if (rate > 0) PetscCall(ratesBy(reach / rate, false, rows, variables, out));
+  PetscCall(characteristicRate(&rate));
+  if (of_time) PetscCall(ratesInTime(rate > 0 ? std::max(difference_step, difference_step / rate) : difference_step, !(rate > 0), rows, variables, out));
+  else if (rate > 0) PetscCall(ratesBy(difference_step / rate, false, rows, variables, out));
   PetscFunctionReturn(0);
 }
 

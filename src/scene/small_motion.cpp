@@ -1,4 +1,4 @@
-/* Small motions about the state of a linearization: what a measure makes of one, and a mode's parts. */
+/* Small motions about the state of a linearization: derivatives of measures, right-hand sides of excitations, and the part of a body in a mode. */
 #include "extension.h"
 #include "linearization.h"
 #include <algorithm>
@@ -8,7 +8,7 @@
 namespace hhtdae
 {
 
-/* Of multipliers, variables and force states the equations have no rates, of states no second ones */
+/* Transforms x, x', x'' to the coordinates of the run. The equations contain no rates of multipliers, variables and force states, and no second rates of states: these are set to zero */
 PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) const
 {
   Vec in;
@@ -34,58 +34,57 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
   PetscFunctionReturn(0);
 }
 
-/* Differences of fourth order at one reach after the other: along most of a small motion measures are polynomials, or nearly so, and two agree at once.
-   Where a force is steep, as those of contacts are, the first ones are outside of where it is linear; too near, they are rounding of the measure, which is
-   no derivative of 0: where it is large, as a pressure or a reaction under preload, those that reach further are tried as well
-   (Linearize.MeasuresFarFromZero). `largest`: displacement of the motion that this is a part of. */
+/* Differences of fourth order with decreasing steps until two agree; most measures are nearly polynomial along a small motion, and the first two agree. With a steep force, as in contacts, large
+   steps leave the linear range; with small ones the difference is rounding of the measure. If this rounding is large, as of a pressure or a reaction under preload, larger steps are
+   tried as well (Linearize.MeasuresFarFromZero). `largest`: largest displacement of the whole motion, of which `along` may be the real or imaginary part. */
 PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double largest, double *x) const
 {
-  constexpr double weight[2] = {8. / 12, -1. / 12}, agree = 1e-9;
+  constexpr double weight[2] = {8. / 12, -1. / 12}, agreement = 1e-9;
   Vec              d[3], at[3];
-  double           here, before = INFINITY, best = INFINITY;
+  double           reference, previous = INFINITY, best = INFINITY;
   PetscFunctionBegin;
   for (int c = 0; c < 3; c++) at[c] = state[c];
-  PetscCall(look(at));
-  PetscCall(moved.value(m, &here));
+  PetscCall(setState(at));
+  PetscCall(perturbed.value(m, &reference));
   for (int c = 0; c < 3; c++) {
     PetscCall(VecDuplicate(state[0], &d[c]));
     PetscCall(VecDuplicate(state[0], &at[c]));
   }
   PetscCall(toState(along, d));
   *x = 0;
-  double     now = 0, rounding = 0;
+  double     estimate = 0, rounding = 0;
   const auto attempt = [&](double reach) -> PetscErrorCode {
     const double e = reach * std::min(1., size) / (largest > 0 ? largest : 1);
     PetscFunctionBegin;
-    now      = 0;
-    rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(here) / e;
+    estimate = 0;
+    rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(reference) / e;
     for (int k = 1; k <= 2; k++)
       for (int side : {1, -1}) {
         double y;
         for (int c = 0; c < 3; c++) PetscCall(VecWAXPY(at[c], side * k * e, d[c], state[c]));
-        PetscCall(look(at));
-        PetscCall(moved.value(m, &y));
-        y -= here;
-        if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* half a turn is both pi and -pi */
-        now += side * weight[k - 1] * y / e;
+        PetscCall(setState(at));
+        PetscCall(perturbed.value(m, &y));
+        y -= reference;
+        if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* an angle of half a turn may be pi or -pi */
+        estimate += side * weight[k - 1] * y / e;
       }
-    const double change = std::abs(now - before) + rounding; /* infinite for the first one */
-    if (change < best) {
-      best = change;
-      *x   = now;
+    const double uncertainty = std::abs(estimate - previous) + rounding; /* infinite for the first step */
+    if (uncertainty < best) {
+      best = uncertainty;
+      *x   = estimate;
     }
-    before = now;
+    previous = estimate;
     PetscFunctionReturn(0);
   };
   for (double reach : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
     PetscCall(attempt(reach));
-    if (best <= agree * std::abs(now) || 10 * rounding > best) break;
+    if (best <= agreement * std::abs(estimate) || 10 * rounding > best) break;
   }
-  if (rounding > 0 && !(best <= 1e3 * agree * std::abs(*x))) {
-    before = INFINITY;
+  if (rounding > 0 && !(best <= 1e3 * agreement * std::abs(*x))) {
+    previous = INFINITY;
     for (double reach : {1e-3, 1e-2, 1e-1, 1.}) {
       PetscCall(attempt(reach));
-      if (best <= agree * std::abs(now)) break;
+      if (best <= agreement * std::abs(estimate)) break;
     }
   }
   for (int c = 0; c < 3; c++) {
@@ -106,8 +105,8 @@ PetscErrorCode Linearization::Work::displacement(const std::vector<std::complex<
   PetscFunctionReturn(0);
 }
 
-/* The row of a motion is its function less what it drives; that of an acceleration is of a state, whose rate it is */
-PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) const
+/* The row of a motion has its function minus the driven quantity; a motion of an acceleration is the rate of a state, in whose row the excitation acts */
+PetscErrorCode Linearization::Work::motionLoad(Element e, std::vector<double> *b) const
 {
   const SceneData &s = R->scene;
   PetscFunctionBegin;
@@ -121,9 +120,9 @@ PetscErrorCode Linearization::Work::drive(Element e, std::vector<double> *b) con
   PetscFunctionReturn(0);
 }
 
-/* b = -M x'' of x'' that takes all masses along with the ground, in the equations of motion alone: rows of variables, states and force states that
-   read accelerations read those relative to the ground (Linearize.GroundAccelerationAndMeasuresOfAcceleration) */
-PetscErrorCode Linearization::Work::shake(const Vector3 &ground, std::vector<double> *b) const
+/* b = -M x'' for the x'' of rigid translation with the ground, only in equations of motion: variables, states and force states read accelerations
+   relative to the ground (Linearize.GroundAccelerationAndMeasuresOfAcceleration) */
+PetscErrorCode Linearization::Work::groundLoad(const Vector3 &ground, std::vector<double> *b) const
 {
   Vec           along, force;
   double       *x;
@@ -155,18 +154,18 @@ PetscErrorCode Linearization::Work::load(const Excitation &in, std::vector<doubl
   PetscFunctionBegin;
   b->assign(R->n, 0);
   if (!in.ground.isZero(0)) {
-    PetscCall(shake(in.ground, b));
+    PetscCall(groundLoad(in.ground, b));
     PetscFunctionReturn(0);
   }
   if (in.driven.id >= 0) {
-    PetscCall(drive(in.driven, b));
+    PetscCall(motionLoad(in.driven, b));
     PetscFunctionReturn(0);
   }
-  PetscCall(push(in, b));
+  PetscCall(pointLoad(in, b));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Linearization::Work::push(const Excitation &in, std::vector<double> *b) const
+PetscErrorCode Linearization::Work::pointLoad(const Excitation &in, std::vector<double> *b) const
 {
   const SceneData &s = R->scene;
   Motion           m, centre;
@@ -175,22 +174,22 @@ PetscErrorCode Linearization::Work::push(const Excitation &in, std::vector<doubl
   const PetscInt body = s.markers[in.at.id].body;
   PetscCheck(in.load.allFinite() && in.moment.allFinite(), comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization: force or moment of an excitation is not a number");
   PetscCheck(body >= 0, comm(), PETSC_ERR_ARG_WRONG, "Linearization: the marker of an excitation is on the ground, which no load moves");
-  /* each by itself: what has no effect is not to be dropped beside what has one */
+  /* force and moment are checked separately: one without effect is an error even if the other has one */
   const bool force_acts  = in.load.isZero(0) || !s.planar || !in.load.head<2>().isZero(0);
   const bool moment_acts = in.moment.isZero(0) || (!s.turnless(body) && (!s.planar || in.moment(2) != 0));
   PetscCheck(force_acts && moment_acts, comm(), PETSC_ERR_ARG_WRONG, "Linearization: %s of an excitation, (%g, %g, %g), moves nothing: the body %s %s", force_acts ? "the moment" : "the force",
              (force_acts ? in.moment : in.load)(0), (force_acts ? in.moment : in.load)(1), (force_acts ? in.moment : in.load)(2), s.bodies[body].name.c_str(),
              force_acts && s.turnless(body) ? "does not turn" : "stays in the plane");
   Vec at[3] = {state[0], state[1], state[2]};
-  PetscCall(look(at));
-  PetscCall(moved.motion(in.at, &m));
-  PetscCall(moved.motion(Body{body}, &centre));
+  PetscCall(setState(at));
+  PetscCall(perturbed.motion(in.at, &m));
+  PetscCall(perturbed.motion(Body{body}, &centre));
   const PetscInt local = R->local_body[body];
   if (local < 0 || !R->bodies.body[local].owned) PetscFunctionReturn(0);
   const LocalBody &k        = R->bodies.body[local];
   const Vector3    moment   = in.moment + (m.position - centre.position).cross(in.load);
   const int        position = GroupSize(k.kind, 0);
-  if (k.kind == BodyKind::Attached) { /* to the flexible body and its modes */
+  if (k.kind == BodyKind::Attached) { /* the load acts on the flexible body and its modes */
     const Carrier              &c = R->bodies.carriers[k.carrier];
     Eigen::Matrix<double, 6, 1> on;
     on << in.load, moment;
@@ -223,7 +222,7 @@ PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const
   PetscFunctionReturn(0);
 }
 
-/* By the entry itself, so that it becomes 1; of several as large the first on the lowest rank */
+/* Divides by the entry of largest magnitude, which becomes 1; among equal ones by the first on the lowest rank */
 PetscErrorCode Linearization::normalize(Mode *m) const
 {
   const Work          &w    = *work_;
@@ -255,15 +254,15 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   const Work    &w = *work_;
   const Runtime &R = *w.R;
   Vec            x, y;
-  double         energy[2] = {0, 0}; /* of the body, of all */
+  double         energy[2] = {0, 0}; /* of the body, and of all */
   Vector3c       motion[2] = {Vector3c::Zero(), Vector3c::Zero()};
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::part()", m));
   PetscCheck(R.scene.valid(b), w.comm(), PETSC_ERR_ARG_WRONG, "Linearization::part(): the body is not one of this scene");
-  Motion at; /* where it is, and so is what its attachments are attached to */
+  Motion at; /* also moves the bodies to the state, which c.jacobian() below needs */
   Vec    state[3] = {w.state[0], w.state[1], w.state[2]};
-  PetscCall(w.look(state));
-  PetscCall(w.moved.motion(b, &at));
+  PetscCall(w.setState(state));
+  PetscCall(w.perturbed.motion(b, &at));
   const PetscInt local = R.local_body[b.id];
   const bool     mine  = local >= 0 && R.bodies.body[local].owned;
   const PetscInt first = mine ? R.bodies.body[local].first : 0, last = mine ? first + R.bodies.coordinates(local) : 0;
@@ -291,13 +290,13 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
     for (int c = 0; c < position; c++) motion[0](c) = m.shape[first + c];
     for (int c = 0; c < rotations; c++) motion[1](rotations == 1 ? 2 : c) = m.shape[first + position + c];
   }
-  if (mine && R.bodies.body[local].kind == BodyKind::Attached) { /* as its body and the modes move it */
+  if (mine && R.bodies.body[local].kind == BodyKind::Attached) { /* its motion follows from its body and the modes */
     const LocalBody       &k    = R.bodies.body[local];
     const Carrier         &c    = R.bodies.carriers[k.carrier];
     const Eigen::MatrixXd  J    = c.jacobian(R.bodies, (int)k.place);
-    const Eigen::VectorXcd moved = J * Eigen::Map<const Eigen::VectorXcd>(m.shape.data() + R.bodies.body[c.body].first, J.cols());
-    motion[0]                   = moved.head<3>();
-    motion[1]                   = moved.tail<3>();
+    const Eigen::VectorXcd frame_motion = J * Eigen::Map<const Eigen::VectorXcd>(m.shape.data() + R.bodies.body[c.body].first, J.cols());
+    motion[0]                           = frame_motion.head<3>();
+    motion[1]                           = frame_motion.tail<3>();
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPI_DOUBLE, MPI_SUM, w.comm()));
   for (Vector3c &x : motion) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, x.data(), 6, MPI_DOUBLE, MPI_SUM, w.comm()));
