@@ -1,4 +1,4 @@
-/* What the assembly sees of joints, forces, variables and states: lists of instances that add to the residual and the matrix. */
+/* Batches: lists of instances of joints, forces, variables or states that add to the residual and the matrix. */
 #ifndef HHTDAE_SCENE_BATCH_H
 #define HHTDAE_SCENE_BATCH_H
 
@@ -12,18 +12,18 @@
 namespace hhtdae
 {
 
-/* A scalar unknown that an element reads: where it is, and its column of the matrix. A multiplier that was dropped is nowhere, and zero. */
+/* A scalar unknown that an element reads: local number, and group and offset of its column in the matrix. local = -1: a dropped multiplier, which is zero. */
 struct Input {
   PetscInt local = -1, group = -1, offset = 0;
 };
 
-/* One evaluation: state of the local unknowns (own, then others'), own rows of the residual or arrays of the matrix */
+/* One evaluation: state of the local unknowns (own, then other ranks'), own rows of the residual or arrays of the matrix */
 struct Evaluation {
   double        t;
   const double *u, *v, *a;
   Bodies       &bodies;
   PetscInt      n;                      /* own unknowns */
-  double       *F  = nullptr;           /* residual, cleared; null in a Jacobian */
+  double       *F  = nullptr;           /* residual, set to zero before; null in a Jacobian */
   double        sv = 0, sa = 0;         /* the Jacobian is F_u + sv F_v + sa F_a */
   Sink          sink{nullptr, nullptr};
 
@@ -41,28 +41,28 @@ class Batch
 {
 public:
   virtual ~Batch() = default;
-  virtual void pattern(Pattern &p) = 0;       /* asks for blocks */
-  virtual void resolve(const Pattern &p);     /* their slots */
+  virtual void pattern(Pattern &p) = 0;       /* requests blocks of the matrix */
+  virtual void resolve(const Pattern &p);     /* gets their slots */
   virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
   virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
-  /* after an accepted step; bodies have moved there */
+  /* updates the memory after an accepted step, to which the bodies have been moved */
   virtual void accept(Bodies &) {}
-  /* potential energy of the instances that belong to this rank; bodies have moved */
+  /* potential energy of the instances that belong to this rank, at the present state of the bodies */
   virtual double energy(const Evaluation &) const { return 0; }
-  /* What the ends of a step do not show: bodies that could be through each other, angles that could turn by more than half a turn.
-     Whether there are such, and how long a step may be at the present velocities and accelerations; bodies have moved */
+  /* Upper bound on the next step, s, at the present velocities and accelerations, so that no contact is tunnelled through and no counted angle turns by more than half
+     a turn; limitsSteps(): whether there are such instances */
   virtual bool   limitsSteps() const { return false; }
   virtual double longestStep(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
-  /* energy and momentum of own coordinates that are not those of bodies */
+  /* adds energy and momentum of own coordinates that do not belong to bodies of the scene */
   virtual void addTo(Balance &, const Evaluation &) const {}
-  /* accepted-step memory, for checkpoints: number of doubles, and the copy out or in */
+  /* memory of accepted steps, for checkpoints: number of values; copies them from x (in) or to x */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }
-  /* whether its instances begin with what their stores were told to remember, StoreBase::remember() */
+  /* whether the memory begins with that of the stores, StoreBase::remember() */
   virtual bool isDescribed() const { return false; }
-  /* out of one instance, by its number in the store that described it; false if it is not here */
+  /* copies the memory of one instance, by its number in its store; false if the instance is not in this batch */
   virtual bool memoryOf(const StoreBase *, PetscInt, double *) const { return false; }
-  /* The angle of a marker about the z axis of another, by their numbers in the scene, if an instance here counts its turns */
+  /* The angle of a marker about the z axis of another, by their numbers in the scene; false if no instance counts its turns */
   virtual bool countedAngle(PetscInt, PetscInt, double *) const { return false; }
 
 protected:
@@ -82,19 +82,19 @@ inline void Batch::resolve(const Pattern &p)
 inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || k == BodyKind::Attached || TurnsInSpace(k)) && group == 1; }
 inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
 
-/* An entry of the derivative that pairs x or theta of a row marker with x or theta of a column marker reaches groups (g, h) of
-   their bodies: a turn of the body moves its markers' origins as well. */
+/* Whether derivatives between x or theta of a row marker and of a column marker, as `pair` states, contribute to groups (g, h) of
+   their bodies: rotations of a body move the origins of its markers, too. */
 template <class Pair> bool Reaches(const Pair &pair, BodyKind row, int g, BodyKind column, int h)
 {
   const bool tr = Turns(row, g), tc = Turns(column, h);
   return pair(0, 0) || (tr && pair(1, 0)) || (tc && pair(0, 1)) || (tr && tc && pair(1, 1));
 }
 
-/* ---- how long a step the instances of a kernel allow ---- */
+/* ---- limits of instances on the step size ---- */
 
-/* A kernel that has a limit says so by
+/* A kernel that limits steps has
      static double longestStep(const Data &, const Frame<double> *f, const Twist<double> *w, double acceleration, double angular);
-   the last two are magnitudes of the relative acceleration and angular acceleration of the markers, about */
+   acceleration, angular: estimates of the magnitudes of the markers' relative acceleration and angular acceleration */
 template <class K, class = void> struct HasLongestStep : std::false_type {
 };
 template <class K>
@@ -129,7 +129,7 @@ template <class K, class Instances> double LongestSteps(const Instances &all, co
   return least;
 }
 
-/* ---- what the instances of a kernel remember of accepted steps ---- */
+/* ---- memory of accepted steps ---- */
 
 template <class K, class Instance> void Remember(Instance &e, const Bodies &B)
 {
@@ -142,7 +142,7 @@ template <class K, class Instance> void Remember(Instance &e, const Bodies &B)
   (void)B;
 }
 
-/* Which instances of a store a batch has, for kernels that remember */
+/* The instances of a store that are in a batch, for kernels with memory */
 struct InstancesOf {
   const StoreBase      *store = nullptr;
   std::vector<PetscInt> number; /* increasing */
@@ -153,7 +153,7 @@ struct InstancesOf {
     const auto at = std::lower_bound(number.begin(), number.end(), e);
     return s == store && at != number.end() && *at == e ? (PetscInt)(at - number.begin()) : -1;
   }
-  bool joins(std::size_t n, std::array<int, 2> pair, PetscInt i, PetscInt j) const; /* whether these are a pair of markers of instance n; counted_angles.cpp */
+  bool joins(std::size_t n, std::array<int, 2> pair, PetscInt i, PetscInt j) const; /* whether i and j are the markers `pair` of instance n; counted_angles.cpp */
 };
 
 /* Batch::countedAngle() of a kernel's instances */
@@ -169,7 +169,7 @@ template <class K, class Instances> bool AngleOf(const Instances &all, const Ins
   return false;
 }
 
-/* out to x or in from it; returns what comes behind */
+/* copies from x (in) or to x; returns x + K::memory */
 template <class K, class Instance> double *CopyMemory(Instance &e, double *x, bool in)
 {
   if constexpr (K::memory > 0) {

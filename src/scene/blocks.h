@@ -1,4 +1,4 @@
-/* Blocks of the matrix between the coordinates of two markers' bodies: what kernels of all kinds share, compiled once. */
+/* Blocks of the matrix between the coordinates of two markers' bodies: functions common to all kernels, compiled once. */
 #ifndef HHTDAE_SCENE_BLOCKS_H
 #define HHTDAE_SCENE_BLOCKS_H
 
@@ -9,25 +9,24 @@ namespace hhtdae
 
 using Six = Matrix<6, 6>;
 
-/* Derivatives A by the frame and, unless null, V by the twist of marker `column`, of a load (force, moment) on marker `row`, or of
-   any six numbers that are paired with its (x, theta): in coordinates of both bodies. What the row's body adds as its own lever
-   turns is not in it, see AddLever(). */
+/* Transforms derivatives A by the frame and, unless null, V by the twist of marker `column`, of a load (force, moment) on marker `row`, to the coordinates of both
+   bodies. The change of the load's lever with rotations of the row's body is not included, see AddLever(). */
 Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &A,
               const Six *V = nullptr);
 
-/* The change of the moment s x f of a force held fixed in space when its body turns, s from its centre to the marker: [f][s], in
+/* Adds the change of the moment s x f of a force fixed in space with rotations of its body, s from the centre of mass to the marker: [f][s], in
    coordinates */
 void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const Vector3 &f, Six &H);
 
-/* The same of derivatives V by the twist of marker `column`, which is on an attachment's frame: to the groups of its v and w, for the groups of the row's body
-   that the load reaches; returns the number of slots used. PairBlock() has what positions make of V. */
+/* Adds derivatives V by the twist of a marker `column` on an attachment's frame to the columns of its v and w, for the groups of the row's body
+   on which the load acts; returns the number of slots used. PairBlock() covers the dependence of the twist on positions. */
 int RateBlocks(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &V, const Slot *slot,
                const bool *loads);
 
 /* The part of D that belongs to groups g and h of two bodies */
 void AddBlock(const Sink &sink, const Slot &slot, const Six &D, BodyKind row, int g, BodyKind column, int h);
 
-/* Bits of a marker's position (1) and rotation (2), of kernels' `depends` and `acts`: do they reach group g of its body */
+/* Bits of a marker's position (1) and rotation (2) in `depends` and `acts` of kernels; Reach(): whether they involve group g of its body */
 inline unsigned OfMarker(unsigned mask, int k) { return mask >> (2 * k) & 3; }
 inline bool     Reach(unsigned bits, BodyKind b, int g) { return (bits & 1) || (Turns(b, g) && (bits & 2)); }
 

@@ -1,8 +1,8 @@
 /*
-  The bodies of this rank, its own first, then those of other ranks that its joints and forces touch, then the ground: their present
-  motion, the loads that the elements put on them, and the change from marker perturbations to generalized coordinates.
+  The bodies of this rank: its own, then those of other ranks on which its joints and forces act, then the ground; with their present
+  motion, the loads of the elements, and the transformation from perturbations of markers to generalized coordinates.
 
-  The residual of a body is its inertia less the load, written in space axes and taken to the coordinates at the end:
+  The residual of a body is inertia minus load, in space axes, transformed to the coordinates at the end:
   rows of r: m r'' - f;  rows of the rotation: G^T (N - m), N = I w' + w x I w, I = A J A^T (moments about the centre of mass), with
   dA = [G dU] A for rotational coordinates U, see rotation.h.
 */
@@ -24,7 +24,7 @@ namespace hhtdae
 /* Attached: the frame of an attachment of a flexible body, which has no coordinates */
 enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint, Flexible, Attached };
 
-constexpr int max_coordinates = 6; /* of a body with markers */
+constexpr int max_coordinates = 6; /* of a body, without modal ones */
 /* without modal coordinates, which are a third group of a flexible body; see Bodies::modes() */
 inline int Coordinates(BodyKind k)
 {
@@ -38,7 +38,7 @@ inline int Groups(BodyKind k)
   if (k == BodyKind::Attached) return 2;
   return k == BodyKind::Ground ? 0 : TurnsInSpace(k) || k == BodyKind::Planar ? 2 : 1;
 }
-/* What depends on the motion of an attachment's frame has blocks for its velocity and acceleration, too: groups x, theta, v, w, a, alpha, see projection.h */
+/* Attachments' frames have groups for velocity and acceleration, too: x, theta, v, w, a, alpha, see projection.h */
 constexpr int frame_groups = 6, first_rate_group = 2;
 /* group 0: position, group 1: rotation */
 inline int GroupSize(BodyKind k, int group)
@@ -48,15 +48,15 @@ inline int GroupSize(BodyKind k, int group)
 }
 inline int GroupOffset(BodyKind k, int group) { return group == 0 ? 0 : GroupSize(k, 0); }
 
-/* what does not change in a step */
+/* data that are constant in a step */
 struct LocalBody {
   BodyKind kind  = BodyKind::Ground;
   bool     owned = false;
-  PetscInt first = -1; /* coordinate, among the local unknowns */
+  PetscInt first   = -1; /* local number of the first coordinate */
   PetscInt group = -1;
   PetscInt id    = -1; /* in the scene */
-  PetscInt modal = -1; /* of a flexible body: its place in Bodies::modal */
-  PetscInt carrier = -1, place = -1; /* of an attachment's frame: its body in Bodies::carriers, and which one of it */
+  PetscInt modal   = -1; /* of a flexible body: its number in Bodies::modal */
+  PetscInt carrier = -1, place = -1; /* of an attachment's frame: number of its body in Bodies::carriers, and its own number in Carrier::attached */
   double   mass  = 0;
   Matrix3  J;          /* inertia in body axes; planar: J(2,2) */
   Matrix3  C;          /* A = exp([x]) C, or body axes to the axes of the Euler angles */
@@ -66,8 +66,8 @@ struct LocalBody {
 struct BodyMotion {
   Vector3   r, v, w;
   Matrix3   A;
-  Matrix3   G;     /* of bodies that turn in space */
-  Vector3   w0;    /* of these, where the matrix of a step is made: w at its beginning */
+  Matrix3   G;     /* of bodies with rotations in space */
+  Vector3   w0;    /* of the same, for the matrix of a step: w at the beginning of the step */
   Vector3   f, m;  /* load: force, moment about the centre of mass */
 };
 
@@ -77,8 +77,8 @@ struct LocalMarker {
   Matrix3  R; /* axes, in body axes */
 };
 
-/* A flexible body: its equations, the load of its attachments on the modes, and room for its matrix. The rest is what all attachments together add to the
-   matrix: by position and angles (`rigid`), by the modes to the first six rows (`rigid_modal`, transposed) and the other way round, and modes by modes. */
+/* A flexible body: its equations, the load of its attachments on the modes, and storage for its matrix. The last members are the sum of all attachments' contributions to the
+   matrix: by position and angles (`rigid`), by the modes to the first six rows (`rigid_modal`, transposed) and vice versa, and modes by modes. */
 struct ModalPart {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::unique_ptr<ModalDynamics>           dynamics;
@@ -95,15 +95,15 @@ struct ModalPart {
 class Bodies
 {
 public:
-  std::vector<LocalBody>   body; /* own, others', ground */
+  std::vector<LocalBody>   body; /* own, other ranks', ground */
   std::vector<BodyMotion>  now;
   std::vector<LocalMarker> marker;
   std::vector<ModalPart>   modal;
   std::vector<Carrier>     carriers; /* flexible bodies with attachments in use */
   PetscInt                 own = 0;
-  long                     moves = 0; /* so far */
+  long                     moves      = 0;     /* number of calls of move() */
   bool                     local = false; /* rotations are local vectors, not Euler angles */
-  double                   commutator = 0; /* sv h^2/12 in the matrix of a step */
+  double                   commutator = 0;     /* sv times TSHHT3GetRotationFactor(), in the matrix of a step; else 0 */
   Vector3                  gravity = Vector3::Zero();
 
   /* motion of all bodies from their coordinates and rates; clears the loads */
@@ -137,12 +137,12 @@ public:
 
   /* J, columns (x, theta) of marker m at f, to the coordinates of its body; returns their number. R is 1, 2, 3 or 6; columns.cpp */
   template <int R> int columns(PetscInt m, const Frame<double> &f, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
-  /* dU of a rotation vector in the step, by that of Newmark's relations: it has a term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives
-     of the residual by U are to be multiplied by it, rows of moments are not. */
+  /* Derivative of the rotation vector in a step by that of Newmark's relations: the former has a further term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives
+     of the residual by U have to be multiplied by it, rows of moments have not. */
   Matrix3 inStep(const BodyMotion &b) const { return commutator == 0 ? Matrix3(Matrix3::Identity()) : Matrix3(Matrix3::Identity() - commutator * Cross<double>(b.w0)); }
-  /* the same for what columns() has made */
+  /* the same for the result of columns() */
   template <int R> void inStep(PetscInt m, Matrix<R, 6> &out) const;
-  /* J, columns (v, w) of marker m: adds its change with coordinates and, times sv, with their velocities, to out */
+  /* J, columns (v, w) of marker m: adds its derivatives by the coordinates and, times sv, by their velocities to out */
   template <int R> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
   /* dw/dU + sv dw/dU' */
   Matrix3 angularVelocityGradient(const BodyMotion &b, const double *rate, double sv) const
@@ -158,12 +158,12 @@ public:
   /* the same of a flexible body, all its coordinates: ModalPart::block */
   void modalJacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa);
   ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* without a: q'' is not used */
-  /* the loads on attachments' frames to their bodies, when all elements have put theirs */
+  /* transfers the loads on attachments' frames to their bodies, after all elements have added theirs */
   void loadCarriers()
   {
     for (Carrier &c : carriers) c.load(*this);
   }
-  /* How attitude, w and alpha change in a step with the rotational coordinates and, times sv and sa, with their velocities and accelerations */
+  /* Derivatives of attitude, w and alpha in a step by the rotational coordinates and, times sv and sa, by their velocities and accelerations */
   struct AngularGradient {
     Matrix3 G, w, alpha;
   };

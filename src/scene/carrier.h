@@ -1,13 +1,13 @@
 /*
-  Attachments of flexible bodies. Joints, forces and markers see a frame that is an explicit function of the body's floating frame and its modes:
+  Attachments of flexible bodies. Joints, forces and markers act on a frame that is an explicit function of the body's floating frame and its modes:
 
     x = r + A (s + xi),   R = A exp([phi]),   (xi, phi) = Psi eta
 
-  with its velocities and accelerations, so that an attachment has no unknowns and no equations of its own. With geometric stiffening each of the six motions
-  loses (eta^T B eta)/2, B its own: a force or moment F along it then adds F B to the stiffness of the modes, as the derivative of its work.
+  and so are its velocity and acceleration, so that an attachment has no unknowns and no equations. With geometric stiffening each of the six motions
+  is reduced by (eta^T B eta)/2 with a matrix B for each: a force or moment F along it then adds F B to the stiffness of the modes, by the derivative of its work.
 
-  Elements put their loads on the frame (a local body of the kind Attached); load() hands them on to the body and its modes. What they add to the matrix is
-  written in the frame's motion (x, theta, v, w, a, alpha) and taken to the body's coordinates by projection.h, with the derivatives that linearize() makes.
+  Elements put their loads on the frame (a local body of kind Attached); load() transfers them to the body and its modes. Matrix contributions of elements are
+  derivatives by the frame's motion (x, theta, v, w, a, alpha); projection.h transforms them to the body's coordinates with the derivatives from linearize().
 */
 #ifndef HHTDAE_SCENE_CARRIER_H
 #define HHTDAE_SCENE_CARRIER_H
@@ -23,7 +23,7 @@ namespace hhtdae
 
 class Bodies;
 
-/* exp([phi]) and its left differential: the turn is [J dphi], dR = [J dphi] R; s = |phi|^2 */
+/* exp([phi]) and its left differential, dR = [J dphi] R; s = |phi|^2 */
 struct SmallTurn {
   Vector3 phi;
   double  a, b, as, bs, ass, bss; /* J = 1 + a [phi] + b [phi]^2 and its first and second derivatives by s */
@@ -40,7 +40,7 @@ private:
   Matrix3 square() const { return phi * phi.transpose() - phi.squaredNorm() * Matrix3::Identity(); }
 };
 
-/* Six motions of the point in body axes, translation and rotation vector, and their derivatives by the modes */
+/* Motion of the point by the deformation in body axes, translation and rotation vector, and its derivatives by the modes */
 struct AttachedPoint {
   Eigen::Matrix<double, 6, 1>              motion;
   Eigen::Matrix<double, 6, Eigen::Dynamic> by_modes;
@@ -57,8 +57,8 @@ struct FrameGradient {
   std::array<Matrix3, 6> angles, motion, bend, bend_rate;
 };
 
-/* A flexible body with those of its attachments that are in use. Products with the modes are made for all of them at once: of n attachments
-   columns 3k are the translations, columns 3(n + k) the rotations of attachment k. */
+/* A flexible body with those of its attachments that are in use. Products with the modes are computed for all attachments at once: with n attachments,
+   columns 3k.. are the translations, columns 3(n + k).. the rotations of attachment k. */
 class Carrier
 {
 public:
@@ -67,29 +67,29 @@ public:
     const ModalAttachment *attachment;
     Vector3                s; /* undeformed, from the centre of mass, body axes */
     SmallTurn              turn;
-    Vector3                arm;            /* from the body's origin, space axes */
-    Vector3                velocity, spin; /* relative to the body, space axes */
+    Vector3                arm;            /* frame's origin relative to the body's origin, space axes */
+    Vector3                velocity, spin; /* of the frame relative to the body, space axes */
     FrameGradient          gradient;
   };
   PetscInt              body = -1; /* local number */
   std::vector<Attached> attached;
-  Eigen::MatrixXd       shapes;          /* padded modes x 6n: derivatives of the motions by the modes, now */
+  Eigen::MatrixXd       shapes;          /* padded modes x 6n: derivatives of the motions by the modes at the present deformation */
   Eigen::MatrixXd       bend, bend_rate; /* columns B eta', B eta''; empty: no attachment has geometric stiffening */
 
-  void    finish(int modes); /* when all have been added */
+  void    finish(int modes); /* after all attachments have been added */
   int     count() const { return (int)attached.size(); }
   int     column(int k, int part) const { return 3 * (k + part * count()); } /* part 0: translation, 1: rotation */
   bool    stiffens() const { return !stiffening_.empty(); }
   Vector3 motion(int k, int part) const { return motion_.segment<3>(column(k, part)); }
 
   void move(Bodies &B, const double *u, const double *v);
-  void load(Bodies &B); /* the frames' loads to the body and its modes */
+  void load(Bodies &B); /* transfers the frames' loads to the body and its modes */
   void acceleration(const Bodies &B, int k, const double *v, const double *a, Vector3 &linear, Vector3 &angular) const;
-  /* gradients of all frames; those of accelerations only if they are wanted */
+  /* gradients of all frames; accelerations: also those of accelerations */
   void linearize(const Bodies &B, const double *v, const double *a, double sv, double sa, bool accelerations);
-  /* (x, theta) of a frame by position, small rotation and modes of the body */
+  /* derivatives of (x, theta) of a frame by position, small rotation and modes of the body */
   Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian(const Bodies &B, int k) const;
-  /* what the loads, held fixed in space, add to the stiffness of the modes through the curvature of their motions */
+  /* K: geometric stiffness of the modes by the loads, held fixed in space */
   void stiffen(Eigen::MatrixXd &K) const;
 
 private:

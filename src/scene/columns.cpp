@@ -1,4 +1,4 @@
-/* From perturbations of markers to coordinates of their bodies, for matrices of 1, 2, 3 and 6 rows: compiled here for all kernels. */
+/* Transforms derivatives by perturbations of markers to coordinates of their bodies, for matrices of 1, 2, 3 and 6 rows, compiled once for all kernels. */
 #include "bodies.h"
 
 namespace hhtdae
@@ -7,7 +7,7 @@ namespace hhtdae
 namespace
 {
 
-/* what a turn does through a marker at s from the centre of mass: J_theta - J_x [s] */
+/* derivative by rotations of the body, with the marker at s from the centre of mass: J_theta - J_x [s] */
 template <int R> Matrix<R, 3> About(const Matrix<R, 6> &J, const Vector3 &s)
 {
   Matrix<R, 3> A;
@@ -76,7 +76,7 @@ void Bodies::velocityColumns(PetscInt m, const Frame<double> &f, const double *v
     out.template leftCols<2>() += sv * J.template leftCols<2>();
     out.col(2) += sv * (J.col(5) - s(1) * J.col(0) + s(0) * J.col(1)) + J.template leftCols<3>() * b.w.cross(CrossZ(s));
     return;
-  case BodyKind::Attached: /* the frame's v and w are columns of their own */
+  case BodyKind::Attached: /* v and w of the frame have separate columns */
     out.template rightCols<3>() -= J.template leftCols<3>() * (Cross<double>(b.w) * Cross<double>(s));
     return;
   case BodyKind::Flexible:

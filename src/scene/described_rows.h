@@ -1,6 +1,6 @@
 /*
-  Rows of a constraint where the description puts its bodies, for what is done before any numbering: assembly,
-  redundancy. Every rank has the whole description, so that these are plain computations, the same on every rank.
+  Rows of a constraint at the described poses, for assembly and the redundancy check, before unknowns are numbered.
+  Every rank has the whole description and computes the same.
   Included by store.h.
 */
 #ifndef HHTDAE_SCENE_DESCRIBED_ROWS_H
@@ -22,7 +22,7 @@ struct DescribedRows {
   Eigen::MatrixXd modal; /* by the modal coordinates of marker 0's body; empty: the rows do not depend on them */
 };
 
-/* The rows of units of their own, divided by the largest gradient at a marker: lengths, or angles where they depend on rotations alone */
+/* Divides rows with users' units by the largest gradient at a marker: they become lengths, or angles if they depend only on rotations */
 template <int R, int M> void MakeLengths(DescribedRows &rows)
 {
   for (int r = 0; r < R; r++) {
@@ -40,8 +40,8 @@ template <int R, int M> void MakeLengths(DescribedRows &rows)
   }
 }
 
-/* expressions.cpp: an input at the start. States have their initial values, variables what their definitions make of these, of time and of where the bodies
-   are (UserConstraint.StartVelocitiesByAVariable); multipliers and force states nothing yet. */
+/* expressions.cpp: value of an input at the start. States have their initial values, variables are computed from these, time and positions
+   (UserConstraint.StartVelocitiesByAVariable); multipliers and force states are zero. */
 double InitialInput(const SceneData &s, const ScalarRef &r, double t);
 
 template <class K, class D> void DescribeRows(const SceneData &s, const D &d, double t, DescribedRows &rows)

@@ -5,7 +5,7 @@
 namespace hhtdae
 {
 
-constexpr int kComponents = 6; /* of a user's force, at most */
+constexpr int max_user_components = 6; /* largest number of components of a user's force */
 
 LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expression *e, std::size_t count)
     : name_(name)
@@ -16,7 +16,7 @@ LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expres
   }
 }
 
-/* What -info tells of the step that fails for it */
+/* Reports a non-finite value, for which the step fails, under -info */
 void LocalFunction::report(const Evaluation &e, const Piece &p, const double *m, double f) const
 {
   std::ostringstream text;
@@ -64,7 +64,7 @@ void ExpressionBatch::pattern(Pattern &p)
 
 void ExpressionBatch::residual(Evaluation &e)
 {
-  double f[kComponents];
+  double f[max_user_components];
   for (const Row &r : all_) {
     const double *x = r.kind == RateOfState ? e.v : e.u;
     r.f.value(e, f);
@@ -75,7 +75,7 @@ void ExpressionBatch::residual(Evaluation &e)
 void ExpressionBatch::jacobian(Evaluation &e)
 {
   const Slot *slot = slot_.data();
-  double      f[kComponents];
+  double      f[max_user_components];
   for (const Row &r : all_) {
     const int n = r.f.size();
     r.f.gradient(e, f, G_);

@@ -1,4 +1,4 @@
-/* All instances of one force kernel on this rank, eliminated (the default) or carried as force states F - f(...) = 0, (7b). */
+/* All instances of one force kernel on this rank: forces evaluated in the equations of motion (the default), or force states F - f(...) = 0, (7b). */
 #ifndef HHTDAE_SCENE_FORCE_BATCH_H
 #define HHTDAE_SCENE_FORCE_BATCH_H
 
@@ -13,19 +13,19 @@ namespace hhtdae
 template <class K> struct ForceInstance {
   static constexpr int Z = K::inputs;
   PetscInt         marker[K::markers];
-  PetscInt         state = -1, state_group = -1; /* force states, if carried */
+  PetscInt             state = -1, state_group = -1; /* first force state and its group, if there are force states */
   Input            input[Z > 0 ? Z : 1];
   typename K::Data data;
 };
 
-/* A force with a potential says so by  static double energy(const Data &, const Frame<double> *f);  used for the balance of energy alone */
+/* A kernel with a potential has  static double energy(const Data &, const Frame<double> *f);  used only for the balance of energy */
 template <class K, class = void> struct HasEnergy : std::false_type {
 };
 template <class K>
 struct HasEnergy<K, std::void_t<decltype(K::energy(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr))>> : std::true_type {
 };
 
-/* What both ways share: blocks between the coordinates of the markers' bodies */
+/* Common part of both: blocks between the coordinates of the markers' bodies */
 template <class K> class ForceBatchBase : public Batch
 {
 protected:
@@ -74,7 +74,7 @@ public:
 protected:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
 
-  /* the owner of the first body that can move has it, as in OwnerOf() */
+  /* owned by the owner of the first movable body, as in OwnerOf() */
   bool mine(const Instance &e) const
   {
     for (int k = 0; k < M; k++) {
@@ -84,7 +84,7 @@ protected:
     return false;
   }
 
-  /* does the load reach group g of marker k's body; do the load or its components depend on it */
+  /* whether the load acts on group g of marker k's body; whether it depends on the group */
   static bool loads(BodyKind b, int g, int k)
   {
     return Reach(OfMarker(K::acts, k), b, g);
@@ -126,7 +126,7 @@ protected:
     for (int k = 0; k < M; k++) ev.bodies.load(e.marker[k], f[k], on[k].f, on[k].m);
   }
 
-  /* - d load: derivatives of the wrenches by frames (and twists, null if none) */
+  /* adds - d load, from derivatives of the wrenches by frames and twists (null if there are none) */
   static void bodyBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Wrench<double> *on, const Matrix<6 * M, 6 * M> &frames,
                          const Matrix<6 * M, 6 * M> *twists, const Slot *&slot)
   {
@@ -151,7 +151,7 @@ protected:
       }
   }
 
-  /* The same by the velocities of attachments' frames, which have columns of their own */
+  /* derivatives by the velocities of attachments' frames, which have separate columns */
   static bool byRates(const Instance &e, const Bodies &B, int l) { return K::damped && bodyOf(B, e, l).kind == BodyKind::Attached; }
   void        ratePattern(const Instance &e, Pattern &p)
   {
@@ -181,7 +181,7 @@ protected:
   }
 };
 
-/* Components eliminated: the load depends on the state */
+/* Without force states */
 template <class K> class ForceBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;
@@ -236,7 +236,7 @@ public:
   }
 };
 
-/* Components carried as force states: rows F - c(...) = 0, loads from F and the frames alone */
+/* With force states: rows F - c(...) = 0; loads depend on F and the frames only */
 template <class K> class ForceStateBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;

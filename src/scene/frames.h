@@ -1,4 +1,4 @@
-/* Marker frames, their motion and the loads on them, for numbers of any kind; rotations. */
+/* Marker frames, their motion and the loads on them, for doubles and dual numbers; rotations. */
 #ifndef HHTDAE_SCENE_FRAMES_H
 #define HHTDAE_SCENE_FRAMES_H
 
@@ -11,7 +11,7 @@
 namespace hhtdae
 {
 
-/* Of plain numbers they are Eigen's. */
+/* Vectors and matrices of doubles are Eigen's. */
 template <class T> struct Vectors {
   using Vector = DualVector<T>;
   using Matrix = DualMatrix<T>;
@@ -27,7 +27,7 @@ template <int R, int C> using Matrix = Eigen::Matrix<double, R, C>;
 /* with mixed second derivatives: x.derivatives()(a).derivatives()(b) */
 template <int N> using Dual2 = Dual<N, Dual<N>>;
 
-/* The derivatives as a row: of N directions, or n of them from the first on */
+/* The derivatives as a row: by all N directions, or by n of them from `first` on */
 template <int N> Eigen::Map<const Matrix<1, N>> DerivativeRow(const Dual<N> &x) { return Eigen::Map<const Matrix<1, N>>(x.derivatives().data()); }
 template <int n, int N> Eigen::Map<const Matrix<1, n>> DerivativeRow(const Dual<N> &x, int first)
 {
@@ -68,7 +68,7 @@ template <class T> T Taylor(double f, double f1, double f2, const T &t)
 inline double Taylor(double f, double, double, double) { return f; }
 
 /*
-  Frames of M markers as duals: directions 6k..6k+2 move marker k, 6k+3..6k+5 turn it about the space axes through its own origin,
+  Frames of M markers as dual numbers: directions 6k..6k+2 translate marker k, 6k+3..6k+5 rotate it about the space axes through its own origin,
   R -> (1 + [e]) R. In Dual2 the inner direction b perturbs first and the outer one a after it, R -> (1 + a[e_a])(1 + b[e_b]) R,
   so that second derivatives are the derivatives along b of the gradient along a, as J^T lambda needs them.
 */

@@ -1,4 +1,4 @@
-/* What this rank needs of the scene: bodies, markers, joints and forces, the pattern of its rows, the exchange with other ranks. */
+/* Lays out this rank's part of a run: bodies, markers, batches of elements, the pattern of its rows, the exchange with other ranks. */
 #include "attach.h"
 #include "extension.h"
 #include "runtime.h"
@@ -16,7 +16,7 @@ PetscMPIInt OwnerOfBody(const Runtime &R, PetscInt b) { return R.number.owner.em
 class LocalizerOf : public Localizer
 {
 public:
-  /* Read: after the layout, without blocks of the matrix */
+  /* Collect: find the bodies and unknowns of other ranks that are needed. Place: number everything. Read: after the layout, for probes, without blocks of the matrix */
   enum Pass { Collect, Place, Read };
   LocalizerOf(Runtime &r, Pass pass) : R(r), pass_(pass), collecting_(pass == Collect), marker_(r.scene.markers.size(), -1)
   {
@@ -94,7 +94,7 @@ public:
       PetscInt offset = row;
       if (p.store->isConstraint()) {
         const unsigned char active = p.store->active(p.index);
-        if (!(active >> row & 1)) return {}; /* dropped: zero */
+        if (!(active >> row & 1)) return {}; /* a dropped row: the multiplier is zero */
         offset = 0;
         for (PetscInt i = 0; i < row; i++) offset += active >> i & 1;
       }
@@ -103,10 +103,10 @@ public:
     return {};
   }
 
-  std::vector<PetscInt> other_bodies, others; /* what collecting has found */
+  std::vector<PetscInt> other_bodies, others; /* results of Collect: bodies and unknowns of other ranks */
 
 private:
-  /* a body's groups are made with the body */
+  /* modal coordinates belong to the third group of the body, which MakeBody() has added */
   Input modal(const ScalarRef &r)
   {
     if (collecting_) {
@@ -175,7 +175,7 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
   return k;
 }
 
-/* Frames of attachments with their bodies, which are here wherever a frame is */
+/* Makes a Carrier for every flexible body with attachments on this rank; the body is here if a frame is */
 void MakeCarriers(Runtime &R)
 {
   Bodies               &B = R.bodies;
@@ -204,7 +204,7 @@ void MakeCarriers(Runtime &R)
   for (Carrier &c : B.carriers) c.finish(B.modes(c.body));
 }
 
-/* Own bodies in the order of their numbers, others', the ground */
+/* Makes the local bodies: own ones in the order of their numbers, those of other ranks, the ground */
 void MakeBodies(Runtime &R, const std::vector<PetscInt> &other)
 {
   Bodies &B = R.bodies;
@@ -243,7 +243,7 @@ void SortUnique(std::vector<PetscInt> &x)
   x.erase(std::unique(x.begin(), x.end()), x.end());
 }
 
-/* Leaves are others' unknowns here; the roots that have leaves are packed */
+/* PetscSF: leaves are the other ranks' unknowns on this rank; `boundary` has the roots with leaves */
 PetscErrorCode MakeExchange(Runtime &R)
 {
   const PetscInt  n = (PetscInt)R.others.size();
@@ -270,7 +270,7 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* The bodies' blocks are asked for before all others */
+/* The bodies' own blocks are requested first, so that the first slots are theirs */
 PetscErrorCode MakePattern(Runtime &R)
 {
   PetscInt bodies = 0;
@@ -356,7 +356,7 @@ PetscErrorCode Layout(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* What reads a part of an element, made when it is first asked for; memories as they are now */
+/* A probe of a part of an element, made at the first query; with the present memories */
 Probe &ReaderOf(Runtime &R, const Part &p)
 {
   std::unique_ptr<Probe> &reader = R.readers[{p.store, p.index}];

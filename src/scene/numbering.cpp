@@ -5,7 +5,7 @@
 namespace hhtdae
 {
 
-/* The owner of its first body that can move */
+/* An element is owned by the owner of its first movable body */
 PetscMPIInt OwnerOf(const Model &M, const StoreBase &s, PetscInt e)
 {
   if (M.size == 1) return 0;
@@ -32,7 +32,7 @@ PetscInt CoordinatesOf(const SceneData &s, const BodyData &b)
 namespace
 {
 
-/* Visits everything that has unknowns, in the order of their numbers within a rank: f(owner, count, place of the number) */
+/* Visits everything that has unknowns, in the order of the numbers within a rank: f(owner, number of unknowns, reference to the first number) */
 template <class F> void Visit(Model &M, F f)
 {
   SceneData &s = M.scene;

@@ -4,7 +4,7 @@
 namespace hhtdae
 {
 
-/* Columns of each row group, sorted, then offsets of every block */
+/* Determines the sorted columns of each row group, then the slots of all requests */
 void Pattern::build(PetscInt start, PetscInt n)
 {
   struct Column {
@@ -23,7 +23,7 @@ void Pattern::build(PetscInt start, PetscInt n)
   for (const Request &r : request_)
     if (stored(r)) columns[fill[r.row]++] = {r.column, r.diagonal, 0};
 
-  /* unique columns by global number; own ones before others'; diagonal if all who asked want no more */
+  /* columns are unique and sorted by global number, own ones first; diagonal if all requests for the block are */
   const auto before = [&](const Column &a, const Column &b) {
     const Group &x = group[a.group], &y = group[b.group];
     return x.own != y.own ? x.own : x.global < y.global;

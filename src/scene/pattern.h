@@ -1,7 +1,7 @@
 /*
-  The sparsity pattern by groups of unknowns. The rows of a group (the position of a body, its angles, the rows of a joint's
-  primitive) have the same columns, so that a block of the matrix is found by one offset and one stride, and elements add to the
-  arrays of the matrix without any search.
+  The sparsity pattern by groups of unknowns. The rows of a group (the position of a body, its angles, the rows of a constraint
+  kernel's instance) have the same columns, so that a block of the matrix is given by one offset and one stride, and elements add to the
+  arrays of the matrix without searching.
 */
 #ifndef HHTDAE_SCENE_PATTERN_H
 #define HHTDAE_SCENE_PATTERN_H
@@ -14,19 +14,19 @@ namespace hhtdae
 
 struct Group {
   PetscInt global; /* number of its first unknown */
-  PetscInt local;  /* the same among the local unknowns: own, then others' */
+  PetscInt local;  /* its number among the local unknowns: own, then other ranks' */
   PetscInt size;
   bool     own;
-  PetscInt frame = -1; /* of the motion of an attachment's frame, which is no unknown: blocks go to projection.h; and its first column there */
-  int      at    = 0;
+  PetscInt frame = -1; /* local body, if the group is part of the motion of an attachment's frame; its blocks go to projection.h */
+  int      at    = 0;  /* first column in the frame's motion */
 };
 
-/* Where a block goes: entry (r, c) at base + r stride + c of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix */
+/* Position of a block: entry (r, c) is at base + r stride + c in the array of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix */
 struct Slot {
   PetscInt base   = -1; /* -1: the rows belong to another rank */
   PetscInt stride = 0;
   bool     off = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
-  bool     frame = false; /* of an attachment's frame: in the array of the projection */
+  bool     frame = false;                 /* a block of an attachment's frame, in the array of the projection */
 
   Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, frame}; }
 };
@@ -46,23 +46,23 @@ public:
     group.push_back({-1, -1, 3, false, frame, at});
     return (PetscInt)group.size() - 1;
   }
-  /* asks for a block; its slot is known after build() under the number that is returned. Group -1: nothing, its slot takes nothing */
+  /* requests a block and returns the number of its slot, which is known after build(). Group -1: no block, adding to its slot does nothing */
   PetscInt need(PetscInt row, PetscInt column, bool diagonal = false)
   {
     request_.push_back({column < 0 ? -1 : row, column, diagonal});
     return (PetscInt)request_.size() - 1;
   }
-  /* diagonal entries that no element asks for are left out: multipliers have none */
+  /* entries that no element requests are not stored, even on the diagonal: multipliers have none */
   void build(PetscInt start, PetscInt n);
   Slot slot(PetscInt number) const { return slot_[number]; }
-  /* f(number, row, column) for all blocks of attachments' frames that were asked for; and where such a block goes, after build() */
+  /* calls f(number, row, column) for all requested blocks of attachments' frames; put() sets the slot of such a block, after build() */
   template <class F> void ofFrames(F f) const
   {
     for (std::size_t q = 0; q < request_.size(); q++)
       if (toFrame(request_[q])) f((PetscInt)q, request_[q].row, request_[q].column);
   }
   void put(PetscInt number, const Slot &s) { slot_[number] = s; }
-  void release(); /* requests, slots and rows: only the groups stay */
+  void release(); /* frees everything but the groups */
 
   /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
   std::vector<PetscInt> di, dj, oi, oj;
@@ -73,7 +73,7 @@ public:
 private:
   struct Request {
     PetscInt row, column;
-    bool     diagonal; /* entries (r, r) alone, unless somebody else wants all */
+    bool     diagonal; /* only entries (r, r), unless another request needs all */
   };
   bool toFrame(const Request &r) const { return r.row >= 0 && (group[r.row].frame >= 0 || group[r.column].frame >= 0); }
   std::vector<Request> request_;

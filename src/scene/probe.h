@@ -1,7 +1,7 @@
 /*
-  A joint or force read from outside, for measures: the loads of a constraint on the bodies of its markers, the
-  components of a force that is eliminated. A probe is an instance of its own, so that any rank can read one whose
-  bodies and multipliers it has.
+  Probes read a joint or force for measures: the loads of a constraint on the bodies of its markers, the
+  components of a force without force states. A probe is a copy of the instance, so that any rank that has its bodies and multipliers
+  can evaluate it.
 */
 #ifndef HHTDAE_SCENE_PROBE_H
 #define HHTDAE_SCENE_PROBE_H
@@ -20,21 +20,21 @@ public:
   virtual int      markers() const     = 0;
   virtual PetscInt marker(int k) const = 0; /* local number */
 
-  /* of a constraint: - J^T lambda on the bodies of its markers; its multipliers */
+  /* of a constraint: the load - J^T lambda on the bodies of its markers; its multipliers */
   virtual void  reaction(const Evaluation &, Wrench<double> *) const {}
   virtual int   multipliers() const { return 0; }
   virtual Input multiplier(int) const { return {}; }
-  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 a marker) and
-     by the multipliers. The reactions of the kernels that have inputs do not depend on them. */
+  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 per marker) and
+     by the multipliers. Reactions of kernels with inputs do not depend on the inputs. */
   virtual void reactionGradient(const Evaluation &, const double *, double *, double *) const {}
 
-  /* Its rows, dropped ones too, in the state of e: values as of a description, at velocity level Psi; speed: what Psi is the difference of */
+  /* All rows, also dropped ones, in the state of e, values at velocity level being Psi; speed: sum of the magnitudes of the terms of Psi */
   virtual void rows(const Evaluation &, DescribedRows &, double *speed) const { (void)speed; }
 
   /* of a force */
   virtual void components(const Evaluation &, double *) const {}
 
-  /* of either: on the bodies of its markers */
+  /* of both: loads on the bodies of the markers */
   virtual void loads(const Evaluation &, Wrench<double> *on) const
   {
     for (int k = 0; k < markers(); k++) on[k] = {Vector3::Zero(), Vector3::Zero()};

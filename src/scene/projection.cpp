@@ -9,12 +9,12 @@ namespace
 
 using Wide = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 
-constexpr double rounding = 1e-12; /* of the largest entry: what is left of symmetry where loads have a potential */
+constexpr double asymmetry_tolerance = 1e-12; /* relative to the largest entry: smaller asymmetries are rounding of loads with a potential */
 
 Carrier       &CarrierOf(Bodies &B, PetscInt frame) { return B.carriers[B.body[frame].carrier]; }
 const Carrier &CarrierOf(const Bodies &B, PetscInt frame) { return B.carriers[B.body[frame].carrier]; }
 
-/* Columns (x, theta, v, w, a, alpha) of a frame to those of its body's position and angles, and of its motions */
+/* Transforms columns (x, theta, v, w, a, alpha) of a frame to those of its body's position and angles (`rigid`), and of the attachment's motion */
 struct ByBody {
   Wide rigid, motion, bend[2];
 
@@ -40,7 +40,7 @@ struct ByBody {
   }
 };
 
-/* Rows (force, moment) on a frame to those of its body's position and angles, and of its motions */
+/* Transforms rows (force, moment) on a frame to those of its body's position and angles, and of the attachment's motion */
 template <class In> Eigen::Matrix<double, 12, Eigen::Dynamic> ToBody(const Bodies &B, PetscInt frame, const In &Y)
 {
   const Carrier                            &c = CarrierOf(B, frame);
@@ -161,7 +161,7 @@ void Projection::finish(Evaluation &e)
     if (B.body[B.carriers[c].body].owned) deliver(e, c);
 }
 
-/* d(L^T (f, m))/dq for the loads on the frames, which are held fixed in space. What the body's angles make of the whole moment, the body adds itself. */
+/* d(L^T (f, m))/dq for loads on the frames fixed in space, without d(G^T m)/dq of the whole moment, which the body adds itself */
 void Projection::geometric(const Evaluation &e, std::size_t carrier)
 {
   const Bodies     &B    = e.bodies;
@@ -187,7 +187,7 @@ void Projection::geometric(const Evaluation &e, std::size_t carrier)
   }
 }
 
-/* rows of a group of unknowns: columns of r, angles, modes of the body */
+/* Rows of a group of unknowns, columns of a frame: adds to the columns of r, angles and modes of the body */
 void Projection::addColumns(Evaluation &e, const Pair &p)
 {
   const Carrier &c = CarrierOf(e.bodies, p.column_frame);
@@ -199,7 +199,7 @@ void Projection::addColumns(Evaluation &e, const Pair &p)
   addModalColumns(e, s[2], c, k, D.motion, D.bend);
 }
 
-/* rows of wide_: those of by_motion times the shapes of attachment k */
+/* wide_ = W times the transposed shapes of attachment k, or += with `more` */
 void Projection::byModes(const Eigen::MatrixXd &shapes, const Carrier &c, int k, const Wide &W, int m, bool more)
 {
   const auto x = shapes.middleCols<3>(c.column(k, 0)), y = shapes.middleCols<3>(c.column(k, 1));
@@ -223,7 +223,7 @@ void Projection::addModalColumns(Evaluation &e, const Slot &s, const Carrier &c,
   e.sink.add(s, wide_, (int)wide_.rows(), m);
 }
 
-/* columns of a group of unknowns: rows of r, angles, modes of the body */
+/* Rows of a frame, columns of a group of unknowns: adds to the rows of r, angles and modes of the body */
 void Projection::addRows(Evaluation &e, const Pair &p)
 {
   const Carrier &c = CarrierOf(e.bodies, p.row_frame);
@@ -237,7 +237,7 @@ void Projection::addRows(Evaluation &e, const Pair &p)
   e.sink.add(s[2], wide_.transpose(), m, n);
 }
 
-/* frames of two bodies: rows of r, angles, modes of one, columns of the other */
+/* Frames of two bodies: adds to the rows of r, angles and modes of one, columns of the other */
 void Projection::addBoth(Evaluation &e, const Pair &p)
 {
   const Bodies   &B  = e.bodies;
@@ -271,7 +271,7 @@ void Projection::addBoth(Evaluation &e, const Pair &p)
   }
 }
 
-/* frames of one body */
+/* Frames of the same body: adds to its Core */
 void Projection::collect(const Evaluation &e, const Pair &p)
 {
   const Bodies  &B    = e.bodies;
@@ -302,7 +302,8 @@ void Projection::collect(const Evaluation &e, const Pair &p)
   }
 }
 
-/* Of the matrix between the motions the symmetric part is added with the invariants, at half the work; damping and other loads without a potential leave a rest */
+/* Hands the Core of a body over to its ModalPart. The symmetric part of the matrix between modes is added together with the invariants, at half the cost; damping and other loads without a
+   potential leave an unsymmetric part */
 void Projection::deliver(Evaluation &e, std::size_t carrier)
 {
   const Carrier &c    = e.bodies.carriers[carrier];
@@ -344,7 +345,7 @@ void Projection::addUnsymmetric(const Carrier &c, const Core &core, ModalPart &p
   for (const Matrix<6, 6> &x : core.motion) largest = std::max(largest, x.cwiseAbs().maxCoeff());
   for (const auto &x : core.place) {
     const Matrix<6, 6> D = 0.5 * (core.motion[x.second] - core.motion[core.place.at({x.first.second, x.first.first})].transpose());
-    if (D.cwiseAbs().maxCoeff() <= rounding * largest) continue;
+    if (D.cwiseAbs().maxCoeff() <= asymmetry_tolerance * largest) continue;
     if (used.empty()) right_.setZero(c.shapes.rows(), c.shapes.cols());
     addTo(right_, c, x.first.first, x.first.second, D);
     for (int i = 0; i < 6; i++) used.push_back(c.column(x.first.second, i / 3) + i % 3);

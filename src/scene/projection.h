@@ -1,11 +1,11 @@
 /*
-  From the motion of attachments' frames to the coordinates of the flexible bodies that carry them. Elements add to blocks whose rows are (x, theta) of a frame,
-  as (force, moment), and whose columns are its motion (x, theta, v, w, a, alpha). With y that motion and q the body's position, angles and modes
+  Transforms matrix contributions at attachments' frames to the coordinates of their flexible bodies. Elements add to blocks whose rows are the (force, moment) on a frame
+  and whose columns are its motion (x, theta, v, w, a, alpha). With this motion y and the body's position, angles and modes q
 
     dy = D dq,    generalized force  Q = L^T (f, m),    matrix  L^T K D + d(L^T (f, m))/dq for fixed (f, m)
 
-  where D has what rates and accelerations make of a step's coordinates, and L is its part (x, theta) without that. The products with the modes are made once for
-  all elements between two frames, or between a frame and a group of unknowns; on one body they are collected for all of its frames and added with its own matrix.
+  where D contains the dependence of rates and accelerations on the coordinates (sv, sa), and L is its part (x, theta) without it. The products with the modes are computed once for
+  all elements between two frames, or between a frame and a group of unknowns; for frames of the same body they are collected and added with its own matrix.
 */
 #ifndef HHTDAE_SCENE_PROJECTION_H
 #define HHTDAE_SCENE_PROJECTION_H
@@ -19,25 +19,25 @@ namespace hhtdae
 class Projection
 {
 public:
-  /* when all elements have asked for their blocks: asks for those of the bodies */
+  /* requests the blocks of the bodies, after all elements have requested theirs */
   void pattern(Pattern &p, const Bodies &B);
   void resolve(Pattern &p);
   bool empty() const { return of_.empty() && carriers_ == 0; }
 
-  /* around what elements add; the loads on frames are complete, and the bodies' own blocks come after it */
+  /* to be called before and after the elements add to the matrix; finish() needs the complete loads on frames, and the bodies' own blocks are added after it */
   void begin(Sink &s);
   void finish(Evaluation &e);
 
 private:
   using Wide  = Eigen::Matrix<double, Eigen::Dynamic, 6>;
   using Block = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
-  struct Pair { /* a block of frames: rows of one or of a group, columns of one or of a group */
+  struct Pair { /* a block whose rows, columns or both belong to a frame, the others to a group of unknowns */
     PetscInt    row_frame = -1, column_frame = -1, row_group = -1, column_group = -1;
     PetscInt    rows = 0, columns = 0;
-    std::size_t at    = 0; /* in the array */
-    std::size_t first = 0; /* of its slots, if it has any */
+    std::size_t at    = 0; /* first entry in array_ */
+    std::size_t first = 0; /* its first slot, if it has any */
   };
-  /* what is collected for a body: of its first six coordinates, and of its motions by columns of Carrier::shapes, between these by pairs of attachments */
+  /* sum over all pairs of frames of a body: `rigid` is its first six coordinates, `motion` the motions of attachments, in the order of the columns of Carrier::shapes */
   struct Core {
     Matrix<6, 6>                               rigid;
     Eigen::MatrixXd                            rigid_motion, motion_rigid;    /* rows, columns */

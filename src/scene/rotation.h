@@ -1,12 +1,12 @@
 /*
-  How a body's attitude depends on its three rotational coordinates: dA = [G dU] A, G the matrix of 3-1-3 Euler angles (euler.h) or, by
-  default, the tangent of a local rotation vector.
+  Attitude of a body as a function of its three rotational coordinates U: dA = [G dU] A, G the matrix of 3-1-3 Euler angles (euler.h) or, by
+  default, the tangent operator of a local rotation vector.
 
-  A local rotation vector x turns the body from a reference attitude C, A = exp([x]) C, about axes of space. The reference is the attitude
-  at the last accepted state, so that x is the rotation in the present step: singular where that makes a full turn, which fails and is made
-  shorter; steps of variable length stay far below (step_limit.cpp). Velocities and accelerations that belong to it are the angular velocity w and its derivative, which do not depend on the
+  A local rotation vector x rotates the body from a reference attitude C, A = exp([x]) C, in axes of space. The reference is the attitude
+  at the last accepted state, so that x is the rotation in the present step. It is singular at a full turn, where a step fails and is repeated with a
+  smaller one; step_limit.cpp keeps steps far below. Its velocities and accelerations are the angular velocity w and its derivative, which do not depend on the
   reference: with x = 0 at the beginning of a step, Newmark's relations are those of the generalized-alpha method on the rotation group, see
-  src/integrator/coordinates/rotations.cpp. The rows of a body's moments are multiplied by G^T in both cases, as those of generalized forces.
+  src/integrator/coordinates/rotations.cpp. The moment equations of a body are multiplied by G^T in both cases, as generalized forces.
 
     exp([x]) = 1 + S1 [x] + S2 [x]^2,    G = 1 + S2 [x] + S3 [x]^2,    w = G x',    S_m(z) = sum (-z)^k/(2k+m)!,  z = |x|^2
 
